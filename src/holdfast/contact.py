@@ -1,0 +1,154 @@
+"""The words for a contact: states, reasons, causes, phases, estimates and events.
+
+Arrays of states hold codes: the place of the state in `ContactState`. Labels use the same
+codes, and an instant without a label is UNKNOWN, so that labels and decisions compare.
+"""
+
+from collections.abc import Mapping
+from enum import StrEnum
+from typing import NamedTuple
+
+import msgspec
+import numpy as np
+import numpy.typing as npt
+
+
+class ContactState(StrEnum):
+    """What is known of a contact; the code of a state is its place in this list."""
+
+    UNKNOWN = "UNKNOWN"
+    NO_CONTACT = "NO_CONTACT"
+    UNSTABLE = "UNSTABLE"
+    STABLE = "STABLE"
+
+    @property
+    def code(self) -> int:
+        """The state as a number: its place in the list of states."""
+        return _STATES.index(self)
+
+
+_STATES = tuple(ContactState)
+UNKNOWN, NO_CONTACT, UNSTABLE, STABLE = range(len(_STATES))
+"""Codes of the states, for arrays."""
+
+
+class Reason(StrEnum):
+    """Why a contact's state is UNKNOWN; the code of a reason is its place in this list."""
+
+    NONE = ""
+    TARE = "tare"
+    WARM_UP = "warm_up"
+    GAP = "gap"
+    FAULT = "fault"
+
+
+class Fault(StrEnum):
+    """What is wrong with the readings of a finger; bit i of a fault mask is place i here."""
+
+    NOT_FINITE = "not_finite"
+    STUCK = "stuck"
+    SATURATED = "saturated"
+    TARE_LOADED = "tare_loaded"
+
+
+class Cause(StrEnum):
+    """Why a contact is not stable."""
+
+    CLOSING = "closing"
+    DISTURBANCE = "disturbance"
+    SLIP = "slip"
+    LOST = "lost"
+    RELEASED = "released"
+
+
+class Phase(StrEnum):
+    """What the experiment was doing."""
+
+    FREE = "free"
+    CLOSING = "closing"
+    LOCKED = "locked"
+    DISTURBED = "disturbed"
+    SLIPPING = "slipping"
+    RELEASED = "released"
+
+
+class ContactEstimate(msgspec.Struct, frozen=True, gc=False):
+    """What a detector says of one finger at one sample.
+
+    Attributes:
+        time: of the sample [s], on the clock of the source.
+        state: UNKNOWN, NO_CONTACT, UNSTABLE or STABLE.
+        reason: why the state is UNKNOWN; empty otherwise.
+        stable_probability: that the contact is stable; NaN while UNKNOWN.
+        instability: sigma, the standard deviation of the Haar details, in the unit of the
+            readings; NaN without a full window.
+        force: F_tip = (F_x, F_y, F_z) in the fingertip frame, in the unit of the readings.
+        faults: what is wrong with the readings.
+    """
+
+    time: float
+    state: ContactState
+    reason: Reason
+    stable_probability: float
+    instability: float
+    force: tuple[float, float, float]
+    faults: tuple[Fault, ...] = ()
+
+
+class HandEstimate(msgspec.Struct, frozen=True, gc=False):
+    """What a detector says of a hand at one instant: its own state, and each finger's.
+
+    Attributes:
+        time: of the newest sample [s].
+        state: of the hand, see `hand_state`.
+        fingers: the latest estimate of every finger of the model.
+    """
+
+    time: float
+    state: ContactState
+    fingers: Mapping[str, ContactEstimate]
+
+
+class ContactEvent(NamedTuple):
+    """A change of a finger's contact state.
+
+    Attributes:
+        finger: whose contact it is; "hand" for the hand as a whole.
+        state: the state that begins.
+        previous: the state that ends.
+        time: of the sample at which it was told [s].
+    """
+
+    finger: str
+    state: ContactState
+    previous: ContactState
+    time: float
+
+
+def hand_state(codes: npt.NDArray[np.int8], n_model_fingers: int) -> int:
+    """The state of a hand, from the codes of its fingers' states.
+
+    UNSTABLE if any finger is, else UNKNOWN if any is, else STABLE if at least two fingers are
+    in contact (one, where the model has one), else NO_CONTACT.
+
+    Args:
+        codes: (n_fingers,) state codes.
+        n_model_fingers: how many fingers the model has.
+
+    Returns:
+        The code of the hand's state.
+
+    Example:
+        >>> hand_state(np.array([STABLE, STABLE, NO_CONTACT], dtype=np.int8), 3) == STABLE
+        True
+    """
+    n_stable = 0
+    n_unknown = 0
+    for code in codes:
+        if code == UNSTABLE:
+            return UNSTABLE
+        n_unknown += code == UNKNOWN
+        n_stable += code == STABLE
+    if n_unknown > 0:
+        return UNKNOWN
+    return STABLE if n_stable >= min(2, n_model_fingers) else NO_CONTACT

@@ -1,0 +1,356 @@
+"""A recording is one continuous capture of a hand: values only, no files and no clock."""
+
+import hashlib
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field, replace
+from functools import cached_property
+from types import MappingProxyType
+from typing import Any, Self
+
+import numpy as np
+import numpy.typing as npt
+
+from holdfast.contact import Cause, ContactState
+from holdfast.errors import RecordingError
+from holdfast.sensors import Sensor
+from holdfast.sensors.values import Array, Unit
+
+GAP_PERIODS = 3.0
+"""A step in time longer than this many sample periods is a gap."""
+
+
+@dataclass(frozen=True)
+class Label:
+    """A state over the interval [start, end), with what it rests on.
+
+    Attributes:
+        start: first instant [s], on the clock of the recording.
+        end: first instant after it [s].
+        state: STABLE, UNSTABLE or NO_CONTACT.
+        cause: why the contact is not stable, where that is known.
+        evidence: what the label rests on ("hand", "slip measured by marker", ...).
+        confidence: from 0 to 1.
+        author: a person, or the name of a rule.
+
+    Raises:
+        ValueError: it does not end after its start, or a field is out of range.
+    """
+
+    start: float
+    end: float
+    state: ContactState
+    cause: Cause | None = None
+    evidence: str = ""
+    confidence: float = 1.0
+    author: str = ""
+
+    def __post_init__(self) -> None:
+        if not (np.isfinite([self.start, self.end]).all() and self.start < self.end):
+            raise ValueError(f"a label ends after its start; [{self.start}, {self.end}) s given")
+        if self.state is ContactState.UNKNOWN:
+            raise ValueError("a label is STABLE, UNSTABLE or NO_CONTACT; UNKNOWN is no label")
+        if not 0 <= self.confidence <= 1:
+            raise ValueError(f"confidence from 0 to 1 expected, {self.confidence} given")
+
+
+@dataclass(frozen=True, eq=False)
+class Tactile:
+    """What one sensor reported: readings over time, and their labels.
+
+    Arrays become read-only. Readings keep the number type that they come in.
+
+    Attributes:
+        sensor: whose readings they are.
+        times: (n,) strictly increasing, on the clock of the recording [s].
+        readings: (n, n_taxels, 3) in taxel frames [unit]; NaN where a value is missing.
+        unit: `count` or `N`; that of the sensor, unless the readings are calibrated.
+        labels: intervals in order of time, without overlap, within the recording.
+
+    Raises:
+        RecordingError: shapes, times or labels contradict each other.
+    """
+
+    sensor: Sensor
+    times: Array
+    readings: npt.NDArray[Any]
+    unit: Unit | None = None
+    labels: tuple[Label, ...] = ()
+
+    def __post_init__(self) -> None:
+        times = _read_only(np.asarray(self.times, dtype=np.float64))
+        readings = _read_only(np.asarray(self.readings))
+        _check_samples(times, readings, self.sensor)
+        labels = tuple(sorted(self.labels, key=lambda label: label.start))
+        object.__setattr__(self, "times", times)
+        object.__setattr__(self, "readings", readings)
+        object.__setattr__(self, "unit", self.unit or self.sensor.unit)
+        object.__setattr__(self, "labels", labels)
+        if labels:
+            _check_labels(labels, float(times[0]), float(times[-1]) + 1.5 * self.period)
+
+    @property
+    def n_samples(self) -> int:
+        """How many samples it has."""
+        return len(self.times)
+
+    @cached_property
+    def period(self) -> float:
+        """The median step in time [s]; that of the sensor where there is no step."""
+        return (
+            float(np.median(np.diff(self.times))) if len(self.times) > 1 else 1 / self.sensor.rate
+        )
+
+    @property
+    def rate(self) -> float:
+        """Samples per second, by the median step in time [Hz]."""
+        return 1 / self.period
+
+    @property
+    def n_gaps(self) -> int:
+        """How many steps in time are longer than three periods."""
+        return int((np.diff(self.times) > GAP_PERIODS * self.period).sum())
+
+    @property
+    def n_repeats(self) -> int:
+        """How many samples repeat the readings of the sample before."""
+        same = (self.readings[1:] == self.readings[:-1]).all(axis=(1, 2))
+        return int(same.sum())
+
+    @property
+    def label_states(self) -> npt.NDArray[np.int8]:
+        """(n,) code of the label's state at each sample; UNKNOWN where there is none."""
+        return label_states(self.labels, self.times)
+
+    def slice(self, start: int, stop: int) -> Self:
+        """The samples from `start` up to `stop`, with the labels cut to them."""
+        times = self.times[start:stop]
+        labels: tuple[Label, ...] = ()
+        if len(times):
+            first, last = float(times[0]), float(times[-1]) + self.period
+            labels = tuple(
+                replace(label, start=max(label.start, first), end=min(label.end, last))
+                for label in self.labels
+                if label.start < last and label.end > first
+            )
+        return replace(self, times=times, readings=self.readings[start:stop], labels=labels)
+
+
+@dataclass(frozen=True, eq=False)
+class Truth:
+    """What is known for certain about a recording, on the clock of its modules.
+
+    Attributes:
+        times: (n,) [s].
+        hand: arrays of first axis n: `phase`, `outside_force` (n, 3) [N] world, `object_pose`
+            (n, 7) position [m] and quaternion w x y z in the world, `joints` (n, n_joints)
+            [rad], and what else a source knows.
+        fingers: per finger, the same: `contact_force` (n, 3) on the object [N] world,
+            `slip_speed` (n,) [m/s], `slipping_share` (n,), `tip_pose` (n, 7).
+
+    Raises:
+        RecordingError: an array has another first axis than the times.
+    """
+
+    times: Array
+    hand: Mapping[str, npt.NDArray[Any]] = field(default_factory=dict)
+    fingers: Mapping[str, Mapping[str, npt.NDArray[Any]]] = field(default_factory=dict)
+
+    def __post_init__(self) -> None:
+        n = len(self.times)
+        fingers = {finger: _locked_arrays(arrays, n) for finger, arrays in self.fingers.items()}
+        object.__setattr__(self, "times", _read_only(np.asarray(self.times, dtype=np.float64)))
+        object.__setattr__(self, "hand", _locked_arrays(self.hand, n))
+        object.__setattr__(self, "fingers", MappingProxyType(fingers))
+
+
+@dataclass(frozen=True, eq=False)
+class Recording:
+    """One continuous capture of a hand.
+
+    Attributes:
+        name: what it is called; its file's name without the suffix.
+        modules: the readings of each sensor. Fingertips are `thumb`, `index`, `middle`,
+            `ring`; pads `index/1`, the palm `palm/1`; who knows no names calls them
+            `finger1`, `finger2`, ... in the order of the device.
+        metadata: `object`, `object_mass` [kg], `case`, `repeat`, `profile`, `seed`, `hand`,
+            `source` and what else is known; plain JSON values.
+        truth: what is known for certain, or None.
+        markers: (time [s], text) that somebody set while recording.
+        media: (path of a video, offset [s] of its start on the clock of the recording).
+        complete: False where the end of the file was cut off and the rest recovered.
+
+    Raises:
+        RecordingError: it has no module, or no module has a sample.
+    """
+
+    name: str
+    modules: Mapping[str, Tactile]
+    metadata: Mapping[str, Any] = field(default_factory=dict)
+    truth: Truth | None = None
+    markers: tuple[tuple[float, str], ...] = ()
+    media: tuple[tuple[str, float], ...] = ()
+    complete: bool = True
+
+    def __post_init__(self) -> None:
+        if not any(module.n_samples for module in self.modules.values()):
+            raise RecordingError(f"recording {self.name!r} has no samples; at least one expected")
+        object.__setattr__(self, "modules", MappingProxyType(dict(self.modules)))
+        object.__setattr__(self, "metadata", MappingProxyType(dict(self.metadata)))
+        object.__setattr__(self, "markers", tuple((float(t), str(x)) for t, x in self.markers))
+        object.__setattr__(self, "media", tuple((str(p), float(t)) for p, t in self.media))
+
+    @property
+    def start(self) -> float:
+        """Time of the first sample of any module [s]."""
+        return min(float(m.times[0]) for m in self.modules.values() if m.n_samples)
+
+    @property
+    def end(self) -> float:
+        """Time of the last sample of any module [s]."""
+        return max(float(m.times[-1]) for m in self.modules.values() if m.n_samples)
+
+    @property
+    def duration(self) -> float:
+        """From the first sample to the last [s]."""
+        return self.end - self.start
+
+    @cached_property
+    def digest(self) -> str:
+        """A hash of the samples: their times, readings and sensors, whatever the file format.
+
+        Names, labels and metadata are no part of it: relabelling keeps a recording's identity.
+        """
+        state = hashlib.blake2b(digest_size=16)
+        for name in sorted(self.modules):
+            module = self.modules[name]
+            readings = np.ascontiguousarray(module.readings)
+            head = (name, module.sensor.name, module.unit, readings.dtype.str, readings.shape)
+            state.update(repr(head).encode())
+            state.update(np.ascontiguousarray(module.times))
+            state.update(readings)
+        return state.hexdigest()
+
+    def with_labels(self, labels: Mapping[str, Sequence[Label]]) -> Self:
+        """The same recording with these labels in place of its own.
+
+        Raises:
+            RecordingError: labels for a module that it does not have, or out of its time.
+        """
+        if unknown := sorted(set(labels) - set(self.modules)):
+            raise RecordingError(
+                f"labels for {', '.join(unknown)} given; recording {self.name!r} "
+                f"has {', '.join(self.modules)}"
+            )
+        modules = {
+            name: replace(module, labels=tuple(labels.get(name, ())))
+            for name, module in self.modules.items()
+        }
+        return replace(self, modules=modules)
+
+
+def label_states(labels: Sequence[Label], times: Array) -> npt.NDArray[np.int8]:
+    """The code of the label's state at each time; UNKNOWN where there is none.
+
+    Args:
+        labels: in order of time, without overlap.
+        times: (n,) [s].
+
+    Returns:
+        (n,) codes as in `holdfast.contact`.
+    """
+    codes = np.zeros(len(times), dtype=np.int8)
+    for label in labels:
+        first, last = np.searchsorted(times, (label.start, label.end))
+        codes[first:last] = label.state.code
+    return codes
+
+
+def labels_from_samples(
+    times: Array,
+    states: Sequence[tuple[ContactState, Cause | None] | None],
+    *,
+    period: float,
+    evidence: str = "",
+    author: str = "",
+) -> tuple[Label, ...]:
+    """Intervals of equal state out of one state (or None) a sample.
+
+    Args:
+        times: (n,) [s].
+        states: n pairs of state and cause; None where there is no label.
+        period: how long the last sample lasts [s].
+        evidence: for every label.
+        author: for every label.
+    """
+    labels: list[Label] = []
+    ends = [*times[1:].tolist(), float(times[-1]) + period] if len(times) else []
+    first = 0
+    for k, state in enumerate(states):
+        if k + 1 < len(states) and states[k + 1] == state:
+            continue
+        if state is not None:
+            span = (float(times[first]), float(ends[k]))
+            labels.append(Label(*span, *state, evidence=evidence, author=author))
+        first = k + 1
+    return tuple(labels)
+
+
+def _check_samples(times: Array, readings: npt.NDArray[Any], sensor: Sensor) -> None:
+    if times.ndim != 1:
+        raise RecordingError(f"times of shape (n,) expected, {times.shape} given")
+    if readings.ndim != 3 or readings.shape[2] != 3:
+        raise RecordingError(
+            f"readings of shape (n, {sensor.n_taxels}, 3) expected for {sensor.name}, "
+            f"{readings.shape} given"
+        )
+    if readings.shape[1] != sensor.n_taxels:
+        raise RecordingError(
+            f"{readings.shape[1]} taxels given, {sensor.n_taxels} expected ({sensor.name})"
+        )
+    if len(readings) != len(times):
+        raise RecordingError(f"{len(readings)} samples given with {len(times)} times")
+    if not (
+        np.issubdtype(readings.dtype, np.integer) or np.issubdtype(readings.dtype, np.floating)
+    ):
+        raise RecordingError(f"readings are numbers; {readings.dtype} given")
+    if not np.isfinite(times).all():
+        raise RecordingError("a time is not finite; seconds expected")
+    steps = np.diff(times)
+    if (steps <= 0).any():
+        k = int(np.flatnonzero(steps <= 0)[0])
+        what = "stand still" if steps[k] == 0 else "go back"
+        raise RecordingError(
+            f"times {what} at sample {k + 1}: {times[k + 1]:g} s after {times[k]:g} s; "
+            "strictly increasing times expected"
+        )
+
+
+def _check_labels(labels: tuple[Label, ...], start: float, end: float) -> None:
+    tolerance = 1e-6
+    for label in labels:
+        if label.start < start - tolerance or label.end > end + tolerance:
+            raise RecordingError(
+                f"label [{label.start:g}, {label.end:g}) s lies outside the recording, "
+                f"which runs from {start:g} to {end:g} s"
+            )
+    for one, two in zip(labels, labels[1:], strict=False):
+        if two.start < one.end - tolerance:
+            raise RecordingError(
+                f"labels overlap: [{one.start:g}, {one.end:g}) and [{two.start:g}, {two.end:g}) s"
+            )
+
+
+def _read_only(array: npt.NDArray[Any]) -> npt.NDArray[Any]:
+    view = array.view()
+    view.flags.writeable = False
+    return view
+
+
+def _locked_arrays(
+    arrays: Mapping[str, npt.NDArray[Any]], n: int
+) -> Mapping[str, npt.NDArray[Any]]:
+    locked = {name: _read_only(np.asarray(array)) for name, array in arrays.items()}
+    for name, array in locked.items():
+        if len(array) != n:
+            raise RecordingError(f"truth {name!r} has {len(array)} rows for {n} times")
+    return MappingProxyType(locked)

@@ -1,0 +1,259 @@
+"""A sensor is its taxels' poses; a hand is its sensors and their places in a flat packet."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from types import MappingProxyType
+from typing import Any, Literal, Self
+
+import msgspec
+import numpy as np
+import numpy.typing as npt
+
+Array = npt.NDArray[np.float64]
+Unit = Literal["count", "N"]
+
+ROTATION_TOLERANCE = 1e-5
+"""How far a rotation may be from SO(3) as read: tables are rounded to six digits."""
+
+
+@dataclass(frozen=True, eq=False)
+class Sensor:
+    """A tactile sensor: the pose of each of its taxels in the fingertip frame.
+
+    Rotations are checked to be in SO(3) to 1e-5 as given and made exact from there.
+
+    Attributes:
+        name: what it is called.
+        positions: (n_taxels, 3) of the taxels in the fingertip frame [m].
+        rotations: (n_taxels, 3, 3) R_i, from taxel frame to fingertip frame; a taxel's z is
+            its outward normal, positive when pressed.
+        normal: (3,) unit vector of the sensor's normal in the fingertip frame.
+        rate: nominal samples per second [Hz].
+        unit: of raw readings, `count` or `N`.
+        limits: smallest and largest reading that the device can send, where that is known.
+
+    Raises:
+        ValueError: a shape is wrong, a number is not finite, or a rotation is none.
+    """
+
+    name: str
+    positions: Array
+    rotations: Array
+    normal: Array
+    rate: float
+    unit: Unit = "count"
+    limits: tuple[float, float] | None = None
+
+    def __post_init__(self) -> None:
+        if not self.name:
+            raise ValueError("a sensor needs a name, '' given")
+        positions = _array(self.positions, f"positions of {self.name}", (None, 3))
+        n_taxels = len(positions)
+        rotations = _array(self.rotations, f"rotations of {self.name}", (n_taxels, 3, 3))
+        normal = _array(self.normal, f"normal of {self.name}", (3,))
+        length = float(np.linalg.norm(normal))
+        if n_taxels == 0 or length == 0:
+            raise ValueError(f"{self.name}: at least one taxel and a normal that is not zero")
+        if not (np.isfinite(self.rate) and self.rate > 0):
+            raise ValueError(f"{self.name}: a rate above 0 Hz expected, {self.rate} given")
+        if self.unit not in ("count", "N"):
+            raise ValueError(f"{self.name}: unit 'count' or 'N' expected, {self.unit!r} given")
+        object.__setattr__(self, "positions", _locked(positions))
+        object.__setattr__(self, "rotations", _locked(_exact_rotations(rotations, self.name)))
+        object.__setattr__(self, "normal", _locked(normal / length))
+
+    @property
+    def n_taxels(self) -> int:
+        """How many taxels it has."""
+        return len(self.positions)
+
+    def __eq__(self, other: object) -> bool:
+        return isinstance(other, Sensor) and self.to_dict() == other.to_dict()
+
+    def __hash__(self) -> int:
+        return hash((self.name, self.n_taxels, self.positions.tobytes()))
+
+    def to_dict(self) -> dict[str, Any]:
+        """The sensor as plain data, as `from_json` reads it."""
+        return {
+            "name": self.name,
+            "positions": self.positions.tolist(),
+            "rotations": self.rotations.tolist(),
+            "normal": self.normal.tolist(),
+            "rate": self.rate,
+            "unit": self.unit,
+            "limits": None if self.limits is None else list(self.limits),
+        }
+
+    @classmethod
+    def from_dict(cls, data: Mapping[str, Any]) -> Self:
+        """The sensor that `to_dict` wrote down.
+
+        Raises:
+            ValueError: a field is missing, unknown, or not what `Sensor` accepts.
+        """
+        known = {"name", "positions", "rotations", "normal", "rate", "unit", "limits"}
+        needed = known - {"unit", "limits"}
+        if unknown := sorted(set(data) - known):
+            raise ValueError(f"unknown fields {unknown} in a sensor; it has {sorted(known)}")
+        if missing := sorted(needed - set(data)):
+            raise ValueError(f"fields {missing} are missing in a sensor; it needs {sorted(needed)}")
+        limits = data.get("limits")
+        return cls(
+            name=str(data["name"]),
+            positions=data["positions"],
+            rotations=data["rotations"],
+            normal=data["normal"],
+            rate=float(data["rate"]),
+            unit=data.get("unit", "count"),
+            limits=None if limits is None else (float(limits[0]), float(limits[1])),
+        )
+
+    @classmethod
+    def from_json(cls, path: str | Path) -> Self:
+        """The sensor in a JSON file with the fields of `Sensor`.
+
+        Raises:
+            ValueError: the file is no JSON object, or not what `Sensor` accepts.
+            OSError: it cannot be read.
+        """
+        try:
+            data = msgspec.json.decode(Path(path).read_bytes(), type=dict[str, Any])
+        except msgspec.DecodeError as cause:
+            raise ValueError(f"{path} is no JSON object of a sensor: {cause}") from cause
+        try:
+            return cls.from_dict(data)
+        except (TypeError, ValueError, IndexError) as cause:
+            raise ValueError(f"{path}: {cause}") from cause
+
+    @classmethod
+    def from_urdf(
+        cls,
+        path: str | Path,
+        base: str,
+        *,
+        match: str = "taxel",
+        rate: float = 150.0,
+        normal: npt.ArrayLike = (0.0, 0.0, 1.0),
+    ) -> Self:
+        """The sensor whose taxels are the joints of a URDF file whose names hold `match`.
+
+        Args:
+            path: an expanded URDF file (xacro must have been run).
+            base: the link whose frame is the fingertip frame.
+            match: text that the names of taxel joints have in common.
+            rate: nominal samples per second [Hz].
+            normal: of the sensor, in the frame of `base`.
+
+        Raises:
+            ValueError: no such link, no such joint below it, or no URDF.
+            OSError: the file cannot be read.
+        """
+        from holdfast.sensors.urdf import taxel_poses
+
+        positions, rotations = taxel_poses(Path(path), base, match)
+        name = Path(path).stem
+        return cls(name, positions, rotations, np.asarray(normal, dtype=float), rate)
+
+
+@dataclass(frozen=True, eq=False)
+class HandModule:
+    """One sensor of a hand: which taxels of the flat packet are its own, and where they sit.
+
+    Attributes:
+        sensor: what it is.
+        flat_indices: (n_taxels,) place of taxel 1, 2, ... in the flat packet of the hand.
+        link: of the hand, that carries it.
+        positions: (n_taxels, 3) in the frame of that link [m].
+        rotations: (n_taxels, 3, 3) from taxel frame to the frame of that link.
+    """
+
+    sensor: Sensor
+    flat_indices: npt.NDArray[np.int64]
+    link: str
+    positions: Array
+    rotations: Array
+
+
+@dataclass(frozen=True, eq=False)
+class Hand:
+    """A hand covered with sensors that report in one flat packet.
+
+    Attributes:
+        name: what it is called.
+        modules: its sensors by name; fingertips are `thumb`, `index`, `middle`, `ring`.
+
+    Raises:
+        ValueError: the modules' flat indices are not 0, 1, ..., n_taxels - 1, each once.
+    """
+
+    name: str
+    modules: Mapping[str, HandModule]
+
+    def __post_init__(self) -> None:
+        flat = np.sort(np.concatenate([m.flat_indices for m in self.modules.values()]))
+        if not np.array_equal(flat, np.arange(len(flat))):
+            raise ValueError(f"{self.name}: every flat index belongs to one module, once")
+        object.__setattr__(self, "modules", MappingProxyType(dict(self.modules)))
+
+    @property
+    def n_taxels(self) -> int:
+        """How many taxels all its modules have."""
+        return sum(module.sensor.n_taxels for module in self.modules.values())
+
+    def split(self, flat: npt.ArrayLike) -> dict[str, npt.NDArray[Any]]:
+        """The readings of each module out of flat packets.
+
+        Args:
+            flat: (..., n_taxels, 3) in the order of the packet.
+
+        Returns:
+            (..., n_taxels of the module, 3) by module.
+
+        Raises:
+            ValueError: another number of taxels or axes.
+        """
+        readings = np.asarray(flat)
+        if readings.shape[-2:] != (self.n_taxels, 3):
+            raise ValueError(
+                f"({self.n_taxels}, 3) taxels and axes expected for {self.name}, "
+                f"{readings.shape[-2:]} given"
+            )
+        return {name: readings[..., m.flat_indices, :] for name, m in self.modules.items()}
+
+
+def _array(given: npt.ArrayLike, what: str, shape: tuple[int | None, ...]) -> Array:
+    try:
+        array = np.array(given, dtype=np.float64)
+    except (TypeError, ValueError) as cause:
+        raise ValueError(f"{what}: numbers in a regular array expected") from cause
+    matches = array.ndim == len(shape) and all(
+        want in (None, got) for want, got in zip(shape, array.shape, strict=True)
+    )
+    if not matches:
+        wanted = tuple("n" if size is None else size for size in shape)
+        raise ValueError(f"{what}: shape {wanted} expected, {array.shape} given")
+    if not np.isfinite(array).all():
+        raise ValueError(f"{what}: finite numbers expected, NaN or infinity given")
+    return array
+
+
+def _exact_rotations(rotations: Array, name: str) -> Array:
+    """The nearest members of SO(3), by polar decomposition."""
+    left, _, right = np.linalg.svd(rotations)
+    exact: Array = left @ right
+    error = np.abs(exact - rotations).max(axis=(1, 2))
+    worst = int(error.argmax())
+    if error[worst] > ROTATION_TOLERANCE or np.linalg.det(exact).min() < 0:
+        worst = int(np.linalg.det(exact).argmin()) if error[worst] <= ROTATION_TOLERANCE else worst
+        raise ValueError(
+            f"{name}: the rotation of taxel {worst + 1} is {error[worst]:.1e} away from a proper "
+            f"rotation; at most {ROTATION_TOLERANCE:.0e} expected"
+        )
+    return exact
+
+
+def _locked(array: Array) -> Array:
+    array.flags.writeable = False
+    return array
