@@ -4,6 +4,7 @@ import hashlib
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
+from itertools import pairwise
 from types import MappingProxyType
 from typing import Any, Self
 
@@ -226,8 +227,8 @@ class Recording:
             readings = np.ascontiguousarray(module.readings)
             head = (name, module.sensor.name, module.unit, readings.dtype.str, readings.shape)
             state.update(repr(head).encode())
-            state.update(np.ascontiguousarray(module.times))
-            state.update(readings)
+            state.update(np.ascontiguousarray(module.times).data)
+            state.update(readings.data)
         return state.hexdigest()
 
     def with_labels(self, labels: Mapping[str, Sequence[Label]]) -> Self:
@@ -333,7 +334,7 @@ def _check_labels(labels: tuple[Label, ...], start: float, end: float) -> None:
                 f"label [{label.start:g}, {label.end:g}) s lies outside the recording, "
                 f"which runs from {start:g} to {end:g} s"
             )
-    for one, two in zip(labels, labels[1:], strict=False):
+    for one, two in pairwise(labels):
         if two.start < one.end - tolerance:
             raise RecordingError(
                 f"labels overlap: [{one.start:g}, {one.end:g}) and [{two.start:g}, {two.end:g}) s"
