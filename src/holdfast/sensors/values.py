@@ -16,6 +16,9 @@ Unit = Literal["count", "N"]
 ROTATION_TOLERANCE = 1e-5
 """How far a rotation may be from SO(3) as read: tables are rounded to six digits."""
 
+ROUNDING = 1e-14
+"""A rotation nearer to SO(3) than this is exact already: written and read, it stays the same."""
+
 
 @dataclass(frozen=True, eq=False)
 class Sensor:
@@ -167,6 +170,7 @@ class HandModule:
         link: of the hand, that carries it.
         positions: (n_taxels, 3) in the frame of that link [m].
         rotations: (n_taxels, 3, 3) from taxel frame to the frame of that link.
+        grid: (n_taxels, 2) row and column of each taxel on a flat map of the hand.
     """
 
     sensor: Sensor
@@ -174,6 +178,7 @@ class HandModule:
     link: str
     positions: Array
     rotations: Array
+    grid: npt.NDArray[np.int64]
 
 
 @dataclass(frozen=True, eq=False)
@@ -251,7 +256,7 @@ def _exact_rotations(rotations: Array, name: str) -> Array:
             f"{name}: the rotation of taxel {worst + 1} is {error[worst]:.1e} away from a proper "
             f"rotation; at most {ROTATION_TOLERANCE:.0e} expected"
         )
-    return exact
+    return rotations if error[worst] < ROUNDING else exact
 
 
 def _locked(array: Array) -> Array:
