@@ -1,0 +1,80 @@
+"""Contact stability of robot fingertips, from 3-axis tactile sensors, at every sample.
+
+The names below are the public interface; each is imported when it is first used, so that
+`import holdfast` costs next to nothing.
+
+Example:
+    >>> import holdfast
+    >>> holdfast.Hand.__name__
+    'Hand'
+"""
+
+from importlib import import_module
+from typing import TYPE_CHECKING, Any
+
+if TYPE_CHECKING:
+    from holdfast.contact import ContactEstimate as ContactEstimate
+    from holdfast.contact import ContactState as ContactState
+    from holdfast.contact import HandEstimate as HandEstimate
+    from holdfast.errors import HoldfastError as HoldfastError
+    from holdfast.errors import MissingExtra as MissingExtra
+    from holdfast.errors import ModelError as ModelError
+    from holdfast.errors import OutputError as OutputError
+    from holdfast.errors import RecordingError as RecordingError
+    from holdfast.errors import StreamError as StreamError
+    from holdfast.errors import TrainingError as TrainingError
+    from holdfast.recordings import Label as Label
+    from holdfast.recordings import Recording as Recording
+    from holdfast.recordings import Tactile as Tactile
+    from holdfast.recordings import Truth as Truth
+    from holdfast.sensors import Hand as Hand
+    from holdfast.sensors import Sensor as Sensor
+
+_HOMES = {
+    "FEATURE_NAMES": "features",
+    "fingertip_force": "features",
+    "haar_features": "features",
+    "Hand": "sensors",
+    "Sensor": "sensors",
+    "Label": "recordings",
+    "Recording": "recordings",
+    "Tactile": "recordings",
+    "Truth": "recordings",
+    "load_dataset": "io",
+    "load_recording": "io",
+    "save_recording": "io",
+    "Model": "model",
+    "Detector": "detector",
+    "detect": "detector",
+    "ContactEstimate": "contact",
+    "ContactState": "contact",
+    "HandEstimate": "contact",
+    "StabilityClassifier": "training",
+    "event_metrics": "metrics",
+    "sample_metrics": "metrics",
+    "HoldfastError": "errors",
+    "MissingExtra": "errors",
+    "ModelError": "errors",
+    "OutputError": "errors",
+    "RecordingError": "errors",
+    "StreamError": "errors",
+    "TrainingError": "errors",
+}
+"""Where each public name lives."""
+
+__all__ = sorted([*_HOMES, "__version__"])  # noqa: PLE0605 (one list of names, above)
+
+
+def __getattr__(name: str) -> Any:  # noqa: ANN401 (the value is any of the public names)
+    if name == "__version__":
+        value: Any = import_module("importlib.metadata").version("holdfast")
+    elif name in _HOMES:
+        value = getattr(import_module(f"holdfast.{_HOMES[name]}"), name)
+    else:
+        raise AttributeError(f"module 'holdfast' has no attribute {name!r}")
+    globals()[name] = value
+    return value
+
+
+def __dir__() -> list[str]:
+    return sorted({*globals(), *__all__})

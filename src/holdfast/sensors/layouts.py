@@ -144,6 +144,7 @@ def _hand_module(rows: list[dict[str, str]]) -> HandModule:
         link=rows[0]["link"],
         positions=positions,
         rotations=rotations,
+        grid=np.array([(int(row["row"]), int(row["column"])) for row in rows]),
     )
 
 

@@ -1,0 +1,199 @@
+"""`holdfast sensors`: which sensors and hands are known, and what they look like."""
+
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any
+
+import typer
+
+from holdfast.cli.console import print_json, print_table, say, show
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+    from holdfast.sensors import Hand, Sensor
+
+PLOT_SUFFIXES = (".pdf", ".png", ".svg")
+
+
+def sensors(
+    name: Annotated[
+        str | None,
+        typer.Argument(help="A built-in sensor or hand, a .json sensor file, or a .urdf file."),
+    ] = None,
+    base: Annotated[
+        str | None, typer.Option(help="The link of the .urdf file that is the fingertip frame.")
+    ] = None,
+    plot: Annotated[
+        Path | None, typer.Option(help="Draw its taxels to this .svg, .png or .pdf file.")
+    ] = None,
+    force: Annotated[bool, typer.Option("--force", help="Overwrite the plot.")] = False,
+    as_json: Annotated[bool, typer.Option("--json", help="Print JSON on stdout.")] = False,
+) -> None:
+    """Shows the sensors and hands that are known.
+
+    Without a name it lists them; with one it shows that sensor or hand: its taxels, unit, rate,
+    limits and normal, or the modules of a hand and their places in the flat packet.
+
+    Example:
+      holdfast sensors
+      holdfast sensors allegro-uskin --plot hand.svg
+      holdfast sensors fingertip.urdf --base tip_link --json
+    """
+    if name is None:
+        _refuse(plot, base)
+        _show_all(as_json)
+        return
+    found = _find(name, base)
+    if plot is not None:
+        _draw(found, plot, force)
+    _show_one(found, as_json)
+
+
+def _refuse(plot: Path | None, base: str | None) -> None:
+    if plot is not None or base is not None:
+        raise ValueError("--plot and --base need the name of a sensor; holdfast sensors lists them")
+
+
+def _find(name: str, base: str | None) -> "Sensor | Hand":
+    from holdfast import sensors as known
+
+    suffix = Path(name).suffix.lower()
+    if suffix == ".urdf":
+        if base is None:
+            raise ValueError(f"{name} needs --base LINK: the link that is the fingertip frame")
+        return known.Sensor.from_urdf(name, base)
+    if base is not None:
+        raise ValueError(f"--base belongs to a .urdf file; {name!r} given")
+    if suffix == ".json":
+        return known.Sensor.from_json(name)
+    if name in known.built_in_hands():
+        return known.hand(name)
+    if name in known.built_in_sensors():
+        return known.sensor(name)
+    raise ValueError(
+        f"unknown sensor or hand {name!r}; built in are "
+        f"{', '.join(known.built_in_sensors() + known.built_in_hands())}; "
+        "or give a .json or .urdf file"
+    )
+
+
+def _show_all(as_json: bool) -> None:
+    from holdfast import sensors as known
+
+    all_sensors = [known.sensor(name) for name in known.built_in_sensors()]
+    all_hands = [known.hand(name) for name in known.built_in_hands()]
+    if as_json:
+        print_json(
+            {
+                "sensors": [_sensor_summary(sensor) for sensor in all_sensors],
+                "hands": [_hand_summary(hand) for hand in all_hands],
+            }
+        )
+        return
+    rows = [(s.name, s.n_taxels, s.unit, f"{s.rate:g} Hz") for s in all_sensors]
+    print_table(("sensor", "taxels", "unit", "rate"), rows)
+    show()
+    print_table(
+        ("hand", "taxels", "modules"), [(h.name, h.n_taxels, len(h.modules)) for h in all_hands]
+    )
+
+
+def _show_one(found: "Sensor | Hand", as_json: bool) -> None:
+    from holdfast.sensors import Sensor
+
+    if isinstance(found, Sensor):
+        if as_json:
+            print_json(found.to_dict() | {"n_taxels": found.n_taxels})
+        else:
+            _print_sensor(found)
+    elif as_json:
+        print_json(_hand_summary(found))
+    else:
+        _print_hand(found)
+
+
+def _sensor_summary(sensor: "Sensor") -> dict[str, Any]:
+    return {
+        "name": sensor.name,
+        "n_taxels": sensor.n_taxels,
+        "unit": sensor.unit,
+        "rate": sensor.rate,
+        "limits": sensor.limits,
+        "normal": sensor.normal,
+    }
+
+
+def _hand_summary(hand: "Hand") -> dict[str, Any]:
+    modules = {
+        name: {
+            "sensor": module.sensor.name,
+            "n_taxels": module.sensor.n_taxels,
+            "link": module.link,
+            "flat_indices": module.flat_indices,
+        }
+        for name, module in hand.modules.items()
+    }
+    return {"name": hand.name, "n_taxels": hand.n_taxels, "modules": modules}
+
+
+def _print_sensor(sensor: "Sensor") -> None:
+    limits = "unknown" if sensor.limits is None else "{:g} to {:g}".format(*sensor.limits)
+    normal = ", ".join(f"{value:.3g}" for value in sensor.normal)
+    print_table(
+        ("sensor", sensor.name),
+        [
+            ("taxels", sensor.n_taxels),
+            ("unit", sensor.unit),
+            ("rate", f"{sensor.rate:g} Hz"),
+            ("limits", limits),
+            ("normal", f"({normal}) in the fingertip frame"),
+        ],
+    )
+    show()
+    rows = [
+        (k + 1, *(f"{1e3 * p:.1f}" for p in position), *(f"{z:.2f}" for z in rotation[:, 2]))
+        for k, (position, rotation) in enumerate(
+            zip(sensor.positions, sensor.rotations, strict=True)
+        )
+    ]
+    print_table(("taxel", "x [mm]", "y [mm]", "z [mm]", "n_x", "n_y", "n_z"), rows)
+
+
+def _print_hand(hand: "Hand") -> None:
+    rows = [
+        (name, m.sensor.name, m.sensor.n_taxels, m.link, _ranges(m.flat_indices.tolist()))
+        for name, m in hand.modules.items()
+    ]
+    print_table(("module", "sensor", "taxels", "link", "flat indices"), rows)
+
+
+def _ranges(indices: list[int]) -> str:
+    """Indices as ranges: "0-8, 18-26"."""
+    runs: list[list[int]] = []
+    for index in sorted(indices):
+        if runs and index == runs[-1][1] + 1:
+            runs[-1][1] = index
+        else:
+            runs.append([index, index])
+    return ", ".join(f"{a}-{b}" if a < b else f"{a}" for a, b in runs)
+
+
+def _draw(found: "Sensor | Hand", plot: Path, force: bool) -> None:
+    from holdfast.files import refuse_overwrite
+
+    if plot.suffix.lower() not in PLOT_SUFFIXES:
+        raise ValueError(f"a plot ends in {', '.join(PLOT_SUFFIXES)}; {plot.name!r} given")
+    refuse_overwrite(plot, force=force)
+    from holdfast.plots.sensors import plot_hand, plot_sensor
+    from holdfast.sensors import Sensor
+
+    figure = plot_sensor(found) if isinstance(found, Sensor) else plot_hand(found)
+    _save(figure, plot, force)
+    say(f"{plot} written")
+
+
+def _save(figure: "Figure", plot: Path, force: bool) -> None:
+    from holdfast.files import whole_file
+
+    with whole_file(plot, force=force) as part:
+        figure.savefig(part)

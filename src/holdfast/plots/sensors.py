@@ -1,0 +1,175 @@
+"""Figures of sensors and hands: where the taxels sit and where they look."""
+
+import numpy as np
+import numpy.typing as npt
+from matplotlib.axes import Axes
+from matplotlib.cm import ScalarMappable
+from matplotlib.colors import Normalize
+from matplotlib.figure import Figure
+from matplotlib.patches import FancyBboxPatch
+from mpl_toolkits.mplot3d import Axes3D  # type: ignore[import-untyped]
+
+from holdfast.sensors import Hand, HandModule, Sensor
+from holdfast.sensors.values import Array
+
+MM = 1e3
+FLAT = 1e-3
+"""Heights that differ by less than this are one height [mm]."""
+
+AXIS_COLOURS = ("#c0392b", "#2e8b57", "#2b5ea8")
+PART_COLOURS = {
+    "thumb": "#b3476b",
+    "index": "#d1813c",
+    "middle": "#4a8f5c",
+    "ring": "#3a78b0",
+    "palm": "#77788a",
+}
+
+
+def plot_sensor(sensor: Sensor) -> Figure:
+    """The taxels of a sensor: in space with their normals, and numbered, seen from outside."""
+    figure = Figure(figsize=(8.2, 4.2), dpi=160, layout="constrained")
+    unit = "counts" if sensor.unit == "count" else "newtons"
+    figure.suptitle(
+        f"{sensor.name}: {sensor.n_taxels} taxels, {sensor.rate:g} Hz, readings in {unit}",
+        fontsize=10,
+    )
+    right, up = _view(sensor.normal)
+    height = sensor.positions @ sensor.normal * MM
+    scale = _height_scale(height)
+    colours: Array = scale.to_rgba(height)
+    _draw_space(figure.add_subplot(1, 2, 1, projection="3d"), sensor, colours, up)
+    front = figure.add_subplot(1, 2, 2)
+    _draw_front(front, sensor, colours, (right, up))
+    if np.ptp(height) > FLAT:
+        bar = figure.colorbar(scale, ax=front, shrink=0.6, aspect=25)
+        bar.set_label(f"{_axis_name(sensor.normal)} [mm]", fontsize=7)
+        bar.ax.tick_params(labelsize=6)
+    return figure
+
+
+def plot_hand(hand: Hand) -> Figure:
+    """The flat map of a hand: every taxel with its flat index, coloured by finger."""
+    cells = np.concatenate([module.grid for module in hand.modules.values()])
+    n_rows, n_columns = cells.max(axis=0) + 1
+    figure = Figure(figsize=(0.3 * n_columns + 0.6, 0.3 * n_rows + 0.6), dpi=160)
+    axes = figure.add_axes((0.01, 0.01, 0.98, 0.96))
+    axes.set_title(
+        f"{hand.name}: {hand.n_taxels} taxels in {len(hand.modules)} modules, numbered by "
+        "their place in the flat packet",
+        fontsize=8,
+    )
+    for name, module in hand.modules.items():
+        _draw_module(axes, name, module)
+    axes.set_xlim(-1.1, n_columns + 0.1)
+    axes.set_ylim(n_rows + 0.1, -1.1)
+    axes.set_aspect("equal")
+    axes.axis("off")
+    return figure
+
+
+def _draw_space(axes: Axes3D, sensor: Sensor, colours: Array, up: Array) -> None:
+    places = sensor.positions * MM
+    size = float(np.ptp(places, axis=0).max()) or 10.0
+    normals = sensor.rotations[:, :, 2] * 0.16 * size
+    axes.scatter(*places.T, c=colours, s=22, depthshade=False, edgecolors="black", linewidths=0.4)
+    axes.quiver(*places.T, *normals.T, color="#444444", linewidth=0.8, arrow_length_ratio=0.3)
+    _draw_frame(axes, places, size)
+    _same_scale(axes, places, size)
+    _look_from_outside(axes, sensor.normal, up)
+
+
+def _draw_frame(axes: Axes3D, places: Array, size: float) -> None:
+    """The axes of the fingertip frame, at its origin."""
+    for axis, (name, colour) in enumerate(zip("xyz", AXIS_COLOURS, strict=True)):
+        arrow = np.zeros(3)
+        arrow[axis] = 0.3 * size
+        axes.quiver(0, 0, 0, *arrow, color=colour, linewidth=1.6, arrow_length_ratio=0.2)
+        axes.text(*(1.2 * arrow), name, color=colour, fontsize=8, ha="center", va="center")
+
+
+def _same_scale(axes: Axes3D, places: Array, size: float) -> None:
+    both = np.vstack([places, np.zeros(3), np.full(3, 0.3 * size)])
+    low, high = both.min(axis=0) - 0.08 * size, both.max(axis=0) + 0.08 * size
+    axes.set(xlim=(low[0], high[0]), ylim=(low[1], high[1]), zlim=(low[2], high[2]))
+    axes.set_box_aspect(high - low, zoom=1.25)
+    axes.set_axis_off()
+
+
+def _look_from_outside(axes: Axes3D, normal: Array, up: Array) -> None:
+    """From a little above and beside the normal."""
+    right = np.cross(up, normal)
+    eye = normal + 0.6 * right + 0.45 * up
+    elevation = np.degrees(np.arcsin(eye[2] / np.linalg.norm(eye)))
+    axes.view_init(elev=elevation, azim=np.degrees(np.arctan2(eye[1], eye[0])))
+
+
+def _draw_front(axes: Axes, sensor: Sensor, colours: Array, view: tuple[Array, Array]) -> None:
+    places = sensor.positions @ np.transpose(view) * MM
+    size = float(np.ptp(places, axis=0).max()) or 10.0
+    for axis, length, colour in ((2, 0.13, "#444444"), (0, 0.07, AXIS_COLOURS[0])):
+        arrows = sensor.rotations[:, :, axis] @ np.transpose(view) * length * size
+        axes.quiver(
+            *places.T, *arrows.T, angles="xy", scale_units="xy", scale=1, width=0.004, color=colour
+        )
+    axes.scatter(
+        places[:, 0], places[:, 1], c=colours, s=130, edgecolors="black", linewidths=0.6, zorder=2
+    )
+    for k, (x, y) in enumerate(places):
+        ink = "white" if colours[k, :3].mean() < 0.55 else "black"
+        axes.text(x, y, str(k + 1), ha="center", va="center", fontsize=6.5, color=ink)
+    _label_front(axes, view)
+
+
+def _label_front(axes: Axes, view: tuple[Array, Array]) -> None:
+    right, up = view
+    axes.set_aspect("equal")
+    axes.margins(0.16)
+    axes.set_xlabel(f"{_axis_name(right)} [mm]", fontsize=7)
+    axes.set_ylabel(f"{_axis_name(up)} [mm]", fontsize=7)
+    axes.tick_params(labelsize=6)
+    axes.set_title("seen from outside: taxel z grey, taxel x red", fontsize=8)
+    axes.spines[["top", "right"]].set_visible(False)
+
+
+def _draw_module(axes: Axes, name: str, module: HandModule) -> None:
+    colour = PART_COLOURS.get(name.split("/", maxsplit=1)[0], "#777777")
+    strength = 0.55 if "/" not in name else 0.28
+    for (row, column), index in zip(module.grid, module.flat_indices, strict=True):
+        cell = FancyBboxPatch(
+            (column + 0.1, row + 0.1), 0.8, 0.8, boxstyle="round,pad=0,rounding_size=0.2",
+            facecolor=(colour, strength), edgecolor=colour, linewidth=0.6,
+        )  # fmt: skip
+        axes.add_patch(cell)
+        axes.text(column + 0.5, row + 0.52, str(index), ha="center", va="center", fontsize=4.6)
+    _label_module(axes, name, module.grid, colour)
+
+
+def _label_module(axes: Axes, name: str, grid: npt.NDArray[np.int64], colour: str) -> None:
+    (top, left), (_, right) = grid.min(axis=0), grid.max(axis=0)
+    axes.text(
+        (left + right + 1) / 2, top - 0.12, name,
+        ha="center", va="bottom", fontsize=6.5, color=colour, fontweight="bold",
+    )  # fmt: skip
+
+
+def _view(normal: Array) -> tuple[Array, Array]:
+    """Right and up as one sees them who looks at the sensor from outside."""
+    axis = np.array([0.0, 0.0, 1.0]) if abs(normal[2]) < 0.7 else np.array([0.0, 1.0, 0.0])
+    right = np.cross(axis, normal)
+    right /= np.linalg.norm(right)
+    return right, np.cross(normal, right)
+
+
+def _height_scale(height: Array) -> ScalarMappable:
+    """Colours for heights along the normal; one colour where the sensor is flat."""
+    low, high = float(height.min()), float(height.max())
+    room = 0.1 * (high - low) if high - low > FLAT else 1.0
+    return ScalarMappable(Normalize(low - room, high + room), "viridis")
+
+
+def _axis_name(direction: Array) -> str:
+    axis = int(np.abs(direction).argmax())
+    if abs(direction[axis]) < 0.999:
+        return "({:.2f}, {:.2f}, {:.2f})".format(*direction)
+    return ("" if direction[axis] > 0 else "-") + "xyz"[axis]
