@@ -37,6 +37,8 @@ def whole_file(path: str | Path, *, force: bool = False) -> Iterator[Path]:
         part.chmod(0o666 & ~_umask())
         part.replace(target)
     except OSError as cause:
+        if cause.filename not in (None, str(part), str(target)):
+            raise  # an input that the block reads, not the output
         raise OutputError(f"cannot write {target}: {cause.strerror or cause}") from cause
     finally:
         part.unlink(missing_ok=True)

@@ -48,6 +48,8 @@ class Label:
     def __post_init__(self) -> None:
         if not (np.isfinite([self.start, self.end]).all() and self.start < self.end):
             raise ValueError(f"a label ends after its start; [{self.start}, {self.end}) s given")
+        object.__setattr__(self, "state", ContactState(self.state))
+        object.__setattr__(self, "cause", None if self.cause is None else Cause(self.cause))
         if self.state is ContactState.UNKNOWN:
             raise ValueError("a label is STABLE, UNSTABLE or NO_CONTACT; UNKNOWN is no label")
         if not 0 <= self.confidence <= 1:
@@ -87,7 +89,7 @@ class Tactile:
         object.__setattr__(self, "unit", self.unit or self.sensor.unit)
         object.__setattr__(self, "labels", labels)
         if labels:
-            _check_labels(labels, float(times[0]), float(times[-1]) + 1.5 * self.period)
+            _check_labels(labels, times, self.period)
 
     @property
     def n_samples(self) -> int:
@@ -124,16 +126,18 @@ class Tactile:
 
     def slice(self, start: int, stop: int) -> Self:
         """The samples from `start` up to `stop`, with the labels cut to them."""
-        times = self.times[start:stop]
-        labels: tuple[Label, ...] = ()
-        if len(times):
-            first, last = float(times[0]), float(times[-1]) + self.period
-            labels = tuple(
-                replace(label, start=max(label.start, first), end=min(label.end, last))
-                for label in self.labels
-                if label.start < last and label.end > first
-            )
-        return replace(self, times=times, readings=self.readings[start:stop], labels=labels)
+        part = replace(
+            self, times=self.times[start:stop], readings=self.readings[start:stop], labels=()
+        )
+        if not part.n_samples:
+            return part
+        first, last = float(part.times[0]), float(part.times[-1]) + part.period
+        labels = tuple(
+            replace(label, start=max(label.start, first), end=min(label.end, last))
+            for label in self.labels
+            if label.start < last and label.end > first
+        )
+        return replace(part, labels=labels)
 
 
 @dataclass(frozen=True, eq=False)
@@ -162,6 +166,11 @@ class Truth:
         object.__setattr__(self, "times", _read_only(np.asarray(self.times, dtype=np.float64)))
         object.__setattr__(self, "hand", _locked_arrays(self.hand, n))
         object.__setattr__(self, "fingers", MappingProxyType(fingers))
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        """Read-only mappings cannot be pickled, and recordings travel to worker processes."""
+        fingers = {finger: dict(arrays) for finger, arrays in self.fingers.items()}
+        return type(self), (self.times, dict(self.hand), fingers)
 
 
 @dataclass(frozen=True, eq=False)
@@ -199,6 +208,18 @@ class Recording:
         object.__setattr__(self, "metadata", MappingProxyType(dict(self.metadata)))
         object.__setattr__(self, "markers", tuple((float(t), str(x)) for t, x in self.markers))
         object.__setattr__(self, "media", tuple((str(p), float(t)) for p, t in self.media))
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        """Read-only mappings cannot be pickled, and recordings travel to worker processes."""
+        return type(self), (
+            self.name,
+            dict(self.modules),
+            dict(self.metadata),
+            self.truth,
+            self.markers,
+            self.media,
+            self.complete,
+        )
 
     @property
     def start(self) -> float:
@@ -282,7 +303,12 @@ def labels_from_samples(
         period: how long the last sample lasts [s].
         evidence: for every label.
         author: for every label.
+
+    Raises:
+        ValueError: another number of states than of times.
     """
+    if len(states) != len(times):
+        raise ValueError(f"{len(states)} states given for {len(times)} times")
     labels: list[Label] = []
     ends = [*times[1:].tolist(), float(times[-1]) + period] if len(times) else []
     first = 0
@@ -321,24 +347,29 @@ def _check_samples(times: Array, readings: npt.NDArray[Any], sensor: Sensor) -> 
         k = int(np.flatnonzero(steps <= 0)[0])
         what = "stand still" if steps[k] == 0 else "go back"
         raise RecordingError(
-            f"times {what} at sample {k + 1}: {times[k + 1]:g} s after {times[k]:g} s; "
+            f"times {what} at sample {k + 1}: {times[k + 1]:.15g} s after {times[k]:.15g} s; "
             "strictly increasing times expected"
         )
 
 
-def _check_labels(labels: tuple[Label, ...], start: float, end: float) -> None:
+def _check_labels(labels: tuple[Label, ...], times: Array, period: float) -> None:
+    if len(times) == 0:
+        raise RecordingError(f"{len(labels)} labels given for a module without samples")
+    start, end = float(times[0]), float(times[-1]) + 1.5 * period
     tolerance = 1e-6
     for label in labels:
         if label.start < start - tolerance or label.end > end + tolerance:
             raise RecordingError(
-                f"label [{label.start:g}, {label.end:g}) s lies outside the recording, "
-                f"which runs from {start:g} to {end:g} s"
+                f"label {_span(label)} lies outside the recording, "
+                f"which runs from {start:.15g} to {end:.15g} s"
             )
     for one, two in pairwise(labels):
         if two.start < one.end - tolerance:
-            raise RecordingError(
-                f"labels overlap: [{one.start:g}, {one.end:g}) and [{two.start:g}, {two.end:g}) s"
-            )
+            raise RecordingError(f"labels overlap: {_span(one)} and {_span(two)}")
+
+
+def _span(label: Label) -> str:
+    return f"[{label.start:.15g}, {label.end:.15g}) s"
 
 
 def _read_only(array: npt.NDArray[Any]) -> npt.NDArray[Any]:

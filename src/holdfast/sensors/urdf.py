@@ -41,8 +41,8 @@ class _Joint:
         self.name = element.get("name", "")
         self.parent = _link(element, "parent")
         self.child = _link(element, "child")
-        self.position = np.array([float(v) for v in attributes.get("xyz", "0 0 0").split()])
-        angles = [float(v) for v in attributes.get("rpy", "0 0 0").split()]
+        self.position = _three(attributes.get("xyz", "0 0 0"))
+        angles = _three(attributes.get("rpy", "0 0 0"))
         self.rotation: Array = Rotation.from_euler("xyz", angles).as_matrix()
 
 
@@ -59,6 +59,13 @@ def _joints(path: Path) -> list[_Joint]:
         raise ValueError(
             f"{path} is no URDF file (is it a xacro not yet expanded?): {cause}"
         ) from cause
+
+
+def _three(text: str) -> Array:
+    numbers = np.array([float(word) for word in text.split()])
+    if numbers.shape != (3,) or not np.isfinite(numbers).all():
+        raise ValueError(f"three finite numbers expected, {text!r} given")
+    return numbers
 
 
 def _link(joint: ET.Element, end: str) -> str:

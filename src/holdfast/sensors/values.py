@@ -62,6 +62,7 @@ class Sensor:
             raise ValueError(f"{self.name}: a rate above 0 Hz expected, {self.rate} given")
         if self.unit not in ("count", "N"):
             raise ValueError(f"{self.name}: unit 'count' or 'N' expected, {self.unit!r} given")
+        object.__setattr__(self, "limits", _checked_limits(self.limits, self.name))
         object.__setattr__(self, "positions", _locked(positions))
         object.__setattr__(self, "rotations", _locked(_exact_rotations(rotations, self.name)))
         object.__setattr__(self, "normal", _locked(normal / length))
@@ -75,7 +76,7 @@ class Sensor:
         return isinstance(other, Sensor) and self.to_dict() == other.to_dict()
 
     def __hash__(self) -> int:
-        return hash((self.name, self.n_taxels, self.positions.tobytes()))
+        return hash((self.name, self.n_taxels))
 
     def to_dict(self) -> dict[str, Any]:
         """The sensor as plain data, as `from_json` reads it."""
@@ -102,7 +103,6 @@ class Sensor:
             raise ValueError(f"unknown fields {unknown} in a sensor; it has {sorted(known)}")
         if missing := sorted(needed - set(data)):
             raise ValueError(f"fields {missing} are missing in a sensor; it needs {sorted(needed)}")
-        limits = data.get("limits")
         return cls(
             name=str(data["name"]),
             positions=data["positions"],
@@ -110,7 +110,7 @@ class Sensor:
             normal=data["normal"],
             rate=float(data["rate"]),
             unit=data.get("unit", "count"),
-            limits=None if limits is None else (float(limits[0]), float(limits[1])),
+            limits=data.get("limits"),
         )
 
     @classmethod
@@ -127,7 +127,7 @@ class Sensor:
             raise ValueError(f"{path} is no JSON object of a sensor: {cause}") from cause
         try:
             return cls.from_dict(data)
-        except (TypeError, ValueError, IndexError) as cause:
+        except (TypeError, ValueError) as cause:
             raise ValueError(f"{path}: {cause}") from cause
 
     @classmethod
@@ -171,6 +171,9 @@ class HandModule:
         positions: (n_taxels, 3) in the frame of that link [m].
         rotations: (n_taxels, 3, 3) from taxel frame to the frame of that link.
         grid: (n_taxels, 2) row and column of each taxel on a flat map of the hand.
+
+    Raises:
+        ValueError: a shape is wrong, a number is not finite, or a rotation is none.
     """
 
     sensor: Sensor
@@ -179,6 +182,19 @@ class HandModule:
     positions: Array
     rotations: Array
     grid: npt.NDArray[np.int64]
+
+    def __post_init__(self) -> None:
+        n, what = self.sensor.n_taxels, f"of {self.sensor.name} on {self.link}"
+        rotations = _array(self.rotations, f"rotations {what}", (n, 3, 3))
+        exact = _exact_rotations(rotations, f"{self.sensor.name} on {self.link}")
+        flat = _array(self.flat_indices, f"flat indices {what}", (n,)).astype(np.int64)
+        grid = _array(self.grid, f"grid {what}", (n, 2)).astype(np.int64)
+        positions = _array(self.positions, f"positions {what}", (n, 3))
+        object.__setattr__(self, "positions", _locked(positions))
+        object.__setattr__(self, "rotations", _locked(exact))
+        for name, values in (("flat_indices", flat), ("grid", grid)):
+            values.flags.writeable = False
+            object.__setattr__(self, name, values)
 
 
 @dataclass(frozen=True, eq=False)
@@ -201,6 +217,10 @@ class Hand:
         if not np.array_equal(flat, np.arange(len(flat))):
             raise ValueError(f"{self.name}: every flat index belongs to one module, once")
         object.__setattr__(self, "modules", MappingProxyType(dict(self.modules)))
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        """A read-only mapping cannot be pickled."""
+        return type(self), (self.name, dict(self.modules))
 
     @property
     def n_taxels(self) -> int:
@@ -250,13 +270,27 @@ def _exact_rotations(rotations: Array, name: str) -> Array:
     exact: Array = left @ right
     error = np.abs(exact - rotations).max(axis=(1, 2))
     worst = int(error.argmax())
-    if error[worst] > ROTATION_TOLERANCE or np.linalg.det(exact).min() < 0:
-        worst = int(np.linalg.det(exact).argmin()) if error[worst] <= ROTATION_TOLERANCE else worst
+    if error[worst] > ROTATION_TOLERANCE:
         raise ValueError(
             f"{name}: the rotation of taxel {worst + 1} is {error[worst]:.1e} away from a proper "
             f"rotation; at most {ROTATION_TOLERANCE:.0e} expected"
         )
+    signs = np.linalg.det(exact)
+    if signs.min() < 0:
+        raise ValueError(
+            f"{name}: the rotation of taxel {int(signs.argmin()) + 1} is a reflection "
+            "(determinant -1); a rotation expected"
+        )
     return rotations if error[worst] < ROUNDING else exact
+
+
+def _checked_limits(given: object, name: str) -> tuple[float, float] | None:
+    if given is None:
+        return None
+    low, high = _array(given, f"limits of {name}", (2,)).tolist()  # type: ignore[arg-type]
+    if low >= high:
+        raise ValueError(f"limits of {name}: smallest, largest expected, {low}, {high} given")
+    return low, high
 
 
 def _locked(array: Array) -> Array:
