@@ -1,0 +1,21 @@
+"""Ways of fitting a classifier, by name; one file each."""
+
+from holdfast.classifiers.fitting import Parameters, Recipe, Samples
+from holdfast.classifiers.linear import LinearClassifier
+from holdfast.classifiers.logreg import LogisticRegression
+from holdfast.classifiers.svm import LinearSVM
+
+RECIPES: dict[str, Recipe] = {"logreg": LogisticRegression(), "svm": LinearSVM()}
+
+__all__ = ["RECIPES", "LinearClassifier", "Parameters", "Recipe", "Samples", "recipe"]
+
+
+def recipe(name: str) -> Recipe:
+    """The way of fitting of that name.
+
+    Raises:
+        ValueError: there is none.
+    """
+    if name not in RECIPES:
+        raise ValueError(f"unknown classifier {name!r}; there are {', '.join(RECIPES)}")
+    return RECIPES[name]

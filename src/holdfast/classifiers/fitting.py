@@ -1,0 +1,77 @@
+"""What every way of fitting has in common: samples in, a classifier of plain numbers out."""
+
+from collections.abc import Mapping
+from typing import Any, NamedTuple, Protocol
+
+import numpy as np
+import numpy.typing as npt
+
+from holdfast.classifiers.linear import LinearClassifier
+from holdfast.errors import TrainingError
+
+Parameters = Mapping[str, Any]
+
+
+class Samples(NamedTuple):
+    """Training samples of one classifier.
+
+    Attributes:
+        features: (n, n_features) finite.
+        stable: (n,) the class: True where the label is STABLE.
+        groups: (n,) which recording (or object) a sample comes from.
+    """
+
+    features: npt.NDArray[np.float64]
+    stable: npt.NDArray[np.bool_]
+    groups: npt.NDArray[np.int64]
+
+    def take(self, rows: npt.NDArray[np.bool_]) -> "Samples":
+        """The samples where `rows` is True."""
+        return Samples(self.features[rows], self.stable[rows], self.groups[rows])
+
+    @property
+    def one_class(self) -> bool:
+        """Whether all labels are the same, or there are none."""
+        return not self.stable.any() or bool(self.stable.all())
+
+
+class Recipe(Protocol):
+    """A way of fitting a classifier.
+
+    Attributes:
+        name: on the command line.
+        reference: the parameters of the reference setting (no search).
+    """
+
+    name: str
+    reference: Parameters
+
+    def suggest(self, trial: Any) -> Parameters:
+        """Parameters to try, drawn from an Optuna trial."""
+        ...
+
+    def fit(self, samples: Samples, parameters: Parameters, seed: int) -> LinearClassifier:
+        """The classifier fitted to the samples, with a calibrated probability."""
+        ...
+
+
+def standardise(features: npt.NDArray[np.float64]) -> tuple[npt.NDArray[np.float64], ...]:
+    """Mean and scale of each feature, and the features standardised by them."""
+    mean = features.mean(axis=0)
+    scale = features.std(axis=0)
+    scale[scale == 0] = 1.0
+    return mean, scale, (features - mean) / scale
+
+
+def check_classes(samples: Samples) -> None:
+    """Does nothing where there is something to learn.
+
+    Raises:
+        TrainingError: fewer than two classes among the samples.
+    """
+    if samples.one_class:
+        n_stable = int(samples.stable.sum())
+        raise TrainingError(
+            f"{n_stable} samples labelled stable and {len(samples.stable) - n_stable} labelled "
+            "not stable given; both classes are needed to train"
+        )

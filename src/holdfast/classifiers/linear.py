@@ -1,0 +1,97 @@
+"""A linear rule over standardised features, with a calibrated probability: plain numbers."""
+
+import math
+
+import msgspec
+import numba
+import numpy as np
+import numpy.typing as npt
+
+from holdfast.errors import ModelError
+
+Array = npt.NDArray[np.float64]
+
+
+class LinearClassifier(msgspec.Struct, frozen=True, forbid_unknown_fields=True, tag="linear"):
+    """What logistic regression and the linear SVM come down to.
+
+    Decision value z = intercept + sum_j coefficients_j (phi_j - mean_j) / scale_j, probability
+    of stability p = 1 / (1 + exp(-(slope z + offset))), stable where p >= threshold.
+
+    Attributes:
+        mean: of each feature in training.
+        scale: standard deviation of each feature in training.
+        coefficients: of the standardised features.
+        intercept: of the decision value.
+        slope: of the calibration.
+        offset: of the calibration.
+        threshold: the probability from which on a contact is called stable.
+
+    Raises:
+        ModelError: lengths differ, a number is not finite, or a scale or slope is not above 0.
+    """
+
+    mean: tuple[float, ...]
+    scale: tuple[float, ...]
+    coefficients: tuple[float, ...]
+    intercept: float
+    slope: float = 1.0
+    offset: float = 0.0
+    threshold: float = 0.5
+
+    def __post_init__(self) -> None:
+        lengths = {len(self.mean), len(self.scale), len(self.coefficients)}
+        if len(lengths) != 1:
+            raise ModelError(
+                f"{len(self.mean)} means, {len(self.scale)} scales and "
+                f"{len(self.coefficients)} coefficients given; as many of each expected"
+            )
+        numbers = (*self.mean, *self.scale, *self.coefficients, self.intercept, self.offset)
+        if not all(math.isfinite(number) for number in (*numbers, self.slope)):
+            raise ModelError("a number of the classifier is not finite")
+        if min((*self.scale, self.slope), default=1.0) <= 0:
+            raise ModelError("scales and slope above 0 expected")
+        if not 0 <= self.threshold <= 1:
+            raise ModelError(f"a threshold from 0 to 1 expected, {self.threshold} given")
+
+    @property
+    def n_features(self) -> int:
+        """How many features it looks at."""
+        return len(self.mean)
+
+    def weights(self) -> Array:
+        """The rule in the order of the kernel: offset first, then one weight a feature.
+
+        The scale and the calibration are folded in: p = logistic(w_0 + sum_j w_j phi_j).
+        """
+        folded = np.array(self.coefficients) / np.array(self.scale)
+        intercept = self.intercept - float(folded @ np.array(self.mean))
+        return np.concatenate([[self.slope * intercept + self.offset], self.slope * folded])
+
+    def decision(self, features: Array) -> Array:
+        """The uncalibrated decision value z of each row of (n, n_features)."""
+        standardised = (features - np.array(self.mean)) / np.array(self.scale)
+        return np.asarray(standardised @ np.array(self.coefficients) + self.intercept)
+
+    def probability(self, features: Array) -> Array:
+        """The probability of stability of each row of (n, n_features); NaN for rows with NaN."""
+        probabilities = np.empty(len(features))
+        _probabilities(np.ascontiguousarray(features), self.weights(), probabilities)
+        return probabilities
+
+
+@numba.njit(cache=True, error_model="numpy")
+def linear_probability(features: Array, weights: Array) -> float:  # pragma: no cover (compiled)
+    """Logistic of the weighted sum: the one place where a probability is computed."""
+    value = weights[0]
+    for j in range(len(weights) - 1):
+        value += weights[j + 1] * features[j]
+    return 1.0 / (1.0 + math.exp(-value))
+
+
+@numba.njit(cache=True, error_model="numpy")
+def _probabilities(
+    features: Array, weights: Array, out: Array
+) -> None:  # pragma: no cover (compiled)
+    for k in range(len(features)):
+        out[k] = linear_probability(features[k], weights)

@@ -1,0 +1,54 @@
+"""Logistic regression."""
+
+from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
+
+from holdfast.classifiers.fitting import Parameters, Samples, check_classes, standardise
+from holdfast.classifiers.linear import LinearClassifier
+
+
+@dataclass(frozen=True)
+class LogisticRegression:
+    """L2-regularised logistic regression on standardised features.
+
+    Balanced class weights multiply the odds by n_0 / n_1. The probability is corrected by just
+    that factor; the decision stays where the weights put it.
+    """
+
+    name: str = "logreg"
+    reference: Parameters = field(default_factory=lambda: {"C": 1.0, "class_weight": "balanced"})
+
+    def suggest(self, trial: Any) -> Parameters:
+        """C over eight decades, and whether classes are weighted."""
+        return {
+            "C": trial.suggest_float("C", 1e-4, 1e4, log=True),
+            "class_weight": trial.suggest_categorical("class_weight", ["balanced", None]),
+        }
+
+    def fit(self, samples: Samples, parameters: Parameters, seed: int) -> LinearClassifier:
+        """The classifier fitted to the samples; deterministic, the seed is not used.
+
+        Raises:
+            TrainingError: only one class.
+        """
+        from sklearn.linear_model import LogisticRegression as Estimator
+
+        del seed
+        check_classes(samples)
+        mean, scale, features = standardise(samples.features)
+        balanced = parameters["class_weight"] == "balanced"
+        estimator = Estimator(
+            C=parameters["C"], class_weight=parameters["class_weight"], max_iter=1000
+        ).fit(features, samples.stable)
+        n_stable = int(samples.stable.sum())
+        odds = (len(samples.stable) - n_stable) / n_stable if balanced else 1.0
+        return LinearClassifier(
+            mean=tuple(mean.tolist()),
+            scale=tuple(scale.tolist()),
+            coefficients=tuple(estimator.coef_[0].tolist()),
+            intercept=float(estimator.intercept_[0]),
+            offset=-float(np.log(odds)),
+            threshold=1.0 / (1.0 + odds),
+        )

@@ -1,0 +1,91 @@
+"""The linear support vector machine."""
+
+from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+from holdfast.classifiers.fitting import Parameters, Samples, check_classes, standardise
+from holdfast.classifiers.linear import LinearClassifier
+
+FOLDS = 5
+"""Folds, by group, whose held-out decision values the sigmoid is fitted to."""
+
+
+@dataclass(frozen=True)
+class LinearSVM:
+    """Linear SVM (squared hinge) on standardised features, with a sigmoid for its probability.
+
+    The sigmoid is fitted, without class weights, to decision values out of fold where the
+    groups allow it, else to those of the training samples (Platt 1999).
+    """
+
+    name: str = "svm"
+    reference: Parameters = field(default_factory=lambda: {"C": 1.0, "class_weight": "balanced"})
+
+    def suggest(self, trial: Any) -> Parameters:
+        """C over eight decades, and whether classes are weighted."""
+        return {
+            "C": trial.suggest_float("C", 1e-5, 1e3, log=True),
+            "class_weight": trial.suggest_categorical("class_weight", ["balanced", None]),
+        }
+
+    def fit(self, samples: Samples, parameters: Parameters, seed: int) -> LinearClassifier:
+        """The classifier fitted to the samples.
+
+        Raises:
+            TrainingError: only one class.
+        """
+        check_classes(samples)
+        mean, scale, features = standardise(samples.features)
+        coefficients, intercept = _fit(features, samples.stable, parameters, seed)
+        values = _held_out(samples._replace(features=features), parameters, seed)
+        slope, offset = _sigmoid(values, samples.stable)
+        return LinearClassifier(
+            mean=tuple(mean.tolist()),
+            scale=tuple(scale.tolist()),
+            coefficients=tuple(coefficients.tolist()),
+            intercept=intercept,
+            slope=slope,
+            offset=offset,
+            threshold=float(1.0 / (1.0 + np.exp(-offset))),
+        )
+
+
+def _fit(
+    features: npt.NDArray[np.float64],
+    stable: npt.NDArray[np.bool_],
+    parameters: Parameters,
+    seed: int,
+) -> tuple[npt.NDArray[np.float64], float]:
+    from sklearn.svm import LinearSVC
+
+    estimator = LinearSVC(dual=False, random_state=seed, max_iter=2000, **parameters)
+    estimator.fit(features, stable)
+    return estimator.coef_[0], float(estimator.intercept_[0])
+
+
+def _held_out(samples: Samples, parameters: Parameters, seed: int) -> npt.NDArray[np.float64]:
+    """Decision values out of fold by group; those in sample where a fold lacks a class."""
+    features, stable, groups = samples
+    names = np.unique(groups)
+    folds = [names[i :: min(FOLDS, len(names))] for i in range(min(FOLDS, len(names)))]
+    coefficients, intercept = _fit(features, stable, parameters, seed)
+    values = features @ coefficients + intercept
+    held = [np.isin(groups, fold) for fold in folds]
+    if len(names) < 2 or any(samples.take(~rows).one_class for rows in held):
+        return np.asarray(values)
+    for rows in held:
+        coefficients, intercept = _fit(features[~rows], stable[~rows], parameters, seed)
+        values[rows] = features[rows] @ coefficients + intercept
+    return np.asarray(values)
+
+
+def _sigmoid(values: npt.NDArray[np.float64], stable: npt.NDArray[np.bool_]) -> tuple[float, float]:
+    """Slope and offset of the logistic function that the classes follow along the values."""
+    from sklearn.linear_model import LogisticRegression
+
+    spread = float(values.std()) or 1.0
+    fit = LogisticRegression(C=1e6, max_iter=1000).fit(values[:, None] / spread, stable)
+    return max(float(fit.coef_[0, 0]) / spread, 1e-6), float(fit.intercept_[0])

@@ -1,0 +1,16 @@
+"""From readings to features: tare, fingertip force, the Haar window."""
+
+from holdfast.features.force import fingertip_force
+from holdfast.features.haar import FEATURE_NAMES, haar_features
+from holdfast.features.specs import DEPLOYED, FeatureSpec, parse_features
+from holdfast.features.tare import Tare
+
+__all__ = [
+    "DEPLOYED",
+    "FEATURE_NAMES",
+    "FeatureSpec",
+    "Tare",
+    "fingertip_force",
+    "haar_features",
+    "parse_features",
+]

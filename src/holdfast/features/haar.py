@@ -1,0 +1,124 @@
+"""The Haar window: the one definition that batch and stream both use."""
+
+import math
+
+import numba
+import numpy as np
+import numpy.typing as npt
+
+Array = npt.NDArray[np.float64]
+
+FEATURE_NAMES = ("F_a", "F_x", "F_y", "F_z", "m", "sigma")
+"""The paper's features, in the order of the columns of `haar_features`."""
+
+_BLOCK = 512
+"""Samples that one thread takes at a time: small enough for the cache."""
+
+
+def haar_features(force: npt.ArrayLike, window: int = 14) -> npt.NDArray[np.float64]:
+    r"""The paper's six features of a fingertip force, at every sample.
+
+    Amplitude F_a = |F_tip|, the three components, and from the Haar transform of F_a over the
+    window that ends at the sample, the moving average m of the approximations (equation 1) and
+    the standard deviation sigma of the details (equation 2):
+
+        a = (x_0 + x_1) / sqrt(2),        d = (x_0 - x_1) / sqrt(2)
+        m = sum(a) / N_w,                 sigma = sqrt(sum((d - mean(d))^2) / N_w)
+
+    Args:
+        force: (n, 3) fingertip force, in count or N; a row that is not finite starts anew.
+        window: N_w, samples in the window; even, at least 2.
+
+    Returns:
+        (n, 6) float64 in the order of `FEATURE_NAMES`; rows without a full window are NaN.
+
+    Raises:
+        ValueError: an odd window, one under 2, or another shape of force.
+
+    Example:
+        >>> force = np.array([[3.0, 4.0, 0.0], [6.0, 8.0, 0.0], [3.0, 4.0, 0.0], [3.0, 4.0, 0.0]])
+        >>> haar_features(force, window=4)[-1].round(3).tolist()
+        [5.0, 3.0, 4.0, 0.0, 4.419, 1.25]
+    """
+    n_window = check_window(window)
+    values = np.ascontiguousarray(force, dtype=np.float64)
+    if values.ndim != 2 or values.shape[1] != 3:
+        raise ValueError(f"a force of shape (n, 3) expected, {values.shape} given")
+    out = np.empty((len(values), len(FEATURE_NAMES)))
+    _haar_features(values, n_window, out)
+    return out
+
+
+def check_window(window: int) -> int:
+    """The window, if it can be cut into pairs.
+
+    Raises:
+        ValueError: it is odd or under 2.
+    """
+    if window != int(window) or window < 2 or window % 2:
+        raise ValueError(f"an even window of at least 2 samples expected, {window} given")
+    return int(window)
+
+
+@numba.njit(cache=True, error_model="numpy")
+def haar_windows(
+    x: Array, window: int, m: Array, sigma: Array, scratch: Array
+) -> None:  # pragma: no cover (compiled)
+    """Fills m and sigma of every window in x, the first ending at x[window - 1] (eq. 1 and 2).
+
+    Two passes over each window: nothing is carried from one sample to the next, so nothing
+    drifts, any chunking gives the same bits, and a value that is not finite makes exactly the
+    windows that hold it NaN. The inner loops run over windows, which a compiler vectorises.
+
+    Args:
+        x: (n + window - 1,) values, contiguous.
+        window: N_w.
+        m: (n,) is filled.
+        sigma: (n,) is filled.
+        scratch: (n,) is overwritten.
+    """
+    n = len(m)
+    m[:] = 0.0
+    sigma[:] = 0.0
+    scratch[:] = 0.0
+    for j in range(0, window, 2):
+        older, newer = x[j : j + n], x[j + 1 : j + 1 + n]
+        for k in range(n):
+            m[k] += older[k] + newer[k]
+            scratch[k] += older[k] - newer[k]
+    for k in range(n):
+        m[k] /= math.sqrt(2.0) * window
+        scratch[k] /= window // 2
+    for j in range(0, window, 2):
+        older, newer = x[j : j + n], x[j + 1 : j + 1 + n]
+        for k in range(n):
+            deviation = older[k] - newer[k] - scratch[k]
+            sigma[k] += deviation * deviation
+    for k in range(n):
+        sigma[k] = math.sqrt(sigma[k] / (2.0 * window))
+
+
+@numba.njit(cache=True, parallel=True, error_model="numpy")
+def _haar_features(force: Array, window: int, out: Array) -> None:  # pragma: no cover (compiled)
+    n = len(force)
+    out[: min(window - 1, n)] = math.nan
+    for block in numba.prange(max(n - window + _BLOCK, 0) // _BLOCK):
+        start = window - 1 + block * _BLOCK
+        stop = min(start + _BLOCK, n)
+        origin = start - window + 1
+        amplitude = np.empty(stop - origin)
+        for k in range(origin, stop):
+            x, y, z = force[k, 0], force[k, 1], force[k, 2]
+            amplitude[k - origin] = math.sqrt(x * x + y * y + z * z)
+        m = np.empty(stop - start)
+        sigma = np.empty(stop - start)
+        scratch = np.empty(stop - start)
+        haar_windows(amplitude, window, m, sigma, scratch)
+        for k in range(start, stop):
+            row = out[k]
+            if math.isfinite(sigma[k - start]):
+                row[0] = amplitude[k - origin]
+                row[1], row[2], row[3] = force[k, 0], force[k, 1], force[k, 2]
+                row[4], row[5] = m[k - start], sigma[k - start]
+            else:
+                row[:] = math.nan

@@ -1,0 +1,94 @@
+"""Features as data: what a classifier sees is a list that a model file can hold."""
+
+from collections.abc import Sequence
+from typing import Literal
+
+import msgspec
+import numpy as np
+import numpy.typing as npt
+
+from holdfast.features.haar import FEATURE_NAMES, check_window
+
+KINDS = FEATURE_NAMES
+TRANSFORMS = ("none", "log", "noise")
+SCOPES = ("finger", "hand")
+
+WINDOWED = ("m", "sigma")
+"""Kinds that look at a window; the others look at one sample."""
+
+DEPLOYED = ("F_a", "F_x", "F_y", "F_z", "sigma")
+"""The features of the paper's deployed model, which drops m."""
+
+
+class FeatureSpec(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
+    """One feature of a finger at a sample.
+
+    Attributes:
+        kind: `F_a`, `F_x`, `F_y`, `F_z`, `m` or `sigma`.
+        window: samples in its window, for `m` and `sigma`; 0 for the others.
+        transform: `none`; `log`, the logarithm of its root sum of squares with `floor`; or
+            `noise`, the logarithm of sigma over the sigma that the sensor's noise alone gives.
+        scope: `finger`; or `hand`, the largest value among all fingers of the hand.
+        floor: for `log`: keeps the logarithm finite, in the unit of the readings.
+    """
+
+    kind: Literal["F_a", "F_x", "F_y", "F_z", "m", "sigma"]
+    window: int = 0
+    transform: Literal["none", "log", "noise"] = "none"
+    scope: Literal["finger", "hand"] = "finger"
+    floor: float = 0.0
+
+    def __post_init__(self) -> None:
+        if self.kind in WINDOWED:
+            check_window(self.window)
+        elif self.window != 0:
+            raise ValueError(f"{self.kind} has no window; {self.window} given")
+        if self.transform == "noise" and (self.kind != "sigma" or self.window < 4):
+            raise ValueError(f"the transform 'noise' is of sigma over 4 or more; {self} given")
+        if not (np.isfinite(self.floor) and self.floor >= 0):
+            raise ValueError(f"a floor of at least 0 expected, {self.floor} given")
+
+    def __str__(self) -> str:
+        text = f"{self.kind}[{self.window}]" if self.window else str(self.kind)
+        text = text if self.transform == "none" else f"{self.transform}({text})"
+        return text if self.scope == "finger" else f"hand {text}"
+
+
+def parse_features(names: str | Sequence[str], window: int = 14) -> tuple[FeatureSpec, ...]:
+    """The features of that list of names, with that window.
+
+    Args:
+        names: separated by commas, out of `FEATURE_NAMES`; `F_tip` stands for F_x, F_y, F_z.
+        window: N_w, samples.
+
+    Raises:
+        ValueError: an unknown name, the same twice, none at all, or an odd window.
+
+    Example:
+        >>> [str(feature) for feature in parse_features("F_a,sigma")]
+        ['F_a', 'sigma[14]']
+    """
+    given = names.split(",") if isinstance(names, str) else list(names)
+    wanted: list[str] = []
+    for name in (name.strip() for name in given):
+        wanted += ["F_x", "F_y", "F_z"] if name == "F_tip" else [name]
+    if unknown := [name for name in wanted if name not in FEATURE_NAMES]:
+        known = ", ".join(FEATURE_NAMES)
+        raise ValueError(f"unknown feature {unknown[0]!r}; there are {known}, and F_tip for three")
+    if len(set(wanted)) < len(wanted):
+        raise ValueError(f"a feature is given twice in {','.join(wanted)}")
+    check_window(window)
+    return tuple(FeatureSpec(n, window if n in WINDOWED else 0) for n in wanted)  # type: ignore[arg-type]
+
+
+def spec_codes(specs: Sequence[FeatureSpec], width: int) -> npt.NDArray[np.int64]:
+    """(width, 4) kind, window, transform and scope as numbers, for the kernel; -1 is padding."""
+    codes = np.full((width, 4), -1, dtype=np.int64)
+    for row, spec in zip(codes, specs, strict=False):
+        row[:] = (
+            KINDS.index(spec.kind),
+            spec.window,
+            TRANSFORMS.index(spec.transform),
+            SCOPES.index(spec.scope),
+        )
+    return codes

@@ -1,0 +1,191 @@
+"""A stream of samples of a hand on its way to features: layout, memory, and their feeding."""
+
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any, NamedTuple
+
+import numpy as np
+import numpy.typing as npt
+
+from holdfast.features import kernel
+from holdfast.features.force import baseline_of
+from holdfast.features.kernel import Array, Layout, Memory, Output
+from holdfast.features.specs import FeatureSpec, spec_codes
+from holdfast.features.tare import Tare
+from holdfast.recordings import Recording
+from holdfast.sensors import Sensor
+
+TARE_KINDS = {
+    "seconds": kernel.TARE_SECONDS,
+    "first": kernel.TARE_FIRST,
+    "none": kernel.TARE_NONE,
+    "interval": kernel.TARE_GIVEN,
+}
+COUNT_STEP_NOISE = 1 / np.sqrt(12)
+"""Standard deviation of rounding to whole counts: no sensor in counts is more quiet."""
+NEWTON_NOISE = 1e-6
+"""The same for readings in newtons, whose step nobody knows [N]."""
+CHUNK = 2048
+"""Instants that are packed at a time: bounds the memory of offline work."""
+
+
+@dataclass(frozen=True)
+class StreamPlan:
+    """What a stream has to know before its first sample.
+
+    Attributes:
+        sensors: of each finger, in the order of the kernel's arrays.
+        features: of each finger.
+        window: N_w of the sigma that is reported [samples].
+        tare: how the baseline is found.
+        rate: samples per second [Hz].
+    """
+
+    sensors: Mapping[str, Sensor]
+    features: Mapping[str, Sequence[FeatureSpec]]
+    window: int
+    tare: Tare
+    rate: float
+
+    @property
+    def fingers(self) -> tuple[str, ...]:
+        """Names of the fingers, in the order of the kernel's arrays."""
+        return tuple(self.sensors)
+
+    def layout(self) -> Layout:
+        """The plan as the kernel's constant arrays."""
+        sensors = list(self.sensors.values())
+        features = [self.features[finger] for finger in self.fingers]
+        width = max(1, *(len(specs) for specs in features))
+        n_taxels = [sensor.n_taxels for sensor in sensors]
+        longest = [max([self.window, *(spec.window for spec in specs)]) for specs in features]
+        floors = np.zeros((len(sensors), width))
+        for row, specs in zip(floors, features, strict=True):
+            row[: len(specs)] = [spec.floor for spec in specs]
+        return Layout(
+            offsets=np.cumsum([0, *n_taxels]),
+            rotations=np.concatenate([sensor.rotations for sensor in sensors]),
+            limits=np.array([sensor.limits or (-np.inf, np.inf) for sensor in sensors]),
+            least_noise=np.array([_least_noise(sensor) for sensor in sensors]),
+            specs=np.stack([spec_codes(specs, width) for specs in features]),
+            floors=floors,
+            windows=np.array([(self.window, most) for most in longest], dtype=np.int64),
+            tare_kind=TARE_KINDS[self.tare.kind],
+            tare_seconds=self.tare.seconds,
+            period=1.0 / self.rate,
+        )
+
+
+def new_memory(layout: Layout) -> Memory:
+    """The memory of a stream that has seen nothing."""
+    n_fingers = len(layout.offsets) - 1
+    n_taxels = int(layout.offsets[-1])
+    longest = int(layout.windows[:, 1].max())
+
+    def zeros() -> npt.NDArray[np.int64]:
+        return np.zeros(n_fingers, dtype=np.int64)
+
+    noise = np.zeros((n_fingers, 3))
+    noise[:, 2] = np.nan
+    return Memory(
+        baseline=np.zeros((n_taxels, 3)),
+        previous=np.zeros((n_taxels, 3)),
+        history=np.zeros((n_fingers, 4, 2 * longest)),
+        clock=np.full((n_fingers, 2), np.nan),
+        seen=zeros(),
+        run=zeros(),
+        gapped=zeros(),
+        tared=zeros(),
+        frozen=zeros(),
+        changes=zeros(),
+        pulling=zeros(),
+        noise=noise,
+        largest=np.zeros(n_fingers),
+        scratch=np.zeros((3, 1)),
+    )
+
+
+def new_output(layout: Layout) -> Output:
+    """An output to be filled, as before the first sample."""
+    n_fingers = len(layout.offsets) - 1
+    waiting = kernel.TARE if layout.tare_kind == kernel.TARE_SECONDS else kernel.WARM_UP
+    return Output(
+        features=np.full((n_fingers, layout.specs.shape[1]), np.nan),
+        force=np.full((n_fingers, 3), np.nan),
+        amplitude=np.full(n_fingers, np.nan),
+        sigma=np.full(n_fingers, np.nan),
+        reason=np.full(n_fingers, waiting, dtype=np.int64),
+        faults=np.zeros(n_fingers, dtype=np.int64),
+    )
+
+
+class Samples(NamedTuple):
+    """Samples of several fingers at successive instants.
+
+    Attributes:
+        times: (n,) [s].
+        present: (n, n_fingers) which finger has a sample then.
+        readings: (n, n_taxels, 3) of all fingers, one after the other.
+    """
+
+    times: Array
+    present: npt.NDArray[np.bool_]
+    readings: Array
+
+
+def samples_of(recording: Recording, fingers: Sequence[str]) -> Iterator[Samples]:
+    """The samples of those fingers in order of time, a bounded number at a time.
+
+    Fingers that have a sample at the same time share an instant.
+
+    Args:
+        recording: that has them.
+        fingers: names of its modules.
+
+    Yields:
+        At most `CHUNK` instants at a time.
+    """
+    modules = [recording.modules[finger] for finger in fingers]
+    times = modules[0].times
+    for module in modules[1:]:
+        if not np.array_equal(times, module.times):
+            times = np.union1d(times, module.times)
+    offsets = np.cumsum([0, *(module.sensor.n_taxels for module in modules)])
+    for start in range(0, len(times), CHUNK):
+        chunk = times[start : start + CHUNK]
+        present = np.zeros((len(chunk), len(modules)), dtype=np.bool_)
+        readings = np.zeros((len(chunk), int(offsets[-1]), 3))
+        for place, module in enumerate(modules):
+            first, last = np.searchsorted(module.times, (chunk[0], chunk[-1] + 0.0), side="left")
+            last += last < len(module.times) and module.times[last] == chunk[-1]
+            rows = np.searchsorted(chunk, module.times[first:last])
+            present[rows, place] = True
+            readings[rows, offsets[place] : offsets[place + 1]] = module.readings[first:last]
+        yield Samples(chunk, present, readings)
+
+
+def give_baseline(plan: StreamPlan, memory: Memory, recording: Recording) -> None:
+    """Puts the mean over the plan's interval into the memory, for a tare by interval.
+
+    Raises:
+        ValueError: a finger has no finite sample in that interval.
+    """
+    first = 0
+    for finger, sensor in plan.sensors.items():
+        module = recording.modules[finger]
+        readings = np.asarray(module.readings, dtype=np.float64)
+        try:
+            baseline, _ = baseline_of(readings, module.times, plan.tare, 1 / plan.rate)
+        except ValueError as cause:
+            raise ValueError(
+                f"{finger} of {recording.name!r}, which runs from {recording.start:g} to "
+                f"{recording.end:g} s: {cause}"
+            ) from cause
+        memory.baseline[first : first + sensor.n_taxels] = baseline
+        first += sensor.n_taxels
+
+
+def _least_noise(sensor: Sensor) -> float:
+    """Of a force component: the rounding of all taxels together [unit of the readings]."""
+    step: Any = COUNT_STEP_NOISE if sensor.unit == "count" else NEWTON_NOISE
+    return float(step * np.sqrt(sensor.n_taxels))
