@@ -1,0 +1,140 @@
+"""`holdfast doctor`: what is installed, and whether it works."""
+
+import os
+import platform
+import re
+import time
+from importlib import metadata
+from pathlib import Path
+from typing import Annotated, Any
+
+import typer
+
+from holdfast.cli.console import print_json, print_table, show
+
+PURPOSES = {
+    "bench": "peers to compare speed with in holdfast bench",
+    "hdf5": "importing recordings kept in HDF5",
+}
+"""What each extra is for."""
+
+_REQUIREMENT = re.compile(r"(?P<package>[\w.-]+)(?:.*extra\s*==\s*['\"](?P<extra>[\w-]+)['\"])?")
+
+
+def doctor(
+    as_json: Annotated[bool, typer.Option("--json", help="Print JSON on stdout.")] = False,
+) -> None:
+    """Shows what is installed and what works.
+
+    Python, packages, extras and how to get them, the compiled kernels, and where HOLDFAST_DATA
+    points. It reports, and always exits with 0.
+
+    Example:
+      holdfast doctor
+      holdfast doctor --json
+    """
+    report = _report()
+    if as_json:
+        print_json(report)
+    else:
+        _print(report)
+
+
+def _report() -> dict[str, Any]:
+    packages = _packages()
+    return {
+        "holdfast": metadata.version("holdfast"),
+        "python": platform.python_version(),
+        "platform": platform.platform(),
+        "cpus": len(os.sched_getaffinity(0))
+        if hasattr(os, "sched_getaffinity")
+        else os.cpu_count(),
+        "packages": packages.pop("", {}),
+        "extras": {extra: _extra(extra, found) for extra, found in sorted(packages.items())},
+        "kernels": _kernels(),
+        "data": _data(),
+    }
+
+
+def _packages() -> dict[str, dict[str, str | None]]:
+    """Version of each required package, None where it is missing, by extra ("" is the core)."""
+    found: dict[str, dict[str, str | None]] = {}
+    for requirement in metadata.requires("holdfast") or []:
+        match = _REQUIREMENT.match(requirement)
+        if match is not None and match["package"] != "holdfast":
+            group = found.setdefault(match["extra"] or "", {})
+            group[match["package"]] = _version(match["package"])
+    return found
+
+
+def _version(package: str) -> str | None:
+    try:
+        return metadata.version(package)
+    except metadata.PackageNotFoundError:
+        return None
+
+
+def _extra(extra: str, packages: dict[str, str | None]) -> dict[str, Any]:
+    return {
+        "purpose": PURPOSES.get(extra, ""),
+        "installed": None not in packages.values(),
+        "packages": packages,
+        "install": f'pip install "holdfast[{extra}]"',
+    }
+
+
+def _kernels() -> dict[str, Any]:
+    """Compiles the feature kernel, or loads it from its cache, and runs it once."""
+    begin = time.perf_counter()
+    error = None
+    try:
+        import numpy as np
+
+        from holdfast.features import haar_features
+
+        haar_features(np.ones((16, 3)))
+    except Exception as cause:  # the doctor tells what is broken, whatever it is
+        error = f"{type(cause).__name__}: {cause}"
+    return {
+        "ok": error is None,
+        "seconds": round(time.perf_counter() - begin, 3),
+        "cache": os.environ.get("NUMBA_CACHE_DIR", "beside the package"),
+        "error": error,
+    }
+
+
+def _data() -> dict[str, Any]:
+    given = os.environ.get("HOLDFAST_DATA")
+    return {"path": given, "found": given is not None and Path(given).is_dir()}
+
+
+def _print(report: dict[str, Any]) -> None:
+    kernels, data = report["kernels"], report["data"]
+    works = f"work ({kernels['seconds']:.1f} s to load)" if kernels["ok"] else kernels["error"]
+    rows = [(key, report[key]) for key in ("python", "platform", "cpus")]
+    rows += [
+        ("kernels", works),
+        ("kernel cache", kernels["cache"]),
+        ("HOLDFAST_DATA", _where(data)),
+    ]
+    print_table(("holdfast", report["holdfast"]), rows)
+    show()
+    print_table(
+        ("package", "version"),
+        [(name, version or "MISSING") for name, version in report["packages"].items()],
+    )
+    show()
+    print_table(
+        ("extra", "for", "state"),
+        [(name, x["purpose"], _state(x)) for name, x in report["extras"].items()],
+    )
+
+
+def _where(data: dict[str, Any]) -> str:
+    if data["path"] is None:
+        return "not set"
+    return f"{data['path']} ({'found' if data['found'] else 'NOT FOUND'})"
+
+
+def _state(extra: dict[str, Any]) -> str:
+    return "installed" if extra["installed"] else extra["install"]
