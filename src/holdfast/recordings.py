@@ -14,7 +14,7 @@ import numpy.typing as npt
 from holdfast.contact import Cause, ContactState
 from holdfast.errors import RecordingError
 from holdfast.sensors import Sensor
-from holdfast.sensors.values import Array, Unit
+from holdfast.sensors.values import Array, Unit, rebuilt
 
 GAP_PERIODS = 3.0
 """A step in time longer than this many sample periods is a gap."""
@@ -90,6 +90,9 @@ class Tactile:
         object.__setattr__(self, "labels", labels)
         if labels:
             _check_labels(labels, times, self.period)
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        return rebuilt(self)
 
     @property
     def n_samples(self) -> int:
@@ -168,9 +171,7 @@ class Truth:
         object.__setattr__(self, "fingers", MappingProxyType(fingers))
 
     def __reduce__(self) -> tuple[Any, ...]:
-        """Read-only mappings cannot be pickled, and recordings travel to worker processes."""
-        fingers = {finger: dict(arrays) for finger, arrays in self.fingers.items()}
-        return type(self), (self.times, dict(self.hand), fingers)
+        return rebuilt(self)
 
 
 @dataclass(frozen=True, eq=False)
@@ -210,16 +211,7 @@ class Recording:
         object.__setattr__(self, "media", tuple((str(p), float(t)) for p, t in self.media))
 
     def __reduce__(self) -> tuple[Any, ...]:
-        """Read-only mappings cannot be pickled, and recordings travel to worker processes."""
-        return type(self), (
-            self.name,
-            dict(self.modules),
-            dict(self.metadata),
-            self.truth,
-            self.markers,
-            self.media,
-            self.complete,
-        )
+        return rebuilt(self)
 
     @property
     def start(self) -> float:

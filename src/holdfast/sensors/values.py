@@ -1,7 +1,7 @@
 """A sensor is its taxels' poses; a hand is its sensors and their places in a flat packet."""
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, fields
 from pathlib import Path
 from types import MappingProxyType
 from typing import Any, Literal, Self
@@ -66,6 +66,9 @@ class Sensor:
         object.__setattr__(self, "positions", _locked(positions))
         object.__setattr__(self, "rotations", _locked(_exact_rotations(rotations, self.name)))
         object.__setattr__(self, "normal", _locked(normal / length))
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        return rebuilt(self)
 
     @property
     def n_taxels(self) -> int:
@@ -196,6 +199,9 @@ class HandModule:
             values.flags.writeable = False
             object.__setattr__(self, name, values)
 
+    def __reduce__(self) -> tuple[Any, ...]:
+        return rebuilt(self)
+
 
 @dataclass(frozen=True, eq=False)
 class Hand:
@@ -219,8 +225,7 @@ class Hand:
         object.__setattr__(self, "modules", MappingProxyType(dict(self.modules)))
 
     def __reduce__(self) -> tuple[Any, ...]:
-        """A read-only mapping cannot be pickled."""
-        return type(self), (self.name, dict(self.modules))
+        return rebuilt(self)
 
     @property
     def n_taxels(self) -> int:
@@ -246,6 +251,20 @@ class Hand:
                 f"{readings.shape[-2:]} given"
             )
         return {name: readings[..., m.flat_indices, :] for name, m in self.modules.items()}
+
+
+def rebuilt(value: Any) -> tuple[Any, ...]:  # noqa: ANN401 (any dataclass)
+    """How pickle and copy make a value anew: by its constructor, which locks its arrays.
+
+    Values travel to worker processes; read-only mappings cannot, and become plain ones.
+    """
+    return type(value), tuple(_plain(getattr(value, part.name)) for part in fields(value))
+
+
+def _plain(part: object) -> object:
+    if isinstance(part, Mapping):
+        return {key: _plain(item) for key, item in part.items()}
+    return part
 
 
 def _array(given: npt.ArrayLike, what: str, shape: tuple[int | None, ...]) -> Array:

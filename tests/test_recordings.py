@@ -1,0 +1,313 @@
+import copy
+import pickle
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+from hypothesis.extra import numpy as arrays
+
+from holdfast.contact import STABLE, UNKNOWN, UNSTABLE, Cause, ContactState
+from holdfast.errors import RecordingError
+from holdfast.recordings import (
+    Label,
+    Recording,
+    Tactile,
+    Truth,
+    label_states,
+    labels_from_samples,
+)
+from holdfast.sensors import sensor
+
+SENSOR = sensor("anyskin")
+STATES = (ContactState.STABLE, ContactState.UNSTABLE, ContactState.NO_CONTACT)
+
+
+def tactile(n=10, **fields):
+    """Ten samples at 100 Hz that count upwards."""
+    readings = np.arange(n * 15, dtype=np.float32).reshape(n, 5, 3)
+    return Tactile(
+        **({"sensor": SENSOR, "times": np.arange(n) / 100, "readings": readings} | fields)
+    )
+
+
+def recording(**fields):
+    return Recording(**({"name": "one", "modules": {"finger1": tactile()}} | fields))
+
+
+class TestLabel:
+    @pytest.mark.parametrize("span", [(1, 1), (2, 1), (0, float("nan")), (0, float("inf"))])
+    def test_ends_after_its_start(self, span):
+        with pytest.raises(ValueError) as refused:
+            Label(*span, ContactState.STABLE)
+        assert str(refused.value) == (
+            f"a label ends after its start; [{span[0]}, {span[1]}) s given"
+        )
+
+    @pytest.mark.parametrize("state", [ContactState.UNKNOWN, "UNKNOWN"])
+    def test_unknown_is_no_label(self, state):
+        with pytest.raises(
+            ValueError, match=r"^a label is STABLE, UNSTABLE or NO_CONTACT; UNKNOWN is no label$"
+        ):
+            Label(0, 1, state)
+
+    def test_other_words_are_no_state_and_no_cause(self):
+        with pytest.raises(ValueError, match="'wobbly' is not a valid ContactState"):
+            Label(0, 1, "wobbly")
+        with pytest.raises(ValueError, match="'wind' is not a valid Cause"):
+            Label(0, 1, ContactState.UNSTABLE, "wind")
+
+    @pytest.mark.parametrize("confidence", [-0.1, 1.1, float("nan")])
+    def test_confidence(self, confidence):
+        with pytest.raises(
+            ValueError, match=f"^confidence from 0 to 1 expected, {confidence} given$"
+        ):
+            Label(0, 1, ContactState.STABLE, confidence=confidence)
+
+    def test_plain_words_become_members(self):
+        label = Label(0, 1, "UNSTABLE", "slip")
+        assert label.state is ContactState.UNSTABLE
+        assert label.cause is Cause.SLIP
+
+
+class TestTactile:
+    @pytest.mark.parametrize(
+        ("fields", "message"),
+        [
+            ({"times": np.zeros((10, 1))}, "times of shape (n,) expected, (10, 1) given"),
+            (
+                {"readings": np.zeros((10, 15))},
+                "readings of shape (n, 5, 3) expected for anyskin, (10, 15) given",
+            ),
+            (
+                {"readings": np.zeros((10, 5, 2))},
+                "readings of shape (n, 5, 3) expected for anyskin, (10, 5, 2) given",
+            ),
+            ({"readings": np.zeros((10, 4, 3))}, "4 taxels given, 5 expected (anyskin)"),
+            ({"readings": np.zeros((9, 5, 3))}, "9 samples given with 10 times"),
+            ({"readings": np.zeros((10, 5, 3), bool)}, "readings are numbers; bool given"),
+            ({"readings": np.zeros((10, 5, 3), complex)}, "readings are numbers; complex128 given"),
+            (
+                {"times": np.array([0, 1, 2, 3, np.nan, 5, 6, 7, 8, 9])},
+                "a time is not finite; seconds expected",
+            ),
+            (
+                {"times": np.array([0, 1, 2, 3, 3, 5, 6, 7, 8, 9])},
+                "times stand still at sample 4: 3 s after 3 s; strictly increasing times expected",
+            ),
+            (
+                {"times": 1.7e9 + np.array([0, 1, 2, 1.5, 4, 5, 6, 7, 8, 9])},
+                "times go back at sample 3: 1700000001.5 s after 1700000002 s; "
+                "strictly increasing times expected",
+            ),
+        ],
+    )
+    def test_refuses(self, fields, message):
+        with pytest.raises(RecordingError) as refused:
+            tactile(**fields)
+        assert str(refused.value) == message
+
+    def test_labels_within_the_recording(self):
+        with pytest.raises(RecordingError) as refused:
+            tactile(labels=(Label(0, 1, ContactState.STABLE),))
+        assert str(refused.value) == (
+            "label [0, 1) s lies outside the recording, which runs from 0 to 0.105 s"
+        )
+
+    def test_labels_before_the_recording(self):
+        with pytest.raises(RecordingError, match="outside the recording"):
+            tactile(labels=(Label(-0.01, 0.05, ContactState.STABLE),))
+
+    def test_labels_do_not_overlap(self):
+        labels = (Label(0, 0.05, ContactState.STABLE), Label(0.04, 0.06, ContactState.UNSTABLE))
+        with pytest.raises(RecordingError) as refused:
+            tactile(labels=labels)
+        assert str(refused.value) == "labels overlap: [0, 0.05) s and [0.04, 0.06) s"
+
+    def test_labels_need_samples(self):
+        with pytest.raises(RecordingError, match=r"^1 labels given for a module without samples$"):
+            tactile(n=0, labels=(Label(0, 1, ContactState.STABLE),))
+
+    def test_labels_are_put_in_order(self):
+        late, early = Label(0.05, 0.06, ContactState.STABLE), Label(0, 0.05, ContactState.UNSTABLE)
+        assert tactile(labels=[late, early]).labels == (early, late)
+
+    def test_arrays_are_read_only(self):
+        given = tactile()
+        with pytest.raises(ValueError, match="read-only"):
+            given.times[0] = 1
+        with pytest.raises(ValueError, match="read-only"):
+            given.readings[0] = 1
+
+    @pytest.mark.parametrize("dtype", [np.uint16, np.int32, np.float32, np.float64])
+    def test_readings_keep_their_type(self, dtype):
+        assert tactile(readings=np.ones((10, 5, 3), dtype)).readings.dtype == dtype
+
+    def test_missing_values_are_allowed(self):
+        assert np.isnan(tactile(readings=np.full((10, 5, 3), np.nan)).readings).all()
+
+    def test_unit_is_that_of_the_sensor_unless_given(self):
+        assert tactile().unit == "count"
+        assert tactile(unit="N").unit == "N"
+
+    def test_rate_gaps_and_repeats(self):
+        times = np.array([0, 1, 2, 3, 7, 8, 9, 12, 13, 14]) / 100
+        readings = np.repeat(np.arange(5.0), 2)[:, None, None] * np.ones((5, 3))
+        given = tactile(times=times, readings=readings)
+        assert given.rate == pytest.approx(100)
+        assert given.n_gaps == 1  # four periods; three are none
+        assert given.n_repeats == 5
+
+    def test_one_sample_has_the_rate_of_the_sensor(self):
+        assert tactile(n=1).rate == pytest.approx(SENSOR.rate)
+
+    def test_no_samples(self):
+        empty = tactile(n=0)
+        assert (empty.n_samples, empty.n_gaps, empty.n_repeats) == (0, 0, 0)
+        assert empty.label_states.shape == (0,)
+
+    def test_label_states(self):
+        labels = (
+            Label(0.02, 0.04, ContactState.STABLE),
+            Label(0.04, 0.05, ContactState.UNSTABLE, Cause.SLIP),
+        )
+        assert tactile(labels=labels).label_states.tolist() == [
+            UNKNOWN, UNKNOWN, STABLE, STABLE, UNSTABLE, UNKNOWN, UNKNOWN, UNKNOWN, UNKNOWN, UNKNOWN,
+        ]  # fmt: skip
+
+    def test_slice_cuts_the_labels(self):
+        labels = (
+            Label(0, 0.03, ContactState.STABLE),
+            Label(0.03, 0.05, ContactState.UNSTABLE),
+            Label(0.08, 0.1, ContactState.STABLE),
+        )
+        whole = tactile(labels=labels)
+        part = whole.slice(2, 6)
+        assert part.times.tolist() == whole.times[2:6].tolist()
+        assert part.label_states.tolist() == whole.label_states[2:6].tolist()
+        assert part.labels == (replace(labels[0], start=0.02), labels[1])
+
+    @given(st.integers(0, 10), st.integers(0, 10), st.integers(0, 2**32 - 1))
+    def test_any_slice_keeps_its_label_states(self, start, stop, seed):
+        random = np.random.default_rng(seed)
+        times = np.cumsum(random.uniform(0.001, 0.5, 10))
+        states = [(STATES[k], None) for k in random.integers(0, 3, 10)]
+        whole = tactile(times=times, labels=labels_from_samples(times, states, period=0.001))
+        part = whole.slice(start, stop)
+        assert part.label_states.tolist() == whole.label_states[start:stop].tolist()
+
+
+class TestLabelsFromSamples:
+    @given(st.data())
+    def test_round_trip(self, data):
+        n = data.draw(st.integers(0, 30))
+        steps = data.draw(arrays.arrays(float, n, elements=st.floats(1e-3, 10)))
+        times = 100 + np.cumsum(steps)
+        pairs = st.none() | st.tuples(st.sampled_from(STATES), st.none() | st.sampled_from(Cause))
+        states = data.draw(st.lists(pairs, min_size=n, max_size=n))
+        labels = labels_from_samples(times, states, period=0.01, evidence="test", author="me")
+        expected = [UNKNOWN if state is None else state[0].code for state in states]
+        assert label_states(labels, times).tolist() == expected
+        assert all((label.evidence, label.author) == ("test", "me") for label in labels)
+
+    def test_equal_neighbours_are_one_label(self):
+        stable, slip = (ContactState.STABLE, None), (ContactState.UNSTABLE, Cause.SLIP)
+        labels = labels_from_samples(np.arange(5.0), [stable, stable, None, slip, slip], period=0.5)
+        assert labels == (
+            Label(0, 2, ContactState.STABLE),
+            Label(3, 4.5, ContactState.UNSTABLE, Cause.SLIP),
+        )
+
+    def test_as_many_states_as_times(self):
+        with pytest.raises(ValueError, match=r"^1 states given for 2 times$"):
+            labels_from_samples(np.arange(2.0), [None], period=1)
+
+
+class TestRecording:
+    @pytest.mark.parametrize("modules", [{}, {"finger1": tactile(n=0)}])
+    def test_needs_a_sample(self, modules):
+        with pytest.raises(RecordingError) as refused:
+            Recording("one", modules)
+        assert str(refused.value) == "recording 'one' has no samples; at least one expected"
+
+    def test_start_end_and_duration_are_over_all_modules(self):
+        late = tactile(times=0.05 + np.arange(10) / 100)
+        whole = recording(modules={"a": tactile(), "b": late, "c": tactile(n=0)})
+        assert (whole.start, whole.end) == (0, pytest.approx(0.14))
+        assert whole.duration == pytest.approx(0.14)
+
+    def test_mappings_are_read_only(self):
+        with pytest.raises(TypeError):
+            recording().modules["finger1"] = tactile()
+        with pytest.raises(TypeError):
+            recording().metadata["object"] = "can"
+
+    def test_labels_for_a_module_that_is_not_there(self):
+        with pytest.raises(RecordingError) as refused:
+            recording().with_labels({"thumb": ()})
+        assert str(refused.value) == "labels for thumb given; recording 'one' has finger1"
+
+    def test_with_labels_replaces_all(self):
+        label = Label(0, 0.05, ContactState.STABLE)
+        labelled = recording().with_labels({"finger1": [label]})
+        assert labelled.modules["finger1"].labels == (label,)
+        assert labelled.with_labels({}).modules["finger1"].labels == ()
+
+    def test_digest_is_of_the_samples_only(self):
+        one = recording()
+        labelled = one.with_labels({"finger1": [Label(0, 0.05, ContactState.STABLE)]})
+        assert labelled.digest == one.digest
+        assert (
+            recording(name="two", metadata={"object": "can"}, complete=False).digest == one.digest
+        )
+
+    def test_digest_does_not_depend_on_memory_layout(self):
+        readings = np.asfortranarray(tactile().readings)
+        assert recording(modules={"finger1": tactile(readings=readings)}).digest == (
+            recording().digest
+        )
+
+    @given(st.integers(0, 10 * 5 * 3 * 32 - 1))
+    def test_digest_changes_with_one_bit(self, bit):
+        readings = tactile().readings.copy()
+        readings.view(np.uint8).reshape(-1)[bit // 8] ^= 1 << bit % 8
+        changed = recording(modules={"finger1": tactile(readings=readings)})
+        assert changed.digest != recording().digest
+
+    def test_digest_knows_times_module_sensor_and_unit(self):
+        others = [
+            {"finger2": tactile()},
+            {"finger1": tactile(times=1 + np.arange(10) / 100)},
+            {"finger1": tactile(unit="N")},
+            {"finger1": tactile(readings=tactile().readings.astype(np.float64))},
+            {"finger1": tactile(sensor=replace(SENSOR, name="other"))},
+        ]
+        digests = {recording(modules=modules).digest for modules in others}
+        assert len(digests | {recording().digest}) == 6
+
+    @pytest.mark.parametrize("copied", [copy.deepcopy, lambda r: pickle.loads(pickle.dumps(r))])
+    def test_travels_to_other_processes(self, copied):
+        truth = Truth(
+            np.arange(3.0), {"phase": np.ones(3)}, {"finger1": {"slip_speed": np.ones(3)}}
+        )
+        one = recording(truth=truth, markers=((0.5, "bump"),), metadata={"object": "can"})
+        other = copied(one)
+        assert other.digest == one.digest
+        assert (other.metadata, other.markers) == (one.metadata, one.markers)
+        assert other.truth.fingers["finger1"]["slip_speed"].tolist() == [1, 1, 1]
+        assert not other.modules["finger1"].readings.flags.writeable
+
+
+class TestTruth:
+    @pytest.mark.parametrize(
+        "fields", [{"hand": {"phase": np.ones(2)}}, {"fingers": {"thumb": {"phase": np.ones(2)}}}]
+    )
+    def test_as_many_rows_as_times(self, fields):
+        with pytest.raises(RecordingError, match=r"^truth 'phase' has 2 rows for 3 times$"):
+            Truth(np.arange(3.0), **fields)
+
+    def test_arrays_are_read_only(self):
+        truth = Truth(np.arange(3.0), {"joints": np.ones((3, 16))})
+        with pytest.raises(ValueError, match="read-only"):
+            truth.hand["joints"][0] = 0
