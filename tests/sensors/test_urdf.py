@@ -1,0 +1,108 @@
+import numpy as np
+import pytest
+
+from holdfast.sensors import Sensor
+
+FINGER = """<?xml version="1.0" encoding="utf-8"?>
+<robot name="finger">
+  <link name="palm"/><link name="tip"/><link name="pad"/>
+  <joint name="finger_joint" type="revolute">
+    <origin xyz="0 0 0.1" rpy="0 0 0"/><parent link="palm"/><child link="tip"/>
+  </joint>
+  <joint name="mount" type="fixed">
+    <origin xyz="0.01 0 0" rpy="0 1.5707963267948966 0"/><parent link="tip"/><child link="pad"/>
+  </joint>
+  <joint name="taxel_1" type="fixed">
+    <origin xyz="0 0.002 0.003" rpy="0 0 0"/><parent link="pad"/><child link="t1"/>
+  </joint>
+  <joint name="taxel_2" type="fixed">
+    <origin xyz="0 -0.002 0.003" rpy="0.3 -0.2 0.1"/><parent link="pad"/><child link="t2"/>
+  </joint>
+  <joint name="taxel_3" type="fixed"><parent link="tip"/><child link="t3"/></joint>
+  <joint name="taxel_elsewhere" type="fixed"><parent link="palm"/><child link="t4"/></joint>
+  <transmission name="drive"><joint name="taxel_drive"/></transmission>
+</robot>
+"""
+
+
+@pytest.fixture
+def finger(tmp_path):
+    path = tmp_path / "finger.urdf"
+    path.write_text(FINGER)
+    return path
+
+
+def changed(path, old, new):
+    path.write_text(FINGER.replace(old, new))
+    return path
+
+
+def test_poses_add_up_along_the_joints(finger):
+    one = Sensor.from_urdf(finger, "tip", rate=100, normal=(1, 0, 0))
+    assert (one.name, one.n_taxels, one.rate) == ("finger", 3, 100)
+    assert one.normal.tolist() == [1, 0, 0]
+    np.testing.assert_allclose(
+        one.positions, [[0.013, 0.002, 0], [0.013, -0.002, 0], [0, 0, 0]], atol=1e-15
+    )
+    np.testing.assert_allclose(one.rotations[0, :, 2], [1, 0, 0], atol=1e-15)
+    np.testing.assert_allclose(one.rotations[2], np.eye(3))
+
+
+def test_angles_are_about_fixed_axes(finger):
+    """URDF: R = Rz(yaw) Ry(pitch) Rx(roll)."""
+    roll, pitch, yaw = 0.3, -0.2, 0.1
+    x = [[1, 0, 0], [0, np.cos(roll), -np.sin(roll)], [0, np.sin(roll), np.cos(roll)]]
+    y = [[np.cos(pitch), 0, np.sin(pitch)], [0, 1, 0], [-np.sin(pitch), 0, np.cos(pitch)]]
+    z = [[np.cos(yaw), -np.sin(yaw), 0], [np.sin(yaw), np.cos(yaw), 0], [0, 0, 1]]
+    turn = np.array(z) @ np.array(y) @ np.array(x)
+    np.testing.assert_allclose(Sensor.from_urdf(finger, "pad").rotations[1], turn, atol=1e-15)
+
+
+def test_base_decides_what_belongs_to_it(finger):
+    assert Sensor.from_urdf(finger, "pad").n_taxels == 2
+    assert Sensor.from_urdf(finger, "palm").n_taxels == 4
+
+
+def test_match(finger):
+    assert Sensor.from_urdf(finger, "tip", match="taxel_1").n_taxels == 1
+    with pytest.raises(ValueError, match=r"has no joint below 'tip' whose name holds 'sensor'$"):
+        Sensor.from_urdf(finger, "tip", match="sensor")
+
+
+def test_unknown_base_tells_the_links(finger):
+    with pytest.raises(ValueError, match="has no link 'hand'; it has pad, palm, t1, t2"):
+        Sensor.from_urdf(finger, "hand")
+
+
+def test_a_ring_of_joints_ends(finger):
+    path = changed(
+        finger,
+        '<parent link="palm"/><child link="tip"/>',
+        '<parent link="pad"/><child link="tip"/>',
+    )
+    with pytest.raises(ValueError, match="has no joint below 't1'"):
+        Sensor.from_urdf(path, "t1")
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "hint"),
+    [
+        ('xyz="0.01 0 0"', 'xyz="${width} 0 0"', "could not convert string to float"),
+        ('xyz="0.01 0 0"', 'xyz="0.01 0"', "three finite numbers expected, '0.01 0' given"),
+        ('xyz="0.01 0 0"', 'xyz="nan 0 0"', "three finite numbers expected, 'nan 0 0' given"),
+        ("</robot>", "", "no element found"),
+    ],
+)
+def test_no_urdf(finger, old, new, hint):
+    with pytest.raises(
+        ValueError, match=r"is no URDF file \(is it a xacro not yet expanded\?\)"
+    ) as refused:
+        Sensor.from_urdf(changed(finger, old, new), "tip")
+    assert hint in str(refused.value)
+
+
+@pytest.mark.parametrize("declared", ["<!DOCTYPE robot>", '<!DOCTYPE r [<!ENTITY a "aa">]>'])
+def test_document_types_are_refused(finger, declared):
+    path = changed(finger, "<robot name", f"{declared}<robot name")
+    with pytest.raises(ValueError, match=r"declares a document type: a plain URDF file has none$"):
+        Sensor.from_urdf(path, "tip")

@@ -1,0 +1,195 @@
+import copy
+import json
+import pickle
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+from scipy.spatial.transform import Rotation
+
+from holdfast.sensors import Hand, HandModule, Sensor, built_in_sensors, hand, sensor
+
+
+def two_taxels(**fields):
+    plain = {
+        "name": "pair",
+        "positions": [[0, 0, 0], [0.01, 0, 0]],
+        "rotations": [np.eye(3), np.eye(3)],
+        "normal": [0, 0, 2],
+        "rate": 100.0,
+    }
+    return Sensor(**(plain | fields))
+
+
+def written(folder, **fields):
+    plain = two_taxels().to_dict() | fields
+    path = folder / "pair.json"
+    path.write_text(json.dumps({key: value for key, value in plain.items() if value != "absent"}))
+    return path
+
+
+def one_module(indices):
+    pair = two_taxels()
+    return HandModule(pair, indices, "tip", pair.positions, pair.rotations, [[0, 0], [0, 1]])
+
+
+@pytest.mark.parametrize(
+    ("fields", "message"),
+    [
+        ({"name": ""}, "a sensor needs a name, '' given"),
+        ({"positions": [[0, 0]]}, "positions of pair: shape ('n', 3) expected, (1, 2) given"),
+        ({"positions": [[0, 0, 0], [0]]}, "positions of pair: numbers in a regular array expected"),
+        ({"positions": "here"}, "positions of pair: numbers in a regular array expected"),
+        (
+            {"positions": [[0, 0, 0], [0, 0, np.nan]]},
+            "positions of pair: finite numbers expected, NaN or infinity given",
+        ),
+        (
+            {"rotations": [np.eye(3)]},
+            "rotations of pair: shape (2, 3, 3) expected, (1, 3, 3) given",
+        ),
+        (
+            {"rotations": [np.eye(3), 1.01 * np.eye(3)]},
+            "pair: the rotation of taxel 2 is 1.0e-02 away from a proper rotation; "
+            "at most 1e-05 expected",
+        ),
+        (
+            {"rotations": [np.eye(3), np.diag([1, 1, -1])]},
+            "pair: the rotation of taxel 2 is a reflection (determinant -1); a rotation expected",
+        ),
+        ({"normal": [0, 0, 0]}, "pair: at least one taxel and a normal that is not zero"),
+        (
+            {"positions": np.zeros((0, 3)), "rotations": np.zeros((0, 3, 3))},
+            "pair: at least one taxel and a normal that is not zero",
+        ),
+        ({"rate": 0}, "pair: a rate above 0 Hz expected, 0 given"),
+        ({"rate": float("inf")}, "pair: a rate above 0 Hz expected, inf given"),
+        ({"unit": "V"}, "pair: unit 'count' or 'N' expected, 'V' given"),
+        ({"limits": (1, 0)}, "limits of pair: smallest, largest expected, 1.0, 0.0 given"),
+        ({"limits": (1, 2, 3)}, "limits of pair: shape (2,) expected, (3,) given"),
+    ],
+)
+def test_refuses(fields, message):
+    with pytest.raises(ValueError) as refused:
+        two_taxels(**fields)
+    assert str(refused.value) == message
+
+
+def test_arrays_are_read_only_and_its_own():
+    positions = np.zeros((2, 3))
+    one = two_taxels(positions=positions)
+    positions[0] = 1
+    assert one.positions.max() == 0
+    for array in (one.positions, one.rotations, one.normal):
+        with pytest.raises(ValueError, match="read-only"):
+            array[0] = 1
+
+
+def test_normal_has_length_one():
+    assert two_taxels().normal.tolist() == [0, 0, 1]
+
+
+@given(st.integers(0, 2**32 - 1))
+def test_rounded_rotations_become_exact(seed):
+    turns = Rotation.random(2, rng=np.random.default_rng(seed)).as_matrix()
+    exact = two_taxels(rotations=turns.round(6)).rotations
+    np.testing.assert_allclose(exact @ exact.transpose(0, 2, 1), [np.eye(3)] * 2, atol=1e-12)
+    np.testing.assert_allclose(exact, turns, atol=2e-6)
+
+
+def test_equal_by_content():
+    assert two_taxels() == two_taxels()
+    assert hash(two_taxels()) == hash(two_taxels())
+    assert two_taxels() != two_taxels(rate=50.0)
+    assert two_taxels() != "pair"
+
+
+@pytest.mark.parametrize("name", built_in_sensors())
+def test_written_and_read_it_is_the_same(name, tmp_path):
+    path = tmp_path / "sensor.json"
+    path.write_text(json.dumps(sensor(name).to_dict()))
+    assert Sensor.from_json(path) == sensor(name)
+
+
+@pytest.mark.parametrize("copied", [copy.deepcopy, lambda value: pickle.loads(pickle.dumps(value))])
+def test_copies_are_equal_and_read_only(copied):
+    one = copied(sensor("uskin-curved"))
+    assert one == sensor("uskin-curved")
+    assert not one.positions.flags.writeable
+    other = copied(hand("allegro-uskin"))
+    assert other.n_taxels == 368
+    assert not other.modules["thumb"].flat_indices.flags.writeable
+
+
+class TestFromJson:
+    @pytest.mark.parametrize(
+        ("fields", "message"),
+        [
+            ({"colour": "red"}, "unknown fields ['colour'] in a sensor; it has"),
+            ({"positions": "absent"}, "fields ['positions'] are missing in a sensor; it needs"),
+            ({"positions": [[0, 0]]}, "positions of pair: shape ('n', 3) expected, (1, 2) given"),
+            ({"rate": None}, "float() argument must be"),
+            ({"rate": "fast"}, "could not convert string to float"),
+            ({"unit": "kg"}, "unit 'count' or 'N' expected, 'kg' given"),
+            ({"limits": [0]}, "limits of pair: shape (2,) expected, (1,) given"),
+            ({"rotations": [[[1, 0, 0]] * 3] * 2}, "away from a proper rotation"),
+        ],
+    )
+    def test_refuses(self, tmp_path, fields, message):
+        path = written(tmp_path, **fields)
+        with pytest.raises(ValueError) as refused:
+            Sensor.from_json(path)
+        assert str(refused.value).startswith(f"{path}: ")
+        assert message in str(refused.value)
+
+    @pytest.mark.parametrize("text", ["", "[]", "{", '{"rate": NaN}', "\x80"])
+    def test_no_json_object(self, tmp_path, text):
+        path = tmp_path / "pair.json"
+        path.write_text(text, "latin-1")
+        with pytest.raises(ValueError, match="is no JSON object of a sensor"):
+            Sensor.from_json(path)
+
+    def test_no_file(self, tmp_path):
+        with pytest.raises(FileNotFoundError):
+            Sensor.from_json(tmp_path / "none.json")
+
+    def test_unit_and_limits_may_be_left_out(self, tmp_path):
+        one = Sensor.from_json(written(tmp_path, unit="absent", limits="absent"))
+        assert (one.unit, one.limits) == ("count", None)
+
+    def test_infinity_in_disguise(self, tmp_path):
+        path = written(tmp_path)
+        path.write_text(path.read_text().replace("0.01", "1e999"))
+        with pytest.raises(ValueError, match="pair"):
+            Sensor.from_json(path)
+
+
+class TestHand:
+    def test_every_flat_index_once(self):
+        for indices in ([0, 0], [0, 2], [1, 2]):
+            with pytest.raises(
+                ValueError, match=r"^odd: every flat index belongs to one module, once$"
+            ):
+                Hand("odd", {"a": one_module(indices)})
+
+    def test_modules_are_read_only(self):
+        with pytest.raises(TypeError):
+            hand("allegro-uskin").modules["thumb"] = None
+
+    def test_a_module_fits_its_sensor(self):
+        with pytest.raises(
+            ValueError, match=r"^flat indices of pair on tip: shape \(2,\) expected, \(3,\) given$"
+        ):
+            one_module([0, 1, 2])
+
+    def test_rotations_of_modules_are_exact(self):
+        for module in hand("allegro-uskin").modules.values():
+            turns = module.rotations
+            expected = np.tile(np.eye(3), (len(turns), 1, 1))
+            np.testing.assert_allclose(turns @ turns.transpose(0, 2, 1), expected, atol=1e-12)
+
+    def test_a_module_refuses_what_is_no_rotation(self):
+        with pytest.raises(ValueError, match=r"^pair on tip: the rotation of taxel 1 is"):
+            replace(one_module([0, 1]), rotations=np.ones((2, 3, 3)))

@@ -1,0 +1,49 @@
+import subprocess
+import sys
+from importlib import metadata
+from pathlib import Path
+
+import pytest
+
+import holdfast
+
+PUBLIC = [
+    *("FEATURE_NAMES", "fingertip_force", "haar_features"),
+    *("Hand", "Sensor", "Label", "Recording", "Tactile", "Truth"),
+    *("load_dataset", "load_recording", "save_recording"),
+    *("Model", "Detector", "detect", "ContactEstimate", "ContactState", "HandEstimate"),
+    *("StabilityClassifier", "event_metrics", "sample_metrics"),
+    *("HoldfastError", "MissingExtra", "ModelError", "OutputError"),
+    *("RecordingError", "StreamError", "TrainingError"),
+]
+
+
+@pytest.mark.parametrize("name", PUBLIC)
+def test_public_name(name):
+    assert getattr(holdfast, name) is not None
+    assert name in holdfast.__all__
+    assert name in dir(holdfast)
+
+
+def test_there_is_no_other_public_name():
+    assert sorted([*PUBLIC, "__version__"]) == holdfast.__all__
+
+
+def test_version_is_that_of_the_distribution():
+    assert holdfast.__version__ == metadata.version("holdfast")
+
+
+def test_other_names_are_refused():
+    with pytest.raises(AttributeError, match=r"^module 'holdfast' has no attribute 'grip'$"):
+        _ = holdfast.grip
+
+
+def test_type_checkers_know_every_name():
+    source = Path(holdfast.__file__).read_text("utf-8")
+    assert [name for name in PUBLIC if f" import {name} as {name}\n" not in source] == []
+
+
+def test_import_loads_nothing_heavy():
+    code = "import sys, holdfast; print(*{'numpy', 'numba', 'sklearn', 'typer'} & set(sys.modules))"
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
+    assert done.stdout.strip() == ""
