@@ -1,0 +1,207 @@
+import json
+import os
+import subprocess
+import sys
+
+import pytest
+
+from holdfast.cli import app, main
+from holdfast.cli.console import Bar, print_json, print_table, progress
+from holdfast.errors import RecordingError
+
+
+def run(*words, **options):
+    return subprocess.run(
+        [
+            sys.executable,
+            "-c",
+            "import sys; from holdfast.cli import main; sys.exit(main())",
+            *words,
+        ],
+        capture_output=True,
+        text=True,
+        check=False,
+        **options,
+    )
+
+
+@pytest.fixture
+def failing(monkeypatch):
+    """Makes the verb `doctor` raise."""
+
+    def arrange(failure):
+        def verb() -> None:
+            raise failure
+
+        monkeypatch.setattr(app, "load_verb", lambda name: verb)
+
+    return arrange
+
+
+def one_line(capsys):
+    out, err = capsys.readouterr()
+    assert out == ""
+    assert err.endswith("\n")
+    assert err.count("\n") == 1
+    return err.rstrip("\n")
+
+
+@pytest.mark.parametrize("verb", app.VERBS)
+def test_every_verb_has_help_with_an_example(verb, capsys):
+    assert main([verb, "--help"]) == 0
+    out, err = capsys.readouterr()
+    assert err == ""
+    assert f"\n  Example:\n    holdfast {verb}" in out
+    assert "--json" in out
+
+
+@pytest.mark.parametrize("verb", app.VERBS)
+def test_help_lists_the_first_line_of_every_verb(verb):
+    assert app.load_verb(verb).__doc__.splitlines()[0] == app.VERBS[verb]
+
+
+def test_help_names_every_verb_and_loads_nothing_heavy():
+    code = (
+        "import sys; from holdfast.cli import main; main(['--help']); "
+        "print(*{'numpy', 'scipy', 'numba', 'sklearn', 'pyarrow', 'matplotlib', 'rich', 'msgspec'}"
+        " & set(sys.modules), file=sys.stderr)"
+    )
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
+    assert done.stderr.strip() == ""
+    for verb, summary in app.VERBS.items():
+        assert f"{verb:10}{summary}"[:60] in done.stdout
+
+
+@pytest.mark.parametrize(
+    ("words", "message"),
+    [
+        ([], "holdfast: Missing command (see holdfast --help)"),
+        (["fly"], "holdfast: No such command 'fly'"),
+        (["--fast"], "holdfast: No such option: --fast"),
+        (["doctor", "--fast"], "holdfast: No such option: --fast"),
+        (["doctor", "now"], "holdfast: Got unexpected extra argument"),
+        (["sensors", "--plot"], "holdfast: Option '--plot' requires an argument"),
+    ],
+)
+def test_bad_usage_is_one_line(words, message, capsys):
+    assert main(words) == 2
+    assert one_line(capsys).startswith(message)
+
+
+@pytest.mark.parametrize(
+    ("failure", "message"),
+    [
+        (RecordingError("no\n samples"), "no samples"),
+        (ValueError("an even window expected, 13 given"), "an even window expected, 13 given"),
+        (TypeError("a path expected"), "a path expected"),
+        (
+            FileNotFoundError(2, "No such file or directory", "a.mcap"),
+            "a.mcap: No such file or directory",
+        ),
+        (OSError(28, "No space left on device"), "[Errno 28] No space left on device"),
+        (MemoryError(), "MemoryError"),
+    ],
+)
+def test_bad_input_is_one_line(failing, failure, message, capsys):
+    failing(failure)
+    assert main(["doctor"]) == 2
+    assert one_line(capsys) == f"holdfast: {message}"
+
+
+def test_interrupt(failing, capsys):
+    failing(KeyboardInterrupt())
+    assert main(["doctor"]) == 130
+    assert one_line(capsys) == "holdfast: interrupted"
+
+
+def test_a_bug_asks_to_be_reported(failing, capsys, monkeypatch):
+    monkeypatch.delenv("HOLDFAST_DEBUG", raising=False)
+    failing(KeyError("thumb"))
+    assert main(["doctor"]) == 1
+    assert one_line(capsys) == "holdfast: internal error (KeyError: 'thumb'): please report it"
+
+
+def test_the_traceback_is_for_those_who_ask(failing, capsys, monkeypatch):
+    monkeypatch.setenv("HOLDFAST_DEBUG", "1")
+    failing(KeyError("thumb"))
+    assert main(["doctor"]) == 1
+    assert "Traceback" in capsys.readouterr().err
+
+
+def test_a_reader_that_left_is_no_failure():
+    reading, writing = os.pipe()
+    os.close(reading)
+    done = subprocess.run(
+        [
+            sys.executable,
+            "-c",
+            "import sys; from holdfast.cli import main; sys.exit(main())",
+            "sensors",
+        ],
+        stdout=writing,
+        stderr=subprocess.PIPE,
+        text=True,
+        check=False,
+    )
+    os.close(writing)
+    assert (done.returncode, done.stderr) == (0, "")
+
+
+def test_exit_code_reaches_the_shell():
+    done = run("sensors", "nothing")
+    assert done.returncode == 2
+    assert done.stdout == ""
+    assert done.stderr.count("\n") == 1
+
+
+class TestConsole:
+    def test_json_takes_what_verbs_have(self, capsys, tmp_path):
+        import numpy as np
+
+        given = {
+            "array": np.array([1.0, np.nan]),
+            "number": np.float64(2.5),
+            "count": np.int64(3),
+            "flag": np.bool_(True),
+            "path": tmp_path,
+            "infinite": float("inf"),
+        }
+        print_json(given)
+        out = capsys.readouterr().out
+        assert out.count("\n") == 1
+        assert json.loads(out) == {
+            "array": [1.0, None],
+            "number": 2.5,
+            "count": 3,
+            "flag": True,
+            "path": str(tmp_path),
+            "infinite": None,
+        }
+
+    def test_json_refuses_the_rest(self):
+        with pytest.raises(TypeError, match=r"^object is no JSON value$"):
+            print_json({"a": object()})
+
+    def test_table(self, capsys):
+        print_table(("name", "rate"), [("a", 5), ("long", "-"), ("b", "12.5")])
+        assert capsys.readouterr().out == "name  rate\na        5\nlong     -\nb     12.5\n"
+
+    def test_empty_table(self, capsys):
+        print_table(("name", "rate"), [])
+        assert capsys.readouterr().out == "name  rate\n"
+
+    def test_progress_is_silent_where_nobody_looks(self, capsys):
+        assert list(progress(range(3), "counting")) == [0, 1, 2]
+        assert capsys.readouterr() == ("", "")
+
+    def test_progress_appears_on_a_terminal_after_a_while(self, capsys, monkeypatch):
+        monkeypatch.setattr("sys.stderr.isatty", lambda: True, raising=False)
+        monkeypatch.setattr("holdfast.cli.console.PATIENCE", -1.0)
+        with Bar("counting", 3) as bar:
+            bar.advance(3)
+        assert "counting" in capsys.readouterr().err
+
+    def test_a_quick_task_shows_no_bar(self, capsys, monkeypatch):
+        monkeypatch.setattr("sys.stderr.isatty", lambda: True, raising=False)
+        assert list(progress(iter("ab"), "counting", total=2)) == ["a", "b"]
+        assert capsys.readouterr() == ("", "")

@@ -1,0 +1,67 @@
+import json
+from importlib import metadata
+
+import numpy as np
+import pytest
+
+from holdfast.cli import main
+from holdfast.cli.doctor import PURPOSES
+
+
+def report(capsys):
+    assert main(["doctor", "--json"]) == 0
+    out, err = capsys.readouterr()
+    assert err == ""
+    return json.loads(out)
+
+
+def test_tells_versions(capsys):
+    told = report(capsys)
+    assert told["holdfast"] == metadata.version("holdfast")
+    assert told["packages"]["numpy"] == np.__version__
+    assert told["cpus"] >= 1
+
+
+def test_the_kernels_work(capsys):
+    assert report(capsys)["kernels"]["ok"] is True
+
+
+def test_every_extra_has_a_purpose_and_a_way_to_get_it(capsys):
+    extras = report(capsys)["extras"]
+    assert set(extras) == set(PURPOSES)
+    assert extras["hdf5"]["install"] == 'pip install "holdfast[hdf5]"'
+
+
+def test_missing_packages_are_told(capsys, monkeypatch):
+    monkeypatch.setattr("holdfast.cli.doctor._version", lambda package: None)
+    told = report(capsys)
+    assert told["packages"]["numpy"] is None
+    assert told["extras"]["hdf5"]["installed"] is False
+    assert main(["doctor"]) == 0
+    out = capsys.readouterr().out
+    assert "MISSING" in out
+    assert 'pip install "holdfast[hdf5]"' in out
+
+
+def test_broken_kernels_are_told_and_exit_is_0(capsys, monkeypatch):
+    def broken(force):
+        raise RuntimeError("no LLVM")
+
+    monkeypatch.setattr("holdfast.features.haar_features", broken)
+    assert report(capsys)["kernels"]["error"] == "RuntimeError: no LLVM"
+    assert main(["doctor"]) == 0
+    assert "RuntimeError: no LLVM" in capsys.readouterr().out
+
+
+@pytest.mark.parametrize("found", [True, False])
+def test_where_the_data_are(capsys, monkeypatch, tmp_path, found):
+    path = tmp_path if found else tmp_path / "none"
+    monkeypatch.setenv("HOLDFAST_DATA", str(path))
+    assert report(capsys)["data"] == {"path": str(path), "found": found}
+
+
+def test_no_data(capsys, monkeypatch):
+    monkeypatch.delenv("HOLDFAST_DATA", raising=False)
+    assert report(capsys)["data"] == {"path": None, "found": False}
+    assert main(["doctor"]) == 0
+    assert "not set" in capsys.readouterr().out

@@ -1,0 +1,135 @@
+import json
+import math
+import re
+
+import pytest
+
+from holdfast.cli import main
+from holdfast.cli.sensors import _ranges
+from holdfast.sensors import Sensor, built_in_hands, built_in_sensors, hand, sensor
+
+URDF = """<robot name="finger"><link name="tip"/>
+<joint name="taxel_1" type="fixed"><parent link="tip"/><child link="t"/></joint></robot>"""
+
+
+def refusal(capsys, *words):
+    assert main(["sensors", *map(str, words)]) == 2
+    out, err = capsys.readouterr()
+    assert out == ""
+    assert err.count("\n") == 1
+    return err.removeprefix("holdfast: ").rstrip("\n")
+
+
+def shown(capsys, *words):
+    assert main(["sensors", *map(str, words)]) == 0
+    return capsys.readouterr().out
+
+
+def test_lists_all(capsys):
+    out = shown(capsys)
+    for name in built_in_sensors() + built_in_hands():
+        assert re.search(rf"^{name} +\d+", out, re.MULTILINE)
+
+
+def test_lists_all_for_machines(capsys):
+    listed = json.loads(shown(capsys, "--json"))
+    assert [one["name"] for one in listed["sensors"]] == list(built_in_sensors())
+    assert listed["hands"][0]["n_taxels"] == 368
+
+
+def test_shows_a_sensor(capsys):
+    out = shown(capsys, "uskin-curved")
+    assert "0 to 65535" in out
+    assert len(out.splitlines()) == 6 + 1 + 1 + 30
+
+
+@pytest.mark.parametrize("name", built_in_sensors())
+def test_json_of_a_sensor_is_a_sensor_file(name, capsys, tmp_path):
+    """What it prints is what `from_json` reads, but for the number of taxels."""
+    printed = json.loads(shown(capsys, name, "--json"))
+    assert printed.pop("n_taxels") == sensor(name).n_taxels
+    assert Sensor.from_dict(printed) == sensor(name)
+
+
+def test_shows_a_hand(capsys):
+    out = shown(capsys, "allegro-uskin")
+    assert re.search(r"^thumb +uskin-curved +30 +thumb_link3 +0-8, 17-22,", out, re.MULTILINE)
+    printed = json.loads(shown(capsys, "allegro-uskin", "--json"))
+    indices = hand("allegro-uskin").modules["index"].flat_indices.tolist()
+    assert printed["modules"]["index"]["flat_indices"] == indices
+
+
+def test_own_sensor_from_json(capsys, tmp_path):
+    path = tmp_path / "mine.json"
+    path.write_text(json.dumps(sensor("gtac").to_dict() | {"name": "mine"}))
+    assert json.loads(shown(capsys, path, "--json"))["name"] == "mine"
+
+
+def test_own_sensor_from_urdf(capsys, tmp_path):
+    path = tmp_path / "finger.urdf"
+    path.write_text(URDF)
+    assert json.loads(shown(capsys, path, "--base", "tip", "--json"))["n_taxels"] == 1
+    assert refusal(capsys, path) == (
+        f"{path} needs --base LINK: the link that is the fingertip frame"
+    )
+
+
+@pytest.mark.parametrize("name", ["uskin-curved", "papillarray", "allegro-uskin"])
+@pytest.mark.parametrize(
+    ("suffix", "magic"), [(".png", b"\x89PNG"), (".svg", b"<?xml"), (".pdf", b"%PDF")]
+)
+def test_plots(name, suffix, magic, capsys, tmp_path):
+    plot = tmp_path / f"plot{suffix}"
+    shown(capsys, name, "--plot", plot)
+    assert plot.read_bytes().startswith(magic)
+    assert list(tmp_path.iterdir()) == [plot]
+
+
+def test_plots_a_sensor_of_one_oblique_taxel(capsys, tmp_path):
+    path = tmp_path / "one.json"
+    third = 1 / math.sqrt(3)
+    path.write_text(
+        json.dumps(
+            {
+                "name": "one",
+                "positions": [[0, 0, 0]],
+                "rotations": [[[1, 0, 0], [0, 1, 0], [0, 0, 1]]],
+                "normal": [third, third, third],
+                "rate": 100,
+            }
+        )
+    )
+    shown(capsys, path, "--plot", tmp_path / "one.png")
+
+
+def test_a_plot_is_not_overwritten(capsys, tmp_path):
+    plot = tmp_path / "a.svg"
+    plot.write_text("mine")
+    assert refusal(capsys, "gtac", "--plot", plot) == (
+        f"{plot} exists already: choose another name, or give --force"
+    )
+    assert plot.read_text() == "mine"
+    shown(capsys, "gtac", "--plot", plot, "--force")
+    assert plot.read_text() != "mine"
+
+
+def test_refusals(capsys, tmp_path):
+    assert refusal(capsys, "uskin") == (
+        "unknown sensor or hand 'uskin'; built in are uskin-curved, uskin-4x4, uskin-4x6, gtac, "
+        "anyskin, papillarray, allegro-uskin; or give a .json or .urdf file"
+    )
+    assert refusal(capsys, "gtac", "--plot", "a.txt") == (
+        "a plot ends in .pdf, .png, .svg; 'a.txt' given"
+    )
+    assert refusal(capsys, "--plot", "a.svg") == (
+        "--plot and --base need the name of a sensor; holdfast sensors lists them"
+    )
+    assert (
+        refusal(capsys, "gtac", "--base", "tip") == "--base belongs to a .urdf file; 'gtac' given"
+    )
+    missing = tmp_path / "none.json"
+    assert refusal(capsys, missing) == f"{missing}: No such file or directory"
+
+
+def test_ranges():
+    assert _ranges([5, 3, 4, 9]) == "3-5, 9"
