@@ -1,0 +1,29 @@
+"""Recordings on disk: Parquet for analysis, MCAP while recording, and other people's data."""
+
+from holdfast.io.dataset import Dataset, load_dataset
+from holdfast.io.files import load_recording, read_chunks, save_recording
+from holdfast.io.importers import FORMATS, import_recordings
+from holdfast.io.labels import (
+    LabelFile,
+    labels_from_csv,
+    labels_path,
+    labels_to_csv,
+    load_labels,
+    save_labels,
+)
+
+__all__ = [
+    "FORMATS",
+    "Dataset",
+    "LabelFile",
+    "import_recordings",
+    "labels_from_csv",
+    "labels_path",
+    "labels_to_csv",
+    "load_dataset",
+    "load_labels",
+    "load_recording",
+    "read_chunks",
+    "save_labels",
+    "save_recording",
+]

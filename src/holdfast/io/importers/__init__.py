@@ -1,0 +1,77 @@
+"""Other people's recordings: one file a format, loaded by name."""
+
+from collections.abc import Iterator, Mapping
+from dataclasses import replace
+from importlib import import_module
+from pathlib import Path
+from types import ModuleType
+
+from holdfast.errors import RecordingError
+from holdfast.recordings import Recording
+from holdfast.sensors import Sensor
+
+FORMATS = {
+    "uskin-pick-move": "folders of uSkin 4x4 recordings with measured slip (imanlab)",
+    "xela-log": "CSV of a whole hand: a time column and 368 x 3 columns in flat taxel order",
+    "gtac": "CSV of the GTac gripper: 15 magnetic nodes",
+    "arq-crisp": "HDF5 of the ARQ-CRISP slip data sets of 2021 and 2023 (extra: hdf5)",
+    "csv": "the generic CSV of docs/formats.md",
+}
+"""The formats that can be imported, and what they are; sniffed in this order."""
+
+
+def import_recordings(
+    path: str | Path,
+    format: str | None = None,  # noqa: A002 (the command line's own word)
+    *,
+    labels: bool = True,
+    sensors: Mapping[str, Sensor] | None = None,
+) -> Iterator[Recording]:
+    """The recordings that a file or folder of another format holds, one at a time.
+
+    Args:
+        path: of the file or folder.
+        format: one of `FORMATS`; found out from the content where it is not given.
+        labels: keep the labels that the data come with.
+        sensors: sensor by module, for `csv` files that do not name theirs.
+
+    Yields:
+        Recordings, each when it is asked for.
+
+    Raises:
+        RecordingError: there is nothing at `path`, no format fits, or the data contradict
+            the format.
+        MissingExtra: the format needs a package that is not installed.
+        ValueError: there is no format of that name.
+    """
+    place = Path(path)
+    if format is not None and format not in FORMATS:
+        raise ValueError(f"unknown format {format!r}; there are {', '.join(FORMATS)}")
+    if not place.exists():
+        raise RecordingError(f"{place} does not exist; a file or folder to import expected")
+    name = format or _sniffed(place)
+    source = _importer(name)
+    recordings: Iterator[Recording] = (
+        source.read(place, sensors) if name == "csv" else source.read(place)
+    )
+    return recordings if labels else (_bare(recording) for recording in recordings)
+
+
+def _importer(name: str) -> ModuleType:
+    module = "generic_csv" if name == "csv" else name.replace("-", "_")
+    return import_module(f"holdfast.io.importers.{module}")
+
+
+def _sniffed(path: Path) -> str:
+    for name in FORMATS:
+        if _importer(name).sniff(path):
+            return name
+    raise RecordingError(
+        f"{path} is of no format that holdfast knows; there are {', '.join(FORMATS)} "
+        "(choose one with --format)"
+    )
+
+
+def _bare(recording: Recording) -> Recording:
+    modules = {name: replace(module, labels=()) for name, module in recording.modules.items()}
+    return replace(recording, modules=modules)

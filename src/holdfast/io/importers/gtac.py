@@ -1,0 +1,77 @@
+"""Recordings of the GTac gripper: 15 finger sections, each with a 3-axis Hall sensor.
+
+Of the sensor's two layers only the magnetic one has three axes; the piezoresistive cells and
+the servos stay behind.
+"""
+
+from collections.abc import Iterator
+from pathlib import Path
+
+import numpy as np
+
+from holdfast.errors import RecordingError
+from holdfast.io.importers.table import Table, counts_or, csv_files, header_line, read_table
+from holdfast.recordings import Recording, Tactile
+from holdfast.sensors import sensor
+from holdfast.sensors.values import Array
+
+N_NODES = 15
+NAMES = tuple(f"mag_{axis}{node + 1}" for node in range(N_NODES) for axis in "xyz")
+MILLISECOND = 1e-3
+
+
+def sniff(path: Path) -> bool:
+    """Whether it is such a CSV file, or a folder that holds one."""
+    return any(_is_header(header_line(file)) for file in csv_files(path))
+
+
+def read(path: Path) -> Iterator[Recording]:
+    """The recording in a CSV file, or those in the CSV files of a folder.
+
+    Raises:
+        RecordingError: there is no CSV file, or one is not as expected.
+    """
+    files = [file for file in csv_files(path) if path.is_file() or _is_header(header_line(file))]
+    if not files:
+        raise RecordingError(f"no gtac file in {path}; CSV files with columns mag_x1.. expected")
+    return (_recording(file) for file in files)
+
+
+def _is_header(names: tuple[str, ...]) -> bool:
+    if set(NAMES) <= set(names):
+        return True
+    numbered = tuple(str(k) for k in range(len(names) - 1))
+    return len(names) > len(NAMES) + 2 and names == ("", *numbered)
+
+
+def _recording(path: Path) -> Recording:
+    table, _ = read_table(path)
+    if not _is_header(table.names):
+        raise RecordingError(
+            f"{path}: columns mag_x1,mag_y1,...,mag_z{N_NODES} expected, or a header of numbers "
+            f"after an unnamed index; {', '.join(map(repr, table.names[:4]))}... given"
+        )
+    numbered = table.names[0] == "" and "mag_x1" not in table.names
+    values = table.values[:, 1 : 1 + len(NAMES)] if numbered else table.columns(NAMES)
+    times, n_left_out = _times(table)
+    readings = counts_or(values[n_left_out:]).reshape(-1, N_NODES, 3)
+    metadata = {"source": "roobooot/GTac_", "rows_without_time": n_left_out}
+    try:
+        return Recording(path.stem, {"finger1": Tactile(sensor("gtac"), times, readings)}, metadata)
+    except RecordingError as cause:
+        raise RecordingError(f"{path}: {cause}") from cause
+
+
+def _times(table: Table) -> tuple[Array, int]:
+    """Times [s], and how many rows before them have none (the logger's first)."""
+    named = "milliseconds" in table.names
+    milliseconds = table.columns(["milliseconds"])[:, 0] if named else table.values[:, -1]
+    missing = np.isnan(milliseconds)
+    n_left_out = int(missing[0])
+    if missing[1:].any():
+        row = int(np.flatnonzero(missing[1:])[0]) + 1
+        raise RecordingError(
+            f"{table.path}, row {table.first_line + row}: no timestamp; "
+            "only the first row may lack its own"
+        )
+    return milliseconds[n_left_out:] * MILLISECOND, n_left_out

@@ -1,0 +1,59 @@
+"""Logs of a whole hand: a time column, then Fx, Fy, Fz of 368 taxels in flat order."""
+
+from collections.abc import Iterator
+from pathlib import Path
+
+import numpy as np
+
+from holdfast.errors import RecordingError
+from holdfast.io.importers.table import counts_or, csv_files, header_line, read_table
+from holdfast.recordings import Recording, Tactile
+from holdfast.sensors import hand
+
+HAND = "allegro-uskin"
+N_COLUMNS = 368 * 3
+
+
+def sniff(path: Path) -> bool:
+    """Whether it is such a CSV file, or a folder that holds one."""
+    return any(len(header_line(file)) == N_COLUMNS + 1 for file in csv_files(path))
+
+
+def read(path: Path) -> Iterator[Recording]:
+    """The recording in a CSV file, or those in the CSV files of a folder.
+
+    Raises:
+        RecordingError: there is no CSV file, or one is not as expected.
+    """
+    files = csv_files(path)
+    if not files:
+        raise RecordingError(f"no CSV file in {path}; xela-log files expected")
+    return (_recording(file) for file in files)
+
+
+def _recording(path: Path) -> Recording:
+    allegro = hand(HAND)
+    table, _ = read_table(path)
+    n_given = len(table.names) - 1
+    if n_given != allegro.n_taxels * 3:
+        raise RecordingError(
+            f"{path}: a time column and {n_given} others given; {allegro.n_taxels * 3} expected "
+            f"({allegro.n_taxels} taxels x 3 axes of {HAND})"
+        )
+    place = _time_column(table.names)
+    times = table.values[:, place]
+    readings = counts_or(np.delete(table.values, place, axis=1))
+    unit = "count" if np.issubdtype(readings.dtype, np.integer) else "N"
+    try:
+        modules = {
+            name: Tactile(allegro.modules[name].sensor, times, part, unit)  # type: ignore[arg-type]
+            for name, part in allegro.split(readings.reshape(-1, allegro.n_taxels, 3)).items()
+        }
+        return Recording(path.stem, modules, {"hand": HAND, "source": path.name})
+    except RecordingError as cause:
+        raise RecordingError(f"{path}: {cause}") from cause
+
+
+def _time_column(names: tuple[str, ...]) -> int:
+    """The column whose name holds "time"; the first where there is none."""
+    return next((k for k, name in enumerate(names) if "time" in name.lower()), 0)

@@ -1,0 +1,185 @@
+"""Labels of a person or a rule: `<name>.labels.json` beside the recording, and CSV."""
+
+import csv
+from collections.abc import Mapping, Sequence
+from io import StringIO
+from pathlib import Path
+from typing import Literal
+
+import msgspec
+
+from holdfast.contact import Cause, ContactState
+from holdfast.errors import RecordingError
+from holdfast.files import write_whole
+from holdfast.io.header import LabelData, label_data, label_of
+from holdfast.recordings import Label, Recording
+
+SUFFIX = ".labels.json"
+CSV_COLUMNS = ("finger", "start", "end", "state", "cause")
+
+
+class LabelFile(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
+    """What a label file says.
+
+    Attributes:
+        schema: which kind and version of file it is.
+        recording: `Recording.digest` of the recording that was labelled.
+        name: of that recording.
+        modules: labels by module; a module that is not named has none.
+        author: who or what labelled.
+        time: when, as ISO 8601 text; empty where nobody said.
+        notes: free text.
+    """
+
+    schema: Literal["holdfast.labels/1"] = "holdfast.labels/1"
+    recording: str
+    name: str
+    modules: dict[str, list[LabelData]]
+    author: str = ""
+    time: str = ""
+    notes: str = ""
+
+
+def labels_path(path: str | Path) -> Path:
+    """Where the labels of the recording at `path` are kept.
+
+    Example:
+        >>> labels_path("grasps/can_1.parquet").name
+        'can_1.labels.json'
+    """
+    recording = Path(path)
+    return recording.with_name(recording.stem + SUFFIX)
+
+
+def save_labels(
+    recording: Recording,
+    path: str | Path,
+    *,
+    author: str = "",
+    time: str = "",
+    notes: str = "",
+    force: bool = False,
+) -> Path:
+    """Writes the labels of a recording into the label file beside it.
+
+    Args:
+        recording: whose labels are written.
+        path: of the recording.
+        author: who or what labelled.
+        time: when, as ISO 8601 text; io has no clock of its own.
+        notes: free text.
+        force: replace a label file that is there.
+
+    Returns:
+        The path of the label file.
+
+    Raises:
+        OutputError: it exists already or cannot be written.
+    """
+    file = LabelFile(
+        recording=recording.digest,
+        name=recording.name,
+        modules={
+            name: [label_data(label) for label in module.labels]
+            for name, module in recording.modules.items()
+        },
+        author=author,
+        time=time,
+        notes=notes,
+    )
+    target = labels_path(path)
+    write_whole(target, msgspec.json.format(msgspec.json.encode(file)) + b"\n", force=force)
+    return target
+
+
+def load_labels(path: str | Path) -> LabelFile:
+    """What the label file at `path` says.
+
+    Raises:
+        RecordingError: it cannot be read or is no label file.
+    """
+    try:
+        return msgspec.json.decode(Path(path).read_bytes(), type=LabelFile)
+    except OSError as cause:
+        raise RecordingError(f"cannot read {path}: {cause.strerror}") from cause
+    except (msgspec.DecodeError, UnicodeError) as cause:
+        raise RecordingError(f"{path} is no label file: {cause}") from cause
+
+
+def labels_for(path: Path, digest: str) -> Mapping[str, tuple[Label, ...]] | None:
+    """The labels beside the recording at `path`, or None where there are none.
+
+    Args:
+        path: of the recording.
+        digest: of the recording.
+
+    Raises:
+        RecordingError: the label file is of another recording, or none.
+    """
+    file_path = labels_path(path)
+    if not file_path.exists():
+        return None
+    file = load_labels(file_path)
+    if file.recording != digest:
+        raise RecordingError(
+            f"{file_path} labels another recording ({file.name!r}, hash {file.recording[:12]}) "
+            f"than {path.name} (hash {digest[:12]}): remove it or put its recording back"
+        )
+    try:
+        return {
+            name: tuple(label_of(label) for label in labels)
+            for name, labels in file.modules.items()
+        }
+    except ValueError as cause:
+        raise RecordingError(f"{file_path}: {cause}") from cause
+
+
+def labels_to_csv(labels: Mapping[str, Sequence[Label]]) -> str:
+    """Labels by finger as CSV with the columns finger,start,end,state,cause; times in [s]."""
+    text = StringIO()
+    writer = csv.writer(text, lineterminator="\n")
+    writer.writerow(CSV_COLUMNS)
+    for finger, intervals in labels.items():
+        for label in intervals:
+            cause = label.cause or ""
+            state = label.state.value.lower()
+            writer.writerow([finger, repr(label.start), repr(label.end), state, cause])
+    return text.getvalue()
+
+
+def labels_from_csv(path: str | Path, *, author: str = "") -> dict[str, tuple[Label, ...]]:
+    """Labels by finger out of a CSV file with the columns finger,start,end,state,cause.
+
+    Args:
+        path: of the CSV file; times in [s].
+        author: who or what labelled.
+
+    Raises:
+        RecordingError: a column is missing, or a row is no label.
+    """
+    try:
+        rows = list(csv.DictReader(StringIO(Path(path).read_text("utf-8-sig"))))
+    except OSError as cause:
+        raise RecordingError(f"cannot read {path}: {cause.strerror}") from cause
+    except (UnicodeError, csv.Error) as cause:
+        raise RecordingError(f"{path} is no CSV text: {cause}") from cause
+    labels: dict[str, list[Label]] = {}
+    for number, row in enumerate(rows, start=2):
+        finger, label = _from_row(row, f"{path}, row {number}", author)
+        labels.setdefault(finger, []).append(label)
+    return {finger: tuple(intervals) for finger, intervals in labels.items()}
+
+
+def _from_row(row: Mapping[str, str | None], place: str, author: str) -> tuple[str, Label]:
+    if missing := [name for name in CSV_COLUMNS[:4] if not row.get(name)]:
+        raise RecordingError(
+            f"{place}: no {', '.join(missing)}; the columns are {','.join(CSV_COLUMNS)}"
+        )
+    values = {name: (row.get(name) or "").strip() for name in CSV_COLUMNS}
+    try:
+        cause = Cause(values["cause"].lower()) if values["cause"] else None
+        state = ContactState(values["state"].upper())
+        start, end = float(values["start"]), float(values["end"])
+        return values["finger"], Label(start, end, state, cause, "csv", 1.0, author)
+    except ValueError as problem:
+        raise RecordingError(f"{place}: {problem}") from problem

@@ -1,0 +1,101 @@
+"""A recording in consecutive pieces, so that memory stays bounded."""
+
+from collections.abc import Iterable, Iterator, Mapping
+from dataclasses import replace
+from pathlib import Path
+from types import ModuleType
+from typing import Any
+
+import msgspec
+import numpy as np
+import numpy.typing as npt
+
+from holdfast.io.header import Header, Samples, cut_labels, recording_from
+from holdfast.io.labels import labels_for, labels_path
+from holdfast.io.spans import spans
+from holdfast.recordings import Label, Recording
+from holdfast.sensors.values import Array
+
+_Buffer = dict[str, tuple[Array, npt.NDArray[Any]]]
+
+
+def pieces(source: ModuleType, path: Path, n_samples: int) -> Iterator[Recording]:
+    """Recordings of at most `n_samples` samples a module, as `read_chunks` says.
+
+    Args:
+        source: the format: `holdfast.io.parquet` or `holdfast.io.mcap`.
+        path: of the file.
+        n_samples: how many samples of a module a piece holds at most.
+    """
+    header, groups, complete = source.chunks(path)
+    labels = _labels(source, path, header, complete)
+    left = sorted(header.markers)
+    for samples, until in _cuts(groups, n_samples):
+        markers = [marker for marker in left if marker[0] < until]
+        left = left[len(markers) :]
+        part = msgspec.structs.replace(header, markers=markers)
+        piece = recording_from(part, samples, path, complete=complete)
+        yield piece if labels is None else _relabelled(piece, labels)
+
+
+def _labels(
+    source: ModuleType, path: Path, header: Header, complete: bool
+) -> Mapping[str, tuple[Label, ...]] | None:
+    """Labels from beside the file; a file that was cut is read whole to know its digest."""
+    if not labels_path(path).exists():
+        return None
+    known = header.digest if complete else ""
+    return labels_for(path, known or source.load(path).digest)
+
+
+def _relabelled(piece: Recording, labels: Mapping[str, tuple[Label, ...]]) -> Recording:
+    modules = {
+        name: replace(module, labels=cut_labels(labels.get(name, ()), module))
+        for name, module in piece.modules.items()
+    }
+    return replace(piece, modules=modules)
+
+
+def _cuts(groups: Iterable[Samples], n_samples: int) -> Iterator[tuple[Samples, float]]:
+    """Samples of one piece after the other, and the time at which the next one begins."""
+    parts: list[Samples] = []
+    n_held = dict[str, int]()
+    for group in groups:
+        parts.append(group)
+        for topic, (times, _) in group.items():
+            n_held[topic] = n_held.get(topic, 0) + len(times)
+        if max((n for topic, n in n_held.items() if _is_tactile(topic)), default=0) > n_samples:
+            *whole, rest = _split(_joined(parts), n_samples)
+            starts = [_start(piece) for piece in [*whole[1:], rest]]
+            yield from zip(whole, starts, strict=True)
+            parts, n_held = [rest], {topic: len(times) for topic, (times, _) in rest.items()}
+    if parts:
+        yield _joined(parts), np.inf
+
+
+def _split(samples: _Buffer, n_samples: int) -> list[_Buffer]:
+    times = {topic: pair[0] for topic, pair in samples.items()}
+    tactile = [topic for topic in times if _is_tactile(topic)]
+    return [
+        {topic: (samples[topic][0][cut], samples[topic][1][cut]) for topic, cut in span.items()}
+        for span in spans(times, np.inf, n_samples, tactile)
+    ]
+
+
+def _joined(parts: list[Samples]) -> _Buffer:
+    topics = list(dict.fromkeys(topic for part in parts for topic in part))
+    return {
+        topic: (
+            np.concatenate([part[topic][0] for part in parts if topic in part]),
+            np.concatenate([part[topic][1] for part in parts if topic in part]),
+        )
+        for topic in topics
+    }
+
+
+def _start(samples: Samples) -> float:
+    return min(float(times[0]) for times, _ in samples.values() if len(times))
+
+
+def _is_tactile(topic: str) -> bool:
+    return topic.startswith("/tactile/")
