@@ -1,0 +1,46 @@
+"""How good decisions are: by sample, by event, pooled over recordings, with intervals."""
+
+from holdfast.metrics.decisions import Decisions, FingerDecisions, hand_decisions
+from holdfast.metrics.events import (
+    AlarmMatch,
+    EventMetrics,
+    FalseAlarm,
+    InstabilityEvent,
+    event_metrics,
+    match_alarms,
+    pool_events,
+)
+from holdfast.metrics.intervals import Interval, bootstrap_interval, ratio_of_sums
+from holdfast.metrics.samples import SampleMetrics, sample_metrics
+from holdfast.metrics.summary import (
+    EventIntervals,
+    HandEventMetrics,
+    Intervals,
+    Metrics,
+    RecordingMetrics,
+    summarise,
+)
+
+__all__ = [
+    "AlarmMatch",
+    "Decisions",
+    "EventIntervals",
+    "EventMetrics",
+    "FalseAlarm",
+    "FingerDecisions",
+    "HandEventMetrics",
+    "InstabilityEvent",
+    "Interval",
+    "Intervals",
+    "Metrics",
+    "RecordingMetrics",
+    "SampleMetrics",
+    "bootstrap_interval",
+    "event_metrics",
+    "hand_decisions",
+    "match_alarms",
+    "pool_events",
+    "ratio_of_sums",
+    "sample_metrics",
+    "summarise",
+]

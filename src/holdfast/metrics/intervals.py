@@ -1,0 +1,138 @@
+"""Intervals by bootstrap over recordings: neighbouring samples are nearly copies.
+
+A resample draws as many recordings as there are, with replacement; it is told by how often
+each recording was drawn. A statistic takes all resamples at once.
+"""
+
+from collections.abc import Callable, Sequence
+from functools import lru_cache
+
+import numpy as np
+import numpy.typing as npt
+
+from holdfast.metrics.statistics import finite_or_none, quantile
+from holdfast.sensors.values import Array
+
+Interval = tuple[float | None, float | None]
+"""Lower and upper end; None where an end is infinite."""
+
+Statistic = Callable[[Array], Array]
+"""From draws (n, n_recordings) to values (n,); NaN where a resample does not define it."""
+
+_N_BINS = 4096
+"""Bins of about equal count that stand for many scores: far finer than an interval is wide."""
+
+
+def bootstrap_interval(
+    statistic: Statistic,
+    n_recordings: int,
+    *,
+    n: int = 1000,
+    seed: int = 0,
+    level: float = 0.95,
+) -> Interval | None:
+    """The percentile interval of a statistic over resampled recordings.
+
+    Its ends are the (1 - level)/2 and (1 + level)/2 quantiles of the statistic over n
+    resamples. Resamples that do not define the statistic are left out.
+
+    Args:
+        statistic: see `ratio_of_sums`, `auc_of` and `quantile_of`.
+        n_recordings: how many there are.
+        n: how many resamples.
+        seed: of the resamples; the same seed draws the same recordings for every statistic.
+        level: share of the resamples within the interval.
+
+    Returns:
+        The interval; None with fewer than two recordings, or where nothing defines it.
+
+    Example:
+        >>> right, samples = np.array([90, 80, 99]), np.array([100, 100, 100])
+        >>> bootstrap_interval(ratio_of_sums(right, samples), n_recordings=3)
+        (0.8, 0.99)
+    """
+    if n_recordings < 2:
+        return None
+    values = statistic(_draws(n_recordings, n, seed))
+    ordered = np.sort(values[~np.isnan(values)])
+    if not len(ordered):
+        return None
+    low, high = quantile(ordered, (1 - level) / 2), quantile(ordered, (1 + level) / 2)
+    return finite_or_none(low), finite_or_none(high)
+
+
+def ratio_of_sums(parts: npt.ArrayLike, wholes: npt.ArrayLike) -> Statistic:
+    """The statistic sum(parts) / sum(wholes); with wholes of 1, the mean of the parts.
+
+    Args:
+        parts: (n_recordings,).
+        wholes: (n_recordings,).
+    """
+    part, whole = np.asarray(parts, dtype=np.float64), np.asarray(wholes, dtype=np.float64)
+    return lambda draws: _divide(draws @ part, draws @ whole)
+
+
+def auc_of(positives: Sequence[Array], negatives: Sequence[Array]) -> Statistic:
+    """The statistic AUC over the pooled samples.
+
+    With U[r, s] the pairs that positives of recording r win over negatives of recording s,
+    and w[r] how often r was drawn,
+
+        AUC = sum(w[r] w[s] U[r, s]) / (sum(w[r] p[r]) sum(w[s] q[s]))
+
+    which needs no sorting for a resample. Up to 4096 samples U is exact; beyond, scores of
+    one bin count as ties.
+
+    Args:
+        positives: scores of class 1 for each recording.
+        negatives: scores of class 0 for each recording.
+    """
+    ordered = np.sort(np.concatenate([*positives, *negatives]))
+    edges = np.unique(ordered[:: max(1, -(-len(ordered) // _N_BINS))])
+    positive, negative = _histograms(positives, edges), _histograms(negatives, edges)
+    won = positive @ (np.cumsum(negative, axis=1) - negative / 2).T
+    p, q = positive.sum(axis=1), negative.sum(axis=1)
+    return lambda w: _divide(((w @ won) * w).sum(axis=1), (w @ p) * (w @ q))
+
+
+def quantile_of(values: Sequence[Array], q: float) -> Statistic:
+    """The statistic quantile over the pooled values, which may be infinite.
+
+    Args:
+        values: for each recording.
+        q: from 0 to 1.
+    """
+    recordings = np.repeat(np.arange(len(values)), [len(each) for each in values])
+    pooled = np.concatenate([np.empty(0), *values])
+    order = np.argsort(pooled, kind="stable")
+    ordered, recordings = pooled[order], recordings[order]
+
+    def statistic(draws: Array) -> Array:
+        times = draws.astype(np.intp)[:, recordings]
+        each = (quantile(np.repeat(ordered, row), q) for row in times)
+        return np.array([np.nan if value is None else value for value in each])
+
+    return statistic
+
+
+@lru_cache(maxsize=1)
+def _draws(n_recordings: int, n: int, seed: int) -> Array:
+    """(n, n_recordings) how often each resample drew each recording."""
+    shares = np.full(n_recordings, 1 / n_recordings)
+    draws = np.random.default_rng(seed).multinomial(n_recordings, shares, size=n).astype(float)
+    draws.flags.writeable = False
+    return draws
+
+
+def _histograms(scores: Sequence[Array], edges: Array) -> Array:
+    """(n_recordings, n_edges + 1) how many scores of each recording lie in each bin."""
+    bins = [np.searchsorted(edges, np.sort(each), side="right") for each in scores]
+    rows = [np.bincount(each, minlength=len(edges) + 1) for each in bins]
+    return np.array(rows, dtype=np.float64)
+
+
+def _divide(part: Array, whole: Array) -> Array:
+    """Part / whole; NaN where the whole is 0."""
+    out = np.full(len(part), np.nan)
+    np.divide(part, whole, out=out, where=whole > 0)
+    return out
