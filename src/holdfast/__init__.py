@@ -16,6 +16,8 @@ if TYPE_CHECKING:
     from holdfast.contact import ContactEstimate as ContactEstimate
     from holdfast.contact import ContactState as ContactState
     from holdfast.contact import HandEstimate as HandEstimate
+    from holdfast.detector import Detector as Detector
+    from holdfast.detector import detect as detect
     from holdfast.errors import HoldfastError as HoldfastError
     from holdfast.errors import MissingExtra as MissingExtra
     from holdfast.errors import ModelError as ModelError
@@ -23,6 +25,15 @@ if TYPE_CHECKING:
     from holdfast.errors import RecordingError as RecordingError
     from holdfast.errors import StreamError as StreamError
     from holdfast.errors import TrainingError as TrainingError
+    from holdfast.features import FEATURE_NAMES as FEATURE_NAMES
+    from holdfast.features import fingertip_force as fingertip_force
+    from holdfast.features import haar_features as haar_features
+    from holdfast.io import load_dataset as load_dataset
+    from holdfast.io import load_recording as load_recording
+    from holdfast.io import save_recording as save_recording
+    from holdfast.metrics import event_metrics as event_metrics
+    from holdfast.metrics import sample_metrics as sample_metrics
+    from holdfast.model import Model as Model
     from holdfast.recordings import Label as Label
     from holdfast.recordings import Recording as Recording
     from holdfast.recordings import Tactile as Tactile
