@@ -232,7 +232,7 @@ def _spans(mask: npt.NDArray[np.bool_], times: Array) -> Array:
     period = float(np.median(np.diff(times))) if len(times) > 1 else 0.0
     instants = np.append(times, times[-1:] + period)
     edges = np.diff(np.concatenate([[False], mask, [False]]).astype(np.int8))
-    return np.column_stack([instants[edges == 1], instants[edges == -1]])
+    return instants[np.flatnonzero(edges)].reshape(-1, 2)
 
 
 def _events(runs: Array, stable: Array) -> tuple[Array, Array]:

@@ -58,7 +58,7 @@ class Intervals(msgspec.Struct, frozen=True):
     """Intervals of the pooled sample metrics and of the hand's event metrics.
 
     Attributes:
-        n_recordings: how many recordings they rest on.
+        n_recordings: how many recordings they rest on: those with labels.
         level: share of the resamples within each interval.
         accuracy: [%].
         fdr: [%].
@@ -90,7 +90,8 @@ class Metrics(msgspec.Struct, frozen=True):
         pooled: by sample, over all fingers and recordings.
         recordings: of each recording.
         events: by event, over all recordings.
-        intervals: by bootstrap over recordings; None with fewer than two.
+        intervals: by bootstrap over recordings; None with fewer than
+            two recordings that have labels.
     """
 
     fingers: dict[str, SampleMetrics]
@@ -102,7 +103,10 @@ class Metrics(msgspec.Struct, frozen=True):
 
 @dataclass(frozen=True, eq=False)
 class _Counted:
-    """What stays of a recording once its samples are let go."""
+    """What stays of a recording once its samples are let go.
+
+    Fingers, and the hand, without any label have no events and no false alarms.
+    """
 
     name: str
     tallies: Mapping[str, Tally]
@@ -135,7 +139,7 @@ def summarise(
     """
     counted = [_count(each) for each in decisions]
     names = list(dict.fromkeys(name for each in counted for name in each.tallies))
-    tallies = [pool_tallies(list(each.tallies.values())) for each in counted]
+    tallies = [tally for each in counted for tally in each.tallies.values()]
     return Metrics(
         fingers={
             name: measure(pool_tallies([c.tallies[name] for c in counted if name in c.tallies]))
@@ -144,7 +148,7 @@ def summarise(
         pooled=measure(pool_tallies(tallies)),
         recordings=[_recording_metrics(each) for each in counted],
         events=_event_metrics(counted, names),
-        intervals=_intervals(counted, tallies, n_resamples, seed, level),
+        intervals=_intervals([c for c in counted if c.matches], n_resamples, seed, level),
     )
 
 
@@ -153,9 +157,12 @@ def _count(decisions: Decisions) -> _Counted:
         name: tally_samples(finger.labels, finger.states, finger.stable_probability)
         for name, finger in decisions.fingers.items()
     }
-    matches = {name: _match(finger) for name, finger in decisions.fingers.items()}
-    hand = [] if decisions.hand is None else [_match(decisions.hand)]
-    return _Counted(decisions.name, tallies, matches, hand)
+    matches = {
+        name: _match(finger) for name, finger in decisions.fingers.items() if finger.labels.any()
+    }
+    hand = decisions.hand
+    hand_matches = [] if hand is None or not hand.labels.any() else [_match(hand)]
+    return _Counted(decisions.name, tallies, matches, hand_matches)
 
 
 def _match(finger: FingerDecisions) -> AlarmMatch:
@@ -164,7 +171,7 @@ def _match(finger: FingerDecisions) -> AlarmMatch:
 
 def _recording_metrics(counted: _Counted) -> RecordingMetrics:
     fingers = {name: measure(tally) for name, tally in counted.tallies.items()}
-    return RecordingMetrics(counted.name, fingers, _event_metrics([counted], list(counted.matches)))
+    return RecordingMetrics(counted.name, fingers, _event_metrics([counted], list(fingers)))
 
 
 def _event_metrics(counted: Sequence[_Counted], names: Sequence[str]) -> HandEventMetrics:
@@ -174,12 +181,11 @@ def _event_metrics(counted: Sequence[_Counted], names: Sequence[str]) -> HandEve
     return HandEventMetrics(fingers, pool_events([match for c in counted for match in c.hand]))
 
 
-def _intervals(
-    counted: Sequence[_Counted], tallies: Sequence[Tally], n: int, seed: int, level: float
-) -> Intervals | None:
+def _intervals(counted: Sequence[_Counted], n: int, seed: int, level: float) -> Intervals | None:
     if len(counted) < 2:
         return None
     interval = partial(bootstrap_interval, n_recordings=len(counted), n=n, seed=seed, level=level)
+    tallies = [pool_tallies(list(each.tallies.values())) for each in counted]
     samples = {name: interval(each) for name, each in _sample_statistics(tallies).items()}
     events = {name: interval(each) for name, each in _event_statistics(counted).items()}
     missed = {str(post): events.pop(str(post)) for post in POSTS}
@@ -222,4 +228,4 @@ def _event_statistics(counted: Sequence[_Counted]) -> dict[str, Statistic]:
 
 
 _NOTHING = AlarmMatch((), (), 0.0)
-"""Stands for a recording without decisions about the hand, so that all count alike."""
+"""Stands for a recording whose hand has no labels or decisions, so that all count alike."""

@@ -1,0 +1,258 @@
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from holdfast.contact import NO_CONTACT, STABLE, UNKNOWN, UNSTABLE, ContactState
+from holdfast.metrics import (
+    AlarmMatch,
+    InstabilityEvent,
+    event_metrics,
+    match_alarms,
+    pool_events,
+)
+from holdfast.metrics.events import _owners
+
+from . import naive
+
+U, N, F, S = UNKNOWN, NO_CONTACT, UNSTABLE, STABLE
+"""As codes: unlabelled, no contact, unstable ("fails"), stable."""
+
+
+def codes(*runs):
+    """Codes at 100 Hz from (code, n_samples) pairs."""
+    return np.repeat([code for code, _ in runs], [n for _, n in runs]).astype(np.int8)
+
+
+def match(labels, states, start=0.0):
+    return match_alarms(start + 0.01 * np.arange(len(labels)), labels, states)
+
+
+def spans(labels):
+    found = match(labels, np.full(len(labels), S)).events
+    return [(round(event.onset, 6), round(event.end, 6)) for event in found]
+
+
+def ticks(found, start=0.0):
+    def tick(time):
+        return None if time is None else round((time - start) * 100)
+
+    events = [tuple(tick(time) for time in event) for event in found.events]
+    return events, [tick(alarm.time) for alarm in found.false_alarms]
+
+
+@pytest.mark.parametrize(
+    ("runs", "expected"),
+    [
+        pytest.param([(S, 50), (F, 5), (S, 9)], [(0.5, 0.55)], id="just long enough"),
+        pytest.param([(S, 50), (N, 5), (S, 9)], [(0.5, 0.55)], id="no contact is not stable"),
+        pytest.param(
+            [(S, 50), (F, 3), (N, 2)], [(0.5, 0.55)], id="a run of two states, to the end"
+        ),
+        pytest.param([(S, 49), (F, 20)], [], id="not stable for long enough"),
+        pytest.param([(S, 50), (F, 4), (S, 50)], [], id="too short"),
+        pytest.param([(S, 50), (F, 3), (S, 9), (F, 3)], [(0.5, 0.65)], id="stable gap closed"),
+        pytest.param([(S, 50), (F, 3), (U, 9), (F, 3)], [(0.5, 0.65)], id="unlabelled gap closed"),
+        pytest.param([(S, 50), (F, 3), (S, 10), (F, 3)], [], id="gap of 0.1 s stays open"),
+        pytest.param(
+            [(S, 50), (F, 5), (S, 40), (F, 9)], [(0.5, 0.55)], id="stable again too briefly"
+        ),
+        pytest.param([(S, 30), (F, 1), (S, 30), (F, 9)], [], id="a blip breaks the stable time"),
+        pytest.param([(S, 50), (U, 1), (F, 9)], [], id="the onset follows at once"),
+        pytest.param(
+            [(S, 30), (U, 1), (S, 30), (F, 9)], [], id="unlabelled breaks the stable time"
+        ),
+        pytest.param([(S, 50), (F, 9), (U, 30), (F, 9)], [(0.5, 0.59)], id="ends where unlabelled"),
+        pytest.param([(F, 20), (S, 20)], [], id="nothing was held"),
+        pytest.param([(S, 50), (F, 5)] * 2, [(0.5, 0.55), (1.05, 1.1)], id="two"),
+        pytest.param([], [], id="no samples"),
+        pytest.param([(S, 1)], [], id="one sample"),
+    ],
+)
+def test_what_is_an_event(runs, expected):
+    assert spans(codes(*runs)) == expected
+
+
+LABELS = codes((S, 100), (F, 10), (S, 100))
+"""An event from 1.0 s to 1.1 s: alarms from 0.98 s to 1.35 s belong to it."""
+
+
+@pytest.mark.parametrize(
+    ("alarms", "expected"),
+    [
+        ([97], (None, [97])),
+        ([98], (98, [])),
+        ([135], (135, [])),
+        ([136], (None, [136])),
+        ([50, 98, 104, 134, 150], (98, [50, 150])),
+        ([], (None, [])),
+    ],
+)
+def test_which_alarms_belong(alarms, expected):
+    states = np.full(len(LABELS), S)
+    states[alarms] = F
+    found = match(LABELS, states)
+    assert ticks(found) == ([(100, 110, expected[0])], expected[1])
+
+
+@pytest.mark.parametrize(
+    ("runs", "alarms"),
+    [
+        pytest.param([(S, 5), (F, 5)], [5], id="unstable"),
+        pytest.param([(S, 5), (N, 5)], [5], id="no contact"),
+        pytest.param([(S, 5), (F, 2), (N, 2), (F, 1)], [5], id="once per change"),
+        pytest.param([(S, 5), (U, 1), (F, 4)], [], id="consecutive samples alone count"),
+        pytest.param([(U, 5), (F, 5)], [], id="from unknown"),
+        pytest.param([(F, 5), (S, 5)], [], id="becoming stable"),
+        pytest.param([(F, 10)], [], id="never stable"),
+    ],
+)
+def test_what_is_an_alarm(runs, alarms):
+    states = codes(*runs)
+    assert ticks(match(np.full(len(states), S), states)) == ([], alarms)
+
+
+def test_a_false_alarm_tells_under_which_label_it_came():
+    labels = codes((S, 10), (U, 10), (N, 10))
+    states = np.tile([S, S, S, S, F], 6)
+    found = match(labels, states)
+    assert [alarm.label for alarm in found.false_alarms] == [
+        *[ContactState.STABLE] * 2,
+        *[ContactState.UNKNOWN] * 2,
+        *[ContactState.NO_CONTACT] * 2,
+    ]
+    metrics = pool_events([found])
+    assert metrics.false_alarms == {"UNKNOWN": 2, "NO_CONTACT": 2, "UNSTABLE": 0, "STABLE": 2}
+    assert metrics.false_alarms_per_minute == pytest.approx(6 / (0.1 / 60))
+
+
+def test_an_alarm_in_two_windows_belongs_to_the_later_event():
+    onsets, ends = np.array([1.0, 1.2]), np.array([1.1, 1.3])
+    alarms = np.array([0.5, 1.0, 1.17, 1.18, 1.55, 1.6])
+    assert _owners(alarms, onsets, ends).tolist() == [-1, 0, 0, 1, 1, -1]
+
+
+def test_figures_by_hand():
+    events = [InstabilityEvent(t, t + 1, t + d) for t, d in ((1, 0.03), (3, 0.05), (5, 0.15))]
+    metrics = pool_events(
+        [AlarmMatch(tuple(events), (), 90.0), AlarmMatch((InstabilityEvent(1.0, 2.0),), (), 30.0)]
+    )
+    assert (metrics.n_events, metrics.stable_minutes) == (4, 2.0)
+    assert metrics.missed == {"0.05": 50.0, "0.1": 50.0, "0.2": 25.0}
+    assert metrics.delay_median == pytest.approx(0.1)
+    assert metrics.delay_p95 is None
+    assert metrics.false_alarms_per_minute == 0.0
+
+
+def test_nothing_has_no_figures():
+    for metrics in (pool_events([]), event_metrics([], [], [])):
+        assert (metrics.n_events, metrics.stable_minutes) == (0, 0.0)
+        assert metrics.missed == {"0.05": None, "0.1": None, "0.2": None}
+        assert metrics.delay_median is None
+        assert metrics.delay_p95 is None
+        assert metrics.false_alarms_per_minute is None
+
+
+def test_a_label_holds_until_the_next_sample_however_late():
+    times = [0.0, 0.1, 0.2, 1.2, 1.3]
+    found = match_alarms(times, [S, S, S, F, F], [S, S, S, S, F])
+    (event,) = found.events
+    assert (event.onset, event.end) == (1.2, pytest.approx(1.4))
+    assert event.delay == pytest.approx(0.1)
+    assert found.stable_seconds == pytest.approx(1.2)
+
+
+def test_arguments_that_do_not_fit_are_refused():
+    with pytest.raises(ValueError, match=r"given times \(2,\), labels \(1,\), states \(2,\)"):
+        event_metrics([0.0, 0.1], [S], [S, S])
+    with pytest.raises(ValueError, match="strictly increasing times expected"):
+        event_metrics([0.1, 0.0], [S, S], [S, S])
+
+
+code = st.sampled_from([U, N, F, S, S, S])
+length = st.sampled_from([2, 3, 4, 5, 6, 9, 10, 11, 25, 26, 49, 50, 51, 70])
+sequence = st.lists(st.tuples(code, length), min_size=1, max_size=14).map(lambda r: codes(*r))
+
+
+@st.composite
+def recordings(draw):
+    labels = draw(sequence)
+    states = np.resize(draw(sequence), len(labels))
+    return labels, np.roll(labels, draw(st.integers(0, 40))) if draw(st.booleans()) else states
+
+
+@given(recordings(), st.sampled_from([0.0, -7.3, 1.7e9]))
+def test_the_twin_in_ticks_agrees_wherever_time_begins(recording, start):
+    labels, states = recording
+    found = match(labels, states, start)
+    assert ticks(found, start) == naive.match(labels, states)
+    assert found.stable_seconds == pytest.approx(0.01 * (labels == S).sum(), abs=1e-5)
+
+
+@given(recordings(), recordings())
+def test_a_cut_in_a_calm_stretch_changes_nothing(one, two):
+    calm = codes((S, 60))
+    first = [np.concatenate([part, calm]) for part in one]
+    second = [np.concatenate([calm, part]) for part in two]
+    whole = pool_events(
+        [match(*(np.concatenate(pair) for pair in zip(first, second, strict=True)))]
+    )
+    parts = pool_events([match(*first), match(*second, start=33.0)])
+    assert whole.n_events == parts.n_events
+    assert whole.missed == parts.missed
+    assert whole.false_alarms == parts.false_alarms
+    assert whole.stable_minutes == pytest.approx(parts.stable_minutes)
+    assert whole.delay_median == pytest.approx(parts.delay_median, abs=1e-6)
+
+
+well_formed = st.lists(
+    st.tuples(st.integers(50, 90), st.sampled_from([N, F]), st.integers(5, 60)),
+    min_size=1,
+    max_size=6,
+)
+
+
+def alternating(grasps):
+    return codes(*(run for held, lost, n in grasps for run in ((S, held), (lost, n))), (S, 50))
+
+
+@given(well_formed)
+def test_a_perfect_detector_misses_nothing_and_has_no_false_alarm(grasps):
+    labels = alternating(grasps)
+    metrics = event_metrics(0.01 * np.arange(len(labels)), labels, labels)
+    assert metrics.n_events == len(grasps)
+    assert set(metrics.missed.values()) == {0.0}
+    assert (metrics.delay_median, metrics.delay_p95) == (0.0, 0.0)
+    assert metrics.false_alarms_per_minute == 0.0
+
+
+@given(well_formed, st.integers(-2, 29))
+def test_delays_shift_as_alarms_do(grasps, shift):
+    labels = alternating(grasps)
+    states = np.roll(labels, shift)
+    states[: max(shift, 0)] = S
+    metrics = event_metrics(0.01 * np.arange(len(labels)), labels, states)
+    assert metrics.delay_median == pytest.approx(0.01 * shift, abs=1e-9)
+    assert metrics.delay_p95 == pytest.approx(0.01 * shift, abs=1e-9)
+    expected = {str(post): 100.0 * (shift > 100 * post) for post in (0.05, 0.1, 0.2)}
+    assert metrics.missed == expected
+
+
+@given(recordings(), st.integers(0, 2**32 - 1))
+def test_jitter_far_below_a_period_moves_times_alone(recording, seed):
+    labels, states = recording
+    times = 0.01 * np.arange(len(labels))
+    jitter = np.random.default_rng(seed).uniform(-1e-8, 1e-8, len(labels))
+    one, two = match_alarms(times, labels, states), match_alarms(times + jitter, labels, states)
+    assert ticks(one) == ticks(two)
+
+
+def test_the_example_of_the_documentation():
+    labels = codes((S, 100), (F, 10), (S, 100))
+    states = codes((S, 103), (F, 9), (S, 48), (F, 2), (S, 48))
+    metrics = event_metrics(0.01 * np.arange(210), labels, states)
+    assert metrics.n_events == 1
+    assert metrics.missed == {"0.05": 0.0, "0.1": 0.0, "0.2": 0.0}
+    assert metrics.delay_median == pytest.approx(0.03)
+    assert metrics.stable_minutes == pytest.approx(2 / 60)
+    assert metrics.false_alarms_per_minute == pytest.approx(30)
