@@ -26,6 +26,9 @@ Samples = Mapping[str, tuple[Array, npt.NDArray[Any]]]
 """Times (n,) and values (n, ...) by topic."""
 
 
+_EMPTY_CUT = "is cut so early that nothing can be recovered: it has no samples"
+
+
 class LabelData(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     """A label as a file holds it; fields as in `Label`, states in lower case."""
 
@@ -221,6 +224,9 @@ def recording_from(
         RecordingError: the samples contradict the header or each other.
     """
     sensors = sensors_of(header)
+    if not any(len(samples[topic][0]) for topic in samples if topic.startswith("/tactile/")):
+        state = "has no samples" if complete else _EMPTY_CUT
+        raise RecordingError(f"{path} {state}")
     try:
         modules = {
             name: _tactile(module, sensors[name], samples.get(f"/tactile/{name}"))

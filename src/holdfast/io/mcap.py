@@ -24,6 +24,7 @@ from holdfast.io import cdr
 from holdfast.io.header import (
     Header,
     Samples,
+    Series,
     decode,
     empty,
     header_of,
@@ -50,6 +51,12 @@ _MOST_CHUNK = 1 << 30
 """A chunk that claims to be larger than this when unpacked is refused."""
 
 
+class _Found(NamedTuple):
+    topic: str
+    schema: str
+    data: bytes
+
+
 def save(recording: Recording, path: Path, *, force: bool = False) -> None:
     """Writes a recording as it would have been recorded.
 
@@ -64,15 +71,23 @@ def save(recording: Recording, path: Path, *, force: bool = False) -> None:
     with whole_file(path, force=force) as part:
         log = MessageLog(part, header, force=True)
         try:
-            for time, text in recording.markers:
-                log.text(MARKERS_TOPIC, time, text)
-            times = {topic: pair[0] for topic, pair in samples.items()}
-            for span in spans(times, MESSAGE_SECONDS):
-                for topic, cut in span.items():
-                    if cut.start < cut.stop:
-                        log.samples(topic, samples[topic][0][cut], samples[topic][1][cut])
+            _write(log, samples, list(recording.markers))
         finally:
             log.close()
+
+
+def _write(log: MessageLog, samples: Samples, markers: list[tuple[float, str]]) -> None:
+    """Writes all in the order of time; markers keep their own order."""
+    times = {topic: pair[0] for topic, pair in samples.items()}
+    for span in spans(times, MESSAGE_SECONDS):
+        for topic, cut in span.items():
+            if cut.start < cut.stop:
+                log.samples(topic, samples[topic][0][cut], samples[topic][1][cut])
+        newest = max(times[topic][cut.stop - 1] for topic, cut in span.items() if cut.stop)
+        while markers and markers[0][0] <= newest:
+            log.text(MARKERS_TOPIC, *markers.pop(0))
+    for time, text in markers:
+        log.text(MARKERS_TOPIC, time, text)
 
 
 def load(path: Path) -> Recording:
@@ -81,20 +96,23 @@ def load(path: Path) -> Recording:
     Raises:
         RecordingError: it is damaged, no recording, or nothing can be recovered.
     """
-    header, groups, complete = chunks(path)
+    complete = _is_whole(path)
+    messages = _messages(path, complete)
+    header = _header(path, messages, complete)
     parts: dict[str, tuple[list[Array], list[npt.NDArray[Any]]]] = {
         series.topic: ([np.empty(0)], [empty(series)] if series.number else [])
         for series in series_of(header)
     }
-    for group in groups:
-        for topic, (times, values) in group.items():
-            parts[topic][0].append(times)
-            parts[topic][1].append(values)
+    markers: list[tuple[float, str]] = []
+    for topic, (times, values) in _samples(path, header, messages, markers):
+        parts[topic][0].append(times)
+        parts[topic][1].append(values)
     samples = {
         topic: (np.concatenate(times), np.concatenate(values))
         for topic, (times, values) in parts.items()
         if values
     }
+    header = msgspec.structs.replace(header, markers=markers)
     recording = recording_from(header, _even(samples), path, complete=complete)
     if complete and header.digest and recording.digest != header.digest:
         raise RecordingError(f"{path} is damaged: its samples do not match their digest")
@@ -107,23 +125,13 @@ def chunks(path: Path) -> tuple[Header, Iterator[Samples], bool]:
     Raises:
         RecordingError: as `load`.
     """
-    complete = _is_finished(path)
-    if complete:
-        _check_sums(path)
-    header, markers = None, []
-    for message in _messages(path, complete):
-        if message.topic == HEADER_TOPIC:
-            header = decode(cdr.unpack_text(message.data)[1], path)
-        elif message.topic == MARKERS_TOPIC:
-            markers.append(cdr.unpack_text(message.data))
-    if header is None:
-        raise RecordingError(
-            f"{path} is an MCAP file but no recording of holdfast"
-            if complete
-            else f"{path} is cut so early that nothing can be recovered: it has no header"
-        )
+    complete = _is_whole(path)
+    messages = _messages(path, complete)
+    header = _header(path, messages, complete)
+    markers = [cdr.unpack_text(m.data) for m in messages if m.topic == MARKERS_TOPIC]
     header = msgspec.structs.replace(header, markers=markers)
-    return header, _samples(path, header, complete), complete
+    again = _samples(path, header, _messages(path, complete), [])
+    return header, ({topic: pair} for topic, pair in again), complete
 
 
 def is_foreign(path: Path) -> bool:
@@ -133,30 +141,56 @@ def is_foreign(path: Path) -> bool:
     return head.startswith(MAGIC) and len(head) >= 64 and LIBRARY.encode() not in head
 
 
-class _Found(NamedTuple):
-    topic: str
-    schema: str
-    data: bytes
+def _is_whole(path: Path) -> bool:
+    """Whether the file is whole, and then that all its bytes are as they were written.
+
+    Raises:
+        RecordingError: it is whole but damaged, or of another program.
+    """
+    if is_foreign(path):
+        raise RecordingError(f"{path} is an MCAP file but no recording of holdfast")
+    complete = _is_finished(path)
+    if complete:
+        _check_sums(path)
+    return complete
 
 
-def _samples(path: Path, header: Header, complete: bool) -> Iterator[Samples]:
+def _header(path: Path, messages: Iterator[_Found], complete: bool) -> Header:
+    """The header, which is the first message."""
+    first = next(messages, None)
+    if first is not None and first.topic == HEADER_TOPIC:
+        return decode(cdr.unpack_text(first.data)[1], path)
+    if complete:
+        raise RecordingError(f"{path} is an MCAP file but no recording of holdfast")
+    raise RecordingError(f"{path} is cut so early that nothing can be recovered: it has no header")
+
+
+def _samples(
+    path: Path,
+    header: Header,
+    messages: Iterator[_Found],
+    markers: list[tuple[float, str]],
+) -> Iterator[tuple[str, tuple[Array, npt.NDArray[Any]]]]:
+    """Topic, times and values of each message; markers are put into the list."""
     every = {series.topic: series for series in series_of(header)}
-    for message in _messages(path, complete):
-        if message.topic in (HEADER_TOPIC, MARKERS_TOPIC):
-            continue
-        series = every.get(message.topic)
-        number = message.schema.removeprefix("holdfast_msgs/msg/").removesuffix("Samples").lower()
-        try:
-            times, values = cdr.unpack_samples(message.data, number)
-        except (ValueError, TypeError) as cause:
-            raise RecordingError(f"{path}: {message.topic}: {cause}") from cause
-        if (
-            series is None
-            or series.number not in (None, number)
-            or values.shape[1:] != series.shape
-        ):
-            raise RecordingError(f"{path}: {message.topic} is not as the header says")
-        yield {message.topic: (times, values)}
+    for message in messages:
+        if message.topic == MARKERS_TOPIC:
+            markers.append(cdr.unpack_text(message.data))
+        elif message.topic != HEADER_TOPIC:
+            yield message.topic, _unpacked_samples(path, message, every.get(message.topic))
+
+
+def _unpacked_samples(
+    path: Path, message: _Found, series: Series | None
+) -> tuple[Array, npt.NDArray[Any]]:
+    number = message.schema.removeprefix("holdfast_msgs/msg/").removesuffix("Samples").lower()
+    try:
+        times, values = cdr.unpack_samples(message.data, number)
+    except (ValueError, TypeError) as cause:
+        raise RecordingError(f"{path}: {message.topic}: {cause}") from cause
+    if series is None or series.number not in (None, number) or values.shape[1:] != series.shape:
+        raise RecordingError(f"{path}: {message.topic} is not as the header says")
+    return times, values
 
 
 def _even(samples: dict[str, tuple[Array, npt.NDArray[Any]]]) -> Samples:

@@ -138,10 +138,12 @@ class RecordingWriter:
         Raises:
             OutputError: the disk refuses.
         """
-        for name, parts in self._pending.items():
-            if parts:
-                self._write(name, before=np.inf)
-        self._log.close()
+        try:
+            for name, parts in self._pending.items():
+                if parts and not self._log.closed:
+                    self._write(name, before=np.inf)
+        finally:
+            self._log.close()
 
     def __enter__(self) -> Self:
         return self
@@ -195,6 +197,9 @@ class MessageLog:
         header: of the recording; it goes to disk at once.
         force: replace what is there.
 
+    Attributes:
+        closed: whether the file has ended.
+
     Raises:
         OutputError: the file exists already or cannot be written.
     """
@@ -207,7 +212,7 @@ class MessageLog:
         self._schemas: dict[str, int] = {}
         self._n_messages = 0
         self._span = (np.inf, -np.inf)
-        self._closed = False
+        self.closed = False
         with _refusals(path):
             self._file = path.open("wb" if force else "xb", buffering=0)
             self._writer = Writer(
@@ -223,18 +228,15 @@ class MessageLog:
 
     def samples(self, topic: str, times: Array, values: npt.NDArray[Any]) -> None:
         """Writes one message of samples; times (n,) [s], values (n, ...)."""
-        start, end = float(times[0]), float(times[-1])
-        first, last = min(start, self._span[0]), max(end, self._span[1])
-        if last - first > CHUNK_SECONDS:
-            self.flush()
-            first, last = start, end
-        self._span = (first, last)
+        start = float(times[0])
+        self._make_room(start, float(times[-1]))
         number = number_of(values, topic)
         channel = self._channel(topic, cdr.type_name(number), cdr.schema(number))
         self._message(channel, start, cdr.pack_samples(times, values))
 
     def text(self, topic: str, time: float, text: str) -> None:
         """Writes one message of text."""
+        self._make_room(time, time)
         channel = self._channel(topic, cdr.TEXT_TYPE, cdr.TEXT_SCHEMA)
         self._message(channel, time, cdr.pack_text(time, text))
 
@@ -246,12 +248,20 @@ class MessageLog:
 
     def close(self) -> None:
         """Ends the file."""
-        if self._closed:
+        if self.closed:
             return
-        self._closed = True
+        self.closed = True
         with _refusals(self._path), self._file:
             self._writer.finish()  # type: ignore[no-untyped-call]
             self._writer.flush()  # type: ignore[no-untyped-call]
+
+    def _make_room(self, start: float, end: float) -> None:
+        """Ends the chunk where it would grow too long with a message of this time."""
+        first, last = min(start, self._span[0]), max(end, self._span[1])
+        if last - first > CHUNK_SECONDS:
+            self.flush()
+            first, last = start, end
+        self._span = (first, last)
 
     def _channel(self, topic: str, kind: str, definition: str) -> int:
         if topic not in self._channels:

@@ -29,7 +29,7 @@ from holdfast.io.header import (
     samples_of,
     series_of,
 )
-from holdfast.io.seal import BLANK, KEY, check_seal, seal
+from holdfast.io.seal import BLANK, KEY, check_seal, read_footer, seal
 from holdfast.io.spans import spans
 from holdfast.recordings import Recording
 from holdfast.sensors.values import Array
@@ -99,11 +99,8 @@ def chunks(path: Path) -> tuple[Header, Iterator[Samples], bool]:
 
 def is_foreign(path: Path) -> bool:
     """Whether it is sound Parquet that holds something else than a recording."""
-    try:
-        keys = pq.read_metadata(path).metadata or {}
-    except (pa.ArrowException, OSError):
-        return False
-    return not any(key.startswith(b"holdfast") for key in keys)
+    _, footer = read_footer(path)
+    return footer.endswith(MAGIC) and not any(key.encode() in footer for key in (HEADER_KEY, KEY))
 
 
 def _open(path: Path) -> tuple[Header, pq.ParquetFile]:

@@ -38,8 +38,8 @@ def check_seal(path: Path) -> None:
         raise RecordingError(f"{path} is damaged: its content does not match its seal")
 
 
-def _place(path: Path) -> int:
-    """Where the seal's characters begin."""
+def read_footer(path: Path) -> tuple[int, bytes]:
+    """Where the footer of a Parquet file begins, and its bytes."""
     size = path.stat().st_size
     with path.open("rb") as file:
         file.seek(max(0, size - TAIL))
@@ -47,7 +47,12 @@ def _place(path: Path) -> int:
         footer_size = int.from_bytes(tail[:4], "little") + TAIL
         file.seek(max(0, size - footer_size))
         start = file.tell()
-        footer = file.read()
+        return start, file.read()
+
+
+def _place(path: Path) -> int:
+    """Where the seal's characters begin."""
+    start, footer = read_footer(path)
     # In the footer's thrift encoding a value follows its key: field header, varint length.
     mark = KEY.encode() + b"\x18" + bytes([len(BLANK)])
     if footer.count(mark) != 1:

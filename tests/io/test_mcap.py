@@ -1,0 +1,234 @@
+import os
+import random
+import signal
+import subprocess
+import sys
+import zlib
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from mcap.reader import make_reader
+from mcap.records import Chunk
+from mcap.stream_reader import StreamReader
+from mcap.writer import MCAP0_MAGIC, CompressionType, Writer
+from mcap_ros2.decoder import DecoderFactory
+
+from holdfast.errors import RecordingError
+from holdfast.io import load_recording, save_recording
+from holdfast.recordings import Truth
+
+SAMPLE_TOPICS = ("/tactile/thumb", "/tactile/index/1")
+
+
+@settings(deadline=None, max_examples=60)
+@given(data=st.data())
+def test_what_is_written_is_read(data, recordings, assert_same, tmp_path_factory):
+    recording = data.draw(recordings)
+    path = tmp_path_factory.mktemp("round") / "trip.mcap"
+    save_recording(recording, path)
+    assert_same(load_recording(path), recording)
+
+
+def test_a_whole_recording(make_recording, assert_same, tmp_path):
+    recording = make_recording()
+    save_recording(recording, tmp_path / "a.mcap")
+    loaded = load_recording(tmp_path / "a.mcap")
+    assert_same(loaded, recording)
+    assert loaded.complete
+
+
+def test_others_decode_it(make_recording, tmp_path):
+    recording = make_recording()
+    save_recording(recording, tmp_path / "a.mcap")
+    found = {}
+    with (tmp_path / "a.mcap").open("rb") as file:
+        reader = make_reader(file, decoder_factories=[DecoderFactory()])
+        for _, channel, _, message in reader.iter_decoded_messages():
+            found.setdefault(channel.topic, []).append(message)
+    for topic, module in zip(SAMPLE_TOPICS, recording.modules.values(), strict=True):
+        values = np.concatenate([np.asarray(message.values) for message in found[topic]])
+        times = np.concatenate([np.asarray(message.times) for message in found[topic]])
+        assert list(found[topic][0].shape) == [module.sensor.n_taxels, 3]
+        np.testing.assert_array_equal(times, module.times)
+        np.testing.assert_array_equal(values.reshape(module.readings.shape), module.readings)
+    phases = [text for message in found["/truth/hand/phase"] for text in message.values]
+    assert phases == recording.truth.hand["phase"].tolist()
+    slides = [flag for m in found["/truth/finger/thumb/slides"] for flag in m.values]
+    assert slides == recording.truth.fingers["thumb"]["slides"].tolist()
+    assert [(m.time, m.text) for m in found["/holdfast/markers"]] == list(recording.markers)
+
+
+def test_messages_and_chunks_are_short(make_recording, tmp_path):
+    save_recording(make_recording(), tmp_path / "a.mcap")
+    with (tmp_path / "a.mcap").open("rb") as file:
+        records = list(StreamReader(file, emit_chunks=True, validate_crcs=True).records)
+    chunks = [record for record in records if isinstance(record, Chunk)]
+    assert all(chunk.message_end_time - chunk.message_start_time <= 0.3e9 for chunk in chunks[1:])
+    with (tmp_path / "a.mcap").open("rb") as file:
+        reader = make_reader(file, decoder_factories=[DecoderFactory()])
+        for _, channel, _, message in reader.iter_decoded_messages(topics=SAMPLE_TOPICS):
+            assert message.times[-1] - message.times[0] <= 0.1, channel.topic
+
+
+def test_any_flipped_bit_is_found(make_recording, flipped, tmp_path):
+    path, damaged = tmp_path / "a.mcap", tmp_path / "b.mcap"
+    save_recording(make_recording(150), path)
+    for place, raw in flipped(path.read_bytes(), 500):
+        damaged.write_bytes(raw)
+        with pytest.raises(RecordingError):
+            load_recording(damaged)
+            pytest.fail(f"bit at byte {place} not found")
+
+
+def assert_prefix(got, want):
+    """Every module, label and truth array is the beginning of the whole one's."""
+    assert not got.complete
+    for name, module in got.modules.items():
+        n = module.n_samples
+        np.testing.assert_array_equal(module.times, want.modules[name].times[:n])
+        np.testing.assert_array_equal(module.readings, want.modules[name].readings[:n])
+        np.testing.assert_array_equal(module.label_states, want.modules[name].label_states[:n])
+    n = len(got.truth.times)
+    for name, array in got.truth.hand.items():
+        np.testing.assert_array_equal(array, want.truth.hand[name][:n])
+
+
+def test_a_file_cut_anywhere_gives_what_is_left(make_recording, tmp_path):
+    recording = make_recording(450)
+    path, cut = tmp_path / "a.mcap", tmp_path / "b.mcap"
+    save_recording(recording, path)
+    raw = path.read_bytes()
+    chance = random.Random(0)
+    sizes = sorted({*(chance.randrange(len(raw)) for _ in range(150)), len(raw) - 1, len(raw) - 9})
+    n_before = 0
+    for size in sizes:
+        cut.write_bytes(raw[:size])
+        try:
+            part = load_recording(cut)
+        except RecordingError as refusal:
+            assert n_before == 0, refusal
+            continue
+        assert_prefix(part, recording)
+        assert part.modules["thumb"].n_samples >= n_before
+        n_before = part.modules["thumb"].n_samples
+    assert n_before == recording.modules["thumb"].n_samples
+
+
+def test_a_cut_and_damaged_file_gives_a_sound_prefix_or_nothing(make_recording, flipped, tmp_path):
+    recording = make_recording(450)
+    path = tmp_path / "a.mcap"
+    save_recording(recording, path)
+    raw = path.read_bytes()
+    n_sound = 0
+    for _, damaged in flipped(raw[: len(raw) * 2 // 3], 300, seed=1):
+        path.write_bytes(damaged)
+        try:
+            part = load_recording(path)
+        except RecordingError:
+            continue
+        assert_prefix(part, recording)
+        n_sound += 1
+    assert 0 < n_sound < 300
+
+
+def test_a_cut_before_the_first_samples_is_refused(make_recording, tmp_path):
+    path = tmp_path / "a.mcap"
+    save_recording(make_recording(), path)
+    raw = path.read_bytes()
+    messages = set()
+    for size in (0, 4, 8, 60, 300, 2000):
+        path.write_bytes(raw[:size])
+        with pytest.raises(RecordingError) as caught:
+            load_recording(path)
+        messages.add(str(caught.value).removeprefix(str(path)))
+    assert messages == {
+        " is empty (0 bytes); an MCAP recording expected",
+        " is no MCAP file, or its first bytes are damaged",
+        " is cut so early that nothing can be recovered: it has no header",
+        " is cut so early that nothing can be recovered: it has no samples",
+    }
+
+
+def test_zeros_after_the_cut_are_no_data(make_recording, tmp_path):
+    recording = make_recording()
+    path = tmp_path / "a.mcap"
+    save_recording(recording, path)
+    raw = path.read_bytes()
+    path.write_bytes(raw[: len(raw) // 2] + bytes(5000))
+    try:
+        assert_prefix(load_recording(path), recording)
+    except RecordingError as refusal:
+        assert "fails its checksum" in str(refusal)
+
+
+def test_a_chunk_lost_from_the_middle_is_damage(make_recording, tmp_path):
+    path = tmp_path / "a.mcap"
+    save_recording(make_recording(), path)
+    with path.open("rb") as file:
+        chunks = [r for r in StreamReader(file, emit_chunks=True).records if isinstance(r, Chunk)]
+    raw = path.read_bytes()
+    lost = raw.index(chunks[5].data)
+    opcode = raw.rindex(b"\x06" + (len(chunks[5].data) + 44).to_bytes(8, "little"), 0, lost)
+    damaged = raw[:opcode] + b"\x7f" + raw[opcode + 1 : len(raw) * 2 // 3]
+    path.write_bytes(damaged)
+    with pytest.raises(RecordingError, match=r"is damaged: message \d+ is missing"):
+        load_recording(path)
+
+
+def test_files_of_others_are_refused(tmp_path):
+    path = tmp_path / "a.mcap"
+    path.write_text("time,t01_x\n0,1\n")
+    with pytest.raises(RecordingError, match="is no MCAP file, or its first bytes are damaged"):
+        load_recording(path)
+    with path.open("wb") as file:
+        writer = Writer(file, compression=CompressionType.NONE)
+        writer.start()
+        channel = writer.register_channel("/a", "json", 0)
+        writer.add_message(channel, 0, b"{}", 0)
+        writer.finish()
+    with pytest.raises(RecordingError, match="is an MCAP file but no recording of holdfast"):
+        load_recording(path)
+
+
+def test_truth_that_would_share_a_topic_is_refused(make_recording, tmp_path):
+    zeros = np.zeros(1)
+    truth = Truth(np.array([0.0]), {}, {"a": {"b/c": zeros}, "a/b": {"c": zeros}})
+    with pytest.raises(RecordingError, match="two truth arrays of the recording would share"):
+        save_recording(make_recording(truth=truth), tmp_path / "a.mcap")
+
+
+def test_a_kill_loses_at_most_half_a_second(tmp_path):
+    code = f"""
+import sys, numpy as np
+from holdfast.io.mcap_writer import RecordingWriter
+from holdfast.sensors import sensor
+sensors = {{"thumb": sensor("anyskin"), "index": sensor("anyskin")}}
+writer = RecordingWriter({str(tmp_path / "a.mcap")!r}, sensors)
+for k in range(10**9):
+    for name in ("thumb", "index"):
+        writer.append(name, [k / 150], np.full((1, 5, 3), k, np.uint16))
+    if k % 150 == 0:
+        print(k, flush=True)
+"""
+    with subprocess.Popen([sys.executable, "-c", code], stdout=subprocess.PIPE) as process:
+        for _ in range(5):
+            newest = int(process.stdout.readline())
+        os.kill(process.pid, signal.SIGKILL)
+    recording = load_recording(tmp_path / "a.mcap")
+    assert not recording.complete
+    for module in recording.modules.values():
+        assert module.times[-1] >= newest / 150 - 0.5
+        np.testing.assert_array_equal(module.readings[:, 0, 0], np.arange(module.n_samples))
+
+
+def test_all_bytes_are_under_a_checksum(make_recording, tmp_path):
+    """The checks rest on CRCs that the MCAP format itself has: others find damage too."""
+    path = tmp_path / "a.mcap"
+    save_recording(make_recording(90), path)
+    raw = path.read_bytes()
+    assert raw.endswith(MCAP0_MAGIC)
+    start = int.from_bytes(raw[-28:-20], "little")
+    assert zlib.crc32(raw[: start - 13]) == int.from_bytes(raw[start - 4 : start], "little")
+    assert zlib.crc32(raw[start:-12]) == int.from_bytes(raw[-12:-8], "little")

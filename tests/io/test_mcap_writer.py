@@ -1,0 +1,124 @@
+import errno
+import re
+from itertools import pairwise
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from holdfast.errors import OutputError, RecordingError
+from holdfast.io import load_recording
+from holdfast.io.mcap_writer import RecordingWriter
+from holdfast.sensors import sensor
+
+ANYSKIN = sensor("anyskin")
+
+
+def readings(n, number=np.uint16):
+    return np.arange(n * 15).reshape(n, 5, 3).astype(number)
+
+
+@settings(deadline=None, max_examples=30)
+@given(cuts=st.lists(st.integers(0, 100), max_size=20))
+def test_samples_come_back_however_they_were_given(cuts, tmp_path_factory):
+    path = tmp_path_factory.mktemp("writer") / "a.mcap"
+    times, values = np.arange(100) * 0.013 - 0.5, readings(100)
+    edges = [0, *sorted(cuts), 100]
+    with RecordingWriter(path, {"thumb": ANYSKIN, "none": ANYSKIN}) as writer:
+        for first, last in pairwise(edges):
+            writer.append("thumb", times[first:last], values[first:last])
+    recording = load_recording(path)
+    np.testing.assert_array_equal(recording.modules["thumb"].times, times)
+    np.testing.assert_array_equal(recording.modules["thumb"].readings, values)
+    assert recording.modules["thumb"].readings.dtype == np.uint16
+    assert recording.modules["none"].n_samples == 0
+    assert recording.complete
+
+
+def test_all_that_was_said_comes_back(tmp_path):
+    with RecordingWriter(
+        tmp_path / "a.mcap",
+        {"thumb": ANYSKIN},
+        name="grasp",
+        units={"thumb": "N"},
+        metadata={"object": "can"},
+        media=[("a.mp4", 0.5)],
+    ) as writer:
+        writer.append("thumb", [1.0], readings(1))
+        writer.mark(1.0, "now")
+    recording = load_recording(tmp_path / "a.mcap")
+    assert (recording.name, recording.modules["thumb"].unit) == ("grasp", "N")
+    assert recording.metadata == {"object": "can"}
+    assert (recording.markers, recording.media) == (((1.0, "now"),), (("a.mp4", 0.5),))
+
+
+def test_it_keeps_no_hold_of_what_it_is_given(tmp_path):
+    values = readings(1)
+    with RecordingWriter(tmp_path / "a.mcap", {"thumb": ANYSKIN}) as writer:
+        writer.append("thumb", [0.0], values)
+        values[:] = 0
+    np.testing.assert_array_equal(
+        load_recording(tmp_path / "a.mcap").modules["thumb"].readings, readings(1)
+    )
+
+
+def test_while_it_runs_at_most_half_a_second_is_missing(tmp_path):
+    path, slow = tmp_path / "a.mcap", 0
+    with RecordingWriter(path, {"thumb": ANYSKIN, "index": ANYSKIN}) as writer:
+        for k in range(600):
+            writer.append("thumb", [k / 150], readings(1))
+            if k % 15 == 0:
+                writer.append("index", [k / 150], readings(1))
+                slow = k / 150
+            if k > 75 and k % 50 == 0:
+                modules = load_recording(path).modules
+                assert modules["thumb"].times[-1] > k / 150 - 0.5
+                assert modules["index"].times[-1] > slow - 0.5
+
+
+def test_wrong_samples_are_refused(tmp_path):
+    wrong = [
+        ("pinky", [1.0], readings(1), "samples of 'pinky' given; this recording has thumb"),
+        (
+            "thumb",
+            [1.0],
+            np.zeros((1, 30, 3)),
+            "thumb: times (n,) and readings (n, 5, 3) expected, (1,) and (1, 30, 3) given",
+        ),
+        ("thumb", [1.0], readings(1, np.float32), "thumb: uint16 expected, float32 given"),
+        ("thumb", [0.0], readings(1), "thumb: finite, strictly increasing times expected"),
+        ("thumb", [np.nan], readings(1), "thumb: finite, strictly increasing times expected"),
+        ("thumb", [1.0], readings(1, np.float16), "readings of thumb are float16; a file holds"),
+    ]
+    with RecordingWriter(tmp_path / "a.mcap", {"thumb": ANYSKIN}) as writer:
+        writer.append("thumb", [0.0], readings(1))
+        for module, times, values, text in wrong:
+            with pytest.raises(RecordingError, match=re.escape(text)):
+                writer.append(module, times, values)
+    assert load_recording(tmp_path / "a.mcap").modules["thumb"].n_samples == 1
+
+
+def test_nothing_is_overwritten_unless_forced(tmp_path):
+    path = tmp_path / "a.mcap"
+    path.write_text("mine")
+    with pytest.raises(OutputError, match="exists already"):
+        RecordingWriter(path, {"thumb": ANYSKIN})
+    assert path.read_text() == "mine"
+    with RecordingWriter(path, {"thumb": ANYSKIN}, force=True) as writer:
+        writer.append("thumb", [0.0], readings(1))
+    assert load_recording(path).complete
+
+
+def test_a_full_disk_is_told(tmp_path, monkeypatch):
+    writer = RecordingWriter(tmp_path / "a.mcap", {"thumb": ANYSKIN})
+
+    def full(data):
+        raise OSError(errno.ENOSPC, "No space left on device")
+
+    monkeypatch.setattr("holdfast.io.mcap_writer._Direct.write", lambda self, data: full(data))
+    with pytest.raises(OutputError, match=r"cannot write .*a\.mcap: No space left on device"):
+        writer.append("thumb", np.arange(100) * 0.1, readings(100))
+    with pytest.raises(OutputError, match="No space left on device"):
+        writer.close()
+    writer.close()

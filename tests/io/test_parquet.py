@@ -1,0 +1,165 @@
+from dataclasses import replace
+
+import numpy as np
+import pyarrow as pa
+import pyarrow.parquet as pq
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from holdfast.errors import OutputError, RecordingError
+from holdfast.io import load_recording, save_recording
+from holdfast.io.seal import KEY
+from holdfast.recordings import Recording, Tactile, Truth
+from holdfast.sensors import sensor
+
+
+@settings(deadline=None, max_examples=60)
+@given(data=st.data())
+def test_what_is_written_is_read(data, recordings, assert_same, tmp_path_factory):
+    recording = data.draw(recordings)
+    path = tmp_path_factory.mktemp("round") / "trip.parquet"
+    save_recording(recording, path)
+    assert_same(load_recording(path), recording)
+
+
+def test_a_whole_recording(make_recording, assert_same, tmp_path):
+    recording = make_recording()
+    save_recording(recording, tmp_path / "a.parquet")
+    loaded = load_recording(tmp_path / "a.parquet")
+    assert_same(loaded, recording)
+    assert loaded.complete
+
+
+def test_the_built_in_sensors_come_back_equal(tmp_path):
+    curved = sensor("uskin-curved")
+    module = Tactile(curved, [0.0], np.zeros((1, 30, 3)))
+    save_recording(Recording("a", {"thumb": module}), tmp_path / "a.parquet")
+    assert load_recording(tmp_path / "a.parquet").modules["thumb"].sensor == curved
+
+
+def test_a_file_renamed_renames_its_recording(make_recording, tmp_path):
+    save_recording(make_recording(name="before"), tmp_path / "a.parquet")
+    assert load_recording(tmp_path / "a.parquet").name == "before"
+    (tmp_path / "a.parquet").rename(tmp_path / "after.parquet")
+    assert load_recording(tmp_path / "after.parquet").name == "after"
+
+
+def test_incomplete_stays_incomplete(make_recording, tmp_path):
+    save_recording(make_recording(complete=False), tmp_path / "a.parquet")
+    assert not load_recording(tmp_path / "a.parquet").complete
+
+
+def test_other_byte_order_is_made_native(make_recording, tmp_path):
+    recording = make_recording()
+    thumb = recording.modules["thumb"]
+    swapped = replace(thumb, readings=thumb.readings.astype(">u2"))
+    save_recording(replace(recording, modules={"thumb": swapped}), tmp_path / "a.parquet")
+    readings = load_recording(tmp_path / "a.parquet").modules["thumb"].readings
+    assert readings.dtype == np.uint16
+    np.testing.assert_array_equal(readings, thumb.readings)
+
+
+def test_it_opens_as_a_wide_table(make_recording, tmp_path):
+    recording = make_recording()
+    save_recording(recording, tmp_path / "a.parquet")
+    table = pq.read_table(tmp_path / "a.parquet")
+    thumb, index = recording.modules["thumb"], recording.modules["index/1"]
+    np.testing.assert_array_equal(table["thumb.t02.z"].to_numpy(), thumb.readings[:, 1, 2])
+    held = table["index/1.t05.x"].drop_null()
+    np.testing.assert_array_equal(held.to_numpy(), index.readings[:, 4, 0])
+    assert table["thumb.t01.x"].type == pa.uint16()
+    assert {"truth.time", "truth.hand.phase", "truth.hand.matrix.0.1"} <= set(table.column_names)
+    assert "truth.thumb.slip_speed" in table.column_names
+
+
+def test_row_groups_are_a_minute_at_most(tmp_path):
+    times = np.arange(20_000) / 100
+    module = Tactile(sensor("anyskin"), times, np.zeros((20_000, 5, 3), np.int16))
+    save_recording(Recording("a", {"thumb": module}), tmp_path / "a.parquet")
+    file = pq.ParquetFile(tmp_path / "a.parquet")
+    assert [file.metadata.row_group(k).num_rows for k in range(4)] == [6000, 6000, 6000, 2000]
+    column = file.metadata.row_group(0).column(1)
+    assert column.compression == "ZSTD"
+    assert "BYTE_STREAM_SPLIT" in column.encodings
+
+
+def test_any_flipped_bit_is_found(make_recording, flipped, tmp_path):
+    path, damaged = tmp_path / "a.parquet", tmp_path / "b.parquet"
+    save_recording(make_recording(90), path)
+    for _, raw in flipped(path.read_bytes(), 400):
+        damaged.write_bytes(raw)
+        with pytest.raises(RecordingError, match="damaged"):
+            load_recording(damaged)
+
+
+def test_every_bit_of_the_seal_counts(make_recording, tmp_path):
+    path = tmp_path / "a.parquet"
+    save_recording(make_recording(90), path)
+    raw = path.read_bytes()
+    start = raw.index(KEY.encode())
+    for place in range(start, start + len(KEY) + 66):
+        damaged = bytearray(raw)
+        damaged[place] ^= 1
+        path.write_bytes(damaged)
+        with pytest.raises(RecordingError, match="damaged"):
+            load_recording(path)
+
+
+def test_a_cut_file_is_refused(make_recording, tmp_path):
+    path = tmp_path / "a.parquet"
+    save_recording(make_recording(90), path)
+    raw = path.read_bytes()
+    for size in (4, 11, 12, len(raw) // 2, len(raw) - 9, len(raw) - 1):
+        path.write_bytes(raw[:size])
+        with pytest.raises(RecordingError) as caught:
+            load_recording(path)
+        assert str(caught.value) == (
+            f"{path} is cut or damaged: {size} bytes without the end of a Parquet file, "
+            "from which nothing can be recovered"
+        )
+
+
+def test_empty_and_foreign_files_are_refused(tmp_path):
+    path = tmp_path / "a.parquet"
+    path.write_bytes(b"")
+    with pytest.raises(RecordingError, match=r"a\.parquet is empty \(0 bytes\); a Parquet"):
+        load_recording(path)
+    path.write_text("time,t01_x\n")
+    with pytest.raises(RecordingError, match="is no Parquet file, or its first bytes are damaged"):
+        load_recording(path)
+    pq.write_table(pa.table({"a": [1]}), path)
+    with pytest.raises(RecordingError, match="is a Parquet file but no recording of holdfast"):
+        load_recording(path)
+
+
+def test_what_it_cannot_hold_is_refused_and_leaves_nothing(make_recording, tmp_path):
+    recording = make_recording()
+    thumb = recording.modules["thumb"]
+    half = replace(thumb, readings=np.zeros_like(thumb.readings, np.float16))
+    bad = {
+        "readings of thumb are float16": replace(recording, modules={"thumb": half}),
+        "plain JSON values": replace(recording, metadata={"a": object()}),
+        "truth needs finite, strictly increasing times": replace(
+            recording, truth=Truth(np.array([1.0, 0.0]))
+        ),
+    }
+    for text, wrong in bad.items():
+        with pytest.raises(RecordingError, match=text):
+            save_recording(wrong, tmp_path / "a.parquet")
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_arrays_that_would_share_a_column_are_refused(make_recording, tmp_path):
+    truth = Truth(np.array([0.0]), {"a.0": np.zeros(1), "a": np.zeros((1, 2))})
+    with pytest.raises(RecordingError, match=r"two arrays .* share the column 'truth\.hand\.a\.0'"):
+        save_recording(make_recording(truth=truth), tmp_path / "a.parquet")
+
+
+def test_nothing_is_overwritten_unless_forced(make_recording, tmp_path):
+    path = tmp_path / "a.parquet"
+    save_recording(make_recording(), path)
+    with pytest.raises(OutputError, match="exists already"):
+        save_recording(make_recording(), path)
+    save_recording(make_recording(seed=1), path, force=True)
+    assert load_recording(path).digest == make_recording(seed=1).digest
