@@ -178,7 +178,7 @@ sequence = st.lists(st.tuples(code, length), min_size=1, max_size=14).map(lambda
 def recordings(draw):
     labels = draw(sequence)
     states = np.resize(draw(sequence), len(labels))
-    return labels, np.roll(labels, draw(st.integers(0, 40))) if draw(st.booleans()) else states
+    return labels, np.roll(labels, draw(st.integers(-3, 30))) if draw(st.booleans()) else states
 
 
 @given(recordings(), st.sampled_from([0.0, -7.3, 1.7e9]))
@@ -256,3 +256,11 @@ def test_the_example_of_the_documentation():
     assert metrics.delay_median == pytest.approx(0.03)
     assert metrics.stable_minutes == pytest.approx(2 / 60)
     assert metrics.false_alarms_per_minute == pytest.approx(30)
+
+
+@pytest.mark.parametrize("start", [0.0, 0.1, -7.3, 1.7e9])
+@pytest.mark.parametrize("alarm", [98, 135])
+def test_both_ends_of_the_window_belong_wherever_time_begins(start, alarm):
+    states = np.full(len(LABELS), S)
+    states[alarm] = F
+    assert ticks(match(LABELS, states, start), start) == ([(100, 110, alarm)], [])
