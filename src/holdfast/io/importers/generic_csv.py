@@ -38,7 +38,9 @@ def read(path: Path, sensors: Mapping[str, Sensor] | None = None) -> Iterator[Re
     """
     files = [file for file in csv_files(path) if path.is_file() or _is_header(header_line(file))]
     if not files:
-        raise RecordingError(f"no CSV file with a column {TIME!r} and taxel columns in {path}")
+        raise RecordingError(
+            f"no CSV file in {path} with a column {TIME!r} and taxel columns as expected"
+        )
     return (_recording(file, sensors or {}) for file in files)
 
 

@@ -88,7 +88,7 @@ def read_table(path: Path, text: Sequence[str] = ()) -> tuple[Table, dict[str, l
     except pa.ArrowException as cause:
         raise _explained(path, names, first_line, set(text), str(cause)) from cause
     if len(table) == 0:
-        raise RecordingError(f"{path} has a header but no samples; at least one expected")
+        raise _without_samples(path)
     cells = {
         name: [cell or "" for cell in table[place].to_pylist()] for name, place in places.items()
     }
@@ -151,6 +151,8 @@ def _explained(
     """Which cell or row is to blame, found by a second, slow look."""
     with path.open(encoding="utf-8-sig", errors="replace", newline="") as file:
         lines = list(file)[first_line - 1 :]
+    if not any(line.strip() for line in lines):
+        return _without_samples(path)
     for number, row in enumerate(csv.reader(lines), start=first_line):
         if row and len(row) != len(names):
             return RecordingError(
@@ -163,6 +165,10 @@ def _explained(
                     f"{path}, row {number}, column {name!r}: {cell[:40]!r} given, a number expected"
                 )
     return RecordingError(f"{path} is no table of numbers: {' '.join(cause.split())[:200]}")
+
+
+def _without_samples(path: Path) -> RecordingError:
+    return RecordingError(f"{path} has a header but no samples; at least one expected")
 
 
 def _is_number(cell: str) -> bool:

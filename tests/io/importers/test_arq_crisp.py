@@ -1,0 +1,111 @@
+import sys
+
+import h5py
+import numpy as np
+import pytest
+
+from holdfast.contact import NO_CONTACT, STABLE, UNKNOWN, UNSTABLE, Cause
+from holdfast.errors import MissingExtra, RecordingError
+from holdfast.io import import_recordings
+
+
+def write(path, codes, n_taxels=18, name="GGCNN2/Solder/Pose1/Exp1", **changes):
+    n = len(codes)
+    data = {
+        "tactile_data_raw": np.arange(n_taxels * 3 * n).reshape(n_taxels, 3, n).astype(float),
+        "tactile_timestamps": 1000.0 + 5.5 * np.arange(n),
+        "tactile_slips_label": np.array(codes),
+    }
+    with h5py.File(path, "a") as file:
+        for key, values in (data | changes).items():
+            if values is not None:
+                file[f"{name}/{key}"] = values
+
+
+def test_every_experiment_is_a_recording(tmp_path):
+    for experiment in (1, 2, 10):
+        write(tmp_path / "a.h5", [4, 5], name=f"GGCNN2/Solder/Pose1/Exp{experiment}")
+    recordings = list(import_recordings(tmp_path))
+    assert [recording.name for recording in recordings] == [
+        f"GGCNN2_Solder_Pose1_Exp{k}" for k in (1, 2, 10)
+    ]
+    first = recordings[0]
+    assert first.metadata == {
+        "source": "ARQ-CRISP",
+        "planner": "GGCNN2",
+        "object": "Solder",
+        "pose": "Pose1",
+        "repeat": "Exp1",
+    }
+    module = first.modules["finger1"]
+    np.testing.assert_allclose(module.times, [1.0, 1.0055])
+    assert module.readings[1, 2].tolist() == [13, 15, 17]
+
+
+@pytest.mark.parametrize(("n_taxels", "name"), [(18, "uskin-3x6"), (24, "uskin-4x6")])
+def test_both_sensors(tmp_path, n_taxels, name):
+    write(tmp_path / "a.h5", [4, 5], n_taxels)
+    (recording,) = import_recordings(tmp_path / "a.h5")
+    assert recording.modules["finger1"].sensor.name == name
+
+
+def test_labels_say_what_is_known(tmp_path):
+    codes = [0, 3, 0, 4, 0, 6, 1, 0, 5, 0, 2, 0]
+    write(tmp_path / "a.h5", codes)
+    (recording,) = import_recordings(tmp_path / "a.h5")
+    module = recording.modules["finger1"]
+    assert module.label_states.tolist() == [
+        *(NO_CONTACT, UNSTABLE, STABLE, STABLE, STABLE, UNKNOWN),
+        *(UNSTABLE, STABLE, UNSTABLE, STABLE, UNSTABLE, NO_CONTACT),
+    ]
+    causes = [label.cause for label in module.labels if label.cause]
+    assert causes == [Cause.CLOSING, Cause.SLIP, Cause.SLIP, Cause.RELEASED]
+
+
+def test_rest_that_may_be_either_has_no_label(tmp_path):
+    write(tmp_path / "a.h5", [0, 4, 5, 0])
+    (recording,) = import_recordings(tmp_path / "a.h5")
+    states = recording.modules["finger1"].label_states
+    assert states.tolist() == [UNKNOWN, STABLE, UNSTABLE, UNKNOWN]
+
+
+@pytest.mark.parametrize(
+    ("n_taxels", "changes", "text"),
+    [
+        (20, {}, "20 taxels given; 18 (3 x 6, 2021) or 24 (4 x 6, 2023) expected"),
+        (
+            18,
+            {"tactile_timestamps": np.arange(3.0)},
+            "tactile_data_raw of shape (n_taxels, 3, 3) expected, (18, 3, 2) given",
+        ),
+        (18, {"tactile_slips_label": np.array([1])}, "1 labels given for 2 samples"),
+        (18, {"tactile_slips_label": np.array([1, 7])}, "labels 0 to 6 expected, 7 given"),
+        (18, {"tactile_timestamps": np.zeros(2)}, "times stand still at sample 1: 0 s after 0 s;"),
+    ],
+)
+def test_bad_input_is_told_in_one_line(tmp_path, n_taxels, changes, text):
+    path = tmp_path / "a.h5"
+    write(path, [0, 4], n_taxels, **changes)
+    with pytest.raises(RecordingError) as caught:
+        list(import_recordings(path))
+    assert str(caught.value).startswith(f"{path}: GGCNN2/Solder/Pose1/Exp1: {text}")
+
+
+def test_what_is_no_data_set_is_told(tmp_path):
+    path = tmp_path / "a.h5"
+    path.write_text("version https://git-lfs.github.com/spec/v1\n")
+    with pytest.raises(RecordingError, match=r"is no HDF5 file .a Git LFS pointer"):
+        list(import_recordings(path, "arq-crisp"))
+    path.unlink()
+    write(path, [0, 1], tactile_data_raw=None)
+    with pytest.raises(RecordingError, match="no group with tactile_data_raw in it"):
+        list(import_recordings(path, "arq-crisp"))
+    path.write_bytes(path.read_bytes()[:200])
+    with pytest.raises(RecordingError, match="is damaged or no data set of ARQ-CRISP"):
+        list(import_recordings(path, "arq-crisp"))
+
+
+def test_without_h5py_the_extra_is_named(tmp_path, monkeypatch):
+    monkeypatch.setitem(sys.modules, "h5py", None)
+    with pytest.raises(MissingExtra, match=r'pip install "holdfast\[hdf5\]"'):
+        import_recordings(tmp_path, "arq-crisp")

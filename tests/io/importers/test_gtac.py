@@ -1,0 +1,70 @@
+import numpy as np
+import pytest
+
+from holdfast.errors import RecordingError
+from holdfast.io import import_recordings
+
+NAMED = [f"mag_{axis}{node + 1}" for node in range(15) for axis in "xyz"]
+
+
+def write(path, names, rows):
+    path.write_text("\n".join([",".join(names), *(",".join(map(str, r)) for r in rows)]) + "\n")
+
+
+def rows(n, n_extra=2, milliseconds=None):
+    stamps = [7 * k for k in range(n)] if milliseconds is None else milliseconds
+    return [
+        [k, *range(-10 + k, 35 + k), *([0] * n_extra), 150, stamp] for k, stamp in enumerate(stamps)
+    ]
+
+
+def test_named_columns(tmp_path):
+    write(tmp_path / "egg.csv", ["", *NAMED, "mat1", "mat2", "Hz", "milliseconds"], rows(3))
+    (recording,) = import_recordings(tmp_path / "egg.csv")
+    module = recording.modules["finger1"]
+    assert (recording.name, module.sensor.name) == ("egg", "gtac")
+    np.testing.assert_allclose(module.times, [0, 0.007, 0.014])
+    assert module.readings.dtype == np.int32
+    assert module.readings[0, 1].tolist() == [-7, -6, -5]
+
+
+def test_numbered_columns_and_a_first_row_without_time(tmp_path):
+    names = ["", *map(str, range(49))]
+    write(tmp_path / "roll.csv", names, rows(3, milliseconds=["", 4.0, 12.0]))
+    (recording,) = import_recordings(tmp_path)
+    module = recording.modules["finger1"]
+    np.testing.assert_allclose(module.times, [0.004, 0.012])
+    assert module.readings[0, 0].tolist() == [-9, -8, -7]
+    assert recording.metadata["rows_without_time"] == 1
+
+
+@pytest.mark.parametrize(
+    ("stamps", "text"),
+    [
+        ([0, "", 14], "a.csv, row 3: no timestamp; only the first row may lack its own"),
+        ([0, 990, 5], "a.csv: times go back at sample 2: 0.005 s after 0.99 s"),
+    ],
+)
+def test_bad_times_are_told(tmp_path, stamps, text):
+    names = ["", *map(str, range(49))]
+    write(tmp_path / "a.csv", names, rows(3, milliseconds=stamps))
+    with pytest.raises(RecordingError, match=text.replace(".", r"\.")):
+        list(import_recordings(tmp_path / "a.csv", "gtac"))
+
+
+def test_other_columns_are_told(tmp_path):
+    write(tmp_path / "a.csv", ["a", "b"], [[1, 2]])
+    with pytest.raises(
+        RecordingError, match=r"columns mag_x1,mag_y1,\.\.\.,mag_z15 expected, or a"
+    ):
+        list(import_recordings(tmp_path / "a.csv", "gtac"))
+
+
+def test_the_real_recordings(data_folder):
+    recordings = list(import_recordings(data_folder / "gtac"))
+    assert [r.modules["finger1"].n_samples for r in recordings] == [2990, 2999, 2999]
+    assert [r.metadata["rows_without_time"] for r in recordings] == [0, 1, 1]
+    for recording in recordings:
+        module = recording.modules["finger1"]
+        assert recording.duration == pytest.approx(20, abs=2)
+        assert module.readings[:5].any() or module.readings.any()

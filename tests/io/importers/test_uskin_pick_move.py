@@ -1,0 +1,167 @@
+import re
+
+import numpy as np
+import pytest
+
+from holdfast.contact import Cause, ContactState
+from holdfast.errors import RecordingError
+from holdfast.io import import_recordings, load_recording, save_recording
+
+N = 12
+
+
+def write(path, names, values):
+    lines = [",".join(names), *(",".join(map(str, row)) for row in values)]
+    path.write_text("\n".join(lines) + "\n")
+
+
+@pytest.fixture
+def folder(tmp_path):
+    """A made recording of twelve samples: two stable, four of slip, six lost."""
+    place = tmp_path / "data_sample_1"
+    place.mkdir()
+    k = np.arange(N)
+    taxels = [f"txl{t + 1}_{axis}" for t in range(16) for axis in "xyz"]
+    for finger in (1, 2):
+        values = 1000.0 * finger + np.arange(48) + k[:, None]
+        write(place / f"xela_sensor{finger}.csv", taxels, values)
+    robot = [f"position_joint{j + 1}" for j in range(7)]
+    robot += [f"velocity_joint{j + 1}" for j in range(7)]
+    robot += [f"ee_T_{row}{column}" for column in range(4) for row in range(4)]
+    robot += ["v_x", "v_y", "time"]
+    values = np.arange(33) + 100.0 * k[:, None]
+    values[:, -1] = k / 64
+    write(place / "robot_state.csv", robot, values)
+    marker = [f"marker_position_{axis}" for axis in "xyz"]
+    marker += [f"marker_quaternion_{axis}" for axis in "xyzw"]
+    poses = np.tile([0.1, 0.2, 0.3, 0.4, 0.5, 0.6, 0.7], (N, 1))
+    poses[6:] = 10.0
+    write(place / "marker.csv", marker, poses)
+    write(place / "slip_label.csv", ["slip", "fail"], np.stack([k >= 2, k >= 6], axis=1) * 1.0)
+    write(place / "meta_data.csv", ["dropped", "notes"], [[0, "fine"]])
+    return place
+
+
+def test_all_comes_along(folder):
+    (recording,) = import_recordings(folder.parent)
+    assert recording.name == "data_sample_1"
+    assert list(recording.modules) == ["finger1", "finger2"]
+    first, second = recording.modules.values()
+    assert (first.sensor.name, first.unit, first.readings.dtype) == ("uskin-4x4", "count", "uint16")
+    assert first.readings[3, 2].tolist() == [1009, 1010, 1011]
+    assert second.readings[0, 0].tolist() == [2000, 2001, 2002]
+    np.testing.assert_allclose(first.times, np.arange(N) / 64)
+    assert recording.metadata == {
+        "object": "box",
+        "source": "imanlab/proactive-slip-control",
+        "dropped": 0,
+        "notes": "fine",
+    }
+    truth = recording.truth.hand
+    np.testing.assert_array_equal(truth["marker_pose"][0], [0.1, 0.2, 0.3, 0.7, 0.4, 0.5, 0.6])
+    assert np.isnan(truth["marker_pose"][6:]).all()
+    np.testing.assert_array_equal(truth["robot_joints"][0], np.arange(7))
+    np.testing.assert_array_equal(truth["robot_joint_velocities"][0], np.arange(7, 14))
+    np.testing.assert_array_equal(truth["robot_ee_pose"][0], np.arange(14, 30).reshape(4, 4).T)
+    np.testing.assert_array_equal(truth["robot_velocity"][1], [130, 131])
+
+
+def test_slip_is_unstable_and_fail_is_lost(folder):
+    (recording,) = import_recordings(folder, "uskin-pick-move")
+    for module in recording.modules.values():
+        assert [(label.state, label.cause) for label in module.labels] == [
+            (ContactState.STABLE, None),
+            (ContactState.UNSTABLE, Cause.SLIP),
+            (ContactState.NO_CONTACT, Cause.LOST),
+        ]
+        assert (module.label_states == [3] * 2 + [2] * 4 + [1] * 6).all()
+
+
+def test_labels_can_stay_behind(folder):
+    (recording,) = import_recordings(folder, labels=False)
+    assert not any(module.labels for module in recording.modules.values())
+
+
+@pytest.mark.parametrize(
+    ("file", "change", "text"),
+    [
+        ("xela_sensor2.csv", None, "cannot read {file}: No such file or directory"),
+        ("xela_sensor1.csv", lambda t: "", "{file} is empty; a header line and samples expected"),
+        (
+            "xela_sensor1.csv",
+            lambda t: t.splitlines()[0],
+            "{file} has a header but no samples; at least one expected",
+        ),
+        (
+            "xela_sensor1.csv",
+            lambda t: "\n".join(",".join(line.split(",")[:45]) for line in t.splitlines()),
+            "{file}: 45 columns given, 48 expected (16 taxels x 3 axes of uskin-4x4)",
+        ),
+        (
+            "xela_sensor1.csv",
+            lambda t: t.replace("txl4_y", "txl4_q"),
+            "{file}: column 'txl4_y' is missing; it has 'txl1_x', 'txl1_y', 'txl1_z', 'txl2_x', "
+            "'txl2_y', 'txl2_z' and 42 more",
+        ),
+        (
+            "xela_sensor1.csv",
+            lambda t: t.replace("1013.0", "oops", 1),
+            "{file}, row 2, column 'txl5_y': 'oops' given, a number expected",
+        ),
+        (
+            "xela_sensor1.csv",
+            lambda t: t[:-10] + "\n",
+            "{file}, row 13: 47 cells given, 48 expected as in the header",
+        ),
+        (
+            "xela_sensor2.csv",
+            lambda t: t[: t.rindex("\n", 0, -2) + 1],
+            "{file}: 11 rows given, 12 expected as in robot_state.csv",
+        ),
+        (
+            "slip_label.csv",
+            lambda t: t.replace("1.0", "2.0", 1),
+            "{file}: 0 or 1 expected in columns 'slip' and 'fail'",
+        ),
+        (
+            "robot_state.csv",
+            lambda t: t.replace(f"{2 / 64}", f"{1 / 64}"),
+            "{folder}: times stand still at sample 2: 0.015625 s after 0.015625 s; "
+            "strictly increasing times expected",
+        ),
+        (
+            "robot_state.csv",
+            lambda t: t.replace(f"{2 / 64}", "0.001"),
+            "{folder}: times go back at sample 2: 0.001 s after 0.015625 s; "
+            "strictly increasing times expected",
+        ),
+    ],
+)
+def test_bad_input_is_told_in_one_line(folder, file, change, text):
+    path = folder / file
+    if change is None:
+        path.unlink()
+    else:
+        path.write_text(change(path.read_text()))
+    with pytest.raises(RecordingError) as caught:
+        list(import_recordings(folder, "uskin-pick-move"))
+    assert str(caught.value) == text.format(file=path, folder=folder)
+
+
+def test_the_real_recordings(data_folder, tmp_path, assert_same):
+    recordings = list(import_recordings(data_folder / "uskin_pick_move"))
+    assert [recording.modules["finger1"].n_samples for recording in recordings] == [
+        404,
+        354,
+        323,
+        285,
+        270,
+    ]
+    states = [np.bincount(r.modules["finger2"].label_states, minlength=4) for r in recordings]
+    assert [s[2] for s in states] == [0, 0, 0, 104, 42]
+    assert [s[1] for s in states] == [0, 0, 0, 101, 0]
+    assert all(re.match(r"data_sample_2022-02-\d\d-", recording.name) for recording in recordings)
+    for suffix in ("parquet", "mcap"):
+        path = tmp_path / f"{recordings[3].name}.{suffix}"
+        save_recording(recordings[3], path)
+        assert_same(load_recording(path), recordings[3])

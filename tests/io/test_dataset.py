@@ -1,0 +1,76 @@
+import pyarrow as pa
+import pyarrow.parquet as pq
+import pytest
+from mcap.writer import Writer
+
+from holdfast.errors import RecordingError
+from holdfast.io import Dataset, load_dataset, save_recording
+
+
+@pytest.fixture
+def folder(make_recording, tmp_path):
+    for k, name in enumerate(("b", "a", "c")):
+        suffix = "mcap" if name == "c" else "parquet"
+        save_recording(make_recording(150, seed=k, name=name), tmp_path / f"{name}.{suffix}")
+    return tmp_path
+
+
+def test_recordings_come_sorted_by_name(folder):
+    dataset = load_dataset(folder)
+    assert len(dataset) == 3
+    assert dataset.names == ("a", "b", "c")
+    assert [recording.name for recording in dataset] == ["a", "b", "c"]
+    assert dataset[-1].name == "c"
+    assert dataset[1:].names == ("b", "c")
+    assert isinstance(dataset[1:], Dataset)
+
+
+def test_it_reads_a_recording_each_time_it_is_asked(folder):
+    dataset = load_dataset(folder)
+    assert dataset[0] is not dataset[0]
+
+
+def test_what_is_no_recording_is_ignored(folder):
+    (folder / "model.json").write_text("{}")
+    (folder / "b.labels.json.bak").write_text("{}")
+    (folder / ".hidden.parquet").write_text("")
+    (folder / "sub.parquet").mkdir()
+    pq.write_table(pa.table({"a": [1]}), folder / "table.parquet")
+    with (folder / "ros.mcap").open("wb") as file:
+        writer = Writer(file)
+        writer.start("ros2")
+        writer.finish()
+    assert load_dataset(folder).names == ("a", "b", "c")
+
+
+def test_a_damaged_recording_is_not_ignored(folder):
+    (folder / "a.parquet").write_bytes((folder / "a.parquet").read_bytes()[:-100])
+    dataset = load_dataset(folder)
+    assert dataset.names == ("a", "b", "c")
+    with pytest.raises(RecordingError, match=r"a\.parquet is cut or damaged"):
+        dataset[0]
+
+
+def test_parquet_is_taken_before_mcap(folder, make_recording):
+    save_recording(make_recording(150, name="b"), folder / "b.mcap")
+    assert [path.name for path in load_dataset(folder).paths] == [
+        "a.parquet",
+        "b.parquet",
+        "c.mcap",
+    ]
+
+
+def test_a_file_is_a_dataset_of_one(folder):
+    assert load_dataset(folder / "c.mcap").names == ("c",)
+
+
+def test_missing_and_empty_folders_are_told(tmp_path):
+    with pytest.raises(RecordingError, match=r"there is no folder .*none; a folder of recordings"):
+        load_dataset(tmp_path / "none")
+    (tmp_path / "a.txt").write_text("")
+    with pytest.raises(RecordingError) as caught:
+        load_dataset(tmp_path)
+    assert str(caught.value) == (
+        f"no recording in {tmp_path} (1 other entries); files *.parquet or *.mcap expected: "
+        "`holdfast import` makes them"
+    )

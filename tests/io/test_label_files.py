@@ -1,0 +1,147 @@
+import re
+
+import msgspec
+import pytest
+
+from holdfast.contact import Cause, ContactState
+from holdfast.errors import OutputError, RecordingError
+from holdfast.io import (
+    labels_from_csv,
+    labels_path,
+    labels_to_csv,
+    load_labels,
+    load_recording,
+    save_labels,
+    save_recording,
+)
+from holdfast.recordings import Label
+
+MINE = (
+    Label(0.5, 1.0, ContactState.UNSTABLE, Cause.SLIP, "video", 0.7, "me"),
+    Label(1.0, 2.0, ContactState.STABLE, None, "video", 1.0, "me"),
+)
+
+
+@pytest.fixture
+def saved(make_recording, tmp_path):
+    """A recording on disk with labels beside it, and its path."""
+    recording = make_recording().with_labels({"thumb": MINE})
+    path = tmp_path / "can.parquet"
+    save_recording(make_recording(), path)
+    save_labels(recording, path, author="me", time="2026-11-21T10:00:00Z", notes="ä first try")
+    return recording, path
+
+
+def test_labels_beside_win_over_those_inside(saved, make_recording):
+    _, path = saved
+    loaded = load_recording(path)
+    assert loaded.modules["thumb"].labels == MINE
+    assert loaded.modules["index/1"].labels == ()
+    inside = load_recording(path, labels=False)
+    assert inside.modules["thumb"].labels == make_recording().modules["thumb"].labels
+
+
+def test_the_file_says_who_when_and_what(saved):
+    recording, path = saved
+    file = load_labels(labels_path(path))
+    assert (file.author, file.time) == ("me", "2026-11-21T10:00:00Z")
+    assert (file.notes, file.name) == ("ä first try", "can_1")
+    assert file.recording == recording.digest
+
+
+def test_they_fit_the_recording_in_the_other_format(saved, tmp_path):
+    recording, _ = saved
+    (tmp_path / "other").mkdir()
+    save_recording(recording.with_labels({}), tmp_path / "other" / "can.mcap")
+    labels_path(tmp_path / "can").rename(labels_path(tmp_path / "other" / "can"))
+    assert load_recording(tmp_path / "other" / "can.mcap").modules["thumb"].labels == MINE
+
+
+def test_labels_of_another_recording_are_refused(saved, make_recording):
+    _, path = saved
+    save_recording(make_recording(seed=1), path, force=True)
+    with pytest.raises(RecordingError) as caught:
+        load_recording(path)
+    want = make_recording().digest[:12], make_recording(seed=1).digest[:12]
+    assert str(caught.value) == (
+        f"{labels_path(path)} labels another recording ('can_1', hash {want[0]}) than "
+        f"can.parquet (hash {want[1]}): remove it or put its recording back"
+    )
+
+
+def changed(path, change):
+    data = msgspec.json.decode(path.read_bytes())
+    change(data)
+    path.write_bytes(msgspec.json.encode(data))
+
+
+@pytest.mark.parametrize(
+    ("change", "text"),
+    [
+        (lambda d: d.update(extra=1), "is no label file: Object contains unknown field `extra`"),
+        (lambda d: d.update(schema="holdfast.labels/2"), "Invalid enum value 'holdfast.labels/2'"),
+        (lambda d: d["modules"]["thumb"][0].update(state="fine"), "Invalid enum value 'fine'"),
+        (lambda d: d["modules"]["thumb"][0].update(start="now"), "Expected `float`, got `str`"),
+        (lambda d: d["modules"]["thumb"][0].update(end=0.1), "a label ends after its start"),
+        (lambda d: d["modules"]["thumb"][0].update(confidence=2), "confidence from 0 to 1"),
+        (lambda d: d["modules"]["thumb"][1].update(end=1e3), "lies outside the recording"),
+        (lambda d: d["modules"].update(pinky=[]), "labels for pinky given; recording 'can_1' has"),
+    ],
+)
+def test_wrong_label_files_are_refused(saved, change, text):
+    _, path = saved
+    changed(labels_path(path), change)
+    with pytest.raises(RecordingError, match=re.escape(text)) as caught:
+        load_recording(path)
+    assert "can.labels.json" in str(caught.value)
+
+
+def test_what_is_no_json_is_refused(saved):
+    _, path = saved
+    labels_path(path).write_text("finger,start\n")
+    with pytest.raises(RecordingError, match=r"can\.labels\.json is no label file: JSON is malf"):
+        load_recording(path)
+
+
+def test_labels_are_not_overwritten_unless_forced(saved):
+    recording, path = saved
+    with pytest.raises(OutputError, match="exists already"):
+        save_labels(recording, path)
+    save_labels(recording, path, force=True)
+
+
+def test_csv_goes_out_and_comes_in(tmp_path):
+    path = tmp_path / "labels.csv"
+    path.write_text(labels_to_csv({"thumb": MINE, "index": MINE[:1]}))
+    assert path.read_text().splitlines()[:2] == [
+        "finger,start,end,state,cause",
+        "thumb,0.5,1.0,unstable,slip",
+    ]
+    labels = labels_from_csv(path, author="me")
+    assert list(labels) == ["thumb", "index"]
+    got = labels["thumb"]
+    assert [(x.start, x.end, x.state, x.cause) for x in got] == [
+        (x.start, x.end, x.state, x.cause) for x in MINE
+    ]
+    assert got[0].author == "me"
+
+
+@pytest.mark.parametrize(
+    ("text", "message"),
+    [
+        ("finger,start,end\nthumb,0,1\n", "row 2: no state; the columns are finger,start,end,stat"),
+        ("finger,start,end,state\nthumb,a,1,stable\n", "row 2: could not convert string to float"),
+        ("finger,start,end,state\nthumb,0,1,fine\n", "row 2: 'FINE' is not a valid ContactState"),
+        ("finger,start,end,state\nthumb,1,0,stable\n", "row 2: a label ends after its start"),
+    ],
+)
+def test_wrong_csv_is_refused(tmp_path, text, message):
+    (tmp_path / "a.csv").write_text(text)
+    with pytest.raises(RecordingError, match=re.escape(f"a.csv, {message}")):
+        labels_from_csv(tmp_path / "a.csv")
+
+
+def test_missing_files_are_told(tmp_path):
+    for read in (labels_from_csv, load_labels):
+        with pytest.raises(RecordingError, match=r"cannot read .*: No such file"):
+            read(tmp_path / "none")
