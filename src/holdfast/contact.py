@@ -6,7 +6,7 @@ codes, and an instant without a label is UNKNOWN, so that labels and decisions c
 
 from collections.abc import Mapping
 from enum import StrEnum
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import msgspec
 import numpy as np
@@ -125,7 +125,7 @@ class ContactEvent(NamedTuple):
     time: float
 
 
-def hand_state(codes: npt.NDArray[np.int8], n_model_fingers: int) -> int:
+def hand_state(codes: npt.NDArray[np.integer[Any]], n_model_fingers: int) -> int:
     """The state of a hand, from the codes of its fingers' states.
 
     UNSTABLE if any finger is, else UNKNOWN if any is, else STABLE if at least two fingers are

@@ -228,6 +228,11 @@ class Recording:
         """From the first sample to the last [s]."""
         return self.end - self.start
 
+    @property
+    def rate(self) -> float:
+        """Samples per second: the median over its modules [Hz]."""
+        return float(np.median([m.rate for m in self.modules.values() if m.n_samples]))
+
     @cached_property
     def digest(self) -> str:
         """A hash of the samples: their times, readings and sensors, whatever the file format.

@@ -1,13 +1,16 @@
 """What every way of fitting has in common: samples in, a classifier of plain numbers out."""
 
 from collections.abc import Mapping
-from typing import Any, NamedTuple, Protocol
+from typing import TYPE_CHECKING, Any, NamedTuple, Protocol
 
 import numpy as np
 import numpy.typing as npt
 
 from holdfast.classifiers.linear import LinearClassifier
 from holdfast.errors import TrainingError
+
+if TYPE_CHECKING:
+    from optuna import Trial
 
 Parameters = Mapping[str, Any]
 
@@ -36,17 +39,19 @@ class Samples(NamedTuple):
 
 
 class Recipe(Protocol):
-    """A way of fitting a classifier.
+    """A way of fitting a classifier."""
 
-    Attributes:
-        name: on the command line.
-        reference: the parameters of the reference setting (no search).
-    """
+    @property
+    def name(self) -> str:
+        """What it is called on the command line."""
+        ...
 
-    name: str
-    reference: Parameters
+    @property
+    def reference(self) -> Parameters:
+        """The parameters of the reference setting (no search)."""
+        ...
 
-    def suggest(self, trial: Any) -> Parameters:
+    def suggest(self, trial: "Trial") -> Parameters:
         """Parameters to try, drawn from an Optuna trial."""
         ...
 

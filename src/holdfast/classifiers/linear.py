@@ -3,10 +3,10 @@
 import math
 
 import msgspec
-import numba
 import numpy as np
 import numpy.typing as npt
 
+from holdfast.compiled import compiled
 from holdfast.errors import ModelError
 
 Array = npt.NDArray[np.float64]
@@ -80,8 +80,8 @@ class LinearClassifier(msgspec.Struct, frozen=True, forbid_unknown_fields=True, 
         return probabilities
 
 
-@numba.njit(cache=True, error_model="numpy")
-def linear_probability(features: Array, weights: Array) -> float:  # pragma: no cover (compiled)
+@compiled
+def linear_probability(features: Array, weights: Array) -> float:
     """Logistic of the weighted sum: the one place where a probability is computed."""
     value = weights[0]
     for j in range(len(weights) - 1):
@@ -89,9 +89,7 @@ def linear_probability(features: Array, weights: Array) -> float:  # pragma: no 
     return 1.0 / (1.0 + math.exp(-value))
 
 
-@numba.njit(cache=True, error_model="numpy")
-def _probabilities(
-    features: Array, weights: Array, out: Array
-) -> None:  # pragma: no cover (compiled)
+@compiled
+def _probabilities(features: Array, weights: Array, out: Array) -> None:
     for k in range(len(features)):
         out[k] = linear_probability(features[k], weights)

@@ -1,12 +1,15 @@
 """Logistic regression."""
 
 from dataclasses import dataclass, field
-from typing import Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from holdfast.classifiers.fitting import Parameters, Samples, check_classes, standardise
 from holdfast.classifiers.linear import LinearClassifier
+
+if TYPE_CHECKING:
+    from optuna import Trial
 
 
 @dataclass(frozen=True)
@@ -20,7 +23,7 @@ class LogisticRegression:
     name: str = "logreg"
     reference: Parameters = field(default_factory=lambda: {"C": 1.0, "class_weight": "balanced"})
 
-    def suggest(self, trial: Any) -> Parameters:
+    def suggest(self, trial: "Trial") -> Parameters:
         """C over eight decades, and whether classes are weighted."""
         return {
             "C": trial.suggest_float("C", 1e-4, 1e4, log=True),

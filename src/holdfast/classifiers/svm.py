@@ -1,7 +1,7 @@
 """The linear support vector machine."""
 
 from dataclasses import dataclass, field
-from typing import Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 import numpy.typing as npt
@@ -11,6 +11,9 @@ from holdfast.classifiers.linear import LinearClassifier
 
 FOLDS = 5
 """Folds, by group, whose held-out decision values the sigmoid is fitted to."""
+
+if TYPE_CHECKING:
+    from optuna import Trial
 
 
 @dataclass(frozen=True)
@@ -24,7 +27,7 @@ class LinearSVM:
     name: str = "svm"
     reference: Parameters = field(default_factory=lambda: {"C": 1.0, "class_weight": "balanced"})
 
-    def suggest(self, trial: Any) -> Parameters:
+    def suggest(self, trial: "Trial") -> Parameters:
         """C over eight decades, and whether classes are weighted."""
         return {
             "C": trial.suggest_float("C", 1e-5, 1e3, log=True),

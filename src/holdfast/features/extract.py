@@ -2,10 +2,10 @@
 
 from typing import NamedTuple
 
-import numba
 import numpy as np
 import numpy.typing as npt
 
+from holdfast.compiled import compiled
 from holdfast.features import kernel
 from holdfast.features.kernel import Array, Layout, Memory, Output
 from holdfast.features.stream import (
@@ -48,7 +48,7 @@ def extract(plan: StreamPlan, recording: Recording) -> dict[str, FingerFeatures]
     if layout.tare_kind == kernel.TARE_GIVEN:
         give_baseline(plan, memory, recording)
     pieces: list[list[FingerFeatures]] = [[] for _ in plan.fingers]
-    for times, present, readings in samples_of(recording, plan.fingers):
+    for times, present, readings in samples_of(plan, recording):
         features = np.full((*present.shape, layout.specs.shape[1]), np.nan)
         amplitude = np.full(present.shape, np.nan)
         _extract(layout, memory, output, readings, present, times, features, amplitude)
@@ -64,7 +64,7 @@ def extract(plan: StreamPlan, recording: Recording) -> dict[str, FingerFeatures]
     }
 
 
-@numba.njit(cache=True, error_model="numpy")
+@compiled
 def _extract(
     layout: Layout,
     memory: Memory,
@@ -74,8 +74,8 @@ def _extract(
     times: Array,
     features: Array,
     amplitude: Array,
-) -> None:  # pragma: no cover (compiled)
+) -> None:
     for k in range(len(times)):
         kernel.advance(layout, memory, output, readings[k], present[k], times[k])
         features[k] = output.features
-        amplitude[k] = output.amplitude
+        amplitude[k] = output.values[:, kernel.AMPLITUDE]

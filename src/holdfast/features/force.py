@@ -6,6 +6,7 @@ import numba
 import numpy as np
 import numpy.typing as npt
 
+from holdfast.compiled import compiled_parallel
 from holdfast.errors import RecordingError
 from holdfast.features.kernel import Array, force_of
 from holdfast.features.tare import HALF, Tare, TareArgument
@@ -83,11 +84,9 @@ def baseline_of(values: Array, times: Array, tare: Tare, period: float) -> tuple
     return np.add.accumulate(values[taken], axis=0)[-1] / taken.sum(), first
 
 
-@numba.njit(cache=True, parallel=True, error_model="numpy")
-def _forces(
-    values: Array, baseline: Array, rotations: Array, force: Array
-) -> None:  # pragma: no cover (compiled)
+@compiled_parallel
+def _forces(values: Array, baseline: Array, rotations: Array, force: Array) -> None:
     for k in numba.prange(len(values)):
-        x, y, z = force_of(values[k], baseline, rotations)
+        x, y, z, _ = force_of(values[k], baseline, rotations, 0, len(baseline))
         if math.isfinite(x + y + z):
             force[k, 0], force[k, 1], force[k, 2] = x, y, z

@@ -6,6 +6,8 @@ import numba
 import numpy as np
 import numpy.typing as npt
 
+from holdfast.compiled import compiled, compiled_parallel
+
 Array = npt.NDArray[np.float64]
 
 FEATURE_NAMES = ("F_a", "F_x", "F_y", "F_z", "m", "sigma")
@@ -60,10 +62,8 @@ def check_window(window: int) -> int:
     return int(window)
 
 
-@numba.njit(cache=True, error_model="numpy")
-def haar_windows(
-    x: Array, window: int, m: Array, sigma: Array, scratch: Array
-) -> None:  # pragma: no cover (compiled)
+@compiled
+def haar_windows(x: Array, window: int, m: Array, sigma: Array, scratch: Array) -> None:
     """Fills m and sigma of every window in x, the first ending at x[window - 1] (eq. 1 and 2).
 
     Two passes over each window: nothing is carried from one sample to the next, so nothing
@@ -98,8 +98,8 @@ def haar_windows(
         sigma[k] = math.sqrt(sigma[k] / (2.0 * window))
 
 
-@numba.njit(cache=True, parallel=True, error_model="numpy")
-def _haar_features(force: Array, window: int, out: Array) -> None:  # pragma: no cover (compiled)
+@compiled_parallel
+def _haar_features(force: Array, window: int, out: Array) -> None:
     n = len(force)
     out[: min(window - 1, n)] = math.nan
     for block in numba.prange(max(n - window + _BLOCK, 0) // _BLOCK):

@@ -1,20 +1,22 @@
 """What happens to one sample of a hand: tare, force, faults, features. Compiled, no objects.
 
 `advance` is the only path from readings to features that a model sees: live, offline and in
-training. All memory is laid out beforehand and never grows.
+training. All memory is laid out beforehand and never grows. What belongs to one finger is a
+row of an array, and columns have names: a slice would cost as much as the sum it is for.
 """
 
 import math
 from typing import NamedTuple
 
-import numba
 import numpy as np
 import numpy.typing as npt
 
+from holdfast.compiled import compiled
 from holdfast.features.haar import haar_windows
 
 Array = npt.NDArray[np.float64]
 Integers = npt.NDArray[np.int64]
+Flags = npt.NDArray[np.bool_]
 
 # Codes of holdfast.contact.Reason and bits of holdfast.contact.Fault.
 READY, TARE, WARM_UP, GAP, FAULT = range(5)
@@ -31,61 +33,83 @@ LOADED_SECONDS = 0.25
 GAP_LIMIT = 3.0003
 """Sample periods; a longer step is a gap. The part over 3 is for the rounding of times."""
 
+# Columns of Memory.counts.
+SEEN = 0  # finite samples
+RUN = 1  # forces in the present stretch
+GAPPED = 2  # 1 while a stretch that follows a gap warms up
+TARED = 3  # samples in the baseline so far; -1 once it is frozen
+FROZEN = 4  # samples since the readings last changed
+CHANGES = 5  # samples that changed the readings
+PULLING = 6  # samples since the normal readings together turned negative
+END = 7  # one past the newest value in the history, before which a window is contiguous
+N_COUNTS = 8
+
+# Columns of Memory.levels.
+FIRST = 0  # time of the first finite sample [s]
+LAST = 1  # time of the last sample [s]
+STEPS = 2  # sum of squared steps of the force, while the noise is measured
+N_STEPS = 3  # their number
+NOISE = 4  # standard deviation of a force component by noise alone; NaN while unknown
+LARGEST = 5  # largest F_a so far
+N_LEVELS = 6
+
+# Columns of Layout.constants.
+LEAST, MOST = 0, 1  # readings that the sensor can send
+LEAST_NOISE = 2  # of a force component, by the step of the readings
+N_CONSTANTS = 3
+
+# Columns of Layout.windows.
+SIGMA_WINDOW, LONGEST = 0, 1
+
+# Columns of Output.values: F_tip, then
+AMPLITUDE, MEAN, SIGMA = 3, 4, 5  # F_a, and m and sigma over the reported window
+N_VALUES = 6
+
+FIRST_WINDOWED = 4
+"""Kinds of features before it look at one sample: the channels of the history."""
+
+# Columns of Output.status.
+REASON, FAULTS = 0, 1
+N_STATUS = 2
+
 
 class Layout(NamedTuple):
     """What does not change while a stream runs; taxels of all fingers one after the other."""
 
     offsets: Integers  # (n_fingers + 1,) first taxel of each finger
     rotations: Array  # (n_taxels, 3, 3)
-    limits: Array  # (n_fingers, 2) of the readings; infinite where unknown
-    least_noise: Array  # (n_fingers,) of a force component, from the step of the readings
+    constants: Array  # (n_fingers, N_CONSTANTS)
     specs: Integers  # (n_fingers, n_features, 4) kind, window, transform, scope; -1 padding
     floors: Array  # (n_fingers, n_features)
-    windows: Integers  # (n_fingers, 2) window of the reported sigma, longest window
+    windows: Integers  # (n_fingers, 2) of the reported sigma, and the longest
     tare_kind: int
     tare_seconds: float
     period: float
 
 
 class Memory(NamedTuple):
-    """What a stream remembers of each finger."""
+    """What a stream remembers."""
 
-    baseline: Array  # (n_taxels, 3) sum while the tare runs, then the mean
+    baseline: Array  # (n_taxels, 3) a sum while the tare runs, then the mean
     previous: Array  # (n_taxels, 3) last finite readings
     history: Array  # (n_fingers, 4, 2 * longest) F_a, F_x, F_y, F_z, each written twice
-    clock: Array  # (n_fingers, 2) time of the first finite sample, and of the last sample
-    seen: Integers  # (n_fingers,) finite samples
-    run: Integers  # (n_fingers,) forces in the present stretch
-    gapped: Integers  # (n_fingers,) 1 while a stretch that follows a gap warms up
-    tared: Integers  # (n_fingers,) samples in the baseline so far; -1 once it is frozen
-    frozen: Integers  # (n_fingers,) samples since the readings last changed
-    changes: Integers  # (n_fingers,) samples that changed the readings
-    pulling: Integers  # (n_fingers,) samples since the sum of the normal readings turned negative
-    noise: Array  # (n_fingers, 3) sum of squared steps of force, their number, the noise
-    largest: Array  # (n_fingers,) largest F_a so far
+    counts: Integers  # (n_fingers, N_COUNTS)
+    levels: Array  # (n_fingers, N_LEVELS)
     scratch: Array  # (3, 1)
 
 
 class Output(NamedTuple):
-    """What is known of each finger after a sample."""
+    """What is known after a sample; NaN where nothing is."""
 
-    features: Array  # (n_fingers, n_features); NaN while the reason is not READY
-    force: Array  # (n_fingers, 3); NaN where there is none
-    amplitude: Array  # (n_fingers,)
-    sigma: Array  # (n_fingers,)
-    reason: Integers  # (n_fingers,)
-    faults: Integers  # (n_fingers,) bits
+    features: Array  # (n_fingers, n_features)
+    values: Array  # (n_fingers, N_VALUES)
+    status: Integers  # (n_fingers, N_STATUS)
 
 
-@numba.njit(cache=True, error_model="numpy")
+@compiled
 def advance(
-    layout: Layout,
-    memory: Memory,
-    output: Output,
-    readings: Array,
-    present: npt.NDArray[np.bool_],
-    time: float,
-) -> None:  # pragma: no cover (compiled)
+    layout: Layout, memory: Memory, output: Output, readings: Array, present: Flags, time: float
+) -> None:
     """Takes one sample of the fingers that are present, and fills the output.
 
     Args:
@@ -96,284 +120,252 @@ def advance(
         present: (n_fingers,) which fingers have a sample.
         time: of the sample [s].
     """
-    for finger in range(len(present)):
-        if present[finger]:
-            first, last = layout.offsets[finger], layout.offsets[finger + 1]
-            _take(layout, memory, output, finger, readings[first:last], time)
-        elif memory.seen[finger] > 0 and _is_gap(layout, memory, finger, time):
-            _break(memory, finger)
-            _silence(output, finger, GAP, 0)
-    for finger in range(len(present)):
-        if present[finger] and output.reason[finger] == READY:
-            _fill_features(layout, memory, output, finger)
+    counts, status = memory.counts, output.status
+    for f in range(len(present)):
+        if time - memory.levels[f, LAST] > GAP_LIMIT * layout.period:  # False while LAST is NaN
+            counts[f, RUN] = counts[f, FROZEN] = counts[f, PULLING] = 0
+            counts[f, GAPPED] = 1
+            status[f, REASON], status[f, FAULTS] = GAP, 0
+            output.values[f] = math.nan
+        if present[f]:
+            status[f, REASON], status[f, FAULTS] = _take(
+                layout, memory, output.values, readings, time, f
+            )
+    for f in range(len(present)):
+        if status[f, REASON] != READY:
+            output.features[f] = math.nan
+        elif present[f]:
+            _fill_features(layout, memory, output, f)
+            if math.isnan(output.features[f].sum()):  # the noise is not known yet
+                status[f, REASON] = TARE
 
 
-@numba.njit(cache=True, error_model="numpy")
+@compiled
+def _take(
+    layout: Layout, memory: Memory, values: Array, readings: Array, time: float, f: int
+) -> tuple[int, int]:
+    """One finger's sample up to its force; the reason and the faults after it."""
+    offsets, rotations, constants, _, _, windows, tare_kind, tare_seconds, period = layout
+    baseline, previous, history, counts, levels, scratch = memory
+    first, last = offsets[f], offsets[f + 1]
+    values[f] = math.nan
+    levels[f, LAST] = time
+    total, changed, least, most = _survey(readings, previous, first, last)
+    if not math.isfinite(total):
+        counts[f, RUN] = 0
+        return FAULT, NOT_FINITE
+    _watch(counts, levels, f, changed, time)
+    elapsed = time - levels[f, FIRST] + 0.5 * period  # half a period: rounding moves no sample
+    if math.isnan(levels[f, NOISE]):
+        watched = elapsed >= (tare_seconds if tare_kind == TARE_SECONDS else NOISE_SECONDS)
+        _listen(layout, memory, readings, f, watched)
+    previous[first:last] = readings[first:last]
+    if counts[f, TARED] >= 0:
+        running = elapsed < tare_seconds
+        if not _tare(readings, baseline, counts, f, first, last, tare_kind, running):
+            return TARE, 0
+    x, y, z, pressing = force_of(readings, baseline, rotations, first, last)
+    _remember(history, counts, levels, values, f, x, y, z)
+    if counts[f, RUN] >= windows[f, SIGMA_WINDOW]:
+        moments = _moments(history, counts, f, windows[f, SIGMA_WINDOW], scratch)
+        values[f, MEAN], values[f, SIGMA] = moments
+    faults = _faults(counts, levels, constants, f, period, least, most)
+    if tare_kind == TARE_SECONDS and _pulled(counts, levels, f, pressing, period):
+        faults |= TARE_LOADED
+    if faults:
+        return FAULT, faults
+    if counts[f, RUN] < windows[f, LONGEST]:
+        return GAP if counts[f, GAPPED] else WARM_UP, 0
+    counts[f, GAPPED] = 0
+    return READY, 0
+
+
+@compiled
 def force_of(
-    readings: Array, baseline: Array, rotations: Array
-) -> tuple[float, float, float]:  # pragma: no cover (compiled)
-    """F_tip = sum over taxels of R_i (f_i - baseline_i)."""
-    fx = fy = fz = 0.0
-    for i in range(len(readings)):
+    readings: Array, baseline: Array, rotations: Array, first: int, last: int
+) -> tuple[float, float, float, float]:
+    """F_tip = sum over taxels of R_i (f_i - baseline_i), and the sum of the normal readings."""
+    fx = fy = fz = pressing = 0.0
+    for i in range(first, last):
         x = readings[i, 0] - baseline[i, 0]
         y = readings[i, 1] - baseline[i, 1]
         z = readings[i, 2] - baseline[i, 2]
-        turn = rotations[i]
-        fx += turn[0, 0] * x + turn[0, 1] * y + turn[0, 2] * z
-        fy += turn[1, 0] * x + turn[1, 1] * y + turn[1, 2] * z
-        fz += turn[2, 0] * x + turn[2, 1] * y + turn[2, 2] * z
-    return fx, fy, fz
+        fx += rotations[i, 0, 0] * x + rotations[i, 0, 1] * y + rotations[i, 0, 2] * z
+        fy += rotations[i, 1, 0] * x + rotations[i, 1, 1] * y + rotations[i, 1, 2] * z
+        fz += rotations[i, 2, 0] * x + rotations[i, 2, 1] * y + rotations[i, 2, 2] * z
+        pressing += z
+    return fx, fy, fz, pressing
 
 
-@numba.njit(cache=True, error_model="numpy")
-def _take(
-    layout: Layout, memory: Memory, output: Output, finger: int, readings: Array, time: float
-) -> None:  # pragma: no cover (compiled)
-    if _is_gap(layout, memory, finger, time):
-        _break(memory, finger)
-    memory.clock[finger, 1] = time
-    if not _all_finite(readings):
-        memory.run[finger] = 0
-        _silence(output, finger, FAULT, NOT_FINITE)
-        return
-    _watch(layout, memory, finger, readings, time)
-    if not _tare(layout, memory, finger, readings, time):
-        _silence(output, finger, TARE, 0)
-        return
-    first, last = layout.offsets[finger], layout.offsets[finger + 1]
-    baseline = memory.baseline[first:last]
-    x, y, z = force_of(readings, baseline, layout.rotations[first:last])
-    _remember(memory, output, finger, x, y, z)
-    output.sigma[finger] = _sigma(memory, finger, layout.windows[finger, 0])
-    output.faults[finger] = _faults(layout, memory, finger, readings, baseline)
-    output.reason[finger] = _reason(layout, memory, output, finger)
-    if output.reason[finger] != READY:
-        output.features[finger] = math.nan
-
-
-@numba.njit(cache=True, error_model="numpy")
-def _is_gap(
-    layout: Layout, memory: Memory, finger: int, time: float
-) -> bool:  # pragma: no cover (compiled)
-    return bool(time - memory.clock[finger, 1] > GAP_LIMIT * layout.period)  # False against NaN
-
-
-@numba.njit(cache=True, error_model="numpy")
-def _break(memory: Memory, finger: int) -> None:  # pragma: no cover (compiled)
-    memory.run[finger] = 0
-    memory.gapped[finger] = 1
-    memory.frozen[finger] = 0
-    memory.pulling[finger] = 0
-
-
-@numba.njit(cache=True, error_model="numpy")
-def _silence(
-    output: Output, finger: int, reason: int, faults: int
-) -> None:  # pragma: no cover (compiled)
-    output.features[finger] = math.nan
-    output.force[finger] = math.nan
-    output.amplitude[finger] = math.nan
-    output.sigma[finger] = math.nan
-    output.reason[finger] = reason
-    output.faults[finger] = faults
-
-
-@numba.njit(cache=True, error_model="numpy")
-def _all_finite(readings: Array) -> bool:  # pragma: no cover (compiled)
-    for i in range(len(readings)):
+@compiled
+def _survey(
+    readings: Array, previous: Array, first: int, last: int
+) -> tuple[float, bool, float, float]:
+    """A sum that is finite where all readings are, whether any changed, smallest and largest."""
+    total = 0.0
+    n_changed = 0
+    least, most = math.inf, -math.inf
+    for i in range(first, last):
         for axis in range(3):
-            if not math.isfinite(readings[i, axis]):
-                return False
-    return True
+            value = readings[i, axis]
+            total += value
+            n_changed += value != previous[i, axis]
+            least = min(least, value)
+            most = max(most, value)
+    return total, n_changed > 0, least, most
 
 
-@numba.njit(cache=True, error_model="numpy")
-def _watch(
-    layout: Layout, memory: Memory, finger: int, readings: Array, time: float
-) -> None:  # pragma: no cover (compiled)
-    """Counts changes of the readings, and measures their noise by steps while it is new."""
-    first, last = layout.offsets[finger], layout.offsets[finger + 1]
-    previous = memory.previous[first:last]
-    if memory.seen[finger] == 0:
-        memory.clock[finger, 0] = time
+@compiled
+def _watch(counts: Integers, levels: Array, f: int, changed: bool, time: float) -> None:
+    if counts[f, SEEN] == 0:
+        levels[f, FIRST] = time
+    elif changed:
+        counts[f, FROZEN] = 0
+        counts[f, CHANGES] += 1
     else:
-        changed = False
-        for i in range(len(readings)):
-            for axis in range(3):
-                changed = changed or readings[i, axis] != previous[i, axis]
-        memory.frozen[finger] = 0 if changed else memory.frozen[finger] + 1
-        memory.changes[finger] += changed
-        if math.isnan(memory.noise[finger, 2]):
-            _measure_noise(layout, memory, finger, readings, time)
-    memory.seen[finger] += 1
-    previous[:] = readings
+        counts[f, FROZEN] += 1
+    counts[f, SEEN] += 1
 
 
-@numba.njit(cache=True, error_model="numpy")
-def _measure_noise(
-    layout: Layout, memory: Memory, finger: int, readings: Array, time: float
-) -> None:  # pragma: no cover (compiled)
-    noise = memory.noise[finger]
-    seconds = layout.tare_seconds if layout.tare_kind == TARE_SECONDS else NOISE_SECONDS
-    if _elapsed(layout, memory, finger, time) < seconds:
-        first, last = layout.offsets[finger], layout.offsets[finger + 1]
-        previous = memory.previous[first:last]
-        x, y, z = force_of(readings, previous, layout.rotations[first:last])
-        noise[0] += x * x + y * y + z * z
-        noise[1] += 1.0
-    else:
-        # A step holds the noise of two samples, and three components.
-        measured = math.sqrt(noise[0] / (6.0 * max(noise[1], 1.0)))
-        noise[2] = max(measured, layout.least_noise[finger])
+@compiled
+def _listen(layout: Layout, memory: Memory, readings: Array, f: int, watched: bool) -> None:
+    """The noise of a force component: a step holds that of two samples, in three components."""
+    levels = memory.levels
+    if watched:
+        measured = math.sqrt(levels[f, STEPS] / (6.0 * max(levels[f, N_STEPS], 1.0)))
+        levels[f, NOISE] = max(measured, layout.constants[f, LEAST_NOISE])
+    elif memory.counts[f, SEEN] > 1:
+        first, last = layout.offsets[f], layout.offsets[f + 1]
+        x, y, z, _ = force_of(readings, memory.previous, layout.rotations, first, last)
+        levels[f, STEPS] += x * x + y * y + z * z
+        levels[f, N_STEPS] += 1.0
 
 
-@numba.njit(cache=True, error_model="numpy")
-def _elapsed(
-    layout: Layout, memory: Memory, finger: int, time: float
-) -> float:  # pragma: no cover (compiled)
-    """Since the first finite sample, and half a period more, so that rounding moves no sample."""
-    return float(time - memory.clock[finger, 0] + 0.5 * layout.period)
-
-
-@numba.njit(cache=True, error_model="numpy")
+@compiled
 def _tare(
-    layout: Layout, memory: Memory, finger: int, readings: Array, time: float
-) -> bool:  # pragma: no cover (compiled)
-    """Whether the baseline is frozen; takes this sample into it while it is not."""
-    if memory.tared[finger] < 0:
-        return True
-    first, last = layout.offsets[finger], layout.offsets[finger + 1]
-    baseline = memory.baseline[first:last]
-    if layout.tare_kind == TARE_FIRST:
-        baseline[:] = readings
-    elif layout.tare_kind == TARE_SECONDS:
-        if _elapsed(layout, memory, finger, time) < layout.tare_seconds:
-            baseline += readings
-            memory.tared[finger] += 1
+    readings: Array,
+    baseline: Array,
+    counts: Integers,
+    f: int,
+    first: int,
+    last: int,
+    kind: int,
+    running: bool,
+) -> bool:
+    """Whether the baseline is frozen now; takes this sample into it while it is not."""
+    if kind == TARE_FIRST:
+        baseline[first:last] = readings[first:last]
+    elif kind == TARE_SECONDS:
+        if running:
+            baseline[first:last] += readings[first:last]
+            counts[f, TARED] += 1
             return False
-        baseline /= max(memory.tared[finger], 1)
-    memory.tared[finger] = -1
+        baseline[first:last] /= max(counts[f, TARED], 1)
+    counts[f, TARED] = -1
     return True
 
 
-@numba.njit(cache=True, error_model="numpy")
+@compiled
 def _remember(
-    memory: Memory, output: Output, finger: int, x: float, y: float, z: float
-) -> None:  # pragma: no cover (compiled)
+    history: Array,
+    counts: Integers,
+    levels: Array,
+    values: Array,
+    f: int,
+    x: float,
+    y: float,
+    z: float,
+) -> None:
     amplitude = math.sqrt(x * x + y * y + z * z)
-    history = memory.history[finger]
-    longest = history.shape[1] // 2
-    place = memory.run[finger] % longest
-    memory.run[finger] += 1
-    for channel, value in enumerate((amplitude, x, y, z)):
-        history[channel, place] = value
-        history[channel, place + longest] = value
-    memory.largest[finger] = max(memory.largest[finger], amplitude)
-    output.amplitude[finger] = amplitude
-    output.force[finger, 0] = x
-    output.force[finger, 1] = y
-    output.force[finger, 2] = z
+    length = history.shape[2] // 2
+    place = counts[f, RUN] % length
+    counts[f, RUN] += 1
+    counts[f, END] = place + length + 1
+    history[f, 0, place] = history[f, 0, place + length] = amplitude
+    history[f, 1, place] = history[f, 1, place + length] = x
+    history[f, 2, place] = history[f, 2, place + length] = y
+    history[f, 3, place] = history[f, 3, place + length] = z
+    values[f, 0], values[f, 1], values[f, 2] = x, y, z
+    values[f, AMPLITUDE] = amplitude
+    levels[f, LARGEST] = max(levels[f, LARGEST], amplitude)
 
 
-@numba.njit(cache=True, error_model="numpy")
-def _window(
-    memory: Memory, finger: int, channel: int, window: int
-) -> Array:  # pragma: no cover (compiled)
-    """The last `window` values of a channel, contiguous; the stretch must hold so many."""
-    longest = memory.history.shape[2] // 2
-    end = (memory.run[finger] - 1) % longest + longest + 1
-    return memory.history[finger, channel, end - window : end]
-
-
-@numba.njit(cache=True, error_model="numpy")
-def _moments(
-    memory: Memory, finger: int, window: int
-) -> tuple[float, float]:  # pragma: no cover (compiled)
-    m, sigma, scratch = memory.scratch[0], memory.scratch[1], memory.scratch[2]
-    haar_windows(_window(memory, finger, 0, window), window, m, sigma, scratch)
-    return m[0], sigma[0]
-
-
-@numba.njit(cache=True, error_model="numpy")
-def _sigma(memory: Memory, finger: int, window: int) -> float:  # pragma: no cover (compiled)
-    return _moments(memory, finger, window)[1] if memory.run[finger] >= window else math.nan
-
-
-@numba.njit(cache=True, error_model="numpy")
+@compiled
 def _faults(
-    layout: Layout, memory: Memory, finger: int, readings: Array, baseline: Array
-) -> int:  # pragma: no cover (compiled)
+    counts: Integers,
+    levels: Array,
+    constants: Array,
+    f: int,
+    period: float,
+    least: float,
+    most: float,
+) -> int:
     faults = 0
-    moving = memory.seen[finger] - 1 - memory.frozen[finger]
-    lively = 2 * memory.changes[finger] > moving
-    if lively and memory.frozen[finger] * layout.period >= STUCK_SECONDS:
+    lively = 2 * counts[f, CHANGES] > counts[f, SEEN] - 1 - counts[f, FROZEN]
+    if lively and counts[f, FROZEN] * period >= STUCK_SECONDS:
         faults |= STUCK
-    least, largest = layout.limits[finger, 0], layout.limits[finger, 1]
-    pressing = 0.0
-    for i in range(len(readings)):
-        pressing += readings[i, 2] - baseline[i, 2]
-        for axis in range(3):
-            if readings[i, axis] <= least or readings[i, axis] >= largest:
-                faults |= SATURATED
-    if _pulled(layout, memory, finger, pressing):
-        faults |= TARE_LOADED
+    if least <= constants[f, LEAST] or most >= constants[f, MOST]:
+        faults |= SATURATED
     return faults
 
 
-@numba.njit(cache=True, error_model="numpy")
-def _pulled(
-    layout: Layout, memory: Memory, finger: int, pressing: float
-) -> bool:  # pragma: no cover (compiled)
+@compiled
+def _pulled(counts: Integers, levels: Array, f: int, pressing: float, period: float) -> bool:
     """Whether the normal readings say that something pulls, well above noise, and for long."""
-    if layout.tare_kind != TARE_SECONDS:
-        return False
-    limit = max(20.0 * memory.noise[finger, 2], 0.1 * memory.largest[finger])
-    memory.pulling[finger] = memory.pulling[finger] + 1 if pressing < -limit else 0
-    return bool(memory.pulling[finger] * layout.period >= LOADED_SECONDS)
+    limit = max(20.0 * levels[f, NOISE], 0.1 * levels[f, LARGEST])
+    counts[f, PULLING] = counts[f, PULLING] + 1 if pressing < -limit else 0
+    return bool(counts[f, PULLING] * period >= LOADED_SECONDS)
 
 
-@numba.njit(cache=True, error_model="numpy")
-def _reason(
-    layout: Layout, memory: Memory, output: Output, finger: int
-) -> int:  # pragma: no cover (compiled)
-    if memory.run[finger] < layout.windows[finger, 1]:
-        warming = GAP if memory.gapped[finger] else WARM_UP
-        return FAULT if output.faults[finger] else warming
-    memory.gapped[finger] = 0
-    return FAULT if output.faults[finger] else READY
+@compiled
+def _moments(
+    history: Array, counts: Integers, f: int, window: int, scratch: Array
+) -> tuple[float, float]:
+    """The m and sigma of the last `window` amplitudes; the stretch must hold so many."""
+    end = counts[f, END]
+    m, sigma, spare = scratch[0], scratch[1], scratch[2]
+    haar_windows(history[f, 0, end - window : end], window, m, sigma, spare)
+    return m[0], sigma[0]
 
 
-@numba.njit(cache=True, error_model="numpy")
-def _fill_features(
-    layout: Layout, memory: Memory, output: Output, finger: int
-) -> None:  # pragma: no cover (compiled)
-    for place in range(layout.specs.shape[1]):
-        kind, window, transform, scope = layout.specs[finger, place]
-        if kind < 0:
-            break
-        floor = layout.floors[finger, place]
-        value = _feature(memory, finger, kind, window, transform, floor)
-        if scope == 1:
-            for other in range(len(memory.run)):
-                if memory.run[other] >= max(window, 1):
-                    rival = _feature(memory, other, kind, window, transform, floor)
+@compiled
+def _fill_features(layout: Layout, memory: Memory, output: Output, f: int) -> None:
+    specs, floors, own = layout.specs, layout.floors, layout.windows[f, SIGMA_WINDOW]
+    _, _, history, counts, levels, scratch = memory
+    for place in range(specs.shape[1]):
+        kind, window = specs[f, place, 0], specs[f, place, 1]
+        transform, scope = specs[f, place, 2], specs[f, place, 3]
+        value = 0.0  # in place of those that pad
+        if kind >= 0:
+            if window == own:
+                value = output.values[f, MEAN + kind - FIRST_WINDOWED]
+            else:
+                value = _feature(kind, window, history, counts, f, scratch)
+            value = _transform(value, transform, window, levels[f, NOISE], floors[f, place])
+        if kind >= 0 and scope == 1:
+            for other in range(len(counts)):
+                if counts[other, RUN] >= max(window, 1):
+                    rival = _feature(kind, window, history, counts, other, scratch)
+                    noise = levels[other, NOISE]
+                    rival = _transform(rival, transform, window, noise, floors[f, place])
                     value = max(value, rival)
-        output.features[finger, place] = value
-        if math.isnan(value):  # the noise is not known yet
-            output.reason[finger] = TARE
+        output.features[f, place] = value
 
 
-@numba.njit(cache=True, error_model="numpy")
+@compiled
 def _feature(
-    memory: Memory, finger: int, kind: int, window: int, transform: int, floor: float
-) -> float:  # pragma: no cover (compiled)
-    if kind < 4:
-        value = _window(memory, finger, kind, 1)[0]
-    else:
-        value = _moments(memory, finger, window)[kind - 4]
+    kind: int, window: int, history: Array, counts: Integers, f: int, scratch: Array
+) -> float:
+    if kind < FIRST_WINDOWED:
+        return float(history[f, kind, counts[f, END] - 1])
+    return _moments(history, counts, f, window, scratch)[kind - FIRST_WINDOWED]
+
+
+@compiled
+def _transform(value: float, transform: int, window: int, noise: float, floor: float) -> float:
     if transform == 0:
         return float(value)
     if transform == 1:
         return math.log(math.sqrt(value * value + floor * floor))
-    expected = memory.noise[finger, 2] * math.sqrt((window - 2.0) / (2.0 * window))
+    expected = noise * math.sqrt((window - 2.0) / (2.0 * window))
     return math.log(max(value, 1e-3 * expected) / expected)

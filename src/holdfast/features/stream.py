@@ -2,6 +2,7 @@
 
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
+from functools import reduce
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -57,16 +58,15 @@ class StreamPlan:
         sensors = list(self.sensors.values())
         features = [self.features[finger] for finger in self.fingers]
         width = max(1, *(len(specs) for specs in features))
-        n_taxels = [sensor.n_taxels for sensor in sensors]
         longest = [max([self.window, *(spec.window for spec in specs)]) for specs in features]
         floors = np.zeros((len(sensors), width))
         for row, specs in zip(floors, features, strict=True):
             row[: len(specs)] = [spec.floor for spec in specs]
+        constants = [(*(s.limits or (-np.inf, np.inf)), _least_noise(s)) for s in sensors]
         return Layout(
-            offsets=np.cumsum([0, *n_taxels]),
+            offsets=np.cumsum([0, *(sensor.n_taxels for sensor in sensors)]),
             rotations=np.concatenate([sensor.rotations for sensor in sensors]),
-            limits=np.array([sensor.limits or (-np.inf, np.inf) for sensor in sensors]),
-            least_noise=np.array([_least_noise(sensor) for sensor in sensors]),
+            constants=np.array(constants),
             specs=np.stack([spec_codes(specs, width) for specs in features]),
             floors=floors,
             windows=np.array([(self.window, most) for most in longest], dtype=np.int64),
@@ -78,44 +78,31 @@ class StreamPlan:
 
 def new_memory(layout: Layout) -> Memory:
     """The memory of a stream that has seen nothing."""
-    n_fingers = len(layout.offsets) - 1
-    n_taxels = int(layout.offsets[-1])
-    longest = int(layout.windows[:, 1].max())
-
-    def zeros() -> npt.NDArray[np.int64]:
-        return np.zeros(n_fingers, dtype=np.int64)
-
-    noise = np.zeros((n_fingers, 3))
-    noise[:, 2] = np.nan
+    n_fingers = len(layout.windows)
+    n_taxels = len(layout.rotations)
+    longest = int(layout.windows[:, kernel.LONGEST].max())
+    levels = np.zeros((n_fingers, kernel.N_LEVELS))
+    levels[:, [kernel.FIRST, kernel.LAST, kernel.NOISE]] = np.nan
     return Memory(
         baseline=np.zeros((n_taxels, 3)),
         previous=np.zeros((n_taxels, 3)),
         history=np.zeros((n_fingers, 4, 2 * longest)),
-        clock=np.full((n_fingers, 2), np.nan),
-        seen=zeros(),
-        run=zeros(),
-        gapped=zeros(),
-        tared=zeros(),
-        frozen=zeros(),
-        changes=zeros(),
-        pulling=zeros(),
-        noise=noise,
-        largest=np.zeros(n_fingers),
+        counts=np.zeros((n_fingers, kernel.N_COUNTS), dtype=np.int64),
+        levels=levels,
         scratch=np.zeros((3, 1)),
     )
 
 
 def new_output(layout: Layout) -> Output:
     """An output to be filled, as before the first sample."""
-    n_fingers = len(layout.offsets) - 1
-    waiting = kernel.TARE if layout.tare_kind == kernel.TARE_SECONDS else kernel.WARM_UP
+    n_fingers = len(layout.windows)
+    status = np.zeros((n_fingers, kernel.N_STATUS), dtype=np.int64)
+    taring = layout.tare_kind == kernel.TARE_SECONDS
+    status[:, kernel.REASON] = kernel.TARE if taring else kernel.WARM_UP
     return Output(
         features=np.full((n_fingers, layout.specs.shape[1]), np.nan),
-        force=np.full((n_fingers, 3), np.nan),
-        amplitude=np.full(n_fingers, np.nan),
-        sigma=np.full(n_fingers, np.nan),
-        reason=np.full(n_fingers, waiting, dtype=np.int64),
-        faults=np.zeros(n_fingers, dtype=np.int64),
+        values=np.full((n_fingers, kernel.N_VALUES), np.nan),
+        status=status,
     )
 
 
@@ -133,35 +120,41 @@ class Samples(NamedTuple):
     readings: Array
 
 
-def samples_of(recording: Recording, fingers: Sequence[str]) -> Iterator[Samples]:
-    """The samples of those fingers in order of time, a bounded number at a time.
+def samples_of(plan: StreamPlan, recording: Recording) -> Iterator[Samples]:
+    """The samples of the plan's fingers in order of time, a bounded number at a time.
 
-    Fingers that have a sample at the same time share an instant.
+    Fingers that have a sample at the same time share an instant; one that the recording lacks
+    is never present.
 
     Args:
-        recording: that has them.
-        fingers: names of its modules.
+        plan: of which fingers.
+        recording: that has some of them.
 
     Yields:
         At most `CHUNK` instants at a time.
     """
-    modules = [recording.modules[finger] for finger in fingers]
-    times = modules[0].times
-    for module in modules[1:]:
-        if not np.array_equal(times, module.times):
-            times = np.union1d(times, module.times)
-    offsets = np.cumsum([0, *(module.sensor.n_taxels for module in modules)])
+    offsets = np.cumsum([0, *(sensor.n_taxels for sensor in plan.sensors.values())])
+    modules = [
+        (place, slice(offsets[place], offsets[place + 1]), recording.modules[finger])
+        for place, finger in enumerate(plan.fingers)
+        if finger in recording.modules
+    ]
+    times = reduce(_union, (module.times for _, _, module in modules))
     for start in range(0, len(times), CHUNK):
         chunk = times[start : start + CHUNK]
-        present = np.zeros((len(chunk), len(modules)), dtype=np.bool_)
+        present = np.zeros((len(chunk), len(plan.sensors)), dtype=np.bool_)
         readings = np.zeros((len(chunk), int(offsets[-1]), 3))
-        for place, module in enumerate(modules):
-            first, last = np.searchsorted(module.times, (chunk[0], chunk[-1] + 0.0), side="left")
-            last += last < len(module.times) and module.times[last] == chunk[-1]
+        for place, taxels, module in modules:
+            first = np.searchsorted(module.times, chunk[0], side="left")
+            last = np.searchsorted(module.times, chunk[-1], side="right")
             rows = np.searchsorted(chunk, module.times[first:last])
             present[rows, place] = True
-            readings[rows, offsets[place] : offsets[place + 1]] = module.readings[first:last]
+            readings[rows, taxels] = module.readings[first:last]
         yield Samples(chunk, present, readings)
+
+
+def _union(one: Array, two: Array) -> Array:
+    return one if np.array_equal(one, two) else np.union1d(one, two)
 
 
 def give_baseline(plan: StreamPlan, memory: Memory, recording: Recording) -> None:

@@ -1,0 +1,10 @@
+"""How kernels are compiled: once, kept on disk, by the rules of IEEE arithmetic.
+
+No fast-math: a result does not depend on how many samples are computed at a time. The cache
+does not follow imports: who edits a kernel deletes it (CONTRIBUTING tells how).
+"""
+
+import numba
+
+compiled = numba.njit(cache=True, error_model="numpy")
+compiled_parallel = numba.njit(cache=True, error_model="numpy", parallel=True)

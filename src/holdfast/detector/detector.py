@@ -1,0 +1,226 @@
+"""The detector: samples of a hand in, estimates out. No I/O, no clock, no growth of memory.
+
+Offline detection is the same detector fed with a recording: one kernel computes the features,
+one the probability, one rule turns it into a state.
+"""
+
+from collections.abc import Mapping
+from itertools import pairwise
+from typing import Self
+
+import numpy as np
+import numpy.typing as npt
+
+from holdfast.contact import ContactEstimate, ContactEvent, ContactState, HandEstimate
+from holdfast.detector.rule import N_REPORT, Traces, new_decision, rule_of, run, step_live
+from holdfast.detector.traces import REASONS, STATES, VERDICTS, Detection, detection_of
+from holdfast.errors import ModelError, StreamError
+from holdfast.features.kernel import REASON
+from holdfast.features.stream import StreamPlan, give_baseline, new_memory, new_output, samples_of
+from holdfast.model import Model
+from holdfast.recordings import Recording
+from holdfast.resampling import resample
+from holdfast.sensors import Sensor
+
+HAND = "hand"
+"""Name of the hand as a whole among the fingers of events and metrics."""
+MAX_EVENTS = 1000
+"""Events that a detector keeps until they are fetched; the oldest go first."""
+
+
+class Detector:
+    """Judges a hand, sample by sample.
+
+    Args:
+        model: that judges.
+        fingers: sensor of each finger, for a model that serves any finger; by default all
+            fingers that the model names.
+        rate: of the source [Hz], for a model that takes any.
+
+    Raises:
+        ModelError: the model serves any finger and `fingers` is missing, one of them has
+            another sensor, or the model's tare is an interval, which nobody can know live.
+
+    Example:
+        >>> from holdfast.sensors import sensor
+        >>> detector = Detector(Model.load("builtin:noise-floor"), {"index": sensor("uskin-4x4")})
+        >>> estimate = detector.update({"index": np.zeros((16, 3))}, time=0.0)
+        >>> estimate.fingers["index"].state, estimate.fingers["index"].reason
+        (<ContactState.UNKNOWN: 'UNKNOWN'>, <Reason.TARE: 'tare'>)
+    """
+
+    def __init__(
+        self,
+        model: Model,
+        fingers: Mapping[str, Sensor] | None = None,
+        rate: float | None = None,
+    ) -> None:
+        sensors = model.fingers_of(fingers) if fingers is not None else _own_fingers(model)
+        first = next(iter(sensors.values()))
+        plan = model.plan(sensors, rate or first.rate)
+        if plan.tare.kind == "interval":
+            raise ModelError(
+                f"the model's tare is the interval {model.tare} s of a recording; "
+                "seconds, 'first' or 'none' expected where samples come one by one"
+            )
+        self._start(model, plan)
+
+    @classmethod
+    def _for(cls, model: Model, recording: Recording) -> Self:
+        """The detector for a recording, whose tare may be an interval of it."""
+        detector = cls.__new__(cls)
+        sensors = model.fingers_of({name: m.sensor for name, m in recording.modules.items()})
+        detector._start(model, model.plan(sensors, recording.rate))
+        if detector._plan.tare.kind == "interval":
+            give_baseline(detector._plan, detector._memory, recording)
+        return detector
+
+    def _start(self, model: Model, plan: StreamPlan) -> None:
+        self._plan = plan
+        self._layout = plan.layout()
+        self._rule = rule_of(model, plan)
+        n_fingers, n_taxels = len(plan.fingers), int(self._layout.offsets[-1])
+        self._readings = np.zeros((n_taxels, 3))
+        self._present = np.zeros(n_fingers, dtype=np.bool_)
+        self._report = np.zeros((n_fingers, N_REPORT))
+        bounds = pairwise(self._layout.offsets.tolist())
+        self._slots = {
+            finger: (place, self._readings[start:stop], (stop - start, 3))
+            for place, (finger, (start, stop)) in enumerate(zip(plan.fingers, bounds, strict=True))
+        }
+        self.reset()
+        # Compiles, and changes nothing: no finger is present.
+        self._step(0.0)
+
+    def reset(self) -> None:
+        """Forgets everything, the tare included."""
+        n_fingers = len(self._plan.fingers)
+        self._memory = new_memory(self._layout)
+        self._output = new_output(self._layout)
+        self._decision = new_decision(n_fingers)
+        self._arrays = (*self._layout, *self._memory, *self._output, *self._rule, *self._decision)
+        waiting = REASONS[int(self._output.status[0, REASON])]
+        nothing = ContactEstimate(
+            np.nan, ContactState.UNKNOWN, waiting, np.nan, np.nan, (np.nan, np.nan, np.nan)
+        )
+        self._latest = dict.fromkeys(self._plan.fingers, nothing)
+        self._hand = ContactState.UNKNOWN
+        self._last = -np.inf
+        self._events: list[ContactEvent] = []
+
+    def update(self, samples: Mapping[str, npt.ArrayLike], time: float) -> HandEstimate:
+        """Takes one sample of some or all fingers, and says how the hand is.
+
+        Args:
+            samples: (n_taxels, 3) by finger, in taxel frames, in the unit of the training.
+            time: of the samples, later than the last [s].
+
+        Returns:
+            The latest estimate of every finger; fingers without a sample keep theirs until the
+            time since is a gap.
+
+        Raises:
+            StreamError: an unknown finger, another number of taxels or axes, or a time that
+                does not go forward. The detector is as it was before.
+        """
+        if not time > self._last or time == np.inf:
+            raise StreamError(
+                f"time {time:g} s given after {self._last:g} s; times that go forward expected"
+            )
+        self._place(samples)
+        self._last = time
+        return self._tell(time, self._step(time))
+
+    def events(self) -> list[ContactEvent]:
+        """The changes of state since the last call, at most `MAX_EVENTS`, oldest first."""
+        events, self._events = self._events, []
+        return events
+
+    def run(self, recording: Recording) -> Detection:
+        """Takes all samples of a recording, from where the detector stands.
+
+        Args:
+            recording: that has some of the fingers. A long one may be given in pieces.
+
+        Returns:
+            What `update` would have said, sample by sample.
+        """
+        pieces = []
+        for times, present, readings in samples_of(self._plan, recording):
+            traces = Traces.empty(len(times), present.shape[1])
+            run(
+                self._layout, self._memory, self._output, self._rule, self._decision,
+                readings, present, times, traces,
+            )  # fmt: skip
+            pieces.append((times, present, traces))
+        return detection_of(recording.name, self._plan.fingers, pieces)
+
+    def _step(self, time: float) -> int:
+        return int(step_live(*self._arrays, self._readings, self._present, time, self._report))
+
+    def _place(self, samples: Mapping[str, npt.ArrayLike]) -> None:
+        self._present[:] = False
+        for finger, sample in samples.items():
+            if finger not in self._slots:
+                raise StreamError(
+                    f"finger {finger!r} given; the model judges {', '.join(self._slots)}"
+                )
+            place, slot, shape = self._slots[finger]
+            values = sample if isinstance(sample, np.ndarray) else np.asarray(sample)
+            if values.shape != shape:
+                raise StreamError(
+                    f"{finger}: a sample of shape {values.shape} given, {shape} expected "
+                    f"({self._plan.sensors[finger].name})"
+                )
+            slot[...] = values
+            self._present[place] = True
+
+    def _tell(self, time: float, hand_code: int) -> HandEstimate:
+        latest = {}
+        for finger, row in zip(self._plan.fingers, self._report.tolist(), strict=True):
+            seen, code, probability, sigma, x, y, z = row
+            state, reason, faults = VERDICTS[int(code)]
+            previous = self._latest[finger].state
+            if state is not previous:
+                self._note(finger, state, previous, time)
+            latest[finger] = ContactEstimate(
+                seen, state, reason, probability, sigma, (x, y, z), faults
+            )
+        hand = STATES[hand_code]
+        if hand is not self._hand:
+            self._note(HAND, hand, self._hand, time)
+        self._latest, self._hand = latest, hand
+        return HandEstimate(time, hand, latest)
+
+    def _note(self, finger: str, state: ContactState, previous: ContactState, time: float) -> None:
+        self._events.append(ContactEvent(finger, state, previous, time))
+        del self._events[:-MAX_EVENTS]
+
+
+def detect(model: Model, recording: Recording) -> Detection:
+    """What the model says of a recording: what a detector says when fed sample by sample.
+
+    Args:
+        model: that judges.
+        recording: that has some of its fingers. One whose rate is not within 20 % of the
+            model's is resampled to it first.
+
+    Returns:
+        The traces of the fingers that the recording has, and of the hand.
+
+    Raises:
+        ModelError: the recording has none of the model's fingers, or another sensor.
+        ValueError: a tare by interval finds no samples.
+    """
+    if model.rate is not None and not model.rate_fits(recording.rate):
+        recording = resample(recording, model.rate)
+    return Detector._for(model, recording).run(recording)
+
+
+def _own_fingers(model: Model) -> dict[str, Sensor]:
+    if any(finger == "*" or part.sensor is None for finger, part in model.fingers.items()):
+        raise ModelError(
+            f"the model {model.name or 'given'} serves any finger: say which fingers the hand "
+            "has, and with which sensors"
+        )
+    return {name: model.sensors[str(part.sensor)] for name, part in model.fingers.items()}
