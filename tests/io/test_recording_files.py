@@ -23,6 +23,18 @@ def test_what_cannot_be_read_is_told(read, tmp_path):
         assert str(caught.value) == text
 
 
+@pytest.mark.parametrize("suffix", ["parquet", "mcap"])
+def test_what_the_disk_refuses_is_told(make_recording, tmp_path, monkeypatch, suffix):
+    def refuse(*_):
+        raise PermissionError(13, "Permission denied")
+
+    path = tmp_path / f"a.{suffix}"
+    save_recording(make_recording(150), path)
+    monkeypatch.setattr(f"holdfast.io.{suffix}.load", refuse)
+    with pytest.raises(RecordingError, match=r"cannot read .*: Permission denied"):
+        load_recording(path)
+
+
 def test_an_unknown_suffix_is_not_written(make_recording, tmp_path):
     with pytest.raises(OutputError, match=r"cannot write .*a\.h5: \.h5 given, \.parquet or \.mcap"):
         save_recording(make_recording(), tmp_path / "a.h5")

@@ -28,7 +28,10 @@ def load_recording(path: str | Path, labels: bool = True) -> Recording:
             beside it is of another recording.
     """
     file = Path(path)
-    recording: Recording = _format_of(file).load(file)
+    try:
+        recording: Recording = _format_of(file).load(file)
+    except OSError as cause:
+        raise RecordingError(f"cannot read {file}: {cause.strerror or cause}") from cause
     beside = labels_for(file, recording.digest) if labels else None
     if beside is None:
         return recording
