@@ -116,7 +116,7 @@ def test_a_full_disk_is_told(tmp_path, monkeypatch):
     def full(data):
         raise OSError(errno.ENOSPC, "No space left on device")
 
-    monkeypatch.setattr("holdfast.io.mcap_writer._Direct.write", lambda self, data: full(data))
+    monkeypatch.setattr("holdfast.io.message_log._Direct.write", lambda self, data: full(data))
     with pytest.raises(OutputError, match=r"cannot write .*a\.mcap: No space left on device"):
         writer.append("thumb", np.arange(100) * 0.1, readings(100))
     with pytest.raises(OutputError, match="No space left on device"):

@@ -21,23 +21,16 @@ from zstandard import ZstdError
 from holdfast.errors import RecordingError
 from holdfast.files import whole_file
 from holdfast.io import cdr
-from holdfast.io.header import (
-    Header,
+from holdfast.io.header import Header, decode, header_of
+from holdfast.io.mcap_writer import MESSAGE_SECONDS
+from holdfast.io.message_log import HEADER_TOPIC, LIBRARY, MARKERS_TOPIC, MessageLog
+from holdfast.io.series import (
     Samples,
     Series,
-    decode,
     empty,
-    header_of,
     recording_from,
     samples_of,
     series_of,
-)
-from holdfast.io.mcap_writer import (
-    HEADER_TOPIC,
-    LIBRARY,
-    MARKERS_TOPIC,
-    MESSAGE_SECONDS,
-    MessageLog,
 )
 from holdfast.io.spans import spans
 from holdfast.recordings import Recording

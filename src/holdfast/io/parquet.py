@@ -17,19 +17,16 @@ import pyarrow.parquet as pq
 
 from holdfast.errors import RecordingError
 from holdfast.files import whole_file
-from holdfast.io.header import (
-    Header,
+from holdfast.io.header import Header, decode, encode, header_of
+from holdfast.io.seal import BLANK, KEY, check_seal, read_footer, seal
+from holdfast.io.series import (
     Samples,
     Series,
-    decode,
-    encode,
-    header_of,
     n_components,
     recording_from,
     samples_of,
     series_of,
 )
-from holdfast.io.seal import BLANK, KEY, check_seal, read_footer, seal
 from holdfast.io.spans import spans
 from holdfast.recordings import Recording
 from holdfast.sensors.values import Array

@@ -10,8 +10,9 @@ import msgspec
 import numpy as np
 import numpy.typing as npt
 
-from holdfast.io.header import Header, Samples, cut_labels, recording_from
+from holdfast.io.header import Header
 from holdfast.io.labels import labels_for, labels_path
+from holdfast.io.series import Samples, cut_labels, recording_from
 from holdfast.io.spans import spans
 from holdfast.recordings import Label, Recording
 from holdfast.sensors.values import Array
