@@ -125,7 +125,7 @@ def _marker(path: Path, n_rows: int) -> Mapping[str, npt.NDArray[Any]]:
 
 
 def _robot(table: Table) -> Mapping[str, npt.NDArray[Any]]:
-    """The arm's joints, the pose of its end effector (a 4x4 matrix) and its commanded speed."""
+    """The arm's joints, the pose of its end effector (4 x 4), and `v_x`, `v_y` as given."""
     places = [(row, column) for row in range(4) for column in range(4)]
     pose = table.columns([f"ee_T_{row}{column}" for row, column in places])
     return {

@@ -1,0 +1,45 @@
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from holdfast.errors import RecordingError
+from holdfast.io.importers.table import counts_or, natural, read_table
+
+
+def test_numbers_text_comments_and_holes(tmp_path):
+    path = tmp_path / "a.csv"
+    path.write_bytes("\ufeff# by hand\r\na,ü,b\r\n1,x,\r\nnan,,2.5e3\r\n".encode())
+    table, cells = read_table(path, ["ü"])
+    assert (table.names, table.comments, table.first_line) == (("a", "ü", "b"), ("by hand",), 3)
+    np.testing.assert_array_equal(table.columns(["b", "a"]), [[np.nan, 1], [2500, np.nan]])
+    assert cells == {"ü": ["x", ""]}
+
+
+@pytest.mark.parametrize(
+    ("values", "number"),
+    [
+        ([0.0, 65535.0], "uint16"),
+        ([-1.0, 70000.0], "int32"),
+        ([0.5, 1.0], "float64"),
+        ([np.nan, 1.0], "float64"),
+        ([0.0, 1e12], "float64"),
+    ],
+)
+def test_whole_numbers_become_counts(values, number):
+    got = counts_or(np.array(values))
+    assert got.dtype == number
+    np.testing.assert_array_equal(got, values)
+
+
+def test_names_sort_as_a_person_would():
+    paths = [Path(name) for name in ("Exp10", "Exp2", "Exp1")]
+    assert [p.name for p in sorted(paths, key=natural)] == ["Exp1", "Exp2", "Exp10"]
+
+
+@pytest.mark.parametrize("raw", [b"\xff\xfe\x00", b"a,b\n1,\xff\n"])
+def test_what_is_no_text_is_told(tmp_path, raw):
+    path = tmp_path / "a.csv"
+    path.write_bytes(raw)
+    with pytest.raises(RecordingError, match=r"a\.csv(, row 2, column 'b': .* given,| is no CSV)"):
+        read_table(path)

@@ -1,0 +1,39 @@
+import re
+from pathlib import Path
+
+import msgspec
+import pytest
+
+from holdfast.errors import RecordingError
+from holdfast.io.header import decode, encode, header_of
+
+
+def test_it_comes_back(make_recording):
+    header = header_of(make_recording(), "a")
+    assert decode(encode(header), Path("a")) == header
+
+
+@pytest.mark.parametrize(
+    ("change", "text"),
+    [
+        (lambda h: h.update(extra=1), "Object contains unknown field `extra`"),
+        (lambda h: h.update(schema="holdfast.recording/9"), "Invalid enum value"),
+        (lambda h: h.pop("name"), "Object missing required field `name`"),
+        (lambda h: h["modules"]["thumb"].update(n_samples="9"), "Expected `int | null`, got `str`"),
+        (lambda h: h["modules"]["thumb"]["sensor"].update(skin=1), "unknown fields ['skin'] in a"),
+        (lambda h: h["modules"]["thumb"]["sensor"].update(rate=0), "a rate above 0 Hz expected"),
+        (lambda h: h["modules"]["thumb"]["sensor"].pop("normal"), "fields ['normal'] are missing"),
+        (lambda h: h["truth"]["hand"]["phase"].update(shape=[0.5]), "Expected `int`, got `float`"),
+    ],
+)
+def test_what_is_not_as_described_is_refused(make_recording, change, text):
+    data = msgspec.json.decode(encode(header_of(make_recording(), "a")))
+    change(data)
+    with pytest.raises(RecordingError, match=re.escape(text)) as caught:
+        decode(msgspec.json.encode(data), Path("a.parquet"))
+    assert str(caught.value).startswith("a.parquet: the header of the recording is refused: ")
+
+
+def test_what_is_no_json_is_refused():
+    with pytest.raises(RecordingError, match="the header of the recording is refused: Input data"):
+        decode(b"", Path("a.parquet"))
