@@ -258,7 +258,7 @@ def test_the_example_of_the_documentation():
     assert metrics.false_alarms_per_minute == pytest.approx(30)
 
 
-@pytest.mark.parametrize("start", [0.0, 0.1, -7.3, 1.7e9])
+@pytest.mark.parametrize("start", [0.0, 14.7, -7.3, 1.7e9])
 @pytest.mark.parametrize("alarm", [98, 135])
 def test_both_ends_of_the_window_belong_wherever_time_begins(start, alarm):
     states = np.full(len(LABELS), S)
