@@ -101,14 +101,19 @@ class Tactile:
 
     @cached_property
     def period(self) -> float:
-        """The median step in time [s]; that of the sensor where there is no step."""
-        return (
-            float(np.median(np.diff(self.times))) if len(self.times) > 1 else 1 / self.sensor.rate
-        )
+        """The mean step in time, gaps left out [s]; that of the sensor where there is no step.
+
+        A gap is told by the median step. The mean is what counts: stamps in whole milliseconds
+        make the median of a 149.5 Hz stream read 143 or 167 Hz.
+        """
+        steps = np.diff(self.times)
+        if not len(steps):
+            return 1 / self.sensor.rate
+        return float(steps[steps <= GAP_PERIODS * np.median(steps)].mean())
 
     @property
     def rate(self) -> float:
-        """Samples per second, by the median step in time [Hz]."""
+        """Samples per second, by the mean step in time [Hz]."""
         return 1 / self.period
 
     @property

@@ -1,0 +1,102 @@
+"""Recordings made from an analytic signal, for a first look and for tests: no physics.
+
+A fingertip of 30 taxels is pressed by a smooth grip that closes, holds, is shaken, holds again
+and lets go. The pressure has the shape of a bell over the taxels; shaking is a band of
+sinusoids. Labels follow from the schedule, so they are exact.
+"""
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from holdfast.contact import Cause, ContactState
+from holdfast.recordings import Label, Recording, Tactile
+from holdfast.sensors import Sensor, sensor
+from holdfast.sensors.values import Array
+
+RATE = 150.0
+NOISE = 0.9
+"""Standard deviation of a reading [counts], as in the data sheet of the uSkin."""
+BASELINE = (32768.0, 32768.0, 36000.0)
+"""Readings at rest [counts]."""
+
+FREE, CLOSING, HOLD, SHAKE, RELEASE = 1.5, 0.8, 3.0, 1.2, 0.5
+"""How long each part lasts [s]."""
+
+
+def synthetic_recording(
+    name: str, seed: int, fingers: Sequence[str] = ("thumb", "index", "middle")
+) -> Recording:
+    """One grasp: free, closing, held, shaken, held, let go, free.
+
+    Args:
+        name: of the recording.
+        seed: of grip, shaking and noise; the same seed gives the same bytes.
+        fingers: that take part.
+
+    Returns:
+        Counts of curved uSkin fingertips at 150 Hz, with labels.
+    """
+    generator = np.random.default_rng(seed)
+    grip = generator.uniform(400.0, 1200.0)
+    modules = {finger: _finger(generator, grip) for finger in fingers}
+    metadata = {"source": "synthetic", "seed": seed, "object": f"object {seed % 3}"}
+    return Recording(name, modules, metadata)
+
+
+def _finger(generator: np.random.Generator, grip: float) -> Tactile:
+    tip = sensor("uskin-curved")
+    ends = np.cumsum([FREE, CLOSING, HOLD, SHAKE, HOLD, RELEASE, FREE])
+    times = np.arange(round(ends[-1] * RATE)) / RATE
+    force = _force(generator, times, ends, grip * generator.uniform(0.7, 1.3))
+    readings = _readings(generator, tip, force)
+    return Tactile(tip, times, readings, labels=_labels(ends))
+
+
+def _force(generator: np.random.Generator, times: Array, ends: Array, grip: float) -> Array:
+    """(n, 3) force on the fingertip [counts]: grip, a steady shear, and the shaking."""
+    closing = _ramp((times - ends[0]) / CLOSING)
+    release = _ramp((times - ends[4]) / RELEASE)
+    level = grip * (closing - release)
+    shaken = (times >= ends[2]) & (times < ends[3])
+    frequencies = generator.uniform(4.0, 30.0, size=(6, 1))
+    phases = generator.uniform(0.0, 2 * np.pi, size=(6, 3))
+    angle = 2 * np.pi * frequencies * times[:, None, None] + phases
+    shaking = 0.05 * np.sin(angle).sum(axis=1) * shaken[:, None]
+    direction = np.array([1.0, *generator.normal(0.0, 0.2, size=2)])
+    return np.asarray(level[:, None] * (direction + shaking))
+
+
+def _readings(generator: np.random.Generator, tip: Sensor, force: Array) -> Array:
+    """(n, n_taxels, 3) counts: the force spread over the taxels near the middle, and noise."""
+    middle = tip.positions[np.abs(tip.positions @ [0.0, 1.0, 0.0]).argmin()]
+    distance = np.linalg.norm(tip.positions - middle, axis=1)
+    share = np.exp(-0.5 * (distance / 6e-3) ** 2)
+    share /= share.sum()
+    in_taxels = np.einsum("tji,nj->nti", tip.rotations, force) * share[:, None]
+    rest = np.array(BASELINE) + generator.normal(0.0, 200.0, size=(tip.n_taxels, 3))
+    noise = generator.normal(0.0, NOISE, size=in_taxels.shape)
+    return np.clip(np.rint(rest + in_taxels + noise), 0, 65535).astype(np.uint16)
+
+
+def _labels(ends: Array) -> tuple[Label, ...]:
+    states = (
+        (ContactState.NO_CONTACT, None),
+        (ContactState.UNSTABLE, Cause.CLOSING),
+        (ContactState.STABLE, None),
+        (ContactState.UNSTABLE, Cause.DISTURBANCE),
+        (ContactState.STABLE, None),
+        (ContactState.UNSTABLE, Cause.RELEASED),
+        (ContactState.NO_CONTACT, None),
+    )
+    starts = [0.0, *ends[:-1].tolist()]
+    return tuple(
+        Label(start, float(end), state, cause, evidence="schedule", author="synthetic")
+        for start, end, (state, cause) in zip(starts, ends, states, strict=True)
+    )
+
+
+def _ramp(x: Array) -> Array:
+    """From 0 to 1 and smooth."""
+    x = np.clip(x, 0.0, 1.0)
+    return x * x * (3 - 2 * x)

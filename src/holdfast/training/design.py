@@ -1,0 +1,130 @@
+"""From recordings to training samples, one recording at a time."""
+
+from collections.abc import Collection, Iterable, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+import numpy.typing as npt
+
+from holdfast.classifiers import Samples
+from holdfast.contact import STABLE, UNKNOWN
+from holdfast.features import FeatureSpec, Tare
+from holdfast.features.extract import extract
+from holdfast.features.force import tare_amplitude
+from holdfast.features.stream import StreamPlan
+from holdfast.model import ANY_FINGER, RATE_TOLERANCE
+from holdfast.recordings import Recording, label_states
+from holdfast.resampling import resample
+from holdfast.sensors import Sensor
+from holdfast.training.setting import Setting
+from holdfast.training.splits import Division, Integers
+from holdfast.training.survey import Survey
+
+CONTACT_DEVIATIONS = 5.0
+"""Standard deviations of F_a over the mean of the tare stretches, from which on is contact."""
+
+
+@dataclass(frozen=True)
+class FingerDesign:
+    """What one classifier is trained from.
+
+    Attributes:
+        sensor: of the finger.
+        samples: labelled, with features; groups are those of the division.
+        units: (n,) what each sample is held out with.
+        at_rest: (n_recordings, 3) number, sum and sum of squares of F_a in each tare stretch.
+    """
+
+    sensor: Sensor
+    samples: Samples
+    units: Integers
+    at_rest: npt.NDArray[np.float64]
+
+    def without(self, held: Collection[int]) -> Samples:
+        """The samples that those units leave to train from."""
+        return self.samples.take(~np.isin(self.units, list(held)))
+
+    def contact_threshold(self, recordings: Sequence[int]) -> float | None:
+        """Mean + 5 standard deviations of F_a over those recordings' tare stretches."""
+        n, total, squares = self.at_rest[list(recordings)].sum(axis=0)
+        if n < 2:
+            return None
+        mean = total / n
+        return float(mean + CONTACT_DEVIATIONS * np.sqrt(max(squares / n - mean**2, 0.0)))
+
+
+def gather(
+    recordings: Iterable[Recording], found: Survey, setting: Setting, division: Division
+) -> dict[str, FingerDesign]:
+    """The training samples of every finger, or of all together under `"*"`.
+
+    Args:
+        recordings: the same that were surveyed.
+        found: by the survey.
+        setting: which features, tare and so on.
+        division: of the recordings.
+
+    Returns:
+        By finger; at most `setting.max_samples` each, every n-th of larger data.
+
+    Raises:
+        RecordingError: a recording cannot be read.
+    """
+    step = -(-found.n_labelled // setting.max_samples)
+    piles: dict[str, list[Samples]] = {finger: [] for finger in found.sensors}
+    units: dict[str, list[Integers]] = {finger: [] for finger in found.sensors}
+    at_rest = {finger: np.zeros((len(found.entries), 3)) for finger in found.sensors}
+    for place, given in enumerate(recordings):
+        recording = at_rate(given, found.rate)
+        sensors = {f: s for f, s in found.sensors.items() if f in recording.modules}
+        plan = stream_plan(sensors, setting.features, setting, found.rate)
+        for finger, rows in extract(plan, recording).items():
+            module = recording.modules[finger]
+            states = label_states(module.labels, module.times)
+            usable = (states != UNKNOWN) & np.isfinite(rows.features).all(axis=1)
+            kept = np.flatnonzero(usable)[:: max(step, 1)]
+            groups = np.full(len(kept), division.group_of[place])
+            piles[finger].append(Samples(rows.features[kept], states[kept] == STABLE, groups))
+            units[finger].append(division.units_of(place, module.n_samples)[kept])
+            if plan.tare.without_contact:
+                amplitude = tare_amplitude(module, plan.tare, found.rate)
+                at_rest[finger][place] = len(amplitude), amplitude.sum(), (amplitude**2).sum()
+    designs = {
+        finger: FingerDesign(
+            found.sensors[finger], _stack(pile), np.concatenate(units[finger]), at_rest[finger]
+        )
+        for finger, pile in piles.items()
+    }
+    return {ANY_FINGER: _pool(list(designs.values()))} if setting.shared else designs
+
+
+def at_rate(recording: Recording, rate: float) -> Recording:
+    """The recording as a model of that rate takes it: as it is within 20 %, else resampled."""
+    if abs(recording.rate / rate - 1) <= RATE_TOLERANCE:
+        return recording
+    return resample(recording, rate)
+
+
+def stream_plan(
+    sensors: dict[str, Sensor],
+    features: tuple[FeatureSpec, ...],
+    setting: Setting,
+    rate: float,
+) -> StreamPlan:
+    """The stream of features that the setting asks of those fingers."""
+    tare = Tare.parse(setting.tare)
+    return StreamPlan(sensors, dict.fromkeys(sensors, features), setting.window, tare, rate)
+
+
+def _stack(pile: Sequence[Samples]) -> Samples:
+    return Samples(*(np.concatenate(parts) for parts in zip(*pile, strict=True)))
+
+
+def _pool(designs: Sequence[FingerDesign]) -> FingerDesign:
+    first = designs[0]
+    return FingerDesign(
+        first.sensor,
+        _stack([design.samples for design in designs]),
+        np.concatenate([design.units for design in designs]),
+        np.sum([design.at_rest for design in designs], axis=0),
+    )

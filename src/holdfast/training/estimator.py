@@ -1,0 +1,102 @@
+"""The scikit-learn face: an estimator over lists of recordings."""
+
+from collections.abc import Sequence
+from typing import Self
+
+import numpy as np
+import numpy.typing as npt
+from sklearn.base import BaseEstimator, ClassifierMixin
+from sklearn.utils.validation import check_is_fitted
+
+from holdfast.contact import STABLE
+from holdfast.features import DEPLOYED, Tare, parse_features
+from holdfast.recordings import Recording
+from holdfast.training.fitting import fit_all
+from holdfast.training.judging import decisions_of, evaluate
+from holdfast.training.setting import Setting
+
+
+class StabilityClassifier(ClassifierMixin, BaseEstimator):
+    """Stability of contacts, as a scikit-learn estimator over lists of recordings.
+
+    Windows never cross the boundary of a recording. Labels come with the recordings, so `y` is
+    not looked at; it may be None. `GridSearchCV(StabilityClassifier(), {"window": [8, 14]})`
+    with `groups` works as for any estimator.
+
+    Args:
+        classifier: `logreg` or `svm`.
+        window: N_w [samples].
+        features: names, separated by commas.
+        tare: seconds, "first", "none" or "START:END".
+        C: inverse strength of the regularisation.
+        class_weight: `balanced` or None.
+        shared: one classifier for all fingers.
+        seed: of everything random.
+
+    Attributes:
+        model_: the fitted `Model`.
+    """
+
+    def __init__(
+        self,
+        classifier: str = "logreg",
+        window: int = 14,
+        features: str = ",".join(DEPLOYED),
+        tare: float | str = 0.5,
+        C: float = 1.0,
+        class_weight: str | None = "balanced",
+        shared: bool = False,
+        seed: int = 0,
+    ) -> None:
+        self.classifier = classifier
+        self.window = window
+        self.features = features
+        self.tare = tare
+        self.C = C
+        self.class_weight = class_weight
+        self.shared = shared
+        self.seed = seed
+
+    def fit(self, X: Sequence[Recording], y: object = None) -> Self:
+        """Fits a classifier for every finger that the recordings label.
+
+        Raises:
+            TrainingError: no labels, or only one class.
+        """
+        self.model_ = fit_all(X, self._setting(), {"C": self.C, "class_weight": self.class_weight})
+        self.classes_ = np.array([0, 1])
+        return self
+
+    def predict_proba(self, X: Sequence[Recording]) -> list[dict[str, npt.NDArray[np.float64]]]:
+        """By recording and finger, (n,) the probability of stability; NaN where there is none."""
+        check_is_fitted(self)
+        return [self.model_.predict_proba(recording) for recording in X]
+
+    def predict(self, X: Sequence[Recording]) -> list[dict[str, npt.NDArray[np.int64]]]:
+        """By recording and finger, (n,) 1 where the contact is stable, else 0."""
+        check_is_fitted(self)
+        judged = [decisions_of(self.model_, recording) for recording in X]
+        return [
+            {
+                name: (finger.states == STABLE).astype(np.int64)
+                for name, finger in each.fingers.items()
+            }
+            for each in judged
+        ]
+
+    def score(self, X: Sequence[Recording], y: object = None) -> float:
+        """The accuracy over all labelled samples, from 0 to 1."""
+        check_is_fitted(self)
+        accuracy = evaluate(self.model_, X).pooled.accuracy
+        return float("nan") if accuracy is None else accuracy / 100
+
+    def _setting(self) -> Setting:
+        return Setting(
+            classifier=self.classifier,
+            features=parse_features(self.features, self.window),
+            window=self.window,
+            tare=Tare.parse(self.tare),
+            trials=0,
+            seed=self.seed,
+            shared=self.shared,
+        )
