@@ -12,10 +12,10 @@ import numpy as np
 import numpy.typing as npt
 
 from holdfast.contact import ContactEstimate, ContactEvent, ContactState, HandEstimate
-from holdfast.detector.rule import N_REPORT, Traces, new_decision, rule_of, run, step_live
-from holdfast.detector.traces import REASONS, STATES, VERDICTS, Detection, detection_of
+from holdfast.detector.rule import N_REPORT, Live, Traces, new_decision, rule_of, run, step_live
+from holdfast.detector.traces import STATES, VERDICTS, Detection, detection_of
 from holdfast.errors import ModelError, StreamError
-from holdfast.features.kernel import REASON
+from holdfast.features.kernel import Array
 from holdfast.features.stream import StreamPlan, give_baseline, new_memory, new_output, samples_of
 from holdfast.model import Model
 from holdfast.recordings import Recording
@@ -66,8 +66,18 @@ class Detector:
         self._start(model, plan)
 
     @classmethod
-    def _for(cls, model: Model, recording: Recording) -> Self:
-        """The detector for a recording, whose tare may be an interval of it."""
+    def for_recording(cls, model: Model, recording: Recording) -> Self:
+        """The detector for a recording, whose tare may be an interval of it.
+
+        Args:
+            model: that judges.
+            recording: whose fingers and rate it is for; or its first piece, where `run` gets
+                it in pieces (a tare by interval then needs that interval in the first).
+
+        Raises:
+            ModelError: the recording has none of the model's fingers, or another sensor.
+            ValueError: a tare by interval finds no samples.
+        """
         detector = cls.__new__(cls)
         sensors = model.fingers_of({name: m.sensor for name, m in recording.modules.items()})
         detector._start(model, model.plan(sensors, recording.rate))
@@ -77,6 +87,7 @@ class Detector:
 
     def _start(self, model: Model, plan: StreamPlan) -> None:
         self._plan = plan
+        self._names = (*plan.fingers, HAND)
         self._layout = plan.layout()
         self._rule = rule_of(model, plan)
         n_fingers, n_taxels = len(plan.fingers), int(self._layout.offsets[-1])
@@ -92,19 +103,22 @@ class Detector:
         # Compiles, and changes nothing: no finger is present.
         self._step(0.0)
 
+    def __getstate__(self) -> object:
+        # A copy would share memory with this one, by address.
+        raise TypeError("a detector is not copied or pickled; make another of the same model")
+
     def reset(self) -> None:
         """Forgets everything, the tare included."""
         n_fingers = len(self._plan.fingers)
         self._memory = new_memory(self._layout)
         self._output = new_output(self._layout)
         self._decision = new_decision(n_fingers)
-        self._arrays = (*self._layout, *self._memory, *self._output, *self._rule, *self._decision)
-        waiting = REASONS[int(self._output.status[0, REASON])]
-        nothing = ContactEstimate(
-            np.nan, ContactState.UNKNOWN, waiting, np.nan, np.nan, (np.nan, np.nan, np.nan)
-        )
-        self._latest = dict.fromkeys(self._plan.fingers, nothing)
-        self._hand = ContactState.UNKNOWN
+        live = Live(
+            self._layout, self._memory, self._output, self._rule, self._decision,
+            self._readings, self._present, self._report,
+        )  # fmt: skip
+        self._table, self._arrays = live.table()
+        self._told = [ContactState.UNKNOWN] * (n_fingers + 1)
         self._last = -np.inf
         self._events: list[ContactEvent] = []
 
@@ -123,10 +137,8 @@ class Detector:
             StreamError: an unknown finger, another number of taxels or axes, or a time that
                 does not go forward. The detector is as it was before.
         """
-        if not time > self._last or time == np.inf:
-            raise StreamError(
-                f"time {time:g} s given after {self._last:g} s; times that go forward expected"
-            )
+        time = float(time)
+        self._check_time(time)
         self._place(samples)
         self._last = time
         return self._tell(time, self._step(time))
@@ -145,6 +157,7 @@ class Detector:
         Returns:
             What `update` would have said, sample by sample.
         """
+        self._check_recording(recording)
         pieces = []
         for times, present, readings in samples_of(self._plan, recording):
             traces = Traces.empty(len(times), present.shape[1])
@@ -152,11 +165,49 @@ class Detector:
                 self._layout, self._memory, self._output, self._rule, self._decision,
                 readings, present, times, traces,
             )  # fmt: skip
+            self._follow(times, traces)
             pieces.append((times, present, traces))
         return detection_of(recording.name, self._plan.fingers, pieces)
 
+    def _check_time(self, time: float) -> None:
+        if not self._last < time < np.inf:
+            after = "" if self._last == -np.inf else f" after {self._last:.15g} s"
+            raise StreamError(
+                f"time {time:.15g} s given{after}; finite times that go forward expected"
+            )
+
+    def _check_recording(self, recording: Recording) -> None:
+        modules = {f: recording.modules[f] for f in self._slots if f in recording.modules}
+        if not any(module.n_samples for module in modules.values()):
+            raise StreamError(
+                f"recording {recording.name!r} has samples of {', '.join(recording.modules)}; "
+                f"the model judges {', '.join(self._slots)}"
+            )
+        for finger, module in modules.items():
+            self._check_shape(finger, module.readings.shape[1:])
+        self._check_time(min(float(m.times[0]) for m in modules.values() if m.n_samples))
+
+    def _check_shape(self, finger: str, shape: tuple[int, ...]) -> None:
+        expected = self._slots[finger][2]
+        if shape != expected:
+            raise StreamError(
+                f"{finger}: a sample of shape {shape} given, {expected} expected "
+                f"({self._plan.sensors[finger].name})"
+            )
+
+    def _follow(self, times: Array, traces: Traces) -> None:
+        """Notes what `update` would have noted at those samples."""
+        before = [state.code for state in self._told]
+        codes = np.vstack([before, np.column_stack([traces.state, traces.hand])])
+        rows, places = np.nonzero(codes[1:] != codes[:-1])
+        for k, place in zip(rows[-MAX_EVENTS:], places[-MAX_EVENTS:], strict=True):
+            self._told[place] = STATES[codes[k, place]]
+            self._note(int(place), STATES[codes[k + 1, place]], float(times[k]))
+        self._told = [STATES[code] for code in codes[-1]]
+        self._last = float(times[-1])
+
     def _step(self, time: float) -> int:
-        return int(step_live(*self._arrays, self._readings, self._present, time, self._report))
+        return int(step_live(self._table, time))
 
     def _place(self, samples: Mapping[str, npt.ArrayLike]) -> None:
         self._present[:] = False
@@ -168,32 +219,29 @@ class Detector:
             place, slot, shape = self._slots[finger]
             values = sample if isinstance(sample, np.ndarray) else np.asarray(sample)
             if values.shape != shape:
-                raise StreamError(
-                    f"{finger}: a sample of shape {values.shape} given, {shape} expected "
-                    f"({self._plan.sensors[finger].name})"
-                )
+                self._check_shape(finger, values.shape)
             slot[...] = values
             self._present[place] = True
 
     def _tell(self, time: float, hand_code: int) -> HandEstimate:
-        latest = {}
-        for finger, row in zip(self._plan.fingers, self._report.tolist(), strict=True):
+        fingers = {}
+        told = self._told
+        for place, row in enumerate(self._report.tolist()):
             seen, code, probability, sigma, x, y, z = row
-            state, reason, faults = VERDICTS[int(code)]
-            previous = self._latest[finger].state
-            if state is not previous:
-                self._note(finger, state, previous, time)
-            latest[finger] = ContactEstimate(
+            state, reason, faults = VERDICTS[code]
+            if state is not told[place]:
+                self._note(place, state, time)
+            fingers[self._names[place]] = ContactEstimate(
                 seen, state, reason, probability, sigma, (x, y, z), faults
             )
         hand = STATES[hand_code]
-        if hand is not self._hand:
-            self._note(HAND, hand, self._hand, time)
-        self._latest, self._hand = latest, hand
-        return HandEstimate(time, hand, latest)
+        if hand is not told[-1]:
+            self._note(len(told) - 1, hand, time)
+        return HandEstimate(time, hand, fingers)
 
-    def _note(self, finger: str, state: ContactState, previous: ContactState, time: float) -> None:
-        self._events.append(ContactEvent(finger, state, previous, time))
+    def _note(self, place: int, state: ContactState, time: float) -> None:
+        self._events.append(ContactEvent(self._names[place], state, self._told[place], time))
+        self._told[place] = state
         del self._events[:-MAX_EVENTS]
 
 
@@ -214,7 +262,7 @@ def detect(model: Model, recording: Recording) -> Detection:
     """
     if model.rate is not None and not model.rate_fits(recording.rate):
         recording = resample(recording, model.rate)
-    return Detector._for(model, recording).run(recording)
+    return Detector.for_recording(model, recording).run(recording)
 
 
 def _own_fingers(model: Model) -> dict[str, Sensor]:

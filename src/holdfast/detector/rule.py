@@ -1,7 +1,7 @@
 """From features to states: the one rule, compiled, for a sample or for a thousand."""
 
 import math
-from typing import NamedTuple, Self
+from typing import Any, NamedTuple, Self
 
 import numpy as np
 import numpy.typing as npt
@@ -9,10 +9,20 @@ import numpy.typing as npt
 from holdfast import contact
 from holdfast.classifiers.linear import linear_probability
 from holdfast.compiled import compiled
+from holdfast.detector.table import (
+    flags1,
+    floats1,
+    floats2,
+    floats3,
+    integers1,
+    integers2,
+    integers3,
+    table_of,
+)
 from holdfast.features import kernel
 from holdfast.features.kernel import FAULTS, REASON, Array, Flags, Integers, Layout, Memory, Output
 from holdfast.features.stream import StreamPlan
-from holdfast.model import Model
+from holdfast.model import ANY_FINGER, Model
 
 UNKNOWN, NO_CONTACT, UNSTABLE, STABLE = (
     contact.UNKNOWN,
@@ -107,7 +117,7 @@ def rule_of(model: Model, plan: StreamPlan) -> Rule:
         limits=np.array(limits, dtype=np.float64),  # None becomes NaN
         hysteresis=float(model.debounce.hysteresis),
         min_duration=float(model.debounce.min_duration),
-        n_fingers=len(model.fingers),
+        n_fingers=len(plan.fingers) if ANY_FINGER in model.fingers else len(model.fingers),
     )
 
 
@@ -151,48 +161,61 @@ def verdict_code(state: int, reason: int, faults: int) -> int:
 _verdict_code = compiled(verdict_code)
 
 
-@compiled
-def step_live(
-    # Layout
-    offsets: Integers, rotations: Array, constants: Array, specs: Integers, floors: Array,
-    windows: Integers, tare_kind: int, tare_seconds: float, period: float,
-    # Memory
-    baseline: Array, previous: Array, history: Array, counts: Integers, levels: Array,
-    scratch: Array,
-    # Output
-    features: Array, output_values: Array, status: Integers,
-    # Rule
-    weights: Array, n_weights: Integers, limits: Array, hysteresis: float, min_duration: float,
-    n_fingers: int,
-    # Decision
-    codes: Integers, values: Array,
-    # the sample
-    readings: Array, present: Flags, time: float,
-    report: Array,
-) -> int:  # fmt: skip
-    """The same as `step`, for a caller in Python, which would lose 5 us on tuples of arrays.
+class Live(NamedTuple):
+    """What a detector hands to the kernel by address: its memory, the sample and the report."""
 
-    The report (n_fingers, N_REPORT) gets time, verdict, probability, sigma and force.
+    layout: Layout
+    memory: Memory
+    output: Output
+    rule: Rule
+    decision: Decision
+    readings: Array  # (n_taxels, 3) of all fingers
+    present: Flags  # (n_fingers,)
+    report: Array  # (n_fingers, N_REPORT) time, verdict, probability, sigma and force
+
+    def table(self) -> tuple[Integers, list[npt.NDArray[Any]]]:
+        """The table that `step_live` takes, and the arrays that must live as long."""
+        layout, rule = self.layout, self.rule
+        integers = np.array([layout.tare_kind, rule.n_fingers], dtype=np.int64)
+        floats = np.array([layout.tare_seconds, layout.period, rule.hysteresis, rule.min_duration])
+        arrays = [
+            integers, floats, *layout[:6], *self.memory, *self.output, *rule[:3], *self.decision,
+            self.readings, self.present, self.report,
+        ]  # fmt: skip
+        return table_of(arrays), arrays
+
+
+@compiled
+def step_live(table: Integers, time: float) -> int:
+    """The same as `step`, for a caller in Python, with all arrays in the table of a `Live`.
+
+    The report is filled.
     """
-    hand = step(
-        Layout(
-            offsets, rotations, constants, specs, floors, windows, tare_kind, tare_seconds, period
-        ),
-        Memory(baseline, previous, history, counts, levels, scratch),
-        Output(features, output_values, status),
-        Rule(weights, n_weights, limits, hysteresis, min_duration, n_fingers),
-        Decision(codes, values),
-        readings,
-        present,
-        time,
-    )
+    kind, numbers = integers1(table, 0), floats1(table, 1)
+    layout = Layout(
+        integers1(table, 2), floats3(table, 3), floats2(table, 4), integers3(table, 5),
+        floats2(table, 6), integers2(table, 7), kind[0], numbers[0], numbers[1],
+    )  # fmt: skip
+    memory = Memory(
+        floats2(table, 8), floats2(table, 9), floats3(table, 10), integers2(table, 11),
+        floats2(table, 12), floats2(table, 13),
+    )  # fmt: skip
+    output = Output(floats2(table, 14), floats2(table, 15), integers2(table, 16))
+    rule = Rule(
+        floats2(table, 17), integers1(table, 18), floats2(table, 19), numbers[2], numbers[3],
+        kind[1],
+    )  # fmt: skip
+    decision = Decision(integers2(table, 20), floats2(table, 21))
+    readings, present, report = floats2(table, 22), flags1(table, 23), floats2(table, 24)
+    hand = step(layout, memory, output, rule, decision, readings, present, time)
     for f in range(len(present)):
-        report[f, 0] = levels[f, kernel.LAST]
-        report[f, 1] = _verdict_code(codes[f, TOLD], status[f, REASON], status[f, FAULTS])
-        report[f, 2] = values[f, PROBABILITY]
-        report[f, 3] = output_values[f, kernel.SIGMA]
+        state, status = decision.codes[f, TOLD], output.status[f]
+        report[f, 0] = memory.levels[f, kernel.LAST]
+        report[f, 1] = _verdict_code(state, status[REASON], status[FAULTS])
+        report[f, 2] = decision.values[f, PROBABILITY]
+        report[f, 3] = output.values[f, kernel.SIGMA]
         for axis in range(3):
-            report[f, 4 + axis] = output_values[f, axis]
+            report[f, 4 + axis] = output.values[f, axis]
     return hand
 
 

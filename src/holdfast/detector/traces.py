@@ -18,7 +18,7 @@ FAULTS = tuple(
     for mask in range(1 << len(Fault))
 )
 """The faults of every mask."""
-VERDICTS = {
+VERDICTS: dict[float, tuple[ContactState, Reason, tuple[Fault, ...]]] = {
     verdict_code(state.code, reason, mask): (state, REASONS[reason], FAULTS[mask])
     for state in STATES
     for reason in range(len(REASONS))
@@ -86,7 +86,9 @@ def detection_of(
     fingers: Sequence[str],
     pieces: Sequence[tuple[Array, npt.NDArray[np.bool_], Traces]],
 ) -> Detection:
-    """Puts together what the kernel filled: (times, present, traces) a piece."""
+    """Puts together what the kernel filled: (times, present, traces) a piece, or no piece."""
+    if not pieces:
+        return Detection(name, {}, np.empty(0), np.empty(0, dtype=np.int8))
     traces = Traces(*(np.concatenate(parts) for parts in zip(*(p[2] for p in pieces), strict=True)))
     times = np.concatenate([piece[0] for piece in pieces])
     present = np.concatenate([piece[1] for piece in pieces])
