@@ -64,7 +64,7 @@ def standardise(features: npt.NDArray[np.float64]) -> tuple[npt.NDArray[np.float
     """Mean and scale of each feature, and the features standardised by them."""
     mean = features.mean(axis=0)
     scale = features.std(axis=0)
-    scale[scale == 0] = 1.0
+    scale[np.ptp(features, axis=0) == 0] = 1.0  # rounding may leave a constant 1e-17 of spread
     return mean, scale, (features - mean) / scale
 
 

@@ -51,6 +51,9 @@ class LinearClassifier(msgspec.Struct, frozen=True, forbid_unknown_fields=True, 
             raise ModelError("a number of the classifier is not finite")
         if min((*self.scale, self.slope), default=1.0) <= 0:
             raise ModelError("scales and slope above 0 expected")
+        with np.errstate(over="ignore", invalid="ignore"):
+            if not np.isfinite(self.weights()).all():
+                raise ModelError("the weights of the classifier overflow: a scale is too small")
         if not 0 <= self.threshold <= 1:
             raise ModelError(f"a threshold from 0 to 1 expected, {self.threshold} given")
 
@@ -68,16 +71,33 @@ class LinearClassifier(msgspec.Struct, frozen=True, forbid_unknown_fields=True, 
         intercept = self.intercept - float(folded @ np.array(self.mean))
         return np.concatenate([[self.slope * intercept + self.offset], self.slope * folded])
 
-    def decision(self, features: Array) -> Array:
-        """The uncalibrated decision value z of each row of (n, n_features)."""
-        standardised = (features - np.array(self.mean)) / np.array(self.scale)
+    def decision(self, features: npt.ArrayLike) -> Array:
+        """The uncalibrated decision value z of each row of (n, n_features).
+
+        Raises:
+            ValueError: another number of features.
+        """
+        standardised = (self._checked(features) - np.array(self.mean)) / np.array(self.scale)
         return np.asarray(standardised @ np.array(self.coefficients) + self.intercept)
 
-    def probability(self, features: Array) -> Array:
-        """The probability of stability of each row of (n, n_features); NaN for rows with NaN."""
-        probabilities = np.empty(len(features))
-        _probabilities(np.ascontiguousarray(features), self.weights(), probabilities)
+    def probability(self, features: npt.ArrayLike) -> Array:
+        """The probability of stability of each row of (n, n_features); NaN for rows with NaN.
+
+        Raises:
+            ValueError: another number of features.
+        """
+        rows = self._checked(features)
+        probabilities = np.empty(len(rows))
+        _probabilities(rows, self.weights(), probabilities)
         return probabilities
+
+    def _checked(self, features: npt.ArrayLike) -> Array:
+        rows = np.ascontiguousarray(features, dtype=np.float64)
+        if rows.ndim != 2 or rows.shape[1] != self.n_features:
+            raise ValueError(
+                f"features of shape (n, {self.n_features}) expected, {rows.shape} given"
+            )
+        return rows
 
 
 @compiled

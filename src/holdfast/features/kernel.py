@@ -27,7 +27,7 @@ TARE_SECONDS, TARE_FIRST, TARE_NONE, TARE_GIVEN = range(4)
 NOISE_SECONDS = 0.5
 """How long the noise of a sensor is watched where the tare takes no time [s]."""
 STUCK_SECONDS = 0.5
-"""Readings that used to change and have not for so long are stuck [s]."""
+"""Readings that changed for so long and then have not for so long are stuck [s]."""
 LOADED_SECONDS = 0.25
 """Pulling for so long means that the tare was taken under load: nothing pulls a skin [s]."""
 GAP_LIMIT = 3.0003
@@ -161,7 +161,7 @@ def _take(
         _listen(layout, memory, readings, f, watched)
     previous[first:last] = readings[first:last]
     if counts[f, TARED] >= 0:
-        running = elapsed < tare_seconds
+        running = elapsed < tare_seconds or counts[f, TARED] == 0  # one sample at least
         if not _tare(readings, baseline, counts, f, first, last, tare_kind, running):
             return TARE, 0
     x, y, z, pressing = force_of(readings, baseline, rotations, first, last)
@@ -302,7 +302,8 @@ def _faults(
 ) -> int:
     faults = 0
     lively = 2 * counts[f, CHANGES] > counts[f, SEEN] - 1 - counts[f, FROZEN]
-    if lively and counts[f, FROZEN] * period >= STUCK_SECONDS:
+    long = STUCK_SECONDS / period
+    if lively and counts[f, FROZEN] >= long and counts[f, CHANGES] >= long:
         faults |= STUCK
     if least <= constants[f, LEAST] or most >= constants[f, MOST]:
         faults |= SATURATED

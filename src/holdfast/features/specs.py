@@ -45,6 +45,8 @@ class FeatureSpec(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
             raise ValueError(f"{self.kind} has no window; {self.window} given")
         if self.transform == "noise" and (self.kind != "sigma" or self.window < 4):
             raise ValueError(f"the transform 'noise' is of sigma over 4 or more; {self} given")
+        if self.transform == "log" and self.floor == 0:
+            raise ValueError(f"{self}: a floor above 0 expected, which keeps it finite; 0 given")
         if not (np.isfinite(self.floor) and self.floor >= 0):
             raise ValueError(f"a floor of at least 0 expected, {self.floor} given")
 

@@ -72,7 +72,12 @@ class Tare:
 
     def __str__(self) -> str:
         if self.kind == "seconds":
-            return f"{self.seconds:g}"
+            return _exact(self.seconds)
         if self.kind == "interval":
-            return f"{self.interval[0]:g}:{self.interval[1]:g}"
+            return ":".join(map(_exact, self.interval))
         return self.kind
+
+
+def _exact(number: float) -> str:
+    """The shortest text that is read as the same number."""
+    return repr(number).removesuffix(".0")
