@@ -151,6 +151,7 @@ class Model(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=Tru
         except OSError as cause:
             raise ModelError(f"cannot read the model {path}: {cause.strerror}") from cause
         try:
+            _check_sensors(data)
             return msgspec.json.decode(data, type=cls, dec_hook=_decode)
         except (ModelError, ValueError) as cause:  # msgspec's own errors are ValueErrors
             raise ModelError(f"{path} is no model of {SCHEMA}: {cause}") from cause
@@ -290,13 +291,19 @@ def _noise_floor() -> Model:
 BUILT_IN = {"builtin:noise-floor": _noise_floor()}
 
 
+def _check_sensors(data: bytes) -> None:
+    """Refuses fields that no sensor has: msgspec would pass over them in a dataclass."""
+    found = msgspec.json.decode(data)
+    sensors = found.get("sensors") if isinstance(found, dict) else None
+    for fields in sensors.values() if isinstance(sensors, dict) else ():
+        Sensor.from_dict(fields if isinstance(fields, dict) else {})
+
+
 def _decode(kind: type, data: Any) -> Any:  # noqa: ANN401 (msgspec's own signature)
-    if kind is Sensor and isinstance(data, dict):
-        return Sensor.from_dict(data)
-    raise NotImplementedError(kind)
+    return np.array(data, dtype=np.float64)  # the arrays of a sensor
 
 
 def _encode(value: Any) -> Any:  # noqa: ANN401 (msgspec's own signature)
-    if isinstance(value, Sensor):
-        return value.to_dict()
+    if isinstance(value, np.ndarray):
+        return value.tolist()
     raise NotImplementedError(type(value))

@@ -98,5 +98,5 @@ def _labels(ends: Array) -> tuple[Label, ...]:
 
 def _ramp(x: Array) -> Array:
     """From 0 to 1 and smooth."""
-    x = np.clip(x, 0.0, 1.0)
-    return x * x * (3 - 2 * x)
+    inside: Array = np.clip(x, 0.0, 1.0)
+    return inside * inside * (3 - 2 * inside)

@@ -1,0 +1,81 @@
+"""`holdfast demo`: the main job in one go, on data of its own."""
+
+import time
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from holdfast.cli.console import print_json, progress, say, show
+
+N_RECORDINGS = 6
+
+
+def demo(
+    out: Annotated[
+        Path, typer.Argument(help="A folder for what is made; it is made if missing.")
+    ] = Path("holdfast-demo"),
+    speed: Annotated[
+        float, typer.Option(help="Of the replay: 1 is real time, 0 as fast as it goes.")
+    ] = 1.0,
+    seed: Annotated[int, typer.Option(help="Of the recordings.")] = 0,
+    force: Annotated[bool, typer.Option("--force", help="Overwrite an earlier demo.")] = False,
+    as_json: Annotated[bool, typer.Option("--json", help="Print JSON on stdout.")] = False,
+) -> None:
+    """Does the main job in one go, on data of its own.
+
+    Makes recordings, trains a model on them, tells how good it is on recordings that it has not
+    seen, and replays one of those sample by sample, as a hand would send it.
+
+    Example:
+      holdfast demo
+      holdfast demo tried/ --speed 0 --json
+    """
+    from holdfast.cli.replay import replay
+    from holdfast.files import refuse_overwrite
+    from holdfast.io import load_dataset, save_recording
+    from holdfast.synthetic import synthetic_recording
+    from holdfast.training import Setting, train
+
+    if not speed >= 0:
+        raise ValueError(f"a speed of at least 0 expected, {speed} given")
+    start = time.monotonic()
+    folder, model = out / "recordings", out / "model.json"
+    folder.mkdir(parents=True, exist_ok=True)
+    names = [f"grasp-{k}" for k in range(N_RECORDINGS)]
+    for path in (model, *(folder / f"{name}.parquet" for name in names)):
+        refuse_overwrite(path, force=force)
+    say(f"1/4  making {N_RECORDINGS} recordings of three fingertips")
+    for k, name in enumerate(progress(names, "making")):
+        recording = synthetic_recording(name, seed * N_RECORDINGS + k)
+        save_recording(recording, folder / f"{name}.parquet", force=force)
+    say("2/4  training, one recording left out at a time (compiles kernels the first time)")
+    recordings = load_dataset(folder)
+    trained = train(recordings, Setting(trials=0, seed=seed))
+    trained.model.save(model, force=force)
+    accuracy = trained.cross_validation.pooled.accuracy
+    say(f"3/4  on recordings that it has not seen: {accuracy:.1f} % of samples right")
+    say(f"4/4  replaying {names[-1]} sample by sample" + (f" at speed {speed:g}" if speed else ""))
+    n_updates = replay(trained.model, recordings[-1], speed)
+    if as_json:
+        print_json(
+            {
+                "recordings": folder,
+                "model": model,
+                "accuracy": accuracy,
+                "updates": n_updates,
+                "seconds": time.monotonic() - start,
+            }
+        )
+        return
+    _farewell(out, folder, model, names[-1], time.monotonic() - start)
+
+
+def _farewell(out: Path, folder: Path, model: Path, name: str, seconds: float) -> None:
+    show(f"made in {seconds:.0f} s, in {out}:")
+    show(f"  {folder}: {N_RECORDINGS} recordings, {model}: the model")
+    show("what to try next:")
+    show(f"  holdfast info {folder}/{name}.parquet --plot grasp.png")
+    show(f"  holdfast evaluate {model} {folder}")
+    show(f"  holdfast detect {model} {folder}/{name}.parquet | head")
+    show("  holdfast import YOUR-DATA recordings/    (holdfast import --help lists the formats)")
