@@ -37,7 +37,7 @@ def evaluate(
     """
     import msgspec
 
-    from holdfast.cli.figures import show_metrics
+    from holdfast.cli.report import show_metrics
     from holdfast.errors import TrainingError
     from holdfast.files import refuse_overwrite
     from holdfast.io import load_dataset

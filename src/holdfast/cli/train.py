@@ -84,7 +84,7 @@ def train(
     if as_json:
         print_json({"model": model, "split": split, "cross_validation": trained.cross_validation})
         return
-    from holdfast.cli.figures import show_metrics
+    from holdfast.cli.report import show_metrics
 
     show_metrics(trained.cross_validation)
     show(

@@ -24,6 +24,9 @@ N_SEARCHES = 5
 """Searches for the parameters of the figures. What is held out takes no part in the search for
 the parameters that it is judged with."""
 
+UNDECIDED_SHARE = 0.2
+"""Share of labelled samples without a decision from which on the user is told."""
+
 NOBODY: frozenset[int] = frozenset()
 
 Tell = Callable[[str], None]
@@ -73,6 +76,7 @@ def train(
     parameters = trainer.search(NOBODY)
     model = fit_model(trainer.material, setting, parameters, NOBODY)
     metrics = trainer.cross_validate(parameters)
+    _tell_undecided(metrics, tell)
     return Trained(trainer.sign(model, parameters, metrics), metrics)
 
 
@@ -149,6 +153,18 @@ class _Trainer:
             return decisions_of(models[self.division.group_of[place]], recording)
         judged = [decisions_of(model, recording) for model in models]
         return pick(judged, lambda n: self.division.units_of(place, n), len(models[0].fingers))
+
+
+def _tell_undecided(metrics: Metrics, tell: Tell) -> None:
+    """Warns where much of the labelled data was left without a decision."""
+    n_labelled = metrics.pooled.n + metrics.pooled.n_undecided
+    share = metrics.pooled.n_undecided / max(n_labelled, 1)
+    if share > UNDECIDED_SHARE:
+        tell(
+            f"{100 * share:.0f} % of the labelled samples have no decision, for the tare, gaps or "
+            "faults (holdfast detect tells which); recordings that begin in contact need "
+            "--tare first"
+        )
 
 
 def _search(
