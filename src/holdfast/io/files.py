@@ -59,7 +59,9 @@ def save_recording(recording: Recording, path: str | Path, force: bool = False) 
     _module(target.suffix).save(_native(recording), target, force=force)
 
 
-def read_chunks(path: str | Path, n_samples: int = 16384) -> Iterator[Recording]:
+def read_chunks(
+    path: str | Path, n_samples: int = 16384, labels: bool = True
+) -> Iterator[Recording]:
     """Consecutive pieces of a recording, in bounded memory.
 
     Put together they are what `load_recording` gives. Labels, truth and markers are cut to
@@ -68,6 +70,7 @@ def read_chunks(path: str | Path, n_samples: int = 16384) -> Iterator[Recording]
     Args:
         path: of the file.
         n_samples: how many samples of a module a piece holds at most.
+        labels: take the labels of `<name>.labels.json`, as `load_recording` does.
 
     Yields:
         Recordings of the same name and modules.
@@ -81,7 +84,7 @@ def read_chunks(path: str | Path, n_samples: int = 16384) -> Iterator[Recording]
     from holdfast.io.pieces import pieces
 
     file = Path(path)
-    return pieces(_format_of(file), file, n_samples)
+    return pieces(_format_of(file), file, n_samples, labels=labels)
 
 
 def is_recording(path: Path) -> bool:

@@ -20,23 +20,26 @@ from holdfast.sensors.values import Array
 _Buffer = dict[str, tuple[Array, npt.NDArray[Any]]]
 
 
-def pieces(source: ModuleType, path: Path, n_samples: int) -> Iterator[Recording]:
+def pieces(
+    source: ModuleType, path: Path, n_samples: int, *, labels: bool = True
+) -> Iterator[Recording]:
     """Recordings of at most `n_samples` samples a module, as `read_chunks` says.
 
     Args:
         source: the format: `holdfast.io.parquet` or `holdfast.io.mcap`.
         path: of the file.
         n_samples: how many samples of a module a piece holds at most.
+        labels: take those beside the file, where there are any.
     """
     header, groups, complete = source.chunks(path)
-    labels = _labels(source, path, header, complete)
+    beside = _labels(source, path, header, complete) if labels else None
     left = sorted(header.markers)
     for samples, until in _cuts(groups, n_samples):
         markers = [marker for marker in left if marker[0] < until]
         left = left[len(markers) :]
         part = msgspec.structs.replace(header, markers=markers)
         piece = recording_from(part, samples, path, complete=complete)
-        yield piece if labels is None else _relabelled(piece, labels)
+        yield piece if beside is None else _relabelled(piece, beside)
 
 
 def _labels(

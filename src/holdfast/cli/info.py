@@ -1,0 +1,232 @@
+"""`holdfast info`: what is in a recording, or in a folder of them."""
+
+from collections.abc import Mapping
+from dataclasses import replace
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any
+
+import typer
+
+from holdfast.cli.console import complain, print_json, print_table, progress, show
+
+if TYPE_CHECKING:
+    from holdfast.features import Tare
+    from holdfast.recordings import Recording, Tactile
+
+LABEL_STATES = ("stable", "unstable", "no_contact")
+MOST_TEXT = 90
+"""Characters of a value of the metadata that are shown to a person."""
+
+
+def info(
+    path: Annotated[Path, typer.Argument(help="A recording, or a folder of them.")],
+    plot: Annotated[
+        Path | None, typer.Option(help="Draw the recording to this .svg, .png or .pdf file.")
+    ] = None,
+    tare: Annotated[
+        str, typer.Option(help="Of plot and faults: seconds, first, none or START:END.")
+    ] = "0.5",
+    force: Annotated[bool, typer.Option("--force", help="Overwrite the plot.")] = False,
+    as_json: Annotated[bool, typer.Option("--json", help="Print JSON on stdout.")] = False,
+) -> None:
+    """Shows what is in a recording, or in a folder of them.
+
+    Modules, sensors, samples, rates, gaps, repeated samples, seconds of each label, samples with
+    faults, and what is known besides. The plot shows each finger's forces, sigma, labels, markers
+    and slip (where truth has it) over time; start the tare where nothing is touched.
+
+    Example:
+      holdfast info real/
+      holdfast info grasp.parquet --plot grasp.pdf
+      holdfast info grasp.mcap --plot grasp.svg --tare first --json
+    """
+    from holdfast.features import Tare
+
+    chosen = Tare.parse(tare)
+    if path.is_dir():
+        if plot is not None:
+            raise ValueError(f"--plot draws one recording; the folder {path} given")
+        _tell_all(path, chosen, as_json)
+    else:
+        _tell_one(path, plot, chosen, force, as_json)
+
+
+def _tell_one(path: Path, plot: Path | None, tare: "Tare", force: bool, as_json: bool) -> None:
+    from holdfast.cli.figures import refuse_plot, save_plot
+    from holdfast.io import load_recording
+
+    if plot is not None:
+        refuse_plot(plot, force)
+    recording = load_recording(path)
+    document = _document(recording, tare)
+    if plot is not None:
+        from holdfast.plots.recording import plot_recording
+
+        save_plot(plot_recording(recording, tare), plot, force)
+    if as_json:
+        print_json(document)
+    else:
+        _print_one(document)
+
+
+def _tell_all(folder: Path, tare: "Tare", as_json: bool) -> None:
+    from holdfast.errors import RecordingError
+    from holdfast.io import load_dataset, load_recording
+
+    paths = load_dataset(folder).paths
+    documents: list[dict[str, Any]] = []
+    for path in progress(paths, "reading"):
+        try:
+            documents.append(_document(load_recording(path), tare))
+        except RecordingError as cause:
+            documents.append({"name": path.stem, "error": str(cause)})
+    if as_json:
+        print_json({"recordings": documents})
+    else:
+        _print_all(documents)
+    failures = [document["error"] for document in documents if "error" in document]
+    for failure in failures[:-1]:
+        complain(failure)
+    if failures:
+        raise RecordingError(failures[-1])
+
+
+def _document(recording: "Recording", tare: "Tare") -> dict[str, Any]:
+    truth = recording.truth
+    return {
+        "name": recording.name,
+        "modules": {
+            name: _module(recording, name, module, tare)
+            for name, module in recording.modules.items()
+        },
+        "start": recording.start,
+        "duration": recording.duration,
+        "complete": recording.complete,
+        "metadata": recording.metadata,
+        "markers": [{"time": time, "text": text} for time, text in recording.markers],
+        "media": [{"path": path, "offset": offset} for path, offset in recording.media],
+        "truth": truth
+        and {
+            "n_samples": len(truth.times),
+            "hand": list(truth.hand),
+            "fingers": {finger: list(arrays) for finger, arrays in truth.fingers.items()},
+        },
+        "digest": recording.digest,
+    }
+
+
+def _module(recording: "Recording", name: str, module: "Tactile", tare: "Tare") -> dict[str, Any]:
+    return {
+        "sensor": module.sensor.name,
+        "n_taxels": module.sensor.n_taxels,
+        "unit": module.unit,
+        "n_samples": module.n_samples,
+        "rate": module.rate,
+        "gaps": module.n_gaps,
+        "repeats": module.n_repeats,
+        "labels": _labelled(module),
+        "faults": _faults(recording, name, module, tare) if module.n_samples else {},
+    }
+
+
+def _labelled(module: "Tactile") -> Mapping[str, float]:
+    """Seconds of each state."""
+    seconds = dict.fromkeys(LABEL_STATES, 0.0)
+    for label in module.labels:
+        seconds[label.state.value.lower()] += label.end - label.start
+    return seconds
+
+
+def _faults(
+    recording: "Recording", name: str, module: "Tactile", tare: "Tare"
+) -> Mapping[str, int]:
+    """How many samples show which fault, as a detector would tell them."""
+    import msgspec
+
+    from holdfast.contact import Fault
+    from holdfast.detector import Detector
+    from holdfast.model import Model
+
+    model = msgspec.structs.replace(Model.load("builtin:noise-floor"), tare=str(tare))
+    alone = replace(recording, modules={name: module}, truth=None)
+    masks = Detector.for_recording(model, alone).run(alone).fingers[name].faults
+    counts = {fault: int((masks >> bit & 1).sum()) for bit, fault in enumerate(Fault)}
+    return {fault.value: n for fault, n in counts.items() if n}
+
+
+def _print_one(document: Mapping[str, Any]) -> None:
+    complete = "yes" if document["complete"] else "no: the end of the file was cut off"
+    rows = [
+        ("duration", f"{document['duration']:.3f} s from {document['start']:.3f} s"),
+        ("complete", complete),
+        ("digest", document["digest"]),
+        *((key, _short(value)) for key, value in document["metadata"].items()),
+        *((f"media at {x['offset']:g} s", x["path"]) for x in document["media"]),
+    ]
+    if document["truth"]:
+        rows.append(("truth", _short(", ".join(_channels(document["truth"])))))
+    print_table(("recording", document["name"]), rows)
+    show()
+    header = ("module", "sensor", "taxels", "unit", "samples", "rate [Hz]", "gaps", "repeats")
+    labels = tuple(f"{state} [s]" for state in LABEL_STATES)
+    print_table((*header, *labels, "faults"), _module_rows(document["modules"]))
+    if document["markers"]:
+        show()
+        print_table(
+            ("marker [s]", "text"), [(f"{m['time']:.3f}", m["text"]) for m in document["markers"]]
+        )
+
+
+def _channels(truth: Mapping[str, Any]) -> list[str]:
+    fingers = truth["fingers"].items()
+    return truth["hand"] + [f"{finger}.{name}" for finger, names in fingers for name in names]
+
+
+def _module_rows(modules: Mapping[str, Mapping[str, Any]]) -> list[tuple[object, ...]]:
+    return [
+        (
+            name,
+            m["sensor"],
+            m["n_taxels"],
+            m["unit"],
+            m["n_samples"],
+            f"{m['rate']:.1f}",
+            m["gaps"],
+            m["repeats"],
+            *(f"{m['labels'][state]:.2f}" for state in LABEL_STATES),
+            ", ".join(f"{fault} {n}" for fault, n in m["faults"].items()) or "none",
+        )
+        for name, m in modules.items()
+    ]
+
+
+def _print_all(documents: list[dict[str, Any]]) -> None:
+    labels = tuple(f"{state} [s]" for state in LABEL_STATES)
+    print_table(
+        ("recording", "modules", "samples", "rate [Hz]", "duration [s]", "gaps", *labels, "state"),
+        [_summary(document) for document in documents],
+    )
+
+
+def _summary(document: Mapping[str, Any]) -> tuple[object, ...]:
+    """A line of the table; labels are the mean over the modules, who share them as a rule."""
+    if "error" in document:
+        return (document["name"], *8 * ("-",), "unreadable")
+    modules = list(document["modules"].values())
+    rates = sorted(m["rate"] for m in modules if m["n_samples"])
+    faults = sorted({fault for m in modules for fault in m["faults"]})
+    return (
+        document["name"],
+        len(modules),
+        sum(m["n_samples"] for m in modules),
+        f"{rates[len(rates) // 2]:.1f}",
+        f"{document['duration']:.2f}",
+        sum(m["gaps"] for m in modules),
+        *(f"{sum(m['labels'][s] for m in modules) / len(modules):.2f}" for s in LABEL_STATES),
+        ", ".join(([] if document["complete"] else ["cut"]) + faults) or "sound",
+    )
+
+
+def _short(value: object) -> str:
+    text = " ".join(str(value).split())
+    return text if len(text) <= MOST_TEXT else f"{text[: MOST_TEXT - 3]}..."
