@@ -1,0 +1,158 @@
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from holdfast.errors import RecordingError
+from holdfast.features import fingertip_force
+from holdfast.sensors import sensor
+
+from . import naive
+
+CURVED = sensor("uskin-curved")
+PERIOD = 1 / CURVED.rate
+
+
+def readings(n, seed=0, which=CURVED):
+    return np.random.default_rng(seed).integers(20_000, 40_000, size=(n, which.n_taxels, 3))
+
+
+def by_loop(values, tare, times=None, which=CURVED):
+    period = 1 / which.rate
+    times = np.arange(len(values)) * period if times is None else times
+    baseline, first = naive.first_mean(values, times, tare, period)
+    rows = [naive.force(sample, baseline, which.rotations) for sample in values]
+    return np.array([[np.nan] * 3] * first + rows[first:]), first
+
+
+@pytest.mark.parametrize("name", ["uskin-curved", "uskin-4x4", "gtac", "papillarray"])
+@pytest.mark.parametrize("kind", [np.float64, np.float32, np.uint16])
+def test_equals_the_loop(name, kind):
+    which = sensor(name)
+    n = int(0.5 * which.rate)
+    values = readings(n + 12, which=which).astype(kind)
+    expected, first = by_loop(values, 0.5, which=which)
+    assert first == n
+    found = fingertip_force(values, which)
+    assert np.allclose(found, expected, rtol=1e-12, atol=1e-6, equal_nan=True)
+
+
+@pytest.mark.parametrize("start", [0.0, 0.1, -3.0, 12345.678, 1e9, 1.7e9])
+@pytest.mark.parametrize("rate", [100.0, 150.0])
+def test_half_a_second_is_the_same_number_of_samples_whenever_it_begins(start, rate):
+    which = CURVED if rate == CURVED.rate else sensor("uskin-4x4")
+    values = readings(90, which=which)
+    times = start + np.arange(90) / rate
+    found = fingertip_force(values, which, 0.5, times)
+    assert np.isnan(found).all(axis=1).sum() == round(0.5 * rate)
+    assert np.array_equal(found, fingertip_force(values, which, 0.5), equal_nan=True)
+
+
+def test_the_mean_of_the_first_75_samples_is_zero_force():
+    values = np.repeat(readings(1), 100, axis=0).astype(float)
+    values[:75] += np.linspace(-1, 1, 75)[:, None, None]
+    assert np.abs(fingertip_force(values, CURVED)[75:]).max() < 1e-6
+
+
+def test_first():
+    values = readings(5)
+    found = fingertip_force(values, CURVED, "first")
+    assert (found[0] == 0).all()
+    expected = [naive.force(sample, values[0], CURVED.rotations) for sample in values]
+    assert np.allclose(found, expected, rtol=1e-12, atol=1e-6)
+
+
+def test_none():
+    values = readings(5)
+    expected = [naive.force(v, np.zeros((30, 3)), CURVED.rotations) for v in values]
+    assert np.allclose(fingertip_force(values, CURVED, "none"), expected, rtol=1e-12)
+
+
+@pytest.mark.parametrize("given", ["0.1:0.2", (0.1, 0.2)])
+def test_interval(given):
+    values = readings(60)
+    times = np.arange(60) * PERIOD
+    inside = (times >= 0.1) & (times < 0.2)
+    baseline = values[inside].mean(axis=0)
+    expected = [naive.force(sample, baseline, CURVED.rotations) for sample in values]
+    found = fingertip_force(values, CURVED, given)
+    assert np.allclose(found, expected, rtol=1e-12, atol=1e-6)
+
+
+def test_an_interval_without_samples_is_refused():
+    with pytest.raises(ValueError) as raised:
+        fingertip_force(readings(10), CURVED, (5.0, 6.0))
+    assert str(raised.value) == "tare 5:6: no finite sample in that time"
+
+
+@pytest.mark.parametrize("bad", [np.nan, np.inf])
+def test_samples_that_are_not_finite_are_no_part_of_the_tare(bad):
+    values = readings(100).astype(float)
+    values[:3, 4, 1] = values[50, 0, 0] = values[90, 29, 2] = bad
+    expected, first = by_loop(values, 0.5)
+    assert first == 78  # half a second from the first finite sample
+    expected[90] = np.nan
+    found = fingertip_force(values, CURVED)
+    assert np.allclose(found, expected, rtol=1e-12, atol=1e-6, equal_nan=True)
+
+
+def test_first_is_the_first_finite_sample():
+    values = readings(6).astype(float)
+    values[0, 0, 0] = np.nan
+    found = fingertip_force(values, CURVED, "first")
+    assert np.isnan(found[0]).all()
+    assert (found[1] == 0).all()
+
+
+def test_no_finite_sample_at_all():
+    with pytest.raises(ValueError) as raised:
+        fingertip_force(np.full((100, 30, 3), np.nan), CURVED)
+    assert str(raised.value) == "tare 0.5: no finite sample in that time"
+
+
+def test_a_tare_shorter_than_a_period_takes_one_sample():
+    values = readings(4)
+    found = fingertip_force(values, CURVED, 1e-4)
+    assert np.isnan(found[0]).all()
+    assert np.array_equal(found[1:], fingertip_force(values, CURVED, "first")[1:])
+
+
+@pytest.mark.parametrize("tare", ["first", "none"])
+def test_no_finite_sample_gives_no_force(tare):
+    assert np.isnan(fingertip_force(np.full((9, 30, 3), np.nan), CURVED, tare)).all()
+
+
+@pytest.mark.parametrize("tare", [0.5, "first", "none"])
+def test_no_samples(tare):
+    assert fingertip_force(np.empty((0, 30, 3)), CURVED, tare).shape == (0, 3)
+
+
+@given(k=st.integers(1, 119), tare=st.sampled_from([0.1, 0.5, "first", "none"]))
+@settings(deadline=None)
+def test_the_future_changes_nothing(k, tare):
+    values = readings(120).astype(float)
+    later = values.copy()
+    later[k:] += 500.0
+    found = fingertip_force(values, CURVED, tare)[:k]
+    assert np.array_equal(fingertip_force(later, CURVED, tare)[:k], found, equal_nan=True)
+
+
+@pytest.mark.parametrize(
+    ("shape", "message"),
+    [
+        ((9, 24, 3), "readings of shape (n, 30, 3) expected for uskin-curved, (9, 24, 3) given"),
+        ((9, 30, 2), "readings of shape (n, 30, 3) expected for uskin-curved, (9, 30, 2) given"),
+        ((30, 3), "readings of shape (n, 30, 3) expected for uskin-curved, (30, 3) given"),
+    ],
+)
+def test_refuses_other_shapes(shape, message):
+    with pytest.raises(RecordingError) as raised:
+        fingertip_force(np.zeros(shape), CURVED)
+    assert str(raised.value) == message
+
+
+@pytest.mark.parametrize("n", [8, 10])
+def test_refuses_other_times(n):
+    with pytest.raises(RecordingError) as raised:
+        fingertip_force(readings(9), CURVED, times=np.arange(n))
+    assert str(raised.value) == f"9 samples given with times of shape ({n},)"

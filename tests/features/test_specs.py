@@ -1,0 +1,70 @@
+import numpy as np
+import pytest
+
+from holdfast.features import DEPLOYED, FeatureSpec, parse_features
+from holdfast.features.specs import spec_codes
+
+
+def test_the_deployed_features_drop_m():
+    assert DEPLOYED == ("F_a", "F_x", "F_y", "F_z", "sigma")
+
+
+@pytest.mark.parametrize(
+    ("names", "expected"),
+    [
+        ("F_a,F_x,F_y,F_z,m,sigma", "F_a F_x F_y F_z m[14] sigma[14]"),
+        (" sigma , F_a", "sigma[14] F_a"),
+        ("F_tip,m", "F_x F_y F_z m[14]"),
+        (["sigma"], "sigma[14]"),
+        (DEPLOYED, "F_a F_x F_y F_z sigma[14]"),
+    ],
+)
+def test_names(names, expected):
+    assert " ".join(map(str, parse_features(names))) == expected
+
+
+@pytest.mark.parametrize(
+    ("names", "window", "message"),
+    [
+        ("F_a,F_q", 14, "unknown feature 'F_q'; there are F_a, F_x, F_y, F_z, m, sigma, and F_tip"
+                        " for three"),
+        ("", 14, "unknown feature ''; there are F_a, F_x, F_y, F_z, m, sigma, and F_tip for three"),
+        ("F_a,F_a", 14, "a feature is given twice in F_a,F_a"),
+        ("F_tip,F_x", 14, "a feature is given twice in F_x,F_y,F_z,F_x"),
+        ("F_a", 13, "an even window of at least 2 samples expected, 13 given"),
+    ],
+)  # fmt: skip
+def test_refuses_names(names, window, message):
+    with pytest.raises(ValueError) as raised:
+        parse_features(names, window)
+    assert str(raised.value) == message
+
+
+@pytest.mark.parametrize(
+    ("arguments", "message"),
+    [
+        (("m", 3), "an even window of at least 2 samples expected, 3 given"),
+        (("F_x", 14), "F_x has no window; 14 given"),
+        (("m", 14, "noise"),
+         "the transform 'noise' is of sigma over 4 or more; noise(m[14]) given"),
+        (("sigma", 2, "noise"),
+         "the transform 'noise' is of sigma over 4 or more; noise(sigma[2]) given"),
+        (("F_a", 0, "log"),
+         "log(F_a): a floor above 0 expected, which keeps it finite; 0 given"),
+        (("F_a", 0, "log", "finger", -1.0), "a floor of at least 0 expected, -1.0 given"),
+        (("F_a", 0, "log", "finger", np.nan), "a floor of at least 0 expected, nan given"),
+    ],
+)  # fmt: skip
+def test_refuses_specifications(arguments, message):
+    with pytest.raises(ValueError) as raised:
+        FeatureSpec(*arguments)
+    assert message in str(raised.value)
+
+
+def test_text():
+    assert str(FeatureSpec("sigma", 20, "noise", "hand")) == "hand noise(sigma[20])"
+
+
+def test_codes_are_padded():
+    specs = [FeatureSpec("F_z"), FeatureSpec("sigma", 8, "log", "hand", 1.0)]
+    assert spec_codes(specs, 3).tolist() == [[3, 0, 0, 0], [5, 8, 1, 1], [-1, -1, -1, -1]]
