@@ -1,0 +1,1 @@
+"""A physical twin of the experiment: deterministic physics, from a seed, without a clock."""
