@@ -40,6 +40,7 @@ if TYPE_CHECKING:
     from holdfast.recordings import Truth as Truth
     from holdfast.sensors import Hand as Hand
     from holdfast.sensors import Sensor as Sensor
+    from holdfast.training import StabilityClassifier as StabilityClassifier
 
 _HOMES = {
     "FEATURE_NAMES": "features",
