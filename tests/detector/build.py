@@ -1,0 +1,67 @@
+"""Small hands, models and recordings for the tests of detectors and models."""
+
+import numpy as np
+
+from holdfast.classifiers import LinearClassifier
+from holdfast.features import FeatureSpec, parse_features
+from holdfast.model import FingerModel, Model
+from holdfast.recordings import Recording, Tactile
+from holdfast.sensors import Sensor
+
+RATE = 100.0
+RICH = (
+    *parse_features("F_a,F_x,F_y,F_z,m,sigma", 6),
+    FeatureSpec("sigma", 10, "noise"),
+    FeatureSpec("sigma", 4, "log", "finger", 0.5),
+    FeatureSpec("F_a", 0, "log", "hand", 1.0),
+    FeatureSpec("sigma", 8, "none", "hand"),
+)
+"""Every kind, transform and scope, over several windows."""
+
+
+def sensor(n_taxels=2, name="tiny", rate=RATE, limits=(0.0, 1000.0), unit="count"):
+    turns, _ = np.linalg.qr(np.random.default_rng(n_taxels).normal(size=(n_taxels, 3, 3)))
+    turns *= np.linalg.det(turns)[:, None, None]
+    places = np.arange(3.0 * n_taxels).reshape(-1, 3)
+    return Sensor(name, places, turns, np.array([0.0, 0.0, 1.0]), rate, unit, limits)
+
+
+def classifier(n_features, seed=0, **options):
+    rng = np.random.default_rng(seed)
+    options.setdefault("intercept", 0.3)
+    return LinearClassifier(
+        mean=tuple(rng.normal(size=n_features)),
+        scale=tuple(rng.uniform(20, 80, size=n_features)),
+        coefficients=tuple(rng.normal(size=n_features)),
+        **options,
+    )
+
+
+def finger_model(features=None, seed=0, **options):
+    features = parse_features("F_a,F_x,F_y,F_z,sigma", 6) if features is None else features
+    options.setdefault("classifier", classifier(len(features), seed))
+    return FingerModel(features=features, **options)
+
+
+def model(fingers=("thumb", "index"), features=None, which=None, threshold=None, **options):
+    which = sensor() if which is None else which
+    parts = {
+        name: finger_model(features, seed, sensor=which.name, contact_threshold=threshold)
+        for seed, name in enumerate(fingers)
+    }
+    options = {"rate": which.rate, "window": 6, "tare": "0.2"} | options
+    return Model(fingers=parts, sensors={which.name: which}, **options)
+
+
+def tactile(n=200, seed=0, which=None, start=0.0, rate=None, times=None):
+    """Readings in the middle of the range that wander, in whole counts."""
+    which = sensor() if which is None else which
+    rng = np.random.default_rng(seed)
+    steps = rng.normal(scale=4, size=(n, which.n_taxels, 3)).cumsum(axis=0)
+    values = np.rint(np.clip(500 + steps + rng.normal(scale=3, size=steps.shape), 100, 900))
+    times = start + np.arange(n) / (rate or which.rate) if times is None else times
+    return Tactile(which, times, values)
+
+
+def recording(**modules):
+    return Recording("made", modules)

@@ -1,0 +1,85 @@
+import numpy as np
+import pytest
+
+from holdfast.detector import Detector
+from holdfast.features import Tare
+from holdfast.model import ANY_FINGER, Debounce, Model
+
+from . import naive
+from .build import RATE, RICH, finger_model, model, sensor, tactile
+
+
+def eventful(seed, which, n=420):
+    """Samples that go missing, repeat, stick, saturate, break, pull, and come in at odd times."""
+    rng = np.random.default_rng(seed)
+    values = np.array(tactile(n, seed, which).readings)
+    press = np.zeros(n)
+    for start in rng.integers(60, n, size=3):
+        press[start : start + rng.integers(20, 90)] += rng.normal(scale=60)
+    values[:, :, 2] += np.rint(press)[:, None]
+    values = np.clip(values, 1, 999)
+    frozen = rng.integers(120, n - 80)
+    values[frozen : frozen + 70] = values[frozen]
+    values[rng.integers(30, n, size=2), 0, 1] = 1000.0
+    values[rng.integers(0, n, size=3), 1, 2] = rng.choice([np.nan, np.inf])
+    kept = rng.random(n) > 0.05
+    hole = rng.integers(50, n)
+    kept[hole : hole + rng.integers(2, 30)] = False
+    return values, kept
+
+
+def stream(seed, fingers, which):
+    rng = np.random.default_rng([seed, 1])
+    found = {name: eventful([seed, i], which) for i, name in enumerate(fingers)}
+    times = np.arange(420) / RATE + rng.uniform(-0.2, 0.2, size=420) / RATE
+    for k, time in enumerate(times):
+        yield {name: values[k] for name, (values, kept) in found.items() if kept[k]}, float(time)
+
+
+def same(estimate, twin):
+    time, hand, rows = twin
+    assert estimate.time == time
+    assert str(estimate.state) == hand
+    assert list(estimate.fingers) == list(rows)
+    for name, (told, numbers) in rows.items():
+        one = estimate.fingers[name]
+        assert (str(one.state), str(one.reason), tuple(map(str, one.faults))) == told
+        found = (one.time, one.stable_probability, one.instability, *one.force)
+        assert found == pytest.approx(numbers, rel=1e-9, abs=1e-9, nan_ok=True)
+
+
+MODELS = {
+    "rich": {"features": RICH, "tare": "0.2", "threshold": 15.0},
+    "rich, first": {"features": RICH, "tare": "first"},
+    "none": {"tare": "none", "threshold": 200.0},
+    "debounced": {"tare": "0.1", "debounce": Debounce(0.05, 0.1), "threshold": 30.0},
+    "long window": {"tare": "0.3", "window": 20},
+}
+
+
+@pytest.mark.parametrize("seed", range(3))
+@pytest.mark.parametrize("options", MODELS.values(), ids=MODELS)
+def test_equals_the_twin(options, seed):
+    judge = model(("thumb", "index", "ring"), **options)
+    which = sensor()
+    sensors = dict.fromkeys(judge.fingers, which)
+    detector, twin = Detector(judge), naive.Hand(judge, sensors, Tare.parse(judge.tare), RATE)
+    seen = set()
+    for samples, time in stream(seed, judge.fingers, which):
+        estimate = detector.update(samples, time)
+        same(estimate, twin.update(samples, time))
+        seen |= {(x.state, x.reason, *x.faults) for x in estimate.fingers.values()}
+    assert len(seen) >= 6  # of states, reasons and faults together
+
+
+def test_equals_the_twin_with_contact_by_noise():
+    judge = Model(fingers={ANY_FINGER: finger_model(contact_noise=5.0)}, window=6, tare="0.2")
+    sensors = {"finger1": sensor(), "finger2": sensor(3, "other")}
+    detector = Detector(judge, sensors, RATE)
+    twin = naive.Hand(judge, sensors, Tare.parse("0.2"), RATE)
+    for k in range(300):
+        samples = {
+            name: tactile(300, 7 + i, which).readings[k] / (1 if k > 100 else 5)
+            for i, (name, which) in enumerate(sensors.items())
+        }
+        same(detector.update(samples, k / RATE), twin.update(samples, k / RATE))
