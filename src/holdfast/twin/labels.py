@@ -1,0 +1,136 @@
+"""Labels out of the truth, by intervals, as a careful person would draw them.
+
+Sample by sample, "an outside force acts" flickers inside a shake, for the finger that pushes
+leaves the object three to eight times a second. A person labels the shake as a whole.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+import numpy.typing as npt
+
+from holdfast.contact import Cause, ContactState, Phase
+from holdfast.recordings import Label, Truth, labels_from_samples
+from holdfast.sensors.values import Array
+
+Mask = npt.NDArray[np.bool_]
+
+
+@dataclass(frozen=True)
+class LabelRule:
+    """What counts as contact, as sliding, and how intervals are drawn.
+
+    Attributes:
+        contact: force on the object from which on a finger touches it [N].
+        sliding: slip speed from which on a held contact slips [m/s].
+        merge: disturbances with a shorter rest between them are one [s].
+        margin: by which a disturbance is drawn longer at both ends [s].
+        blip: contact or its loss for a shorter time is not told [s].
+    """
+
+    contact: float = 0.05
+    sliding: float = 0.001
+    merge: float = 0.35
+    margin: float = 0.1
+    blip: float = 0.1
+
+
+def labels_from_truth(
+    truth: Truth, finger: str, rule: LabelRule | None = None
+) -> tuple[Label, ...]:
+    """The labels of one finger.
+
+    Stable while the object is locked, the finger touches it, nothing disturbs it and it does
+    not slide; unstable while the hand closes or opens on it and during disturbances (cause
+    slip, where it slides in them); no contact otherwise.
+
+    Args:
+        truth: with `phase` of the hand, and `contact_force` and `slip_speed` of the finger.
+        finger: whose labels.
+        rule: thresholds and margins.
+    """
+    rule = rule or LabelRule()
+    times = truth.times
+    arrays = truth.fingers[finger]
+    phase = truth.hand["phase"]
+    touching = _steady(
+        np.linalg.norm(arrays["contact_force"], axis=1) > rule.contact, times, rule.blip
+    )
+    held = np.isin(phase, (Phase.LOCKED, Phase.DISTURBED, Phase.SLIPPING))
+    sliding = held & (arrays["slip_speed"] > rule.sliding)
+    troubled = np.isin(phase, (Phase.DISTURBED, Phase.SLIPPING)) | sliding
+    troubled = held & _grown(_closed(troubled, times, rule.merge), times, rule.margin)
+    lost = _since(held) & ~held & (phase == Phase.FREE)
+    slipped = _spans_with(troubled, sliding)
+    states = [
+        _state(*row)
+        for row in zip(
+            touching.tolist(),
+            held.tolist(),
+            troubled.tolist(),
+            slipped.tolist(),
+            (phase == Phase.CLOSING).tolist(),
+            lost.tolist(),
+            strict=True,
+        )
+    ]
+    period = float(np.median(np.diff(times)))
+    return labels_from_samples(times, states, period=period, evidence="truth", author="twin")
+
+
+def _state(
+    touching: bool, held: bool, troubled: bool, slipped: bool, closing: bool, lost: bool
+) -> tuple[ContactState, Cause | None]:
+    if troubled:
+        return ContactState.UNSTABLE, Cause.SLIP if slipped else Cause.DISTURBANCE
+    if not touching:
+        return ContactState.NO_CONTACT, Cause.LOST if lost else None
+    if held:
+        return ContactState.STABLE, None
+    if closing:
+        return ContactState.UNSTABLE, Cause.CLOSING
+    return ContactState.UNSTABLE, Cause.LOST if lost else Cause.RELEASED
+
+
+def _runs(mask: Mask) -> npt.NDArray[np.int64]:
+    """(n_runs, 2) first sample of each run of True, and the first after it."""
+    edges = np.flatnonzero(np.diff(np.concatenate([[False], mask, [False]]).astype(np.int8)))
+    return edges.reshape(-1, 2)
+
+
+def _closed(mask: Mask, times: Array, gap: float) -> Mask:
+    """The mask with rests shorter than `gap` filled in between its runs."""
+    filled = mask.copy()
+    runs = _runs(mask)
+    for (_, end), (start, _) in zip(runs, runs[1:], strict=False):
+        if times[start] - times[end - 1] < gap:
+            filled[end:start] = True
+    return filled
+
+
+def _steady(mask: Mask, times: Array, blip: float) -> Mask:
+    """The mask without rests and then without runs that are shorter than `blip`."""
+    return ~_closed(~_closed(mask, times, blip), times, blip)
+
+
+def _grown(mask: Mask, times: Array, margin: float) -> Mask:
+    """The mask with every run longer by `margin` at both ends."""
+    grown = mask.copy()
+    for start, end in _runs(mask):
+        first = np.searchsorted(times, times[start] - margin)
+        last = np.searchsorted(times, times[end - 1] + margin, side="right")
+        grown[first:last] = True
+    return grown
+
+
+def _spans_with(mask: Mask, wanted: Mask) -> Mask:
+    """The runs of the mask in which something wanted happens."""
+    found = np.zeros_like(mask)
+    for start, end in _runs(mask):
+        found[start:end] = wanted[start:end].any()
+    return found
+
+
+def _since(mask: Mask) -> Mask:
+    """True from the first True on."""
+    return np.logical_or.accumulate(mask)

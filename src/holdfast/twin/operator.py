@@ -1,0 +1,218 @@
+"""The person at the table: holds the object until it is locked, pushes it, takes it back.
+
+Both hands have finite stiffness and tremble. A pure force would drop every object at once; a
+finger that goes a few millimetres and yields does not.
+"""
+
+import math
+from typing import NamedTuple
+
+import numpy as np
+
+from holdfast.compiled import compiled
+from holdfast.sensors.values import Array
+from holdfast.twin.profile import Profile
+
+HOLD_STIFFNESS, HOLD_DAMPING = 250.0, 10.0
+"""Of the hand that holds the object [N/m, N s/m]: a relaxed human hand and arm."""
+HOLD_TURN_STIFFNESS, HOLD_TURN_DAMPING = 0.25, 0.01
+"""The same against turning [N m/rad, N m s/rad]."""
+PUSH_DAMPING = 8.0
+"""Of the pushing finger [N s/m]."""
+PUSH_LIMIT = 14.0
+"""Most that the pushing finger gives [N]."""
+PUSH_GAP = 0.002
+"""How far off the pushing finger starts [m]."""
+ARM = 0.006
+"""Standard deviation of the place where the finger pushes about the centre of mass [m]."""
+TREMOR_BAND = (6.0, 11.0)
+"""Of physiological tremor [Hz]."""
+N_TREMORS = 8
+"""Sinusoids that make up the tremor."""
+
+PUSH, JERK, SHAKE = range(3)
+"""Styles of a disturbance: there and back, a short blow, to and fro."""
+
+DIRECTIONS = {
+    "down": (0.0, 0.0, -1.0),
+    "up": (0.0, 0.0, 1.0),
+    "left": (0.0, -1.0, 0.0),
+    "right": (0.0, 1.0, 0.0),
+}
+"""Of the disturbances with a name, in the world; the others go anywhere."""
+
+
+class Push(NamedTuple):
+    """One disturbance.
+
+    Attributes:
+        start: after the object was locked [s].
+        duration: [s].
+        direction: "down", "up", "left", "right" or "random".
+        style: PUSH, JERK or SHAKE.
+        numbers: (9,) unit vector of the direction, place on the object against the centre of
+            mass [m], depth [m], stiffness [N/m], rate of shaking [Hz].
+    """
+
+    start: float
+    duration: float
+    direction: str
+    style: int
+    numbers: Array
+
+
+def draw_pushes(generator: np.random.Generator, profile: Profile) -> list[Push]:
+    """Disturbances that fill the hold: every named direction and some random ones, in turn."""
+    names = [*DIRECTIONS, "random", "random"]
+    pushes: list[Push] = []
+    start = float(generator.uniform(1.0, 1.5))
+    while True:
+        name = names[len(pushes) % len(names)]
+        push = _draw_push(generator, profile, start, name)
+        if push.start + push.duration + 1.0 > profile.hold:
+            return pushes
+        pushes.append(push)
+        start = push.start + push.duration + float(generator.uniform(*profile.rest))
+
+
+def draw_tremor(generator: np.random.Generator) -> Array:
+    """(3, N_TREMORS, 3) amplitude, angular rate [rad/s] and phase of each axis: rms 1."""
+    tremor = np.empty((3, N_TREMORS, 3))
+    weights = generator.uniform(0.5, 1.0, size=(3, N_TREMORS))
+    tremor[:, :, 0] = weights * np.sqrt(2.0 / (weights**2).sum(axis=1, keepdims=True))
+    tremor[:, :, 1] = 2 * np.pi * generator.uniform(*TREMOR_BAND, size=(3, N_TREMORS))
+    tremor[:, :, 2] = generator.uniform(0.0, 2 * np.pi, size=(3, N_TREMORS))
+    return tremor
+
+
+@compiled
+def tremble(tremor: Array, time: float, axis: int) -> tuple[float, float]:
+    """Deflection and speed of an axis, for a tremor of rms 1."""
+    place = speed = 0.0
+    for k in range(tremor.shape[1]):
+        amplitude, rate, phase = tremor[axis, k]
+        place += amplitude * math.sin(rate * time + phase)
+        speed += amplitude * rate * math.cos(rate * time + phase)
+    return place, speed
+
+
+@compiled
+def hold_wrench(
+    body: Array, anchor: Array, gain: float, weight: float, tremor: Array, rms: float, time: float
+) -> tuple[float, float, float, float, float, float]:
+    """Force and torque about the centre of mass of the hand that holds the object.
+
+    Args:
+        body: (18,) position, rotation, velocity and spin of the object in the world.
+        anchor: (12,) position and rotation where the hand wants it.
+        gain: from 0 (let go) to 1.
+        weight: of the object, which the hand carries [N].
+        tremor: of the hand.
+        rms: of the tremor [m].
+        time: [s].
+    """
+    force = np.zeros(3)
+    for axis in range(3):
+        place, speed = tremble(tremor, time, axis)
+        stretch = anchor[axis] + rms * place - body[axis]
+        force[axis] = HOLD_STIFFNESS * stretch + HOLD_DAMPING * (rms * speed - body[12 + axis])
+    turn = np.zeros(3)  # of the rotation from here to the anchor, small angles: sum of r x r_wanted
+    for column in range(3):
+        x, y, z = body[3 + column], body[6 + column], body[9 + column]
+        u, v, w = anchor[3 + column], anchor[6 + column], anchor[9 + column]
+        turn[0] += 0.5 * (y * w - z * v)
+        turn[1] += 0.5 * (z * u - x * w)
+        turn[2] += 0.5 * (x * v - y * u)
+    torque = HOLD_TURN_STIFFNESS * turn - HOLD_TURN_DAMPING * body[15:18]
+    return (
+        gain * force[0],
+        gain * force[1],
+        gain * (force[2] + weight),
+        gain * torque[0],
+        gain * torque[1],
+        gain * torque[2],
+    )
+
+
+@compiled
+def push_wrench(
+    body: Array,
+    origin: Array,
+    numbers: Array,
+    style: int,
+    duration: float,
+    tremor: Array,
+    rms: float,
+    elapsed: float,
+) -> tuple[float, float, float, float, float, float]:
+    """Force and torque about the centre of mass of the pushing finger; it never pulls.
+
+    Args:
+        body: (18,) position, rotation, velocity and spin of the object in the world.
+        origin: (3,) where the centre of mass was when the push began.
+        numbers: of the `Push`.
+        style: PUSH, JERK or SHAKE.
+        duration: of the push [s].
+        tremor: of the finger.
+        rms: of the tremor [m].
+        elapsed: since the push began [s].
+    """
+    ux, uy, uz, ax, ay, az, depth, stiffness, rate = numbers
+    aim, aim_speed = _aim(style, depth, rate, elapsed, duration)
+    place, speed = tremble(tremor, elapsed, 0)
+    aim += rms * place - PUSH_GAP
+    aim_speed += rms * speed
+    along = ux * (body[0] - origin[0]) + uy * (body[1] - origin[1]) + uz * (body[2] - origin[2])
+    vx = body[12] + body[16] * az - body[17] * ay
+    vy = body[13] + body[17] * ax - body[15] * az
+    vz = body[14] + body[15] * ay - body[16] * ax
+    pace = ux * vx + uy * vy + uz * vz
+    force = stiffness * (aim - along) + PUSH_DAMPING * (aim_speed - pace)
+    if aim <= along:
+        force = 0.0
+    force = min(max(force, 0.0), PUSH_LIMIT)
+    fx, fy, fz = force * ux, force * uy, force * uz
+    return fx, fy, fz, ay * fz - az * fy, az * fx - ax * fz, ax * fy - ay * fx
+
+
+@compiled
+def _aim(
+    style: int, depth: float, rate: float, elapsed: float, duration: float
+) -> tuple[float, float]:
+    """Where the finger wants to be along its direction, and how fast that moves."""
+    pulse = math.pi / duration
+    if style == PUSH:  # there and back, as smooth as a raised cosine
+        return (
+            0.5 * (depth + PUSH_GAP) * (1 - math.cos(2 * pulse * elapsed)),
+            (depth + PUSH_GAP) * pulse * math.sin(2 * pulse * elapsed),
+        )
+    if style == JERK:  # a sharper blow: the fourth power of a half wave
+        wave = math.sin(pulse * elapsed)
+        return (
+            (depth + PUSH_GAP) * wave**4,
+            4 * (depth + PUSH_GAP) * wave**3 * math.cos(pulse * elapsed) * pulse,
+        )
+    turning = 2 * math.pi * rate
+    rise = math.sin(pulse * elapsed)  # shaking swells and fades
+    return (
+        (depth + PUSH_GAP) * rise * (0.5 - 0.5 * math.cos(turning * elapsed)),
+        (depth + PUSH_GAP)
+        * (
+            pulse * math.cos(pulse * elapsed) * (0.5 - 0.5 * math.cos(turning * elapsed))
+            + rise * 0.5 * turning * math.sin(turning * elapsed)
+        ),
+    )
+
+
+def _draw_push(generator: np.random.Generator, profile: Profile, start: float, name: str) -> Push:
+    drawn = generator.normal(size=3)
+    direction = np.array(DIRECTIONS.get(name, tuple(drawn / np.linalg.norm(drawn))))
+    arm = generator.normal(0.0, ARM, size=3)
+    arm -= direction * (arm @ direction)
+    depth = generator.uniform(*profile.push_depth)
+    stiffness = generator.uniform(*profile.push_stiffness)
+    rate = generator.uniform(*profile.shake_rate)
+    duration = float(generator.uniform(*profile.push_duration))
+    style = int(generator.integers(3))
+    numbers = np.array([*direction, *arm, depth, stiffness, rate])
+    return Push(start, duration, name, style, numbers)
