@@ -5,6 +5,7 @@ leaves the object three to eight times a second. A person labels the shake as a 
 """
 
 from dataclasses import dataclass
+from itertools import pairwise
 
 import numpy as np
 import numpy.typing as npt
@@ -102,7 +103,7 @@ def _closed(mask: Mask, times: Array, gap: float) -> Mask:
     """The mask with rests shorter than `gap` filled in between its runs."""
     filled = mask.copy()
     runs = _runs(mask)
-    for (_, end), (start, _) in zip(runs, runs[1:], strict=False):
+    for (_, end), (start, _) in pairwise(runs):
         if times[start] - times[end - 1] < gap:
             filled[end:start] = True
     return filled
