@@ -121,8 +121,8 @@ def _staged(out: Path) -> Iterator[Path]:
     except OSError as cause:
         raise OutputError(f"cannot write to {out}: {cause.strerror}") from cause
     try:
-        with staging as folder:
-            yield Path(folder)
+        with staging as name:
+            yield Path(name)
     except OutputError as cause:
         raise OutputError(str(cause).replace(staging.name, str(out))) from cause
     finally:

@@ -179,7 +179,7 @@ def _print_one(document: Mapping[str, Any]) -> None:
 
 def _channels(truth: Mapping[str, Any]) -> list[str]:
     fingers = truth["fingers"].items()
-    return truth["hand"] + [f"{finger}.{name}" for finger, names in fingers for name in names]
+    return [*truth["hand"], *(f"{finger}.{name}" for finger, names in fingers for name in names)]
 
 
 def _module_rows(modules: Mapping[str, Mapping[str, Any]]) -> list[tuple[object, ...]]:

@@ -93,11 +93,11 @@ def is_recording(path: Path) -> bool:
 
 
 def _format_of(path: Path) -> ModuleType:
-    if path.suffix not in SUFFIXES:
-        raise RecordingError(f"cannot read {path}: {_suffixes(path)}")
     if not path.is_file():
         what = "is a folder" if path.is_dir() else "does not exist"
         raise RecordingError(f"{path} {what}; a recording's file expected")
+    if path.suffix not in SUFFIXES:
+        raise RecordingError(f"cannot read {path}: {_suffixes(path)}")
     return _module(path.suffix)
 
 

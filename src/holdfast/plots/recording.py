@@ -94,9 +94,7 @@ def _fingers(recording: Recording) -> dict[str, Tactile]:
     return {name: module for name, module in every.items() if "/" not in name} or every
 
 
-def _curves(
-    recording: Recording, name: str, module: Tactile, tare: Tare, window: int
-) -> _Curves:
+def _curves(recording: Recording, name: str, module: Tactile, tare: Tare, window: int) -> _Curves:
     times = module.times
     if not np.isfinite(module.readings).all(axis=(1, 2)).any():
         return _Curves(times, np.full((len(times), len(FEATURE_NAMES)), np.nan), None)

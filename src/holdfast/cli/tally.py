@@ -1,0 +1,143 @@
+"""Shares of states, reasons and faults, and the events, over a stream of detections."""
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+import numpy.typing as npt
+
+from holdfast.cli.console import print_table, show
+from holdfast.contact import UNKNOWN, ContactEvent, ContactState, Fault, Reason
+from holdfast.detector import HAND
+
+if TYPE_CHECKING:
+    from holdfast.detector import Detection
+    from holdfast.sensors.values import Array
+
+STATES, REASONS, FAULTS = tuple(ContactState), tuple(Reason), tuple(Fault)
+MOST_EVENTS = 40
+"""Events that are shown to a person."""
+
+_Codes = npt.NDArray[np.int8]
+_Numbers = npt.NDArray[np.int64]
+
+
+class Tally:
+    """What a model says of a recording, in short; it grows by the events only."""
+
+    def __init__(self) -> None:
+        self._name = ""
+        self._counts: dict[str, _Counts] = {}
+        self._changes: dict[str, _Changes] = {}
+
+    def add(self, detection: "Detection") -> None:
+        """Takes the next piece."""
+        self._name = detection.name
+        for name, trace in detection.fingers.items():
+            self._count(name, trace.state, trace.reason, trace.faults)
+            self._change(name, trace.times, trace.state)
+        self._count(HAND, detection.hand)
+        self._change(HAND, detection.times, detection.hand)
+
+    def document(self) -> dict[str, Any]:
+        """All of it, as JSON has it: shares are of samples, or of instants for the hand."""
+        shares = {name: counts.document() for name, counts in self._counts.items()}
+        hand = shares.pop(HAND)
+        return {
+            "name": self._name,
+            "fingers": shares,
+            "hand": {key: hand[key] for key in ("n_samples", "states")},
+            "events": [event._asdict() for event in self._events()],
+        }
+
+    def print(self) -> None:
+        """All of it for a person; of many events the first."""
+        names = [name for name in self._counts if name != HAND] + [HAND]
+        print_table(
+            (self._name, "samples", *(f"{state} %" for state in STATES), "unknown for", "faults"),
+            [(name, *self._counts[name].row()) for name in names],
+        )
+        events = self._events()
+        show()
+        print_table(
+            ("time [s]", "finger", "state", "before"),
+            [(f"{e.time:.3f}", e.finger, e.state, e.previous) for e in events[:MOST_EVENTS]],
+        )
+        if len(events) > MOST_EVENTS:
+            show(f"and {len(events) - MOST_EVENTS} more events (--json has them all)")
+
+    def _count(self, name: str, states: _Codes, *causes: _Codes) -> None:
+        counts = self._counts.setdefault(name, _Counts.none())
+        counts.states += np.bincount(states, minlength=len(STATES))
+        if causes:
+            reasons, faults = causes
+            counts.reasons += np.bincount(reasons, minlength=len(REASONS))
+            counts.faults += (faults[:, None] >> np.arange(len(FAULTS)) & 1).sum(axis=0)
+
+    def _change(self, name: str, times: "Array", states: _Codes) -> None:
+        self._changes.setdefault(name, _Changes()).add(times, states)
+
+    def _events(self) -> list[ContactEvent]:
+        events = [
+            ContactEvent(name, STATES[state], STATES[previous], time)
+            for name, changes in self._changes.items()
+            for time, state, previous in changes
+        ]
+        return sorted(events, key=lambda event: event.time)
+
+
+@dataclass
+class _Counts:
+    """How many samples had which state, reason and fault."""
+
+    states: _Numbers
+    reasons: _Numbers
+    faults: _Numbers
+
+    @classmethod
+    def none(cls) -> "_Counts":
+        return cls(*(np.zeros(len(all_), dtype=np.int64) for all_ in (STATES, REASONS, FAULTS)))
+
+    def document(self) -> dict[str, Any]:
+        n = int(self.states.sum())
+        return {
+            "n_samples": n,
+            "states": {s.value: k / n for s, k in zip(STATES, self.states.tolist(), strict=True)},
+            "reasons": _some(REASONS[1:], self.reasons[1:]),
+            "faults": _some(FAULTS, self.faults),
+        }
+
+    def row(self) -> tuple[object, ...]:
+        n = int(self.states.sum())
+        shares = (f"{100 * k / n:.1f}" for k in self.states.tolist())
+        return n, *shares, _text(REASONS[1:], self.reasons[1:]), _text(FAULTS, self.faults)
+
+
+class _Changes:
+    """The changes of one state over a stream."""
+
+    def __init__(self) -> None:
+        self._told = UNKNOWN
+        self._pieces: list[tuple[Array, _Codes, _Codes]] = []
+
+    def add(self, times: "Array", states: _Codes) -> None:
+        if not len(states):
+            return
+        before = np.concatenate([np.array([self._told], dtype=np.int8), states[:-1]])
+        changed = states != before
+        if changed.any():
+            self._pieces.append((times[changed], states[changed], before[changed]))
+        self._told = int(states[-1])
+
+    def __iter__(self) -> Iterator[tuple[float, int, int]]:
+        for times, states, before in self._pieces:
+            yield from zip(times.tolist(), states.tolist(), before.tolist(), strict=True)
+
+
+def _some(names: "tuple[Reason, ...] | tuple[Fault, ...]", counts: _Numbers) -> dict[str, int]:
+    return {name.value: k for name, k in zip(names, counts.tolist(), strict=True) if k}
+
+
+def _text(names: "tuple[Reason, ...] | tuple[Fault, ...]", counts: _Numbers) -> str:
+    return ", ".join(f"{name} {k}" for name, k in _some(names, counts).items()) or "-"
