@@ -1,0 +1,213 @@
+import json
+import os
+import re
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from holdfast.cli import main
+from holdfast.io import load_recording, save_recording
+from holdfast.synthetic import synthetic_recording
+
+HEADER = "# sensor: anyskin\ntime," + ",".join(
+    f"t{taxel:02d}_{axis}" for taxel in range(1, 6) for axis in "xyz"
+)
+
+
+@pytest.fixture(scope="module")
+def grasp():
+    return synthetic_recording("grasp", 1, ("thumb", "index"))
+
+
+@pytest.fixture
+def table(tmp_path):
+    """Writes a CSV file of an AnySkin, labelled stable."""
+
+    def write(name="press.csv", n=40, extra=""):
+        rows = [
+            ",".join([f"{k / 100:.2f}", *(str(100 + k + c) for c in range(15)), "stable"])
+            for k in range(n)
+        ]
+        path = tmp_path / "in" / name
+        path.parent.mkdir(exist_ok=True)
+        path.write_text("\n".join([f"{HEADER},label", *rows]) + extra + "\n")
+        return path
+
+    return write
+
+
+def refusal(capsys, *words):
+    assert main(["import", *map(str, words)]) == 2
+    out, err = capsys.readouterr()
+    assert out == ""
+    assert err.count("\n") == 1
+    return err.removeprefix("holdfast: ").rstrip("\n")
+
+
+def imported(capsys, *words):
+    assert main(["import", *map(str, words), "--json"]) == 0
+    return json.loads(capsys.readouterr().out)
+
+
+def test_imports_a_file(capsys, table, tmp_path):
+    told = imported(capsys, table(), tmp_path / "a" / "b")
+    path = tmp_path / "a" / "b" / "press.parquet"
+    assert told == {
+        "out": str(path.parent),
+        "n_recordings": 1,
+        "n_modules": 1,
+        "n_samples": 40,
+        "recordings": [
+            {
+                "name": "press",
+                "path": str(path),
+                "modules": {"finger1": 40},
+                "n_samples": 40,
+                "duration": pytest.approx(0.39),
+                "n_labels": 1,
+                "complete": True,
+            }
+        ],
+    }
+    assert list(path.parent.iterdir()) == [path]
+    assert load_recording(path).modules["finger1"].n_samples == 40
+
+
+def test_tells_a_person(capsys, table, tmp_path):
+    table("one.csv")
+    table("two.csv", n=30)
+    assert main(["import", str(tmp_path / "in"), str(tmp_path / "out"), "--format", "csv"]) == 0
+    out = capsys.readouterr().out
+    assert re.search(r"^one +1 +40 +0.39 +1$", out, re.MULTILINE)
+    assert out.endswith(f"2 recordings with 2 modules and 70 samples in {tmp_path / 'out'}\n")
+
+
+def test_without_labels_and_as_mcap(capsys, table, tmp_path):
+    imported(capsys, table(), tmp_path / "out", "--no-labels", "--suffix", "mcap")
+    assert load_recording(tmp_path / "out" / "press.mcap").modules["finger1"].labels == ()
+
+
+def test_own_recordings_come_in(capsys, grasp, tmp_path):
+    save_recording(grasp, tmp_path / "grasp.mcap")
+    imported(capsys, tmp_path / "grasp.mcap", tmp_path / "out", "--no-labels")
+    got = load_recording(tmp_path / "out" / "grasp.parquet")
+    assert got.digest == grasp.digest
+    assert got.modules["thumb"].labels == ()
+    imported(capsys, tmp_path, tmp_path / "again")
+    assert load_recording(tmp_path / "again" / "grasp.parquet").modules["thumb"].labels
+
+
+def test_a_cut_file_is_recovered(capsys, grasp, tmp_path):
+    whole, cut = tmp_path / "grasp.mcap", tmp_path / "cut.mcap"
+    save_recording(grasp, whole)
+    data = whole.read_bytes()
+    cut.write_bytes(data[: len(data) // 2])
+    assert main(["import", str(cut), str(tmp_path / "out"), "--json"]) == 0
+    out, err = capsys.readouterr()
+    assert re.fullmatch(rf"{re.escape(str(cut))} was cut: \d+\.\d\d s recovered\n", err)
+    (told,) = json.loads(out)["recordings"]
+    assert (told["name"], told["complete"]) == ("cut", False)
+    got = load_recording(tmp_path / "out" / "cut.parquet")
+    assert not got.complete
+    n = got.modules["thumb"].n_samples
+    assert 0 < n < grasp.modules["thumb"].n_samples
+    assert np.array_equal(got.modules["thumb"].readings, grasp.modules["thumb"].readings[:n])
+
+
+class TestOutputs:
+    def test_nothing_is_overwritten(self, capsys, table, tmp_path):
+        out = tmp_path / "out"
+        out.mkdir()
+        (out / "two.parquet").write_text("mine")
+        table("one.csv")
+        table("two.csv")
+        assert refusal(capsys, tmp_path / "in", out) == (
+            f"{out / 'two.parquet'} exists already: choose another name, or give --force"
+        )
+        assert [path.name for path in out.iterdir()] == ["two.parquet"]
+        assert (out / "two.parquet").read_text() == "mine"
+        imported(capsys, tmp_path / "in", out, "--force")
+        assert load_recording(out / "two.parquet").name == "two"
+
+    def test_all_or_none(self, capsys, table, tmp_path):
+        table("a.csv")
+        bad = table("b.csv", extra="\n1,2,3")
+        text = refusal(capsys, tmp_path / "in", tmp_path / "x" / "out")
+        assert str(bad) in text
+        assert not (tmp_path / "x").exists()
+
+    def test_a_full_disk_names_the_file(self, capsys, table, tmp_path, monkeypatch):
+        def full(*_, **__):
+            raise OSError(28, "No space left on device")
+
+        monkeypatch.setattr("holdfast.io.parquet.seal", full)
+        out = tmp_path / "out"
+        assert refusal(capsys, table(), out) == (
+            f"cannot write {out / 'press.parquet'}: No space left on device"
+        )
+        assert not out.exists()
+
+    def test_out_is_a_file(self, capsys, table, tmp_path):
+        out = tmp_path / "out"
+        out.write_text("mine")
+        assert refusal(capsys, table(), out) == f"{out}: is a file; a folder expected"
+        assert refusal(capsys, table(), out / "deeper") == (
+            f"cannot write to {out / 'deeper'}: Not a directory"
+        )
+
+    @pytest.mark.skipif(os.geteuid() == 0, reason="root may write anywhere")
+    def test_out_is_read_only(self, capsys, table, tmp_path):
+        out = tmp_path / "out"
+        out.mkdir(mode=0o500)
+        assert refusal(capsys, table(), out) == f"cannot write to {out}: Permission denied"
+
+    def test_a_name_that_leads_elsewhere(self, capsys, grasp, tmp_path):
+        save_recording(replace(grasp, name="../up"), tmp_path / "a.parquet")
+        assert refusal(capsys, tmp_path / "a.parquet", tmp_path / "out") == (
+            "'../up' is a recording's name that no file can have"
+        )
+        assert [path.name for path in tmp_path.iterdir()] == ["a.parquet"]
+
+    def test_two_of_one_name(self, capsys, grasp, tmp_path):
+        for stem in "ab":
+            save_recording(grasp, tmp_path / f"{stem}.parquet")
+        assert refusal(capsys, tmp_path, tmp_path / "out") == (
+            "two recordings are called 'grasp': import one by one"
+        )
+
+
+def test_refusals(capsys, table, tmp_path):
+    out = tmp_path / "out"
+    formats = "uskin-pick-move, xela-log, gtac, arq-crisp, csv"
+    missing, empty, text = tmp_path / "none", tmp_path / "empty", tmp_path / "notes.txt"
+    empty.mkdir()
+    text.write_text("hello")
+    assert refusal(capsys, missing, out) == (
+        f"{missing} does not exist; a file or folder to import expected"
+    )
+    for path in (empty, text):
+        assert refusal(capsys, path, out) == (
+            f"{path} is of no format that holdfast knows; there are {formats} "
+            "(choose one with --format)"
+        )
+    assert refusal(capsys, text, out, "--format", "bag") == (
+        f"unknown format 'bag'; there are {formats}"
+    )
+    assert "'bag' is not one of 'parquet', 'mcap'" in refusal(
+        capsys, text, out, "--suffix", "bag"
+    )
+    cut = tmp_path / "cut.parquet"
+    cut.write_bytes(b"PAR1" + bytes(100))
+    assert refusal(capsys, cut, out) == (
+        f"{cut} is cut or damaged: 104 bytes without the end of a Parquet file, "
+        "from which nothing can be recovered"
+    )
+    assert not out.exists()
+
+
+def test_real_uskin(capsys, data_folder, tmp_path):
+    told = imported(
+        capsys, data_folder / "uskin_pick_move", tmp_path, "--format", "uskin-pick-move"
+    )
+    assert (told["n_recordings"], told["n_modules"], told["n_samples"]) == (5, 10, 3272)
