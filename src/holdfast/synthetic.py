@@ -76,7 +76,8 @@ def _readings(generator: np.random.Generator, tip: Sensor, force: Array) -> Arra
     in_taxels = np.einsum("tji,nj->nti", tip.rotations, force) * share[:, None]
     rest = np.array(BASELINE) + generator.normal(0.0, 200.0, size=(tip.n_taxels, 3))
     noise = generator.normal(0.0, NOISE, size=in_taxels.shape)
-    return np.clip(np.rint(rest + in_taxels + noise), 0, 65535).astype(np.uint16)
+    counts: Array = np.clip(np.rint(rest + in_taxels + noise), 0, 65535).astype(np.uint16)
+    return counts
 
 
 def _labels(ends: Array) -> tuple[Label, ...]:

@@ -44,6 +44,8 @@ class LinearSVM:
         mean, scale, features = standardise(samples.features)
         coefficients, intercept = _fit(features, samples.stable, parameters, seed)
         values = _held_out(samples._replace(features=features), parameters, seed)
+        if values is None:
+            values = features @ coefficients + intercept
         slope, offset = _sigmoid(values, samples.stable)
         return LinearClassifier(
             mean=tuple(mean.tolist()),
@@ -69,20 +71,20 @@ def _fit(
     return estimator.coef_[0], float(estimator.intercept_[0])
 
 
-def _held_out(samples: Samples, parameters: Parameters, seed: int) -> npt.NDArray[np.float64]:
-    """Decision values out of fold by group; those in sample where a fold lacks a class."""
+def _held_out(
+    samples: Samples, parameters: Parameters, seed: int
+) -> npt.NDArray[np.float64] | None:
+    """Decision values out of fold by group; None where a fold lacks a class."""
     features, stable, groups = samples
     names = np.unique(groups)
-    folds = [names[i :: min(FOLDS, len(names))] for i in range(min(FOLDS, len(names)))]
-    coefficients, intercept = _fit(features, stable, parameters, seed)
-    values = features @ coefficients + intercept
-    held = [np.isin(groups, fold) for fold in folds]
+    held = [np.isin(groups, names[i::FOLDS]) for i in range(min(FOLDS, len(names)))]
     if len(names) < 2 or any(samples.take(~rows).one_class for rows in held):
-        return np.asarray(values)
+        return None
+    values = np.empty(len(stable))
     for rows in held:
         coefficients, intercept = _fit(features[~rows], stable[~rows], parameters, seed)
         values[rows] = features[rows] @ coefficients + intercept
-    return np.asarray(values)
+    return values
 
 
 def _sigmoid(values: npt.NDArray[np.float64], stable: npt.NDArray[np.bool_]) -> tuple[float, float]:

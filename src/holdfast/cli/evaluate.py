@@ -10,7 +10,7 @@ from holdfast.cli.console import print_json, progress, say, show
 if TYPE_CHECKING:
     from collections.abc import Iterator
 
-    from holdfast.metrics import Decisions, Metrics
+    from holdfast.metrics import Decisions
     from holdfast.model import Model
     from holdfast.recordings import Recording
 
@@ -37,16 +37,16 @@ def evaluate(
     """
     import msgspec
 
+    from holdfast.cli.figures import refuse_plot, save_plot
     from holdfast.cli.report import show_metrics
     from holdfast.errors import TrainingError
-    from holdfast.files import refuse_overwrite
     from holdfast.io import load_dataset
     from holdfast.metrics import summarise
     from holdfast.model import Model
     from holdfast.training import decisions_of
 
     if plot is not None:
-        refuse_overwrite(plot, force=force)
+        refuse_plot(plot, force)
     judge = Model.load(model)
     seen: list[str] = []
     judged = []
@@ -65,20 +65,14 @@ def evaluate(
         raise TrainingError(f"{data}: {len(recordings)} recordings without a label to judge by")
     _tell_seen(seen, len(recordings))
     if plot is not None:
-        _draw(metrics, judged, plot, force)
+        from holdfast.plots.evaluation import draw_evaluation
+
+        save_plot(draw_evaluation(metrics, judged), plot, force)
     if as_json:
         print_json({**msgspec.to_builtins(metrics), "trained_on": seen})
         return
     show_metrics(metrics)
     show(f"\n{model} on {len(recordings)} recordings")
-
-
-def _draw(metrics: "Metrics", judged: "list[Decisions]", plot: Path, force: bool) -> None:
-    from holdfast.files import whole_file
-    from holdfast.plots.evaluation import draw_evaluation
-
-    with whole_file(plot, force=force) as part:
-        draw_evaluation(metrics, judged).savefig(part)
 
 
 def _tell_seen(seen: list[str], n_recordings: int) -> None:

@@ -1,6 +1,6 @@
 """`holdfast train`: a model out of labelled recordings, with figures out of fold."""
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
@@ -10,7 +10,6 @@ from holdfast.cli.console import print_json, progress, say, show
 
 if TYPE_CHECKING:
     from holdfast.recordings import Recording
-    from holdfast.training import Setting
 
 
 def train(
@@ -42,8 +41,8 @@ def train(
     ] = False,
     max_samples: Annotated[
         int, typer.Option(help="A finger that are kept in memory; of more, every n-th.")
-    ] = 1_000_000,
-    jobs: Annotated[int, typer.Option(help="Fits at a time; -1: one a processor.")] = 1,
+    ] = 200_000,
+    jobs: Annotated[int, typer.Option(help="Searches or fits at a time; -1: one a processor.")] = 1,
     force: Annotated[bool, typer.Option("--force", help="Overwrite the model.")] = False,
     as_json: Annotated[bool, typer.Option("--json", help="Print JSON on stdout.")] = False,
 ) -> None:
@@ -77,8 +76,13 @@ def train(
     )
     refuse_overwrite(model, force=force)
     recordings = _dataset(data)
-    journal = _journal(model, setting, resume=resume, force=force)
-    trained = fit(recordings, setting, journal=journal, tell=say, follow=_follow, n_jobs=jobs)
+    journal = _journal(model, resume=resume, force=force)
+    try:
+        trained = fit(recordings, setting, journal=journal, tell=say, follow=progress, n_jobs=jobs)
+    except KeyboardInterrupt:
+        if journal.exists():
+            say(f"what the search found so far is in {journal}: go on with --resume")
+        raise
     trained.model.save(model, force=force)
     journal.unlink(missing_ok=True)
     if as_json:
@@ -99,7 +103,7 @@ def _dataset(data: Path) -> "Sequence[Recording]":
     return load_dataset(data)
 
 
-def _journal(model: Path, setting: "Setting", *, resume: bool, force: bool) -> Path:
+def _journal(model: Path, *, resume: bool, force: bool) -> Path:
     """Where the search is kept until the model is written."""
     from holdfast.errors import OutputError
 
@@ -113,10 +117,4 @@ def _journal(model: Path, setting: "Setting", *, resume: bool, force: bool) -> P
         )
     if resume and not journal.exists():
         raise OutputError(f"nothing to resume: there is no {journal}")
-    if setting.trials and not journal.exists():
-        journal.touch()
     return journal
-
-
-def _follow(recordings: "Sequence[Recording]", what: str) -> "Iterator[Recording]":
-    return progress(recordings, what)

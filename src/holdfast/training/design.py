@@ -1,6 +1,6 @@
 """From recordings to training samples, one recording at a time."""
 
-from collections.abc import Collection, Iterable, Sequence
+from collections.abc import Collection, Iterable, Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -8,12 +8,13 @@ import numpy.typing as npt
 
 from holdfast.classifiers import Samples
 from holdfast.contact import STABLE, UNKNOWN
+from holdfast.errors import TrainingError
 from holdfast.features import FeatureSpec, Tare
 from holdfast.features.extract import extract
 from holdfast.features.force import tare_amplitude
 from holdfast.features.stream import StreamPlan
 from holdfast.model import ANY_FINGER, RATE_TOLERANCE
-from holdfast.recordings import Recording, label_states
+from holdfast.recordings import Recording, Tactile, label_states
 from holdfast.resampling import resample
 from holdfast.sensors import Sensor
 from holdfast.training.setting import Setting
@@ -44,6 +45,17 @@ class FingerDesign:
         """The samples that those units leave to train from."""
         return self.samples.take(~np.isin(self.units, list(held)))
 
+    def one_sided(self, n_units: int) -> list[int]:
+        """The units without which only one class is left, or none."""
+        counts = np.array(
+            [
+                np.bincount(self.units[self.samples.stable == stable], minlength=n_units)
+                for stable in (False, True)
+            ]
+        )
+        left = counts.sum(axis=1, keepdims=True) - counts
+        return np.flatnonzero((left == 0).any(axis=0)).tolist()
+
     def contact_threshold(self, recordings: Sequence[int]) -> float | None:
         """Mean + 5 standard deviations of F_a over those recordings' tare stretches."""
         n, total, squares = self.at_rest[list(recordings)].sum(axis=0)
@@ -69,33 +81,38 @@ def gather(
 
     Raises:
         RecordingError: a recording cannot be read.
+        TrainingError: one classifier is asked for fingers with different sensors.
     """
-    step = -(-found.n_labelled // setting.max_samples)
+    step = max(1, -(-found.n_labelled // setting.max_samples))
     piles: dict[str, list[Samples]] = {finger: [] for finger in found.sensors}
     units: dict[str, list[Integers]] = {finger: [] for finger in found.sensors}
     at_rest = {finger: np.zeros((len(found.entries), 3)) for finger in found.sensors}
+    n_seen = dict.fromkeys(found.sensors, 0)
     for place, given in enumerate(recordings):
+        if not found.entries[place].n_labelled:
+            continue
         recording = at_rate(given, found.rate)
-        sensors = {f: s for f, s in found.sensors.items() if f in recording.modules}
+        sensors = {f: s for f, s in found.sensors.items() if _has(recording, f, s)}
         plan = stream_plan(sensors, setting.features, setting, found.rate)
         for finger, rows in extract(plan, recording).items():
             module = recording.modules[finger]
             states = label_states(module.labels, module.times)
             usable = (states != UNKNOWN) & np.isfinite(rows.features).all(axis=1)
-            kept = np.flatnonzero(usable)[:: max(step, 1)]
+            rows_usable = np.flatnonzero(usable)
+            kept = rows_usable[-n_seen[finger] % step :: step]
+            n_seen[finger] += len(rows_usable)
             groups = np.full(len(kept), division.group_of[place])
             piles[finger].append(Samples(rows.features[kept], states[kept] == STABLE, groups))
             units[finger].append(division.units_of(place, module.n_samples)[kept])
             if plan.tare.without_contact:
-                amplitude = tare_amplitude(module, plan.tare, found.rate)
-                at_rest[finger][place] = len(amplitude), amplitude.sum(), (amplitude**2).sum()
+                at_rest[finger][place] = _at_rest(module, plan.tare, found.rate)
     designs = {
         finger: FingerDesign(
             found.sensors[finger], _stack(pile), np.concatenate(units[finger]), at_rest[finger]
         )
         for finger, pile in piles.items()
     }
-    return {ANY_FINGER: _pool(list(designs.values()))} if setting.shared else designs
+    return {ANY_FINGER: _pool(designs)} if setting.shared else designs
 
 
 def at_rate(recording: Recording, rate: float) -> Recording:
@@ -116,15 +133,35 @@ def stream_plan(
     return StreamPlan(sensors, dict.fromkeys(sensors, features), setting.window, tare, rate)
 
 
+def _has(recording: Recording, finger: str, sensor: Sensor) -> bool:
+    """Whether the recording has samples of that finger, by that sensor."""
+    module = recording.modules.get(finger)
+    return module is not None and module.n_samples > 0 and module.sensor == sensor
+
+
+def _at_rest(module: Tactile, tare: Tare, rate: float) -> tuple[int, float, float]:
+    """Number, sum and sum of squares of F_a in the tare stretch; none of a dead finger."""
+    try:
+        amplitude = tare_amplitude(module, tare, rate)
+    except ValueError:  # no finite sample in that time
+        return 0, 0.0, 0.0
+    return len(amplitude), float(amplitude.sum()), float((amplitude**2).sum())
+
+
 def _stack(pile: Sequence[Samples]) -> Samples:
     return Samples(*(np.concatenate(parts) for parts in zip(*pile, strict=True)))
 
 
-def _pool(designs: Sequence[FingerDesign]) -> FingerDesign:
-    first = designs[0]
+def _pool(designs: Mapping[str, FingerDesign]) -> FingerDesign:
+    if len({design.sensor for design in designs.values()}) > 1:
+        raise TrainingError(
+            "one classifier for all fingers needs one sensor; given are "
+            + ", ".join(f"{finger} ({each.sensor.name})" for finger, each in designs.items())
+        )
+    each = list(designs.values())
     return FingerDesign(
-        first.sensor,
-        _stack([design.samples for design in designs]),
-        np.concatenate([design.units for design in designs]),
-        np.sum([design.at_rest for design in designs], axis=0),
+        each[0].sensor,
+        _stack([design.samples for design in each]),
+        np.concatenate([design.units for design in each]),
+        np.sum([design.at_rest for design in each], axis=0),
     )

@@ -11,6 +11,7 @@ from sklearn.utils.validation import check_is_fitted
 from holdfast.contact import STABLE
 from holdfast.features import DEPLOYED, Tare, parse_features
 from holdfast.recordings import Recording
+from holdfast.training.design import at_rate
 from holdfast.training.fitting import fit_all
 from holdfast.training.judging import decisions_of, evaluate
 from holdfast.training.setting import Setting
@@ -70,7 +71,11 @@ class StabilityClassifier(ClassifierMixin, BaseEstimator):
     def predict_proba(self, X: Sequence[Recording]) -> list[dict[str, npt.NDArray[np.float64]]]:
         """By recording and finger, (n,) the probability of stability; NaN where there is none."""
         check_is_fitted(self)
-        return [self.model_.predict_proba(recording) for recording in X]
+        rate = self.model_.rate
+        return [
+            self.model_.predict_proba(recording if rate is None else at_rate(recording, rate))
+            for recording in X
+        ]
 
     def predict(self, X: Sequence[Recording]) -> list[dict[str, npt.NDArray[np.int64]]]:
         """By recording and finger, (n,) 1 where the contact is stable, else 0."""

@@ -5,7 +5,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from holdfast.classifiers import Parameters, Samples
+from holdfast.classifiers import Parameters
 from holdfast.errors import TrainingError
 from holdfast.model import FingerModel, Model
 from holdfast.recordings import Recording
@@ -36,7 +36,19 @@ class Material:
             TrainingError: a finger has one.
         """
         for finger, design in self.designs.items():
-            _check_classes(finger, design.samples, "")
+            if design.samples.one_class:
+                n_stable = int(np.count_nonzero(design.samples.stable))
+                raise TrainingError(
+                    f"{finger}: {n_stable} samples labelled stable and "
+                    f"{len(design.samples.stable) - n_stable} labelled not stable; both classes "
+                    "are needed"
+                )
+
+    def one_sided(self) -> dict[str, list[str]]:
+        """By finger: the units without which it has only one class left."""
+        units = self.division.units
+        found = {finger: each.one_sided(len(units)) for finger, each in self.designs.items()}
+        return {finger: [units[k] for k in places] for finger, places in found.items() if places}
 
 
 def fit_model(
@@ -44,34 +56,49 @@ def fit_model(
     setting: Setting,
     parameters: Mapping[str, Parameters],
     held: Collection[int],
-) -> Model:
+) -> Model | None:
     """A model from all but the held units; it says nothing of its origin yet.
 
-    Raises:
-        TrainingError: a finger has only one class left.
+    Returns:
+        The model of the fingers that have both classes left; None where none has.
     """
-    division = material.division
-    names = ", ".join(division.units[unit] for unit in held)
+    recordings = material.division.recordings_without(held)
     fingers = {}
     for finger, design in material.designs.items():
         samples = design.without(held)
-        _check_classes(finger, samples, f" without {names}" if names else "")
-        threshold = design.contact_threshold(division.recordings_without(held))
-        asked = setting.contact_threshold
+        if samples.one_class:
+            continue
+        threshold = setting.contact_threshold
         fingers[finger] = FingerModel(
             features=setting.features,
             classifier=setting.recipe.fit(samples, parameters[finger], setting.seed),
             sensor=design.sensor.name,
-            contact_threshold=threshold if asked is None else asked,
+            contact_threshold=(
+                design.contact_threshold(recordings) if threshold is None else threshold
+            ),
         )
-    sensors = [design.sensor for design in material.designs.values()]
+    if not fingers:
+        return None
     return Model(
         fingers=fingers,
         rate=material.found.rate,
-        sensors={sensor.name: sensor for sensor in sensors},
+        sensors={d.sensor.name: d.sensor for d in material.designs.values()},
         window=setting.window,
         tare=str(setting.tare),
     )
+
+
+def fit_whole(material: Material, setting: Setting, parameters: Mapping[str, Parameters]) -> Model:
+    """A model of all fingers from all samples.
+
+    Raises:
+        TrainingError: a finger has only one class.
+    """
+    material.check_classes()
+    model = fit_model(material, setting, parameters, ())
+    if model is None:
+        raise TrainingError("no finger given; at least one expected")
+    return model
 
 
 def fit_all(recordings: Sequence[Recording], setting: Setting, parameters: Parameters) -> Model:
@@ -84,13 +111,4 @@ def fit_all(recordings: Sequence[Recording], setting: Setting, parameters: Param
     division = divide(found.entries, "random", setting.seed)
     designs = gather(recordings, found, setting, division)
     material = Material(found, division, designs)
-    return fit_model(material, setting, dict.fromkeys(designs, parameters), frozenset())
-
-
-def _check_classes(finger: str, samples: Samples, situation: str) -> None:
-    if samples.one_class:
-        n_stable = int(np.count_nonzero(samples.stable))
-        raise TrainingError(
-            f"{finger}{situation}: {n_stable} samples labelled stable and "
-            f"{len(samples.stable) - n_stable} labelled not stable; both classes are needed"
-        )
+    return fit_whole(material, setting, dict.fromkeys(designs, parameters))

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from holdfast.errors import TrainingError
-from holdfast.recordings import Recording
+from holdfast.recordings import Recording, Tactile
 from holdfast.sensors import Sensor
 
 
@@ -60,20 +60,17 @@ def survey(recordings: Iterable[Recording]) -> Survey:
 
     Raises:
         TrainingError: there is none, none has labels, two have the same samples, or one finger
-            has different sensors.
+            has different sensors or units.
     """
     entries: list[Entry] = []
-    sensors: dict[str, Sensor] = {}
+    first: dict[str, Tactile] = {}
     for recording in recordings:
         entries.append(_entry(recording))
         for finger in entries[-1].n_labelled:
-            found = recording.modules[finger].sensor
-            known = sensors.setdefault(finger, found)
-            if known != found:
-                raise TrainingError(
-                    f"{finger} of {recording.name!r} has the sensor {found.name} "
-                    f"({found.n_taxels} taxels), that of others {known.name} ({known.n_taxels})"
-                )
+            module = recording.modules[finger]
+            _refuse_unlike(f"{finger} of {recording.name!r}", module, first.get(finger, module))
+            first.setdefault(finger, module.slice(0, 0))
+    sensors = {finger: module.sensor for finger, module in first.items()}
     if not entries:
         raise TrainingError("no recordings given; at least one expected")
     if not sensors:
@@ -96,6 +93,16 @@ def _entry(recording: Recording) -> Entry:
         rate=recording.rate,
         n_labelled={name: count for name, count in counts.items() if count},
     )
+
+
+def _refuse_unlike(what: str, module: Tactile, known: Tactile) -> None:
+    if module.sensor != known.sensor:
+        raise TrainingError(
+            f"{what} has the sensor {module.sensor.name} ({module.sensor.n_taxels} taxels), "
+            f"that of others {known.sensor.name} ({known.sensor.n_taxels})"
+        )
+    if module.unit != known.unit:
+        raise TrainingError(f"{what} has readings in {module.unit}, others in {known.unit}")
 
 
 def _refuse_copies(entries: list[Entry]) -> None:

@@ -1,19 +1,21 @@
 """Training and its honest figures: fit on all, judge out of fold, by the detector itself."""
 
-from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
+from collections.abc import Callable, Collection, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from importlib.metadata import version
 from pathlib import Path
+from typing import Protocol, TypeVar
 
 import msgspec
 
-from holdfast.classifiers import Parameters, Recipe, Samples
+from holdfast.classifiers import Parameters, Samples
+from holdfast.errors import TrainingError
 from holdfast.metrics import Decisions, Metrics, summarise
-from holdfast.model import Model, Training
+from holdfast.model import ANY_FINGER, Model, Training
 from holdfast.parallel import each
 from holdfast.recordings import Recording
 from holdfast.training.design import gather
-from holdfast.training.fitting import Material, fit_model
+from holdfast.training.fitting import Material, fit_model, fit_whole
 from holdfast.training.judging import decisions_of, pick
 from holdfast.training.setting import SEARCH_SAMPLES, Setting
 from holdfast.training.splits import divide, inner_folds
@@ -24,13 +26,18 @@ N_SEARCHES = 5
 """Searches for the parameters of the figures. What is held out takes no part in the search for
 the parameters that it is judged with."""
 
-UNDECIDED_SHARE = 0.2
-"""Share of labelled samples without a decision from which on the user is told."""
-
 NOBODY: frozenset[int] = frozenset()
 
+T = TypeVar("T")
 Tell = Callable[[str], None]
-Follow = Callable[[Sequence[Recording], str], Iterator[Recording]]
+
+
+class Follow(Protocol):
+    """Goes through items, with a word on what for and how many; may show progress."""
+
+    def __call__(self, items: Iterable[T], what: str, total: int) -> Iterator[T]:
+        """Yields the items."""
+        ...
 
 
 @dataclass(frozen=True)
@@ -52,7 +59,7 @@ def train(
     *,
     journal: Path | None = None,
     tell: Tell = lambda _: None,
-    follow: Follow = lambda items, _: iter(items),
+    follow: Follow = lambda items, _, __: iter(items),
     n_jobs: int = 1,
 ) -> Trained:
     """Trains a model, and measures it on what it has not seen.
@@ -64,20 +71,21 @@ def train(
         setting: how to train; the default of the paper's deployed model.
         journal: file that keeps the search, so that a stopped one can go on.
         tell: is given every warning.
-        follow: goes through recordings, with a word on what for; may show progress.
-        n_jobs: fits at a time; -1 for as many as there are processors.
+        follow: goes through recordings and through what is done with them.
+        n_jobs: searches or fits at a time; -1 for as many as there are processors.
 
     Raises:
         TrainingError: no labels, one class, or too few recordings or objects for the split.
         RecordingError: a recording cannot be read.
+        OutputError: the journal cannot be written.
     """
     setting = setting or Setting()
     trainer = _Trainer(recordings, setting, journal, tell, follow, n_jobs)
-    parameters = trainer.search(NOBODY)
-    model = fit_model(trainer.material, setting, parameters, NOBODY)
-    metrics = trainer.cross_validate(parameters)
-    _tell_undecided(metrics, tell)
-    return Trained(trainer.sign(model, parameters, metrics), metrics)
+    trainer.check()
+    whole, *without = trainer.search([NOBODY, *trainer.searches_without()])
+    model = fit_whole(trainer.material, setting, whole)
+    metrics = trainer.cross_validate(without or [whole])
+    return Trained(trainer.sign(model, whole, metrics), metrics)
 
 
 class _Trainer:
@@ -92,33 +100,69 @@ class _Trainer:
     ) -> None:
         self.recordings, self.setting, self.journal = recordings, setting, journal
         self.tell, self.follow, self.n_jobs = tell, follow, n_jobs
-        self.found = survey(follow(recordings, "reading"))
+        self.found = survey(self._read("reading"))
         self.division = divide(self.found.entries, setting.split, setting.seed)
-        self.designs = gather(follow(recordings, "features"), self.found, setting, self.division)
+        self.designs = gather(self._read("features"), self.found, setting, self.division)
         self.material = Material(self.found, self.division, self.designs)
-        self.material.check_classes()
 
-    def search(self, held: Collection[int]) -> dict[str, Parameters]:
-        """The parameters of every finger, found without those units."""
+    def check(self) -> None:
+        """Tells which figures there cannot be, before any work is done.
+
+        Raises:
+            TrainingError: a finger has only one class; or there is no figure at all.
+        """
+        self.material.check_classes()
+        one_sided = self.material.one_sided()
+        n_units = len(self.division.units)
+        if all(len(one_sided.get(finger, ())) == n_units for finger in self.designs):
+            finger, names = next(iter(one_sided.items()))
+            raise TrainingError(
+                f"{finger} has labels of only one class left without {names[0]}, and so for "
+                f"every {self.setting.split} and finger: nothing would be judged out of fold"
+            )
+        for finger, names in one_sided.items():
+            some = ", ".join(names[:3]) + (" ..." if len(names) > 3 else "")
+            self.tell(
+                f"{finger} has labels of only one class left without {some}: not judged there"
+            )
+
+    def searches_without(self) -> list[set[int]]:
+        """The units that each search for the parameters of the figures leaves out."""
+        n_units = len(self.division.units)
+        n_searches = min(N_SEARCHES, n_units) if self.setting.trials else 0
+        return [set(range(k, n_units, n_searches)) for k in range(n_searches)]
+
+    def search(self, without: Sequence[Collection[int]]) -> list[dict[str, Parameters]]:
+        """The parameters of every finger, found without those units, for each set of units."""
         setting = self.setting
         if not setting.trials:
-            return dict.fromkeys(self.designs, setting.recipe.reference)
+            return [dict.fromkeys(self.designs, setting.recipe.reference) for _ in without]
         tasks = [
-            (design.without(held), setting, finger, _study_name(finger, held), self.journal)
+            (_spread(design.without(held)), setting, finger, self.journal)
+            for held in without
             for finger, design in self.designs.items()
         ]
-        n_jobs = 1 if self.journal else self.n_jobs  # a journal has one writer at a time
-        found = list(each(_search, tasks, n_jobs))
+        found = list(self.follow(each(_search, tasks, self.n_jobs), "searching", len(tasks)))
         for warning in dict.fromkeys(warning for _, warning in found if warning):
             self.tell(warning)
-        return dict(zip(self.designs, (parameters for parameters, _ in found), strict=True))
+        parameters = iter(parameters for parameters, _ in found)
+        return [{finger: next(parameters) for finger in self.designs} for _ in without]
 
-    def cross_validate(self, whole: Mapping[str, Parameters]) -> Metrics:
-        """The metrics of predictions out of fold."""
-        models = self._fold_models(whole)
+    def cross_validate(self, found: Sequence[Mapping[str, Parameters]]) -> Metrics:
+        """The metrics of predictions out of fold.
+
+        Args:
+            found: parameters of every finger; unit k takes those of place k, modulo how many.
+        """
+        n_units = len(self.division.units)
+        tasks = [
+            (self.material, self.setting, found[unit % len(found)], {unit})
+            for unit in range(n_units)
+        ]
+        models = list(self.follow(each(fit_model, tasks, self.n_jobs), "fitting", n_units))
         judged = (
             self._judge(models, place, recording)
-            for place, recording in enumerate(self.follow(self.recordings, "judging"))
+            for place, recording in enumerate(self._read("judging"))
         )
         return summarise(judged, seed=self.setting.seed)
 
@@ -135,61 +179,50 @@ class _Trainer:
         )
         return msgspec.structs.replace(model, training=training)
 
-    def _fold_models(self, whole: Mapping[str, Parameters]) -> list[Model]:
-        """A model for each unit, none of whose parts has seen that unit."""
-        n_units = len(self.division.units)
-        n_searches = min(N_SEARCHES, n_units) if self.setting.trials else 1
-        found = [whole]
-        if self.setting.trials:
-            found = [self.search(set(range(k, n_units, n_searches))) for k in range(n_searches)]
-        tasks = [
-            (self.material, self.setting, found[unit % n_searches], {unit})
-            for unit in range(n_units)
-        ]
-        return list(each(fit_model, tasks, self.n_jobs))
+    def _read(self, what: str) -> Iterator[Recording]:
+        return self.follow(self.recordings, what, len(self.recordings))
 
-    def _judge(self, models: Sequence[Model], place: int, recording: Recording) -> Decisions:
+    def _judge(self, models: Sequence[Model | None], place: int, recording: Recording) -> Decisions:
+        """What the models that have not seen it say; nothing where there is nothing to say."""
+        nothing = Decisions(recording.name, {})
+        if not self.found.entries[place].n_labelled:
+            return nothing
         if self.division.split != "random":
-            return decisions_of(models[self.division.group_of[place]], recording)
-        judged = [decisions_of(model, recording) for model in models]
-        return pick(judged, lambda n: self.division.units_of(place, n), len(models[0].fingers))
+            model = models[self.division.group_of[place]]
+            return nothing if model is None else _judged(model, recording)
+        judged = [_judged(model, recording) for model in models if model is not None]
+        if len(judged) < len(models) or len({tuple(each.fingers) for each in judged}) > 1:
+            return nothing
+        return pick(judged, lambda n: self.division.units_of(place, n), len(self.designs))
 
 
-def _tell_undecided(metrics: Metrics, tell: Tell) -> None:
-    """Warns where much of the labelled data was left without a decision."""
-    n_labelled = metrics.pooled.n + metrics.pooled.n_undecided
-    share = metrics.pooled.n_undecided / max(n_labelled, 1)
-    if share > UNDECIDED_SHARE:
-        tell(
-            f"{100 * share:.0f} % of the labelled samples have no decision, for the tare, gaps or "
-            "faults (holdfast detect tells which); recordings that begin in contact need "
-            "--tare first"
-        )
+def _judged(model: Model, recording: Recording) -> Decisions:
+    if ANY_FINGER not in model.fingers and not set(model.fingers) & set(recording.modules):
+        return Decisions(recording.name, {})
+    return decisions_of(model, recording)
+
+
+def _spread(samples: Samples) -> Samples:
+    """At most `SEARCH_SAMPLES`, evenly spread."""
+    step = max(1, -(-len(samples.stable) // SEARCH_SAMPLES))
+    return Samples(samples.features[::step], samples.stable[::step], samples.groups[::step])
 
 
 def _search(
-    samples: Samples, setting: Setting, finger: str, name: str, journal: Path | None
+    samples: Samples, setting: Setting, finger: str, journal: Path | None
 ) -> tuple[Parameters, str]:
     """The parameters found, and a warning where no search was possible."""
-    step = max(1, len(samples.stable) // SEARCH_SAMPLES)
-    spread = Samples(samples.features[::step], samples.stable[::step], samples.groups[::step])
-    folds = inner_folds(spread, INNER_FOLDS, setting.seed)
-    recipe: Recipe = setting.recipe
+    folds = inner_folds(samples, INNER_FOLDS, setting.seed)
     if len(folds) < 2:
-        return recipe.reference, (
+        return setting.recipe.reference, (
             f"{finger}: {len(folds)} of the folds by recording hold both classes, 2 needed to "
             "search for parameters; the reference setting is taken"
         )
     return search(
-        spread,
+        samples,
         folds,
-        recipe,
+        setting.recipe,
         n_trials=setting.trials,
         seed=setting.seed,
         journal=journal,
-        name=name,
     ), ""
-
-
-def _study_name(finger: str, held: Collection[int]) -> str:
-    return f"{finger} without {sorted(held)}" if held else finger

@@ -8,10 +8,10 @@ import numpy as np
 import numpy.typing as npt
 
 from holdfast.classifiers import Parameters, Recipe, Samples
+from holdfast.training.journal import Journal, search_key
 
 if TYPE_CHECKING:
-    from optuna import Study, Trial
-    from optuna.storages import BaseStorage
+    from optuna import Trial
 
 INNER_FOLDS = 5
 
@@ -24,12 +24,12 @@ def search(
     n_trials: int,
     seed: int,
     journal: Path | None = None,
-    name: str = "search",
 ) -> Parameters:
     """The parameters with the least log loss over the held-out samples of the folds.
 
-    The first trial is the reference setting; the others are drawn by TPE. Every trial has its
-    own seed, so that a search that was stopped and goes on ends where it would have ended.
+    The first trial is the reference setting; the others are drawn by TPE. A search that was
+    stopped is gone through again with the losses from its journal, so that it ends where it
+    would have ended.
 
     Args:
         samples: to fit and to score.
@@ -38,44 +38,30 @@ def search(
         n_trials: altogether, those in the journal included.
         seed: of the search.
         journal: file that keeps the trials, so that a stopped search can go on.
-        name: of the search within the journal.
+
+    Raises:
+        OutputError: the journal cannot be read or written.
     """
     import optuna
-    from optuna.trial import TrialState
 
     optuna.logging.set_verbosity(optuna.logging.WARNING)
-    study = optuna.create_study(
-        study_name=name, storage=_storage(journal), direction="minimize", load_if_exists=True
-    )
-    _finish_stopped(study)
-    n_done = len(study.get_trials(states=(TrialState.COMPLETE,)))
-    if n_done == 0:
-        study.enqueue_trial(dict(recipe.reference), skip_if_exists=True)
+    known = None
+    if journal is not None:
+        known = Journal(journal, search_key(*samples, *folds, recipe.name, seed))
 
     def loss(trial: "Trial") -> float:
-        return _log_loss(samples, folds, recipe, recipe.suggest(trial), seed)
+        parameters = recipe.suggest(trial)
+        found = None if known is None else known.find(parameters)
+        if found is None:
+            found = _log_loss(samples, folds, recipe, parameters, seed)
+            if known is not None:
+                known.add(parameters, found)
+        return found
 
-    for number in range(n_done, n_trials):
-        study.sampler = optuna.samplers.TPESampler(seed=seed + number)
-        study.optimize(loss, n_trials=1)
+    study = optuna.create_study(sampler=optuna.samplers.TPESampler(seed=seed))
+    study.enqueue_trial(dict(recipe.reference))
+    study.optimize(loss, n_trials=n_trials)
     return dict(study.best_params)
-
-
-def _storage(journal: Path | None) -> "BaseStorage | None":
-    if journal is None:
-        return None
-    from optuna.storages import JournalStorage
-    from optuna.storages.journal import JournalFileBackend
-
-    return JournalStorage(JournalFileBackend(str(journal)))
-
-
-def _finish_stopped(study: "Study") -> None:
-    """Puts back the trials that were under way when a search was stopped."""
-    from optuna.trial import TrialState
-
-    for trial in study.get_trials(states=(TrialState.RUNNING,)):
-        study.tell(trial.number, state=TrialState.FAIL)
 
 
 def _log_loss(
