@@ -194,9 +194,7 @@ def test_refusals(capsys, table, tmp_path):
     assert refusal(capsys, text, out, "--format", "bag") == (
         f"unknown format 'bag'; there are {formats}"
     )
-    assert "'bag' is not one of 'parquet', 'mcap'" in refusal(
-        capsys, text, out, "--suffix", "bag"
-    )
+    assert "'bag' is not one of 'parquet', 'mcap'" in refusal(capsys, text, out, "--suffix", "bag")
     cut = tmp_path / "cut.parquet"
     cut.write_bytes(b"PAR1" + bytes(100))
     assert refusal(capsys, cut, out) == (

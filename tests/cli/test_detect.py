@@ -1,0 +1,290 @@
+import json
+import re
+import tracemalloc
+from dataclasses import replace
+
+import msgspec
+import numpy as np
+import pytest
+
+from holdfast.classifiers import LinearClassifier
+from holdfast.cli import main
+from holdfast.cli.detect import PIECE
+from holdfast.cli.lines import json_lines
+from holdfast.contact import Fault
+from holdfast.detector import detect
+from holdfast.features import FeatureSpec
+from holdfast.io import load_recording, save_recording
+from holdfast.model import FingerModel, Model
+from holdfast.recordings import Recording, Tactile
+from holdfast.sensors import sensor
+from holdfast.synthetic import synthetic_recording
+
+FIELDS = [
+    "time", "finger", "state", "reason", "stable_probability", "instability", "force", "faults"
+]  # fmt: skip
+NOISE_FLOOR = "builtin:noise-floor"
+
+
+def finger_model(name):
+    rule = LinearClassifier(mean=(10.0,), scale=(3.0,), coefficients=(-2.0,), intercept=0.0)
+    return FingerModel(
+        features=(FeatureSpec("sigma", 14),), classifier=rule, sensor=name, contact_threshold=50.0
+    )
+
+
+@pytest.fixture(scope="module")
+def model(tmp_path_factory):
+    """A model's file: thumb and index with curved uSkin fingertips at 150 Hz."""
+    curved = sensor("uskin-curved")
+    path = tmp_path_factory.mktemp("model") / "model.json"
+    Model(
+        fingers={name: finger_model("uskin-curved") for name in ("thumb", "index")},
+        sensors={"uskin-curved": curved},
+        rate=150.0,
+    ).save(path)
+    return path
+
+
+@pytest.fixture(scope="module")
+def grasp(tmp_path_factory):
+    """A long grasp, whose index begins late and stands still at other times."""
+    one = synthetic_recording("grasp", 1, ("thumb", "index"))
+    n = 2 * PIECE // one.modules["thumb"].n_samples + 1
+    modules = {}
+    for name, skipped in (("thumb", 0), ("index", PIECE + 300)):
+        m = one.modules[name]
+        readings = np.concatenate([m.readings] * n)
+        times = np.arange(len(readings)) / 150 + (0.002 if skipped else 0)
+        modules[name] = Tactile(m.sensor, times[skipped:], readings[skipped:])
+    path = tmp_path_factory.mktemp("grasp") / "grasp.parquet"
+    save_recording(Recording("grasp", modules), path)
+    return path
+
+
+@pytest.fixture
+def save(tmp_path):
+    def write(recording, name="a.parquet"):
+        save_recording(recording, tmp_path / name)
+        return tmp_path / name
+
+    return write
+
+
+def refusal(capsys, *words):
+    assert main(["detect", *map(str, words)]) == 2
+    out, err = capsys.readouterr()
+    assert out == ""
+    return err.removeprefix("holdfast: ").rstrip("\n")
+
+
+def lines(capsys, *words):
+    assert main(["detect", *map(str, words)]) == 0
+    out, err = capsys.readouterr()
+    return [json.loads(line) for line in out.splitlines()], err
+
+
+def summary(capsys, *words):
+    assert main(["detect", *map(str, words), "--summary", "--json"]) == 0
+    return json.loads(capsys.readouterr().out)
+
+
+def plain(estimate):
+    numbers = [estimate.stable_probability, estimate.instability, *estimate.force]
+    probability, sigma, *force = [None if np.isnan(x) else x for x in numbers]
+    return {
+        "time": estimate.time,
+        "state": estimate.state.value,
+        "reason": estimate.reason.value,
+        "stable_probability": probability,
+        "instability": sigma,
+        "force": force,
+        "faults": [fault.value for fault in estimate.faults],
+    }
+
+
+@pytest.mark.parametrize("name", ["model", NOISE_FLOOR])
+def test_lines_are_what_detect_says(name, request, capsys, grasp):
+    """In pieces as at once, one a finger and sample, in the order of time."""
+    given = request.getfixturevalue("model") if name == "model" else name
+    got, err = lines(capsys, given, grasp)
+    assert err == ""
+    assert list(got[0]) == FIELDS
+    assert [line["time"] for line in got] == sorted(line["time"] for line in got)
+    want = detect(Model.load(given), load_recording(grasp))
+    for finger, trace in want.fingers.items():
+        mine = [{k: v for k, v in x.items() if k != "finger"} for x in got if x["finger"] == finger]
+        assert mine == [plain(trace.estimate(k)) for k in range(len(trace))]
+    assert len(got) == sum(len(trace) for trace in want.fingers.values())
+    assert {"STABLE", "UNSTABLE", "NO_CONTACT", "UNKNOWN"} == {line["state"] for line in got}
+
+
+def test_at_one_instant_fingers_keep_their_order(capsys, save):
+    got, _ = lines(capsys, NOISE_FLOOR, save(synthetic_recording("a", 1, ("thumb", "index"))))
+    assert [line["finger"] for line in got[:4]] == ["thumb", "index", "thumb", "index"]
+    assert got[0]["reason"] == "tare"
+    assert got[0]["force"] == [None, None, None]
+
+
+def test_faults_are_named(capsys, save):
+    recording = synthetic_recording("a", 1, ("thumb",))
+    readings = recording.modules["thumb"].readings.astype(float)
+    readings[400, 3, 2] = np.inf
+    module = replace(recording.modules["thumb"], readings=readings)
+    got, _ = lines(capsys, NOISE_FLOOR, save(Recording("a", {"thumb": module})))
+    assert (got[400]["reason"], got[400]["faults"]) == ("fault", [Fault.NOT_FINITE])
+
+
+def test_labels_beside_are_not_looked_at(capsys, save):
+    path = save(synthetic_recording("a", 1, ("thumb",)))
+    path.with_name("a.labels.json").write_text("damaged")
+    assert lines(capsys, NOISE_FLOOR, path)[0]
+
+
+def test_a_cut_file_is_judged(capsys, save):
+    path = save(synthetic_recording("a", 1, ("thumb",)), "a.mcap")
+    path.write_bytes(path.read_bytes()[:60_000])
+    got, err = lines(capsys, NOISE_FLOOR, path)
+    assert got
+    assert err == f"{path} was cut: what could be recovered is judged\n"
+
+
+def test_lines_keep_no_memory(grasp):
+    detection = detect(Model.load(NOISE_FLOOR), load_recording(grasp))
+    sum(len(block) for block in json_lines(detection))
+    tracemalloc.start()
+    for _ in range(3):
+        sum(len(block) for block in json_lines(detection))
+    left, _ = tracemalloc.get_traced_memory()
+    tracemalloc.stop()
+    assert left < 100_000
+
+
+class TestSummary:
+    def test_shares_and_events(self, capsys, model, grasp):
+        told = summary(capsys, model, grasp)
+        want = detect(Model.load(model), load_recording(grasp))
+        assert list(told) == ["model", "name", "fingers", "hand", "events"]
+        assert (told["model"], told["name"]) == (str(model), "grasp")
+        for finger, trace in want.fingers.items():
+            shares = told["fingers"][finger]
+            assert shares["n_samples"] == len(trace)
+            assert sum(shares["states"].values()) == pytest.approx(1)
+            assert shares["states"]["STABLE"] == np.mean(trace.state == 3)
+            assert sum(shares["reasons"].values()) == np.sum(trace.state == 0)
+            changes = np.flatnonzero(np.diff(trace.state, prepend=0))
+            events = [event for event in told["events"] if event["finger"] == finger]
+            assert [event["time"] for event in events] == trace.times[changes].tolist()
+        hand = [event for event in told["events"] if event["finger"] == "hand"]
+        assert len(hand) == np.count_nonzero(np.diff(want.hand, prepend=0))
+        assert told["hand"]["states"]["UNSTABLE"] == np.mean(want.hand == 2)
+
+    def test_for_a_person(self, capsys, model, grasp):
+        assert main(["detect", str(model), str(grasp), "--summary"]) == 0
+        out = capsys.readouterr().out
+        assert re.search(r"^thumb +\d+( +\d+\.\d){4} +tare 75, warm_up 13 +-$", out, re.MULTILINE)
+        assert re.search(r"^ +\d+\.\d{3} +hand +\w+ +UNKNOWN$", out, re.MULTILINE)
+        assert re.search(r"^and \d+ more events \(--json has them all\)$", out, re.MULTILINE)
+
+    def test_debouncing_thins_events_out(self, capsys, model, grasp):
+        raw = summary(capsys, model, grasp)["events"]
+        held = summary(capsys, model, grasp, "--debounce", "0.2", "--hysteresis", "0.2")["events"]
+        assert 0 < len(held) < len(raw)
+
+
+class TestRate:
+    @pytest.fixture
+    def slow(self, save):
+        """Half of the samples of a grasp: 75 Hz."""
+        recording = synthetic_recording("slow", 1, ("thumb", "index"))
+        modules = {
+            name: replace(m, times=m.times[::2], readings=m.readings[::2], labels=())
+            for name, m in recording.modules.items()
+        }
+        return save(replace(recording, modules=modules))
+
+    def test_resampled_and_told(self, capsys, model, slow):
+        got, err = lines(capsys, model, slow)
+        assert err == f"{slow}: 75 Hz given, the model expects 150 Hz: resampled\n"
+        times = [line["time"] for line in got if line["finger"] == "thumb"]
+        assert np.diff(times) == pytest.approx(1 / 150)
+        want = detect(Model.load(model), load_recording(slow)).fingers["thumb"]
+        assert times == want.times.tolist()
+
+    def test_strict_refuses(self, capsys, model, slow):
+        assert refusal(capsys, model, slow, "--rate", "strict") == (
+            f"{slow}: 75 Hz given, the model expects 150 Hz within 20 % "
+            "(--rate resample takes it all the same)"
+        )
+
+    def test_strict_takes_what_fits(self, capsys, model, grasp):
+        assert lines(capsys, model, grasp, "--rate", "strict")[0]
+
+
+def test_a_tare_by_interval(capsys, model, grasp, tmp_path):
+    given = msgspec.structs.replace(Model.load(model), tare="40:41")
+    given.save(tmp_path / "interval.json")
+    got, _ = lines(capsys, tmp_path / "interval.json", grasp)
+    assert got[0]["reason"] == "warm_up"
+    assert None not in got[0]["force"]
+
+
+def test_missing_fingers_are_told(capsys, model, save):
+    path = save(synthetic_recording("one", 1, ("index",)))
+    got, err = lines(capsys, model, path)
+    assert {line["finger"] for line in got} == {"index"}
+    assert err == "the model also judges thumb; one has index\n"
+
+
+def test_refusals(capsys, model, grasp, save, tmp_path):
+    readings = np.zeros((100, 24, 3))
+    wide = Recording("a", {"thumb": Tactile(sensor("uskin-4x6"), np.arange(100) / 100, readings)})
+    assert refusal(capsys, model, save(wide)) == (
+        "thumb: 24 taxels (uskin-4x6) given, the model expects 30 (uskin-curved)"
+    )
+    other = save(synthetic_recording("b", 1, ("ring",)), "b.parquet")
+    assert refusal(capsys, model, other) == "the model judges thumb, index; ring given"
+    missing = tmp_path / "none.parquet"
+    assert refusal(capsys, model, missing) == (
+        f"{missing} does not exist; a recording's file expected"
+    )
+    assert refusal(capsys, model, tmp_path) == (
+        f"{tmp_path} is a folder; a recording's file expected"
+    )
+    assert refusal(capsys, missing, grasp) == (
+        f"cannot read the model {missing}: No such file or directory"
+    )
+    assert refusal(capsys, "builtin:best", grasp) == (
+        "unknown model 'builtin:best'; built in are builtin:noise-floor"
+    )
+    for uri in ("xela://auto", "twin:?object=can&seed=1"):
+        assert refusal(capsys, model, uri) == (
+            f"only the path of a recording can be a source yet; {uri!r} given"
+        )
+    assert refusal(capsys, model, grasp, "--debounce=-1") == (
+        "a duration of at least 0 s expected, -1.0 given"
+    )
+    assert refusal(capsys, model, grasp, "--hysteresis", "nan") == (
+        "a hysteresis from 0 to 1 expected, nan given"
+    )
+    assert "'slow' is not one of 'resample', 'strict'" in refusal(
+        capsys, model, grasp, "--rate", "slow"
+    )
+
+
+def test_a_damaged_file(capsys, save):
+    path = save(synthetic_recording("a", 1, ("thumb",)))
+    data = bytearray(path.read_bytes())
+    data[len(data) // 2] ^= 1
+    path.write_bytes(data)
+    assert refusal(capsys, NOISE_FLOOR, path) == (
+        f"{path} is damaged: its content does not match its seal"
+    )
+
+
+def test_real_uskin(capsys, data_folder, tmp_path):
+    source = data_folder / "uskin_pick_move" / "data_sample_2022-02-22-08-10-01"
+    assert main(["import", str(source), str(tmp_path)]) == 0
+    capsys.readouterr()
+    got, _ = lines(capsys, NOISE_FLOOR, tmp_path / f"{source.name}.parquet")
+    assert len(got) == 2 * 285

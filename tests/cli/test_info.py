@@ -1,0 +1,198 @@
+import json
+import re
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from holdfast.cli import main
+from holdfast.io import save_recording
+from holdfast.recordings import Recording, Tactile, Truth
+from holdfast.sensors import sensor
+from holdfast.synthetic import synthetic_recording
+
+
+@pytest.fixture(scope="module")
+def grasp():
+    """A grasp with a marker, truth and metadata."""
+    recording = synthetic_recording("grasp", 1, ("thumb", "index"))
+    times = recording.modules["thumb"].times
+    return replace(
+        recording,
+        metadata={"object": "can", "notes": "very " * 30 + "long"},
+        markers=((1.5, "closing"), (5.3, "shaken")),
+        media=(("grasp.mp4", 0.25),),
+        truth=Truth(times, {"phase": np.zeros(len(times))}, {"thumb": {"slip_speed": 0 * times}}),
+    )
+
+
+@pytest.fixture
+def path(grasp, tmp_path):
+    save_recording(grasp, tmp_path / "grasp.parquet")
+    return tmp_path / "grasp.parquet"
+
+
+def refusal(capsys, *words):
+    assert main(["info", *map(str, words)]) == 2
+    out, err = capsys.readouterr()
+    assert out == ""
+    assert err.count("\n") == 1
+    return err.removeprefix("holdfast: ").rstrip("\n")
+
+
+def told(capsys, *words):
+    assert main(["info", *map(str, words), "--json"]) == 0
+    return json.loads(capsys.readouterr().out)
+
+
+def test_json_of_a_recording(capsys, path, grasp):
+    document = told(capsys, path)
+    thumb = document["modules"].pop("thumb")
+    assert list(document["modules"]) == ["index"]
+    del document["modules"]
+    assert document == {
+        "name": "grasp",
+        "start": grasp.start,
+        "duration": grasp.duration,
+        "complete": True,
+        "metadata": dict(grasp.metadata),
+        "markers": [{"time": 1.5, "text": "closing"}, {"time": 5.3, "text": "shaken"}],
+        "media": [{"path": "grasp.mp4", "offset": 0.25}],
+        "truth": {
+            "n_samples": grasp.modules["thumb"].n_samples,
+            "hand": ["phase"],
+            "fingers": {"thumb": ["slip_speed"]},
+        },
+        "digest": grasp.digest,
+    }
+    labels = {"stable": 0.0, "unstable": 0.0, "no_contact": 0.0}
+    for label in grasp.modules["thumb"].labels:
+        labels[label.state.lower()] += label.end - label.start
+    assert thumb == {
+        "sensor": "uskin-curved",
+        "n_taxels": 30,
+        "unit": "count",
+        "n_samples": grasp.modules["thumb"].n_samples,
+        "rate": pytest.approx(150.0),
+        "gaps": 0,
+        "repeats": 0,
+        "labels": pytest.approx(labels),
+        "faults": {},
+    }
+
+
+def test_gaps_repeats_and_faults(capsys, tmp_path):
+    rng = np.random.default_rng(0)
+    readings = rng.integers(100, 200, (300, 5, 3)).astype(float)
+    readings[50] = readings[49]
+    readings[100, 2, 1] = np.nan
+    times = np.arange(300) / 100 + np.where(np.arange(300) < 200, 0, 1.0)
+    module = Tactile(sensor("anyskin"), times, readings)
+    save_recording(Recording("a", {"finger1": module}), tmp_path / "a.parquet")
+    found = told(capsys, tmp_path / "a.parquet")["modules"]["finger1"]
+    assert (found["gaps"], found["repeats"], found["faults"]) == (1, 1, {"not_finite": 1})
+
+
+def test_a_module_without_samples(capsys, grasp, tmp_path):
+    thumb = grasp.modules["thumb"]
+    both = {"thumb": thumb, "index": replace(thumb, labels=()).slice(0, 0)}
+    save_recording(Recording("a", both), tmp_path / "a.parquet")
+    assert told(capsys, tmp_path / "a.parquet")["modules"]["index"]["n_samples"] == 0
+    assert main(["info", str(tmp_path / "a.parquet"), "--plot", str(tmp_path / "a.svg")]) == 0
+
+
+def test_tells_a_person(capsys, path):
+    assert main(["info", str(path)]) == 0
+    out, err = capsys.readouterr()
+    assert err == ""
+    assert re.search(r"^duration +\d+\.\d{3} s from 0\.000 s$", out, re.MULTILINE)
+    assert re.search(r"^complete +yes$", out, re.MULTILINE)
+    assert re.search(r"^notes +very .*\.\.\.$", out, re.MULTILINE)
+    assert re.search(r"^truth +phase, thumb\.slip_speed$", out, re.MULTILINE)
+    assert re.search(r"^thumb +uskin-curved +30 +count .* none$", out, re.MULTILINE)
+    assert re.search(r"^ +5\.300 +shaken$", out, re.MULTILINE)
+    assert max(map(len, out.splitlines())) < 150
+
+
+def test_a_cut_file_is_shown(capsys, grasp, tmp_path):
+    save_recording(grasp, tmp_path / "a.mcap")
+    data = (tmp_path / "a.mcap").read_bytes()
+    (tmp_path / "a.mcap").write_bytes(data[: len(data) // 2])
+    assert main(["info", str(tmp_path / "a.mcap")]) == 0
+    assert "no: the end of the file was cut off" in capsys.readouterr().out
+    assert told(capsys, tmp_path / "a.mcap")["complete"] is False
+
+
+class TestFolder:
+    def test_all_recordings_by_name(self, capsys, grasp, path):
+        save_recording(replace(grasp, name="b"), path.with_name("b.mcap"))
+        path.with_name("notes.txt").write_text("mine")
+        documents = told(capsys, path.parent)["recordings"]
+        assert [one["name"] for one in documents] == ["b", "grasp"]
+        assert documents[1] == told(capsys, path)
+        assert main(["info", str(path.parent)]) == 0
+        assert re.search(r"^grasp +2 +\d+ +150\.0 .* sound$", capsys.readouterr().out, re.M)
+
+    def test_damaged_ones_are_named_and_the_rest_shown(self, capsys, path):
+        broken = path.with_name("broken.parquet")
+        broken.write_bytes(b"")
+        message = f"{broken} is empty (0 bytes); a Parquet recording expected"
+        assert main(["info", str(path.parent), "--json"]) == 2
+        out, err = capsys.readouterr()
+        assert err == f"holdfast: {message}\n"
+        first, second = json.loads(out)["recordings"]
+        assert first == {"name": "broken", "error": message}
+        assert second["name"] == "grasp"
+        assert main(["info", str(path.parent)]) == 2
+        assert re.search(r"^broken .* unreadable$", capsys.readouterr().out, re.M)
+
+    def test_refusals(self, capsys, tmp_path):
+        assert refusal(capsys, tmp_path) == (
+            f"no recording in {tmp_path} (0 other entries); files *.parquet or *.mcap expected: "
+            "`holdfast import` makes them"
+        )
+        assert refusal(capsys, tmp_path, "--plot", "a.svg") == (
+            f"--plot draws one recording; the folder {tmp_path} given"
+        )
+
+
+@pytest.mark.parametrize(
+    ("suffix", "magic"), [(".png", b"\x89PNG"), (".svg", b"<?xml"), (".pdf", b"%PDF")]
+)
+def test_plots(suffix, magic, capsys, path):
+    plot = path.with_name(f"plot{suffix}")
+    assert main(["info", str(path), "--plot", str(plot), "--tare", "first", "--json"]) == 0
+    out, err = capsys.readouterr()
+    assert err == f"{plot} written\n"
+    assert json.loads(out)["name"] == "grasp"
+    assert plot.read_bytes().startswith(magic)
+
+
+def test_a_plot_is_not_overwritten(capsys, path):
+    plot = path.with_name("a.svg")
+    plot.write_text("mine")
+    assert refusal(capsys, path, "--plot", plot) == (
+        f"{plot} exists already: choose another name, or give --force"
+    )
+    assert plot.read_text() == "mine"
+    assert main(["info", str(path), "--plot", str(plot), "--force"]) == 0
+    assert plot.read_text() != "mine"
+
+
+def test_refusals(capsys, path):
+    missing = path.with_name("none")
+    assert refusal(capsys, missing) == f"{missing} does not exist; a recording's file expected"
+    assert refusal(capsys, path, "--plot", "a.txt") == (
+        "a plot ends in .pdf, .png, .svg; 'a.txt' given"
+    )
+    assert refusal(capsys, path, "--tare", "soon") == (
+        "tare: seconds above 0, 'first', 'none' or START:END expected, 'soon' given"
+    )
+    assert refusal(capsys, path, "--tare", "90:91") == (
+        "thumb of 'grasp', which runs from 0 to 11.4933333333333 s: "
+        "tare 90:91: no finite sample in that time"
+    )
+    data = bytearray(path.read_bytes())
+    data[1000] ^= 1
+    path.write_bytes(data)
+    assert refusal(capsys, path) == f"{path} is damaged: its content does not match its seal"

@@ -1,0 +1,136 @@
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from holdfast.features import Tare, fingertip_force, haar_features
+from holdfast.plots.recording import plot_recording
+from holdfast.recordings import Recording, Tactile, Truth
+from holdfast.sensors import sensor
+from holdfast.synthetic import synthetic_recording
+
+
+@pytest.fixture(scope="module")
+def grasp():
+    return synthetic_recording("grasp", 1, ("thumb", "index"))
+
+
+def drawn(axes):
+    """The longest line in each colour."""
+    lines = sorted(axes.get_lines(), key=lambda line: len(line.get_xdata()))
+    return {line.get_color(): line for line in lines}
+
+
+def titles(figure):
+    return [axes.get_title("left") for axes in figure.axes if axes.get_title("left")]
+
+
+def legend(figure):
+    return [text.get_text() for text in figure.legends[0].get_texts()]
+
+
+def test_draws_forces_and_sigma(grasp):
+    figure = plot_recording(grasp)
+    assert titles(figure) == ["thumb", "index"]
+    assert [axes.get_ylabel() for axes in figure.axes] == ["force [counts]", "σ [counts]"] * 2
+    thumb = grasp.modules["thumb"]
+    force = fingertip_force(thumb.readings, thumb.sensor, 0.5, thumb.times)
+    forces = drawn(figure.axes[0])
+    for axis, colour in enumerate(("#0072B2", "#E69F00", "#CC79A7")):
+        np.testing.assert_array_equal(forces[colour].get_ydata(), force[:, axis])
+    np.testing.assert_allclose(forces["#000000"].get_ydata(), np.linalg.norm(force, axis=1))
+    sigma = drawn(figure.axes[1])["#333333"].get_ydata()
+    np.testing.assert_array_equal(sigma, haar_features(force)[:, 5])
+
+
+def test_labels_are_shaded_and_explained(grasp):
+    figure = plot_recording(grasp)
+    assert legend(figure)[4:] == ["stable", "unstable", "no contact"]
+    assert len(figure.axes[0].patches) == len(grasp.modules["thumb"].labels)
+    bare = grasp.with_labels({})
+    assert len(legend(plot_recording(bare))) == 4
+
+
+def test_pads_are_left_out_where_there_are_fingertips(grasp):
+    thumb, index = grasp.modules.values()
+    hand = Recording("hand", {"thumb": thumb, "palm/1": index})
+    assert titles(plot_recording(hand)) == ["thumb"]
+    pads = Recording("pads", {"index/1": thumb, "palm/1": index})
+    assert titles(plot_recording(pads)) == ["index/1", "palm/1"]
+
+
+def test_slip_where_it_is_known(grasp):
+    times = grasp.modules["thumb"].times
+    truth = Truth(times, {}, {"thumb": {"slip_speed": 0.001 * times}})
+    figure = plot_recording(replace(grasp, truth=truth))
+    assert figure.axes[2].get_ylabel() == "slip [mm/s]"
+    np.testing.assert_allclose(drawn(figure.axes[2])["#333333"].get_ydata(), times)
+    assert [text.get_text() for text in figure.axes[5].texts] == ["slip not known"]
+
+
+def test_a_gap_breaks_the_lines(grasp):
+    thumb = grasp.modules["thumb"]
+    times = thumb.times + np.where(np.arange(thumb.n_samples) < 700, 0, 1.0)
+    gapped = replace(thumb, times=times, labels=())
+    figure = plot_recording(Recording("gapped", {"thumb": gapped}))
+    force = drawn(figure.axes[0])["#0072B2"].get_ydata()
+    assert np.isnan(force[700])
+    assert np.isfinite(force[701])
+    sigma = drawn(figure.axes[1])["#333333"].get_ydata()
+    assert np.isnan(sigma[700:714]).all()
+    assert np.isfinite(sigma[714])
+
+
+def test_sigma_of_wide_range_is_logarithmic(grasp):
+    assert plot_recording(grasp).axes[1].get_yscale() == "linear"
+    thumb = grasp.modules["thumb"]
+    readings = thumb.readings.astype(float)
+    readings[900:905] += 5000
+    hit = Recording("hit", {"thumb": replace(thumb, readings=readings)})
+    assert plot_recording(hit).axes[1].get_yscale() == "log"
+
+
+def test_markers_that_would_overlap_are_not_named(grasp):
+    marked = replace(grasp, markers=((2.0, "touch"), (2.1, "hold"), (8.0, "let go"), (99.0, "x")))
+    figure = plot_recording(marked)
+    assert [text.get_text() for text in figure.axes[0].texts] == ["touch", "let go"]
+    assert [text.get_text() for text in figure.axes[2].texts] == []
+
+
+def test_time_since_1970_counts_from_the_start(grasp):
+    modules = {
+        name: replace(m, times=m.times + 1.6e9, labels=()) for name, m in grasp.modules.items()
+    }
+    figure = plot_recording(replace(grasp, modules=modules))
+    assert figure.axes[0].get_xlim()[0] == 0
+    assert figure.axes[-1].get_xlabel() == "time since 1600000000.000 s [s]"
+
+
+def test_title_tells_the_tare(grasp):
+    told = {
+        "0.5": "tare: first 0.5 s",
+        "first": "tare: first sample",
+        "none": "no tare",
+        "1:2": "tare: 1 to 2 s",
+    }
+    for tare, text in told.items():
+        figure = plot_recording(grasp, Tare.parse(tare), window=8)
+        assert figure.get_suptitle() == f"grasp   ({text}, window of 8 samples)"
+
+
+@pytest.mark.parametrize("n_fingers", [1, 3, 4, 5])
+@pytest.mark.filterwarnings("error")
+def test_any_number_of_fingers(grasp, n_fingers, tmp_path):
+    thumb = grasp.modules["thumb"]
+    many = Recording("many", {f"finger{k + 1}": thumb for k in range(n_fingers)})
+    figure = plot_recording(many)
+    assert titles(figure) == list(many.modules)
+    figure.savefig(tmp_path / "a.svg")
+
+
+@pytest.mark.parametrize("readings", [np.full((1, 5, 3), 7.0), np.full((60, 5, 3), np.nan)])
+def test_odd_recordings_are_drawn(readings, tmp_path):
+    module = Tactile(sensor("anyskin"), np.arange(len(readings)) / 100, readings, "N")
+    figure = plot_recording(Recording("odd", {"finger1": module}))
+    assert figure.axes[0].get_ylabel() == "force [N]"
+    figure.savefig(tmp_path / "a.png")
