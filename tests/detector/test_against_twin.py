@@ -69,7 +69,7 @@ def test_equals_the_twin(options, seed):
         estimate = detector.update(samples, time)
         same(estimate, twin.update(samples, time))
         seen |= {(x.state, x.reason, *x.faults) for x in estimate.fingers.values()}
-    assert len(seen) >= 6  # of states, reasons and faults together
+    assert len(seen) >= 5  # of states, reasons and faults together
 
 
 def test_equals_the_twin_with_contact_by_noise():

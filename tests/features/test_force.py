@@ -79,9 +79,10 @@ def test_interval(given):
     assert np.allclose(found, expected, rtol=1e-12, atol=1e-6)
 
 
-def test_an_interval_without_samples_is_refused():
+@pytest.mark.parametrize("n", [0, 10])
+def test_an_interval_without_samples_is_refused(n):
     with pytest.raises(ValueError) as raised:
-        fingertip_force(readings(10), CURVED, (5.0, 6.0))
+        fingertip_force(readings(n), CURVED, (5.0, 6.0))
     assert str(raised.value) == "tare 5:6: no finite sample in that time"
 
 

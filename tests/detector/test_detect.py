@@ -1,0 +1,271 @@
+"""Offline is live: `detect` and `run` equal `update` sample by sample, in every field."""
+
+from itertools import pairwise
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from holdfast.contact import ContactState
+from holdfast.detector import Detector, detect
+from holdfast.errors import ModelError, StreamError
+from holdfast.features import fingertip_force, haar_features, parse_features
+from holdfast.features.extract import extract
+from holdfast.features.stream import StreamPlan
+from holdfast.features.tare import Tare
+from holdfast.model import ANY_FINGER, Debounce, Model
+from holdfast.recordings import Recording
+from holdfast.resampling import resample
+
+from .build import RATE, RICH, finger_model, model, recording, sensor, tactile
+
+STATES = tuple(ContactState)
+
+
+def feed(detector, made):
+    """Every estimate of `update`, fed with the samples of a recording in order of time."""
+    modules = {n: m for n, m in made.modules.items() if n in detector._slots}
+    for time in np.unique(np.concatenate([m.times for m in modules.values()])):
+        samples = {}
+        for name, module in modules.items():
+            for k in np.flatnonzero(module.times == time):
+                samples[name] = module.readings[k]
+        yield set(samples), detector.update(samples, time)
+
+
+def fields(estimate):
+    numbers = (estimate.time, estimate.stable_probability, estimate.instability, *estimate.force)
+    return repr((*numbers, estimate.state, estimate.reason, estimate.faults))
+
+
+def assert_same(detection, told):
+    rows = dict.fromkeys(detection.fingers, 0)
+    for k, (present, estimate) in enumerate(told):
+        assert estimate.time == detection.times[k]
+        assert estimate.state is STATES[detection.hand[k]]
+        for finger in present:
+            one = detection.fingers[finger].estimate(rows[finger])
+            assert fields(estimate.fingers[finger]) == fields(one)
+            rows[finger] += 1
+    assert rows == {finger: len(trace) for finger, trace in detection.fingers.items()}
+    assert len(detection.times) == len(told)
+
+
+def broken(module):
+    """The same module with a hole, a break and a frozen stretch."""
+    values = np.array(module.readings)
+    values[90, 0, 0] = np.nan
+    values[120:180] = values[120]
+    kept = np.ones(len(values), dtype=bool)
+    kept[70:80] = False
+    return type(module)(module.sensor, module.times[kept], values[kept])
+
+
+CLOCKS = {
+    "one clock": {"thumb": tactile(seed=1), "index": tactile(seed=2)},
+    "shifted": {"thumb": tactile(seed=1), "index": tactile(seed=2, start=0.0031)},
+    "two rates": {"thumb": tactile(seed=1), "index": tactile(150, seed=2, rate=71.0)},
+    "late": {"thumb": tactile(seed=1), "index": tactile(100, seed=2, start=0.9)},
+    "short": {"thumb": tactile(seed=1), "index": tactile(1, seed=2)},
+    "one missing": {"index": tactile(seed=2)},
+    "one more": {n: tactile(seed=i) for i, n in enumerate(("index", "palm/1", "thumb"))},
+    "broken": {"thumb": broken(tactile(seed=1)), "index": broken(tactile(seed=2, start=0.0031))},
+    "since 1970": {n: tactile(seed=i, start=1.7e9) for i, n in enumerate(("thumb", "index"))},
+}
+
+
+@pytest.mark.parametrize("tare", ["0.2", "first", "none"])
+@pytest.mark.parametrize("clock", CLOCKS)
+def test_detect_equals_update(clock, tare):
+    made = recording(**CLOCKS[clock])
+    judge = model(features=RICH, tare=tare, threshold=20.0, debounce=Debounce(0.02, 0.05))
+    assert_same(detect(judge, made), list(feed(Detector(judge), made)))
+
+
+def test_detect_equals_update_over_many_chunks():
+    made = recording(thumb=tactile(5000, seed=1), index=tactile(4000, seed=2, rate=71.0))
+    judge = model()
+    assert_same(detect(judge, made), list(feed(Detector(judge), made)))
+
+
+def test_detect_equals_update_without_a_rate():
+    which = sensor()
+    judge = Model(fingers={ANY_FINGER: finger_model(RICH, contact_noise=3.0)}, tare="0.2")
+    made = recording(finger1=tactile(seed=1, rate=80.0), finger2=tactile(seed=2, rate=80.0))
+    live = Detector(judge, {"finger1": which, "finger2": which}, rate=made.rate)
+    assert_same(detect(judge, made), list(feed(live, made)))
+
+
+@pytest.mark.parametrize("kind", [np.int16, np.uint16, np.float32, np.float64])
+def test_readings_of_any_type(kind):
+    module = tactile(120, seed=3)
+    made = recording(thumb=type(module)(module.sensor, module.times, module.readings.astype(kind)))
+    judge = model(("thumb",))
+    assert_same(detect(judge, made), list(feed(Detector(judge), made)))
+
+
+@given(cuts=st.lists(st.integers(1, 260), max_size=5), clock=st.sampled_from(sorted(CLOCKS)))
+@settings(max_examples=40, deadline=None)
+def test_any_pieces_give_the_same(cuts, clock):
+    made = recording(**CLOCKS[clock])
+    judge = model(features=RICH, threshold=20.0)
+    whole = detect(judge, made)
+    detector = Detector(judge)
+    bounds = [
+        -np.inf,
+        *sorted({float(whole.times[c]) for c in cuts if c < len(whole.times)}),
+        np.inf,
+    ]
+    pieces = []
+    for start, stop in pairwise(bounds):
+        part = {
+            n: m.slice(*np.searchsorted(m.times, (start, stop))) for n, m in made.modules.items()
+        }
+        if any(m.n_samples for n, m in part.items() if n in judge.fingers):
+            pieces.append(detector.run(Recording("piece", part)))
+    assert np.array_equal(np.concatenate([p.hand for p in pieces]), whole.hand)
+    for finger, trace in whole.fingers.items():
+        parts = [p.fingers[finger] for p in pieces if finger in p.fingers]
+        for found, expected in zip(zip(*parts, strict=True), trace, strict=True):
+            assert np.array_equal(np.concatenate(found), expected, equal_nan=True)
+
+
+@given(cuts=st.lists(st.integers(1, 199), min_size=1, max_size=4, unique=True))
+@settings(max_examples=25, deadline=None)
+def test_run_and_update_take_turns(cuts):
+    made = recording(**CLOCKS["broken"])
+    judge = model(threshold=20.0)
+    whole = Detector(judge)
+    told = [(e.time, e.state) for _, e in feed(whole, made)]
+    mixed = Detector(judge)
+    bounds = [-np.inf, *(told[c][0] for c in sorted(cuts)), np.inf]
+    for i, (start, stop) in enumerate(pairwise(bounds)):
+        part = {
+            n: m.slice(*np.searchsorted(m.times, (start, stop))) for n, m in made.modules.items()
+        }
+        if i % 2 and any(m.n_samples for m in part.values()):
+            mixed.run(Recording("piece", part))
+        elif any(m.n_samples for m in part.values()):
+            list(feed(mixed, Recording("piece", part)))
+    assert mixed.events() == whole.events()
+
+
+def test_a_recording_at_another_rate_is_resampled():
+    made = recording(thumb=tactile(400, seed=1, rate=250.0), index=tactile(400, seed=2, rate=250.0))
+    judge = model()
+    found = detect(judge, made)
+    assert_same(found, list(feed(Detector(judge), resample(made, RATE))))
+    assert len(found.times) == pytest.approx(160, abs=1)
+
+
+@pytest.mark.parametrize("rate", [84.0, 118.0])
+def test_a_recording_near_the_rate_is_taken_as_it_is(rate):
+    made = recording(thumb=tactile(seed=1, rate=rate), index=tactile(seed=2, rate=rate))
+    assert np.array_equal(detect(model(), made).times, made.modules["thumb"].times)
+
+
+def test_the_future_changes_nothing():
+    made = recording(**CLOCKS["shifted"])
+    modules = {}
+    for name, module in made.modules.items():
+        values = np.array(module.readings)
+        values[130:] = 990 - values[130:]
+        modules[name] = type(module)(module.sensor, module.times, values)
+    judge = model(features=RICH, threshold=20.0)
+    one, two = detect(judge, made), detect(judge, recording(**modules))
+    assert np.array_equal(one.hand[:260], two.hand[:260])
+    for finger, trace in one.fingers.items():
+        for found, other in zip(trace, two.fingers[finger], strict=True):
+            assert np.array_equal(found[:130], other[:130], equal_nan=True)
+
+
+@pytest.mark.parametrize("start", [0.0, 0.3, 1e9, 1.7e9])
+def test_a_shift_of_time_changes_nothing(start):
+    judge = model(("thumb",), threshold=20.0)
+    plain = detect(judge, recording(thumb=tactile(seed=4))).fingers["thumb"]
+    moved = detect(judge, recording(thumb=tactile(seed=4, start=start))).fingers["thumb"]
+    for found, expected in zip(moved[1:], plain[1:], strict=True):
+        assert np.array_equal(found, expected, equal_nan=True)
+
+
+class TestExtract:
+    @pytest.mark.parametrize("tare", [0.2, "first", "none", (0.3, 0.6)])
+    @pytest.mark.parametrize("window", [2, 6, 14, 40])
+    def test_equals_the_batch_functions(self, tare, window):
+        which, module = sensor(5), tactile(300, which=sensor(5))
+        features = parse_features("F_a,F_x,F_y,F_z,m,sigma", window)
+        plan = StreamPlan({"thumb": which}, {"thumb": features}, window, Tare.parse(tare), RATE)
+        force = fingertip_force(module.readings, which, tare, module.times)
+        expected = haar_features(force, window)
+        found = extract(plan, recording(thumb=module))["thumb"]
+        assert np.array_equal(found.features, expected, equal_nan=True)
+        assert np.allclose(found.amplitude, np.linalg.norm(force, axis=1), equal_nan=True)
+
+    def test_stretches_begin_anew_after_gaps(self):
+        which, module = sensor(), broken(tactile())
+        features = parse_features("sigma", 6)
+        plan = StreamPlan({"thumb": which}, {"thumb": features}, 6, Tare.parse("first"), RATE)
+        found = extract(plan, recording(thumb=module))["thumb"].features
+        batch = haar_features(fingertip_force(module.readings, which, "first"), 6)[:, 5:]
+        both = np.isfinite(found)
+        assert np.array_equal(found[both], batch[both])
+        assert np.isnan(found[70:75]).all()
+        assert np.isfinite(found[75])
+
+
+class TestIntervalTare:
+    def test_equals_the_batch_functions(self):
+        made = recording(thumb=tactile(seed=1), index=tactile(seed=2, start=0.003))
+        found = detect(model(tare="0.5:0.9"), made)
+        for name, module in made.modules.items():
+            expected = fingertip_force(module.readings, module.sensor, (0.5, 0.9), module.times)
+            assert np.array_equal(found.fingers[name].force, expected)
+
+    def test_a_finger_may_be_missing(self):
+        found = detect(model(tare="0.5:0.9"), recording(index=tactile(seed=2)))
+        expected = fingertip_force(tactile(seed=2).readings, sensor(), (0.5, 0.9))
+        assert np.array_equal(found.fingers["index"].force, expected)
+
+    def test_is_refused_live(self):
+        with pytest.raises(ModelError) as raised:
+            Detector(model(tare="0.5:0.9"))
+        assert str(raised.value) == (
+            "the model's tare is the interval 0.5:0.9 s of a recording; "
+            "seconds, 'first' or 'none' expected where samples come one by one"
+        )
+
+    def test_without_samples_is_refused(self):
+        with pytest.raises(ValueError) as raised:
+            detect(model(tare="7:9"), recording(index=tactile(seed=2)))
+        assert str(raised.value) == (
+            "index of 'made', which runs from 0 to 1.99 s: tare 7:9: no finite sample in that time"
+        )
+
+
+class TestRefusals:
+    def test_none_of_the_fingers(self):
+        with pytest.raises(ModelError) as raised:
+            detect(model(), recording(ring=tactile()))
+        assert str(raised.value) == "the model judges thumb, index; ring given"
+
+    def test_run_with_none_of_the_fingers(self):
+        with pytest.raises(StreamError) as raised:
+            Detector(model()).run(recording(ring=tactile()))
+        assert str(raised.value) == (
+            "recording 'made' has samples of ring; the model judges thumb, index"
+        )
+
+    def test_run_with_other_taxels(self):
+        with pytest.raises(StreamError) as raised:
+            Detector(model()).run(recording(index=tactile(which=sensor(1, "small"))))
+        assert str(raised.value) == "index: a sample of shape (1, 3) given, (2, 3) expected (tiny)"
+
+    def test_run_that_goes_back(self):
+        detector = Detector(model())
+        detector.run(recording(index=tactile(20, start=1.0)))
+        with pytest.raises(StreamError) as raised:
+            detector.run(recording(index=tactile(20, start=1.1)))
+        assert str(raised.value) == (
+            "time 1.1 s given after 1.19 s; finite times that go forward expected"
+        )

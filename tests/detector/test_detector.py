@@ -1,0 +1,493 @@
+import copy
+import itertools
+import pickle
+import sys
+import tracemalloc
+
+import numpy as np
+import pytest
+
+from holdfast.contact import ContactEvent, ContactState, Fault, Reason
+from holdfast.detector import HAND, Detector, detect
+from holdfast.detector.detector import MAX_EVENTS
+from holdfast.errors import ModelError, StreamError
+from holdfast.features import FeatureSpec
+from holdfast.model import ANY_FINGER, Debounce, Model
+
+from .build import RATE, classifier, finger_model, model, recording, sensor, tactile
+
+UNKNOWN, NO_CONTACT, UNSTABLE, STABLE = ContactState
+N_TARE = 20
+"""Samples in the tare of 0.2 s."""
+
+
+def feed(detector, values, finger="thumb", start=0.0):
+    return [
+        detector.update({finger: sample}, start + k / RATE).fingers[finger]
+        for k, sample in enumerate(values)
+    ]
+
+
+def lively(n=200, seed=0):
+    return np.array(tactile(n, seed).readings)
+
+
+def runs(estimates, key):
+    return [(value, len(list(group))) for value, group in itertools.groupby(map(key, estimates))]
+
+
+def by_force(threshold=0.5, **options):
+    """Stable where F_x is above 100: the probability is exactly half there."""
+    rule = classifier(1, intercept=0.0)
+    rule = type(rule)(
+        mean=(100.0,), scale=(10.0,), coefficients=(1.0,), intercept=0.0, threshold=threshold
+    )
+    part = finger_model((FeatureSpec("F_x"),), classifier=rule, contact_threshold=5.0)
+    options = {"tare": "none", "window": 2, "rate": RATE} | options
+    return Model(fingers={ANY_FINGER: part}, **options)
+
+
+FLAT = type(sensor())(
+    "flat", [[0.0, 0.0, 0.0]], [np.eye(3)], [0.0, 0.0, 1.0], RATE, "N", (-1e4, 1e4)
+)  # fmt: skip
+
+
+def pushes(detector, forces, finger="finger1", start=0.0):
+    samples = [[[fx, 0.0, 0.0]] for fx in forces]
+    return [e.state for e in feed(detector, samples, finger, start)]
+
+
+class TestReasons:
+    def test_tare_then_warm_up_then_an_answer(self):
+        told = feed(Detector(model(("thumb",))), lively(60))
+        assert runs(told, lambda e: e.reason)[:3] == [("tare", 20), ("warm_up", 5), ("", 35)]
+        assert all(np.isnan(e.force).all() for e in told[:N_TARE])
+        assert np.isfinite([e.force for e in told[N_TARE:]]).all()
+        assert np.isfinite([e.instability for e in told]).tolist() == [False] * 25 + [True] * 35
+        assert np.isfinite([e.stable_probability for e in told]).tolist() == (
+            [False] * 25 + [True] * 35
+        )
+
+    @pytest.mark.parametrize("tare", ["first", "none"])
+    def test_no_time_for_a_tare(self, tare):
+        told = feed(Detector(model(("thumb",), tare=tare)), lively(30))
+        assert runs(told, lambda e: e.reason) == [("warm_up", 5), ("", 25)]
+
+    def test_the_state_is_unknown_just_where_there_is_a_reason(self):
+        values = lively()
+        values[[40, 90], 0, 0] = np.nan
+        for estimate in feed(Detector(model(("thumb",))), values):
+            assert (estimate.state is UNKNOWN) == (estimate.reason is not Reason.NONE)
+            assert np.isnan(estimate.stable_probability) == (estimate.state is UNKNOWN)
+
+    @pytest.mark.parametrize("bad", [np.nan, np.inf, -np.inf])
+    def test_a_sample_that_is_not_finite(self, bad):
+        values = lively(60)
+        values[40, 1, 2] = bad
+        told = feed(Detector(model(("thumb",))), values)
+        expected = [("tare", 20), ("warm_up", 5), ("", 15), ("fault", 1), ("warm_up", 5), ("", 14)]
+        assert runs(told, lambda e: e.reason) == expected
+        assert told[40].faults == (Fault.NOT_FINITE,)
+        assert told[41].faults == ()
+
+    @pytest.mark.parametrize("start", [0.0, 1.7e9])
+    @pytest.mark.parametrize(("periods", "gap"), [(2.5, False), (3.0, False), (3.1, True)])
+    def test_a_gap_is_longer_than_three_periods(self, periods, gap, start):
+        detector = Detector(model(("thumb",)))
+        feed(detector, lively(60), start=start)
+        again = start + (59 + periods) / RATE
+        told = feed(detector, lively(20), start=again)
+        expected = [("gap", 5), ("", 15)] if gap else [("", 20)]
+        assert runs(told, lambda e: e.reason) == expected
+
+    def test_jitter_is_no_gap(self):
+        rng = np.random.default_rng(0)
+        times = np.arange(200) / RATE + rng.uniform(-0.9, 0.9, size=200) / RATE
+        detector = Detector(model(("thumb",)))
+        told = [
+            detector.update({"thumb": sample}, time).fingers["thumb"]
+            for sample, time in zip(lively(), np.sort(times), strict=True)
+        ]
+        assert Reason.GAP not in {e.reason for e in told}
+
+    def test_a_missing_finger_keeps_its_estimate_for_three_periods(self):
+        detector = Detector(model())
+        values = lively()
+        for k in range(50):
+            last = detector.update({"thumb": values[k], "index": values[k]}, k / RATE)
+        told = [detector.update({"thumb": values[k]}, k / RATE) for k in range(50, 60)]
+        assert [e.fingers["index"] for e in told[:3]] == [last.fingers["index"]] * 3
+        assert {e.fingers["index"].reason for e in told[3:]} == {Reason.GAP}
+        assert {e.fingers["index"].time for e in told} == {49 / RATE}
+        assert {e.fingers["thumb"].reason for e in told} == {Reason.NONE}
+        assert np.isnan(told[-1].fingers["index"].force).all()
+
+    def test_a_finger_that_never_came(self):
+        detector = Detector(model())
+        estimate = detector.update({"thumb": lively(1)[0]}, 0.0).fingers["index"]
+        assert (estimate.state, estimate.reason) == (UNKNOWN, Reason.TARE)
+        assert np.isnan(estimate.time)
+
+    def test_repeated_samples_count(self):
+        values = np.repeat(lively(30), 2, axis=0)
+        told = feed(Detector(model(("thumb",))), values)
+        assert runs(told, lambda e: e.reason) == [("tare", 20), ("warm_up", 5), ("", 35)]
+
+    def test_the_tare_stays_over_a_gap(self):
+        detector = Detector(model(("thumb",)))
+        values = lively(80)
+        one = feed(detector, values)
+        two = feed(detector, values[60:], start=100.0)
+        assert [e.force for e in two] == [e.force for e in one[60:]]
+
+
+class TestFaults:
+    def faults(self, values, **options):
+        return [e.faults for e in feed(Detector(model(("thumb",), **options)), values)]
+
+    def test_stuck_after_half_a_second_and_until_it_moves(self):
+        values = lively(300)
+        values[150:250] = values[150]
+        found = self.faults(values)
+        assert runs(found, lambda f: f) == [((), 200), ((Fault.STUCK,), 50), ((), 50)]
+
+    def test_the_state_is_unknown_while_stuck(self):
+        values = lively(300)
+        values[150:] = values[150]
+        told = feed(Detector(model(("thumb",))), values)[-1]
+        assert (told.state, told.reason) == (UNKNOWN, Reason.FAULT)
+        assert np.isfinite(told.force).all()
+
+    def test_a_quiet_sensor_is_not_stuck(self):
+        values = np.full((900, 2, 3), 500.0)
+        values[::70, 0, 0] += 1
+        assert set(self.faults(values)) == {()}
+
+    def test_a_sensor_that_settles_is_not_stuck(self):
+        values = np.full((300, 2, 3), 500.0)
+        values[:10] += np.arange(10)[:, None, None]
+        assert set(self.faults(values, tare="first")) == {()}
+
+    @pytest.mark.parametrize("limit", [0.0, 1000.0, -1.0, 1001.0])
+    def test_saturated_while_it_lasts(self, limit):
+        values = lively(100)
+        values[50:53, 1, 1] = limit
+        found = self.faults(values)
+        assert runs(found, lambda f: f) == [((), 50), ((Fault.SATURATED,), 3), ((), 47)]
+
+    def test_just_within_the_limits(self):
+        values = lively(100)
+        values[50, 0, 0], values[51, 0, 0] = 1.0, 999.0
+        assert set(self.faults(values)) == {()}
+
+    def test_no_limits_no_saturation(self):
+        judge = model(("thumb",), which=sensor(limits=None))
+        values = lively(60)
+        values[40:] = 1e9 * np.sign(values[40:] - 500)
+        assert Fault.SATURATED not in {f for e in feed(Detector(judge), values) for f in e.faults}
+
+    def loaded(self):
+        rng = np.random.default_rng(3)
+        values = 500 + np.rint(rng.normal(scale=2, size=(400, 2, 3)))
+        values[:100, :, 2] += 200  # pressed while the tare is taken
+        values[300:, :, 2] += 200
+        return values
+
+    def test_a_tare_under_load_shows_when_the_load_goes(self):
+        found = self.faults(self.loaded())
+        assert runs(found, lambda f: f) == [((), 124), ((Fault.TARE_LOADED,), 176), ((), 100)]
+
+    @pytest.mark.parametrize("tare", ["first", "none"])
+    def test_a_recording_may_begin_in_contact(self, tare):
+        assert set(self.faults(self.loaded(), tare=tare)) == {()}
+
+    def test_a_short_pull_is_no_loaded_tare(self):
+        values = self.loaded()[100:]
+        values[100:120, :, 2] -= 200
+        assert set(self.faults(values)) == {()}
+
+    def test_several_at_once(self):
+        values = lively(300)
+        values[150:] = values[150]
+        values[150:, 0, 0] = 1000.0
+        assert self.faults(values)[-1] == (Fault.STUCK, Fault.SATURATED)
+
+
+class TestContactThreshold:
+    def test_absolute(self):
+        judge = by_force()
+        forces = [200, 200, 4.9, 5.0, 5.1, 101, 99]
+        found = pushes(Detector(judge, {"finger1": FLAT}), forces)
+        expected = [STABLE, STABLE, NO_CONTACT, UNSTABLE, UNSTABLE, STABLE, UNSTABLE]
+        assert found[1:] == expected[1:]
+
+    def test_the_probability_without_contact_is_zero(self):
+        told = feed(Detector(by_force(), {"f": FLAT}), [[[1.0, 0, 0]]] * 3, "f")
+        assert (told[-1].state, told[-1].stable_probability) == (NO_CONTACT, 0.0)
+
+    def test_none(self):
+        values = np.full((60, 2, 3), 500.0)
+        told = feed(Detector(model(("thumb",))), values)
+        assert {e.state for e in told[26:]} <= {STABLE, UNSTABLE}
+
+    def test_by_noise(self):
+        rng = np.random.default_rng(0)
+        values = rng.normal(scale=3.0, size=(600, 1, 3))
+        values[300:, 0, 0] += 40.0
+        judge = Model(fingers={ANY_FINGER: finger_model(contact_noise=5.0)}, window=6, rate=RATE)
+        told = feed(Detector(judge, {"f": FLAT}), values, "f")
+        assert {e.state for e in told[60:300]} == {NO_CONTACT}
+        assert NO_CONTACT not in {e.state for e in told[300:]}
+
+
+class TestDebounce:
+    def test_off_by_default(self):
+        forces = [150, 150, *([50, 150] * 20)]
+        found = pushes(Detector(by_force(), {"finger1": FLAT}), forces)
+        assert found[2:] == [UNSTABLE, STABLE] * 20
+
+    def test_a_state_is_told_when_it_has_lasted(self):
+        judge = by_force(debounce=Debounce(min_duration=0.03))
+        forces = [150] * 5 + [50] * 2 + [150] * 5 + [50] * 6
+        found = pushes(Detector(judge, {"finger1": FLAT}), forces)
+        assert [s for s, _ in itertools.groupby(found[1:])] == [STABLE, UNSTABLE]
+        assert found.index(UNSTABLE) == 12 + 3
+
+    def test_what_is_unknown_does_not_hold_back(self):
+        judge = by_force(debounce=Debounce(min_duration=1.0))
+        detector = Detector(judge, {"finger1": FLAT})
+        assert pushes(detector, [150, 150, 50, np.nan, 50, 50]) == [
+            UNKNOWN, STABLE, STABLE, UNKNOWN, UNKNOWN, UNSTABLE,
+        ]  # fmt: skip
+
+    def test_hysteresis_moves_the_threshold_away(self):
+        judge = by_force(debounce=Debounce(hysteresis=0.2))  # 0.3 and 0.7 are 91.5 and 108.5
+        forces = [50, 50, 101, 108, 109, 101, 92, 91, 108]
+        found = pushes(Detector(judge, {"finger1": FLAT}), forces)
+        expected = [UNSTABLE] * 3 + [STABLE] * 3 + [UNSTABLE] * 2
+        assert found[1:] == expected
+
+    def test_a_gap_forgets_the_candidate(self):
+        judge = by_force(debounce=Debounce(min_duration=0.05))
+        detector = Detector(judge, {"finger1": FLAT})
+        pushes(detector, [150] * 5 + [50] * 2)
+        assert pushes(detector, [150] * 4, start=9.0)[1:] == [STABLE] * 3
+
+
+HANDS = {
+    "S": STABLE, "U": UNSTABLE, "-": NO_CONTACT,
+    "SS": STABLE, "S-": NO_CONTACT, "--": NO_CONTACT, "SU": UNSTABLE, "S?": UNKNOWN,
+    "U?": UNSTABLE, "SS-": STABLE, "SS-?": UNKNOWN, "S---": NO_CONTACT, "SSSS": STABLE,
+}  # fmt: skip
+
+
+@pytest.mark.parametrize(("fingers", "expected"), HANDS.items(), ids=HANDS)
+def test_states_of_the_hand(fingers, expected):
+    forces = {"S": 150.0, "U": 50.0, "-": 0.0}
+    names = [f"finger{i + 1}" for i in range(len(fingers))]
+    detector = Detector(by_force(), dict.fromkeys(names, FLAT))
+    samples = {
+        name: [[forces[kind], 0.0, 0.0]]
+        for name, kind in zip(names, fingers, strict=True)
+        if kind != "?"
+    }
+    told = [detector.update(samples, k / RATE) for k in range(3)][-1]
+    assert told.state is expected
+
+
+class TestEvents:
+    def test_changes_in_order(self):
+        detector = Detector(by_force(), {"a": FLAT, "b": FLAT})
+        for k, (one, two) in enumerate([(150, 150), (150, 150), (50, 150), (150, 0)]):
+            detector.update({"a": [[one, 0, 0]], "b": [[two, 0, 0]]}, float(k) / RATE)
+        assert detector.events() == [
+            ContactEvent("a", STABLE, UNKNOWN, 0.01),
+            ContactEvent("b", STABLE, UNKNOWN, 0.01),
+            ContactEvent(HAND, STABLE, UNKNOWN, 0.01),
+            ContactEvent("a", UNSTABLE, STABLE, 0.02),
+            ContactEvent(HAND, UNSTABLE, STABLE, 0.02),
+            ContactEvent("a", STABLE, UNSTABLE, 0.03),
+            ContactEvent("b", NO_CONTACT, STABLE, 0.03),
+            ContactEvent(HAND, NO_CONTACT, UNSTABLE, 0.03),
+        ]
+        assert detector.events() == []
+
+    def test_the_newest_are_kept(self):
+        detector = Detector(by_force(), {"finger1": FLAT})
+        pushes(detector, [150, 50] * 900)
+        events = detector.events()
+        assert len(events) == MAX_EVENTS
+        assert events[-1].time == pytest.approx(1799 / RATE)
+
+    def test_the_newest_of_a_run_are_kept(self):
+        values = np.zeros((1800, 1, 3))
+        values[:, 0, 0] = [150, 50] * 900
+        module = type(tactile())(FLAT, np.arange(1800) / RATE, values)
+        one, two = (Detector(by_force(), {"finger1": FLAT}) for _ in range(2))
+        pushes(one, values[:, 0, 0])
+        two.run(recording(finger1=module))
+        assert two.events() == one.events()
+
+
+def test_reset_forgets_everything():
+    detector, values = Detector(model()), lively()
+    samples = [{"thumb": v, "index": v[::-1]} for v in values]
+    one = [repr(detector.update(s, k / RATE)) for k, s in enumerate(samples)]
+    events = detector.events()
+    detector.update({"thumb": values[0]}, 50.0)
+    detector.reset()
+    assert [repr(detector.update(s, k / RATE)) for k, s in enumerate(samples)] == one
+    assert detector.events() == events
+
+
+REFUSED = {
+    "unknown finger": ({"ring": np.zeros((2, 3))}, 1.0,
+                       "finger 'ring' given; the model judges thumb, index"),
+    "taxels": ({"thumb": np.zeros((2, 3)), "index": np.zeros((3, 3))}, 1.0,
+               "index: a sample of shape (3, 3) given, (2, 3) expected (tiny)"),
+    "axes": ({"thumb": np.zeros((2, 2))}, 1.0,
+             "thumb: a sample of shape (2, 2) given, (2, 3) expected (tiny)"),
+    "list": ({"thumb": [1, 2, 3]}, 1.0,
+             "thumb: a sample of shape (3,) given, (2, 3) expected (tiny)"),
+    "back": ({}, 0.25, "time 0.25 s given after 0.49 s; finite times that go forward expected"),
+    "still": ({}, 0.49, "time 0.49 s given after 0.49 s; finite times that go forward expected"),
+    "nan": ({}, np.nan, "time nan s given after 0.49 s; finite times that go forward expected"),
+    "infinite": ({}, np.inf,
+                 "time inf s given after 0.49 s; finite times that go forward expected"),
+}  # fmt: skip
+
+
+@pytest.mark.parametrize(("samples", "time", "message"), REFUSED.values(), ids=REFUSED)
+def test_a_refused_update_changes_nothing(samples, time, message):
+    values = lively()
+    one, two = Detector(model()), Detector(model())
+    for k in range(100):
+        if k == 50:
+            with pytest.raises(StreamError) as raised:
+                two.update(samples, time)
+            assert str(raised.value) == message
+        given = {"index": values[k]} if k == 50 else {"thumb": values[k], "index": values[k]}
+        assert repr(one.update(given, k / RATE)) == repr(two.update(given, k / RATE))
+    assert one.events() == two.events()
+
+
+@pytest.mark.parametrize("time", [np.nan, np.inf, -np.inf])
+def test_refuses_a_first_time_that_is_not_finite(time):
+    with pytest.raises(StreamError) as raised:
+        Detector(model()).update({}, time)
+    assert str(raised.value) == f"time {time} s given; finite times that go forward expected"
+
+
+@pytest.mark.parametrize("time", [1, np.float32(1), np.int64(1)])
+def test_times_of_any_type(time):
+    told = Detector(model()).update({"thumb": lively(1)[0]}, time)
+    assert (told.time, type(told.time)) == (1.0, float)
+
+
+def test_a_sample_is_not_aliased():
+    values = lively()
+    one, two = Detector(model(("thumb",))), Detector(model(("thumb",)))
+    buffer = np.empty((2, 3))
+    for k in range(100):
+        buffer[:] = values[k]
+        told = two.update({"thumb": buffer}, k / RATE)
+        buffer[:] = np.nan
+        assert repr(told) == repr(one.update({"thumb": values[k]}, k / RATE))
+    assert (values == lively()).all()
+
+
+def test_an_estimate_stays_as_it_was():
+    detector, values = Detector(model(("thumb",))), lively()
+    first = [detector.update({"thumb": values[k]}, k / RATE) for k in range(50)]
+    kept = list(map(repr, first))
+    for k in range(50, 100):
+        detector.update({"thumb": values[k]}, k / RATE)
+    assert list(map(repr, first)) == kept
+
+
+def test_two_detectors_share_nothing():
+    judge, values = model(("thumb",)), lively()
+    alone = list(map(repr, feed(Detector(judge), values)))
+    one, two = Detector(judge), Detector(judge)
+    for k, sample in enumerate(values):
+        assert repr(one.update({"thumb": sample}, k / RATE).fingers["thumb"]) == alone[k]
+        two.update({"thumb": sample[::-1] + k}, k / RATE)
+
+
+@pytest.mark.parametrize("how", [copy.copy, copy.deepcopy, pickle.dumps])
+def test_is_not_copied(how):
+    with pytest.raises(TypeError) as raised:
+        how(Detector(model()))
+    expected = "a detector is not copied or pickled; make another of the same model"
+    assert str(raised.value) == expected
+
+
+def test_memory_does_not_grow():
+    detector, values = Detector(model(threshold=5.0)), lively(500)
+
+    def stream(first, last):
+        for k in range(first, last):
+            detector.update({"thumb": values[k % 500], "index": values[-k % 500]}, k / RATE)
+
+    stream(0, 20_000)  # the list of events is full
+    blocks = sys.getallocatedblocks()
+    stream(20_000, 220_000)
+    assert sys.getallocatedblocks() - blocks < 1000
+    tracemalloc.start()
+    try:
+        stream(220_000, 221_000)
+        before = tracemalloc.get_traced_memory()[0]
+        stream(221_000, 231_000)
+        assert tracemalloc.get_traced_memory()[0] - before < 300_000
+    finally:
+        tracemalloc.stop()
+
+
+class TestConstruction:
+    def test_a_model_for_any_finger_asks_which(self):
+        with pytest.raises(ModelError) as raised:
+            Detector(Model.load("builtin:noise-floor"))
+        assert str(raised.value) == (
+            "the model builtin:noise-floor serves any finger: say which fingers the hand has, "
+            "and with which sensors"
+        )
+
+    def test_another_sensor(self):
+        with pytest.raises(ModelError) as raised:
+            Detector(model(), {"thumb": sensor(3)})
+        assert str(raised.value) == "thumb: 3 taxels (tiny) given, the model expects 2 (tiny)"
+
+
+class TestNoiseFloor:
+    def noisy(self, level, n=1000):
+        values = np.random.default_rng(5).normal(scale=level, size=(n, 2, 3))
+        values[200:, :, 0] += 500 * level  # in contact
+        values[600:700, :, 0] += 30 * level * np.random.default_rng(6).normal(size=(100, 2))
+        return np.clip(30_000 + values, 1, 65_000)
+
+    @pytest.mark.parametrize("level", [1.0, 5.0, 25.0])
+    def test_stable_at_the_noise_and_unstable_in_bursts(self, level):
+        which = sensor(limits=(0, 65_535))
+        module = type(tactile())(which, np.arange(1000) / RATE, self.noisy(level))
+        found = detect(Model.load("builtin:noise-floor"), recording(finger1=module))
+        trace = found.fingers["finger1"]
+        states = np.array([s.code for s in ContactState])[trace.state]
+        quiet = np.r_[states[220:600], states[714:]]
+        assert (states[64:200] == NO_CONTACT.code).mean() > 0.99
+        assert (quiet == STABLE.code).mean() > 0.98
+        assert (states[606:700] == UNSTABLE.code).all()
+
+    @pytest.mark.parametrize("tare", ["2", "first", "none"])
+    @pytest.mark.parametrize("level", [0.8, 3.0, 40.0, 900.0])
+    def test_the_noise_is_that_of_a_force_component(self, level, tare):
+        rng = np.random.default_rng(7)
+        detector = Detector(by_force(tare=tare), {"f": FLAT})
+        feed(detector, rng.normal(scale=level, size=(250, 1, 3)), "f")
+        found = detector._memory.levels[0, 4]
+        # half a second holds 50 samples only: 10 % is one and a half standard errors
+        assert found == pytest.approx(level, rel=0.1 if tare == "2" else 0.2)
+
+    def test_no_sensor_in_counts_is_more_quiet_than_its_step(self):
+        detector = Detector(model(("thumb",)))
+        feed(detector, np.full((40, 2, 3), 500.0))
+        assert detector._memory.levels[0, 4] == pytest.approx(np.sqrt(2 / 12))

@@ -1,0 +1,148 @@
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from holdfast.contact import ContactState
+from holdfast.recordings import Label, Recording, Tactile
+from holdfast.resampling import resample
+from holdfast.sensors import Sensor
+
+SENSOR = Sensor("one", [[0.0, 0.0, 0.0]], [np.eye(3)], [0.0, 0.0, 1.0], 100.0)
+
+
+def made(signal, times, labels=()):
+    readings = np.asarray(signal, dtype=float)[:, None, None] * [[[1.0, 2.0, -1.0]]]
+    return Recording("made", {"thumb": Tactile(SENSOR, times, readings, labels=labels)})
+
+
+def after(signal, times, rate, labels=()):
+    return resample(made(signal, times, labels), rate).modules["thumb"]
+
+
+RATES = [(100, 150), (150, 100), (100, 100), (1000, 150), (160, 150), (100, 99), (60, 400)]
+
+
+@pytest.mark.parametrize(("source", "rate"), RATES)
+def test_a_constant_stays(source, rate):
+    times = np.arange(300) / source
+    found = after(np.full(300, 7.0), times, rate)
+    assert found.readings == pytest.approx(np.tile([7.0, 14.0, -7.0], (found.n_samples, 1, 1)))
+    assert found.times[0] == times[0]
+    assert times[-1] - found.times[-1] < 1 / rate + 1e-6
+    assert found.rate == pytest.approx(rate)
+    assert found.n_samples == pytest.approx(299 / source * rate + 1, abs=1)
+
+
+@pytest.mark.parametrize(("source", "rate"), RATES)
+def test_a_slow_sine_stays(source, rate):
+    def wave(times):
+        return np.sin(2 * np.pi * 1.0 * times)
+
+    times = np.arange(5 * source) / source
+    found = after(wave(times), times, rate)
+    behind = max(1 / rate - 1 / source, 0) / 2  # the mean since the last sample is so far back
+    expected = wave(found.times - behind)
+    one_sample = 2 * np.pi * 1.0 / source  # how far the wave gets in a period of the source
+    assert np.abs(found.readings[2:, 0, 0] - expected[2:]).max() < 1.01 * one_sample
+
+
+def test_the_rate_it_has_changes_nothing():
+    times = np.arange(50) / 100
+    found = after(np.arange(50.0) ** 2, times, 100.0)
+    assert found.times == pytest.approx(times)
+    assert found.readings[:, 0, 0] == pytest.approx(np.arange(50.0) ** 2, abs=1e-6)
+
+
+def test_down_is_the_mean_since_the_last():
+    found = after(np.arange(13.0), np.arange(13) / 400, 100.0)
+    assert found.readings[:, 0, 0].tolist() == [0.0, 2.5, 6.5, 10.5]
+
+
+def test_up_is_linear():
+    found = after([0.0, 1.0, 0.0], np.arange(3) / 100, 400.0)
+    assert found.readings[:, 0, 0] == pytest.approx([0, 0.25, 0.5, 0.75, 1, 0.75, 0.5, 0.25, 0])
+
+
+@pytest.mark.parametrize(("source", "rate"), RATES)
+def test_time_since_1970(source, rate):
+    signal = np.random.default_rng(0).normal(size=20_000)
+    one = after(signal, np.arange(20_000) / source, rate)
+    two = after(signal, 1.7e9 + np.arange(20_000) / source, rate)
+    assert two.times - 1.7e9 == pytest.approx(one.times, abs=1e-6)
+    assert two.readings == pytest.approx(one.readings, abs=1e-3)
+
+
+@pytest.mark.parametrize("rate", [40.0, 100.0, 230.0])
+def test_gaps_stay(rate):
+    times = np.r_[np.arange(50), np.arange(80, 130), [200]] / 100
+    found = after(times, times, rate)
+    assert found.n_gaps == 2
+    assert not ((found.times > 0.4901) & (found.times < 0.7999)).any()
+    assert {0.0, 0.8, 2.0} <= set(found.times.round(9))
+    assert found.readings[-1, 0, 0] == 2.0  # a stretch of one sample
+
+
+@pytest.mark.parametrize("rate", [40.0, 230.0])
+def test_one_sample(rate):
+    found = after([5.0], [3.0], rate)
+    assert (found.times.tolist(), found.readings[0, 0, 0]) == ([3.0], 5.0)
+
+
+def test_a_module_without_samples_stays():
+    empty = Tactile(SENSOR, np.empty(0), np.empty((0, 1, 3)))
+    one = made([1.0, 2.0], [0.0, 0.01]).modules["thumb"]
+    found = resample(Recording("made", {"thumb": one, "index": empty}), 150.0)
+    assert found.modules["index"].n_samples == 0
+
+
+@pytest.mark.parametrize(("source", "rate"), [*RATES, (100, 65), (150, 40)])
+@pytest.mark.parametrize("n", [2, 57, 58, 59, 200])
+def test_labels_stay_up_to_the_last_sample(source, rate, n):
+    middle, end = (n // 2) / source, (n + 0.4) / source
+    labels = (
+        Label(0.0, middle, ContactState.STABLE),
+        Label(middle, end, ContactState.UNSTABLE, evidence="hand"),
+    )
+    found = after(np.zeros(n), np.arange(n) / source, rate, labels)
+    assert found.labels[0] == labels[0]
+    expected = np.where(found.times < middle, ContactState.STABLE.code, ContactState.UNSTABLE.code)
+    assert np.array_equal(found.label_states, expected)
+    if len(found.labels) > 1:
+        assert (found.labels[1].start, found.labels[1].evidence) == (middle, "hand")
+
+
+def test_all_else_stays():
+    one = made(np.zeros(9), np.arange(9) / 100)
+    found = resample(
+        Recording("made", one.modules, {"object": "can"}, markers=((0.01, "push"),)), 150.0
+    )
+    assert (found.name, found.metadata["object"], found.markers) == (
+        "made", "can", ((0.01, "push"),),
+    )  # fmt: skip
+
+
+@given(
+    cut=st.integers(30, 119),
+    pair=st.sampled_from(RATES),
+    jitter=st.floats(0, 0.4),
+    seed=st.integers(0, 9),
+)
+@settings(deadline=None)
+def test_every_value_rests_on_samples_up_to_the_first_at_or_after_it(cut, pair, jitter, seed):
+    source, rate = pair
+    rng = np.random.default_rng(seed)
+    times = np.sort(np.arange(120) + jitter * rng.uniform(-1, 1, size=120)) / source
+    signal = rng.normal(size=120)
+    changed = signal.copy()
+    changed[cut:] += 10
+    one, two = after(signal, times, rate), after(changed, times, rate)
+    known = one.times < times[cut - 1] - 2e-3 / rate
+    assert np.array_equal(one.readings[known], two.readings[known])
+
+
+@pytest.mark.parametrize("rate", [0.0, -1.0, np.nan, np.inf])
+def test_refuses_rates(rate):
+    with pytest.raises(ValueError) as raised:
+        resample(made([1.0], [0.0]), rate)
+    assert str(raised.value) == f"a rate above 0 Hz expected, {rate} given"
