@@ -153,7 +153,7 @@ class Model(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=Tru
         try:
             _check_sensors(data)
             return msgspec.json.decode(data, type=cls, dec_hook=_decode)
-        except (ModelError, ValueError) as cause:  # msgspec's own errors are ValueErrors
+        except (ModelError, TypeError, ValueError, RecursionError) as cause:  # msgspec's too
             raise ModelError(f"{path} is no model of {SCHEMA}: {cause}") from cause
 
     def save(self, path: str | Path, *, force: bool = False) -> None:
@@ -304,6 +304,6 @@ def _decode(kind: type, data: Any) -> Any:  # noqa: ANN401 (msgspec's own signat
 
 
 def _encode(value: Any) -> Any:  # noqa: ANN401 (msgspec's own signature)
-    if isinstance(value, np.ndarray):
+    if isinstance(value, np.ndarray | np.generic):
         return value.tolist()
     raise NotImplementedError(type(value))

@@ -30,9 +30,9 @@ def classifier(n_features, seed=0, **options):
     rng = np.random.default_rng(seed)
     options.setdefault("intercept", 0.3)
     return LinearClassifier(
-        mean=tuple(rng.normal(size=n_features)),
-        scale=tuple(rng.uniform(20, 80, size=n_features)),
-        coefficients=tuple(rng.normal(size=n_features)),
+        mean=tuple(rng.normal(size=n_features).tolist()),
+        scale=tuple(rng.uniform(20, 80, size=n_features).tolist()),
+        coefficients=tuple(rng.normal(size=n_features).tolist()),
         **options,
     )
 

@@ -1,0 +1,264 @@
+import json
+
+import msgspec
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from detector.build import RATE, RICH, classifier, finger_model, model, recording, sensor, tactile
+from holdfast.classifiers import LinearClassifier
+from holdfast.contact import NO_CONTACT
+from holdfast.detector import detect
+from holdfast.errors import ModelError, OutputError
+from holdfast.features import FeatureSpec, parse_features
+from holdfast.model import ANY_FINGER, Debounce, FingerModel, Model, Training
+
+TRAINING = Training(
+    recordings={"one": "0a1b"},
+    split="recording",
+    parameters={"thumb": {"C": 0.1, "class_weight": "balanced"}},
+    figures={"accuracy": 91.25, "auc": None},
+    seed=3,
+    versions={"numpy": "2.0"},
+)
+FULL = model(
+    features=RICH, threshold=12.5, debounce=Debounce(0.05, 0.1), training=TRAINING, name="full"
+)
+
+
+def saved(judge, path):
+    judge.save(path)
+    return path
+
+
+class TestSaveAndLoad:
+    @pytest.mark.parametrize("judge", [FULL, Model.load("builtin:noise-floor"), model()])
+    def test_it_is_the_same(self, judge, tmp_path):
+        assert Model.load(saved(judge, tmp_path / "m.json")) == judge
+
+    @given(st.integers(0, 2**32), st.floats(0, 1), st.floats(0, 1e300))
+    @settings(max_examples=30, deadline=None)
+    def test_every_bit(self, seed, threshold, contact):
+        part = finger_model(
+            classifier=classifier(5, seed, threshold=threshold), contact_threshold=contact
+        )
+        judge = Model(fingers={ANY_FINGER: part}, rate=1 / 3)
+        assert msgspec.json.decode(msgspec.json.encode(judge), type=Model) == judge
+
+    def test_numbers_of_numpy(self, tmp_path):
+        rule = LinearClassifier((np.float64(1.5),), (2.0,), (3.0,), np.float64(0.25))
+        judge = Model(fingers={ANY_FINGER: finger_model((FeatureSpec("F_x"),), classifier=rule)})
+        assert Model.load(saved(judge, tmp_path / "m.json")) == judge
+
+    def test_it_judges_the_same(self, tmp_path):
+        made = recording(thumb=tactile(seed=1), index=tactile(seed=2))
+        one = FULL.predict_proba(made)
+        two = Model.load(saved(FULL, tmp_path / "m.json")).predict_proba(made)
+        for finger, expected in one.items():
+            assert np.array_equal(two[finger], expected, equal_nan=True)
+
+    def test_nothing_is_overwritten(self, tmp_path):
+        path = saved(FULL, tmp_path / "m.json")
+        with pytest.raises(OutputError):
+            model().save(path)
+        assert Model.load(path) == FULL
+        model().save(path, force=True)
+        assert Model.load(path) == model()
+
+    def test_not_over_a_name(self):
+        with pytest.raises(OutputError) as raised:
+            FULL.save("builtin:mine")
+        assert str(raised.value) == "builtin:mine is the name of a built-in model; a file expected"
+
+
+def change(path, *keys):
+    """The plain data of a saved model, and the part of it that the keys lead to."""
+    data = json.loads(path.read_text())
+    part = data
+    for key in keys:
+        part = part[key]
+    return data, part
+
+
+CHANGES = {
+    "extra field": ((), {"colour": 1}, "Object contains unknown field `colour`"),
+    "extra field of a finger": (("fingers", "thumb"), {"colour": 1},
+                                "Object contains unknown field `colour`"),
+    "extra field of a classifier": (("fingers", "thumb", "classifier"), {"colour": 1},
+                                    "Object contains unknown field `colour`"),
+    "extra field of a feature": (("fingers", "thumb", "features", 0), {"colour": 1},
+                                 "Object contains unknown field `colour`"),
+    "extra field of a sensor": (("sensors", "tiny"), {"colour": 1}, "unknown fields ['colour']"),
+    "schema": ((), {"schema": "holdfast.model/2"}, "Invalid enum value 'holdfast.model/2'"),
+    "kind of classifier": (("fingers", "thumb", "classifier"), {"type": "forest"}, "forest"),
+    "kind of feature": (("fingers", "thumb", "features", 0), {"kind": "F_q"}, "F_q"),
+    "odd window": (("fingers", "thumb", "features", 4), {"window": 7}, "7 given"),
+    "weights": (("fingers", "thumb", "classifier"), {"mean": [0.0]}, "1 means, 10 scales"),
+    "text": (("fingers", "thumb", "classifier"), {"intercept": "high"}, "Expected `float`"),
+    "null": (("fingers", "thumb", "classifier"), {"intercept": None}, "Expected `float`"),
+    "scale": (("fingers", "thumb", "classifier"), {"scale": [0.0] * 10}, "above 0 expected"),
+    "rate": ((), {"rate": -1.0}, "a rate above 0 Hz expected, -1.0 given"),
+    "tare": ((), {"tare": "soon"}, "'soon' given"),
+    "window": ((), {"window": 5}, "an even window of at least 2 samples expected, 5 given"),
+    "hysteresis": (("debounce",), {"hysteresis": 2.0}, "a hysteresis from 0 to 1"),
+    "no fingers": ((), {"fingers": {}}, "a model of at least one finger expected, none given"),
+    "unknown sensor": (("fingers", "thumb"), {"sensor": "skin"}, "names the sensor 'skin'"),
+    "a sensor's shape": (("sensors", "tiny"), {"positions": [[0.0, 1.0]]}, "positions of tiny"),
+    "a sensor's rotation": (("sensors", "tiny"), {"rotations": [np.zeros((3, 3)).tolist()] * 2},
+                            "rotation"),
+    "no sensor": (("sensors",), {"tiny": 5}, "are missing in a sensor"),
+    "a sensor's positions": (("sensors", "tiny"), {"positions": None}, "positions"),
+}  # fmt: skip
+
+
+@pytest.mark.parametrize(("keys", "new", "message"), CHANGES.values(), ids=CHANGES)
+def test_refuses_to_load(keys, new, message, tmp_path):
+    path = saved(FULL, tmp_path / "m.json")
+    data, part = change(path, *keys)
+    part.update(new)
+    path.write_text(json.dumps(data))
+    with pytest.raises(ModelError) as raised:
+        Model.load(path)
+    text = str(raised.value)
+    assert text.startswith(f"{path} is no model of holdfast.model/1: ")
+    assert message in text
+    assert "\n" not in text
+
+
+@pytest.mark.parametrize("number", ["NaN", "Infinity", "-Infinity", "1e999", "-1e999"])
+@pytest.mark.parametrize(
+    "keys",
+    [("rate",), ("fingers", "thumb", "classifier", "intercept"), ("sensors", "tiny", "rate")],
+)
+def test_refuses_numbers_that_are_not_finite(number, keys, tmp_path):
+    path = saved(FULL, tmp_path / "m.json")
+    data, part = change(path, *keys[:-1])
+    part[keys[-1]] = 123454321.0
+    path.write_text(json.dumps(data).replace("123454321.0", number))
+    with pytest.raises(ModelError, match="is no model of") as raised:
+        Model.load(path)
+    assert "\n" not in str(raised.value)
+
+
+@pytest.mark.parametrize(
+    "content", [b"", b"\x80\x04pickle", b"[1]", b"null", b"{}", b"{", b"5", b"[" * 100_000]
+)
+def test_refuses_what_is_no_model(content, tmp_path):
+    path = tmp_path / "m.json"
+    path.write_bytes(content)
+    with pytest.raises(ModelError) as raised:
+        Model.load(path)
+    assert str(raised.value).startswith(f"{path} is no model of holdfast.model/1: ")
+    assert "\n" not in str(raised.value)
+
+
+def test_refuses_a_file_that_is_not_there(tmp_path):
+    with pytest.raises(ModelError) as raised:
+        Model.load(tmp_path / "m.json")
+    expected = f"cannot read the model {tmp_path / 'm.json'}: No such file or directory"
+    assert str(raised.value) == expected
+
+
+def test_refuses_an_unknown_name():
+    with pytest.raises(ModelError) as raised:
+        Model.load("builtin:magic")
+    assert str(raised.value) == "unknown model 'builtin:magic'; built in are builtin:noise-floor"
+
+
+class TestFingers:
+    def test_features_and_classifier_fit(self):
+        with pytest.raises(ModelError) as raised:
+            FingerModel(features=(FeatureSpec("F_a"),), classifier=classifier(2))
+        assert str(raised.value) == "1 features given, the classifier expects 2"
+
+    @pytest.mark.parametrize("name", ["contact_threshold", "contact_noise"])
+    @pytest.mark.parametrize("value", [-1.0, np.nan, np.inf])
+    def test_thresholds(self, name, value):
+        with pytest.raises(ModelError) as raised:
+            finger_model(**{name: value})
+        assert str(raised.value) == f"a contact threshold of at least 0 expected, {value} given"
+
+    def test_any_finger_has_no_others(self):
+        with pytest.raises(ModelError) as raised:
+            Model(fingers={ANY_FINGER: finger_model(), "thumb": finger_model()})
+        assert str(raised.value) == "a model for any finger ('*') has no others; ['*', 'thumb']"
+
+    def test_an_unknown_finger(self):
+        with pytest.raises(ModelError) as raised:
+            model().finger("ring")
+        assert str(raised.value) == "the model has no finger 'ring'; it has thumb, index"
+
+    def test_fingertips_only_where_there_are_any(self):
+        judge, which = Model(fingers={ANY_FINGER: finger_model()}), sensor()
+        assert list(judge.fingers_of({"index": which, "index/1": which})) == ["index"]
+        assert list(judge.fingers_of({"index/1": which, "palm/1": which})) == ["index/1", "palm/1"]
+
+    def test_fingers_that_the_hand_lacks_are_kept(self):
+        assert list(model().fingers_of({"index": sensor()})) == ["thumb", "index"]
+
+    def test_another_sensor(self):
+        with pytest.raises(ModelError) as raised:
+            model().predict_proba(recording(index=tactile(which=sensor(3, "big"))))
+        assert str(raised.value) == "index: 3 taxels (big) given, the model expects 2 (tiny)"
+
+    def test_any_finger_of_its_sensor(self):
+        part = finger_model(sensor="tiny")
+        judge = Model(fingers={ANY_FINGER: part}, sensors={"tiny": sensor()})
+        assert list(judge.fingers_of({"a": sensor(), "b": sensor(3, "big")})) == ["a"]
+        with pytest.raises(ModelError) as raised:
+            judge.fingers_of({"b": sensor(3, "big")})
+        assert str(raised.value) == (
+            "the model judges fingers with the sensor 'tiny'; given are b (big)"
+        )
+
+
+@pytest.mark.parametrize(
+    ("rate", "fits"), [(100, True), (81, True), (119, True), (79, False), (121, False)]
+)
+def test_a_rate_within_a_fifth_fits(rate, fits):
+    assert model().rate_fits(rate) is fits
+    assert Model(fingers={ANY_FINGER: finger_model()}).rate_fits(rate)
+
+
+class TestPredictProba:
+    def test_a_number_for_each_sample(self):
+        made = recording(thumb=tactile(150, seed=1), index=tactile(90, seed=2, start=0.002))
+        found = FULL.predict_proba(made)
+        assert {finger: p.shape for finger, p in found.items()} == {"thumb": (150,), "index": (90,)}
+        for probability in found.values():
+            known = probability[np.isfinite(probability)]
+            assert len(known) > 30
+            assert ((known >= 0) & (known <= 1)).all()
+
+    @pytest.mark.parametrize("threshold", [None, 30.0])
+    def test_equals_detect_but_for_no_contact(self, threshold):
+        made = recording(thumb=tactile(seed=1), index=tactile(seed=2, start=0.002))
+        judge = model(features=RICH, threshold=threshold)
+        found = judge.predict_proba(made)
+        for finger, trace in detect(judge, made).fingers.items():
+            touching = trace.state != NO_CONTACT
+            assert np.array_equal(
+                found[finger][touching], trace.stable_probability[touching], equal_nan=True
+            )
+            assert touching.all() or threshold is not None
+
+    def test_only_fingers_that_are_there(self):
+        assert list(model().predict_proba(recording(index=tactile()))) == ["index"]
+
+
+def test_the_noise_floor():
+    judge = Model.load("builtin:noise-floor")
+    part = judge.fingers[ANY_FINGER]
+    assert part.features == (FeatureSpec("sigma", 14, "noise"),)
+    at = part.classifier.probability(np.log([[1.0], [3.0], [9.0]]))
+    assert at == pytest.approx([0.9, 0.5, 0.1])
+
+
+def test_the_plan_takes_the_models_rate():
+    sensors = {"thumb": sensor()}
+    assert model().plan(sensors, 90.0).rate == RATE
+    assert Model(fingers={ANY_FINGER: finger_model()}).plan(sensors, 90.0).rate == 90.0
+    assert model().plan(sensors, 90.0).features["thumb"] == parse_features(
+        "F_a,F_x,F_y,F_z,sigma", 6
+    )
