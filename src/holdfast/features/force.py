@@ -10,6 +10,7 @@ from holdfast.compiled import compiled_parallel
 from holdfast.errors import RecordingError
 from holdfast.features.kernel import Array, force_of
 from holdfast.features.tare import HALF, Tare, TareArgument
+from holdfast.recordings import Tactile
 from holdfast.sensors import Sensor
 
 
@@ -66,10 +67,10 @@ def baseline_of(values: Array, times: Array, tare: Tare, period: float) -> tuple
     Raises:
         ValueError: no finite sample in the time that the tare takes.
     """
-    if tare.kind == "none" or not len(values):
+    if tare.kind == "none" or not (len(values) or tare.kind == "interval"):
         return np.zeros(values.shape[1:]), 0
     finite = np.isfinite(values).all(axis=(1, 2))
-    start = int(finite.argmax())
+    start = int(finite.argmax()) if len(values) else 0
     if tare.kind == "first":
         return values[start], start
     if tare.kind == "interval":
@@ -77,6 +78,7 @@ def baseline_of(values: Array, times: Array, tare: Tare, period: float) -> tuple
         first = 0
     else:
         running = times - times[start] + HALF * period < tare.seconds
+        running[: start + 1] = True  # one sample at least
         taken = finite & running
         first = int(running.sum())
     if not taken.any():
@@ -90,3 +92,23 @@ def _forces(values: Array, baseline: Array, rotations: Array, force: Array) -> N
         x, y, z, _ = force_of(values[k], baseline, rotations, 0, len(baseline))
         if math.isfinite(x + y + z):
             force[k, 0], force[k, 1], force[k, 2] = x, y, z
+
+
+def tare_amplitude(module: Tactile, tare: Tare, rate: float) -> Array:
+    """F_a of the samples that a tare by seconds is taken from, with that very tare.
+
+    Args:
+        module: readings of a finger.
+        tare: by seconds.
+        rate: samples per second [Hz].
+
+    Returns:
+        (n,) what the sensor shows without contact [unit of the readings].
+    """
+    n_enough = int(np.searchsorted(module.times, module.times[0] + tare.seconds + 1)) + 1
+    values = np.ascontiguousarray(module.readings[:n_enough], dtype=np.float64)
+    baseline, first = baseline_of(values, module.times[:n_enough], tare, 1 / rate)
+    force = np.full((first, 3), np.nan)
+    _forces(values[:first], baseline, module.sensor.rotations, force)
+    amplitude: Array = np.linalg.norm(force, axis=1)
+    return amplitude[np.isfinite(amplitude)]

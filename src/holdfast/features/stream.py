@@ -160,22 +160,26 @@ def _union(one: Array, two: Array) -> Array:
 def give_baseline(plan: StreamPlan, memory: Memory, recording: Recording) -> None:
     """Puts the mean over the plan's interval into the memory, for a tare by interval.
 
+    A finger that the recording lacks keeps the baseline that it has.
+
     Raises:
         ValueError: a finger has no finite sample in that interval.
     """
-    first = 0
-    for finger, sensor in plan.sensors.items():
+    ends = np.cumsum([sensor.n_taxels for sensor in plan.sensors.values()])
+    for (finger, sensor), end in zip(plan.sensors.items(), ends, strict=True):
+        if finger not in recording.modules:
+            continue
         module = recording.modules[finger]
-        readings = np.asarray(module.readings, dtype=np.float64)
+        rows = slice(*np.searchsorted(module.times, plan.tare.interval))
+        readings = np.asarray(module.readings[rows], dtype=np.float64)
         try:
-            baseline, _ = baseline_of(readings, module.times, plan.tare, 1 / plan.rate)
+            baseline, _ = baseline_of(readings, module.times[rows], plan.tare, 1 / plan.rate)
         except ValueError as cause:
             raise ValueError(
-                f"{finger} of {recording.name!r}, which runs from {recording.start:g} to "
-                f"{recording.end:g} s: {cause}"
+                f"{finger} of {recording.name!r}, which runs from {recording.start:.15g} to "
+                f"{recording.end:.15g} s: {cause}"
             ) from cause
-        memory.baseline[first : first + sensor.n_taxels] = baseline
-        first += sensor.n_taxels
+        memory.baseline[end - sensor.n_taxels : end] = baseline
 
 
 def _least_noise(sensor: Sensor) -> float:
