@@ -43,7 +43,10 @@ class LogisticRegression:
         mean, scale, features = standardise(samples.features)
         balanced = parameters["class_weight"] == "balanced"
         estimator = Estimator(
-            C=parameters["C"], class_weight=parameters["class_weight"], max_iter=1000
+            C=parameters["C"],
+            class_weight=parameters["class_weight"],
+            solver="newton-cholesky",
+            max_iter=1000,
         ).fit(features, samples.stable)
         n_stable = int(samples.stable.sum())
         odds = (len(samples.stable) - n_stable) / n_stable if balanced else 1.0

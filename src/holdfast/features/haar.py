@@ -47,7 +47,7 @@ def haar_features(force: npt.ArrayLike, window: int = 14) -> npt.NDArray[np.floa
     if values.ndim != 2 or values.shape[1] != 3:
         raise ValueError(f"a force of shape (n, 3) expected, {values.shape} given")
     out = np.empty((len(values), len(FEATURE_NAMES)))
-    _haar_features(values, n_window, out)
+    fill_features(values, n_window, out)
     return out
 
 
@@ -99,7 +99,8 @@ def haar_windows(x: Array, window: int, m: Array, sigma: Array, scratch: Array) 
 
 
 @compiled_parallel
-def _haar_features(force: Array, window: int, out: Array) -> None:
+def fill_features(force: Array, window: int, out: Array) -> None:
+    """The same as `haar_features`, into (n, 6) that the caller keeps; nothing is checked."""
     n = len(force)
     out[: min(window - 1, n)] = math.nan
     for block in numba.prange(max(n - window + _BLOCK, 0) // _BLOCK):
