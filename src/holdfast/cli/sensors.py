@@ -5,14 +5,10 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from holdfast.cli.console import print_json, print_table, say, show
+from holdfast.cli.console import print_json, print_table, show
 
 if TYPE_CHECKING:
-    from matplotlib.figure import Figure
-
     from holdfast.sensors import Hand, Sensor
-
-PLOT_SUFFIXES = (".pdf", ".png", ".svg")
 
 
 def sensors(
@@ -179,21 +175,10 @@ def _ranges(indices: list[int]) -> str:
 
 
 def _draw(found: "Sensor | Hand", plot: Path, force: bool) -> None:
-    from holdfast.files import refuse_overwrite
+    from holdfast.cli.figures import refuse_plot, save_plot
 
-    if plot.suffix.lower() not in PLOT_SUFFIXES:
-        raise ValueError(f"a plot ends in {', '.join(PLOT_SUFFIXES)}; {plot.name!r} given")
-    refuse_overwrite(plot, force=force)
+    refuse_plot(plot, force)
     from holdfast.plots.sensors import plot_hand, plot_sensor
     from holdfast.sensors import Sensor
 
-    figure = plot_sensor(found) if isinstance(found, Sensor) else plot_hand(found)
-    _save(figure, plot, force)
-    say(f"{plot} written")
-
-
-def _save(figure: "Figure", plot: Path, force: bool) -> None:
-    from holdfast.files import whole_file
-
-    with whole_file(plot, force=force) as part:
-        figure.savefig(part)
+    save_plot(plot_sensor(found) if isinstance(found, Sensor) else plot_hand(found), plot, force)
