@@ -152,7 +152,7 @@ class TestTactile:
         assert tactile(unit="N").unit == "N"
 
     def test_rate_gaps_and_repeats(self):
-        times = np.array([0, 1, 2, 3, 7, 8, 9, 12, 13, 14]) / 100
+        times = np.array([0, 1, 2, 3, 7, 8, 9, 10, 11, 12]) / 100
         readings = np.repeat(np.arange(5.0), 2)[:, None, None] * np.ones((5, 3))
         given = tactile(times=times, readings=readings)
         assert given.rate == pytest.approx(100)

@@ -18,8 +18,6 @@ from holdfast.sensors.values import Array, Unit, rebuilt
 
 GAP_PERIODS = 3.0
 """A step in time longer than this many sample periods is a gap."""
-LOST_PERIODS = 1.5
-"""A step longer than this many median steps does not tell the rate."""
 
 
 @dataclass(frozen=True)
@@ -105,14 +103,14 @@ class Tactile:
     def period(self) -> float:
         """The mean step in time [s]; that of the sensor where there is no step.
 
-        Steps over 1.5 times the median (a lost packet, a gap) are left out. The mean of the
-        others is what counts: stamps in whole milliseconds make the median of a 149.5 Hz stream
-        read 143 or 167 Hz.
+        Steps over three times the median are gaps and left out. The mean of the others is what
+        counts: stamps in whole milliseconds make the median of a 149.5 Hz stream read 143 or
+        167 Hz.
         """
         steps = np.diff(self.times)
         if not len(steps):
             return 1 / self.sensor.rate
-        return float(steps[steps <= LOST_PERIODS * np.median(steps)].mean())
+        return float(steps[steps <= GAP_PERIODS * np.median(steps)].mean())
 
     @property
     def rate(self) -> float:

@@ -25,7 +25,7 @@ def test_named_columns(tmp_path):
     assert (recording.name, module.sensor.name) == ("egg", "gtac")
     np.testing.assert_allclose(module.times, [0, 0.007, 0.014])
     assert module.readings.dtype == np.int32
-    assert module.readings[0, 1].tolist() == [-7, -6, -5]
+    assert module.readings[0, 1].tolist() == [-7, 6, 5]
 
 
 def test_numbered_columns_and_a_first_row_without_time(tmp_path):
@@ -34,7 +34,7 @@ def test_numbered_columns_and_a_first_row_without_time(tmp_path):
     (recording,) = import_recordings(tmp_path)
     module = recording.modules["finger1"]
     np.testing.assert_allclose(module.times, [0.004, 0.012])
-    assert module.readings[0, 0].tolist() == [-9, -8, -7]
+    assert module.readings[0, 0].tolist() == [-9, 8, 7]
     assert recording.metadata["rows_without_time"] == 1
 
 

@@ -18,6 +18,8 @@ from holdfast.sensors.values import Array
 N_NODES = 15
 NAMES = tuple(f"mag_{axis}{node + 1}" for node in range(N_NODES) for axis in "xyz")
 MILLISECOND = 1e-3
+TO_TAXEL_FRAME = np.array([1, -1, -1])
+"""Half a turn about x: the device's z goes down when a section is pressed, a taxel's goes up."""
 
 
 def sniff(path: Path) -> bool:
@@ -54,7 +56,8 @@ def _recording(path: Path) -> Recording:
     numbered = table.names[0] == "" and "mag_x1" not in table.names
     values = table.values[:, 1 : 1 + len(NAMES)] if numbered else table.columns(NAMES)
     times, n_left_out = _times(table)
-    readings = counts_or(values[n_left_out:]).reshape(-1, N_NODES, 3)
+    turned = values[n_left_out:].reshape(-1, N_NODES, 3) * TO_TAXEL_FRAME
+    readings = counts_or(turned)
     metadata = {"source": "roobooot/GTac_", "rows_without_time": n_left_out}
     try:
         return Recording(path.stem, {"finger1": Tactile(sensor("gtac"), times, readings)}, metadata)
