@@ -1,11 +1,11 @@
+import numba
 import numpy as np
 import pytest
 
-from holdfast.compiled import compiled
 from holdfast.detector.table import floats3, integers2, table_of
 
 
-@compiled
+@numba.njit  # not kept: its cache would not follow the module that it tests
 def double(table):
     numbers, integers = floats3(table, 0), integers2(table, 1)
     numbers *= 2.0
