@@ -1,0 +1,473 @@
+"""The objects that the twin grasps: a table of shapes, and their signed distances.
+
+A shape is a core grown by its rounding. Near the surface all distances are then exact and
+smooth, and so are their gradients, which are computed with them.
+"""
+
+import math
+import tomllib
+from dataclasses import dataclass
+from functools import cache
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+from holdfast.compiled import compiled
+from holdfast.sensors.values import Array, rebuilt
+
+TABLE = Path(__file__).with_name("objects.toml")
+
+REVOLVED, BOX, HEXAGON, CAPSULE = range(4)
+"""The cores: a frustum (a cylinder too), a box, a hexagonal prism, a line (a point too)."""
+
+SHAPES = {
+    "sphere": ("radius",),
+    "box": ("half width x", "half width y", "half height", "rounding"),
+    "cylinder": ("radius", "half height", "rounding"),
+    "capsule": ("radius", "half height"),
+    "hexagon": ("radius", "half height", "rounding"),
+    "frustum": ("radius at the foot", "radius at the top", "half height", "rounding"),
+}
+"""What the sizes of each shape are, in order [m]."""
+
+N_SIZE = 6
+"""Numbers of a core: four sizes, its rounding, the height of the centre of mass in it [m]."""
+N_TEXTURE = 5
+"""Numbers of a texture: amplitude [m], two wave numbers along z [rad/m], two about it [1]."""
+
+LIMITS = {
+    "size": (0.001, 0.2),
+    "mass": (0.005, 2.0),
+    "friction": (0.05, 2.0),
+    "texture": (0.0, 0.02),
+    "finger_height": (0.0, 0.06),
+    "yaw": (-math.pi, math.pi),
+}
+"""Smallest and largest value of every column, in its unit."""
+
+GRASP = (0.02, 0.045)
+"""Half widths that fit between thumb and fingers [m]."""
+
+N_GRID = 96
+"""Points of the quadrature of mass along the longest side."""
+
+
+@dataclass(frozen=True, eq=False)
+class Thing:
+    """An object: what it is shaped like, weighs and feels like. Its frame is that of its mass.
+
+    Attributes:
+        name: what it is called.
+        shape: a key of `SHAPES`.
+        size: its sizes, as `SHAPES` orders them [m].
+        mass: [kg].
+        inertia: (3,) about the axes through the centre of mass [kg m^2].
+        mu_static: coefficient of friction at rest.
+        mu_kinetic: coefficient of friction while it slides.
+        texture_amplitude: of the longest wave of its surface [m].
+        texture_wavelength: of that wave [m].
+        finger_height: index and ring finger grasp it so far above and below its middle [m].
+        yaw: about its z axis, so that flat faces meet the pads [rad].
+        foot: (3,) where its bottom is in its frame [m].
+    """
+
+    name: str
+    shape: str
+    size: tuple[float, ...]
+    mass: float
+    inertia: Array
+    mu_static: float
+    mu_kinetic: float
+    texture_amplitude: float
+    texture_wavelength: float
+    finger_height: float
+    yaw: float
+    foot: Array
+
+    def __post_init__(self) -> None:
+        for array in (self.inertia, self.foot):
+            array.flags.writeable = False
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        return rebuilt(self)
+
+    @property
+    def radius(self) -> float:
+        """Its half width, at its middle where it tapers [m]."""
+        return sum(self.size[:2]) / 2 if self.shape == "frustum" else self.size[0]
+
+    @property
+    def half_height(self) -> float:
+        """Half of its height along z [m]."""
+        return self.size[_height(self.shape)]
+
+
+@cache
+def _built_in() -> dict[str, Thing]:
+    return load_things(TABLE)
+
+
+def thing(name: str) -> Thing:
+    """The object of that name from the built-in table.
+
+    Raises:
+        ValueError: there is none; the message lists what there is.
+
+    Example:
+        >>> thing("can").mass
+        0.24
+    """
+    things = _built_in()
+    if name not in things:
+        raise ValueError(f"no object {name!r}; there are {', '.join(things)}")
+    return things[name]
+
+
+def load_things(path: str | Path | None = None) -> dict[str, Thing]:
+    """The objects of a table, by name, in its order.
+
+    Args:
+        path: a TOML file with a line per object, like `objects.toml`; by default that one.
+
+    Raises:
+        ValueError: it is no such table: an unknown field or shape, a number out of range.
+        OSError: it cannot be read.
+    """
+    if path is None:
+        return dict(_built_in())
+    try:
+        table = tomllib.loads(Path(path).read_text("utf-8"))
+    except (tomllib.TOMLDecodeError, UnicodeDecodeError) as cause:
+        raise ValueError(f"{path} is no TOML table of objects: {cause}") from cause
+    if not table:
+        raise ValueError(f"{path} has no objects")
+    things = {}
+    for name, row in table.items():
+        try:
+            things[name] = _thing(name, row)
+        except ValueError as cause:
+            raise ValueError(f"{path}: {name}: {cause}") from cause
+    return things
+
+
+def _thing(name: str, row: object) -> Thing:
+    columns = ("shape", *LIMITS)
+    if not isinstance(row, dict):
+        raise ValueError(f"a line of fields expected ({', '.join(columns)})")
+    if unknown := sorted(set(row) - set(columns)):
+        raise ValueError(f"unknown field {unknown[0]!r}; there are {', '.join(columns)}")
+    if missing := [column for column in columns if column not in row]:
+        raise ValueError(f"{missing[0]!r} is missing")
+    shape = row["shape"]
+    if not isinstance(shape, str) or shape not in SHAPES:
+        raise ValueError(f"no shape {shape!r}; there are {', '.join(SHAPES)}")
+    size = _numbers(row, "size", SHAPES[shape])
+    mass, height, yaw = (_numbers(row, key)[0] for key in ("mass", "finger_height", "yaw"))
+    friction = _numbers(row, "friction", ("static", "kinetic"))
+    texture = _numbers(row, "texture", ("amplitude", "wavelength"))
+    _check(shape, size, friction, texture)
+    core = pack_size(shape, size)
+    volume, centre, inertia = _mass_of(core)
+    bottom = -size[_height(shape)] - centre
+    return Thing(
+        name,
+        shape,
+        size,
+        mass,
+        inertia * (mass / volume),
+        *friction,
+        *texture,
+        finger_height=height,
+        yaw=yaw,
+        foot=np.array([0.0, 0.0, bottom]),
+    )
+
+
+def _numbers(row: dict[str, Any], key: str, names: tuple[str, ...] = ("",)) -> tuple[float, ...]:
+    given = row[key] if isinstance(row[key], list) else [row[key]]
+    low, high = LIMITS[key]
+    if len(given) != len(names):
+        wanted = ", ".join(names) or "one number"
+        raise ValueError(f"{key}: {wanted} expected, {len(given)} numbers given")
+    for value in given:
+        number = isinstance(value, int | float) and not isinstance(value, bool)
+        if not (number and low <= value <= high):
+            raise ValueError(f"{key}: numbers from {low:g} to {high:g} expected, {value!r} given")
+    return tuple(float(value) for value in given)
+
+
+def _check(
+    shape: str, size: tuple[float, ...], friction: tuple[float, ...], texture: tuple[float, ...]
+) -> None:
+    if friction[1] > friction[0]:
+        raise ValueError(f"friction: kinetic {friction[1]:g} is more than static {friction[0]:g}")
+    if texture[1] < 0.0005 or texture[0] > texture[1] / 10:
+        raise ValueError(
+            "texture: a wavelength of at least 0.0005 and 10 amplitudes expected, "
+            f"{texture[1]:g} given for an amplitude of {texture[0]:g}"
+        )
+    height = _height(shape)
+    rounding = size[-1] if shape in ("box", "cylinder", "hexagon", "frustum") else 0.0
+    if rounding >= min(size[: height + 1]):
+        raise ValueError(f"size: a rounding below the other sizes expected, {rounding:g} given")
+    if shape == "capsule" and size[1] < size[0]:
+        raise ValueError(f"size: half height {size[1]:g} is less than the radius {size[0]:g}")
+    for width in size[: max(height, 1)]:
+        if not GRASP[0] <= width <= GRASP[1]:
+            raise ValueError(
+                f"size: it cannot be grasped: half widths from {GRASP[0]:g} to {GRASP[1]:g} m "
+                f"fit between thumb and fingers, {width:g} given"
+            )
+
+
+def _height(shape: str) -> int:
+    return {"sphere": 0, "capsule": 1, "cylinder": 1, "hexagon": 1}.get(shape, 2)
+
+
+def shape_code(shape: str) -> int:
+    """The core of a shape: REVOLVED, BOX, HEXAGON or CAPSULE."""
+    codes = {"box": BOX, "hexagon": HEXAGON, "sphere": CAPSULE, "capsule": CAPSULE}
+    return codes.get(shape, REVOLVED)
+
+
+def pack_size(shape: str, size: tuple[float, ...]) -> Array:
+    """The core of a shape as numbers.
+
+    Returns:
+        (1 + N_SIZE,) its code, its sizes without the rounding, the rounding, and 0 for the
+        height of the centre of mass [m].
+    """
+    core = np.zeros(1 + N_SIZE)
+    core[0] = shape_code(shape)
+    if core[0] == CAPSULE:
+        core[1], core[5] = size[_height(shape)] - size[0], size[0]
+        return core
+    rounding = size[-1]
+    sizes = [value - rounding for value in size[:-1]]
+    if shape == "cylinder":
+        sizes.insert(0, sizes[0])
+    if shape == "frustum":
+        sizes[:2] = _tapered(*size)
+    core[1 : 1 + len(sizes)] = sizes
+    core[5] = rounding
+    return core
+
+
+def _tapered(foot: float, top: float, half_height: float, rounding: float) -> list[float]:
+    """Radii of the core, whose side runs parallel to the frustum's, one rounding inside."""
+    middle, slope = (foot + top) / 2, (top - foot) / (2 * half_height)
+    inset = rounding * math.hypot(1.0, slope)
+    reach = slope * (half_height - rounding)
+    return [middle - reach - inset, middle + reach - inset]
+
+
+def solid(thing: Thing) -> Array:
+    """The object's shape and surface as numbers, for compiled code.
+
+    Returns:
+        (1 + N_SIZE + N_TEXTURE + 2,) code, core, texture, static and kinetic friction.
+    """
+    core = pack_size(thing.shape, thing.size)
+    core[N_SIZE] = -thing.half_height - thing.foot[2]
+    return np.concatenate([core, _texture(thing), [thing.mu_static, thing.mu_kinetic]])
+
+
+def _texture(thing: Thing) -> Array:
+    """Waves about the axis are whole, so that the texture has no seam."""
+    wave = 2 * math.pi / thing.texture_wavelength
+    short = wave / 0.37
+    around = [round(wave * thing.radius), round(short * thing.radius)]
+    return np.array([thing.texture_amplitude, wave, 0.6 * short, *around])
+
+
+def distance_to(thing: Thing, points: npt.ArrayLike) -> Array:
+    """How far points are from the object's textured surface, negative inside.
+
+    Args:
+        thing: the object.
+        points: (..., 3) in its frame [m].
+
+    Returns:
+        (...) [m].
+
+    Example:
+        >>> round(float(distance_to(thing("ball"), [0.0, 0.0, 0.043])), 3)
+        0.01
+    """
+    given = np.asarray(points, dtype=np.float64)
+    flat = np.ascontiguousarray(given.reshape(-1, 3))
+    distances: Array = _distances(solid(thing), flat)
+    return distances.reshape(given.shape[:-1])
+
+
+@compiled
+def _distances(solid: Array, points: Array) -> Array:
+    distances = np.empty(len(points))
+    for i in range(len(points)):
+        distances[i] = signed_distance(solid, points[i, 0], points[i, 1], points[i, 2])
+    return distances
+
+
+@compiled
+def signed_distance(solid: Array, x: float, y: float, z: float) -> float:
+    """The distance of a point in the object's frame from its textured surface [m]."""
+    return probe(solid, x, y, z)[0] + relief(solid, x, y, z)
+
+
+@compiled
+def relief(solid: Array, x: float, y: float, z: float) -> float:
+    """How deep the texture is at a point of the object's frame [m].
+
+    Three waves: A (sin a z + 0.7 sin(0.6 b z + b s + 1) + 0.8 sin(a s + 0.3)) with s the arc
+    about the axis, a = 2 pi / L and b = a / 0.37 (own choice).
+    """
+    a = 1 + N_SIZE
+    if solid[a] == 0.0:
+        return 0.0
+    angle = math.atan2(y, x)
+    waves = math.sin(solid[a + 1] * z)
+    waves += 0.7 * math.sin(solid[a + 2] * z + solid[a + 4] * angle + 1.0)
+    waves += 0.8 * math.sin(solid[a + 3] * angle + 0.3)
+    return solid[a] * waves
+
+
+MOST_RELIEF = 2.5
+"""Amplitudes by which the three waves of a texture reach out at most."""
+
+
+@compiled
+def probe(
+    solid: Array, x: float, y: float, z: float
+) -> tuple[float, float, float, float]:
+    """The distance of a point from the smooth object, and the gradient of it.
+
+    Returns:
+        The distance [m], negative inside, and the outward unit vector of its gradient.
+    """
+    z += solid[6]
+    code = int(solid[0])
+    if code == BOX:
+        d, gx, gy, gz = _box(solid[1], solid[2], solid[3], x, y, z)
+    elif code == HEXAGON:
+        d, gx, gy, gz = _hexagon(solid[1], solid[2], x, y, z)
+    elif code == CAPSULE:
+        along = z - min(max(z, -solid[1]), solid[1])
+        d = math.sqrt(x * x + y * y + along * along)
+        share = 1.0 / max(d, 1e-12)
+        gx, gy, gz = x * share, y * share, along * share
+    else:
+        q = math.sqrt(x * x + y * y)
+        d, gq, gz = _meridian(solid[1], solid[2], solid[3], q, z)
+        share = gq / max(q, 1e-12)
+        gx, gy = x * share, y * share
+    return d - solid[5], gx, gy, gz
+
+
+@compiled
+def _box(
+    a: float, b: float, c: float, x: float, y: float, z: float
+) -> tuple[float, float, float, float]:
+    ex, ey, ez = abs(x) - a, abs(y) - b, abs(z) - c
+    ox, oy, oz = max(ex, 0.0), max(ey, 0.0), max(ez, 0.0)
+    d = math.sqrt(ox * ox + oy * oy + oz * oz)
+    if d > 0.0:
+        share = 1.0 / d
+        return (
+            d,
+            math.copysign(ox * share, x),
+            math.copysign(oy * share, y),
+            math.copysign(oz * share, z),
+        )
+    if ex >= ey and ex >= ez:
+        return ex, math.copysign(1.0, x), 0.0, 0.0
+    if ey >= ez:
+        return ey, 0.0, math.copysign(1.0, y), 0.0
+    return ez, 0.0, 0.0, math.copysign(1.0, z)
+
+
+@compiled
+def _hexagon(
+    inner: float, height: float, x: float, y: float, z: float
+) -> tuple[float, float, float, float]:
+    """Six faces, the first across x; in the sector of a face that face is the nearest."""
+    nx, ny = 1.0, 0.0
+    if abs(y) * math.sqrt(3.0) > abs(x):
+        nx, ny = 0.5, math.sqrt(0.75)
+    nx, ny = math.copysign(nx, x), math.copysign(ny, y)
+    face = nx * x + ny * y - inner
+    side = nx * y - ny * x
+    half = inner / math.sqrt(3.0)
+    over = side - min(max(side, -half), half)
+    tall = abs(z) - height
+    if face <= 0.0 and tall <= 0.0:
+        if face >= tall:
+            return face, nx, ny, 0.0
+        return tall, 0.0, 0.0, math.copysign(1.0, z)
+    face, tall = max(face, 0.0), math.copysign(max(tall, 0.0), z)
+    d = math.sqrt(face * face + over * over + tall * tall)
+    share = 1.0 / d
+    return (
+        d,
+        (face * nx - over * ny) * share,
+        (face * ny + over * nx) * share,
+        tall * share,
+    )
+
+
+@compiled
+def _meridian(
+    foot: float, top: float, height: float, q: float, z: float
+) -> tuple[float, float, float]:
+    """The distance of (radius, height) from a trapezium about the axis, and its gradient."""
+    rise, run = 2.0 * height, top - foot
+    length = math.sqrt(rise * rise + run * run)
+    nq, nz = rise / length, -run / length
+    side = (q - foot) * nq + (z + height) * nz
+    tall = abs(z) - height
+    if side <= 0.0 and tall <= 0.0:
+        if side >= tall:
+            return side, nq, nz
+        return tall, 0.0, math.copysign(1.0, z)
+    along = min(max((z + height) * nq - (q - foot) * nz, 0.0), length)
+    dq, dz = q - foot + along * nz, z + height - along * nq
+    square = dq * dq + dz * dz
+    if tall > 0.0:
+        cap = max(q - (top if z > 0.0 else foot), 0.0)
+        if cap * cap + tall * tall < square:
+            dq, dz = cap, math.copysign(tall, z)
+            square = dq * dq + dz * dz
+    d = math.sqrt(square)
+    share = 1.0 / max(d, 1e-12)
+    return d, dq * share, dz * share
+
+
+def _mass_of(core: Array) -> tuple[float, float, Array]:
+    """Volume [m^3], height of the centre [m], second moments (3,) [m^5] about it.
+
+    A grid over a quarter of the body (all shapes are mirrored in x and y); a cell on its
+    surface counts by the part of it that lies inside.
+    """
+    wide, tall = _extent(core)
+    step = max(wide, 2 * tall) / N_GRID
+    across = (np.arange(math.ceil(wide / step)) + 0.5) * step
+    up = (np.arange(2 * math.ceil(tall / step)) + 0.5) * step - math.ceil(tall / step) * step
+    x, y, z = (part.ravel() for part in np.meshgrid(across, across, up, indexing="ij"))
+    smooth = np.concatenate([core, np.zeros(N_TEXTURE + 2)])
+    depth = -_distances(smooth, np.stack([x, y, z], axis=1))
+    cell = 4 * step**3 * np.clip(0.5 + depth / step, 0.0, 1.0)
+    volume = float(cell.sum())
+    centre = float((cell * z).sum()) / volume
+    xx, yy, zz = ((cell * c * c).sum() for c in (x, y, z - centre))
+    return volume, centre, np.array([yy + zz, xx + zz, xx + yy])
+
+
+def _extent(core: Array) -> tuple[float, float]:
+    """Half width and half height of the box that holds a core and its rounding [m]."""
+    code, rounding = int(core[0]), float(core[5])
+    if code == CAPSULE:
+        return rounding, float(core[1]) + rounding
+    if code == HEXAGON:
+        return float(core[1]) * 2 / math.sqrt(3) + rounding, float(core[2]) + rounding
+    return float(max(core[1], core[2])) + rounding, float(core[3]) + rounding

@@ -1,0 +1,124 @@
+"""The skin of the curved fingertip as a quadrature: nodes, normals and the area of each.
+
+The tables of the sensor give 30 taxels and no surface. The skin is taken to be the smooth
+surface through them: a capsule (a half cylinder that ends in a dome) whose radius varies.
+"""
+
+from functools import cache
+from typing import NamedTuple
+
+import numpy as np
+from scipy.interpolate import RBFInterpolator
+
+from holdfast.sensors import sensor
+from holdfast.sensors.values import Array
+
+AXIS = 0.01254
+"""Palmar coordinate of the capsule's axis [m]: the outer walls' taxels sit beside it."""
+SHOULDER = 0.022
+"""Distal coordinate where the cylinder ends and the dome begins [m]. Own choice: taxels of the
+dome lie 12.5 to 13.3 mm from the point of the axis there, as on a ball."""
+BASE = 0.0005
+"""Distal coordinate where the skin begins [m]: half a pitch before the first row of taxels."""
+MARGIN = 0.003
+"""By which the skin goes round the outer walls' taxels to its edge [m]: half a pitch."""
+PITCH = 0.0033
+"""Distance of neighbouring nodes [m]: half a taxel's pitch, so that a taxel sees about four."""
+N_PARTS = 6
+"""An element is cut into N_PARTS x N_PARTS to measure its area and mean normal."""
+
+_RADIUS = 0.0135  # between the cylinder's 14 mm and the dome's 13, for lengths along the skin
+_DIGITS = 9  # nanometres: so the table does not depend on the linear algebra of the machine
+
+
+class Surface(NamedTuple):
+    """A quadrature of a skin, in the fingertip frame (x palmar, z distal).
+
+    Attributes:
+        nodes: (n, 3) centres of its elements [m].
+        normals: (n, 3) their outward unit normals.
+        areas: (n,) their areas [m^2].
+    """
+
+    nodes: Array
+    normals: Array
+    areas: Array
+
+
+@cache
+def curved_fingertip() -> Surface:
+    """The skin of a `uskin-curved` fingertip: elements of about 10 mm^2.
+
+    Rows of elements lie along the finger and over the tip; every row is cut into elements of
+    about PITCH x PITCH. Nodes are rounded to a nanometre, so that they are the same bits on
+    every machine.
+
+    Returns:
+        The quadrature; its arrays are read-only.
+
+    Example:
+        >>> skin = curved_fingertip()
+        >>> len(skin.nodes), round(skin.areas.sum() * 1e6)
+        (158, 1643)
+    """
+    radius = _radius()
+    rows = [_row(radius, *edges) for edges in _edges()]
+    nodes, vectors = (np.concatenate(parts) for parts in zip(*rows, strict=True))
+    areas = np.linalg.norm(vectors, axis=1)
+    surface = Surface(
+        np.round(nodes, _DIGITS),
+        np.round(vectors / areas[:, None], _DIGITS),
+        np.round(areas, _DIGITS + 6),
+    )
+    for array in surface:
+        array.flags.writeable = False
+    return surface
+
+
+def _radius() -> RBFInterpolator:
+    """The distance from the capsule's axis, by thin-plate splines over the unit capsule.
+
+    There every point, the dome's pole too, is like every other, which no pair of angles gives.
+    """
+    offsets = sensor("uskin-curved").positions - [AXIS, 0.0, 0.0]
+    foot = np.zeros_like(offsets)
+    foot[:, 2] = offsets[:, 2].clip(max=SHOULDER)
+    distances = np.linalg.norm(offsets - foot, axis=1)
+    unit = (offsets - foot) / distances[:, None] * _RADIUS + foot
+    return RBFInterpolator(unit / _RADIUS, distances, kernel="thin_plate_spline")
+
+
+def _edges() -> list[tuple[float, float]]:
+    """Where rows begin and end: length along the skin from the base to the pole [m]."""
+    straight, bent = SHOULDER - BASE, np.pi / 2 * _RADIUS
+    parts = round((straight + bent) / PITCH)
+    lengths = np.linspace(BASE, SHOULDER + bent, parts + 1).tolist()
+    return list(zip(lengths[:-1], lengths[1:], strict=True))
+
+
+def _row(radius: RBFInterpolator, begin: float, end: float) -> tuple[Array, Array]:
+    """Nodes and area vectors of the elements between two lengths along the skin."""
+    angle = np.pi / 2 + MARGIN / _RADIUS
+    elevation = max((begin + end) / 2 - SHOULDER, 0.0) / _RADIUS
+    n = max(round(2 * angle * _RADIUS * np.cos(elevation) / PITCH), 2)
+    lengths = np.linspace(begin, end, N_PARTS + 1)
+    angles = np.linspace(-angle, angle, n * N_PARTS + 1)
+    corners = _points(radius, *np.meshgrid(lengths, angles, indexing="ij"))
+    across, along = np.diff(corners, axis=1), np.diff(corners, axis=0)
+    vectors = np.cross(across[:-1] + across[1:], along[:, :-1] + along[:, 1:]) / 4
+    vectors = vectors.reshape(N_PARTS, n, N_PARTS, 3).sum(axis=(0, 2))
+    middle = np.arange(n) * N_PARTS + N_PARTS // 2
+    return corners[N_PARTS // 2, middle], vectors
+
+
+def _points(radius: RBFInterpolator, lengths: Array, angles: Array) -> Array:
+    """Points of the skin by length along it [m] and angle about its axis [rad]."""
+    elevation = np.maximum(lengths - SHOULDER, 0.0) / _RADIUS
+    level = np.cos(elevation)
+    direction = np.stack([level * np.cos(angles), level * np.sin(angles), np.sin(elevation)], -1)
+    foot = np.zeros_like(direction)
+    foot[..., 2] = np.minimum(lengths, SHOULDER)
+    unit = direction + foot / _RADIUS
+    distances = radius(unit.reshape(-1, 3)).reshape(lengths.shape)
+    points: Array = direction * distances[..., None] + foot
+    return points + [AXIS, 0.0, 0.0]
