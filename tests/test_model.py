@@ -1,4 +1,5 @@
 import json
+from dataclasses import replace
 
 import msgspec
 import numpy as np
@@ -203,6 +204,16 @@ class TestFingers:
         with pytest.raises(ModelError) as raised:
             model().predict_proba(recording(index=tactile(which=sensor(3, "big"))))
         assert str(raised.value) == "index: 3 taxels (big) given, the model expects 2 (tiny)"
+
+    def test_readings_in_another_unit_or_turned_taxels(self):
+        known = sensor()
+        newtons = replace(known, unit="N")
+        with pytest.raises(ModelError) as raised:
+            model().fingers_of({"thumb": newtons})
+        assert str(raised.value) == "thumb: readings in N given, the model expects count"
+        turned = replace(known, rotations=known.rotations[:, [1, 2, 0]])
+        with pytest.raises(ModelError, match="turned otherwise"):
+            model().fingers_of({"thumb": turned})
 
     def test_any_finger_of_its_sensor(self):
         part = finger_model(sensor="tiny")

@@ -17,6 +17,7 @@ from holdfast.features.stream import StreamPlan
 from holdfast.files import write_whole
 from holdfast.recordings import Recording
 from holdfast.sensors import Sensor
+from holdfast.sensors.values import ROTATION_TOLERANCE
 
 SCHEMA = "holdfast.model/1"
 ANY_FINGER = "*"
@@ -259,6 +260,15 @@ class Model(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=Tru
             raise ModelError(
                 f"{name}: {sensor.n_taxels} taxels ({sensor.name}) given, the model expects "
                 f"{known.n_taxels} ({known.name})"
+            )
+        if sensor.unit != known.unit:
+            raise ModelError(
+                f"{name}: readings in {sensor.unit} given, the model expects {known.unit}"
+            )
+        if not np.allclose(sensor.rotations, known.rotations, atol=ROTATION_TOLERANCE):
+            raise ModelError(
+                f"{name}: the taxels of {sensor.name} are turned otherwise than those that the "
+                "model was trained with"
             )
 
 

@@ -86,7 +86,10 @@ class Tactile:
         labels = tuple(sorted(self.labels, key=lambda label: label.start))
         object.__setattr__(self, "times", times)
         object.__setattr__(self, "readings", readings)
-        object.__setattr__(self, "unit", self.unit or self.sensor.unit)
+        unit = self.unit or self.sensor.unit
+        if unit != self.sensor.unit:  # calibrated: the limits of the raw readings are not theirs
+            object.__setattr__(self, "sensor", replace(self.sensor, unit=unit, limits=None))
+        object.__setattr__(self, "unit", unit)
         object.__setattr__(self, "labels", labels)
         if labels:
             _check_labels(labels, times, self.period)
