@@ -13,7 +13,16 @@ import numpy as np
 
 from holdfast.compiled import compiled
 from holdfast.sensors.values import Array
-from holdfast.twin.objects import MOST_RELIEF, N_SIZE, N_TEXTURE, Thing, probe, relief, solid
+from holdfast.twin.objects import (
+    AMPLITUDE,
+    MOST_RELIEF,
+    MU_KINETIC,
+    MU_STATIC,
+    Thing,
+    probe,
+    relief,
+    solid,
+)
 from holdfast.twin.surface import Surface
 
 N_BODY = 18
@@ -30,24 +39,18 @@ FX, FY, FZ, TX, TY, TZ = range(6)  # force [N] and torque [N m] on the fingertip
 SLIP, SHARE, LOAD = 6, 7, 8  # slip speed [m/s], share of the load that slips, load [N]
 N_TIP = 9
 
-_RELIEF = 1 + N_SIZE  # amplitude of the texture in Constants.solid
-_STATIC = _RELIEF + N_TEXTURE  # coefficients of friction in it
-_KINETIC = _STATIC + 1
 _FORGOTTEN = 1e-12  # a slip speed [m/s] below which it is none: no denormal numbers
 
-Twelve = tuple[
-    float, float, float, float, float, float, float, float, float, float, float, float
-]
-Six = tuple[float, float, float, float, float, float]
 Three = tuple[float, float, float]
+Nine = tuple[Three, Three, Three]
 
 
 class Skin(NamedTuple):
     """What the skin is made of.
 
     Attributes:
-        stiffness: of the foundation for small depths [N/m^3]. 60 N/m for 9 mm^2: silicone of
-            about 33 kPa, 5 mm thick; a fingertip yields 0.6 to 1.2 mm at 1 to 4 N.
+        stiffness: of the foundation for small depths [N/m^3]. Silicone of 50 kPa (Ecoflex 00-30
+            and its like), 5 mm thick: a fingertip yields 0.9 mm at 1 N, 1.8 mm at 4 N.
         hardening: relative growth of the stiffness with depth [1/m]: twice at 2.5 mm, half of
             the silicone's thickness.
         damping: relative growth of the pressure with the speed of approach [s/m]
@@ -64,7 +67,7 @@ class Skin(NamedTuple):
         slipping: slip speed above which a node counts as slipping [m/s]. Own choice.
     """
 
-    stiffness: float = 60.0 / 9e-6
+    stiffness: float = 1e7
     hardening: float = 1 / 2.5e-3
     damping: float = 1.2
     shear: float = 0.7
@@ -237,12 +240,12 @@ def _dot(a: Three, b: Three) -> float:
 
 
 @compiled
-def _apply(m: tuple[Three, Three, Three], v: Three) -> Three:
+def _apply(m: Nine, v: Three) -> Three:
     return _dot(m[0], v), _dot(m[1], v), _dot(m[2], v)
 
 
 @compiled
-def _back(m: tuple[Three, Three, Three], v: Three) -> Three:
+def _back(m: Nine, v: Three) -> Three:
     """By the transpose."""
     return (
         m[0][0] * v[0] + m[1][0] * v[1] + m[2][0] * v[2],
@@ -252,7 +255,7 @@ def _back(m: tuple[Three, Three, Three], v: Three) -> Three:
 
 
 @compiled
-def _rotation(bodies: Array, i: int) -> tuple[Three, Three, Three]:
+def _rotation(bodies: Array, i: int) -> Nine:
     return (
         (bodies[i, 3], bodies[i, 4], bodies[i, 5]),
         (bodies[i, 6], bodies[i, 7], bodies[i, 8]),
@@ -278,7 +281,7 @@ def _apart(bodies: Array, tip: int, thing: int, at: int) -> Three:
 
 
 @compiled
-def _pose(bodies: Array, tip: int, thing: int) -> tuple[tuple[Three, Three, Three], Three]:
+def _pose(bodies: Array, tip: int, thing: int) -> tuple[Nine, Three]:
     """The fingertip frame in the object's: rotation, offset [m]."""
     finger, back = _rotation(bodies, tip), _rotation(bodies, thing)
     x = _back(back, (finger[0][0], finger[1][0], finger[2][0]))
@@ -298,11 +301,11 @@ def _motion(bodies: Array, tip: int, thing: int, offset: Three) -> tuple[Three, 
 
 
 @compiled
-def _far(constants: Constants, rotation: tuple[Three, Three, Three], offset: Three) -> bool:
+def _far(constants: Constants, rotation: Nine, offset: Three) -> bool:
     """Whether the sphere that holds all nodes is clear of the object."""
     skin, solid = constants.skin, constants.solid
     x, y, z = _sum(_apply(rotation, (skin[9], skin[10], skin[11])), offset)
-    return probe(solid, x, y, z)[0] > skin[12] + MOST_RELIEF * solid[_RELIEF]
+    return bool(probe(solid, x, y, z)[0] > skin[12] + MOST_RELIEF * solid[AMPLITUDE])
 
 
 @compiled
@@ -326,7 +329,7 @@ def _press(
     state: Contact,
     constants: Constants,
     tip: int,
-    rotation: tuple[Three, Three, Three],
+    rotation: Nine,
     offset: Three,
     motion: tuple[Three, Three],
     dt: float,
@@ -338,7 +341,7 @@ def _press(
     """
     nodes, solid, skin = constants
     bristles, forces, row = state.bristles[tip], state.node_forces[tip], state.tips[tip]
-    reach = MOST_RELIEF * solid[_RELIEF]
+    reach = MOST_RELIEF * solid[AMPLITUDE]
     fade = 1.0 - math.exp(-dt / skin[7])
     load, slip, slipping = 0.0, 0.0, 0.0
     force, torque = (0.0, 0.0, 0.0), (0.0, 0.0, 0.0)
@@ -367,7 +370,7 @@ def _press(
             velocity[2] - approach * gz,
         )
         tangential = _stretch(
-            bristles[i], constants, rotation, normal, sliding, -d, nodes[i, 3], pressed, fade, dt
+            bristles, i, solid, skin, rotation, normal, sliding, -d, nodes[i, 3], pressed, fade, dt
         )
         f = (
             pressed * gx + tangential[0],
@@ -399,14 +402,17 @@ def _pressure(skin: Array, stiffness: float, depth: float, leaving: float) -> fl
     if depth <= 0.0:
         return 0.0
     elastic = stiffness * depth * (1.0 + skin[1] * depth)
-    return elastic * max(1.0 - skin[2] * leaving, 0.0)
+    pressed: float = elastic * max(1.0 - skin[2] * leaving, 0.0)
+    return pressed
 
 
 @compiled
 def _stretch(
-    bristle: Array,
-    constants: Constants,
-    rotation: tuple[Three, Three, Three],
+    bristles: Array,
+    i: int,
+    solid: Array,
+    skin: Array,
+    rotation: Nine,
     normal: Three,
     sliding: Three,
     depth: float,
@@ -421,22 +427,19 @@ def _stretch(
     mu N / k_t it is cut back to that (return mapping) and the node slides by what was cut.
     mu = mu_k + (mu_s - mu_k) exp(-v_f / v_s), T = -k_t (b + tau v_t), at most mu N.
     """
-    solid, skin = constants.solid, constants.skin
     kt = skin[3] * stiffness * depth / (depth + skin[4])
-    drop = math.exp(-bristle[SLIDING] / skin[6])
-    limit = pressed * (solid[_KINETIC] + (solid[_STATIC] - solid[_KINETIC]) * drop)
-    b = _apply(rotation, (bristle[BX], bristle[BY], bristle[BZ]))
-    b = _flat(
-        (b[0] + sliding[0] * dt, b[1] + sliding[1] * dt, b[2] + sliding[2] * dt), normal
-    )
+    drop = math.exp(-bristles[i, SLIDING] / skin[6])
+    limit = pressed * (solid[MU_KINETIC] + (solid[MU_STATIC] - solid[MU_KINETIC]) * drop)
+    b = _apply(rotation, (bristles[i, BX], bristles[i, BY], bristles[i, BZ]))
+    b = _flat((b[0] + sliding[0] * dt, b[1] + sliding[1] * dt, b[2] + sliding[2] * dt), normal)
     length = math.sqrt(_dot(b, b))
     slip = 0.0
     if length * kt > limit:
         slip = (length - limit / kt) / dt
         b = _scaled(b, limit / (kt * length))
-    bristle[BX], bristle[BY], bristle[BZ] = _back(rotation, b)
-    smooth = bristle[SLIDING] + fade * (slip - bristle[SLIDING])
-    bristle[SLIDING] = smooth if smooth > _FORGOTTEN else 0.0
+    bristles[i, BX], bristles[i, BY], bristles[i, BZ] = _back(rotation, b)
+    smooth = bristles[i, SLIDING] + fade * (slip - bristles[i, SLIDING])
+    bristles[i, SLIDING] = smooth if smooth > _FORGOTTEN else 0.0
     force = _scaled(_sum(b, _scaled(sliding, skin[5])), -kt)
     square = _dot(force, force)
     if square > limit * limit:

@@ -32,11 +32,16 @@ SHAPES = {
 }
 """What the sizes of each shape are, in order [m]."""
 
-N_SIZE = 6
-"""Numbers of a core: four sizes, its rounding, the height of the centre of mass in it [m]."""
-N_TEXTURE = 5
-"""Numbers of a texture: amplitude [m], two wave numbers along z [rad/m], two about it [1]."""
-
+# Columns of a packed object. Sizes of a core are in 1 to 3 [m]; of a frustum they are the radii
+# and half height, and its side's normal (outward, upward) and length [m] stand beside them.
+CODE = 0
+SIDE_OUT, SIDE_UP, SIDE_LENGTH = 4, 5, 6
+ROUNDING = 7  # by which the core is grown [m]
+CENTRE = 8  # height of the centre of mass over the middle [m]
+N_CORE = 9
+AMPLITUDE, WAVE, WAVE_2, AROUND, AROUND_2 = range(9, 14)  # [m], [rad/m], [rad/m], [1], [1]
+MU_STATIC, MU_KINETIC = 14, 15
+N_SOLID = 16
 LIMITS = {
     "size": (0.001, 0.2),
     "mass": (0.005, 2.0),
@@ -153,6 +158,29 @@ def load_things(path: str | Path | None = None) -> dict[str, Thing]:
 
 
 def _thing(name: str, row: object) -> Thing:
+    shape, numbers = _read(row)
+    size, friction, texture = (numbers[key] for key in ("size", "friction", "texture"))
+    _check(shape, size, friction, texture)
+    volume, centre, moments = _mass_of(_core(shape, size))
+    (mass,) = numbers["mass"]
+    return Thing(
+        name=name,
+        shape=shape,
+        size=size,
+        mass=mass,
+        inertia=moments * (mass / volume),
+        mu_static=friction[0],
+        mu_kinetic=friction[1],
+        texture_amplitude=texture[0],
+        texture_wavelength=texture[1],
+        finger_height=numbers["finger_height"][0],
+        yaw=numbers["yaw"][0],
+        foot=np.array([0.0, 0.0, -size[_height(shape)] - centre]),
+    )
+
+
+def _read(row: object) -> tuple[str, dict[str, tuple[float, ...]]]:
+    """Shape and numbers of a line of the table, by column."""
     columns = ("shape", *LIMITS)
     if not isinstance(row, dict):
         raise ValueError(f"a line of fields expected ({', '.join(columns)})")
@@ -163,29 +191,15 @@ def _thing(name: str, row: object) -> Thing:
     shape = row["shape"]
     if not isinstance(shape, str) or shape not in SHAPES:
         raise ValueError(f"no shape {shape!r}; there are {', '.join(SHAPES)}")
-    size = _numbers(row, "size", SHAPES[shape])
-    mass, height, yaw = (_numbers(row, key)[0] for key in ("mass", "finger_height", "yaw"))
-    friction = _numbers(row, "friction", ("static", "kinetic"))
-    texture = _numbers(row, "texture", ("amplitude", "wavelength"))
-    _check(shape, size, friction, texture)
-    core = pack_size(shape, size)
-    volume, centre, inertia = _mass_of(core)
-    bottom = -size[_height(shape)] - centre
-    return Thing(
-        name,
-        shape,
-        size,
-        mass,
-        inertia * (mass / volume),
-        *friction,
-        *texture,
-        finger_height=height,
-        yaw=yaw,
-        foot=np.array([0.0, 0.0, bottom]),
-    )
+    names = {
+        "size": SHAPES[shape],
+        "friction": ("static", "kinetic"),
+        "texture": ("amplitude", "wavelength"),
+    }
+    return shape, {key: _numbers(row, key, names.get(key, ("",))) for key in LIMITS}
 
 
-def _numbers(row: dict[str, Any], key: str, names: tuple[str, ...] = ("",)) -> tuple[float, ...]:
+def _numbers(row: dict[str, Any], key: str, names: tuple[str, ...]) -> tuple[float, ...]:
     given = row[key] if isinstance(row[key], list) else [row[key]]
     low, high = LIMITS[key]
     if len(given) != len(names):
@@ -232,54 +246,54 @@ def shape_code(shape: str) -> int:
     return codes.get(shape, REVOLVED)
 
 
-def pack_size(shape: str, size: tuple[float, ...]) -> Array:
-    """The core of a shape as numbers.
-
-    Returns:
-        (1 + N_SIZE,) its code, its sizes without the rounding, the rounding, and 0 for the
-        height of the centre of mass [m].
-    """
-    core = np.zeros(1 + N_SIZE)
-    core[0] = shape_code(shape)
-    if core[0] == CAPSULE:
-        core[1], core[5] = size[_height(shape)] - size[0], size[0]
+def _core(shape: str, size: tuple[float, ...]) -> Array:
+    """(N_SOLID,) the smooth shape as numbers: its centre of mass at the middle, no texture."""
+    core = np.zeros(N_SOLID)
+    core[CODE] = shape_code(shape)
+    if shape in ("sphere", "capsule"):
+        core[1], core[ROUNDING] = size[_height(shape)] - size[0], size[0]
         return core
-    rounding = size[-1]
-    sizes = [value - rounding for value in size[:-1]]
+    core[ROUNDING] = size[-1]
+    inner = [value - size[-1] for value in size[:-1]]
     if shape == "cylinder":
-        sizes.insert(0, sizes[0])
-    if shape == "frustum":
-        sizes[:2] = _tapered(*size)
-    core[1 : 1 + len(sizes)] = sizes
-    core[5] = rounding
+        _revolve(core, size[0], size[0], *size[1:])
+    elif shape == "frustum":
+        _revolve(core, *size)
+    else:
+        core[1 : 1 + len(inner)] = inner
     return core
 
 
-def _tapered(foot: float, top: float, half_height: float, rounding: float) -> list[float]:
-    """Radii of the core, whose side runs parallel to the frustum's, one rounding inside."""
-    middle, slope = (foot + top) / 2, (top - foot) / (2 * half_height)
-    inset = rounding * math.hypot(1.0, slope)
-    reach = slope * (half_height - rounding)
-    return [middle - reach - inset, middle + reach - inset]
+def _revolve(core: Array, foot: float, top: float, half_height: float, rounding: float) -> None:
+    """The core's side runs parallel to the frustum's, one rounding inside."""
+    slope = (top - foot) / (2 * half_height)
+    steep = math.hypot(1.0, slope)
+    height = half_height - rounding
+    middle = (foot + top) / 2 - rounding * steep
+    core[1:4] = middle - slope * height, middle + slope * height, height
+    core[SIDE_OUT], core[SIDE_UP] = 1 / steep, -slope / steep
+    core[SIDE_LENGTH] = 2 * height * steep
 
 
 def solid(thing: Thing) -> Array:
     """The object's shape and surface as numbers, for compiled code.
 
     Returns:
-        (1 + N_SIZE + N_TEXTURE + 2,) code, core, texture, static and kinetic friction.
+        (N_SOLID,) code, core, texture, static and kinetic friction.
     """
-    core = pack_size(thing.shape, thing.size)
-    core[N_SIZE] = -thing.half_height - thing.foot[2]
-    return np.concatenate([core, _texture(thing), [thing.mu_static, thing.mu_kinetic]])
+    packed = _core(thing.shape, thing.size)
+    packed[CENTRE] = -thing.half_height - thing.foot[2]
+    packed[AMPLITUDE : AROUND_2 + 1] = _texture(thing)
+    packed[MU_STATIC], packed[MU_KINETIC] = thing.mu_static, thing.mu_kinetic
+    return packed
 
 
-def _texture(thing: Thing) -> Array:
+def _texture(thing: Thing) -> list[float]:
     """Waves about the axis are whole, so that the texture has no seam."""
     wave = 2 * math.pi / thing.texture_wavelength
     short = wave / 0.37
     around = [round(wave * thing.radius), round(short * thing.radius)]
-    return np.array([thing.texture_amplitude, wave, 0.6 * short, *around])
+    return [thing.texture_amplitude, wave, 0.6 * short, *around]
 
 
 def distance_to(thing: Thing, points: npt.ArrayLike) -> Array:
@@ -323,14 +337,14 @@ def relief(solid: Array, x: float, y: float, z: float) -> float:
     Three waves: A (sin a z + 0.7 sin(0.6 b z + b s + 1) + 0.8 sin(a s + 0.3)) with s the arc
     about the axis, a = 2 pi / L and b = a / 0.37 (own choice).
     """
-    a = 1 + N_SIZE
-    if solid[a] == 0.0:
+    if solid[AMPLITUDE] == 0.0:
         return 0.0
     angle = math.atan2(y, x)
-    waves = math.sin(solid[a + 1] * z)
-    waves += 0.7 * math.sin(solid[a + 2] * z + solid[a + 4] * angle + 1.0)
-    waves += 0.8 * math.sin(solid[a + 3] * angle + 0.3)
-    return solid[a] * waves
+    waves = math.sin(solid[WAVE] * z)
+    waves += 0.7 * math.sin(solid[WAVE_2] * z + solid[AROUND_2] * angle + 1.0)
+    waves += 0.8 * math.sin(solid[AROUND] * angle + 0.3)
+    deep: float = solid[AMPLITUDE] * waves
+    return deep
 
 
 MOST_RELIEF = 2.5
@@ -338,16 +352,14 @@ MOST_RELIEF = 2.5
 
 
 @compiled
-def probe(
-    solid: Array, x: float, y: float, z: float
-) -> tuple[float, float, float, float]:
+def probe(solid: Array, x: float, y: float, z: float) -> tuple[float, float, float, float]:
     """The distance of a point from the smooth object, and the gradient of it.
 
     Returns:
         The distance [m], negative inside, and the outward unit vector of its gradient.
     """
-    z += solid[6]
-    code = int(solid[0])
+    z += solid[CENTRE]
+    code = int(solid[CODE])
     if code == BOX:
         d, gx, gy, gz = _box(solid[1], solid[2], solid[3], x, y, z)
     elif code == HEXAGON:
@@ -359,10 +371,10 @@ def probe(
         gx, gy, gz = x * share, y * share, along * share
     else:
         q = math.sqrt(x * x + y * y)
-        d, gq, gz = _meridian(solid[1], solid[2], solid[3], q, z)
+        d, gq, gz = _meridian(solid, q, z)
         share = gq / max(q, 1e-12)
         gx, gy = x * share, y * share
-    return d - solid[5], gx, gy, gz
+    return d - solid[ROUNDING], gx, gy, gz
 
 
 @compiled
@@ -417,13 +429,10 @@ def _hexagon(
 
 
 @compiled
-def _meridian(
-    foot: float, top: float, height: float, q: float, z: float
-) -> tuple[float, float, float]:
+def _meridian(solid: Array, q: float, z: float) -> tuple[float, float, float]:
     """The distance of (radius, height) from a trapezium about the axis, and its gradient."""
-    rise, run = 2.0 * height, top - foot
-    length = math.sqrt(rise * rise + run * run)
-    nq, nz = rise / length, -run / length
+    foot, top, height = solid[1], solid[2], solid[3]
+    nq, nz, length = solid[SIDE_OUT], solid[SIDE_UP], solid[SIDE_LENGTH]
     side = (q - foot) * nq + (z + height) * nz
     tall = abs(z) - height
     if side <= 0.0 and tall <= 0.0:
@@ -454,8 +463,7 @@ def _mass_of(core: Array) -> tuple[float, float, Array]:
     across = (np.arange(math.ceil(wide / step)) + 0.5) * step
     up = (np.arange(2 * math.ceil(tall / step)) + 0.5) * step - math.ceil(tall / step) * step
     x, y, z = (part.ravel() for part in np.meshgrid(across, across, up, indexing="ij"))
-    smooth = np.concatenate([core, np.zeros(N_TEXTURE + 2)])
-    depth = -_distances(smooth, np.stack([x, y, z], axis=1))
+    depth = -_distances(core, np.stack([x, y, z], axis=1))
     cell = 4 * step**3 * np.clip(0.5 + depth / step, 0.0, 1.0)
     volume = float(cell.sum())
     centre = float((cell * z).sum()) / volume
@@ -465,7 +473,7 @@ def _mass_of(core: Array) -> tuple[float, float, Array]:
 
 def _extent(core: Array) -> tuple[float, float]:
     """Half width and half height of the box that holds a core and its rounding [m]."""
-    code, rounding = int(core[0]), float(core[5])
+    code, rounding = int(core[CODE]), float(core[ROUNDING])
     if code == CAPSULE:
         return rounding, float(core[1]) + rounding
     if code == HEXAGON:

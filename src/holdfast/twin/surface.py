@@ -5,6 +5,7 @@ surface through them: a capsule (a half cylinder that ends in a dome) whose radi
 """
 
 from functools import cache
+from itertools import pairwise
 from typing import NamedTuple
 
 import numpy as np
@@ -92,8 +93,7 @@ def _edges() -> list[tuple[float, float]]:
     """Where rows begin and end: length along the skin from the base to the pole [m]."""
     straight, bent = SHOULDER - BASE, np.pi / 2 * _RADIUS
     parts = round((straight + bent) / PITCH)
-    lengths = np.linspace(BASE, SHOULDER + bent, parts + 1).tolist()
-    return list(zip(lengths[:-1], lengths[1:], strict=True))
+    return list(pairwise(np.linspace(BASE, SHOULDER + bent, parts + 1).tolist()))
 
 
 def _row(radius: RBFInterpolator, begin: float, end: float) -> tuple[Array, Array]:
@@ -120,5 +120,6 @@ def _points(radius: RBFInterpolator, lengths: Array, angles: Array) -> Array:
     foot[..., 2] = np.minimum(lengths, SHOULDER)
     unit = direction + foot / _RADIUS
     distances = radius(unit.reshape(-1, 3)).reshape(lengths.shape)
+    foot[..., 0] = AXIS
     points: Array = direction * distances[..., None] + foot
-    return points + [AXIS, 0.0, 0.0]
+    return points
