@@ -4,9 +4,10 @@ import xml.etree.ElementTree as ET
 from pathlib import Path
 
 import numpy as np
+import numpy.typing as npt
 from scipy.spatial.transform import Rotation
 
-from holdfast.sensors.values import Array
+Array = npt.NDArray[np.float64]
 
 
 def taxel_poses(path: Path, base: str, match: str) -> tuple[Array, Array]:
