@@ -397,12 +397,17 @@ def _rest(bristles: Array, forces: Array, i: int) -> None:
 
 
 @compiled
+def _elastic(skin: Array, stiffness: float, depth: float) -> float:
+    """The pressing force of a node at rest, k d (1 + h d) [N]."""
+    return stiffness * depth * (1.0 + skin[1] * depth)
+
+
+@compiled
 def _pressure(skin: Array, stiffness: float, depth: float, leaving: float) -> float:
-    """N = k d (1 + h d) (1 - c v_n), never less than 0 [N]."""
+    """Its pressing force while it leaves, N(d) (1 - c v_n), never less than 0 [N]."""
     if depth <= 0.0:
         return 0.0
-    elastic = stiffness * depth * (1.0 + skin[1] * depth)
-    pressed: float = elastic * max(1.0 - skin[2] * leaving, 0.0)
+    pressed: float = _elastic(skin, stiffness, depth) * max(1.0 - skin[2] * leaving, 0.0)
     return pressed
 
 
@@ -423,11 +428,11 @@ def _stretch(
 ) -> Three:
     """Friction on a node in the object's frame [N]; its bristle moves on.
 
-    The bristle b follows the motion along the surface; k_t = shear k d / (d + d_0). Beyond
+    The bristle b follows the motion along the surface; k_t = shear N(d) / (d + d_0). Beyond
     mu N / k_t it is cut back to that (return mapping) and the node slides by what was cut.
     mu = mu_k + (mu_s - mu_k) exp(-v_f / v_s), T = -k_t (b + tau v_t), at most mu N.
     """
-    kt = skin[3] * stiffness * depth / (depth + skin[4])
+    kt = skin[3] * _elastic(skin, stiffness, depth) / (depth + skin[4])
     drop = math.exp(-bristles[i, SLIDING] / skin[6])
     limit = pressed * (solid[MU_KINETIC] + (solid[MU_STATIC] - solid[MU_KINETIC]) * drop)
     b = _apply(rotation, (bristles[i, BX], bristles[i, BY], bristles[i, BZ]))
