@@ -399,7 +399,8 @@ def _rest(bristles: Array, forces: Array, i: int) -> None:
 @compiled
 def _elastic(skin: Array, stiffness: float, depth: float) -> float:
     """The pressing force of a node at rest, k d (1 + h d) [N]."""
-    return stiffness * depth * (1.0 + skin[1] * depth)
+    force: float = stiffness * depth * (1.0 + skin[1] * depth)
+    return force
 
 
 @compiled
