@@ -45,16 +45,23 @@ class FingerDesign:
         """The samples that those units leave to train from."""
         return self.samples.take(~np.isin(self.units, list(held)))
 
-    def one_sided(self, n_units: int) -> list[int]:
-        """The units without which only one class is left, or none."""
-        counts = np.array(
-            [
-                np.bincount(self.units[self.samples.stable == stable], minlength=n_units)
-                for stable in (False, True)
-            ]
-        )
+    def judged(self, n_units: int) -> npt.NDArray[np.bool_]:
+        """(n_units,) whether it has samples there, and both classes without them."""
+        counts = self._class_counts(n_units)
         left = counts.sum(axis=1, keepdims=True) - counts
-        return np.flatnonzero((left == 0).any(axis=0)).tolist()
+        found: npt.NDArray[np.bool_] = self.present(n_units) & (left > 0).all(axis=0)
+        return found
+
+    def present(self, n_units: int) -> npt.NDArray[np.bool_]:
+        """(n_units,) whether it has samples there."""
+        found: npt.NDArray[np.bool_] = self._class_counts(n_units).sum(axis=0) > 0
+        return found
+
+    def _class_counts(self, n_units: int) -> Integers:
+        """(2, n_units) samples of class 0 and class 1 in each unit."""
+        stable = self.samples.stable
+        parts = (self.units[stable == kind] for kind in (False, True))
+        return np.array([np.bincount(part, minlength=n_units) for part in parts])
 
     def contact_threshold(self, recordings: Sequence[int]) -> float | None:
         """Mean + 5 standard deviations of F_a over those recordings' tare stretches."""

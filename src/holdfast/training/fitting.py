@@ -44,11 +44,21 @@ class Material:
                     "are needed"
                 )
 
-    def one_sided(self) -> dict[str, list[str]]:
-        """By finger: the units without which it has only one class left."""
-        units = self.division.units
-        found = {finger: each.one_sided(len(units)) for finger, each in self.designs.items()}
-        return {finger: [units[k] for k in places] for finger, places in found.items() if places}
+    def not_judged(self) -> dict[str, list[str]]:
+        """By finger: the units without which it has only one class left.
+
+        Raises:
+            TrainingError: that is so for all units of all fingers.
+        """
+        names = np.array(self.division.units)
+        n = len(names)
+        if not any(each.judged(n).any() for each in self.designs.values()):
+            raise TrainingError(
+                f"no finger has both classes left without one {self.division.split}: nothing "
+                "would be judged out of fold"
+            )
+        left_out = {f: each.present(n) & ~each.judged(n) for f, each in self.designs.items()}
+        return {finger: names[units].tolist() for finger, units in left_out.items() if units.any()}
 
 
 def fit_model(

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from holdfast.errors import TrainingError
-from holdfast.recordings import Recording, Tactile
+from holdfast.recordings import Recording
 from holdfast.sensors import Sensor
 
 
@@ -59,18 +59,17 @@ def survey(recordings: Iterable[Recording]) -> Survey:
     """Looks at every recording once, one at a time.
 
     Raises:
-        TrainingError: there is none, none has labels, two have the same samples, or one finger
-            has different sensors or units.
+        TrainingError: there is none, none has labels, two have the same samples or name, or
+            one finger has different sensors.
     """
     entries: list[Entry] = []
-    first: dict[str, Tactile] = {}
+    sensors: dict[str, Sensor] = {}
     for recording in recordings:
         entries.append(_entry(recording))
         for finger in entries[-1].n_labelled:
-            module = recording.modules[finger]
-            _refuse_unlike(f"{finger} of {recording.name!r}", module, first.get(finger, module))
-            first.setdefault(finger, module.slice(0, 0))
-    sensors = {finger: module.sensor for finger, module in first.items()}
+            found = recording.modules[finger].sensor
+            known = sensors.setdefault(finger, found)
+            _refuse_unlike(f"{finger} of {recording.name!r}", found, known)
     if not entries:
         raise TrainingError("no recordings given; at least one expected")
     if not sensors:
@@ -95,19 +94,20 @@ def _entry(recording: Recording) -> Entry:
     )
 
 
-def _refuse_unlike(what: str, module: Tactile, known: Tactile) -> None:
-    if module.sensor != known.sensor:
-        raise TrainingError(
-            f"{what} has the sensor {module.sensor.name} ({module.sensor.n_taxels} taxels), "
-            f"that of others {known.sensor.name} ({known.sensor.n_taxels})"
-        )
-    if module.unit != known.unit:
-        raise TrainingError(f"{what} has readings in {module.unit}, others in {known.unit}")
+def _refuse_unlike(what: str, sensor: Sensor, known: Sensor) -> None:
+    if sensor != known:
+        given, expected = (f"{s.name} ({s.n_taxels} taxels, {s.unit})" for s in (sensor, known))
+        where = "" if given != expected else ", laid out in another way"
+        raise TrainingError(f"{what} has the sensor {given}, that of others {expected}{where}")
 
 
 def _refuse_copies(entries: list[Entry]) -> None:
     seen: dict[str, str] = {}
+    names: set[str] = set()
     for entry in entries:
+        if entry.name in names:
+            raise TrainingError(f"two recordings are called {entry.name!r}; each needs its own")
+        names.add(entry.name)
         if entry.digest in seen:
             raise TrainingError(
                 f"recordings {seen[entry.digest]!r} and {entry.name!r} hold the same samples: "

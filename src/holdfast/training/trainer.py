@@ -9,7 +9,6 @@ from typing import Protocol, TypeVar
 import msgspec
 
 from holdfast.classifiers import Parameters, Samples
-from holdfast.errors import TrainingError
 from holdfast.metrics import Decisions, Metrics, summarise
 from holdfast.model import ANY_FINGER, Model, Training
 from holdfast.parallel import each
@@ -112,15 +111,7 @@ class _Trainer:
             TrainingError: a finger has only one class; or there is no figure at all.
         """
         self.material.check_classes()
-        one_sided = self.material.one_sided()
-        n_units = len(self.division.units)
-        if all(len(one_sided.get(finger, ())) == n_units for finger in self.designs):
-            finger, names = next(iter(one_sided.items()))
-            raise TrainingError(
-                f"{finger} has labels of only one class left without {names[0]}, and so for "
-                f"every {self.setting.split} and finger: nothing would be judged out of fold"
-            )
-        for finger, names in one_sided.items():
+        for finger, names in self.material.not_judged().items():
             some = ", ".join(names[:3]) + (" ..." if len(names) > 3 else "")
             self.tell(
                 f"{finger} has labels of only one class left without {some}: not judged there"

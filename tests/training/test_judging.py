@@ -1,0 +1,89 @@
+import weakref
+
+import numpy as np
+import pytest
+
+from holdfast.contact import STABLE, UNKNOWN
+from holdfast.detector import detect
+from holdfast.errors import ModelError
+from holdfast.metrics import hand_decisions
+from holdfast.model import Model
+from holdfast.training import Setting, decisions_of, evaluate, train
+from holdfast.training.judging import pick
+
+from .build import tiny_recording
+
+
+@pytest.fixture(scope="module")
+def model(grasps):
+    return train(grasps, Setting(trials=0, window=6)).model
+
+
+def test_decisions_are_the_detectors_beside_the_labels(model, grasps):
+    decisions = decisions_of(model, grasps[0])
+    detection = detect(model, grasps[0])
+    assert decisions.name == "grasp-0"
+    for finger, trace in detection.fingers.items():
+        found = decisions.fingers[finger]
+        np.testing.assert_array_equal(found.states, trace.state)
+        np.testing.assert_array_equal(found.stable_probability, trace.stable_probability)
+        np.testing.assert_array_equal(found.labels, grasps[0].modules[finger].label_states)
+    np.testing.assert_array_equal(decisions.hand.states, detection.hand)
+    np.testing.assert_array_equal(decisions.hand.times, detection.times)
+    expected = hand_decisions(decisions.fingers, 2)
+    np.testing.assert_array_equal(decisions.hand.labels, expected.labels)
+
+
+def test_labels_of_a_recording_at_another_rate(model):
+    fast = tiny_recording(31, n=1200, rate=300.0)
+    finger = decisions_of(model, fast).fingers["thumb"]
+    assert len(finger.times) == pytest.approx(400, abs=1)
+    assert (finger.labels == STABLE).mean() == pytest.approx(0.5, abs=0.01)
+
+
+def test_without_labels_nothing_is_counted(model):
+    bare = tiny_recording(32, states=[None] * 4)
+    metrics = evaluate(model, [bare])
+    assert (metrics.pooled.n, metrics.pooled.accuracy) == (0, None)
+
+
+def test_one_recording_at_a_time_is_held(model):
+    alive = weakref.WeakSet()
+
+    def lazy():
+        for seed in range(5):
+            recording = tiny_recording(seed)
+            alive.add(recording)
+            assert len(alive) <= 2  # this one, and the last until the loop moves on
+            yield recording
+            del recording
+
+    assert evaluate(model, lazy()).pooled.n == 5 * 2 * (400 - 50 - 13)
+
+
+def test_a_built_in_model(grasps):
+    metrics = evaluate(Model.load("builtin:noise-floor"), grasps)
+    assert metrics.pooled.n > 0
+
+
+def test_a_model_for_other_fingers(model):
+    with pytest.raises(ModelError) as refusal:
+        evaluate(model, [tiny_recording(0, fingers=("ring",))])
+    assert str(refusal.value) == "the model judges thumb, index; ring given"
+
+
+def test_pick_takes_each_sample_from_the_judge_that_its_unit_names(grasps):
+    settings = [Setting(trials=0, window=window) for window in (4, 10)]
+    judged = [decisions_of(train(grasps[:2], each).model, grasps[3]) for each in settings]
+    units = np.random.default_rng(0).integers(2, size=400)
+    found = pick(judged, lambda n: units[:n], 2)
+    for name, finger in found.fingers.items():
+        for k in (0, 1):
+            rows = units == k
+            expected = judged[k].fingers[name]
+            np.testing.assert_array_equal(finger.states[rows], expected.states[rows])
+            np.testing.assert_array_equal(
+                finger.stable_probability[rows], expected.stable_probability[rows]
+            )
+    np.testing.assert_array_equal(found.hand.states, hand_decisions(found.fingers, 2).states)
+    assert (found.hand.states[:50] == UNKNOWN).all()

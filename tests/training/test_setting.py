@@ -1,0 +1,43 @@
+import pytest
+
+from holdfast.training import Setting
+
+
+def test_the_defaults_are_those_of_the_deployed_model():
+    setting = Setting()
+    assert [str(feature) for feature in setting.features] == [
+        "F_a", "F_x", "F_y", "F_z", "sigma[14]"
+    ]  # fmt: skip
+    assert (setting.classifier, setting.window, str(setting.tare)) == ("logreg", 14, "0.5")
+    assert (setting.split, setting.trials) == ("recording", 30)
+
+
+@pytest.mark.parametrize(
+    ("given", "message"),
+    [
+        ({"classifier": "magic"}, "unknown classifier 'magic'; there are logreg, svm"),
+        ({"window": 13}, "an even window of at least 2 samples expected, 13 given"),
+        ({"split": "half"}, "unknown split 'half'; there are recording, object, random"),
+        (
+            {"trials": -1},
+            "trials of at least 0 and samples of at least 1 expected; -1 and 200000 given",
+        ),
+        (
+            {"max_samples": 0},
+            "trials of at least 0 and samples of at least 1 expected; 30 and 0 given",
+        ),
+        ({"seed": -1}, "a seed from 0 to 2^32 - 1 expected, -1 given"),
+        (
+            {"contact_threshold": -1.0},
+            "a contact threshold of at least 0 expected, -1.0 given",
+        ),
+        (
+            {"contact_threshold": float("nan")},
+            "a contact threshold of at least 0 expected, nan given",
+        ),
+    ],
+)
+def test_refusals(given, message):
+    with pytest.raises(ValueError) as refusal:
+        Setting(**given)
+    assert str(refusal.value) == message

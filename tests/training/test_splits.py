@@ -1,0 +1,94 @@
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from holdfast.classifiers import Samples
+from holdfast.errors import TrainingError
+from holdfast.training.splits import RANDOM_FOLDS, divide, inner_folds
+from holdfast.training.survey import Entry
+
+
+def entries(*objects):
+    return [Entry(f"grasp-{k}", str(k), thing, 100.0, {}) for k, thing in enumerate(objects)]
+
+
+def test_a_unit_of_the_split_by_recording_is_a_recording():
+    division = divide(entries("can", "can", None), "recording", 0)
+    assert division.units == ("grasp-0", "grasp-1", "grasp-2")
+    assert division.units_of(2, 4).tolist() == [2] * 4
+    assert division.recordings_without({1}) == [0, 2]
+
+
+def test_a_unit_of_the_split_by_object_is_all_its_recordings():
+    division = divide(entries("can", "egg", "can"), "object", 0)
+    assert division.units == ("can", "egg")
+    assert [division.units_of(place, 1)[0] for place in range(3)] == [0, 1, 0]
+    assert division.recordings_without({0}) == [1]
+
+
+@given(seed=st.integers(0, 2**32 - 1), place=st.integers(0, 50))
+def test_random_fifths(seed, place):
+    division = divide(entries("can"), "random", seed)
+    units = division.units_of(place, 2000)
+    assert (units == division.units_of(place, 2000)).all()
+    shares = np.bincount(units, minlength=RANDOM_FOLDS) / 2000
+    assert shares == pytest.approx(0.2, abs=0.06)
+    assert division.recordings_without({0}) == [0]
+
+
+def test_random_fifths_differ_by_recording_and_seed():
+    division = divide(entries("can", "can"), "random", 0)
+    other = divide(entries("can", "can"), "random", 1)
+    assert (division.units_of(0, 100) != division.units_of(1, 100)).any()
+    assert (division.units_of(0, 100) != other.units_of(0, 100)).any()
+    assert division.group_of.tolist() == [0, 1]  # a search never parts a recording
+
+
+@pytest.mark.parametrize(
+    ("objects", "split", "message"),
+    [
+        (
+            ["can", None],
+            "object",
+            "recording 'grasp-1' does not say its object ('object' in its metadata); the split "
+            "by object needs it of every recording",
+        ),
+        (["can", "can"], "object", "the split by object needs at least two, 1 given (can)"),
+        (["can"], "recording", "the split by recording needs at least two, 1 given (grasp-0)"),
+    ],
+)
+def test_refusals(objects, split, message):
+    with pytest.raises(TrainingError) as refusal:
+        divide(entries(*objects), split, 0)
+    assert str(refusal.value) == message
+
+
+def samples(stable, groups):
+    return Samples(np.zeros((len(stable), 1)), np.array(stable, bool), np.array(groups))
+
+
+@given(n_groups=st.integers(2, 12), n_folds=st.integers(2, 6), seed=st.integers(0, 99))
+def test_inner_folds_hold_out_every_sample_once_and_whole_groups(n_groups, n_folds, seed):
+    groups = np.repeat(np.arange(n_groups), 4)
+    masks = inner_folds(samples([0, 1] * (2 * n_groups), groups), n_folds, seed)
+    assert len(masks) == min(n_groups, n_folds)
+    assert (np.sum(masks, axis=0) == 1).all()
+    for mask in masks:
+        assert not set(groups[mask]) & set(groups[~mask])
+
+
+def test_inner_folds_leave_out_those_without_both_classes():
+    given_samples = samples([0, 0, 0, 1, 0, 1], [0, 0, 1, 1, 2, 2])
+    held = [set(given_samples.groups[mask]) for mask in inner_folds(given_samples, 3, 0)]
+    assert sorted(held, key=str) == [{1}, {2}]
+
+
+def test_inner_folds_leave_out_those_that_leave_one_class():
+    # Without group 1 nothing stable is left; without group 0 both classes are.
+    masks = inner_folds(samples([0, 0, 0, 1], [0, 0, 1, 1]), 5, 0)
+    assert masks == []
+
+
+def test_inner_folds_of_nothing():
+    assert inner_folds(samples([], []), 5, 0) == []

@@ -1,0 +1,83 @@
+from dataclasses import replace
+
+import pytest
+
+from holdfast.errors import TrainingError
+from holdfast.recordings import Recording
+from holdfast.training.survey import survey
+
+from .build import TINY, tiny_module, tiny_recording
+
+WIDE = replace(TINY, name="wide", positions=TINY.positions.repeat(2, 0),
+               rotations=TINY.rotations.repeat(2, 0))  # fmt: skip
+
+
+def test_what_is_found(grasps):
+    found = survey(iter(grasps))
+    assert [entry.name for entry in found.entries] == [each.name for each in grasps]
+    assert [entry.digest for entry in found.entries] == [each.digest for each in grasps]
+    assert found.entries[4].object == "object 1"
+    assert found.entries[0].n_labelled == {"thumb": 400, "index": 400}
+    assert found.sensors == {"thumb": TINY, "index": TINY}
+    assert found.rate == pytest.approx(100.0)
+    assert found.n_labelled == 2400
+
+
+def test_fingers_without_labels_do_not_count(grasps):
+    bare = grasps[0].with_labels({"thumb": grasps[0].modules["thumb"].labels})
+    assert set(survey([bare]).sensors) == {"thumb"}
+
+
+def test_the_rate_is_the_median():
+    given = [tiny_recording(seed, rate=rate) for seed, rate in enumerate([100.0, 50.0, 105.0])]
+    assert survey(given).rate == pytest.approx(100.0)
+
+
+def same_samples():
+    one = tiny_recording(0)
+    return [one, tiny_recording(1), replace(one, name="copy", metadata={"object": "another"})]
+
+
+@pytest.mark.parametrize(
+    ("given", "message"),
+    [
+        ([], "no recordings given; at least one expected"),
+        (
+            [tiny_recording(seed, states=[None] * 4) for seed in range(2)],
+            "none of the 2 recordings has labels to train from",
+        ),
+        (
+            same_samples(),
+            "recordings 'grasp-0' and 'copy' hold the same samples: one would test what the "
+            "other trained",
+        ),
+        (
+            [tiny_recording(0), replace(tiny_recording(1), name="grasp-0")],
+            "two recordings are called 'grasp-0'; each needs its own",
+        ),
+        (
+            [tiny_recording(0), tiny_recording(1, sensor=WIDE)],
+            "thumb of 'grasp-1' has the sensor wide (2 taxels, count), that of others tiny "
+            "(1 taxels, count)",
+        ),
+        (
+            [tiny_recording(0), tiny_recording(1, unit="N")],
+            "thumb of 'grasp-1' has the sensor tiny (1 taxels, N), that of others tiny "
+            "(1 taxels, count)",
+        ),
+        (
+            [tiny_recording(0), tiny_recording(1, sensor=replace(TINY, rate=99.0))],
+            "thumb of 'grasp-1' has the sensor tiny (1 taxels, count), that of others tiny "
+            "(1 taxels, count), laid out in another way",
+        ),
+    ],
+)
+def test_refusals(given, message):
+    with pytest.raises(TrainingError) as refusal:
+        survey(given)
+    assert str(refusal.value) == message
+
+
+def test_another_sensor_without_labels_is_none_of_our_business():
+    other = Recording("other", {"thumb": tiny_module(9, sensor=WIDE, states=[None] * 4)})
+    assert survey([tiny_recording(0), other]).sensors["thumb"] == TINY

@@ -1,0 +1,371 @@
+"""Training as a whole: who saw what, what comes out, and what is refused."""
+
+from dataclasses import replace
+
+import msgspec
+import numpy as np
+import pytest
+
+from holdfast.classifiers import Samples, recipe
+from holdfast.contact import STABLE, UNSTABLE, ContactState
+from holdfast.errors import TrainingError
+from holdfast.features import Tare, parse_features
+from holdfast.metrics import summarise
+from holdfast.recordings import Recording
+from holdfast.training import Setting, decisions_of, train, trainer
+from holdfast.training.fitting import fit_model
+from holdfast.training.splits import divide
+from holdfast.training.survey import survey
+
+from .build import TINY, tiny_module, tiny_recording
+
+SETTING = Setting(window=6, features=parse_features("F_a,F_x,sigma", 6), trials=0)
+QUICK = replace(SETTING, trials=3)
+ONE_CLASS = (ContactState.NO_CONTACT, None, ContactState.UNSTABLE, None)
+
+
+def by_name(metrics):
+    return {each.name: each for each in metrics.recordings}
+
+
+# --- honesty ---------------------------------------------------------------------------------
+
+
+def fitted_by(recordings, setting, monkeypatch, **options):
+    """The groups that each fit of the figures was given, with what was held out."""
+    seen = []
+
+    def spy(material, given, parameters, held):
+        designs = material.designs.values()
+        seen.extend((set(held), set(each.without(held).groups.tolist())) for each in designs)
+        return fit_model(material, given, parameters, held)
+
+    monkeypatch.setattr(trainer, "fit_model", spy)
+    train(recordings, setting, **options)
+    return seen
+
+
+@pytest.mark.parametrize("split", ["recording", "object"])
+def test_no_model_of_the_figures_has_seen_what_it_judges(grasps, split, monkeypatch):
+    setting = replace(QUICK, split=split)
+    division = divide(survey(grasps).entries, split, 0)
+    found = fitted_by(grasps, setting, monkeypatch)
+    every = set(range(len(division.units)))
+    assert [held for held, _ in found[::2]] == [{unit} for unit in sorted(every)]
+    for held, groups in found:
+        assert groups == every - held
+
+
+@pytest.mark.parametrize("split", ["recording", "object"])
+def test_no_search_for_the_figures_has_seen_what_they_judge(grasps, split, monkeypatch):
+    """Parameters of a unit's model come from a search without that unit."""
+    searched, judged = {}, {}
+
+    def spy_search(samples, setting, finger, journal):
+        token = float(len(searched) + 1)
+        searched[token] = set(samples.groups.tolist())
+        return {"C": token, "class_weight": None}, ""
+
+    def spy_fit(material, setting, parameters, held):
+        judged[min(held)] = [given["C"] for given in parameters.values()]
+        return fit_model(material, setting, parameters, held)
+
+    monkeypatch.setattr(trainer, "_search", spy_search)
+    monkeypatch.setattr(trainer, "fit_model", spy_fit)
+    train(grasps, replace(QUICK, split=split))
+    n_units = 6 if split == "recording" else 3
+    n_searches = min(5, n_units)
+    assert len(searched) == 2 * (1 + n_searches)  # two fingers, and once for the model itself
+    assert set(judged) == set(range(n_units))
+    for unit, tokens in judged.items():
+        for token in tokens:
+            assert unit not in searched[token]
+
+
+def test_what_cannot_be_learnt_is_not_learnt():
+    """Labels by the toss of a coin for each recording: only a leak would beat chance.
+
+    Features tell recordings apart by their grip, so that a model which saw the recording that
+    it judges knows its labels by heart.
+    """
+    rng = np.random.default_rng(3)
+    stable, not_stable = ContactState.STABLE, ContactState.UNSTABLE
+    recordings = []
+    for seed in range(24):
+        toss = (stable, not_stable) if rng.random() < 0.5 else (not_stable, stable)
+        states = (None, toss[0], None, toss[1])
+        recordings.append(tiny_recording(seed, ("thumb",), states=states))
+    metrics = train(recordings, SETTING).cross_validation
+    assert metrics.pooled.accuracy < 60
+
+
+def test_out_of_fold_figures_are_those_of_the_folds_own_models(grasps):
+    """Anew, from a model that was trained on the other recordings alone."""
+    trained = train(grasps, SETTING)
+    judged = []
+    for place, recording in enumerate(grasps):
+        others = [other for k, other in enumerate(grasps) if k != place]
+        judged.append(decisions_of(train(others, SETTING).model, recording))
+    expected = summarise(judged)
+    assert trained.cross_validation.pooled.confusion == expected.pooled.confusion
+    assert trained.cross_validation.pooled.auc == pytest.approx(expected.pooled.auc)
+    assert trained.cross_validation.events == expected.events
+
+
+def test_a_random_sample_is_judged_by_the_model_without_it(grasps, monkeypatch):
+    """Every fold's classifier says another constant probability."""
+    calls = []
+
+    class Marked:
+        name, reference = "logreg", recipe("logreg").reference
+
+        def fit(self, samples, parameters, seed):
+            fit = recipe("logreg").fit(samples, parameters, seed)
+            calls.append(len(samples.stable))
+            number = len(calls) - 1  # two fingers of the whole, then two of each fold
+            return msgspec.structs.replace(
+                fit,
+                coefficients=(0.0,) * 3,
+                intercept=0.1 * number,
+                slope=1.0,
+                offset=0.0,
+                threshold=0.5,
+            )
+
+    monkeypatch.setattr(Setting, "recipe", Marked())
+    told = []
+    monkeypatch.setattr(trainer, "summarise", lambda judged, seed: told.extend(judged) or _some())
+    train(grasps, replace(SETTING, split="random"))
+    for place, decisions in enumerate(told):
+        units = divide(survey(grasps).entries, "random", 0).units_of(place, 400)
+        for k, finger in enumerate(decisions.fingers.values()):
+            number = 2 + 2 * units + k
+            expected = 1 / (1 + np.exp(-0.1 * number))
+            known = np.isin(finger.states, (STABLE, UNSTABLE))
+            assert known.sum() > 250
+            np.testing.assert_allclose(finger.stable_probability[known], expected[known])
+    assert [n / calls[0] for n in calls[2:]] == pytest.approx([0.8] * 10, abs=0.04)
+
+
+def _some():
+    return summarise([])
+
+
+# --- what comes out --------------------------------------------------------------------------
+
+
+def test_the_model_says_where_it_came_from(grasps):
+    trained = train(grasps, QUICK)
+    told = trained.model.training
+    assert told.recordings == {each.name: each.digest for each in grasps}
+    assert (told.split, told.seed) == ("recording", 0)
+    assert set(told.parameters) == {"thumb", "index"}
+    assert told.figures["auc"] == trained.cross_validation.pooled.auc
+    assert set(told.versions) == {"holdfast", "numpy", "scikit-learn"}
+    assert trained.model.rate == pytest.approx(100.0)
+    assert trained.model.sensors == {"tiny": TINY}
+
+
+def test_the_same_seed_gives_the_same_model(grasps):
+    given = grasps[:3]
+    assert train(given, QUICK) == train(given, QUICK)
+
+
+@pytest.mark.parametrize("split", ["recording", "random"])
+def test_side_by_side_gives_the_same(grasps, split, tmp_path):
+    setting, given = replace(QUICK, split=split), grasps[:3]
+    alone = train(given, setting, journal=tmp_path / "alone")
+    assert train(given, setting, journal=tmp_path / "together", n_jobs=2) == alone
+
+
+def test_a_stopped_training_ends_where_it_would_have_ended(grasps, tmp_path, monkeypatch):
+    whole = train(grasps, QUICK, journal=tmp_path / "whole")
+    n_fits = []
+    fit = type(recipe("logreg")).fit
+
+    def stops(self, samples, parameters, seed):
+        n_fits.append(1)
+        if len(n_fits) == 70:
+            raise KeyboardInterrupt
+        return fit(self, samples, parameters, seed)
+
+    with monkeypatch.context() as patch:
+        patch.setattr(type(recipe("logreg")), "fit", stops)
+        with pytest.raises(KeyboardInterrupt):
+            train(grasps, QUICK, journal=tmp_path / "stopped")
+    kept = (tmp_path / "stopped").read_bytes()
+    assert train(grasps, QUICK, journal=tmp_path / "stopped") == whole
+    assert (tmp_path / "stopped").read_bytes().startswith(kept)
+
+
+@pytest.mark.parametrize(
+    ("asked", "found"),
+    [
+        ({"contact_threshold": 7.5}, 7.5),
+        ({"contact_threshold": 7.5, "tare": Tare.parse("first")}, 7.5),
+        ({"contact_threshold": 0.0}, 0.0),
+        ({"tare": Tare.parse("first")}, None),
+        ({"tare": Tare.parse("none")}, None),
+    ],
+)
+def test_the_contact_threshold_of_the_model(grasps, asked, found):
+    model = train(grasps, replace(SETTING, **asked)).model
+    assert {finger.contact_threshold for finger in model.fingers.values()} == {found}
+
+
+def test_the_contact_threshold_of_a_fold_is_without_what_it_judges(grasps):
+    """One recording's tare stretch is far noisier; only its own fold may ignore that."""
+    module = grasps[0].modules["thumb"]
+    loud = module.readings.copy()
+    loud[:50] += np.random.default_rng(0).normal(0, 500, size=(50, 1, 3))
+    noisy = Recording("loud", {"thumb": replace(module, readings=loud)})
+    calm = [tiny_recording(seed, ("thumb",)) for seed in range(1, 4)]
+    found = survey([noisy, *calm])
+    division = divide(found.entries, "recording", 0)
+    material = trainer.Material(
+        found, division, trainer.gather([noisy, *calm], found, SETTING, division)
+    )
+    parameters = {"thumb": recipe("logreg").reference}
+    thresholds = [
+        fit_model(material, SETTING, parameters, {unit}).fingers["thumb"].contact_threshold
+        for unit in range(4)
+    ]
+    assert thresholds[0] < 100 < min(thresholds[1:])
+
+
+def test_a_shared_model(grasps):
+    model = train(grasps, replace(QUICK, shared=True)).model
+    assert set(model.fingers) == {"*"}
+    assert set(model.training.parameters) == {"*"}
+    stranger = tiny_recording(20, fingers=("ring",))
+    assert set(decisions_of(model, stranger).fingers) == {"ring"}
+
+
+def test_max_samples_keeps_training_deterministic(grasps):
+    setting = replace(QUICK, max_samples=300)
+    assert train(grasps, setting) == train(grasps, setting)
+
+
+# --- what is missing -------------------------------------------------------------------------
+
+
+def test_fewer_than_two_usable_folds_give_the_reference_setting_and_a_warning():
+    told = []
+    given = [tiny_recording(seed, ("thumb",)) for seed in range(2)]
+    trained = train(given, QUICK, tell=told.append)
+    # Two recordings make two folds for the model itself, but one for each of the figures.
+    assert told == [
+        "thumb: 0 of the folds by recording hold both classes, 2 needed to search for "
+        "parameters; the reference setting is taken"
+    ]
+    assert trained.cross_validation.pooled.n == 2 * 345
+    found, warning = trainer._search(
+        Samples(np.zeros((4, 1)), np.array([0, 1, 0, 1], bool), np.zeros(4, int)),
+        QUICK,
+        "thumb",
+        None,
+    )
+    assert found == recipe("logreg").reference
+    assert warning == told[0]
+
+
+def test_fingers_may_be_missing_from_some_recordings(grasps):
+    given = [*grasps[:3], tiny_recording(21, fingers=("thumb",))]
+    trained = train(given, SETTING)
+    assert set(trained.model.fingers) == {"thumb", "index"}
+    assert set(by_name(trained.cross_validation)["grasp-21"].fingers) == {"thumb"}
+
+
+def test_a_finger_of_one_recording_is_trained_but_not_judged(grasps):
+    told = []
+    given = [*grasps[:3], tiny_recording(22, fingers=("thumb", "ring"))]
+    trained = train(given, SETTING, tell=told.append)
+    assert told == ["ring has labels of only one class left without grasp-22: not judged there"]
+    assert set(trained.model.fingers) == {"thumb", "index", "ring"}
+    assert set(by_name(trained.cross_validation)["grasp-22"].fingers) == {"thumb"}
+
+
+def test_a_recording_whose_fingers_nobody_else_has(grasps):
+    given = [*grasps[:3], tiny_recording(23, fingers=("ring",))]
+    trained = train(given, SETTING, tell=lambda _: None)
+    assert by_name(trained.cross_validation)["grasp-23"].fingers == {}
+
+
+def test_a_recording_without_labels_is_not_judged(grasps):
+    bare = tiny_recording(24, fingers=("palm/1",), states=[None] * 4)
+    trained = train([*grasps[:3], bare], SETTING)
+    assert by_name(trained.cross_validation)["grasp-24"].fingers == {}
+
+
+def test_recordings_with_one_class_help_those_with_both(grasps):
+    given = [*grasps[:2], tiny_recording(25, states=ONE_CLASS)]
+    metrics = train(given, SETTING).cross_validation
+    assert by_name(metrics)["grasp-25"].fingers["thumb"].auc is None
+    assert metrics.pooled.auc is not None
+
+
+@pytest.mark.parametrize("split", ["recording", "random"])
+def test_another_rate_is_judged_at_the_models(grasps, split):
+    fast = tiny_recording(26, n=1200, rate=300.0)
+    metrics = train([*grasps, fast], replace(SETTING, split=split)).cross_validation
+    assert by_name(metrics)["grasp-26"].fingers["thumb"].n == pytest.approx(345, abs=3)
+
+
+@pytest.mark.parametrize(
+    ("given", "split", "message"),
+    [
+        (
+            [tiny_recording(seed, states=ONE_CLASS) for seed in range(2)],
+            "recording",
+            "thumb: 0 samples labelled stable and 290 labelled not stable; both classes are needed",
+        ),
+        (
+            [tiny_recording(0)],
+            "recording",
+            "the split by recording needs at least two, 1 given (grasp-0)",
+        ),
+        (
+            [tiny_recording(0), Recording("bare", {"thumb": tiny_module(1)})],
+            "object",
+            "recording 'bare' does not say its object ('object' in its metadata); the split by "
+            "object needs it of every recording",
+        ),
+        (
+            [tiny_recording(0, ("thumb",)), tiny_recording(1, ("index",))],
+            "recording",
+            "no finger has both classes left without one recording: nothing would be judged "
+            "out of fold",
+        ),
+    ],
+)
+def test_refusals(given, split, message):
+    setting = replace(SETTING, split=split)
+    with pytest.raises(TrainingError) as refusal:
+        train(given, setting)
+    assert str(refusal.value) == message
+
+
+def test_a_window_longer_than_the_data(grasps):
+    setting = replace(SETTING, window=1000, features=parse_features("sigma", 1000))
+    with pytest.raises(TrainingError) as refusal:
+        train(grasps, setting)
+    assert str(refusal.value) == (
+        "thumb: 0 samples labelled stable and 0 labelled not stable; both classes are needed"
+    )
+
+
+def test_what_takes_long_can_be_followed(grasps):
+    told = []
+
+    def follow(items, what, total):
+        told.append((what, total))
+        return iter(items)
+
+    train(grasps, QUICK, follow=follow)
+    assert told == [
+        ("reading", 6),
+        ("features", 6),
+        ("searching", 12),
+        ("fitting", 6),
+        ("judging", 6),
+    ]

@@ -1,0 +1,125 @@
+import numpy as np
+import pytest
+
+from holdfast.classifiers import Samples, recipe
+from holdfast.training.splits import inner_folds
+from holdfast.training.tuning import search
+
+
+def blobs(seed=0, n=240, n_groups=6):
+    """Two overlapping clouds; groups are shifted against each other."""
+    rng = np.random.default_rng(seed)
+    groups = np.repeat(np.arange(n_groups), n // n_groups)
+    stable = rng.random(n) < 0.4
+    features = (
+        rng.normal(size=(n, 3)) + 0.8 * stable[:, None] + rng.normal(size=(n_groups, 3))[groups]
+    )
+    return Samples(features, stable, groups)
+
+
+class Spy:
+    """A way of fitting that notes what it is asked, and may stop like a killed process."""
+
+    def __init__(self, name="logreg", stops_after=None):
+        self._recipe = recipe(name)
+        self.name = name
+        self.reference = self._recipe.reference
+        self.suggest = self._recipe.suggest
+        self.asked = []
+        self.fitted = []
+        self.stops_after = stops_after
+
+    def fit(self, samples, parameters, seed):
+        if self.stops_after is not None and len(self.asked) == self.stops_after:
+            raise KeyboardInterrupt
+        self.asked.append(dict(parameters))
+        self.fitted.append(samples)
+        return self._recipe.fit(samples, parameters, seed)
+
+
+def run(spy, *, n_trials=8, seed=0, journal=None, samples=None):
+    samples = blobs() if samples is None else samples
+    folds = inner_folds(samples, 3, seed)
+    return search(samples, folds, spy, n_trials=n_trials, seed=seed, journal=journal)
+
+
+@pytest.mark.parametrize("name", ["logreg", "svm"])
+def test_the_same_seed_finds_the_same(name):
+    one, two = Spy(name), Spy(name)
+    assert run(one) == run(two)
+    assert one.asked == two.asked
+    assert run(Spy(name), seed=1) is not None
+
+
+def test_another_seed_tries_others():
+    one, two = Spy(), Spy()
+    run(one)
+    run(two, seed=1)
+    assert one.asked[3] != two.asked[3]
+
+
+def test_the_first_trial_is_the_reference_setting():
+    spy = Spy()
+    assert run(spy, n_trials=1) == spy.reference
+    assert spy.asked == [spy.reference] * 3
+
+
+def test_the_best_by_log_loss_is_taken():
+    """Computed anew from the definition for everything that was tried."""
+    spy, samples = Spy(), blobs()
+    best = run(spy, samples=samples)
+    tried = {repr(asked): asked for asked in spy.asked}.values()
+
+    def loss(parameters):
+        logs = []
+        for held in inner_folds(samples, 3, 0):
+            fit = recipe("logreg").fit(samples.take(~held), parameters, 0)
+            p = fit.probability(samples.features[held])
+            logs += np.log(np.where(samples.stable[held], p, 1 - p)).tolist()
+        return -np.mean(logs)
+
+    assert len(tried) == 8
+    assert best == min(tried, key=loss)
+
+
+def test_no_fit_sees_the_group_that_it_is_scored_on():
+    spy, samples = Spy(), blobs()
+    run(spy, n_trials=2, samples=samples)
+    every = set(range(6))
+    left_out = [every - set(fitted.groups) for fitted in spy.fitted]
+    assert [len(groups) for groups in left_out] == [2] * 6
+    assert set.union(*left_out[:3]) == every
+
+
+@pytest.mark.parametrize("stops_after", [0, 1, 2, 3, 4, 10, 13, 23])
+def test_a_stopped_search_ends_where_it_would_have_ended(tmp_path, stops_after):
+    journal = tmp_path / "search"
+    whole = Spy()
+    expected = run(whole)
+    with pytest.raises(KeyboardInterrupt):
+        run(Spy(stops_after=stops_after), journal=journal)
+    rest = Spy()
+    assert run(rest, journal=journal) == expected
+    n_done = stops_after // 3
+    assert rest.asked == whole.asked[3 * n_done :]
+
+
+def test_a_search_that_ended_is_not_done_again(tmp_path):
+    expected = run(Spy(), journal=tmp_path / "search")
+    again = Spy()
+    assert run(again, journal=tmp_path / "search") == expected
+    assert again.asked == []
+    more = Spy()
+    run(more, journal=tmp_path / "search", n_trials=10)
+    assert len(more.asked) == 2 * 3
+
+
+@pytest.mark.parametrize(
+    "other", [{"samples": blobs(1)}, {"seed": 1}, {"spy": Spy("svm")}], ids=["data", "seed", "svm"]
+)
+def test_a_journal_of_another_search_is_not_taken_up(tmp_path, other):
+    run(Spy(), journal=tmp_path / "search")
+    other = {"spy": Spy()} | other
+    expected = run(Spy(other["spy"].name), **{k: v for k, v in other.items() if k != "spy"})
+    assert run(**other, journal=tmp_path / "search") == expected
+    assert len(other["spy"].asked) >= 8 * 3
