@@ -177,7 +177,7 @@ def _tsflex(force: Array) -> Task:
 
 def _scipy(force: Array) -> Array:
     """The same by filters of scipy.ndimage over whole arrays."""
-    from scipy.ndimage import convolve1d
+    from scipy.ndimage import correlate1d
 
     amplitude = np.linalg.norm(force, axis=1)
     details = np.empty_like(amplitude)
@@ -187,10 +187,10 @@ def _scipy(force: Array) -> Array:
     every_other[::2] = 1.0
     half = WINDOW // 2
     back = {"mode": "constant", "origin": half - 1}
-    sums = convolve1d(details, every_other, **back)
-    squares = convolve1d(details**2, every_other, **back)
+    sums = correlate1d(details, every_other, **back)
+    squares = correlate1d(details**2, every_other, **back)
     sigma = np.sqrt(np.maximum(squares - sums**2 / half, 0.0) / WINDOW)
-    m = convolve1d(amplitude, np.ones(WINDOW + 1), **back) / (np.sqrt(2) * WINDOW)
+    m = correlate1d(amplitude, np.ones(WINDOW), **back) / (np.sqrt(2) * WINDOW)
     return np.column_stack([amplitude, force, m, sigma])
 
 

@@ -78,7 +78,7 @@ def calibration(judged: Sequence[FingerDecisions]) -> Array:
     stable = np.concatenate([np.empty(0), *(each.labels[rows] == STABLE for each, rows in known)])
     bins = np.clip((score * N_BINS).astype(int), 0, N_BINS - 1)
     sums = [np.bincount(bins, weights=each) for each in (score, stable, np.ones(len(bins)))]
-    table: Array = np.column_stack(sums)
+    table: Array = np.column_stack(sums).astype(np.float64)  # of nothing, bincount gives integers
     table = table[table[:, 2] > 0]
     table[:, :2] /= table[:, 2:]
     return table

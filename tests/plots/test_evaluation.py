@@ -1,0 +1,129 @@
+import io
+import subprocess
+import sys
+
+import numpy as np
+import pytest
+
+from holdfast.contact import NO_CONTACT, STABLE, UNKNOWN, UNSTABLE
+from holdfast.metrics import Decisions, FingerDecisions, summarise
+from holdfast.plots.evaluation import calibration, draw_evaluation
+
+
+def finger(seed, *, delay=0.05, labelled=True, n=400):
+    rng = np.random.default_rng(seed)
+    times = 0.01 * np.arange(n)
+    labels = np.repeat([NO_CONTACT, STABLE, UNSTABLE, STABLE], n // 4)
+    states = np.roll(labels, round(delay * 100))
+    states[:5] = UNKNOWN
+    score = np.clip(0.5 + 0.4 * (2 * (states == STABLE) - 1) + rng.normal(0, 0.1, n), 0, 1)
+    score = np.where(states == UNKNOWN, np.nan, score)
+    return FingerDecisions(times, labels if labelled else 0 * labels, states, score)
+
+
+def judged(n, names=("thumb", "index"), **options):
+    return [
+        Decisions.of(
+            f"grasp-{k}", {name: finger(10 * k + i, **options) for i, name in enumerate(names)}, 2
+        )
+        for k in range(n)
+    ]
+
+
+def draw(decisions):
+    return draw_evaluation(summarise(decisions, n_resamples=10), decisions)
+
+
+@pytest.mark.parametrize("form", ["png", "svg", "pdf"])
+def test_it_is_drawn_without_a_screen(form):
+    file = io.BytesIO()
+    draw(judged(3)).savefig(file, format=form)
+    assert len(file.getvalue()) > 5000
+
+
+def test_no_global_state_is_touched():
+    """pyplot keeps every figure that it makes until somebody closes it."""
+    program = (
+        "import sys; from holdfast.plots.evaluation import draw_evaluation\n"
+        "from holdfast.metrics import summarise\n"
+        "draw_evaluation(summarise([]), []); assert 'matplotlib.pyplot' not in sys.modules"
+    )
+    subprocess.run([sys.executable, "-c", program], check=True)
+
+
+@pytest.mark.parametrize(
+    "decisions",
+    [
+        judged(1),
+        judged(40),
+        judged(2, names=tuple(f"finger{k}" for k in range(9))),
+        judged(2, labelled=False),
+        [Decisions("nothing", {})],
+        [*judged(2), Decisions("nothing", {})],
+        [*judged(1), *judged(1, names=("ring",))],
+        [],
+    ],
+    ids=["one", "many", "hand", "bare", "nothing", "some", "unlike", "none"],
+)
+def test_whatever_there_is_can_be_drawn(decisions):
+    draw(decisions).savefig(io.BytesIO(), format="png")
+
+
+def test_recordings_are_sorted_with_the_best_on_top():
+    decisions = [
+        Decisions.of(name, {"thumb": finger(k, delay=delay)}, 1)
+        for k, (name, delay) in enumerate([("late", 0.4), ("prompt", 0.0), ("middling", 0.2)])
+    ]
+    axes = draw(decisions).axes[0]
+    assert [label.get_text() for label in axes.get_yticklabels()] == ["late", "middling", "prompt"]
+
+
+def test_a_dot_stands_at_the_accuracy_of_its_finger():
+    decisions = judged(3)
+    metrics = summarise(decisions, n_resamples=10)
+    dots = draw_evaluation(metrics, decisions).axes[0].collections
+    for name, drawn in zip(("thumb", "index"), dots, strict=True):
+        expected = sorted(each.fingers[name].accuracy for each in metrics.recordings)
+        assert sorted(drawn.get_offsets()[:, 0]) == pytest.approx(expected)
+
+
+def test_the_curve_of_the_hand_reaches_the_share_of_events_told():
+    """Alarms 0.05 s late in four of five recordings, never in the fifth."""
+    decisions = judged(4, delay=0.05)
+    silent = finger(9)
+    never = np.where(silent.states == UNKNOWN, UNKNOWN, STABLE)
+    score = np.where(silent.states == UNKNOWN, np.nan, 0.9)
+    deaf = FingerDecisions(silent.times, silent.labels, never, score)
+    decisions.append(Decisions.of("deaf", {"thumb": deaf, "index": deaf}, 2))
+    axes = draw(decisions).axes[3]
+    hand = max(axes.lines, key=lambda line: line.get_linewidth())
+    times, share = hand.get_data()
+    assert share[times < 0.049].max() == 0.0
+    assert share[-1] == pytest.approx(0.8)
+    assert axes.get_title(loc="left") == "alarms of the hand: 5 events, 0.0 false alarms/min"
+
+
+def test_long_names_keep_their_end():
+    decisions = [Decisions("data_sample_of_a_very_long_day_10-49", {"thumb": finger(0)})]
+    (label,) = draw(decisions).axes[0].get_yticklabels()
+    assert label.get_text() == "…f_a_very_long_day_10-49"
+
+
+def test_calibration_by_hand():
+    labels = np.array([STABLE, STABLE, UNSTABLE, NO_CONTACT, UNKNOWN, STABLE])
+    states = np.array([STABLE, STABLE, STABLE, NO_CONTACT, STABLE, UNKNOWN])
+    score = np.array([0.98, 1.0, 0.92, 0.0, 0.5, np.nan])
+    given = FingerDecisions(np.arange(6.0), labels, states, score)
+    np.testing.assert_allclose(calibration([given]), [[0.0, 0.0, 1], [2.9 / 3, 2 / 3, 3]])
+    assert calibration([]).shape == (0, 3)
+
+
+def test_calibrated_probabilities_lie_on_the_diagonal():
+    rng = np.random.default_rng(0)
+    score = rng.random(100_000)
+    labels = np.where(rng.random(100_000) < score, STABLE, UNSTABLE)
+    given = FingerDecisions(np.arange(1e5), labels, labels, score)
+    table = calibration([given])
+    assert len(table) == 10
+    np.testing.assert_allclose(table[:, 0], table[:, 1], atol=0.02)
+    assert table[:, 2].sum() == 100_000
