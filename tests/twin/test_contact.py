@@ -1,0 +1,332 @@
+from collections.abc import Callable
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from scipy.spatial.transform import Rotation
+
+from holdfast.sensors.values import Array
+from holdfast.twin.contact import Contact, Skin, constants_of, new_contact, touch
+from holdfast.twin.objects import Thing, load_things, probe, relief, solid, thing
+from holdfast.twin.surface import Surface, curved_fingertip
+
+from .grip import GRAVITY, Grip
+from .naive_contact import NaiveFinger
+
+NAMES = sorted(load_things())
+SAMPLE = 1 / 150  # [s]
+BOX = thing("box")
+SMOOTH = replace(BOX, texture_amplitude=0.0)
+
+seeds = st.integers(0, 2**32 - 1)
+
+
+def flat_patch(n: int = 6) -> Surface:
+    """A pad whose nodes are all alike on the face of a box."""
+    y, z = np.meshgrid(np.linspace(-0.006, 0.006, n), np.linspace(0.006, 0.018, n))
+    nodes = np.stack([np.full(n * n, 0.02), y.ravel(), z.ravel()], axis=1)
+    return Surface(nodes, np.tile([1.0, 0.0, 0.0], (n * n, 1)), np.full(n * n, 5e-6))
+
+
+def shaken(grip: Grip, seed: int, n_steps: int, each: Callable[[], None]) -> None:
+    """Fingertips and object that move and turn about where they were, without any physics."""
+    rng = np.random.default_rng(seed)
+    home, phase = grip.bodies.copy(), rng.uniform(0, 6, (len(grip.bodies), 6))
+    rate = rng.uniform(10, 80, phase.shape)
+    size = np.array([1.5e-3, 1.5e-3, 1.5e-3, 0.04, 0.04, 0.04])
+    for k in range(n_steps):
+        angle = rate * k * grip.dt + phase
+        shift, speed = size * (np.sin(angle) - np.sin(phase)), size * rate * np.cos(angle)
+        for body, start, move, fast in zip(grip.bodies, home, shift, speed, strict=True):
+            turn = Rotation.from_rotvec(move[3:]).as_matrix()
+            body[:3] = start[:3] + move[:3]
+            body[3:12] = (turn @ start[3:12].reshape(3, 3)).ravel()
+            body[12:15], body[15:18] = fast[:3], fast[3:]
+        touch(grip.state, grip.constants, grip.bodies, grip.dt)
+        each()
+
+
+def world_forces(grip: Grip, tip: int) -> Array:
+    return grip.state.node_forces[tip] @ grip.bodies[tip, 3:12].reshape(3, 3).T
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_same_as_the_naive_twin(name: str) -> None:
+    grip = Grip(thing(name), angles=(0.3, 3.0))
+    twins = [NaiveFinger(curved_fingertip(), thing(name)) for _ in range(2)]
+
+    def compare() -> None:
+        for tip, twin in enumerate(twins):
+            twin.touch(grip.bodies[tip], grip.thing_body, grip.dt)
+            np.testing.assert_allclose(world_forces(grip, tip), twin.forces, atol=2e-6)
+            load = twin.loads.sum()
+            assert grip.state.load[tip] == pytest.approx(load, abs=2e-6)
+            slip = twin.loads @ twin.sliding / max(load, 1e-300)
+            assert grip.state.slip_speed[tip] == pytest.approx(slip, abs=1e-6)
+            share = twin.loads[twin.sliding > Skin().slipping].sum() / max(load, 1e-300)
+            assert grip.state.slipping_share[tip] == pytest.approx(share, abs=1e-6)
+
+    shaken(grip, NAMES.index(name), 60, compare)
+    assert grip.state.load.max() > 0.1
+
+
+@settings(max_examples=15, deadline=None)
+@given(seed=seeds, name=st.sampled_from(NAMES))
+def test_nodes_add_up_and_momentum_is_kept(seed: int, name: str) -> None:
+    grip = Grip(thing(name), angles=(0.0, 2.5, 3.7))
+
+    def check() -> None:
+        state, bodies = grip.state, grip.bodies
+        for tip in range(3):
+            forces = world_forces(grip, tip)
+            np.testing.assert_allclose(forces.sum(axis=0), state.tip_force[tip], atol=1e-9)
+            arms = curved_fingertip().nodes @ bodies[tip, 3:12].reshape(3, 3).T
+            torque = np.cross(arms, forces).sum(axis=0)
+            np.testing.assert_allclose(torque, state.tip_torque[tip], atol=1e-9)
+        np.testing.assert_allclose(state.contact_force.sum(axis=0), state.object_force, atol=1e-9)
+        about = np.array([0.3, -0.2, 0.5])
+        total = np.cross(bodies[-1, :3] - about, state.object_force) + state.object_torque
+        total += np.cross(bodies[:-1, :3] - about, state.tip_force).sum(axis=0)
+        total += state.tip_torque.sum(axis=0)
+        np.testing.assert_allclose(total, 0, atol=1e-9)
+
+    shaken(grip, seed, 20, check)
+
+
+@settings(max_examples=15, deadline=None)
+@given(seed=seeds, name=st.sampled_from(NAMES))
+def test_coulomb_is_never_passed_and_nothing_pulls(seed: int, name: str) -> None:
+    grip = Grip(thing(name), depth=2e-3)
+    mu = thing(name).mu_static
+    slipped = []
+
+    def check() -> None:
+        back = grip.thing_body[3:12].reshape(3, 3)
+        for tip in range(2):
+            forces = world_forces(grip, tip)
+            arms = curved_fingertip().nodes @ grip.bodies[tip, 3:12].reshape(3, 3).T
+            points = (arms + grip.bodies[tip, :3] - grip.thing_body[:3]) @ back
+            normals = np.array([probe(grip.constants.solid, *p)[1:] for p in points]) @ back.T
+            pressed = (forces * normals).sum(axis=1)
+            friction = np.linalg.norm(forces - pressed[:, None] * normals, axis=1)
+            assert pressed.min() >= -1e-12
+            assert (friction <= mu * pressed * (1 + 1e-9) + 1e-12).all()
+            slipped.append(grip.state.slip_speed[tip])
+
+    shaken(grip, seed, 30, check)
+    assert max(slipped) > 1e-3
+
+
+@settings(max_examples=20, deadline=None)
+@given(seed=seeds, name=st.sampled_from(NAMES))
+def test_the_world_may_be_turned_shifted_and_moved(seed: int, name: str) -> None:
+    rng = np.random.default_rng(seed)
+    turn = Rotation.random(random_state=seed % 2**31).as_matrix()
+    shift, drift, spin = rng.normal(size=(3, 3))
+    here, there = Grip(thing(name)), Grip(thing(name))
+
+    def check() -> None:
+        there.bodies[:] = here.bodies
+        for body in there.bodies:
+            body[:3] = turn @ body[:3] + shift
+            body[3:12] = (turn @ body[3:12].reshape(3, 3)).ravel()
+            body[12:15] = turn @ body[12:15] + drift + np.cross(spin, body[:3])
+            body[15:18] = turn @ body[15:18] + spin
+        touch(there.state, there.constants, there.bodies, there.dt)
+        np.testing.assert_allclose(there.state.node_forces, here.state.node_forces, atol=1e-9)
+        for one, other in (
+            (there.state.tip_force, here.state.tip_force),
+            (there.state.tip_torque, here.state.tip_torque),
+            (there.state.object_force, here.state.object_force),
+            (there.state.object_torque, here.state.object_torque),
+        ):
+            np.testing.assert_allclose(one, other @ turn.T, atol=1e-9)
+        np.testing.assert_allclose(there.state.slip_speed, here.state.slip_speed, atol=1e-9)
+
+    shaken(here, seed, 15, check)
+
+
+def test_same_bits_twice() -> None:
+    def run() -> bytes:
+        grip = Grip(thing("can"), depth=2e-3)
+        grip.settle(0.3)
+        return b"".join(part.tobytes() for part in (*grip.state, grip.bodies))
+
+    assert run() == run()
+
+
+def test_a_fingertip_that_leaves_forgets() -> None:
+    grip = Grip(BOX)
+    grip.settle(0.2)
+    assert grip.state.bristles.any()
+    grip.bodies[0, 0] += 0.001  # off the face by a little: node by node
+    grip.bodies[1, 0] -= 0.2  # far away: at once
+    grip.bodies[0, 0] += 0.002
+    touch(grip.state, grip.constants, grip.bodies, grip.dt)
+    for part in grip.state:
+        assert not part.any()
+
+
+def test_a_node_that_leaves_forgets_what_others_keep() -> None:
+    grip = Grip(SMOOTH, depth=2e-3)
+    grip.settle(0.2)
+    touched = grip.state.node_forces[0].any(axis=1)
+    grip.bodies[0, 0] += 1e-3
+    touch(grip.state, grip.constants, grip.bodies, grip.dt)
+    left = touched & ~grip.state.node_forces[0].any(axis=1)
+    assert left.any()
+    assert not grip.state.bristles[0, left].any()
+    assert grip.state.bristles[0, touched & ~left, :3].any(axis=1).all()
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_held_at_rest_without_creep(name: str) -> None:
+    grip = Grip(thing(name), depth=2.2e-3)
+    grip.settle(2.0)
+    before, slip = grip.thing_body[:3].copy(), []
+    for _ in range(2000):
+        grip.step()
+        slip.append(grip.state.slip_speed.max())
+    assert max(slip) < 1e-6
+    assert np.linalg.norm(grip.thing_body[:3] - before) / (2000 * grip.dt) < 1e-6
+    weight = [0.0, 0.0, GRAVITY * grip.mass]
+    np.testing.assert_allclose(grip.state.object_force, weight, atol=1e-3)
+
+
+def test_a_push_within_friction_springs_back() -> None:
+    grip = Grip(SMOOTH, depth=2e-3)
+    grip.settle(1.0)
+    rest, weight = grip.thing_body[2], grip.mass * GRAVITY
+    push = 0.3 * SMOOTH.mu_kinetic * grip.state.load.sum() - weight
+    for force in (push, 0.0):
+        for _ in range(1500):
+            grip.step((0.0, 0.0, -force), spin=False)
+        moved = rest - grip.thing_body[2]
+        assert (moved > 1e-4) == (force > 0)
+    assert abs(moved) < 2e-5
+
+
+@pytest.mark.parametrize("rate", [1.0, 5.0, 20.0])
+@pytest.mark.parametrize("depth", [1e-3, 2e-3])
+def test_a_flat_pad_slips_within_a_sample_of_what_theory_says(rate: float, depth: float) -> None:
+    """Nodes that are all alike are one block on a spring: it slips when F = mu_s N."""
+    grip = Grip(SMOOTH, depth, surface=flat_patch())
+    for _ in range(1000):
+        grip.step(spin=False)
+    limit = SMOOTH.mu_static * grip.state.load.sum() - grip.mass * GRAVITY
+    start = grip.time
+    expected = start + limit / rate
+    while grip.state.slip_speed.max() < 1e-3:
+        grip.step((0.0, 0.0, -rate * (grip.time - start)), spin=False)
+    assert 0 <= grip.time - expected < SAMPLE
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_a_fingertip_slips_from_its_edge_and_lets_go_between_the_frictions(name: str) -> None:
+    grip = Grip(thing(name), depth=2.2e-3)
+    for _ in range(1000):
+        grip.step(spin=False)
+    start, shares, pull = grip.time, [0.0], 0.0
+    while shares[-1] < 0.999 and grip.time < start + 4:
+        pull = 20.0 * (grip.time - start)
+        grip.step((0.0, 0.0, -pull), spin=False)
+        shares.append(float(grip.state.slipping_share.min()))
+    total = (pull + grip.mass * GRAVITY) / grip.state.load.sum()
+    assert thing(name).mu_kinetic < total < 1.15 * thing(name).mu_static
+    assert 0.05 < shares[len(shares) * 4 // 5] < 0.95
+
+
+def test_sliding_friction_is_kinetic_and_texture_makes_it_tremble() -> None:
+    trembling = {}
+    for amplitude in (0.0, 40e-6):
+        grip = Grip(replace(BOX, texture_amplitude=amplitude))
+        grip.thing_body[14] = -0.02
+        forces = []
+        for _ in range(1000):
+            touch(grip.state, grip.constants, grip.bodies, grip.dt)
+            grip.thing_body[:3] += grip.thing_body[12:15] * grip.dt
+            forces.append(grip.state.tip_force[0].copy())
+        assert grip.state.slip_speed[0] == pytest.approx(0.02, rel=0.05)
+        assert grip.state.slipping_share[0] == 1.0
+        drop = BOX.mu_kinetic + (BOX.mu_static - BOX.mu_kinetic) * np.exp(-5)
+        friction = grip.state.tip_force[0, 2] / grip.state.load[0]
+        assert friction == pytest.approx(-drop, rel=0.01)
+        trembling[amplitude] = np.std(forces[500:], axis=0)[0]
+    assert trembling[0.0] < 1e-6
+    assert trembling[40e-6] > 5e-3
+
+
+@pytest.mark.parametrize(("kinetic", "sticks"), [(BOX.mu_kinetic, True), (BOX.mu_static, False)])
+def test_a_slow_pull_sticks_and_slips_where_friction_drops(kinetic: float, sticks: bool) -> None:
+    grip = Grip(replace(SMOOTH, mu_kinetic=kinetic))
+    grip.settle(0.3)
+    rest, start, slip = grip.thing_body[2], grip.time, []
+    for _ in range(2000):
+        pull = 800.0 * (0.01 * (grip.time - start) - (grip.thing_body[2] - rest))
+        grip.step((0.0, 0.0, pull), spin=False)
+        slip.append(grip.state.slip_speed[0])
+    late = np.array(slip[1300:])
+    assert (late.min() < 1e-4) == sticks
+    assert (late.max() > 0.05) == sticks
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_half_the_step_gives_the_same(name: str) -> None:
+    """A push of which the edge slips, and rest: forces, way and slid distance within 2 %."""
+    runs = [_pushed(thing(name), dt) for dt in (1e-3, 0.5e-3)]
+    for one, other in zip(*runs, strict=True):
+        assert np.abs(one - other).max() < 0.02 * np.abs(other).max()
+
+
+def _pushed(thing: Thing, dt: float) -> tuple[Array, Array, Array]:
+    grip, forces, way, slid = Grip(thing, 2.2e-3, dt), [], [], 0.0
+    for _ in range(round(0.4 / dt)):
+        grip.step(spin=False)
+    limit, weight = thing.mu_static * grip.state.load.sum(), thing.mass * GRAVITY
+    push = 0.6 * np.sqrt(limit**2 - weight**2)
+    for k in range(round(0.4 / dt)):
+        time = (k + 0.5) * dt
+        force = push * np.sin(np.pi * time / 0.15) if time < 0.15 else 0.0
+        grip.step((0.0, force, 0.0), spin=False)
+        slid += float(grip.state.slip_speed[0]) * dt
+        if (k + 1) % round(0.01 / dt) == 0:
+            forces.append(grip.state.contact_force.ravel())
+            way.append(grip.thing_body[:3].copy())
+    return np.array(forces), np.array(way), np.array([slid])
+
+
+def test_stiffness_hardens_and_damping_opposes_approach() -> None:
+    patch = flat_patch(3)
+    loads = []
+    for depth, speed in ((1e-3, 0.0), (2e-3, 0.0), (1e-3, -0.05), (1e-3, 0.05), (1e-3, 2.0)):
+        grip = Grip(SMOOTH, depth, surface=patch, angles=(0.0,))
+        grip.bodies[0, 12] = speed
+        touch(grip.state, grip.constants, grip.bodies, grip.dt)
+        loads.append(grip.state.load[0])
+    assert loads[1] / loads[0] == pytest.approx(2 * 1.8 / 1.4, rel=1e-6)
+    assert loads[2:4] == pytest.approx([loads[0] * 1.06, loads[0] * 0.94], rel=1e-6)
+    assert loads[4] == 0
+
+
+def test_texture_moves_the_surface_under_a_node() -> None:
+    one = Surface(np.array([[0.02, 0.0, 0.012]]), np.array([[1.0, 0.0, 0.0]]), np.array([1e-5]))
+    textured, depths = replace(BOX, texture_amplitude=50e-6), []
+    for height in np.linspace(0, 3e-3, 7):
+        constants, state = constants_of(one, textured), new_contact(one, 1)
+        bodies = Grip(SMOOTH, 1e-3, surface=one, angles=(0.0,)).bodies
+        bodies[0, 2] += height
+        touch(state, constants, bodies, 1e-3)
+        point = bodies[0, :3] + bodies[0, 3:12].reshape(3, 3) @ one.nodes[0]
+        depth = 1e-3 - relief(solid(textured), *point)
+        assert state.load[0] == pytest.approx(1e7 * 1e-5 * depth * (1 + 400 * depth), rel=1e-6)
+        depths.append(depth)
+    assert np.ptp(depths) > 50e-6
+
+
+def test_a_new_contact_touches_nothing() -> None:
+    state = new_contact(curved_fingertip(), 4)
+    assert isinstance(state, Contact)
+    assert state.node_forces.shape == (4, len(curved_fingertip().nodes), 3)
+    assert not any(part.any() for part in state)
