@@ -44,7 +44,7 @@ def search(
     """
     import optuna
 
-    optuna.logging.set_verbosity(optuna.logging.WARNING)
+    optuna.logging.set_verbosity(optuna.logging.ERROR)  # its warnings are tracebacks
     known = None
     if journal is not None:
         known = Journal(journal, search_key(*samples, *folds, recipe.name, seed))

@@ -1,0 +1,151 @@
+import json
+
+import pytest
+
+from holdfast.cli import main
+from holdfast.io import load_dataset, save_recording
+from holdfast.model import Model
+from holdfast.synthetic import synthetic_recording
+from holdfast.training import Setting, evaluate, train
+
+FINGERS = ("thumb", "index")
+SAMPLE = {"n", "accuracy", "fdr", "fpr", "fnr", "auc", "auc_contact", "confusion"}
+EVENT = {
+    "n_events", "stable_minutes", "missed", "delay_median", "delay_p95", "false_alarms_per_minute"
+}  # fmt: skip
+
+
+@pytest.fixture(scope="module")
+def folder(tmp_path_factory):
+    """A model trained on `seen`, and recordings `new` that it has not seen."""
+    root = tmp_path_factory.mktemp("evaluate")
+    for place, seeds in (("seen", (0, 1)), ("new", (2, 3))):
+        (root / place).mkdir()
+        for seed in seeds:
+            recording = synthetic_recording(f"grasp-{seed}", seed, FINGERS)
+            save_recording(recording, root / place / f"grasp-{seed}.parquet")
+    train(load_dataset(root / "seen"), Setting(trials=0)).model.save(root / "model.json")
+    return root
+
+
+def run(capsys, *words):
+    code = main(["evaluate", *map(str, words)])
+    out, err = capsys.readouterr()
+    return code, out, err
+
+
+def refusal(capsys, *words):
+    code, out, err = run(capsys, *words)
+    assert (code, out, err.count("\n")) == (2, "", 1)
+    return err.removeprefix("holdfast: ").rstrip("\n")
+
+
+def test_json_has_the_fields_of_the_contract(capsys, folder):
+    code, out, err = run(capsys, folder / "model.json", folder / "new", "--json")
+    assert (code, err) == (0, "")
+    report = json.loads(out)
+    assert {"fingers", "pooled", "recordings", "events", "trained_on"} <= set(report)
+    assert report["trained_on"] == []
+    assert set(report["pooled"]) >= SAMPLE
+    assert [each["name"] for each in report["recordings"]] == ["grasp-2", "grasp-3"]
+    for finger in FINGERS:
+        assert set(report["fingers"][finger]) >= SAMPLE
+        assert set(report["events"]["fingers"][finger]) >= EVENT
+    assert set(report["events"]["hand"]) >= EVENT
+
+
+def test_figures_are_those_of_the_library(capsys, folder):
+    _, out, _ = run(capsys, folder / "model.json", folder / "new", "--json")
+    metrics = evaluate(Model.load(folder / "model.json"), load_dataset(folder / "new"))
+    pooled = json.loads(out)["pooled"]
+    assert pooled["confusion"] == metrics.pooled.confusion
+    assert pooled["auc"] == metrics.pooled.auc
+
+
+def test_recordings_seen_in_training_are_told_whatever_they_are_called(capsys, folder, tmp_path):
+    seen = load_dataset(folder / "seen")[1]
+    save_recording(seen, tmp_path / "renamed.mcap")
+    save_recording(load_dataset(folder / "new")[0], tmp_path / "grasp-0.parquet")
+    code, out, err = run(capsys, folder / "model.json", tmp_path, "--json")
+    assert code == 0
+    assert json.loads(out)["trained_on"] == [load_dataset(tmp_path)[1].name]
+    assert err.startswith("the model has seen 1 of these 2 recordings in training (")
+    assert err.endswith("figures on them flatter\n")
+
+
+def test_labels_do_not_hide_what_was_seen(capsys, folder, tmp_path):
+    """Relabelled, a recording is the same recording."""
+    seen = load_dataset(folder / "seen")[0]
+    labels = {finger: seen.modules[finger].labels[:4] for finger in FINGERS}
+    save_recording(seen.with_labels(labels), tmp_path / "relabelled.parquet")
+    _, out, _ = run(capsys, folder / "model.json", tmp_path, "--json")
+    assert len(json.loads(out)["trained_on"]) == 1
+
+
+def test_one_recording_and_a_table_for_people(capsys, folder):
+    code, out, _ = run(capsys, folder / "model.json", folder / "new" / "grasp-2.parquet")
+    assert code == 0
+    assert "AUC in contact" in out
+    assert out.endswith(f"{folder / 'model.json'} on 1 recordings\n")
+
+
+def test_a_model_without_training(capsys, folder):
+    code, out, err = run(capsys, "builtin:noise-floor", folder / "seen", "--json")
+    assert (code, err) == (0, "")
+    assert json.loads(out)["trained_on"] == []
+
+
+@pytest.mark.parametrize(("suffix", "magic"), [(".png", b"\x89PNG"), (".svg", b"<?xml"),
+                                               (".pdf", b"%PDF")])  # fmt: skip
+def test_plots(capsys, folder, tmp_path, suffix, magic):
+    plot = tmp_path / f"plot{suffix}"
+    code, _, err = run(capsys, folder / "model.json", folder / "new", "--plot", plot)
+    assert (code, err) == (0, f"{plot} written\n")
+    assert plot.read_bytes().startswith(magic)
+    assert list(tmp_path.iterdir()) == [plot]
+
+
+def test_a_plot_is_not_overwritten(capsys, folder, tmp_path):
+    plot = tmp_path / "plot.png"
+    plot.write_text("mine")
+    words = [folder / "model.json", folder / "new", "--plot", plot]
+    assert refusal(capsys, *words) == (
+        f"{plot} exists already: choose another name, or give --force"
+    )
+    assert plot.read_text() == "mine"
+    assert run(capsys, *words, "--force")[0] == 0
+    assert plot.read_bytes().startswith(b"\x89PNG")
+
+
+def test_refusals(capsys, folder, tmp_path):
+    model, new = folder / "model.json", folder / "new"
+    assert refusal(capsys, model, new, "--plot", tmp_path / "plot.txt") == (
+        "a plot ends in .pdf, .png, .svg; 'plot.txt' given"
+    )
+    assert refusal(capsys, tmp_path / "none.json", new) == (
+        f"cannot read the model {tmp_path / 'none.json'}: No such file or directory"
+    )
+    assert refusal(capsys, "builtin:magic", new) == (
+        "unknown model 'builtin:magic'; built in are builtin:noise-floor"
+    )
+    assert refusal(capsys, model, tmp_path / "none") == (
+        f"there is no folder {tmp_path / 'none'}; a folder of recordings expected"
+    )
+    bare = tmp_path / "bare"
+    bare.mkdir()
+    save_recording(load_dataset(new)[0].with_labels({}), bare / "a.parquet")
+    assert refusal(capsys, model, bare) == f"{bare}: 1 recordings without a label to judge by"
+    other = tmp_path / "other"
+    other.mkdir()
+    save_recording(synthetic_recording("ring", 9, ("ring",)), other / "a.parquet")
+    assert refusal(capsys, model, other) == "the model judges thumb, index; ring given"
+
+
+def test_a_damaged_recording(capsys, folder, tmp_path):
+    whole = (folder / "new" / "grasp-2.parquet").read_bytes()
+    place = len(whole) // 2
+    (tmp_path / "a.parquet").write_bytes(
+        whole[:place] + bytes([whole[place] ^ 1]) + whole[place + 1 :]
+    )
+    assert str(tmp_path / "a.parquet") in refusal(capsys, folder / "model.json", tmp_path)
+    assert list(tmp_path.iterdir()) == [tmp_path / "a.parquet"]

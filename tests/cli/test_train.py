@@ -1,0 +1,257 @@
+import errno
+import json
+import os
+import signal
+import subprocess
+import sys
+import time
+
+import pytest
+
+from holdfast import files
+from holdfast.cli import main
+from holdfast.io import load_dataset, save_recording
+from holdfast.model import Model
+from holdfast.recordings import Recording
+from holdfast.synthetic import synthetic_recording
+from holdfast.training import Setting, train
+
+SAMPLE = {"n", "accuracy", "fdr", "fpr", "fnr", "auc", "auc_contact", "confusion"}
+EVENT = {
+    "n_events", "stable_minutes", "missed", "delay_median", "delay_p95", "false_alarms_per_minute"
+}  # fmt: skip
+FINGERS = ("thumb", "index")
+
+
+def check_metrics(metrics, fingers=FINGERS):
+    """METRICS as the contract names its fields."""
+    assert {"fingers", "pooled", "recordings", "events"} <= set(metrics)
+    assert tuple(metrics["fingers"]) == fingers
+    for sample in (*metrics["fingers"].values(), metrics["pooled"]):
+        assert set(sample) >= SAMPLE
+    for recording in metrics["recordings"]:
+        assert {"name", "fingers"} <= set(recording)
+        for sample in recording["fingers"].values():
+            assert set(sample) >= SAMPLE
+    assert tuple(metrics["events"]["fingers"]) == fingers
+    for event in (*metrics["events"]["fingers"].values(), metrics["events"]["hand"]):
+        assert set(event) >= EVENT
+        assert list(event["missed"]) == ["0.05", "0.1", "0.2"]
+
+
+@pytest.fixture(scope="module")
+def data(tmp_path_factory):
+    folder = tmp_path_factory.mktemp("recordings")
+    for k in range(3):
+        recording = synthetic_recording(f"grasp-{k}", k, FINGERS)
+        save_recording(recording, folder / f"grasp-{k}.parquet")
+    return folder
+
+
+@pytest.fixture
+def model(tmp_path):
+    return tmp_path / "model.json"
+
+
+def run(capsys, *words):
+    code = main(["train", *map(str, words)])
+    out, err = capsys.readouterr()
+    return code, out, err
+
+
+def refusal(capsys, *words):
+    code, out, err = run(capsys, *words)
+    assert (code, out, err.count("\n")) == (2, "", 1)
+    return err.removeprefix("holdfast: ").rstrip("\n")
+
+
+def test_json_has_the_fields_of_the_contract(capsys, data, model):
+    code, out, err = run(capsys, data, "-o", model, "--trials", 0, "--json")
+    assert (code, err) == (0, "")
+    report = json.loads(out)
+    assert report["model"] == str(model)
+    assert report["split"] == "recording"
+    check_metrics(report["cross_validation"])
+    assert [r["name"] for r in report["cross_validation"]["recordings"]] == [
+        "grasp-0", "grasp-1", "grasp-2"
+    ]  # fmt: skip
+    assert list(model.parent.iterdir()) == [model]
+
+
+def test_it_is_the_library_that_trains(capsys, data, model):
+    words = ["--window", 8, "--features", "F_a,sigma", "--classifier", "svm", "--tare", "0.4",
+             "--split", "object", "--trials", 2, "--seed", 3, "--shared",
+             "--contact-threshold", 9.5, "--max-samples", 900, "--jobs", 1]  # fmt: skip
+    assert run(capsys, data, "-o", model, *words)[0] == 0
+    from holdfast.features import Tare, parse_features
+
+    setting = Setting(
+        classifier="svm",
+        features=parse_features("F_a,sigma", 8),
+        window=8,
+        tare=Tare.parse("0.4"),
+        split="object",
+        trials=2,
+        seed=3,
+        shared=True,
+        contact_threshold=9.5,
+        max_samples=900,
+    )
+    assert Model.load(model) == train(load_dataset(data), setting).model
+
+
+def test_a_table_for_people(capsys, data, model):
+    code, out, _ = run(capsys, data, "-o", model, "--trials", 0)
+    assert code == 0
+    assert "accuracy %" in out
+    assert "false alarms/min" in out
+    assert f"{model}: trained on 3 recordings, judged by leaving out one recording at a time" in out
+
+
+def test_a_model_is_not_overwritten(capsys, data, model):
+    model.write_text("mine")
+    assert refusal(capsys, data, "-o", model, "--trials", 0) == (
+        f"{model} exists already: choose another name, or give --force"
+    )
+    assert model.read_text() == "mine"
+    assert run(capsys, data, "-o", model, "--trials", 0, "--force")[0] == 0
+    assert Model.load(model).training.recordings.keys() == {"grasp-0", "grasp-1", "grasp-2"}
+
+
+@pytest.mark.parametrize(
+    ("words", "message"),
+    [
+        (["--classifier", "magic"], "unknown classifier 'magic'; there are logreg, svm"),
+        (["--window", "13"], "an even window of at least 2 samples expected, 13 given"),
+        (["--split", "half"], "unknown split 'half'; there are recording, object, random"),
+        (
+            ["--features", "F_a,magic"],
+            "unknown feature 'magic'; there are F_a, F_x, F_y, F_z, m, sigma, and F_tip for three",
+        ),
+        (
+            ["--tare", "soon"],
+            "tare: seconds above 0, 'first', 'none' or START:END expected, 'soon' given",
+        ),
+        (
+            ["--trials", "-1"],
+            "trials of at least 0 and samples of at least 1 expected; -1 and 200000 given",
+        ),
+        (["--seed", "-1"], "a seed from 0 to 2^32 - 1 expected, -1 given"),
+        (["--contact-threshold", "-2"], "a contact threshold of at least 0 expected, -2.0 given"),
+    ],
+)
+def test_wrong_options(capsys, data, model, words, message):
+    assert refusal(capsys, data, "-o", model, *words) == message
+    assert not list(model.parent.iterdir())
+
+
+def test_data_that_cannot_train_leave_everything_as_it_was(capsys, tmp_path, model):
+    model.write_text("mine")
+    folder = tmp_path / "data"
+    assert refusal(capsys, folder, "-o", model, "--force") == (
+        f"there is no folder {folder}; a folder of recordings expected"
+    )
+    folder.mkdir()
+    assert "no recording in" in refusal(capsys, folder, "-o", model, "--force")
+    grasp = synthetic_recording("grasp", 0, ("thumb",))
+    save_recording(grasp, folder / "grasp.parquet")
+    assert refusal(capsys, folder, "-o", model, "--force") == (
+        "the split by recording needs at least two, 1 given (grasp)"
+    )
+    bare = Recording("bare", {"thumb": synthetic_recording("x", 1).modules["thumb"]})
+    save_recording(bare.with_labels({}), folder / "bare.parquet")
+    assert refusal(capsys, folder, "-o", model, "--force", "--split", "object") == (
+        "recording 'bare' does not say its object ('object' in its metadata); the split by "
+        "object needs it of every recording"
+    )
+    save_recording(grasp.with_labels({}), folder / "grasp.parquet", force=True)
+    assert refusal(capsys, folder, "-o", model, "--force") == (
+        "none of the 2 recordings has labels to train from"
+    )
+    assert model.read_text() == "mine"
+    assert sorted(path.name for path in tmp_path.iterdir()) == ["data", "model.json"]
+
+
+def test_a_full_disk(capsys, data, model, monkeypatch):
+    def full(self, target):
+        raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC), str(self))
+
+    model.write_text("mine")
+    monkeypatch.setattr(files.Path, "replace", full)
+    assert refusal(capsys, data, "-o", model, "--trials", 0, "--force") == (
+        f"cannot write {model}: No space left on device"
+    )
+    assert model.read_text() == "mine"
+    assert list(model.parent.iterdir()) == [model]
+
+
+def test_a_folder_that_does_not_exist(capsys, data, tmp_path):
+    model = tmp_path / "none" / "model.json"
+    assert refusal(capsys, data, "-o", model) == (
+        f"cannot write {model}: the folder {tmp_path / 'none'} does not exist"
+    )
+
+
+def test_the_search_goes_when_the_model_is_written(capsys, data, model):
+    assert run(capsys, data, "-o", model, "--trials", 2)[0] == 0
+    assert list(model.parent.iterdir()) == [model]
+
+
+def test_a_search_left_over_is_refused_without_resume(capsys, data, model):
+    journal = model.with_name("model.json.search")
+    journal.write_text("")
+    assert refusal(capsys, data, "-o", model) == (
+        f"{journal} holds a search that was stopped: go on with --resume, or start anew with "
+        "--force"
+    )
+    assert run(capsys, data, "-o", model, "--trials", 0, "--force")[0] == 0
+    assert not journal.exists()
+
+
+def test_nothing_to_resume(capsys, data, model):
+    assert refusal(capsys, data, "-o", model, "--resume") == (
+        f"nothing to resume: there is no {model}.search"
+    )
+
+
+def test_a_killed_search_goes_on_to_the_same_end(capsys, data, model, tmp_path):
+    whole = tmp_path / "whole.json"
+    words = ["--trials", "4", "--json"]
+    expected = json.loads(run(capsys, data, "-o", whole, *words)[1])
+    program = "import sys; from holdfast.cli import main; sys.exit(main(sys.argv[1:]))"
+    command = [sys.executable, "-c", program, "train", str(data), "-o", str(model), *words]
+    process = subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE)
+    journal = model.with_name("model.json.search")
+    while process.poll() is None and not (journal.exists() and journal.stat().st_size > 300):
+        time.sleep(0.01)
+    process.send_signal(signal.SIGKILL)
+    process.communicate()
+    assert not model.exists()
+    n_lines = len(journal.read_bytes().split(b"\n\n"))
+    code, out, _ = run(capsys, data, "-o", model, "--resume", *words)
+    assert code == 0
+    assert json.loads(out)["cross_validation"] == expected["cross_validation"]
+    assert Model.load(model) == Model.load(whole)
+    assert n_lines < 4 * 8
+    assert not journal.exists()
+
+
+def test_an_interrupt_says_how_to_go_on(capsys, data, model, monkeypatch):
+    from holdfast.training import tuning
+
+    losses = tuning._log_loss
+    n_trials = []
+
+    def stops(*given):
+        n_trials.append(1)
+        if len(n_trials) == 3:
+            raise KeyboardInterrupt
+        return losses(*given)
+
+    monkeypatch.setattr(tuning, "_log_loss", stops)
+    code, out, err = run(capsys, data, "-o", model, "--trials", 4)
+    assert (code, out) == (130, "")
+    assert err == (
+        f"what the search found so far is in {model}.search: go on with --resume\n"
+        "holdfast: interrupted\n"
+    )
