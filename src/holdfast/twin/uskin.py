@@ -1,0 +1,347 @@
+"""The uSkin fingertip: from the forces on the nodes of its skin to the counts that it sends.
+
+Silicone spreads a force over the taxels and follows it late; the field of a displaced magnet
+mixes the axes and ends at a range; temperature moves the baseline; noise and a step of one
+count come last.
+"""
+
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+from holdfast.compiled import compiled
+from holdfast.sensors import Sensor
+from holdfast.sensors.values import Array
+from holdfast.twin.uskin_parameters import Three, UskinParameters
+
+Counts = npt.NDArray[np.uint16]
+
+SATURATION_ORDER = 4
+"""How sharply a taxel's range ends: the slope is down to 85 % at 4.5 N of 7.35 N and to 48 % at
+7 N, where the data sheet sees the slope change."""
+ROUNDING = 1 / 12
+"""Variance of rounding to whole counts [count^2]."""
+UINT16_MAX = 65535.0
+STRAY = 0.45
+"""Part of a period that a packet's stamp strays at most: stamps keep their order."""
+
+
+def taxel_shares(nodes: npt.ArrayLike, taxels: npt.ArrayLike, spread: float) -> Array:
+    """How the force on each node is shared among the taxels: rows sum to 1.
+
+    A bell over the distance, made a partition of unity so that no force is lost or gained:
+    w_ni = exp(-|p_n - p_i|^2 / (2 s^2)) / sum_j exp(-|p_n - p_j|^2 / (2 s^2)). The outer walls
+    of the fingertip are ten spreads apart: nothing crosses.
+
+    Args:
+        nodes: (n, 3) positions of the nodes [m].
+        taxels: (n_taxels, 3) positions of the taxels in the same frame [m].
+        spread: standard deviation of the bell [m].
+
+    Returns:
+        (n, n_taxels).
+
+    Example:
+        >>> taxel_shares([[1e-3, 0, 0]], [[0, 0, 0], [2e-3, 0, 0]], 2.8e-3).tolist()
+        [[0.5, 0.5]]
+    """
+    between = np.asarray(nodes, dtype=float)[:, None] - np.asarray(taxels, dtype=float)
+    exponent = -0.5 * (between**2).sum(axis=2) / spread**2
+    bell = np.exp(exponent - exponent.max(axis=1, keepdims=True))
+    shares: Array = bell / bell.sum(axis=1, keepdims=True)
+    return shares
+
+
+class Uskin:
+    """One fingertip: gains, cross-talk, baselines and thermal behaviour of each taxel are fixed.
+
+    Attributes:
+        parameters: what it was made from.
+        sensor: where its taxels are.
+        shares: (n_nodes, n_taxels) of the force on a node.
+        mixing: (n_taxels, 3, 3) from a taxel's force to its reading: gain and cross-talk.
+        baseline: (n_taxels, 3) reading at rest [count].
+        thermal: (n_taxels, 3) by which a degree moves it [count/K].
+    """
+
+    def __init__(
+        self,
+        parameters: UskinParameters,
+        sensor: Sensor,
+        nodes: npt.ArrayLike,
+        generator: np.random.Generator,
+    ) -> None:
+        """Draw the properties of its taxels.
+
+        Args:
+            parameters: of the kind of sensor.
+            sensor: poses of the taxels.
+            nodes: (n_nodes, 3) of the skin in the fingertip frame [m].
+            generator: of all that is drawn; the same state gives the same sensor and counts.
+        """
+        n = sensor.n_taxels
+        self.parameters = parameters
+        self.sensor = sensor
+        self.shares = taxel_shares(nodes, sensor.positions, parameters.spread)
+        gains = np.exp(parameters.gain_spread * generator.standard_normal(n))
+        mixed = parameters.cross_talk * generator.standard_normal((n, 3, 3))
+        mixed[:, range(3), range(3)] = 1.0
+        self.mixing = gains[:, None, None] * mixed
+        drawn = generator.standard_normal((2, n, 3))
+        self.baseline = np.array(parameters.baseline) + drawn[0] * parameters.baseline_spread
+        self.thermal = np.array(parameters.thermal_counts) + drawn[1] * parameters.thermal_spread
+        self._generator = generator
+
+    def taxel_forces(self, node_forces: npt.ArrayLike) -> Array:
+        """The true force of each taxel, in its own frame, positive when pressed.
+
+        f_i = -R_i^T sum_n w_ni F_n. F_n acts on the fingertip: where it is pressed it points
+        inwards, against the taxel's outward z, and the minus makes f_z positive. So
+        sum_i R_i f_i = -sum_n F_n is the force of the finger on the object.
+
+        Args:
+            node_forces: (n_samples, n_nodes, 3) on the skin, in the fingertip frame [N].
+
+        Returns:
+            (n_samples, n_taxels, 3) [N].
+
+        Raises:
+            ValueError: another number of nodes or axes.
+        """
+        forces = np.asarray(node_forces, dtype=np.float64)
+        if forces.ndim != 3 or forces.shape[1:] != (len(self.shares), 3):
+            raise ValueError(
+                f"node forces of shape (n, {len(self.shares)}, 3) expected, {forces.shape} given"
+            )
+        on_taxels = forces.transpose(0, 2, 1).reshape(-1, len(self.shares)) @ self.shares
+        on_taxels = on_taxels.reshape(len(forces), 3, -1).transpose(2, 0, 1)  # taxel first
+        result: Array = np.ascontiguousarray((on_taxels @ -self.sensor.rotations).swapaxes(0, 1))
+        return result
+
+    def readout(self, generator: np.random.Generator | None = None) -> "Readout":
+        """A run of the sensor from rest, to be fed in pieces of any size.
+
+        Args:
+            generator: of noise and warming; by default the one that drew the sensor.
+        """
+        return Readout(self, generator or self._generator)
+
+    def counts(
+        self,
+        taxel_forces: npt.ArrayLike,
+        times: npt.ArrayLike,
+        generator: np.random.Generator | None = None,
+    ) -> Counts:
+        """What the fingertip sends for the true forces of its taxels, from first to last.
+
+        The silicone begins at rest under the first sample's force.
+
+        Args:
+            taxel_forces: (n, n_taxels, 3) in taxel frames [N].
+            times: (n,) increasing [s].
+            generator: of noise and warming; by default the one that drew the sensor.
+
+        Returns:
+            (n, n_taxels, 3).
+
+        Raises:
+            ValueError: shapes contradict each other, a force or time is not finite, or times
+                do not increase.
+        """
+        return self.readout(generator).counts(taxel_forces, times)
+
+
+class Readout:
+    """A run of one fingertip: the state of its silicone and its temperature.
+
+    Attributes:
+        warmth: above the temperature at the start [K].
+    """
+
+    def __init__(self, uskin: Uskin, generator: np.random.Generator) -> None:
+        self.warmth = 0.0
+        self._uskin = uskin
+        self._generator = generator
+        self._rate = 0.0
+        self._last: tuple[float, Array, Array] | None = None  # time, force and late parts
+
+    def counts(self, taxel_forces: npt.ArrayLike, times: npt.ArrayLike) -> Counts:
+        """The next samples; arguments, result and errors as of `Uskin.counts`."""
+        forces, clock = self._checked(taxel_forces, times)
+        if not len(clock):
+            return np.zeros(forces.shape, dtype=np.uint16)
+        uskin, parameters = self._uskin, self._uskin.parameters
+        drawn = self._generator.standard_normal((len(clock), 3 * uskin.sensor.n_taxels + 1))
+        warmth = self._warm(clock, drawn[:, -1])
+        mixed = np.einsum("kia,iba->kib", self._late(forces, clock), uskin.mixing)
+        newtons = saturated(mixed, parameters.limits)
+        values = newtons * parameters.counts_per_newton
+        values += uskin.baseline
+        values += warmth[:, None, None] * uskin.thermal
+        white = np.sqrt(max(parameters.noise_counts**2 - ROUNDING, 0.0))
+        values += white * drawn[:, :-1].reshape(forces.shape)
+        return np.clip(np.rint(values), 0.0, UINT16_MAX).astype(np.uint16)
+
+    def _checked(self, taxel_forces: npt.ArrayLike, times: npt.ArrayLike) -> tuple[Array, Array]:
+        forces = np.ascontiguousarray(taxel_forces, dtype=np.float64)
+        clock = np.ascontiguousarray(times, dtype=np.float64)
+        n_taxels = self._uskin.sensor.n_taxels
+        if forces.shape != (*clock.shape, n_taxels, 3) or clock.ndim != 1:
+            raise ValueError(
+                f"taxel forces of shape (n, {n_taxels}, 3) and n times expected, "
+                f"{forces.shape} and {clock.shape} given"
+            )
+        if not (np.isfinite(forces).all() and np.isfinite(clock).all()):
+            raise ValueError("finite taxel forces and times expected, NaN or infinity given")
+        before = [] if self._last is None else [self._last[0]]
+        if not (np.diff(clock, prepend=before) > 0).all():
+            raise ValueError("times that increase expected")
+        return forces, clock
+
+    def _late(self, forces: Array, clock: Array) -> Array:
+        """The forces as the silicone passes them on: parts of them late.
+
+        Exact for forces that are linear between samples.
+        """
+        shares = np.array(self._uskin.parameters.lag_shares)
+        taus = np.array(self._uskin.parameters.lag_times)
+        if self._last is None:
+            state = np.repeat(forces[None, 0], len(taus), axis=0)
+            self._last = (float(clock[0]), forces[0], state)
+        last, force, state = self._last
+        passed = np.empty_like(forces)
+        _follow(forces, np.diff(clock, prepend=last), force, state, shares, taus, passed)
+        self._last = (float(clock[-1]), forces[-1].copy(), state)
+        return passed
+
+    def _warm(self, clock: Array, drawn: Array) -> Array:
+        """(n,) the temperature above that at the start [K]: a rate that wanders, summed up."""
+        parameters = self._uskin.parameters
+        spread = parameters.warming_rate
+        warmth = np.empty(len(clock))
+        if self._last is None:
+            start, self._rate = float(clock[0]), spread * float(drawn[0])
+        else:
+            start = self._last[0]
+        steps = np.diff(clock, prepend=start)
+        state = np.array([self._rate, self.warmth])
+        _wander(steps, drawn, spread, parameters.thermal_time, state, warmth)
+        self._rate, self.warmth = state.tolist()
+        return warmth
+
+
+def saturated(newtons: Array, limits: Three) -> Array:
+    """Readings that bend towards the range of their axis: x / (1 + (x / limit)^4)^(1/4).
+
+    Args:
+        newtons: (..., 3) unlimited [N].
+        limits: by axis, never passed [N].
+
+    Returns:
+        (..., 3) [N].
+    """
+    square = (newtons / limits) ** 2
+    result: Array = newtons / np.sqrt(np.sqrt(1.0 + square * square))
+    return result
+
+
+@compiled
+def _follow(
+    forces: Array,
+    steps: Array,
+    before: Array,
+    state: Array,
+    shares: Array,
+    taus: Array,
+    passed: Array,
+) -> None:
+    """The sum of a prompt part and low-pass parts; `state` (n_lags, n_taxels, 3) is written.
+
+    Over a step h of a force from u to v: y <- e y + (g - e) u + (1 - g) v, with
+    e = exp(-h / tau) and g = (1 - e) tau / h.
+    """
+    n, n_taxels, n_axes = forces.shape
+    prompt = 1.0 - shares.sum()
+    for k in range(n):
+        earlier = before if k == 0 else forces[k - 1]
+        passed[k] = prompt * forces[k]
+        for lag in range(len(taus)):
+            ratio = steps[k] / taus[lag]
+            keep = np.exp(-ratio)
+            mean = 1.0 if ratio == 0.0 else -np.expm1(-ratio) / ratio
+            for i in range(n_taxels):
+                for axis in range(n_axes):
+                    late = keep * state[lag, i, axis]
+                    late += (mean - keep) * earlier[i, axis] + (1 - mean) * forces[k, i, axis]
+                    state[lag, i, axis] = late
+                    passed[k, i, axis] += shares[lag] * late
+
+
+@compiled
+def _wander(
+    steps: Array, drawn: Array, spread: float, tau: float, state: Array, warmth: Array
+) -> None:
+    """Rate [K/s] and temperature [K] in `state`, which is written; the first step may be 0."""
+    for k in range(len(steps)):
+        keep = np.exp(-steps[k] / tau)
+        rate = keep * state[0] + np.sqrt(1 - keep * keep) * spread * drawn[k]
+        state[1] += 0.5 * (state[0] + rate) * steps[k]
+        state[0] = rate
+        warmth[k] = state[1]
+
+
+def with_server_effects(
+    times: npt.ArrayLike,
+    readings: npt.NDArray[Any],
+    generator: np.random.Generator,
+    jitter: float = 1.0e-3,
+    repeat_share: float = 0.075,
+) -> tuple[Array, npt.NDArray[Any]]:
+    """Stamps and readings as a real server gives them: unsteady, some packets sent twice.
+
+    Every stamp strays on its own, by a Laplace distribution, within 0.45 of a period; a packet
+    that is repeated takes the place of its successor, and never thrice in a row. Defaults are
+    those of five recordings of a uSkin server at 60 Hz (6 to 9 % of rows repeat one, none
+    twice; steps of 3 to 24 ms, their standard deviation 1.2 to 1.5 ms).
+
+    Args:
+        times: (n,) strictly increasing [s].
+        readings: (n, ...) at these times; stack fingers that come in one packet.
+        generator: of what is drawn.
+        jitter: standard deviation of a stamp [s].
+        repeat_share: of the packets that repeat the one before, under a half.
+
+    Returns:
+        (n,) strictly increasing times [s], of which the first stays; (n, ...) readings.
+
+    Raises:
+        ValueError: a jitter below 0, a share outside [0, 0.5), times that do not increase, or
+            another number of readings.
+
+    Example:
+        >>> import numpy as np
+        >>> times, readings = np.arange(600) / 150, np.arange(600)
+        >>> _, sent = with_server_effects(times, readings, np.random.default_rng(1))
+        >>> int((np.diff(sent) == 0).sum())
+        46
+    """
+    clock = np.array(times, dtype=np.float64)
+    steps = np.diff(clock)
+    if not (jitter >= 0 and 0 <= repeat_share < 0.5):
+        raise ValueError(
+            f"jitter of at least 0 s and a share of repeats in [0, 0.5) expected, "
+            f"{jitter} and {repeat_share} given"
+        )
+    if clock.shape != (len(readings),) or not (steps > 0).all():
+        raise ValueError(f"{len(readings)} increasing times expected, shape {clock.shape} given")
+    if len(clock) < 2:
+        return clock, readings.copy()
+    stray = generator.laplace(0.0, jitter / np.sqrt(2), len(clock))
+    chosen = generator.random(len(clock)) < repeat_share / (1 - repeat_share)
+    stray[0], chosen[0] = 0.0, False
+    room = np.minimum(np.append(steps, steps[-1]), np.insert(steps, 0, steps[0]))
+    clock += np.clip(stray, -STRAY * room, STRAY * room)
+    index = np.arange(len(clock))
+    run = index - np.maximum.accumulate(np.where(chosen, 0, index))  # place in a run, from 1
+    return clock, readings[index - run % 2]

@@ -1,0 +1,95 @@
+"""What a uSkin fingertip does to a force, in numbers, and where each number comes from."""
+
+from dataclasses import dataclass, fields
+
+import numpy as np
+
+Three = tuple[float, float, float]
+
+
+@dataclass(frozen=True)
+class UskinParameters:
+    """What a uSkin fingertip does to a force.
+
+    Nothing is published on the curved fingertip. "Data sheet" is that of the flat uSPa46 (July
+    2025, high sensitivity); "packets" are the two of whole Allegro hands, 368 taxels each.
+
+    Attributes:
+        spread: of a force in the silicone, standard deviation [m]. Own choice: under half of
+            the taxels' pitch of 6.4 mm.
+        gain_spread: of the taxels' gains, standard deviation of their logarithm. Own choice;
+            XELA sells a calibration of every taxel against that of the model.
+        cross_talk: standard deviation of the six ratios by which an axis of a taxel reads
+            another. Own choice.
+        limits: the force by axis that a reading never passes [N]. Data sheet: the range.
+        lag_shares: parts of a force that the silicone shows late. Own choice, as silicones do;
+            with `lag_times` a cycle of 20 s up and 20 s down leaves a loop of 1 % of its
+            height (data sheet: hysteresis 1.06 % on z, its cycle not told).
+        lag_times: the time constant of each part [s]. Own choice.
+        counts_per_newton: by axis [count/N]. Data sheet: 0.000628, 0.000628, 0.000729 N/count.
+        baseline: mean reading at rest by axis [count]. Packets.
+        baseline_spread: its standard deviation over taxels [count]. Packets.
+        thermal_counts: by which a degree moves the baseline, by axis [count/K]. Data sheet: 120
+            counts on z for 3.5 degrees.
+        thermal_spread: standard deviation of that over taxels, every axis [count/K]. Own
+            choice: a fifth of it.
+        warming: standard deviation of the temperature's change over `warming_time` [K]. Data
+            sheet: its test; how a hand warms is an own choice.
+        warming_time: the time that `warming` is told for [s]. Data sheet: 50 minutes.
+        thermal_time: over which the rate of warming keeps its direction [s]. Own choice: 5 mm
+            of silicone conduct heat in about 100 s; so the walk is smooth at a sample's scale.
+        noise_counts: rms of a reading at rest, rounding included [count]. Data sheet: mean
+            square 0.8 (x, y) and 0.9 (z).
+
+    Raises:
+        ValueError: a number is not finite or negative, limits, scales or times are not above 0,
+            or the lag takes more than the whole force.
+    """
+
+    spread: float = 2.8e-3
+    gain_spread: float = 0.15
+    cross_talk: float = 0.04
+    limits: Three = (0.87, 0.87, 7.35)
+    lag_shares: tuple[float, float] = (0.10, 0.05)
+    lag_times: tuple[float, float] = (0.030, 2.0)
+    counts_per_newton: Three = (1 / 0.000628, 1 / 0.000628, 1 / 0.000729)
+    baseline: Three = (32768.0, 32768.0, 36200.0)
+    baseline_spread: Three = (260.0, 260.0, 750.0)
+    thermal_counts: Three = (0.0, 0.0, 120 / 3.5)
+    thermal_spread: float = 7.0
+    warming: float = 3.5
+    warming_time: float = 3000.0
+    thermal_time: float = 100.0
+    noise_counts: float = 0.9
+
+    def __post_init__(self) -> None:
+        for part in fields(self):
+            values = np.asarray(getattr(self, part.name), dtype=np.float64)
+            positive = part.name in _ABOVE_ZERO
+            if not (np.isfinite(values).all() and (values >= 0).all()):
+                raise ValueError(f"{part.name}: finite, not negative expected, {values} given")
+            if positive and not (values > 0).all():
+                raise ValueError(f"{part.name}: above 0 expected, {values} given")
+        if sum(self.lag_shares) > 1:
+            raise ValueError(f"lag_shares: at most 1 in sum expected, {self.lag_shares} given")
+
+    @property
+    def warming_rate(self) -> float:
+        """Standard deviation of the rate of warming [K/s].
+
+        The rate is an Ornstein-Uhlenbeck process; its integral over t has the variance
+        2 (rate tau)^2 (t / tau - 1 + exp(-t / tau)), tau the thermal time.
+        """
+        periods = self.warming_time / self.thermal_time
+        walk = np.sqrt(2 * (periods - 1 + np.exp(-periods)))
+        return float(self.warming / (self.thermal_time * walk))
+
+
+_ABOVE_ZERO = (
+    "spread",
+    "limits",
+    "lag_times",
+    "counts_per_newton",
+    "warming_time",
+    "thermal_time",
+)
