@@ -10,19 +10,11 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from holdfast.compiled import compiled
 from holdfast.sensors import Sensor
 from holdfast.sensors.values import Array
-from holdfast.twin.uskin_parameters import Three, UskinParameters
+from holdfast.twin.uskin_parameters import UskinParameters
+from holdfast.twin.uskin_readout import Counts, Readout, Taxels
 
-Counts = npt.NDArray[np.uint16]
-
-SATURATION_ORDER = 4
-"""How sharply a taxel's range ends: the slope is down to 85 % at 4.5 N of 7.35 N and to 48 % at
-7 N, where the data sheet sees the slope change."""
-ROUNDING = 1 / 12
-"""Variance of rounding to whole counts [count^2]."""
-UINT16_MAX = 65535.0
 STRAY = 0.45
 """Part of a period that a packet's stamp strays at most: stamps keep their order."""
 
@@ -60,9 +52,7 @@ class Uskin:
         parameters: what it was made from.
         sensor: where its taxels are.
         shares: (n_nodes, n_taxels) of the force on a node.
-        mixing: (n_taxels, 3, 3) from a taxel's force to its reading: gain and cross-talk.
-        baseline: (n_taxels, 3) reading at rest [count].
-        thermal: (n_taxels, 3) by which a degree moves it [count/K].
+        taxels: what is fixed of each taxel.
     """
 
     def __init__(
@@ -80,17 +70,10 @@ class Uskin:
             nodes: (n_nodes, 3) of the skin in the fingertip frame [m].
             generator: of all that is drawn; the same state gives the same sensor and counts.
         """
-        n = sensor.n_taxels
         self.parameters = parameters
         self.sensor = sensor
         self.shares = taxel_shares(nodes, sensor.positions, parameters.spread)
-        gains = np.exp(parameters.gain_spread * generator.standard_normal(n))
-        mixed = parameters.cross_talk * generator.standard_normal((n, 3, 3))
-        mixed[:, range(3), range(3)] = 1.0
-        self.mixing = gains[:, None, None] * mixed
-        drawn = generator.standard_normal((2, n, 3))
-        self.baseline = np.array(parameters.baseline) + drawn[0] * parameters.baseline_spread
-        self.thermal = np.array(parameters.thermal_counts) + drawn[1] * parameters.thermal_spread
+        self.taxels = _drawn(parameters, sensor.n_taxels, generator)
         self._generator = generator
 
     def taxel_forces(self, node_forces: npt.ArrayLike) -> Array:
@@ -119,13 +102,13 @@ class Uskin:
         result: Array = np.ascontiguousarray((on_taxels @ -self.sensor.rotations).swapaxes(0, 1))
         return result
 
-    def readout(self, generator: np.random.Generator | None = None) -> "Readout":
+    def readout(self, generator: np.random.Generator | None = None) -> Readout:
         """A run of the sensor from rest, to be fed in pieces of any size.
 
         Args:
             generator: of noise and warming; by default the one that drew the sensor.
         """
-        return Readout(self, generator or self._generator)
+        return Readout(self.parameters, self.taxels, generator or self._generator)
 
     def counts(
         self,
@@ -152,143 +135,17 @@ class Uskin:
         return self.readout(generator).counts(taxel_forces, times)
 
 
-class Readout:
-    """A run of one fingertip: the state of its silicone and its temperature.
-
-    Attributes:
-        warmth: above the temperature at the start [K].
-    """
-
-    def __init__(self, uskin: Uskin, generator: np.random.Generator) -> None:
-        self.warmth = 0.0
-        self._uskin = uskin
-        self._generator = generator
-        self._rate = 0.0
-        self._last: tuple[float, Array, Array] | None = None  # time, force and late parts
-
-    def counts(self, taxel_forces: npt.ArrayLike, times: npt.ArrayLike) -> Counts:
-        """The next samples; arguments, result and errors as of `Uskin.counts`."""
-        forces, clock = self._checked(taxel_forces, times)
-        if not len(clock):
-            return np.zeros(forces.shape, dtype=np.uint16)
-        uskin, parameters = self._uskin, self._uskin.parameters
-        drawn = self._generator.standard_normal((len(clock), 3 * uskin.sensor.n_taxels + 1))
-        warmth = self._warm(clock, drawn[:, -1])
-        mixed = np.einsum("kia,iba->kib", self._late(forces, clock), uskin.mixing)
-        newtons = saturated(mixed, parameters.limits)
-        values = newtons * parameters.counts_per_newton
-        values += uskin.baseline
-        values += warmth[:, None, None] * uskin.thermal
-        white = np.sqrt(max(parameters.noise_counts**2 - ROUNDING, 0.0))
-        values += white * drawn[:, :-1].reshape(forces.shape)
-        return np.clip(np.rint(values), 0.0, UINT16_MAX).astype(np.uint16)
-
-    def _checked(self, taxel_forces: npt.ArrayLike, times: npt.ArrayLike) -> tuple[Array, Array]:
-        forces = np.ascontiguousarray(taxel_forces, dtype=np.float64)
-        clock = np.ascontiguousarray(times, dtype=np.float64)
-        n_taxels = self._uskin.sensor.n_taxels
-        if forces.shape != (*clock.shape, n_taxels, 3) or clock.ndim != 1:
-            raise ValueError(
-                f"taxel forces of shape (n, {n_taxels}, 3) and n times expected, "
-                f"{forces.shape} and {clock.shape} given"
-            )
-        if not (np.isfinite(forces).all() and np.isfinite(clock).all()):
-            raise ValueError("finite taxel forces and times expected, NaN or infinity given")
-        before = [] if self._last is None else [self._last[0]]
-        if not (np.diff(clock, prepend=before) > 0).all():
-            raise ValueError("times that increase expected")
-        return forces, clock
-
-    def _late(self, forces: Array, clock: Array) -> Array:
-        """The forces as the silicone passes them on: parts of them late.
-
-        Exact for forces that are linear between samples.
-        """
-        shares = np.array(self._uskin.parameters.lag_shares)
-        taus = np.array(self._uskin.parameters.lag_times)
-        if self._last is None:
-            state = np.repeat(forces[None, 0], len(taus), axis=0)
-            self._last = (float(clock[0]), forces[0], state)
-        last, force, state = self._last
-        passed = np.empty_like(forces)
-        _follow(forces, np.diff(clock, prepend=last), force, state, shares, taus, passed)
-        self._last = (float(clock[-1]), forces[-1].copy(), state)
-        return passed
-
-    def _warm(self, clock: Array, drawn: Array) -> Array:
-        """(n,) the temperature above that at the start [K]: a rate that wanders, summed up."""
-        parameters = self._uskin.parameters
-        spread = parameters.warming_rate
-        warmth = np.empty(len(clock))
-        if self._last is None:
-            start, self._rate = float(clock[0]), spread * float(drawn[0])
-        else:
-            start = self._last[0]
-        steps = np.diff(clock, prepend=start)
-        state = np.array([self._rate, self.warmth])
-        _wander(steps, drawn, spread, parameters.thermal_time, state, warmth)
-        self._rate, self.warmth = state.tolist()
-        return warmth
-
-
-def saturated(newtons: Array, limits: Three) -> Array:
-    """Readings that bend towards the range of their axis: x / (1 + (x / limit)^4)^(1/4).
-
-    Args:
-        newtons: (..., 3) unlimited [N].
-        limits: by axis, never passed [N].
-
-    Returns:
-        (..., 3) [N].
-    """
-    square = (newtons / limits) ** 2
-    result: Array = newtons / np.sqrt(np.sqrt(1.0 + square * square))
-    return result
-
-
-@compiled
-def _follow(
-    forces: Array,
-    steps: Array,
-    before: Array,
-    state: Array,
-    shares: Array,
-    taus: Array,
-    passed: Array,
-) -> None:
-    """The sum of a prompt part and low-pass parts; `state` (n_lags, n_taxels, 3) is written.
-
-    Over a step h of a force from u to v: y <- e y + (g - e) u + (1 - g) v, with
-    e = exp(-h / tau) and g = (1 - e) tau / h.
-    """
-    n, n_taxels, n_axes = forces.shape
-    prompt = 1.0 - shares.sum()
-    for k in range(n):
-        earlier = before if k == 0 else forces[k - 1]
-        passed[k] = prompt * forces[k]
-        for lag in range(len(taus)):
-            ratio = steps[k] / taus[lag]
-            keep = np.exp(-ratio)
-            mean = 1.0 if ratio == 0.0 else -np.expm1(-ratio) / ratio
-            for i in range(n_taxels):
-                for axis in range(n_axes):
-                    late = keep * state[lag, i, axis]
-                    late += (mean - keep) * earlier[i, axis] + (1 - mean) * forces[k, i, axis]
-                    state[lag, i, axis] = late
-                    passed[k, i, axis] += shares[lag] * late
-
-
-@compiled
-def _wander(
-    steps: Array, drawn: Array, spread: float, tau: float, state: Array, warmth: Array
-) -> None:
-    """Rate [K/s] and temperature [K] in `state`, which is written; the first step may be 0."""
-    for k in range(len(steps)):
-        keep = np.exp(-steps[k] / tau)
-        rate = keep * state[0] + np.sqrt(1 - keep * keep) * spread * drawn[k]
-        state[1] += 0.5 * (state[0] + rate) * steps[k]
-        state[0] = rate
-        warmth[k] = state[1]
+def _drawn(parameters: UskinParameters, n: int, generator: np.random.Generator) -> Taxels:
+    """The fixed properties of `n` taxels; gains of median 1."""
+    gains = np.exp(parameters.gain_spread * generator.standard_normal(n))
+    axes = parameters.cross_talk * generator.standard_normal((n, 3, 3))
+    axes[:, range(3), range(3)] = 1.0
+    rest, warm = generator.standard_normal((2, n, 3))
+    return Taxels(
+        gains[:, None, None] * axes,
+        parameters.baseline + rest * parameters.baseline_spread,
+        parameters.thermal_counts + warm * parameters.thermal_spread,
+    )
 
 
 def with_server_effects(

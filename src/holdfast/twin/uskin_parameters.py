@@ -42,7 +42,7 @@ class UskinParameters:
             square 0.8 (x, y) and 0.9 (z).
 
     Raises:
-        ValueError: a number is not finite or negative, limits, scales or times are not above 0,
+        ValueError: numbers are missing, not finite or negative, limits, scales or times are not above 0,
             or the lag takes more than the whole force.
     """
 
@@ -66,6 +66,10 @@ class UskinParameters:
         for part in fields(self):
             values = np.asarray(getattr(self, part.name), dtype=np.float64)
             positive = part.name in _ABOVE_ZERO
+            if values.shape != np.shape(part.default):
+                raise ValueError(
+                    f"{part.name}: numbers like {part.default} expected, {values} given"
+                )
             if not (np.isfinite(values).all() and (values >= 0).all()):
                 raise ValueError(f"{part.name}: finite, not negative expected, {values} given")
             if positive and not (values > 0).all():
