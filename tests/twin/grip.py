@@ -8,7 +8,8 @@ from scipy.spatial.transform import Rotation
 
 from holdfast.sensors.values import Array
 from holdfast.twin.contact import Constants, Contact, constants_of, new_contact, touch
-from holdfast.twin.objects import Thing, probe, solid
+from holdfast.twin.objects import Thing, solid
+from holdfast.twin.shapes import probe
 from holdfast.twin.surface import Surface, curved_fingertip
 
 GRAVITY = 9.81

@@ -5,8 +5,8 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from holdfast.sensors.values import Array
-from holdfast.twin.contact import Skin
 from holdfast.twin.objects import Thing, distance_to
+from holdfast.twin.skin import Skin
 from holdfast.twin.surface import Surface
 
 H = 1e-6  # for central differences [m]

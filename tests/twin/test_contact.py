@@ -8,8 +8,10 @@ from hypothesis import strategies as st
 from scipy.spatial.transform import Rotation
 
 from holdfast.sensors.values import Array
-from holdfast.twin.contact import Contact, Skin, constants_of, new_contact, touch
-from holdfast.twin.objects import Thing, load_things, probe, relief, solid, thing
+from holdfast.twin.contact import Contact, constants_of, new_contact, touch
+from holdfast.twin.objects import Thing, load_things, solid, thing
+from holdfast.twin.shapes import probe, relief
+from holdfast.twin.skin import Skin
 from holdfast.twin.surface import Surface, curved_fingertip
 
 from .grip import GRAVITY, Grip

@@ -1,8 +1,4 @@
-"""The objects that the twin grasps: a table of shapes, and their signed distances.
-
-A shape is a core grown by its rounding. Near the surface all distances are then exact and
-smooth, and so are their gradients, which are computed with them.
-"""
+"""The objects that the twin grasps: a table, and the mass and inertia of what is in it."""
 
 import math
 import tomllib
@@ -14,13 +10,27 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from holdfast.compiled import compiled
 from holdfast.sensors.values import Array, rebuilt
+from holdfast.twin.shapes import (
+    AMPLITUDE,
+    AROUND_2,
+    BOX,
+    CAPSULE,
+    CENTRE,
+    CODE,
+    HEXAGON,
+    MU_KINETIC,
+    MU_STATIC,
+    N_SOLID,
+    REVOLVED,
+    ROUNDING,
+    SIDE_LENGTH,
+    SIDE_OUT,
+    SIDE_UP,
+    distances,
+)
 
 TABLE = Path(__file__).with_name("objects.toml")
-
-REVOLVED, BOX, HEXAGON, CAPSULE = range(4)
-"""The cores: a frustum (a cylinder too), a box, a hexagonal prism, a line (a point too)."""
 
 SHAPES = {
     "sphere": ("radius",),
@@ -32,16 +42,6 @@ SHAPES = {
 }
 """What the sizes of each shape are, in order [m]."""
 
-# Columns of a packed object. Sizes of a core are in 1 to 3 [m]; of a frustum they are the radii
-# and half height, and its side's normal (outward, upward) and length [m] stand beside them.
-CODE = 0
-SIDE_OUT, SIDE_UP, SIDE_LENGTH = 4, 5, 6
-ROUNDING = 7  # by which the core is grown [m]
-CENTRE = 8  # height of the centre of mass over the middle [m]
-N_CORE = 9
-AMPLITUDE, WAVE, WAVE_2, AROUND, AROUND_2 = range(9, 14)  # [m], [rad/m], [rad/m], [1], [1]
-MU_STATIC, MU_KINETIC = 14, 15
-N_SOLID = 16
 LIMITS = {
     "size": (0.001, 0.2),
     "mass": (0.005, 2.0),
@@ -312,144 +312,8 @@ def distance_to(thing: Thing, points: npt.ArrayLike) -> Array:
     """
     given = np.asarray(points, dtype=np.float64)
     flat = np.ascontiguousarray(given.reshape(-1, 3))
-    distances: Array = _distances(solid(thing), flat)
-    return distances.reshape(given.shape[:-1])
-
-
-@compiled
-def _distances(solid: Array, points: Array) -> Array:
-    distances = np.empty(len(points))
-    for i in range(len(points)):
-        distances[i] = signed_distance(solid, points[i, 0], points[i, 1], points[i, 2])
-    return distances
-
-
-@compiled
-def signed_distance(solid: Array, x: float, y: float, z: float) -> float:
-    """The distance of a point in the object's frame from its textured surface [m]."""
-    return probe(solid, x, y, z)[0] + relief(solid, x, y, z)
-
-
-@compiled
-def relief(solid: Array, x: float, y: float, z: float) -> float:
-    """How deep the texture is at a point of the object's frame [m].
-
-    Three waves: A (sin a z + 0.7 sin(0.6 b z + b s + 1) + 0.8 sin(a s + 0.3)) with s the arc
-    about the axis, a = 2 pi / L and b = a / 0.37 (own choice).
-    """
-    if solid[AMPLITUDE] == 0.0:
-        return 0.0
-    angle = math.atan2(y, x)
-    waves = math.sin(solid[WAVE] * z)
-    waves += 0.7 * math.sin(solid[WAVE_2] * z + solid[AROUND_2] * angle + 1.0)
-    waves += 0.8 * math.sin(solid[AROUND] * angle + 0.3)
-    deep: float = solid[AMPLITUDE] * waves
-    return deep
-
-
-MOST_RELIEF = 2.5
-"""Amplitudes by which the three waves of a texture reach out at most."""
-
-
-@compiled
-def probe(solid: Array, x: float, y: float, z: float) -> tuple[float, float, float, float]:
-    """The distance of a point from the smooth object, and the gradient of it.
-
-    Returns:
-        The distance [m], negative inside, and the outward unit vector of its gradient.
-    """
-    z += solid[CENTRE]
-    code = int(solid[CODE])
-    if code == BOX:
-        d, gx, gy, gz = _box(solid[1], solid[2], solid[3], x, y, z)
-    elif code == HEXAGON:
-        d, gx, gy, gz = _hexagon(solid[1], solid[2], x, y, z)
-    elif code == CAPSULE:
-        along = z - min(max(z, -solid[1]), solid[1])
-        d = math.sqrt(x * x + y * y + along * along)
-        share = 1.0 / max(d, 1e-12)
-        gx, gy, gz = x * share, y * share, along * share
-    else:
-        q = math.sqrt(x * x + y * y)
-        d, gq, gz = _meridian(solid, q, z)
-        share = gq / max(q, 1e-12)
-        gx, gy = x * share, y * share
-    return d - solid[ROUNDING], gx, gy, gz
-
-
-@compiled
-def _box(
-    a: float, b: float, c: float, x: float, y: float, z: float
-) -> tuple[float, float, float, float]:
-    ex, ey, ez = abs(x) - a, abs(y) - b, abs(z) - c
-    ox, oy, oz = max(ex, 0.0), max(ey, 0.0), max(ez, 0.0)
-    d = math.sqrt(ox * ox + oy * oy + oz * oz)
-    if d > 0.0:
-        share = 1.0 / d
-        return (
-            d,
-            math.copysign(ox * share, x),
-            math.copysign(oy * share, y),
-            math.copysign(oz * share, z),
-        )
-    if ex >= ey and ex >= ez:
-        return ex, math.copysign(1.0, x), 0.0, 0.0
-    if ey >= ez:
-        return ey, 0.0, math.copysign(1.0, y), 0.0
-    return ez, 0.0, 0.0, math.copysign(1.0, z)
-
-
-@compiled
-def _hexagon(
-    inner: float, height: float, x: float, y: float, z: float
-) -> tuple[float, float, float, float]:
-    """Six faces, the first across x; in the sector of a face that face is the nearest."""
-    nx, ny = 1.0, 0.0
-    if abs(y) * math.sqrt(3.0) > abs(x):
-        nx, ny = 0.5, math.sqrt(0.75)
-    nx, ny = math.copysign(nx, x), math.copysign(ny, y)
-    face = nx * x + ny * y - inner
-    side = nx * y - ny * x
-    half = inner / math.sqrt(3.0)
-    over = side - min(max(side, -half), half)
-    tall = abs(z) - height
-    if face <= 0.0 and tall <= 0.0:
-        if face >= tall:
-            return face, nx, ny, 0.0
-        return tall, 0.0, 0.0, math.copysign(1.0, z)
-    face, tall = max(face, 0.0), math.copysign(max(tall, 0.0), z)
-    d = math.sqrt(face * face + over * over + tall * tall)
-    share = 1.0 / d
-    return (
-        d,
-        (face * nx - over * ny) * share,
-        (face * ny + over * nx) * share,
-        tall * share,
-    )
-
-
-@compiled
-def _meridian(solid: Array, q: float, z: float) -> tuple[float, float, float]:
-    """The distance of (radius, height) from a trapezium about the axis, and its gradient."""
-    foot, top, height = solid[1], solid[2], solid[3]
-    nq, nz, length = solid[SIDE_OUT], solid[SIDE_UP], solid[SIDE_LENGTH]
-    side = (q - foot) * nq + (z + height) * nz
-    tall = abs(z) - height
-    if side <= 0.0 and tall <= 0.0:
-        if side >= tall:
-            return side, nq, nz
-        return tall, 0.0, math.copysign(1.0, z)
-    along = min(max((z + height) * nq - (q - foot) * nz, 0.0), length)
-    dq, dz = q - foot + along * nz, z + height - along * nq
-    square = dq * dq + dz * dz
-    if tall > 0.0:
-        cap = max(q - (top if z > 0.0 else foot), 0.0)
-        if cap * cap + tall * tall < square:
-            dq, dz = cap, math.copysign(tall, z)
-            square = dq * dq + dz * dz
-    d = math.sqrt(square)
-    share = 1.0 / max(d, 1e-12)
-    return d, dq * share, dz * share
+    far: Array = distances(solid(thing), flat)
+    return far.reshape(given.shape[:-1])
 
 
 def _mass_of(core: Array) -> tuple[float, float, Array]:
@@ -463,7 +327,7 @@ def _mass_of(core: Array) -> tuple[float, float, Array]:
     across = (np.arange(math.ceil(wide / step)) + 0.5) * step
     up = (np.arange(2 * math.ceil(tall / step)) + 0.5) * step - math.ceil(tall / step) * step
     x, y, z = (part.ravel() for part in np.meshgrid(across, across, up, indexing="ij"))
-    depth = -_distances(core, np.stack([x, y, z], axis=1))
+    depth = -distances(core, np.stack([x, y, z], axis=1))
     cell = 4 * step**3 * np.clip(0.5 + depth / step, 0.0, 1.0)
     volume = float(cell.sum())
     centre = float((cell * z).sum()) / volume

@@ -1,0 +1,289 @@
+import copy
+import pickle
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from holdfast.sensors.values import Array
+from holdfast.twin.objects import (
+    TABLE,
+    Thing,
+    distance_to,
+    load_things,
+    solid,
+    thing,
+)
+from holdfast.twin.shapes import MOST_RELIEF, probe, relief
+
+THINGS = load_things()
+SMOOTH = {name: replace(one, texture_amplitude=0.0) for name, one in THINGS.items()}
+LINE = (
+    'mug = {shape = "cylinder", size = [0.035, 0.05, 0.003], mass = 0.2, friction = [0.7, 0.6], '
+    "texture = [1e-5, 2e-3], finger_height = 0.02, yaw = 0.1}"
+)
+
+names = st.sampled_from(sorted(THINGS))
+coordinates = st.floats(-0.08, 0.08)
+points = st.tuples(coordinates, coordinates, coordinates)
+
+
+def middle_of(one: Thing) -> float:
+    """Height of the middle in the object's frame [m]."""
+    return one.foot[2] + one.half_height
+
+
+def segments_distance(corners: list[tuple[float, float]], at: Array) -> float:
+    """From a closed polygon in the plane, negative inside: by its sides, one by one."""
+    best, inside = np.inf, True
+    for a, b in zip(corners, corners[1:] + corners[:1], strict=True):
+        start, side = np.array(a), np.array(b) - np.array(a)
+        t = np.clip((at - start) @ side / (side @ side), 0, 1)
+        best = min(best, float(np.linalg.norm(at - start - t * side)))
+        inside &= bool(side[0] * (at - start)[1] - side[1] * (at - start)[0] >= 0)
+    return -best if inside else best
+
+
+def upright(flat: float, tall: float) -> float:
+    """Distance from a body that is a shape in the plane, drawn out along z."""
+    if max(flat, tall) <= 0:
+        return max(flat, tall)
+    return float(np.hypot(max(flat, 0), max(tall, 0)))
+
+
+def naive_distance(one: Thing, point: tuple[float, float, float]) -> float:
+    x, y, z = point[0], point[1], point[2] - middle_of(one)
+    q, size = float(np.hypot(x, y)), one.size
+    if one.shape in ("sphere", "capsule"):
+        reach = one.half_height - size[0]
+        return float(np.linalg.norm([x, y, z - np.clip(z, -reach, reach)])) - size[0]
+    r, tall = size[-1], abs(z) - one.half_height + size[-1]
+    if one.shape == "box":
+        a, b = size[0] - r, size[1] - r
+        flat = segments_distance([(-a, -b), (a, -b), (a, b), (-a, b)], np.array([x, y]))
+        return upright(flat, tall) - r
+    if one.shape == "hexagon":
+        turns = np.radians(np.arange(30, 390, 60))
+        corners = [
+            ((size[0] - r) * 2 / np.sqrt(3) * np.array([np.cos(t), np.sin(t)])) for t in turns
+        ]
+        return upright(segments_distance([tuple(c) for c in corners], np.array([x, y])), tall) - r
+    foot, top, h = (size[0], size[0], size[1]) if one.shape == "cylinder" else size[:3]
+    slope = (top - foot) / (2 * h)
+    inset, high = r * np.hypot(1, slope), h - r
+    low, up = foot + slope * r - inset, top - slope * r - inset
+    corners = [(-low, -high), (low, -high), (up, high), (-up, high)]
+    return segments_distance(corners, np.array([q, z])) - r
+
+
+@settings(max_examples=300)
+@given(name=names, point=points)
+def test_same_as_the_naive_distance(name: str, point: tuple[float, float, float]) -> None:
+    expected = naive_distance(SMOOTH[name], point)
+    assert float(distance_to(SMOOTH[name], point)) == pytest.approx(expected, abs=1e-12)
+
+
+@settings(max_examples=300)
+@given(name=names, point=points, other=points)
+def test_it_is_a_distance(name: str, point: tuple[float, ...], other: tuple[float, ...]) -> None:
+    """It changes by no more than one moves, and going back along the gradient ends on it."""
+    packed = solid(THINGS[name])
+    d, *gradient = probe(packed, *point)
+    assert abs(probe(packed, *other)[0] - d) <= np.linalg.norm(np.subtract(point, other)) + 1e-12
+    if d > 0:
+        assert np.linalg.norm(gradient) == pytest.approx(1, abs=1e-12)
+        assert probe(packed, *(np.array(point) - d * np.array(gradient)))[0] == pytest.approx(
+            0, abs=1e-12
+        )
+
+
+@settings(max_examples=300)
+@given(
+    name=names, angle=st.floats(-3.1, 3.1), height=st.floats(-0.9, 0.9), d=st.floats(-2.5e-3, 9e-3)
+)
+def test_the_gradient_is_that_of_the_distance(
+    name: str, angle: float, height: float, d: float
+) -> None:
+    """Near the surface, where fingertips are: inside by less than the rounding too."""
+    one, packed = THINGS[name], solid(THINGS[name])
+    point = np.array([np.cos(angle), np.sin(angle), 0.0]) * 0.06
+    point[2] = height * one.half_height + middle_of(one)
+    far, *normal = probe(packed, *point)
+    point -= (far - d) * np.array(normal)
+    _, *gradient = probe(packed, *point)
+    steps = 1e-6 * np.eye(3)
+    numeric = [
+        (probe(packed, *(point + s))[0] - probe(packed, *(point - s))[0]) / 2e-6 for s in steps
+    ]
+    np.testing.assert_allclose(gradient, numeric, atol=1e-3)
+
+
+@pytest.mark.parametrize("name", sorted(THINGS))
+def test_sizes_are_where_the_surface_is(name: str) -> None:
+    one = SMOOTH[name]
+    middle = middle_of(one)
+    ends = [
+        [one.radius, 0, middle] if one.shape != "frustum" else [0, 0, one.foot[2]],
+        [-one.radius, 0, middle] if one.shape != "frustum" else [0, 0, one.foot[2]],
+        one.foot,
+        [0, 0, middle + one.half_height],
+    ]
+    np.testing.assert_allclose(distance_to(one, ends), 0, atol=1e-12)
+
+
+def test_a_frustum_is_as_wide_as_the_table_says() -> None:
+    one = replace(SMOOTH["bottle"])
+    foot, top, half = one.size[:3]
+    for share in (-0.8, 0.0, 0.8):
+        wide = (foot + top) / 2 + share * (top - foot) / 2
+        point = [wide, 0.0, middle_of(one) + share * half]
+        assert float(distance_to(one, point)) == pytest.approx(0, abs=1e-12)
+
+
+@pytest.mark.parametrize("name", sorted(THINGS))
+def test_texture_is_bounded_and_has_no_seam(name: str) -> None:
+    one = THINGS[name]
+    packed = solid(one)
+    heights = np.linspace(-0.03, 0.03, 200)
+    deep = np.array([relief(packed, -0.03, 0.01 * np.sin(900 * h), h) for h in heights])
+    assert np.abs(deep).max() <= MOST_RELIEF * one.texture_amplitude
+    assert np.abs(deep).max() > one.texture_amplitude
+    for h in heights[::10]:
+        left, right = relief(packed, -0.03, 1e-12, h), relief(packed, -0.03, -1e-12, h)
+        assert left == pytest.approx(right, abs=1e-3 * one.texture_amplitude)
+    point = [0.03, 0.02, 0.01]
+    bumpy = float(distance_to(one, point) - distance_to(SMOOTH[name], point))
+    assert bumpy == pytest.approx(relief(packed, *point), abs=1e-15)
+    assert relief(solid(SMOOTH[name]), *point) == 0
+
+
+@pytest.mark.parametrize("name", sorted(THINGS))
+def test_inertia_by_random_points(name: str) -> None:
+    """Another quadrature, and the centre of mass is the origin."""
+    one = SMOOTH[name]
+    rng = np.random.default_rng(1)
+    box = np.array([0.04, 0.04, one.half_height * 1.01])
+    some = rng.uniform(-1, 1, (400_000, 3)) * box + [0, 0, middle_of(one)]
+    inside = some[distance_to(one, some) < 0]
+    np.testing.assert_allclose(inside.mean(axis=0), 0, atol=5e-4)
+    square = (inside**2).mean(axis=0)
+    np.testing.assert_allclose(one.inertia, one.mass * (square.sum() - square), rtol=0.01)
+
+
+def test_inertia_of_shapes_with_a_formula(tmp_path: Path) -> None:
+    def made(shape: str, size: list[float]) -> Thing:
+        text = LINE.replace("cylinder", shape).replace("[0.035, 0.05, 0.003]", str(size))
+        (tmp_path / "t.toml").write_text(text.replace("mass = 0.2", "mass = 1.0"))
+        return load_things(tmp_path / "t.toml")["mug"]
+
+    ball = made("sphere", [0.03])
+    np.testing.assert_allclose(ball.inertia, [0.4 * 0.03**2] * 3, rtol=2e-3)
+    box = made("box", [0.03, 0.04, 0.05, 0.001])
+    exact = (np.array([0.04, 0.03, 0.03]) ** 2 + np.array([0.05, 0.05, 0.04]) ** 2) / 3
+    np.testing.assert_allclose(box.inertia, exact, rtol=5e-3)
+    can = made("cylinder", [0.03, 0.05, 0.001])
+    across = 0.03**2 / 4 + 0.05**2 / 3
+    np.testing.assert_allclose(can.inertia, [across, across, 0.03**2 / 2], rtol=5e-3)
+    cone = made("frustum", [0.04, 0.02, 0.05, 0.001])
+    moment = 0.3 * (0.04**5 - 0.02**5) / (0.04**3 - 0.02**3)
+    assert cone.inertia[2] == pytest.approx(moment, rel=0.01)
+    height = 0.1 * (0.04**2 + 2 * 0.04 * 0.02 + 3 * 0.02**2) / (4 * (0.04**2 + 0.0008 + 0.02**2))
+    assert -cone.foot[2] == pytest.approx(height, rel=0.01)
+
+
+def test_the_built_in_table() -> None:
+    assert len(THINGS) == 6
+    assert len({one.shape for one in THINGS.values()}) == 6
+    for name, one in THINGS.items():
+        assert one.name == name
+        assert thing(name) is one
+        assert 0.05 <= one.mass <= 0.35
+        assert 0.03 <= one.radius <= 0.034
+        assert 6e-6 <= one.texture_amplitude <= 60e-6
+        assert 1e-3 <= one.texture_wavelength <= 3e-3
+        assert one.mu_kinetic < one.mu_static
+        assert one.finger_height < one.half_height
+        assert not one.inertia.flags.writeable
+
+
+def test_things_travel() -> None:
+    for again in (pickle.loads(pickle.dumps(thing("can"))), copy.deepcopy(thing("can"))):
+        assert again.name == "can"
+        assert again.inertia.tobytes() == thing("can").inertia.tobytes()
+        assert not again.inertia.flags.writeable
+
+
+def test_a_line_makes_a_new_object(tmp_path: Path) -> None:
+    path = tmp_path / "more.toml"
+    path.write_text(TABLE.read_text("utf-8") + LINE, "utf-8")
+    things = load_things(path)
+    assert list(things) == [*THINGS, "mug"]
+    assert (things["mug"].radius, things["mug"].half_height) == (0.035, 0.05)
+    assert things["mug"].yaw == 0.1
+    assert things["can"].inertia.tobytes() == THINGS["can"].inertia.tobytes()
+
+
+def test_an_unknown_object() -> None:
+    with pytest.raises(ValueError) as caught:
+        thing("cup")
+    assert str(caught.value) == "no object 'cup'; there are ball, box, can, bottle, prism, flask"
+
+
+COLUMNS = "shape, size, mass, friction, texture, finger_height, yaw"
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "message"),
+    [
+        ("mass", "weight", f"unknown field 'weight'; there are {COLUMNS}"),
+        (", yaw = 0.1", "", "'yaw' is missing"),
+        ("cylinder", "torus", "no shape 'torus'; there are sphere, box, cylinder, capsule, "
+         "hexagon, frustum"),
+        ('"cylinder"', "3", "no shape 3; there are sphere, box, cylinder, capsule, hexagon, "
+         "frustum"),
+        (", 0.003]", "]", "size: radius, half height, rounding expected, 2 numbers given"),
+        ("mass = 0.2", "mass = [0.2, 1]", "mass: one number expected, 2 numbers given"),
+        ("mass = 0.2", "mass = -1", "mass: numbers from 0.005 to 2 expected, -1 given"),
+        ("mass = 0.2", "mass = nan", "mass: numbers from 0.005 to 2 expected, nan given"),
+        ("mass = 0.2", "mass = true", "mass: numbers from 0.005 to 2 expected, True given"),
+        ("mass = 0.2", "mass = 'a'", "mass: numbers from 0.005 to 2 expected, 'a' given"),
+        ("0.7, 0.6", "0.6, 0.7", "friction: kinetic 0.7 is more than static 0.6"),
+        ("1e-5, 2e-3", "5e-4, 2e-3", "texture: a wavelength of at least 0.0005 and 10 amplitudes "
+         "expected, 0.002 given for an amplitude of 0.0005"),
+        ("0.05, 0.003", "0.05, 0.04", "size: a rounding below the other sizes expected, "
+         "0.04 given"),
+        ("[0.035", "[0.06", "size: it cannot be grasped: half widths from 0.02 to 0.045 m fit "
+         "between thumb and fingers, 0.06 given"),
+        ('"cylinder", size = [0.035, 0.05, 0.003]', '"capsule", size = [0.035, 0.03]',
+         "size: half height 0.03 is less than the radius 0.035"),
+    ],
+)  # fmt: skip
+def test_what_a_line_may_not_say(tmp_path: Path, old: str, new: str, message: str) -> None:
+    path = tmp_path / "t.toml"
+    assert old in LINE
+    path.write_text(LINE.replace(old, new), "utf-8")
+    with pytest.raises(ValueError) as caught:
+        load_things(path)
+    assert str(caught.value) == f"{path}: mug: {message}"
+
+
+def test_what_is_no_table(tmp_path: Path) -> None:
+    path = tmp_path / "t.toml"
+    for text, message in (
+        ("mug = ", f"{path} is no TOML table of objects: "),
+        ("", f"{path} has no objects"),
+        ("mug = 3", f"{path}: mug: a line of fields expected ({COLUMNS})"),
+    ):
+        path.write_text(text, "utf-8")
+        with pytest.raises(ValueError) as caught:
+            load_things(path)
+        assert str(caught.value).startswith(message)
+        assert "\n" not in str(caught.value)
+    path.write_bytes(b"\xff\xfe")
+    with pytest.raises(ValueError, match="is no TOML table of objects"):
+        load_things(path)
+    with pytest.raises(FileNotFoundError):
+        load_things(tmp_path / "none.toml")
