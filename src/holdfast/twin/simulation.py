@@ -1,0 +1,216 @@
+"""From a seed to a recording of one grasp, with exact truth: deterministic, without a clock."""
+
+import zlib
+from collections.abc import Callable
+from dataclasses import dataclass
+from functools import cache
+
+import numpy as np
+
+from holdfast.contact import Phase
+from holdfast.recordings import Recording, Tactile, Truth
+from holdfast.sensors import sensor
+from holdfast.sensors.values import Array
+from holdfast.twin.contact import SHARE, SLIP
+from holdfast.twin.control import EVERY, draw_controller
+from holdfast.twin.grasp import ClosingPath, closing_path
+from holdfast.twin.hand import FINGERS, N_JOINTS, RATE, TIMESTEP, HandModel
+from holdfast.twin.labels import labels_from_truth
+from holdfast.twin.objects import thing as built_in_thing
+from holdfast.twin.operator import draw_pushes, draw_tremor
+from holdfast.twin.profile import Profile, profile
+from holdfast.twin.protocol import Command, Plan, Protocol
+from holdfast.twin.surface import curved_fingertip
+from holdfast.twin.uskin import Uskin, UskinParameters
+from holdfast.twin.world import World
+
+CASES = (1, 2)
+"""1: close, hold, release. 2: the same with disturbances while the object is locked."""
+LONGEST = 60.0
+"""No grasp lasts longer [s]."""
+PLACE_SPREAD, TURN_SPREAD = 0.002, 0.05
+"""Standard deviations of how a person places the object [m] and [rad]."""
+GRIP_SPREAD = 0.1
+"""Of the logarithm of the load at which a finger stops: it differs from grasp to grasp."""
+THUMB_TO_FINGERS = 0.6 * 3
+"""The thumb stops at 60 % of what three fingers press; they press it further."""
+
+
+@dataclass(frozen=True)
+class Grasp:
+    """Which grasp it is: everything that a recording is made from.
+
+    Attributes:
+        object: name of the object.
+        case: 1 or 2.
+        repeat: from 1 on.
+        profile: name of the profile.
+        seed: of the whole protocol.
+        attempt: from 0 on; after a failed grasp the same is tried again.
+    """
+
+    object: str
+    case: int
+    repeat: int
+    profile: str = "reference"
+    seed: int = 0
+    attempt: int = 0
+
+    @property
+    def name(self) -> str:
+        """What its recording is called."""
+        return f"{self.object}-case{self.case}-{self.repeat}"
+
+    def generator(self, part: str) -> np.random.Generator:
+        """Random numbers of one part of it; parts do not disturb each other."""
+        key = f"{self.object}/{self.case}/{self.repeat}/{self.profile}/{self.attempt}/{part}"
+        return np.random.default_rng([self.seed, zlib.crc32(key.encode())])
+
+
+Watch = Callable[[World, Command], None]
+
+
+def simulate(
+    grasp: Grasp, parameters: UskinParameters | None = None, watch: Watch | None = None
+) -> Recording:
+    """The recording of one grasp, with truth and labels.
+
+    Args:
+        grasp: which one.
+        parameters: of the skin.
+        watch: is called after each sample; may draw a picture.
+
+    Returns:
+        Counts of four fingertips at 150 Hz. A grasp that was never locked, or lost its object,
+        has the case "failed" in its metadata.
+
+    Raises:
+        ValueError: an unknown object, profile or case, or an object that cannot be grasped.
+    """
+    if grasp.case not in CASES:
+        raise ValueError(f"case 1 or 2 expected, {grasp.case} given")
+    plan = _draw_plan(grasp, profile(grasp.profile))
+    world = _world(grasp)
+    uskins = [
+        Uskin(
+            parameters or UskinParameters(),
+            sensor("uskin-curved"),
+            curved_fingertip().nodes,
+            grasp.generator(f"skin {finger}"),
+        )
+        for finger in FINGERS
+    ]
+    protocol = Protocol(plan, 1 / RATE)
+    log = _Log()
+    taxel_forces: list[list[Array]] = [[] for _ in FINGERS]
+    k = 0
+    while not protocol.over(k / RATE):
+        command = protocol.command(k / RATE, world.loads, world.slip, world.bodies[-1])
+        world.advance(command, plan, protocol.anchor)
+        log.add(world, command)
+        for pile, uskin, forces in zip(
+            taxel_forces, uskins, world.contact.node_forces, strict=True
+        ):
+            pile.append(uskin.taxel_forces(forces[None])[0])
+        if watch is not None:
+            watch(world, command)
+        k += 1
+    times = np.arange(k) / RATE
+    truth = log.truth(times)
+    modules = {}
+    for finger, uskin, pile in zip(FINGERS, uskins, taxel_forces, strict=True):
+        counts = uskin.counts(np.array(pile), times)
+        labels = labels_from_truth(truth, finger)
+        modules[finger] = Tactile(uskin.sensor, times, counts, labels=labels)
+    return Recording(grasp.name, modules, _metadata(grasp, protocol), truth)
+
+
+def _draw_plan(grasp: Grasp, chosen: Profile) -> Plan:
+    generator = grasp.generator("plan")
+    scale = chosen.grip * np.exp(GRIP_SPREAD * generator.standard_normal())
+    grips = scale * np.array([THUMB_TO_FINGERS, 1.0, 1.0, 1.0])
+    return Plan(
+        profile=chosen,
+        grips=grips,
+        speed=float(generator.uniform(*chosen.closing_speed)),
+        before=float(generator.uniform(*chosen.idle)),
+        after=float(generator.uniform(*chosen.idle)),
+        pushes=draw_pushes(generator, chosen) if grasp.case == 2 else (),
+    )
+
+
+def _world(grasp: Grasp) -> World:
+    item = built_in_thing(grasp.object)
+    generator = grasp.generator("world")
+    controller = draw_controller(generator, LONGEST, EVERY * TIMESTEP)
+    tremors = np.stack([draw_tremor(generator), draw_tremor(generator)])
+    start = generator.standard_normal(4) * [*[PLACE_SPREAD] * 3, TURN_SPREAD]
+    return World(HandModel.build(item), item, _path(grasp.object), controller, tremors, start)
+
+
+@cache
+def _path(name: str) -> ClosingPath:
+    return closing_path(built_in_thing(name))
+
+
+class _Log:
+    """Collects what is true, sample by sample."""
+
+    def __init__(self) -> None:
+        self._phase: list[Phase] = []
+        self._rows: dict[str, list[Array]] = {
+            name: [] for name in ("outside_force", "object_pose", "joints")
+        }
+        self._tips: list[Array] = []
+        self._bodies: list[Array] = []
+
+    def add(self, world: World, command: Command) -> None:
+        data = world.hand.data
+        self._phase.append(command.phase)
+        self._rows["outside_force"].append(world.outside[:3].copy())
+        pose = np.concatenate([world.bodies[-1, :3], data.qpos[N_JOINTS + 3 :]])
+        self._rows["object_pose"].append(pose)
+        self._rows["joints"].append(data.qpos[:N_JOINTS].copy())
+        self._tips.append(world.contact.tips.copy())
+        self._bodies.append(world.bodies[:-1].copy())
+
+    def truth(self, times: Array) -> Truth:
+        tips = np.array(self._tips)
+        bodies = np.array(self._bodies)
+        fingers = {
+            finger: {
+                "contact_force": -tips[:, place, :3],
+                "slip_speed": tips[:, place, SLIP],
+                "slipping_share": tips[:, place, SHARE],
+                "tip_pose": _poses(bodies[:, place]),
+            }
+            for place, finger in enumerate(FINGERS)
+        }
+        hand = {name: np.array(rows) for name, rows in self._rows.items()}
+        return Truth(times, {"phase": np.array(self._phase, dtype=str), **hand}, fingers)
+
+
+def _poses(bodies: Array) -> Array:
+    """(n, 7) position and quaternion w x y z."""
+    from scipy.spatial.transform import Rotation
+
+    turns = Rotation.from_matrix(bodies[:, 3:12].reshape(-1, 3, 3)).as_quat()
+    return np.column_stack([bodies[:, :3], turns[:, 3], turns[:, :3]])
+
+
+def _metadata(grasp: Grasp, protocol: Protocol) -> dict[str, object]:
+    item = built_in_thing(grasp.object)
+    return {
+        "object": grasp.object,
+        "object_mass": item.mass,
+        "case": "failed" if protocol.failed else str(grasp.case),
+        "planned_case": grasp.case,
+        "repeat": grasp.repeat,
+        "attempt": grasp.attempt,
+        "profile": grasp.profile,
+        "seed": grasp.seed,
+        "hand": "allegro-right",
+        "source": "twin",
+        "locked_at": protocol.locked_at,
+        "lost_at": protocol.lost_at,
+    }
