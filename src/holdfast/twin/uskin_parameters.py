@@ -42,8 +42,8 @@ class UskinParameters:
             square 0.8 (x, y) and 0.9 (z).
 
     Raises:
-        ValueError: numbers are missing, not finite or negative, limits, scales or times are not above 0,
-            or the lag takes more than the whole force.
+        ValueError: numbers are missing, not finite or negative; limits, scales or times are not
+            above 0; the lag takes more than the whole force.
     """
 
     spread: float = 2.8e-3

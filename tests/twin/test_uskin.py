@@ -1,0 +1,428 @@
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from holdfast.features import fingertip_force
+from holdfast.io import import_recordings
+from holdfast.sensors import sensor
+from holdfast.twin.surface import curved_fingertip
+from holdfast.twin.uskin import Uskin, UskinParameters, taxel_shares, with_server_effects
+from holdfast.twin.uskin_readout import saturated
+
+TIP = sensor("uskin-curved")
+SKIN = curved_fingertip()
+REAL = UskinParameters()
+IDEAL = UskinParameters(
+    gain_spread=0.0,
+    cross_talk=0.0,
+    lag_shares=(0.0, 0.0),
+    baseline=(32768.0, 32768.0, 36000.0),
+    baseline_spread=(0.0, 0.0, 0.0),
+    thermal_counts=(0.0, 0.0, 0.0),
+    thermal_spread=0.0,
+    warming=0.0,
+    noise_counts=0.0,
+)
+RATE = 150.0
+
+
+def tip(parameters=REAL, seed=0):
+    return Uskin(parameters, TIP, SKIN.nodes, np.random.default_rng(seed))
+
+
+def clock(seconds):
+    return np.arange(round(seconds * RATE) + 1) / RATE
+
+
+def on_z(course):
+    """Taxel forces (n, 30, 3) that follow a course on every taxel's z."""
+    return np.asarray(course)[:, None, None] * np.tile([0.0, 0.0, 1.0], (TIP.n_taxels, 1))
+
+
+def newtons(parameters, course, times):
+    """What an ideal taxel shows for a course of z [N], to half a count."""
+    counts = tip(parameters).counts(on_z(course), times)
+    return (counts[:, 0, 2] - IDEAL.baseline[2]) / parameters.counts_per_newton[2]
+
+
+SILICONE = replace(IDEAL, lag_shares=REAL.lag_shares, limits=(1e3, 1e3, 1e3))
+
+
+def test_shares_are_a_partition_of_unity():
+    shares = taxel_shares(SKIN.nodes, TIP.positions, REAL.spread)
+    assert shares.shape == (len(SKIN.nodes), 30)
+    assert (shares >= 0).all()
+    np.testing.assert_allclose(shares.sum(axis=1), 1.0, atol=1e-14)
+    assert (shares.sum(axis=0) > 1.0).all()  # every taxel sees some nodes
+
+
+def test_a_node_on_a_taxel_is_mostly_its_own_and_walls_do_not_couple():
+    shares = taxel_shares(TIP.positions, TIP.positions, REAL.spread)
+    assert (np.diag(shares) > 0.7).all()
+    walls = np.abs(TIP.positions[:, 1]) > 0.014
+    across = TIP.positions[walls, 1][:, None] * TIP.positions[walls, 1] < 0
+    assert across.any()
+    assert shares[np.ix_(walls, walls)][across].max() < 1e-12
+
+
+def test_shares_of_a_node_far_from_all_taxels_are_finite():
+    assert taxel_shares([[1.0, 0, 0]], TIP.positions, REAL.spread).sum() == pytest.approx(1.0)
+
+
+@given(st.integers(0, 2**32 - 1), st.floats(1e-3, 1e2))
+def test_taxel_forces_sum_to_the_force_on_the_object(seed, scale):
+    forces = scale * np.random.default_rng(seed).normal(size=(3, len(SKIN.nodes), 3))
+    on_taxels = tip().taxel_forces(forces)
+    total = np.einsum("iab,kib->ka", TIP.rotations, on_taxels)
+    np.testing.assert_allclose(total, -forces.sum(axis=1), atol=1e-12 * scale * len(SKIN.nodes))
+
+
+def test_a_pressed_pad_reads_positive():
+    """The object pushes the pad's middle inwards, against x; the reading says +z and +F_x."""
+    pad = np.linalg.norm(SKIN.nodes - [0.0257, 0.0, 0.0168], axis=1) < 3e-3
+    forces = np.zeros((2, len(SKIN.nodes), 3))
+    forces[1, pad, 0] = -2.0 / pad.sum()
+    uskin = tip(IDEAL)
+    on_taxels = uskin.taxel_forces(forces)
+    assert on_taxels[1, :, 2].max() > 0.3
+    counts = uskin.counts(on_taxels, [0.0, 1.0])
+    force = fingertip_force(counts, TIP, tare="first")[1]
+    assert force[0] == pytest.approx(2.0 / 0.000729, rel=0.05)
+    assert abs(force[1]) < 0.02 * force[0]
+    assert abs(force[2]) < 0.05 * force[0]
+
+
+def test_a_pad_dragged_along_reads_the_drag_on_the_object():
+    """An object that hangs on the finger pulls the skin towards -z: it is itself pulled up."""
+    pad = np.linalg.norm(SKIN.nodes - [0.0257, 0.0, 0.0168], axis=1) < 3e-3
+    forces = np.zeros((2, len(SKIN.nodes), 3))
+    forces[1, pad, 2] = -0.5 / pad.sum()
+    uskin = tip(IDEAL)
+    counts = uskin.counts(uskin.taxel_forces(forces), [0.0, 1.0])
+    force = fingertip_force(counts, TIP, tare="first")[1]
+    assert force[2] == pytest.approx(0.5 / 0.000628, rel=0.05)
+
+
+@pytest.mark.parametrize(("axis", "newton_per_count"), [(0, 628e-6), (1, 628e-6), (2, 729e-6)])
+@pytest.mark.parametrize("newton", [0.1, -0.1])
+def test_scale_is_that_of_the_data_sheet(axis, newton_per_count, newton):
+    forces = np.zeros((1, 30, 3))
+    forces[0, 4, axis] = newton
+    counts = tip(IDEAL).counts(forces, [0.0]).astype(float) - IDEAL.baseline
+    expected = np.zeros((30, 3))
+    expected[4, axis] = round(newton / newton_per_count)
+    assert counts[0].tolist() == expected.tolist()
+
+
+@given(st.floats(-1e3, 1e3), st.floats(0.0, 10.0))
+def test_saturation_is_odd_monotone_and_never_passes_the_limits(newton, step):
+    low, high, mirrored = saturated(
+        np.array([[newton] * 3, [newton + step] * 3, [-newton] * 3]), REAL.limits
+    )
+    assert (low <= high + 1e-12).all()
+    assert (np.abs(high) <= np.array(REAL.limits) * (1 + 1e-12)).all()
+    assert mirrored.tolist() == (-low).tolist()
+
+
+def test_saturation_spares_the_range_of_use_and_bends_where_the_data_sheet_does():
+    z = np.array([1.0, 2.0, 4.5, 7.0])
+    read = saturated(np.stack([0 * z, 0 * z, z], axis=1), REAL.limits)[:, 2]
+    np.testing.assert_allclose(read[:2], z[:2], rtol=2e-3)
+    assert 0.95 * 4.5 < read[2] < 4.5
+    h = 1e-4
+    steps = saturated(np.stack([0 * z, 0 * z, z + h], axis=1), REAL.limits)[:, 2]
+    np.testing.assert_allclose((steps - read)[2:] / h, [0.85, 0.48], atol=0.01)
+
+
+def test_counts_end_at_what_16_bits_hold():
+    wide = replace(IDEAL, limits=(1e6, 1e6, 1e6))
+    forces = np.array([[1.0, -1.0, 1.0]]) * np.full((1, 30, 3), 1e3)
+    counts = tip(wide).counts(forces, [0.0])
+    assert counts[0, 0].tolist() == [65535, 0, 65535]
+
+
+def test_step_response_shows_both_lags():
+    times = clock(12.0)
+    start = 1 / RATE  # a force rises within one sample: later parts see it half a sample late
+    read = newtons(SILICONE, np.where(times >= start, 2.0, 0.0), times) / 2.0
+    since = times - start / 2
+    fast, slow = SILICONE.lag_shares
+    expected = 1 - fast * np.exp(-since / 0.030) - slow * np.exp(-since / 2.0)
+    np.testing.assert_allclose(read[1:], expected[1:], atol=3e-3)
+    assert read[0] == 0.0
+    assert read[1] == pytest.approx(0.86, abs=0.01)
+    assert read[-1] == pytest.approx(1.0, abs=5e-4)
+
+
+def test_a_residual_stays_after_release_and_fades():
+    times = clock(30.0)
+    read = newtons(SILICONE, np.where(times <= 15.0, 2.0, 0.0), times) / 2.0
+    after = {delay: read[np.searchsorted(times, 15.0 + delay)] for delay in (0.2, 2.0, 14.0)}
+    assert after[0.2] == pytest.approx(0.05 * np.exp(-0.1), abs=2e-3)
+    assert after[2.0] == pytest.approx(0.05 * np.exp(-1), abs=2e-3)
+    assert after[14.0] == pytest.approx(0.0, abs=1e-3)
+
+
+def loop(ramp):
+    """Largest opening between loading and unloading, over the height of the cycle."""
+    times = clock(2 * ramp)
+    course = 4.0 * (1 - np.abs(times / ramp - 1))
+    read = newtons(SILICONE, course, times)
+    n = len(times) // 2
+    return np.max(read[n:] - read[n::-1]) / 4.0
+
+
+def test_hysteresis_of_a_slow_cycle_is_that_of_the_data_sheet():
+    assert loop(20.0) == pytest.approx(0.0106, abs=0.001)
+
+
+def test_the_loop_is_dissipative_and_opens_with_speed():
+    assert 0.0 < loop(40.0) < loop(20.0) < loop(5.0) < 0.05
+
+
+def test_a_force_that_rests_is_read_in_full_from_the_first_sample():
+    read = newtons(SILICONE, np.full(300, 1.5), clock(2.0)[:300])
+    np.testing.assert_allclose(read, 1.5, atol=1.5e-3)
+    assert np.ptp(read) == 0.0
+
+
+@pytest.mark.parametrize("noise", [0.9, 0.5, 3.0])
+def test_noise_is_that_asked_for_rounding_included(noise):
+    still = replace(REAL, noise_counts=noise, warming=0.0)
+    counts = tip(still).counts(np.zeros((4000, 30, 3)), np.arange(4000) / RATE).astype(float)
+    rms = counts.std(axis=0)
+    assert np.sqrt((rms**2).mean()) == pytest.approx(noise, rel=0.01)
+    steps = np.diff(counts, axis=0).std(axis=0) / np.sqrt(2)
+    assert np.sqrt((steps**2).mean()) == pytest.approx(noise, rel=0.01)  # white
+
+
+def test_without_noise_and_drift_nothing_moves():
+    still = replace(REAL, noise_counts=0.0, warming=0.0)
+    counts = tip(still).counts(np.zeros((100, 30, 3)), np.arange(100) / RATE)
+    assert np.ptp(counts, axis=0).max() == 0
+
+
+def test_less_noise_than_rounding_is_rounding_only():
+    quiet = tip(replace(REAL, noise_counts=0.2)).counts(np.zeros((5, 30, 3)), np.arange(5.0))
+    still = tip(replace(REAL, noise_counts=0.0)).counts(np.zeros((5, 30, 3)), np.arange(5.0))
+    np.testing.assert_array_equal(quiet, still)
+
+
+def test_baselines_are_like_those_of_real_packets():
+    """Of the two hands' 368 taxels: x, y 32725..32806 +- 227..297, z 35879, 36535 +- 715, 793."""
+    rest = np.concatenate([tip(seed=seed).taxels.baseline for seed in range(40)])
+    mean, spread = rest.mean(axis=0), rest.std(axis=0)
+    assert (np.abs(mean[:2] - 32768) < 40).all()
+    assert 35879 < mean[2] < 36535
+    assert (spread[:2] > 227).all() and (spread[:2] < 297).all()
+    assert 700 < spread[2] < 800
+    first = tip().counts(np.zeros((1, 30, 3)), [0.0]).astype(float)
+    assert np.abs(first[0] - tip().taxels.baseline).max() < 6
+
+
+def test_gains_and_cross_talk_have_the_spread_asked_for():
+    mixing = np.concatenate([tip(seed=seed).taxels.mixing for seed in range(40)])
+    gains = mixing[:, 0, 0]
+    np.testing.assert_array_equal(gains, mixing[:, 2, 2])
+    assert np.log(gains).std() == pytest.approx(0.15, rel=0.1)
+    assert np.median(gains) == pytest.approx(1.0, abs=0.02)
+    off = (mixing / gains[:, None, None])[:, ~np.eye(3, dtype=bool)]
+    assert off.std() == pytest.approx(0.04, rel=0.05)
+    assert off.mean() == pytest.approx(0.0, abs=0.003)
+
+
+def test_drift_over_50_minutes_is_that_of_the_data_sheet():
+    """Standard deviation of z over many runs: 3.5 K and 120 counts, x and y hardly any."""
+    times = np.arange(0.0, 3000.1, 10.0)
+    uskin = tip(replace(REAL, noise_counts=0.0, thermal_spread=0.0))
+    warmths = []
+    for seed in range(300):
+        run = uskin.readout(np.random.default_rng(seed))
+        counts = run.counts(np.zeros((len(times), 30, 3)), times).astype(float)
+        moved = counts[-1] - counts[0]
+        assert moved[:, 2] == pytest.approx(run.warmth * 120 / 3.5, abs=1.01)
+        assert not moved[:, :2].any()
+        warmths.append(run.warmth)
+    assert np.std(warmths) == pytest.approx(3.5, rel=0.12)
+    assert abs(np.mean(warmths)) < 0.7
+
+
+def test_drift_is_smooth_at_the_scale_of_a_sample():
+    """Within a window of 14 samples the fingertip force drifts by far less than its noise."""
+    still = replace(REAL, noise_counts=0.0)
+    counts = tip(still).counts(np.zeros((9000, 30, 3)), np.arange(9000) / RATE).astype(float)
+    assert np.ptp(counts[:, :, 2], axis=0).max() > 2  # but it drifts, in a minute
+    assert np.abs(counts[14:] - counts[:-14]).max() <= 1
+
+
+@given(st.lists(st.integers(1, 40), min_size=1, max_size=8), st.integers(0, 1000))
+def test_fed_in_pieces_it_sends_the_same(pieces, seed):
+    n = sum(pieces)
+    generator = np.random.default_rng(seed)
+    forces = generator.normal(size=(n, 30, 3))
+    times = np.cumsum(generator.uniform(1e-3, 2e-2, n))
+    whole = tip(seed=seed).counts(forces, times)
+    run = tip(seed=seed).readout()
+    cuts = np.cumsum(pieces)[:-1]
+    parts = [
+        run.counts(*p) for p in zip(np.split(forces, cuts), np.split(times, cuts), strict=True)
+    ]
+    np.testing.assert_array_equal(np.concatenate(parts), whole)
+
+
+def test_same_seed_same_bytes_and_another_seed_another_sensor():
+    forces = np.random.default_rng(5).normal(size=(200, len(SKIN.nodes), 3)) * 0.01
+    sent = []
+    for seed in (1, 1, 2):
+        uskin = tip(seed=seed)
+        sent.append(uskin.counts(uskin.taxel_forces(forces), np.arange(200) / RATE).tobytes())
+    assert sent[0] == sent[1] != sent[2]
+
+
+def test_a_sensor_keeps_its_taxels_from_run_to_run_but_not_its_noise():
+    uskin = tip()
+    forces, times = np.zeros((50, 30, 3)), np.arange(50) / RATE
+    one = uskin.counts(forces, times, np.random.default_rng(1))
+    again = uskin.counts(forces, times, np.random.default_rng(1))
+    other = uskin.counts(forces, times, np.random.default_rng(2))
+    np.testing.assert_array_equal(one, again)
+    assert (one != other).any()
+    assert np.abs(one.astype(float) - other).max() < 12
+
+
+def test_counts_are_uint16_and_inputs_stay_as_they_are():
+    forces = np.ones((3, 30, 3))
+    forces.flags.writeable = False
+    counts = tip().counts(forces, np.arange(3.0))
+    assert counts.dtype == np.uint16
+    assert counts.shape == (3, 30, 3)
+    assert forces.tolist() == np.ones((3, 30, 3)).tolist()
+
+
+def test_no_samples_no_counts():
+    assert tip().counts(np.zeros((0, 30, 3)), []).shape == (0, 30, 3)
+    assert tip().taxel_forces(np.zeros((0, len(SKIN.nodes), 3))).shape == (0, 30, 3)
+
+
+def test_another_sensor_does_as_well():
+    patch = sensor("uskin-4x4")
+    uskin = Uskin(IDEAL, patch, patch.positions, np.random.default_rng(0))
+    forces = np.zeros((2, 16, 3))
+    forces[1, 5, 2] = -1.0
+    counts = uskin.counts(uskin.taxel_forces(forces), [0.0, 1.0])
+    force = fingertip_force(counts, patch, tare="first")[1]
+    assert force == pytest.approx([0, 0, 1 / 0.000729], abs=10)
+
+
+@pytest.mark.parametrize(
+    ("forces", "times", "message"),
+    [
+        (np.zeros((2, 29, 3)), [0, 1], r"shape \(n, 30, 3\) and n times .* \(2, 29, 3\)"),
+        (np.zeros((2, 30, 3)), [0], r"\(2, 30, 3\) and \(1,\) given"),
+        (np.full((2, 30, 3), np.nan), [0, 1], "finite taxel forces and times expected"),
+        (np.zeros((2, 30, 3)), [0, np.inf], "finite taxel forces and times expected"),
+        (np.zeros((2, 30, 3)), [1, 1], "times that increase expected"),
+    ],
+)
+def test_bad_samples_are_refused(forces, times, message):
+    with pytest.raises(ValueError, match=message):
+        tip().counts(forces, times)
+
+
+def test_time_that_runs_back_between_pieces_is_refused():
+    run = tip().readout()
+    run.counts(np.zeros((1, 30, 3)), [1.0])
+    with pytest.raises(ValueError, match="times that increase expected"):
+        run.counts(np.zeros((1, 30, 3)), [1.0])
+
+
+def test_node_forces_of_another_skin_are_refused():
+    with pytest.raises(ValueError, match=r"shape \(n, 158, 3\) expected, \(1, 7, 3\) given"):
+        tip().taxel_forces(np.zeros((1, 7, 3)))
+
+
+@pytest.mark.parametrize(
+    ("field", "value", "message"),
+    [
+        ("noise_counts", -1.0, "noise_counts: finite, not negative expected, -1.0 given"),
+        ("spread", 0.0, "spread: above 0 expected, 0.0 given"),
+        ("limits", (1.0, float("nan"), 1.0), "limits: finite, not negative expected"),
+        ("limits", (1.0, 1.0), "limits: numbers like .* expected"),
+        ("lag_shares", (0.6, 0.5), "lag_shares: at most 1 in sum expected, .* given"),
+    ],
+)
+def test_bad_parameters_are_refused(field, value, message):
+    with pytest.raises(ValueError, match=message):
+        replace(REAL, **{field: value})
+
+
+@given(st.integers(2, 400), st.integers(0, 1000), st.floats(0, 0.1))
+def test_server_times_increase_and_packets_stay_in_order(n, seed, jitter):
+    times = np.arange(n) / RATE
+    stamps, sent = with_server_effects(
+        times, np.arange(n), np.random.default_rng(seed), jitter=jitter
+    )
+    assert (np.diff(stamps) > 0).all()
+    assert np.abs(stamps - times).max() < 0.46 / RATE
+    assert set(np.diff(sent).tolist()) <= {0, 1, 2}
+    assert not ((np.diff(sent)[1:] == 0) & (np.diff(sent)[:-1] == 0)).any()
+    assert (sent <= np.arange(n)).all()  # nothing is sent before it is measured
+
+
+@pytest.mark.parametrize("share", [0.0, 0.075, 0.3])
+def test_share_of_repeats_and_jitter_are_those_asked_for(share):
+    n = 20_000
+    stamps, sent = with_server_effects(
+        np.arange(n) / RATE, np.arange(n), np.random.default_rng(3), 1e-3, share
+    )
+    assert (np.diff(sent) == 0).mean() == pytest.approx(share, abs=0.01)
+    assert (stamps - np.arange(n) / RATE).std() == pytest.approx(1e-3, rel=0.15)
+
+
+def test_server_effects_move_whole_samples_and_keep_the_type():
+    readings = np.random.default_rng(0).integers(0, 65535, (50, 4, 30, 3), dtype=np.uint16)
+    _, sent = with_server_effects(np.arange(50) / RATE, readings, np.random.default_rng(1))
+    assert sent.dtype == np.uint16
+    rows = {row.tobytes() for row in readings}
+    assert all(row.tobytes() in rows for row in sent)
+    assert sent.base is None
+
+
+@pytest.mark.parametrize("n", [0, 1])
+def test_server_effects_on_next_to_nothing(n):
+    times, sent = with_server_effects(np.zeros(n), np.ones((n, 2)), np.random.default_rng(0))
+    assert times.shape == (n,)
+    assert sent.shape == (n, 2)
+
+
+@pytest.mark.parametrize(
+    ("times", "jitter", "share", "message"),
+    [
+        ([0, 1], -1.0, 0.1, "jitter of at least 0 s .* -1.0 and 0.1 given"),
+        ([0, 1], float("nan"), 0.1, "jitter of at least 0 s"),
+        ([0, 1], 0.0, 0.5, r"repeats in \[0, 0.5\) expected"),
+        ([1, 1], 0.0, 0.1, "2 increasing times expected"),
+        ([0, 1, 2], 0.0, 0.1, r"2 increasing times expected, shape \(3,\) given"),
+    ],
+)
+def test_bad_server_effects_are_refused(times, jitter, share, message):
+    with pytest.raises(ValueError, match=message):
+        with_server_effects(times, np.zeros((2, 3)), np.random.default_rng(0), jitter, share)
+
+
+def test_server_effects_are_like_those_of_a_real_server(data_folder):
+    """Five recordings at 60 Hz: share of repeats, none twice, spread of the steps in time."""
+    repeats, spreads = [], []
+    for recording in import_recordings(data_folder / "uskin_pick_move"):
+        module = recording.modules["finger1"]
+        same = (np.diff(module.readings.astype(int), axis=0) == 0).all(axis=(1, 2))
+        assert not (same[1:] & same[:-1]).any()
+        repeats.append(same.mean())
+        spreads.append(np.diff(module.times).std())
+    n = 20_000
+    stamps, sent = with_server_effects(np.arange(n) / 60, np.arange(n), np.random.default_rng(0))
+    assert min(repeats) < (np.diff(sent) == 0).mean() < max(repeats)
+    assert min(spreads) < np.diff(stamps).std() < max(spreads)
