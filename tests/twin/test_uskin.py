@@ -117,24 +117,26 @@ def test_scale_is_that_of_the_data_sheet(axis, newton_per_count, newton):
     assert counts[0].tolist() == expected.tolist()
 
 
-@given(st.floats(-1e3, 1e3), st.floats(0.0, 10.0))
-def test_saturation_is_odd_monotone_and_never_passes_the_limits(newton, step):
-    low, high, mirrored = saturated(
-        np.array([[newton] * 3, [newton + step] * 3, [-newton] * 3]), REAL.limits
-    )
-    assert (low <= high + 1e-12).all()
-    assert (np.abs(high) <= np.array(REAL.limits) * (1 + 1e-12)).all()
-    assert mirrored.tolist() == (-low).tolist()
+@given(st.floats(-1e3, 1e3), st.floats(0.0, 10.0), st.sampled_from(REAL.limits))
+def test_saturation_is_odd_monotone_and_never_passes_the_limits(newton, step, limit):
+    low, high = saturated(newton, limit), saturated(newton + step, limit)
+    assert low <= high + 1e-12
+    assert abs(high) <= limit * (1 + 1e-12)
+    assert saturated(-newton, limit) == -low
 
 
 def test_saturation_spares_the_range_of_use_and_bends_where_the_data_sheet_does():
-    z = np.array([1.0, 2.0, 4.5, 7.0])
-    read = saturated(np.stack([0 * z, 0 * z, z], axis=1), REAL.limits)[:, 2]
-    np.testing.assert_allclose(read[:2], z[:2], rtol=2e-3)
-    assert 0.95 * 4.5 < read[2] < 4.5
-    h = 1e-4
-    steps = saturated(np.stack([0 * z, 0 * z, z + h], axis=1), REAL.limits)[:, 2]
-    np.testing.assert_allclose((steps - read)[2:] / h, [0.85, 0.48], atol=0.01)
+    assert saturated(2.0, 7.35) == pytest.approx(2.0, rel=2e-3)
+    slopes = [(saturated(z + 1e-4, 7.35) - saturated(z, 7.35)) / 1e-4 for z in (4.5, 7.0)]
+    assert slopes == pytest.approx([0.85, 0.48], abs=0.01)
+
+
+@pytest.mark.parametrize("axis", [0, 1, 2])
+def test_a_taxel_reads_no_more_than_its_range(axis):
+    forces = np.zeros((2, 30, 3))
+    forces[1, :, axis] = 50.0
+    counts = tip(IDEAL).counts(forces, [0.0, 1.0]).astype(float)
+    assert (counts[1] - counts[0])[:, axis] == pytest.approx([1385, 1385, 10082][axis], abs=1)
 
 
 def test_counts_end_at_what_16_bits_hold():

@@ -1,5 +1,6 @@
 """One run of a uSkin fingertip: silicone, magnets, temperature, noise and whole counts."""
 
+import math
 from typing import NamedTuple
 
 import numpy as np
@@ -7,7 +8,7 @@ import numpy.typing as npt
 
 from holdfast.compiled import compiled
 from holdfast.sensors.values import Array
-from holdfast.twin.uskin_parameters import Three, UskinParameters
+from holdfast.twin.uskin_parameters import UskinParameters
 
 Counts = npt.NDArray[np.uint16]
 
@@ -52,17 +53,15 @@ class Readout:
         forces, clock = self._checked(taxel_forces, times)
         if not len(clock):
             return np.zeros(forces.shape, dtype=np.uint16)
-        parameters, taxels = self._parameters, self._taxels
-        drawn = self._generator.standard_normal((len(clock), taxels.baseline.size + 1))
-        warmth = self._warm(clock, drawn[:, -1])
-        mixed = np.einsum("kia,iba->kib", self._late(forces, clock), taxels.mixing)
-        newtons = saturated(mixed, parameters.limits)
-        values = newtons * parameters.counts_per_newton
-        values += taxels.baseline
-        values += warmth[:, None, None] * taxels.thermal
+        parameters = self._parameters
+        drawn = self._generator.standard_normal((len(clock), 1 + self._taxels.baseline.size))
+        warmth = self._warm(clock, drawn[:, 0])
+        passed = self._late(forces, clock)
         white = np.sqrt(max(parameters.noise_counts**2 - ROUNDING, 0.0))
-        values += white * drawn[:, :-1].reshape(forces.shape)
-        return np.clip(np.rint(values), 0.0, UINT16_MAX).astype(np.uint16)
+        limits, scales = np.array(parameters.limits), np.array(parameters.counts_per_newton)
+        counts = np.empty(forces.shape, dtype=np.uint16)
+        _count(passed, warmth, white * drawn[:, 1:], self._taxels, limits, scales, counts)
+        return counts
 
     def _checked(self, taxel_forces: npt.ArrayLike, times: npt.ArrayLike) -> tuple[Array, Array]:
         forces = np.array(taxel_forces, dtype=np.float64, order="C")
@@ -112,19 +111,46 @@ class Readout:
         return warmth
 
 
-def saturated(newtons: Array, limits: Three) -> Array:
-    """Readings that bend towards the range of their axis: x / (1 + (x / limit)^4)^(1/4).
+@compiled
+def saturated(newtons: float, limit: float) -> float:
+    """A reading that bends towards its range: x / (1 + (x / limit)^4)^(1/4).
+
+    Down to 85 % of its slope at 4.5 N of 7.35 N, and to 48 % at 7 N: where the data sheet sees
+    the slope change.
 
     Args:
-        newtons: (..., 3) unlimited [N].
-        limits: by axis, never passed [N].
+        newtons: unlimited [N].
+        limit: that is never passed [N].
 
     Returns:
-        (..., 3) [N].
+        The reading [N].
     """
-    square = (newtons / limits) ** 2
-    result: Array = newtons / np.sqrt(np.sqrt(1.0 + square * square))
-    return result
+    square = (newtons / limit) ** 2
+    return newtons / math.sqrt(math.sqrt(1.0 + square * square))
+
+
+@compiled
+def _count(
+    forces: Array,
+    warmth: Array,
+    noise: Array,
+    taxels: Taxels,
+    limits: Array,
+    scales: Array,
+    counts: Counts,
+) -> None:
+    """Cross-talk and gain, range, baseline, temperature, noise, and whole counts."""
+    n, n_taxels, n_axes = forces.shape
+    for k in range(n):
+        for i in range(n_taxels):
+            for axis in range(n_axes):
+                newtons = 0.0
+                for other in range(n_axes):
+                    newtons += taxels.mixing[i, axis, other] * forces[k, i, other]
+                value = saturated(newtons, limits[axis]) * scales[axis]
+                value += taxels.baseline[i, axis] + warmth[k] * taxels.thermal[i, axis]
+                value += noise[k, i * n_axes + axis]
+                counts[k, i, axis] = min(max(np.rint(value), 0.0), UINT16_MAX)
 
 
 @compiled
