@@ -20,6 +20,7 @@ from holdfast.errors import HoldfastError
 
 VERBS = {
     "demo": "Does the main job in one go, on data of its own.",
+    "simulate": "Makes recordings of grasps by the physical twin.",
     "import": "Brings in other people's data, whatever its format.",
     "info": "Shows what is in a recording, or in a folder of them.",
     "train": "Trains a model from labelled recordings.",

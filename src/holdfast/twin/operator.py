@@ -61,14 +61,20 @@ class Push(NamedTuple):
     numbers: Array
 
 
-def draw_pushes(generator: np.random.Generator, profile: Profile) -> list[Push]:
-    """Disturbances that fill the hold: every named direction and some random ones, in turn."""
+def draw_pushes(generator: np.random.Generator, profile: Profile, scale: float = 1.0) -> list[Push]:
+    """Disturbances that fill the hold: every named direction and some random ones, in turn.
+
+    Args:
+        generator: of all that is drawn.
+        profile: that it is drawn from.
+        scale: of the depths.
+    """
     names = [*DIRECTIONS, "random", "random"]
     pushes: list[Push] = []
     start = float(generator.uniform(1.0, 1.5))
     while True:
         name = names[len(pushes) % len(names)]
-        push = _draw_push(generator, profile, start, name)
+        push = _draw_push(generator, profile, start, name, scale)
         if push.start + push.duration + 1.0 > profile.hold:
             return pushes
         pushes.append(push)
@@ -204,12 +210,14 @@ def _aim(
     )
 
 
-def _draw_push(generator: np.random.Generator, profile: Profile, start: float, name: str) -> Push:
+def _draw_push(
+    generator: np.random.Generator, profile: Profile, start: float, name: str, scale: float
+) -> Push:
     drawn = generator.normal(size=3)
     direction = np.array(DIRECTIONS.get(name, tuple(drawn / np.linalg.norm(drawn))))
     arm = generator.normal(0.0, ARM, size=3)
     arm -= direction * (arm @ direction)
-    depth = generator.uniform(*profile.push_depth)
+    depth = scale * generator.uniform(*profile.push_depth)
     stiffness = generator.uniform(*profile.push_stiffness)
     rate = generator.uniform(*profile.shake_rate)
     duration = float(generator.uniform(*profile.push_duration))

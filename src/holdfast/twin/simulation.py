@@ -21,9 +21,12 @@ from holdfast.twin.operator import draw_pushes, draw_tremor
 from holdfast.twin.profile import Profile, profile
 from holdfast.twin.protocol import Command, Plan, Protocol
 from holdfast.twin.surface import curved_fingertip
-from holdfast.twin.uskin import Uskin, UskinParameters
+from holdfast.twin.uskin import Uskin
+from holdfast.twin.uskin_parameters import UskinParameters
 from holdfast.twin.world import World
 
+CALMER = 0.75
+"""After a failed grasp a person disturbs the next one less: depths of pushes go down by it."""
 CASES = (1, 2)
 """1: close, hold, release. 2: the same with disturbances while the object is locked."""
 LONGEST = 60.0
@@ -58,8 +61,13 @@ class Grasp:
 
     @property
     def name(self) -> str:
-        """What its recording is called."""
+        """What its recording is called where it does not fail."""
         return f"{self.object}-case{self.case}-{self.repeat}"
+
+    @property
+    def failed_name(self) -> str:
+        """What its recording is called where it fails."""
+        return f"{self.name}-failed{self.attempt + 1}"
 
     def generator(self, part: str) -> np.random.Generator:
         """Random numbers of one part of it; parts do not disturb each other."""
@@ -122,7 +130,8 @@ def simulate(
         counts = uskin.counts(np.array(pile), times)
         labels = labels_from_truth(truth, finger)
         modules[finger] = Tactile(uskin.sensor, times, counts, labels=labels)
-    return Recording(grasp.name, modules, _metadata(grasp, protocol), truth)
+    name = grasp.failed_name if protocol.failed else grasp.name
+    return Recording(name, modules, _metadata(grasp, protocol), truth)
 
 
 def _draw_plan(grasp: Grasp, chosen: Profile) -> Plan:
@@ -135,7 +144,7 @@ def _draw_plan(grasp: Grasp, chosen: Profile) -> Plan:
         speed=float(generator.uniform(*chosen.closing_speed)),
         before=float(generator.uniform(*chosen.idle)),
         after=float(generator.uniform(*chosen.idle)),
-        pushes=draw_pushes(generator, chosen) if grasp.case == 2 else (),
+        pushes=draw_pushes(generator, chosen, CALMER**grasp.attempt) if grasp.case == 2 else (),
     )
 
 

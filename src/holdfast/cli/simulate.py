@@ -1,0 +1,159 @@
+"""`holdfast simulate`: recordings of the twin, with exact truth."""
+
+from collections.abc import Iterator
+from itertools import product
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+from holdfast.cli.console import Bar, print_json, say, show
+
+if TYPE_CHECKING:
+    from holdfast.twin.simulation import Grasp
+
+ATTEMPTS = 4
+"""A grasp that fails is tried again, so often at the most; what failed is kept."""
+
+
+def simulate(
+    out: Annotated[Path, typer.Argument(help="A folder; it is made if missing.")],
+    objects: Annotated[
+        str, typer.Option(help="Names, separated by commas; by default all six.")
+    ] = "",
+    cases: Annotated[str, typer.Option(help="1: hold; 2: hold and disturb; or 1,2.")] = "1,2",
+    repeats: Annotated[int, typer.Option(help="Of every object and case.")] = 5,
+    profile: Annotated[str, typer.Option(help="gentle, reference or vigorous.")] = "reference",
+    seed: Annotated[int, typer.Option(help="The same seed gives the same bytes.")] = 0,
+    jobs: Annotated[int, typer.Option(help="Grasps at a time; -1: one a processor.")] = -1,
+    video: Annotated[
+        Path | None, typer.Option(help="Render the first grasp to this .gif or .png file.")
+    ] = None,
+    force: Annotated[bool, typer.Option("--force", help="Make all anew.")] = False,
+    as_json: Annotated[bool, typer.Option("--json", help="Print JSON on stdout.")] = False,
+) -> None:
+    """Makes recordings of grasps by the physical twin.
+
+    The paper's protocol: an Allegro hand with uSkin fingertips closes on an object, holds it
+    (case 1) or holds it while a person disturbs it (case 2), and lets go. Every recording
+    carries the truth: forces, sliding, poses, phases. What was finished before is kept, so a
+    run that was stopped goes on where it was. A grasp that fails is kept as "...-failed1" and
+    tried again, a little calmer.
+
+    Example:
+      holdfast simulate twin/
+      holdfast simulate few/ --objects can,ball --cases 2 --repeats 1 --profile vigorous
+    """
+    from holdfast.files import refuse_overwrite
+
+    if video is not None:
+        refuse_overwrite(video, force=force)
+    wanted = _grasps(objects, cases, repeats, profile, seed)
+    out.mkdir(parents=True, exist_ok=True)
+    open_tasks = [(grasp, out, force) for grasp in wanted if force or not _done(grasp, out)]
+    if len(open_tasks) < len(wanted):
+        say(f"{len(wanted) - len(open_tasks)} of {len(wanted)} recordings are there already")
+    made = [name for names in _made(open_tasks, jobs) for name in names]
+    if video is not None:
+        _film(wanted[0], video, force)
+    failed = [name for name in made if "-failed" in name]
+    if as_json:
+        print_json({"out": out, "recordings": made, "failed": failed, "profile": profile})
+        return
+    show(f"{len(made)} recordings in {out}, {len(failed)} of them of grasps that failed")
+
+
+def _made(tasks: "list[tuple[Grasp, Path, bool]]", jobs: int) -> Iterator[list[str]]:
+    from holdfast.parallel import each
+
+    with Bar("simulating", len(tasks)) as bar:
+        for names in each(make, tasks, 1 if len(tasks) == 1 else jobs):
+            bar.advance()
+            yield names
+
+
+def make(grasp: "Grasp", out: Path, force: bool) -> list[str]:
+    """Simulates a grasp, again and calmer as long as it fails; the names of what was written."""
+    from dataclasses import replace
+
+    from holdfast.io import save_recording
+    from holdfast.twin.simulation import simulate as run
+
+    names = []
+    for attempt in range(ATTEMPTS):
+        tried = replace(grasp, attempt=attempt)
+        if _failed_before(tried, out) and not force:
+            continue
+        recording = run(tried)
+        path = out / f"{recording.name}.parquet"
+        save_recording(recording, path, force=force)
+        names.append(recording.name)
+        if recording.metadata["case"] != "failed":
+            break
+    return names
+
+
+def _grasps(objects: str, cases: str, repeats: int, profile: str, seed: int) -> "list[Grasp]":
+    from holdfast.twin.objects import load_things, thing
+    from holdfast.twin.profile import profile as known_profile
+    from holdfast.twin.simulation import CASES, Grasp
+
+    names = [name.strip() for name in objects.split(",")] if objects else list(load_things())
+    for name in names:
+        thing(name)
+    known_profile(profile)
+    if not {case.strip() for case in cases.split(",")} <= {str(case) for case in CASES}:
+        raise ValueError(f"--cases 1, 2 or 1,2 expected, {cases!r} given")
+    if repeats < 1 or seed < 0:
+        raise ValueError(
+            f"repeats of at least 1 and a seed of at least 0 expected; {repeats} and {seed} given"
+        )
+    chosen = sorted({int(case) for case in cases.split(",")})
+    return [
+        Grasp(name, case, repeat, profile, seed)
+        for name, case, repeat in product(names, chosen, range(1, repeats + 1))
+    ]
+
+
+def _done(grasp: "Grasp", out: Path) -> bool:
+    """Whether it was finished before, from the same seed and profile.
+
+    Raises:
+        OutputError: what is there was made otherwise.
+    """
+    path = out / f"{grasp.name}.parquet"
+    last_failed = out / f"{grasp.name}-failed{ATTEMPTS}.parquet"
+    for existing in (path, last_failed):
+        if existing.exists():
+            _check_origin(grasp, existing)
+            return True
+    return False
+
+
+def _failed_before(grasp: "Grasp", out: Path) -> bool:
+    path = out / f"{grasp.failed_name}.parquet"
+    if path.exists():
+        _check_origin(grasp, path)
+    return path.exists()
+
+
+def _check_origin(grasp: "Grasp", path: Path) -> None:
+    from holdfast.errors import OutputError
+    from holdfast.io import load_recording
+
+    metadata = load_recording(path, labels=False).metadata
+    origin = metadata.get("profile"), metadata.get("seed")
+    if origin != (grasp.profile, grasp.seed):
+        raise OutputError(
+            f"{path} was made with profile {origin[0]} and seed {origin[1]}, not {grasp.profile} "
+            f"and {grasp.seed}: choose another folder, or give --force"
+        )
+
+
+def _film(grasp: "Grasp", video: Path, force: bool) -> None:
+    from holdfast.files import whole_file
+    from holdfast.twin.film import film
+
+    say(f"rendering {grasp.name}")
+    with whole_file(video, force=force) as part:
+        film(grasp, part)
