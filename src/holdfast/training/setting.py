@@ -14,8 +14,7 @@ SPLITS: tuple[Split, ...] = ("recording", "object", "random")
 MAX_SAMPLES = 200_000
 """Samples a finger that training keeps in memory; of larger data it takes every n-th.
 
-Neighbouring samples are nearly copies: 22 minutes of a finger at 150 Hz say of a linear rule
-what every sample of two hours says, in a tenth of the time."""
+Neighbouring samples are nearly copies: a linear rule learns the same from every other one."""
 SEARCH_SAMPLES = 10_000
 """Samples a finger that the search for hyper-parameters looks at, evenly spread."""
 
