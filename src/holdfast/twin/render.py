@@ -3,14 +3,13 @@
 import shutil
 import subprocess
 import sys
-from collections.abc import Iterable, Iterator
-from contextlib import contextmanager
+from collections.abc import Iterable
 from ctypes.util import find_library
 from importlib import import_module
 from itertools import chain
 from os import environ
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import IO, NamedTuple, Protocol, cast
 
 import mujoco
 import numpy as np
@@ -48,6 +47,14 @@ class Camera(NamedTuple):
     distance: float = 0.42
     azimuth: float = 135.0
     elevation: float = -28.0
+
+
+class _Context(Protocol):
+    """What MuJoCo's back ends have in common."""
+
+    def make_current(self) -> None: ...
+
+    def free(self) -> None: ...
 
 
 class Studio:
@@ -218,10 +225,10 @@ def _draw_arrow(scene: mujoco.MjvScene, point: Array, force: Array) -> None:
     scene.ngeom += 1
 
 
-def _context(width: int, height: int) -> Any:  # of one of MuJoCo's back ends
+def _context(width: int, height: int) -> "_Context":
     name = environ.get("MUJOCO_GL", "").lower().strip() or _back_end()
     try:
-        context = import_module(f"mujoco.{name}").GLContext(width, height)
+        context: _Context = import_module(f"mujoco.{name}").GLContext(width, height)
         context.make_current()
     except Exception as cause:  # every back end fails in its own way
         reason = str(cause).strip().split("\n")[0] or type(cause).__name__
@@ -244,7 +251,7 @@ def _back_end() -> str:
 def _save_animation(frames: Iterable[Picture], path: Path, fps: float) -> None:
     from PIL import Image
 
-    images: Iterator[Any] = (Image.fromarray(frame) for frame in frames)
+    images = (Image.fromarray(frame) for frame in frames)
     if path.suffix.lower() != ".webp":  # 256 colours keep a film small, and its memory too
         images = (image.quantize(256, dither=Image.Dither.NONE) for image in images)
     next(images).save(path, save_all=True, append_images=images, duration=1000 / fps, loop=0)
@@ -253,23 +260,28 @@ def _save_animation(frames: Iterable[Picture], path: Path, fps: float) -> None:
 def _save_mp4(frames: Iterable[Picture], path: Path, fps: float) -> None:
     pictures = iter(frames)
     first = next(pictures)
-    with _ffmpeg(first.shape, path, fps) as pipe:
-        for picture in chain([first], pictures):
-            pipe.write(picture.tobytes())
-
-
-@contextmanager
-def _ffmpeg(shape: tuple[int, ...], path: Path, fps: float) -> Iterator[Any]:
-    """Yields where ffmpeg reads raw pictures from."""
-    command = ["ffmpeg", "-y", "-loglevel", "error", "-f", "rawvideo", "-pix_fmt", "rgb24"]
-    command += ["-s", f"{shape[1]}x{shape[0]}", "-r", f"{fps:g}", "-i", "-"]
-    command += ["-pix_fmt", "yuv420p", "-vf", "pad=ceil(iw/2)*2:ceil(ih/2)*2", str(path)]
+    command = _ffmpeg(first.shape, path, fps)
     with subprocess.Popen(command, stdin=subprocess.PIPE, stderr=subprocess.PIPE) as process:
-        try:
-            yield process.stdin
-            _, talk = process.communicate()
-        except BrokenPipeError:
-            talk = process.stderr.read() if process.stderr else b""
+        talk = _feed(process, chain([first], pictures))
     if process.returncode:
         told = talk.decode(errors="replace").strip().split("\n")[-1]
         raise OutputError(f"cannot write {path.name}: ffmpeg says {told or 'nothing'}")
+
+
+def _ffmpeg(shape: tuple[int, ...], path: Path, fps: float) -> list[str]:
+    """The command that makes a film of raw pictures."""
+    source = ["-f", "rawvideo", "-pix_fmt", "rgb24", "-s", f"{shape[1]}x{shape[0]}"]
+    even = ["-pix_fmt", "yuv420p", "-vf", "pad=ceil(iw/2)*2:ceil(ih/2)*2"]
+    talk = ["ffmpeg", "-y", "-loglevel", "error"]
+    return [*talk, *source, "-r", f"{fps:g}", "-i", "-", *even, str(path)]
+
+
+def _feed(process: "subprocess.Popen[bytes]", frames: Iterable[Picture]) -> bytes:
+    """What ffmpeg says to the pictures; it may stop before it has seen all of them."""
+    pipe = cast("IO[bytes]", process.stdin)
+    try:
+        for frame in frames:
+            pipe.write(frame.tobytes())
+    except BrokenPipeError:
+        pass
+    return process.communicate()[1]
