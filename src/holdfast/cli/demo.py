@@ -6,9 +6,10 @@ from typing import Annotated
 
 import typer
 
-from holdfast.cli.console import print_json, progress, say, show
+from holdfast.cli.console import print_json, say, show
 
-N_RECORDINGS = 6
+OBJECTS, REPEATS = "can,box", 2
+"""What is grasped in the demo, and how often in each case."""
 
 
 def demo(
@@ -24,8 +25,9 @@ def demo(
 ) -> None:
     """Does the main job in one go, on data of its own.
 
-    Makes recordings, trains a model on them, tells how good it is on recordings that it has not
-    seen, and replays one of those sample by sample, as a hand would send it.
+    Simulates grasps of a can and a box with the physical twin, trains a model on them, tells how
+    good it is on recordings that it has not seen, and replays one of those sample by sample, as
+    a hand would send it.
 
     Example:
       holdfast demo
@@ -33,8 +35,7 @@ def demo(
     """
     from holdfast.cli.replay import replay
     from holdfast.files import refuse_overwrite
-    from holdfast.io import load_dataset, save_recording
-    from holdfast.synthetic import synthetic_recording
+    from holdfast.io import load_dataset
     from holdfast.training import Setting, train
 
     if not speed >= 0:
@@ -42,13 +43,8 @@ def demo(
     start = time.monotonic()
     folder, model = out / "recordings", out / "model.json"
     folder.mkdir(parents=True, exist_ok=True)
-    names = [f"grasp-{k}" for k in range(N_RECORDINGS)]
-    for path in (model, *(folder / f"{name}.parquet" for name in names)):
-        refuse_overwrite(path, force=force)
-    say(f"1/4  making {N_RECORDINGS} recordings of three fingertips")
-    for k, name in enumerate(progress(names, "making")):
-        recording = synthetic_recording(name, seed * N_RECORDINGS + k)
-        save_recording(recording, folder / f"{name}.parquet", force=force)
+    refuse_overwrite(model, force=force)
+    names = _simulate(folder, seed, force)
     say("2/4  training, one recording left out at a time (compiles kernels the first time)")
     recordings = load_dataset(folder)
     trained = train(recordings, Setting(trials=0, seed=seed))
@@ -56,7 +52,8 @@ def demo(
     accuracy = trained.cross_validation.pooled.accuracy
     say(f"3/4  on recordings that it has not seen: {accuracy:.1f} % of samples right")
     say(f"4/4  replaying {names[-1]} sample by sample" + (f" at speed {speed:g}" if speed else ""))
-    n_updates = replay(trained.model, recordings[-1], speed)
+    shown = recordings[recordings.names.index(names[-1])]
+    n_updates = replay(trained.model, shown, speed)
     if as_json:
         print_json(
             {
@@ -71,11 +68,22 @@ def demo(
     _farewell(out, folder, model, names[-1], time.monotonic() - start)
 
 
+def _simulate(folder: Path, seed: int, force: bool) -> list[str]:
+    """A few grasps of the twin, with and without disturbances; names of those that held."""
+    from holdfast.cli.simulate import grasps, make_all
+
+    wanted = grasps(OBJECTS, "1,2", REPEATS, "reference", seed)
+    say(f"1/4  simulating {len(wanted)} grasps: an Allegro hand with uSkin fingertips")
+    make_all(wanted, folder, jobs=-1, force=force)
+    return [grasp.name for grasp in wanted]
+
+
 def _farewell(out: Path, folder: Path, model: Path, name: str, seconds: float) -> None:
     show(f"made in {seconds:.0f} s, in {out}:")
-    show(f"  {folder}: {N_RECORDINGS} recordings, {model}: the model")
+    show(f"  {folder}: recordings of the twin, {model}: the model")
     show("what to try next:")
     show(f"  holdfast info {folder}/{name}.parquet --plot grasp.png")
     show(f"  holdfast evaluate {model} {folder}")
     show(f"  holdfast detect {model} {folder}/{name}.parquet | head")
+    show("  holdfast simulate twin/      (the whole protocol: six objects, 60 grasps)")
     show("  holdfast import YOUR-DATA recordings/    (holdfast import --help lists the formats)")

@@ -17,12 +17,14 @@ if TYPE_CHECKING:
 
 REFRESH = 0.1
 """How often the terminal is redrawn [s]."""
+DEBOUNCE = (0.1, 0.1)
+"""For the eye, a state is told when it has lasted so long [s], past its threshold by so much."""
 BAR_WIDTH = 20
 COLOURS = {"UNKNOWN": "dim", "NO_CONTACT": "white", "UNSTABLE": "bold red", "STABLE": "green"}
 
 
 def replay(model: "Model", recording: "Recording", speed: float) -> int:
-    """Feeds a recording, sample by sample, to a detector, and shows what it says.
+    """Feeds a recording, sample by sample, to a debounced detector, and shows what it says.
 
     On a terminal a table follows the states; elsewhere every change of the hand is one line.
 
@@ -34,9 +36,13 @@ def replay(model: "Model", recording: "Recording", speed: float) -> int:
     Returns:
         How many updates there were.
     """
-    from holdfast.detector import Detector
+    import msgspec
 
-    detector = Detector(model)
+    from holdfast.detector import Detector
+    from holdfast.model import Debounce
+
+    calmer = msgspec.structs.replace(model, debounce=Debounce(*DEBOUNCE))
+    detector = Detector(calmer)
     estimates = _estimates(detector, recording, speed)
     if speed and sys.stderr.isatty():
         return _follow(estimates)

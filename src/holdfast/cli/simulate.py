@@ -1,6 +1,6 @@
 """`holdfast simulate`: recordings of the twin, with exact truth."""
 
-from collections.abc import Iterator
+from collections.abc import Sequence
 from itertools import product
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
@@ -25,9 +25,14 @@ def simulate(
     repeats: Annotated[int, typer.Option(help="Of every object and case.")] = 5,
     profile: Annotated[str, typer.Option(help="gentle, reference or vigorous.")] = "reference",
     seed: Annotated[int, typer.Option(help="The same seed gives the same bytes.")] = 0,
+    server: Annotated[
+        bool,
+        typer.Option("--server", help="Unsteady stamps and repeated packets, as servers send."),
+    ] = False,
     jobs: Annotated[int, typer.Option(help="Grasps at a time; -1: one a processor.")] = -1,
     video: Annotated[
-        Path | None, typer.Option(help="Render the first grasp to this .gif or .png file.")
+        Path | None,
+        typer.Option(help="Render the first grasp to this .gif, .png, .webp or .mp4 file."),
     ] = None,
     force: Annotated[bool, typer.Option("--force", help="Make all anew.")] = False,
     as_json: Annotated[bool, typer.Option("--json", help="Print JSON on stdout.")] = False,
@@ -47,13 +52,13 @@ def simulate(
     from holdfast.files import refuse_overwrite
 
     if video is not None:
+        from holdfast.twin.render import check_film
+
+        check_film(video)
         refuse_overwrite(video, force=force)
-    wanted = _grasps(objects, cases, repeats, profile, seed)
+    wanted = grasps(objects, cases, repeats, profile, seed, server=server)
     out.mkdir(parents=True, exist_ok=True)
-    open_tasks = [(grasp, out, force) for grasp in wanted if force or not _done(grasp, out)]
-    if len(open_tasks) < len(wanted):
-        say(f"{len(wanted) - len(open_tasks)} of {len(wanted)} recordings are there already")
-    made = [name for names in _made(open_tasks, jobs) for name in names]
+    made = make_all(wanted, out, jobs=jobs, force=force)
     if video is not None:
         _film(wanted[0], video, force)
     failed = [name for name in made if "-failed" in name]
@@ -63,13 +68,19 @@ def simulate(
     show(f"{len(made)} recordings in {out}, {len(failed)} of them of grasps that failed")
 
 
-def _made(tasks: "list[tuple[Grasp, Path, bool]]", jobs: int) -> Iterator[list[str]]:
+def make_all(wanted: "Sequence[Grasp]", out: Path, *, jobs: int, force: bool) -> list[str]:
+    """Simulates what is not there yet; the names of what was written."""
     from holdfast.parallel import each
 
+    tasks = [(grasp, out, force) for grasp in wanted if force or not _done(grasp, out)]
+    if len(tasks) < len(wanted):
+        say(f"{len(wanted) - len(tasks)} of {len(wanted)} recordings are there already")
+    made = []
     with Bar("simulating", len(tasks)) as bar:
         for names in each(make, tasks, 1 if len(tasks) == 1 else jobs):
+            made += names
             bar.advance()
-            yield names
+    return made
 
 
 def make(grasp: "Grasp", out: Path, force: bool) -> list[str]:
@@ -93,7 +104,14 @@ def make(grasp: "Grasp", out: Path, force: bool) -> list[str]:
     return names
 
 
-def _grasps(objects: str, cases: str, repeats: int, profile: str, seed: int) -> "list[Grasp]":
+def grasps(
+    objects: str, cases: str, repeats: int, profile: str, seed: int, *, server: bool = False
+) -> "list[Grasp]":
+    """The grasps that a user asks for.
+
+    Raises:
+        ValueError: an unknown object, case or profile, or a number out of range.
+    """
     from holdfast.twin.objects import load_things, thing
     from holdfast.twin.profile import profile as known_profile
     from holdfast.twin.simulation import CASES, Grasp
@@ -110,7 +128,7 @@ def _grasps(objects: str, cases: str, repeats: int, profile: str, seed: int) -> 
         )
     chosen = sorted({int(case) for case in cases.split(",")})
     return [
-        Grasp(name, case, repeat, profile, seed)
+        Grasp(name, case, repeat, profile, seed, server=server)
         for name, case, repeat in product(names, chosen, range(1, repeats + 1))
     ]
 
@@ -142,18 +160,23 @@ def _check_origin(grasp: "Grasp", path: Path) -> None:
     from holdfast.io import load_recording
 
     metadata = load_recording(path, labels=False).metadata
-    origin = metadata.get("profile"), metadata.get("seed")
-    if origin != (grasp.profile, grasp.seed):
+    made = {name: metadata.get(name) for name in ("profile", "seed", "server")}
+    wanted = {"profile": grasp.profile, "seed": grasp.seed, "server": grasp.server}
+    if made != wanted:
         raise OutputError(
-            f"{path} was made with profile {origin[0]} and seed {origin[1]}, not {grasp.profile} "
-            f"and {grasp.seed}: choose another folder, or give --force"
+            f"{path} was made with {_listed(made)}; {_listed(wanted)} asked for: choose another "
+            "folder, or give --force"
         )
+
+
+def _listed(origin: "dict[str, object]") -> str:
+    return ", ".join(f"{name} {value}" for name, value in origin.items())
 
 
 def _film(grasp: "Grasp", video: Path, force: bool) -> None:
     from holdfast.files import whole_file
     from holdfast.twin.film import film
 
-    say(f"rendering {grasp.name}")
+    say(f"rendering {grasp.name}: about a minute")
     with whole_file(video, force=force) as part:
         film(grasp, part)

@@ -21,7 +21,7 @@ from holdfast.twin.operator import draw_pushes, draw_tremor
 from holdfast.twin.profile import Profile, profile
 from holdfast.twin.protocol import Command, Plan, Protocol
 from holdfast.twin.surface import curved_fingertip
-from holdfast.twin.uskin import Uskin
+from holdfast.twin.uskin import Uskin, with_server_effects
 from holdfast.twin.uskin_parameters import UskinParameters
 from holdfast.twin.world import World
 
@@ -50,6 +50,7 @@ class Grasp:
         profile: name of the profile.
         seed: of the whole protocol.
         attempt: from 0 on; after a failed grasp the same is tried again.
+        server: whether stamps are unsteady and packets repeat, as servers send them.
     """
 
     object: str
@@ -58,6 +59,7 @@ class Grasp:
     profile: str = "reference"
     seed: int = 0
     attempt: int = 0
+    server: bool = False
 
     @property
     def name(self) -> str:
@@ -127,9 +129,11 @@ def simulate(
     truth = log.truth(times)
     modules = {}
     for finger, uskin, pile in zip(FINGERS, uskins, taxel_forces, strict=True):
-        counts = uskin.counts(np.array(pile), times)
+        counts, stamps = uskin.counts(np.array(pile), times), times
+        if grasp.server:
+            stamps, counts = with_server_effects(times, counts, grasp.generator(f"server {finger}"))
         labels = labels_from_truth(truth, finger)
-        modules[finger] = Tactile(uskin.sensor, times, counts, labels=labels)
+        modules[finger] = Tactile(uskin.sensor, stamps, counts, labels=labels)
     name = grasp.failed_name if protocol.failed else grasp.name
     return Recording(name, modules, _metadata(grasp, protocol), truth)
 
@@ -218,6 +222,7 @@ def _metadata(grasp: Grasp, protocol: Protocol) -> dict[str, object]:
         "attempt": grasp.attempt,
         "profile": grasp.profile,
         "seed": grasp.seed,
+        "server": grasp.server,
         "hand": "allegro-right",
         "source": "twin",
         "locked_at": protocol.locked_at,
