@@ -2,7 +2,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from hypothesis import given
+from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from holdfast.features import fingertip_force
@@ -68,10 +68,16 @@ def test_a_node_on_a_taxel_is_mostly_its_own_and_walls_do_not_couple():
     assert shares[np.ix_(walls, walls)][across].max() < 1e-12
 
 
+def test_shares_fall_as_a_bell_over_the_distance():
+    near, far = taxel_shares([[0.0, 0, 0]], [[1e-3, 0, 0], [0, 0, 5e-3]], 2.8e-3)[0]
+    assert near / far == pytest.approx(np.exp((5.0**2 - 1.0**2) / (2 * 2.8**2)))
+
+
 def test_shares_of_a_node_far_from_all_taxels_are_finite():
     assert taxel_shares([[1.0, 0, 0]], TIP.positions, REAL.spread).sum() == pytest.approx(1.0)
 
 
+@settings(deadline=None)
 @given(st.integers(0, 2**32 - 1), st.floats(1e-3, 1e2))
 def test_taxel_forces_sum_to_the_force_on_the_object(seed, scale):
     forces = scale * np.random.default_rng(seed).normal(size=(3, len(SKIN.nodes), 3))
@@ -117,6 +123,7 @@ def test_scale_is_that_of_the_data_sheet(axis, newton_per_count, newton):
     assert counts[0].tolist() == expected.tolist()
 
 
+@settings(deadline=None)
 @given(st.floats(-1e3, 1e3), st.floats(0.0, 10.0), st.sampled_from(REAL.limits))
 def test_saturation_is_odd_monotone_and_never_passes_the_limits(newton, step, limit):
     low, high = saturated(newton, limit), saturated(newton + step, limit)
@@ -236,6 +243,15 @@ def test_gains_and_cross_talk_have_the_spread_asked_for():
     assert off.mean() == pytest.approx(0.0, abs=0.003)
 
 
+def test_an_axis_reads_the_others_by_the_row_of_its_mixing():
+    uskin = tip(replace(IDEAL, gain_spread=0.15, cross_talk=0.04, limits=(1e3, 1e3, 1e3)))
+    forces = np.zeros((2, 30, 3))
+    forces[1] = [0.3, -0.2, 1.0]
+    counts = uskin.counts(forces, [0.0, 1.0]).astype(float)
+    expected = uskin.taxels.mixing @ [0.3, -0.2, 1.0] * IDEAL.counts_per_newton
+    np.testing.assert_allclose(counts[1] - counts[0], expected, atol=0.51)
+
+
 def test_drift_over_50_minutes_is_that_of_the_data_sheet():
     """Standard deviation of z over many runs: 3.5 K and 120 counts, x and y hardly any."""
     times = np.arange(0.0, 3000.1, 10.0)
@@ -260,6 +276,7 @@ def test_drift_is_smooth_at_the_scale_of_a_sample():
     assert np.abs(counts[14:] - counts[:-14]).max() <= 1
 
 
+@settings(deadline=None)
 @given(st.lists(st.integers(1, 40), min_size=1, max_size=8), st.integers(0, 1000))
 def test_fed_in_pieces_it_sends_the_same(pieces, seed):
     n = sum(pieces)
@@ -361,6 +378,7 @@ def test_bad_parameters_are_refused(field, value, message):
         replace(REAL, **{field: value})
 
 
+@settings(deadline=None)
 @given(st.integers(2, 400), st.integers(0, 1000), st.floats(0, 0.1))
 def test_server_times_increase_and_packets_stay_in_order(n, seed, jitter):
     times = np.arange(n) / RATE
