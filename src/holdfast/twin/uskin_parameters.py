@@ -66,7 +66,7 @@ class UskinParameters:
         for part in fields(self):
             values = np.asarray(getattr(self, part.name), dtype=np.float64)
             positive = part.name in _ABOVE_ZERO
-            if values.shape != np.shape(part.default):
+            if values.shape != np.asarray(part.default).shape:
                 raise ValueError(
                     f"{part.name}: numbers like {part.default} expected, {values} given"
                 )
