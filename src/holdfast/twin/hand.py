@@ -15,6 +15,7 @@ from holdfast.compiled import compiled
 from holdfast.sensors.values import Array
 from holdfast.twin.contact import N_BODY
 from holdfast.twin.objects import Thing
+from holdfast.twin.surface import AXIS
 
 RATE = 150.0
 """Samples per second [Hz]."""
@@ -35,9 +36,17 @@ ARMATURE, DAMPING, FRICTION = 6e-4, 0.012, 0.012
 """Of a joint: inertia of the gear [kg m^2], viscous [N m s/rad] and dry friction [N m]. Own
 choices: small gear motors that can be pushed back by hand."""
 PALM_MASS, PALM_SIDES, PALM_MIDDLE = 0.4154, (0.0408, 0.113, 0.095), (-0.0093, 0.0, -0.0475)
-TIP_MASS, TIP_REACH = 0.0168, {"thumb": 0.0423}
-"""Of the rubber tip that the skin replaces [kg], and how far it sits out on its link [m]."""
-TIP_REACH_FINGER = 0.0267
+"""[kg] and [m]. The vendor's table puts the centre of mass outside of the palm's box: here it is
+in its middle. All inertias are those of the boxes, for the vendor's are not physical."""
+TIP_MASS = 0.0266
+"""Of the skin [kg], by XELA; it takes the place of a rubber tip of 16.8 g."""
+TIP_RADIUS, TIP_BEGIN, TIP_END = 0.0136, 0.006, 0.022
+"""The capsule that shows the skin: radius, and its ends in the fingertip frame [m]."""
+MIRRORED = np.array([-1.0, 1.0, 1.0, 1.0] * 3 + [1.0] * 4)
+"""Turns joints of one hand into those of the other in the mirrored pose: the vendor's left hand
+spreads its fingers about the same axis as the right one."""
+SHELL, FRAME, SKIN, THING = ".60 .62 .66 1", ".30 .32 .36 1", ".95 .55 .18 1", ".42 .66 .80 1"
+"""Colours."""
 
 Rows = list[dict[str, str]]
 
@@ -45,8 +54,9 @@ Rows = list[dict[str, str]]
 def hand_xml(side: str = "right", thing: Thing | None = None) -> str:
     """The hand on its side, palm fixed, as an MJCF; with an object where one is given.
 
-    The palm's x looks along the world's x, its y up, its z along the world's -y: fingers curl
-    about a vertical axis, and gravity pulls along all pads.
+    Palm and world share the x axis. The index finger is on top: the right hand's fingers point
+    along the world's -y, those of the left, its mirror image, along y. They curl about a vertical
+    axis, and gravity pulls along all pads.
 
     Args:
         side: "right", or "left", which is its mirror image.
@@ -58,20 +68,21 @@ def hand_xml(side: str = "right", thing: Thing | None = None) -> str:
     if side not in ("right", "left"):
         raise ValueError(f"side 'right' or 'left' expected, {side!r} given")
     rows = [_mirrored(row) if side == "left" else row for row in _table()]
+    turn = np.pi / 2 if side == "right" else -np.pi / 2
     body = "" if thing is None else _object_xml(thing)
     return f"""<mujoco model="allegro {side}">
   <compiler angle="radian" eulerseq="XYZ"/>
   <option timestep="{TIMESTEP!r}" integrator="implicitfast" gravity="0 0 -9.81"/>
   <visual><global offwidth="1280" offheight="960"/><headlight ambient=".45 .45 .45"/></visual>
   <default>
-    <geom contype="0" conaffinity="0" rgba=".32 .34 .38 1"/>
+    <geom contype="0" conaffinity="0" rgba="{FRAME}"/>
     <joint armature="{ARMATURE}" damping="{DAMPING}" frictionloss="{FRICTION}" limited="true"/>
   </default>
   <asset><texture name="sky" type="skybox" builtin="flat" rgb1="1 1 1" rgb2="1 1 1" width="8"
     height="8"/></asset>
   <worldbody>
     <light pos=".4 -.6 1" dir="-.3 .5 -1" diffuse=".6 .6 .6"/>
-    <body name="palm" euler="{np.pi / 2!r} 0 0">
+    <body name="palm" euler="{turn!r} 0 0">
       {_box_xml(PALM_SIDES, PALM_MIDDLE, PALM_MASS)}
       {"".join(_link_xml(row, rows) for row in rows if row["parent"] == "palm_link")}
     </body>
@@ -193,18 +204,23 @@ def _table() -> Rows:
 
 
 def _mirrored(row: dict[str, str]) -> dict[str, str]:
-    """The same link of the other hand: y to -y. Turns about x and z change their sense."""
-    swapped = dict(row)
-    for name in ("y", "roll", "yaw", "middle_y"):
-        swapped[name] = repr(-float(row[name]))
-    for name in ("axis_x", "axis_z"):
-        swapped[name] = repr(-float(row[name]))
-    return swapped
+    """The same link of the other hand: y to -y. Turns about x and z change their sense.
+
+    But for `MIRRORED` joints, whose limits are symmetric: there the axis stays.
+    """
+    names = ["y", "roll", "yaw", "middle_y"]
+    if MIRRORED[_number(row)] > 0:
+        names += ["axis_x", "axis_z"]
+    return row | {name: repr(-float(row[name])) for name in names}
+
+
+def _number(row: dict[str, str]) -> int:
+    return int(row["joint"].removeprefix("joint_").removesuffix(".0"))
 
 
 def _link_xml(row: dict[str, str], rows: Rows) -> str:
     children = "".join(_link_xml(other, rows) for other in rows if other["parent"] == row["link"])
-    number = int(row["joint"].removeprefix("joint_").removesuffix(".0"))
+    number = _number(row)
     sides = tuple(float(row[f"side_{a}"]) for a in "xyz")
     middle = tuple(float(row[f"middle_{a}"]) for a in "xyz")
     tip = "" if children else _tip_xml(number)
@@ -216,11 +232,12 @@ def _link_xml(row: dict[str, str], rows: Rows) -> str:
 
 
 def _tip_xml(number: int) -> str:
-    """The skin: its mass, and a capsule of its shape for the looks."""
-    reach = 0.0423 if number > N_JOINTS - 5 else TIP_REACH_FINGER
+    """The skin: its mass, and a capsule much like its shape."""
+    x, _, z = MOUNTS[0 if number >= JOINTS["thumb"] else 1]
+    x += AXIS
     return (
-        f'<geom type="capsule" fromto="-.001 0 {reach - 0.019} -.001 0 {reach}" size="0.0138" '
-        f'mass="{TIP_MASS}" rgba=".93 .55 .2 1"/>'
+        f'<geom type="capsule" fromto="{x:.6g} 0 {z + TIP_BEGIN:.6g} {x:.6g} 0 {z + TIP_END:.6g}" '
+        f'size="{TIP_RADIUS}" mass="{TIP_MASS}" rgba="{SKIN}"/>'
     )
 
 
@@ -238,7 +255,7 @@ def _object_xml(thing: Thing) -> str:
 
 
 def _looks_xml(thing: Thing) -> str:
-    colour = 'rgba=".36 .62 .78 1"'
+    colour = f'rgba="{THING}"'
     half, size = thing.half_height, thing.size
     middle = float(thing.foot[2]) + half
     if thing.shape == "sphere":

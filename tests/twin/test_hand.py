@@ -1,0 +1,229 @@
+"""The hand: geometry and masses of the vendor's tables, mirror, motion, forces, gravity."""
+
+import mujoco
+import numpy as np
+import pytest
+
+from holdfast.twin.hand import (
+    FINGERS,
+    JOINTS,
+    MIRRORED,
+    MOUNTS,
+    N_BODY,
+    N_JOINTS,
+    TIMESTEP,
+    TIP_MASS,
+    HandModel,
+    hand_xml,
+)
+from holdfast.twin.objects import load_things, thing
+
+VENDOR_TIPS = {
+    "index": (0.0, 0.05531, 0.13344),
+    "middle": (0.0, 0.0, 0.1362),
+    "ring": (0.0, -0.05531, 0.13344),
+    "thumb": (-0.0132, 0.1677, -0.08607),
+}
+"""Of the vendor's URDF in the palm at the zero pose [m]."""
+REACH = {"thumb": 0.0423, "index": 0.0267, "middle": 0.0267, "ring": 0.0267}
+RUBBER_TIP = 0.0168
+LEFT = {  # of the vendor's URDF of the left hand: place of the joint in its parent, axis
+    0: ((0.0, -0.0435, -0.001542), (0, 0, 1)),
+    8: ((0.0, 0.0435, -0.001542), (0, 0, 1)),
+    12: ((-0.0182, -0.019333, -0.045987), (1, 0, 0)),
+    13: ((-0.027, -0.005, 0.0399), (0, 0, -1)),
+    14: ((0.0, 0.0, 0.0177), (0, 1, 0)),
+}
+
+
+@pytest.fixture(params=["right", "left"])
+def side(request):
+    return request.param
+
+
+@pytest.fixture
+def hand(side):
+    return HandModel.build(thing("can"), side)
+
+
+def moving(hand, seed=0):
+    """Any pose within the limits, any velocities; the five bodies."""
+    draw = np.random.default_rng(seed)
+    low, high = hand.limits().T
+    hand.data.qpos[:N_JOINTS] = draw.uniform(low, high)
+    hand.data.qpos[N_JOINTS:] = [0.1, -0.05, 0.2, *rotation(draw)]
+    hand.data.qvel[:] = draw.normal(size=hand.model.nv)
+    mujoco.mj_forward(hand.model, hand.data)
+    bodies = np.full((5, N_BODY), np.nan)
+    hand.bodies(bodies)
+    return bodies
+
+
+def rotation(draw):
+    quaternion = draw.normal(size=4)
+    return quaternion / np.linalg.norm(quaternion)
+
+
+def in_palm(hand, point):
+    return hand.data.body("palm").xmat.reshape(3, 3).T @ point
+
+
+def test_fingertips_at_the_zero_pose_are_where_the_vendor_says(hand, side):
+    mujoco.mj_kinematics(hand.model, hand.data)
+    for body, finger in zip(hand.tips, FINGERS, strict=True):
+        turn = hand.data.xmat[body].reshape(3, 3)
+        tip = hand.data.xpos[body] + turn @ [0, 0, REACH[finger]]
+        expected = np.array(VENDOR_TIPS[finger]) * [1, 1 if side == "right" else -1, 1]
+        np.testing.assert_allclose(in_palm(hand, tip), expected, atol=1e-4)
+
+
+def test_total_mass_is_the_vendors_with_skins_for_rubber_tips(hand):
+    mass = hand.model.body_mass.sum() - thing("can").mass
+    assert mass == pytest.approx(0.955 + 4 * (TIP_MASS - RUBBER_TIP), abs=2e-4)
+
+
+def test_masses_lie_within_the_boxes_they_belong_to(hand):
+    palm = hand.model.body("palm")
+    np.testing.assert_allclose(palm.ipos, [-0.0093, 0, -0.0475], atol=1e-9)
+    x, y, z = 0.0408, 0.113, 0.095
+    expected = 0.4154 / 12 * np.array([y * y + z * z, x * x + z * z, x * x + y * y])
+    np.testing.assert_allclose(sorted(palm.inertia), sorted(expected), rtol=1e-6)
+
+
+def test_the_left_hand_has_the_vendors_places_and_axes():
+    model = HandModel.build(thing("can"), "left").model
+    for number, (place, axis) in LEFT.items():
+        joint = model.joint(f"joint_{number}")
+        np.testing.assert_allclose(joint.axis, axis, atol=1e-12)
+        np.testing.assert_allclose(model.body(joint.bodyid[0]).pos, place, atol=1e-9)
+
+
+def test_the_left_hand_is_the_mirror_image_of_the_right():
+    right, left = (HandModel.build(thing("can"), side) for side in ("right", "left"))
+    joints = np.random.default_rng(1).uniform(*right.limits().T)
+    right.data.qpos[:N_JOINTS], left.data.qpos[:N_JOINTS] = joints, joints * MIRRORED
+    for hand in (right, left):
+        mujoco.mj_forward(hand.model, hand.data)
+    np.testing.assert_allclose(left.data.xipos, right.data.xipos * [1, -1, 1], atol=1e-12)
+    both = left.data.qfrc_bias[:N_JOINTS], right.data.qfrc_bias[:N_JOINTS]
+    np.testing.assert_allclose(both[0], both[1] * MIRRORED, atol=1e-12)
+    np.testing.assert_allclose(left.limits(), right.limits())
+
+
+def test_the_index_finger_is_on_top_and_the_fingers_point_away_from_the_palm(hand, side):
+    mujoco.mj_kinematics(hand.model, hand.data)
+    heights = [hand.data.body(f"link_{JOINTS[f] + 3}.0").xpos[2] for f in FINGERS[1:]]
+    assert heights == sorted(heights, reverse=True)
+    ahead = hand.data.body("link_7.0").xpos[1]
+    assert ahead < -0.09 if side == "right" else ahead > 0.09
+
+
+def test_joints_are_numbered_as_the_driver_does_and_keep_the_vendors_limits(hand):
+    for number in range(N_JOINTS):
+        assert hand.model.joint(f"joint_{number}").qposadr[0] == number
+    np.testing.assert_allclose(hand.limits()[[0, 1, 12, 15]], [
+        [-0.47, 0.47], [-0.196, 1.61], [0.263, 1.396], [-0.162, 1.719],
+    ])  # fmt: skip
+
+
+def test_joints_stop_at_their_limits(hand):
+    hand.data.qfrc_applied[:N_JOINTS] = 0.7 * np.where(np.arange(N_JOINTS) % 2, 1, -1)
+    for _ in range(1000):
+        mujoco.mj_step(hand.model, hand.data)
+    low, high = hand.limits().T
+    over = np.maximum(low - hand.data.qpos[:N_JOINTS], hand.data.qpos[:N_JOINTS] - high)
+    assert over.max() < 0.05
+    assert np.abs(hand.data.qvel[:N_JOINTS]).max() < 0.01
+
+
+@pytest.mark.parametrize("seed", range(5))
+def test_velocities_are_those_that_mujoco_gives(hand, seed):
+    bodies = moving(hand, seed)
+    told = np.zeros(6)
+    kind = mujoco.mjtObj.mjOBJ_XBODY
+    for row, body in zip(bodies, [*hand.tips, hand.thing], strict=True):
+        mujoco.mj_objectVelocity(hand.model, hand.data, kind, body, told, 0)
+        spin, velocity = told[:3], told[3:]
+        expected = velocity + np.cross(spin, row[:3] - hand.data.xpos[body])
+        np.testing.assert_allclose(row[12:15], expected, atol=1e-12)
+        np.testing.assert_allclose(row[15:], spin, atol=1e-12)
+
+
+def test_velocities_are_the_rates_of_places(hand):
+    before = moving(hand)
+    after, step = np.zeros_like(before), 1e-6
+    mujoco.mj_integratePos(hand.model, hand.data.qpos, hand.data.qvel, step)
+    mujoco.mj_kinematics(hand.model, hand.data)
+    hand.bodies(after)
+    np.testing.assert_allclose((after - before)[:, :3] / step, before[:, 12:15], atol=1e-5)
+
+
+def test_fingertip_frames_are_the_mounts_on_the_last_links(hand):
+    bodies = moving(hand)
+    for row, body, mount in zip(bodies, hand.tips, MOUNTS, strict=False):
+        turn = hand.data.xmat[body].reshape(3, 3)
+        np.testing.assert_allclose(row[:3], hand.data.xpos[body] + turn @ mount, atol=1e-15)
+        np.testing.assert_allclose(row[3:12].reshape(3, 3), turn, atol=1e-15)
+    np.testing.assert_allclose(bodies[-1, :3], hand.data.xipos[hand.thing], atol=1e-15)
+
+
+def test_applied_forces_do_what_mujoco_computes(hand):
+    bodies = moving(hand)
+    draw = np.random.default_rng(2)
+    tips, item = draw.normal(size=(4, 6)), draw.normal(size=6)
+    hand.apply(tips, item, bodies)
+    expected = np.zeros(hand.model.nv)
+    for body, wrench, row in zip([*hand.tips, hand.thing], [*tips, item], bodies, strict=True):
+        force, torque, point = wrench[:3], wrench[3:], row[:3].copy()
+        mujoco.mj_applyFT(hand.model, hand.data, force, torque, point, body, expected)
+    without = hand.data.qfrc_smooth.copy()
+    mujoco.mj_fwdAcceleration(hand.model, hand.data)
+    np.testing.assert_allclose(hand.data.qfrc_smooth - without, expected, atol=1e-12)
+
+
+@pytest.mark.parametrize("name", list(load_things()))
+def test_the_object_weighs_what_the_table_says_and_falls_freely(name):
+    item = thing(name)
+    hand = HandModel.build(item)
+    assert hand.model.body("object").mass[0] == pytest.approx(item.mass)
+    np.testing.assert_allclose(hand.model.body("object").inertia, item.inertia)
+    np.testing.assert_allclose(hand.model.body("object").iquat, [1, 0, 0, 0])
+    for _ in range(105):
+        mujoco.mj_step(hand.model, hand.data)
+    assert hand.data.qvel[N_JOINTS + 2] == pytest.approx(-9.81 * 105 * TIMESTEP)
+    assert hand.data.qvel[N_JOINTS + 3 :] == pytest.approx(np.zeros(3), abs=1e-9)
+
+
+def test_energy_is_conserved_without_friction(side):
+    model = mujoco.MjModel.from_xml_string(hand_xml(side))
+    model.dof_damping[:] = model.dof_frictionloss[:] = 0.0
+    model.opt.integrator, model.opt.timestep = mujoco.mjtIntegrator.mjINT_RK4, 1e-4
+    model.opt.disableflags |= mujoco.mjtDisableBit.mjDSBL_LIMIT
+    model.opt.enableflags |= mujoco.mjtEnableBit.mjENBL_ENERGY
+    data = mujoco.MjData(model)
+    data.qvel[:] = 1.0
+    mujoco.mj_forward(model, data)
+    before = data.energy.copy()
+    for _ in range(2000):
+        mujoco.mj_step(model, data)
+    mujoco.mj_forward(model, data)
+    assert abs(data.energy[0] - before[0]) > 1e-3  # it went up and down
+    assert data.energy.sum() == pytest.approx(before.sum(), abs=1e-6)
+
+
+def test_nothing_collides_in_mujoco(hand):
+    hand.data.qpos[:N_JOINTS] = hand.limits()[:, 1]
+    mujoco.mj_forward(hand.model, hand.data)
+    assert hand.data.ncon == 0
+
+
+def test_the_steps_fit_the_samples_of_the_sensor():
+    model = mujoco.MjModel.from_xml_string(hand_xml())
+    assert model.nu == 0
+    assert model.nq == N_JOINTS
+    assert 1 / (150 * model.opt.timestep) == pytest.approx(7.0, abs=1e-12)
+
+
+def test_another_side_is_refused():
+    with pytest.raises(ValueError, match=r"^side 'right' or 'left' expected, 'top' given$"):
+        hand_xml("top")
