@@ -101,15 +101,7 @@ def simulate(
         raise ValueError(f"case 1 or 2 expected, {grasp.case} given")
     plan = _draw_plan(grasp, profile(grasp.profile))
     world = _world(grasp)
-    uskins = [
-        Uskin(
-            parameters or UskinParameters(),
-            sensor("uskin-curved"),
-            curved_fingertip().nodes,
-            grasp.generator(f"skin {finger}"),
-        )
-        for finger in FINGERS
-    ]
+    uskins = [_skin(grasp.seed, finger, parameters or UskinParameters()) for finger in FINGERS]
     protocol = Protocol(plan, 1 / RATE)
     log = _Log()
     taxel_forces: list[list[Array]] = [[] for _ in FINGERS]
@@ -129,7 +121,8 @@ def simulate(
     truth = log.truth(times)
     modules = {}
     for finger, uskin, pile in zip(FINGERS, uskins, taxel_forces, strict=True):
-        counts, stamps = uskin.counts(np.array(pile), times), times
+        noise = grasp.generator(f"skin {finger}")
+        counts, stamps = uskin.counts(np.array(pile), times, noise), times
         if grasp.server:
             stamps, counts = with_server_effects(times, counts, grasp.generator(f"server {finger}"))
         labels = labels_from_truth(truth, finger)
@@ -159,6 +152,13 @@ def _world(grasp: Grasp) -> World:
     tremors = np.stack([draw_tremor(generator), draw_tremor(generator)])
     start = generator.standard_normal(4) * [*[PLACE_SPREAD] * 3, TURN_SPREAD]
     return World(HandModel.build(item), item, _path(grasp.object), controller, tremors, start)
+
+
+@cache
+def _skin(seed: int, finger: str, parameters: UskinParameters) -> Uskin:
+    """The skin of a finger: a seed is a hand, and has the same gains in all its grasps."""
+    generator = np.random.default_rng([seed, zlib.crc32(f"skin/{finger}".encode())])
+    return Uskin(parameters, sensor("uskin-curved"), curved_fingertip().nodes, generator)
 
 
 @cache
