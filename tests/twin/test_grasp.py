@@ -1,0 +1,102 @@
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from holdfast.twin.grasp import DEPTHS, PLACE, closing_path, object_pose
+from holdfast.twin.grasp import _aims as aims
+from holdfast.twin.hand import FINGERS, JOINTS, MIRRORED, HandModel
+from holdfast.twin.objects import distance_to, load_things, thing
+
+OBJECTS = tuple(load_things())
+
+
+@pytest.fixture(scope="module")
+def can():
+    return closing_path(thing("can"))
+
+
+@pytest.mark.parametrize("name", OBJECTS)
+def test_every_object_can_be_grasped(name):
+    path = closing_path(thing(name))
+    assert path.misses.max() < 0.002
+    assert path.cosines.min() > 0.85
+    limits = HandModel.build(thing(name)).limits()
+    for place, finger in enumerate(FINGERS):
+        own = limits[JOINTS[finger] : JOINTS[finger] + 4]
+        assert (path.joints[place] >= own[:, 0]).all()
+        assert (path.joints[place] <= own[:, 1]).all()
+    assert np.abs(np.diff(path.joints, axis=1)).max() < 0.35  # no jump to another solution
+
+
+@pytest.mark.parametrize("side", ["right", "left"])
+@pytest.mark.parametrize("name", OBJECTS)
+def test_pads_aim_at_the_surface_of_the_object_where_it_stands(name, side):
+    item = replace(thing(name), texture_amplitude=0.0)
+    place, turn = object_pose(item, side)
+    c, s = np.cos(turn), np.sin(turn)
+    mirror = 1 if side == "right" else -1
+    for finger in FINGERS:
+        push, points = aims(item, finger)
+        world = points @ [[1, 0, 0], [0, 0, 1], [0, -1, 0]] * [1, mirror, 1] - place
+        own = world @ [[c, -s, 0], [s, c, 0], [0, 0, 1]]
+        far = distance_to(item, own)
+        touch = np.abs(DEPTHS).argmin()
+        assert far[touch] == pytest.approx(0.0, abs=3e-4)
+        assert (np.diff(far[:touch]) < 0).all()
+        assert push @ push == pytest.approx(1.0)
+
+
+def test_the_left_hand_does_what_the_right_one_does(can):
+    left = closing_path(thing("can"), "left")
+    np.testing.assert_allclose(left.targets(np.zeros(4)), MIRRORED * can.targets(np.zeros(4)))
+
+
+def test_another_side_is_refused():
+    with pytest.raises(ValueError, match="side 'right' or 'left' expected, 'both' given"):
+        closing_path(thing("can"), "both")
+
+
+def test_targets_go_along_the_path(can):
+    for k, depth in enumerate(can.depths):
+        joints = can.targets(np.full(4, depth))
+        for place, finger in enumerate(FINGERS):
+            np.testing.assert_allclose(
+                joints[JOINTS[finger] : JOINTS[finger] + 4], can.joints[place, k]
+            )
+    between = can.targets(np.full(4, 0.5 * (can.depths[3] + can.depths[4])))
+    first = JOINTS["ring"]
+    np.testing.assert_allclose(
+        between[first : first + 4], 0.5 * (can.joints[3, 3] + can.joints[3, 4])
+    )
+
+
+def test_fingers_move_each_on_its_own(can):
+    depths = np.zeros(4)
+    before = can.targets(depths)
+    depths[FINGERS.index("middle")] = -0.01
+    moved = np.flatnonzero(can.targets(depths) != before)
+    assert set(moved) <= set(range(4, 8))
+    assert len(moved)
+
+
+def test_beyond_its_ends_the_path_stands_still(can):
+    np.testing.assert_array_equal(can.targets(np.full(4, 0.2)), can.targets(np.full(4, 0.035)))
+    np.testing.assert_array_equal(can.targets(np.full(4, -0.2)), can.targets(np.full(4, -0.025)))
+
+
+@pytest.mark.parametrize("radius", [0.08, 0.002])
+def test_an_object_of_another_size_is_refused_in_one_line(radius):
+    item = replace(thing("can"), name="tub", size=(radius, 0.05, 0.001))
+    with pytest.raises(ValueError, match=r"^the object 'tub' cannot be grasped: .*$") as refusal:
+        closing_path(item)
+    assert "\n" not in str(refusal.value)
+    assert "20 to 45 mm" in str(refusal.value)
+
+
+@pytest.mark.parametrize("name", OBJECTS)
+def test_the_middle_of_the_object_stands_where_the_pads_meet(name):
+    item = thing(name)
+    place, _ = object_pose(item)
+    middle = place + item.foot + [0, 0, item.half_height]
+    np.testing.assert_allclose(middle, [PLACE[0], -PLACE[2], PLACE[1]])
