@@ -369,3 +369,12 @@ def test_what_takes_long_can_be_followed(grasps):
         ("fitting", 6),
         ("judging", 6),
     ]
+
+
+def test_much_that_stays_undecided_is_told(grasps, monkeypatch):
+    told = []
+    monkeypatch.setattr("holdfast.training.trainer.UNDECIDED_SHARE", 0.0)
+    train(grasps, Setting(trials=0), tell=told.append)
+    assert len(told) == 1
+    assert told[0].endswith("recordings that begin in contact need --tare first")
+    assert " % of the labelled samples have no decision, for tare, warm-up, gaps" in told[0]

@@ -25,6 +25,9 @@ N_SEARCHES = 5
 """Searches for the parameters of the figures. What is held out takes no part in the search for
 the parameters that it is judged with."""
 
+UNDECIDED_SHARE = 0.2
+"""Share of labelled samples without a decision from which on the user is told."""
+
 NOBODY: frozenset[int] = frozenset()
 
 T = TypeVar("T")
@@ -84,6 +87,7 @@ def train(
     whole, *without = trainer.search([NOBODY, *trainer.searches_without()])
     model = fit_whole(trainer.material, setting, whole)
     metrics = trainer.cross_validate(without or [whole])
+    _tell_undecided(metrics, tell)
     return Trained(trainer.sign(model, whole, metrics), metrics)
 
 
@@ -217,3 +221,15 @@ def _search(
         seed=setting.seed,
         journal=journal,
     ), ""
+
+
+def _tell_undecided(metrics: Metrics, tell: Tell) -> None:
+    """Warns where much of the labelled data was left without a decision."""
+    n_labelled = metrics.pooled.n + metrics.pooled.n_undecided
+    share = metrics.pooled.n_undecided / max(n_labelled, 1)
+    if share > UNDECIDED_SHARE:
+        tell(
+            f"{100 * share:.0f} % of the labelled samples have no decision, for tare, warm-up, "
+            "gaps or faults (holdfast detect --summary tells which); recordings that begin in "
+            "contact need --tare first"
+        )
