@@ -3,7 +3,8 @@
 The object stands upright before the palm, where the pads of thumb and fingers can meet it from
 two sides. A thumb that pushes straight against the fingers, or in the middle of the palm, cannot
 meet it with its pad: the line of the grasp is turned, and the object sits above the palm's
-middle, opposite to where the thumb reaches.
+middle. Thumb and middle finger are opposite to each other, index and ring finger above and below:
+so the three fingers share the load of the thumb.
 """
 
 from typing import NamedTuple
@@ -17,15 +18,12 @@ from holdfast.sensors.values import Array
 from holdfast.twin.hand import FINGERS, JOINTS, MIRRORED, MOUNTS, N_JOINTS, HandModel
 from holdfast.twin.objects import Thing, distance_to
 
-PLACE = (0.108, 0.018, 0.021)
+PLACE = (0.108, 0.020, 0.021)
 """Where the middle of the object is in the right palm [m]; its axis is parallel to the palm's y.
-With `TURN` and `THUMB_HEIGHT` found by search: the smallest angles between pads and surface that
-the joints allow."""
+With `TURN` found by search: the smallest angles between pads and surface that the joints
+allow."""
 TURN = np.radians(109.0)
 """Direction in the palm's x-z plane along which the thumb pushes [rad]."""
-THUMB_HEIGHT = 0.005
-"""Of the thumb's pad above the middle of the object [m]: nearly opposite to the middle finger,
-so that the three fingers share its load."""
 PAD = (0.0261, 0.0, 0.016)
 """The middle of the pad in the fingertip frame [m], where the skin's normal is x."""
 DEPTHS = np.linspace(0.035, -0.025, 25)
@@ -131,12 +129,7 @@ def _aims(thing: Thing, finger: str) -> tuple[Array, Array]:
     """Direction in which a pad pushes, and (m, 3) where it shall be, in the right palm."""
     along = np.array([np.cos(TURN), 0.0, np.sin(TURN)])
     push = along if finger == "thumb" else -along
-    height = {
-        "thumb": THUMB_HEIGHT,
-        "index": thing.finger_height,
-        "middle": 0.0,
-        "ring": -thing.finger_height,
-    }[finger]
+    height = {"index": thing.finger_height, "ring": -thing.finger_height}.get(finger, 0.0)
     reach = _reach(thing, -push, height + _middle(thing))
     meet = np.add(PLACE, (0.0, height, 0.0)) - push * reach
     return push, meet - push * DEPTHS[:, None]
