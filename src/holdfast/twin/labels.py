@@ -61,7 +61,7 @@ def labels_from_truth(
     sliding = held & (arrays["slip_speed"] > rule.sliding)
     troubled = np.isin(phase, (Phase.DISTURBED, Phase.SLIPPING)) | sliding
     troubled = held & _grown(_closed(troubled, times, rule.merge), times, rule.margin)
-    lost = _since(held) & ~held & (phase == Phase.FREE)
+    lost = _since(held) & ~_since(phase == Phase.RELEASED) & (phase == Phase.FREE)
     slipped = _spans_with(troubled, sliding)
     states = [
         _state(*row)

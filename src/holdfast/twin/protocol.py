@@ -134,11 +134,13 @@ class Protocol:
         self._depths[~self._stopped] -= self.plan.speed * self._period
         if self._stopped.all() and time < self._all_stopped_at:
             self._all_stopped_at = min(self._all_stopped_at, time)
+        if self._released_at < np.inf:  # given up
+            return self._say(1.0, Phase.CLOSING)
         gripped = (loads > TOUCH).all()
         if gripped and time - self._all_stopped_at >= SETTLE:
             self.locked_at = time
             self._locked_place = thing[:3].copy()
-        elif time - self.plan.before > PATIENCE and self._released_at == np.inf:
+        elif time - self.plan.before > PATIENCE:
             self._released_at = time + HAND_OVER
         return self._say(1.0, Phase.CLOSING)
 

@@ -1,0 +1,194 @@
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from holdfast.contact import Cause, ContactState, Phase
+from holdfast.recordings import Truth, label_states
+from holdfast.twin.labels import LabelRule, labels_from_truth
+
+RATE = 150
+RULE = LabelRule()
+N, U, S = ContactState.NO_CONTACT, ContactState.UNSTABLE, ContactState.STABLE
+
+
+def truth(*spans, force=None, slip=None):
+    """Spans of (seconds, phase, touching); slip and force are [(start, end, value)]."""
+    phases, loads = [], []
+    for seconds, phase, touching in spans:
+        n = round(seconds * RATE)
+        phases += [phase] * n
+        loads += [2.0 * touching] * n
+    times = np.arange(len(phases)) / RATE
+    forces, speeds = np.array(loads, dtype=float), np.zeros(len(phases))
+    for column, changes in ((forces, force or ()), (speeds, slip or ())):
+        for start, end, value in changes:
+            column[(times > start - 1e-9) & (times < end - 1e-9)] = value
+    vectors = forces[:, None] * [0.0, 0.6, 0.8]
+    finger = {"contact_force": vectors, "slip_speed": speeds}
+    return Truth(times, {"phase": np.array(phases, dtype=str)}, {"thumb": finger})
+
+
+GRASP = (
+    (1.0, Phase.FREE, False),
+    (0.5, Phase.CLOSING, False),
+    (0.5, Phase.CLOSING, True),
+    (3.0, Phase.LOCKED, True),
+    (0.5, Phase.RELEASED, True),
+    (0.2, Phase.RELEASED, False),
+    (1.0, Phase.FREE, False),
+)
+
+
+def disturbed(*pushes, phase=Phase.DISTURBED, hold=6.0):
+    """Locked for so long with disturbances at (start, seconds) in it."""
+    spans, at = [], 0.0
+    for start, seconds in pushes:
+        spans += [(start - at, Phase.LOCKED, True), (seconds, phase, True)]
+        at = start + seconds
+    return (*spans, (hold - at, Phase.LOCKED, True))
+
+
+def told(data, rule=None):
+    return [
+        (round(label.start, 2), round(label.end, 2), label.state, label.cause)
+        for label in labels_from_truth(data, "thumb", rule)
+    ]
+
+
+def test_a_grasp_without_disturbance():
+    assert told(truth(*GRASP)) == [
+        (0.0, 1.5, N, None),
+        (1.5, 2.0, U, Cause.CLOSING),
+        (2.0, 5.0, S, None),
+        (5.0, 5.5, U, Cause.RELEASED),
+        (5.5, 6.7, N, None),  # set down, not lost
+    ]
+
+
+def test_labels_tell_where_they_come_from():
+    for label in labels_from_truth(truth(*GRASP), "thumb"):
+        assert (label.author, label.evidence, label.confidence) == ("twin", "truth", 1.0)
+
+
+def test_a_disturbance_is_an_interval_with_margins():
+    assert told(truth(*disturbed((2.0, 1.0)))) == [
+        (0.0, 1.9, S, None),
+        (1.9, pytest.approx(3.1, abs=0.011), U, Cause.DISTURBANCE),
+        (pytest.approx(3.1, abs=0.011), 6.0, S, None),
+    ]
+
+
+@pytest.mark.parametrize(("gap", "n_intervals"), [(0.3, 1), (0.5, 2)])
+def test_disturbances_soon_after_each_other_are_one(gap, n_intervals):
+    data = truth(*disturbed((1.0, 0.5), (1.5 + gap, 0.5)))
+    assert [row[2] for row in told(data)].count(U) == n_intervals
+
+
+def test_a_disturbance_in_which_the_finger_slides_is_a_slip_as_a_whole():
+    data = truth(*disturbed((1.0, 1.0), (4.0, 1.0)), slip=[(1.4, 1.45, 0.02)])
+    causes = [row[3] for row in told(data) if row[2] == U]
+    assert causes == [Cause.SLIP, Cause.DISTURBANCE]
+
+
+def test_what_slides_while_nobody_pushes_is_a_slip():
+    data = truth(*disturbed(), slip=[(2.0, 2.1, 0.002)])
+    assert told(data)[1][2:] == (U, Cause.SLIP)
+    assert told(data)[1][0] == 1.9
+    assert told(truth(*disturbed(), slip=[(2.0, 2.1, 0.0009)])) == [(0.0, 6.0, S, None)]
+
+
+def test_a_shake_does_not_flicker():
+    """The finger that pushes is off the object every other moment: still one interval."""
+    pushes = [(1.0 + 0.2 * k, 0.1) for k in range(10)]
+    data = truth(*disturbed(*pushes), slip=[(s, s + 0.02, 0.05) for s, _ in pushes])
+    assert [row[2] for row in told(data)] == [S, U, S]
+
+
+@pytest.mark.parametrize("seconds", [0.02, 0.08])
+def test_a_blip_of_contact_is_not_told(seconds):
+    spans = ((3.0, Phase.FREE, False),)
+    assert told(truth(*spans, force=[(1.0, 1.0 + seconds, 1.0)])) == [(0.0, 3.0, N, None)]
+    lifted = truth(*disturbed(), force=[(1.0, 1.0 + seconds, 0.0)])
+    assert told(lifted) == [(0.0, 6.0, S, None)]
+
+
+def test_a_finger_that_leaves_for_long_has_no_contact():
+    rows = told(truth(*disturbed(), force=[(1.0, 2.0, 0.0)]))
+    assert [row[2] for row in rows] == [S, N, S]
+    assert rows[1][:2] == (1.0, 2.0)
+    assert rows[1][3] is None
+
+
+def test_an_object_that_falls_is_lost():
+    data = truth(
+        (2.0, Phase.LOCKED, True),
+        (0.5, Phase.FREE, True),
+        (1.0, Phase.FREE, False),
+        (1.0, Phase.RELEASED, False),
+        (1.0, Phase.FREE, False),
+    )
+    assert told(data) == [
+        (0.0, 2.0, S, None),
+        (2.0, 2.5, U, Cause.LOST),
+        (2.5, 3.5, N, Cause.LOST),
+        (3.5, 5.5, N, None),
+    ]
+
+
+def test_a_grasp_never_locked_is_never_stable():
+    rows = told(truth((2.0, Phase.CLOSING, True), (0.5, Phase.RELEASED, True)))
+    assert rows == [(0.0, 2.0, U, Cause.CLOSING), (2.0, 2.5, U, Cause.RELEASED)]
+
+
+def test_thresholds_can_be_chosen():
+    rule = LabelRule(contact=3.0)
+    assert {row[2] for row in told(truth(*GRASP), rule)} == {N}
+    wide = LabelRule(margin=0.3)
+    assert told(truth(*disturbed((2.0, 1.0))), wide)[0][1] == 1.7
+    merged = LabelRule(merge=1.0)
+    pushes = disturbed((1.0, 0.5), (2.2, 0.5))
+    assert len(told(truth(*pushes), merged)) < len(told(truth(*pushes)))
+
+
+@st.composite
+def grasps(draw):
+    phases = [Phase.FREE, Phase.CLOSING, Phase.LOCKED, Phase.DISTURBED, Phase.SLIPPING]
+    spans = draw(
+        st.lists(
+            st.tuples(
+                st.floats(0.02, 1.0), st.sampled_from([*phases, Phase.RELEASED]), st.booleans()
+            ),
+            min_size=1,
+            max_size=12,
+        )
+    )
+    slips = draw(st.lists(st.tuples(st.floats(0, 6), st.floats(0.01, 0.5)), max_size=4))
+    return truth(*spans, slip=[(start, start + long, 0.01) for start, long in slips])
+
+
+@settings(deadline=None, max_examples=60)
+@given(grasps())
+def test_laws(data):
+    labels = labels_from_truth(data, "thumb")
+    times = data.times
+    assert (label_states(labels, times) > 0).all()  # every sample has one
+    assert labels[0].start == times[0]
+    assert all(a.end == b.start for a, b in zip(labels, labels[1:], strict=False))
+    whole = times[-1] - times[0] + 1 / RATE
+    assert sum(label.end - label.start for label in labels) == pytest.approx(whole)
+    assert all(
+        (a.state, a.cause) != (b.state, b.cause) for a, b in zip(labels, labels[1:], strict=False)
+    )
+    phase = data.hand["phase"]
+    for label in labels:
+        inside = (times >= label.start) & (times < label.end)
+        if label.state == S:
+            assert (phase[inside] == Phase.LOCKED).all()
+            assert (data.fingers["thumb"]["slip_speed"][inside] <= RULE.sliding).all()
+            assert label.cause is None
+        if label.state == U:
+            assert label.cause is not None
+        if label.cause in (Cause.SLIP, Cause.DISTURBANCE):
+            held = np.isin(phase[inside], [Phase.LOCKED, Phase.DISTURBED, Phase.SLIPPING])
+            assert held.all()

@@ -1,0 +1,211 @@
+import numpy as np
+import pytest
+from msgspec.structs import replace
+
+from holdfast.contact import Phase
+from holdfast.twin.operator import Push
+from holdfast.twin.profile import profile
+from holdfast.twin.protocol import (
+    CLOSED,
+    HAND_OVER,
+    LOST_DISTANCE,
+    LOST_SECONDS,
+    OPEN,
+    OPENING_SPEED,
+    PATIENCE,
+    SETTLE,
+    Plan,
+    Protocol,
+)
+
+PERIOD = 1 / 150
+BEFORE, AFTER, HOLD, SPEED = 0.5, 0.4, 2.0, 0.02
+SHORT = replace(profile("reference"), hold=HOLD)
+GRIPS = np.array([3.6, 2.0, 2.0, 2.0])
+PUSH = Push(1.0, 0.5, "down", 0, np.zeros(9))
+TOUCHED = 0.001  # depth at which the pads of this hand touch [m]
+
+
+class Table:
+    """A protocol on a table where loads go with depths, 4 N/mm; the rest is told."""
+
+    def __init__(self, pushes=(), grips=GRIPS, before=BEFORE):
+        self.protocol = Protocol(Plan(SHORT, grips, SPEED, before, AFTER, pushes), PERIOD)
+        self.thing = np.zeros(18)
+        self.thing[3:12] = np.eye(3).ravel()
+        self.times, self.commands = [], []
+
+    def run(self, loads=lambda time, depths: 4000 * (TOUCHED - depths), slip=0.0, limit=40.0):
+        depths = np.full(4, OPEN)
+        for k in range(round(limit / PERIOD)):
+            time = k * PERIOD
+            if self.protocol.over(time):
+                break
+            forces = np.maximum(0.0, loads(time, depths))
+            command = self.protocol.command(time, forces, slip, self.thing)
+            depths = command.depths.copy()
+            self.times.append(time)
+            self.commands.append(command._replace(depths=depths))
+        return self
+
+    def phases(self):
+        """Each phase with when it begins, in order."""
+        told = [command.phase for command in self.commands]
+        return [
+            (phase, time)
+            for phase, before, time in zip(told, [None, *told], self.times, strict=False)
+            if phase != before
+        ]
+
+    def column(self, name):
+        return np.array([getattr(command, name) for command in self.commands])
+
+
+def test_phases_come_in_their_order():
+    table = Table().run()
+    phases = dict(table.phases())
+    assert [phase for phase, _ in table.phases()][:-1] == [
+        Phase.FREE, Phase.CLOSING, Phase.LOCKED, Phase.RELEASED
+    ]  # fmt: skip
+    assert table.phases()[-1][0] == Phase.FREE
+    assert table.phases()[1][1] == pytest.approx(BEFORE, abs=PERIOD)
+    assert phases[Phase.LOCKED] == pytest.approx(table.protocol.locked_at + PERIOD)
+    held = phases[Phase.RELEASED] - table.protocol.locked_at
+    assert held == pytest.approx(HOLD + HAND_OVER, abs=2 * PERIOD)
+    assert table.times[-1] - phases[Phase.RELEASED] == pytest.approx(AFTER, abs=2 * PERIOD)
+    assert not table.protocol.failed
+    assert table.protocol.lost_at is None
+
+
+def test_each_finger_stops_at_its_grip_and_all_settle_before_the_lock():
+    table = Table().run()
+    depths = table.column("depths")
+    expected = TOUCHED - GRIPS / 4000
+    locked = table.times.index(table.protocol.locked_at)
+    np.testing.assert_allclose(depths[locked], expected, atol=2 * SPEED * PERIOD)
+    still = (np.abs(np.diff(depths, axis=0)) == 0).all(axis=1)
+    settled = round(SETTLE / PERIOD)
+    assert still[locked - settled : locked].all()
+    assert not still[locked - settled - 3 : locked - settled].all()
+
+
+def test_fingers_close_and_open_at_their_speeds():
+    table = Table().run()
+    depths = table.column("depths")[:, 0]
+    steps = np.diff(depths) / PERIOD
+    np.testing.assert_allclose(steps[steps < 0], -SPEED, rtol=1e-9)
+    np.testing.assert_allclose(steps[steps > 1e-9][:-1], OPENING_SPEED, rtol=1e-9)
+    assert depths[0] == OPEN
+    assert depths.min() >= CLOSED - SPEED * PERIOD
+
+
+def test_the_operator_lets_go_and_takes_back_in_ramps():
+    table = Table().run()
+    times, hold = np.array(table.times), table.column("hold")
+    locked = table.protocol.locked_at
+    held_for = times - locked
+    released = locked + HOLD + HAND_OVER
+    assert (hold[held_for <= 0] == 1.0).all()
+    going = (held_for > 0) & (held_for < HAND_OVER)
+    np.testing.assert_allclose(hold[going], 1 - held_for[going] / HAND_OVER)
+    assert (hold[(held_for > HAND_OVER + PERIOD) & (held_for < HOLD - PERIOD)] == 0.0).all()
+    coming = (held_for > HOLD + PERIOD) & (times < released - PERIOD)
+    assert (np.diff(hold[coming]) > 0).all()
+    np.testing.assert_allclose(np.diff(hold[coming]), PERIOD / HAND_OVER, rtol=1e-6)
+    assert (hold[times > released + PERIOD] == 1.0).all()
+    assert ((hold >= 0) & (hold <= 1)).all()
+
+
+def test_what_never_grips_is_given_up():
+    table = Table().run(loads=lambda time, depths: np.array([4.0, 2.5, 2.5, 0.0]))
+    assert table.protocol.failed
+    assert table.protocol.locked_at is None
+    phases = table.column("phase")
+    assert Phase.LOCKED not in phases
+    assert Phase.RELEASED in phases
+    assert table.times[-1] == pytest.approx(BEFORE + PATIENCE + HAND_OVER + AFTER, abs=3 * PERIOD)
+    assert (table.column("hold") == 1.0).all()
+
+
+def test_a_grip_that_comes_too_late_locks_no_more():
+    late = BEFORE + PATIENCE + 0.1
+    table = Table().run(
+        loads=lambda time, _: np.array([4.0, 2.5, 2.5, 2.5 if time > late else 0.0])
+    )
+    assert table.protocol.locked_at is None
+    assert table.protocol.failed
+
+
+def test_an_object_that_moves_far_is_lost():
+    table = Table()
+    moved = []
+
+    def loads(time, depths):
+        locked = table.protocol.locked_at
+        if locked is not None and time > locked + 1.0 and not moved:
+            moved.append(time)
+            table.thing[2] -= 1.01 * LOST_DISTANCE
+        return 4000 * (TOUCHED - depths)
+
+    table.run(loads)
+    assert table.protocol.lost_at == moved[0]
+    assert table.protocol.failed
+    after = [c for c, t in zip(table.commands, table.times, strict=True) if t >= moved[0]]
+    assert all(c.hold == 0.0 for c in after)  # it is not caught
+    assert after[0].phase == Phase.FREE
+    assert all(c.push == -1 for c in after)
+
+
+@pytest.mark.parametrize("n_left", [0, 1, 2])
+@pytest.mark.parametrize("seconds", [0.5 * LOST_SECONDS, 2 * LOST_SECONDS])
+def test_an_object_on_one_finger_for_long_is_lost(n_left, seconds):
+    table = Table()
+
+    def loads(time, depths):
+        locked = table.protocol.locked_at
+        if locked is not None and 0.8 < time - locked < 0.8 + seconds:
+            return np.where(np.arange(4) < n_left, 2.0, 0.0)
+        return 4000 * (TOUCHED - depths)
+
+    table.run(loads)
+    if n_left == 2 or seconds < LOST_SECONDS:
+        assert table.protocol.lost_at is None
+        assert not table.protocol.failed
+    else:
+        wanted = table.protocol.locked_at + 0.8 + LOST_SECONDS
+        assert table.protocol.lost_at == pytest.approx(wanted, abs=3 * PERIOD)
+
+
+@pytest.mark.parametrize(("slip", "phase"), [(0.0, Phase.DISTURBED), (0.01, Phase.SLIPPING)])
+def test_a_push_is_told_with_its_time(slip, phase):
+    table = Table([PUSH]).run(slip=slip)
+    times, pushes = np.array(table.times), table.column("push")
+    locked = table.protocol.locked_at
+    under_way = pushes == 0
+    assert times[under_way][0] - locked == pytest.approx(PUSH.start, abs=PERIOD)
+    assert under_way.sum() == pytest.approx(PUSH.duration / PERIOD, abs=1)
+    np.testing.assert_allclose(
+        table.column("elapsed")[under_way], times[under_way] - locked - PUSH.start, atol=1e-12
+    )
+    assert (table.column("phase")[under_way] == phase).all()
+    assert (table.column("elapsed")[~under_way] == 0.0).all()
+    held = (times > locked) & (times < locked + HOLD) & ~under_way
+    assert (table.column("phase")[held] == Phase.LOCKED).all()
+    assert (table.column("hold")[under_way] == 0.0).all()
+
+
+def test_the_operator_wants_the_object_where_it_was():
+    table = Table()
+    table.thing[:3] = 1.0, 2.0, 3.0
+    places = []
+
+    def loads(time, depths):
+        places.append(table.protocol.anchor[:3].copy())
+        if table.protocol.locked_at is not None and len(table.protocol.anchor):
+            table.thing[0] = 1.01
+        return 4000 * (TOUCHED - depths)
+
+    table.run(loads)
+    np.testing.assert_array_equal(places[1], [1.0, 2.0, 3.0])
+    np.testing.assert_array_equal(table.protocol.anchor[:3], [1.01, 2.0, 3.0])
+    np.testing.assert_array_equal(table.protocol.anchor[3:], np.eye(3).ravel())
