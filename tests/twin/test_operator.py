@@ -1,0 +1,210 @@
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from scipy.spatial.transform import Rotation
+
+from holdfast.twin.operator import (
+    DIRECTIONS,
+    HOLD_STIFFNESS,
+    HOLD_TURN_STIFFNESS,
+    JERK,
+    PUSH,
+    PUSH_GAP,
+    PUSH_LIMIT,
+    SHAKE,
+    TREMOR_BAND,
+    draw_pushes,
+    draw_tremor,
+    hold_wrench,
+    push_wrench,
+    tremble,
+)
+from holdfast.twin.operator import _aim as aim
+from holdfast.twin.profile import profile, profiles
+
+STILL = draw_tremor(np.random.default_rng(0))
+STYLES = (PUSH, JERK, SHAKE)
+WEIGHT = 2.0
+
+
+def body(place=(0.0, 0.0, 0.0), turn=(0.0, 0.0, 0.0), velocity=(0.0,) * 6):
+    rotation = Rotation.from_rotvec(turn).as_matrix().ravel()
+    return np.array([*place, *rotation, *velocity], dtype=float)
+
+
+def numbers(direction=(0.0, 0.0, -1.0), arm=(0.0, 0.0, 0.0), depth=0.006, stiffness=700.0):
+    return np.array([*direction, *arm, depth, stiffness, 4.0])
+
+
+def push(given, told=None, style=PUSH, rms=0.0, elapsed=0.4, duration=0.8):
+    told = numbers() if told is None else told
+    out = push_wrench(given, np.zeros(3), told, style, duration, STILL, rms, elapsed)
+    return np.array(out)
+
+
+def course(style, depth=0.006, duration=1.0, n=4001):
+    times = np.linspace(0, duration, n)
+    return times, np.array([aim(style, depth, 4.0, time, duration) for time in times])
+
+
+class TestTremor:
+    def test_has_an_rms_of_one(self):
+        times = np.arange(0, 60, 1 / 150)
+        for axis in range(3):
+            places = [tremble(STILL, time, axis)[0] for time in times]
+            assert np.std(places) == pytest.approx(1.0, rel=0.02)
+            assert np.mean(places) == pytest.approx(0.0, abs=0.02)
+
+    def test_keeps_to_its_band(self):
+        times = np.arange(0, 60, 1 / 150)
+        places = np.array([tremble(STILL, time, 0)[0] for time in times])
+        power = np.abs(np.fft.rfft(places * np.hanning(len(places)))) ** 2
+        rates = np.fft.rfftfreq(len(places), 1 / 150)
+        band = (rates > TREMOR_BAND[0] - 0.1) & (rates < TREMOR_BAND[1] + 0.1)
+        assert power[band].sum() / power.sum() > 0.999
+
+    def test_its_speed_is_the_slope_of_its_place(self):
+        step = 1e-6
+        for time in (0.0, 0.3, 7.7):
+            before, after = tremble(STILL, time - step, 1)[0], tremble(STILL, time + step, 1)[0]
+            assert tremble(STILL, time, 1)[1] == pytest.approx((after - before) / (2 * step), 1e-5)
+
+    def test_seeds(self):
+        same, other = draw_tremor(np.random.default_rng(0)), draw_tremor(np.random.default_rng(1))
+        np.testing.assert_array_equal(STILL, same)
+        assert (STILL != other).any()
+
+
+class TestHold:
+    def test_carries_the_weight(self):
+        here = body((0.1, 0.2, 0.3), (0.1, 0.0, 0.4))
+        wrench = hold_wrench(here, here[:12], 1.0, WEIGHT, STILL, 0.0, 0.5)
+        np.testing.assert_allclose(wrench, [0, 0, WEIGHT, 0, 0, 0], atol=1e-12)
+
+    def test_is_a_damped_spring(self):
+        anchor = body()[:12]
+        wrench = hold_wrench(body((0.001, 0, 0)), anchor, 1.0, 0.0, STILL, 0.0, 0.0)
+        assert wrench[0] == pytest.approx(-HOLD_STIFFNESS * 0.001)
+        moving = body(velocity=(0.1, 0, 0, 0, 0, 0))
+        assert hold_wrench(moving, anchor, 1.0, 0.0, STILL, 0.0, 0.0)[0] < 0
+
+    @pytest.mark.parametrize("axis", range(3))
+    def test_turns_back(self, axis):
+        turn = np.zeros(3)
+        turn[axis] = 0.01
+        wrench = hold_wrench(body(turn=turn), body()[:12], 1.0, 0.0, STILL, 0.0, 0.0)
+        np.testing.assert_allclose(wrench[3:], -HOLD_TURN_STIFFNESS * turn, rtol=1e-3, atol=1e-12)
+        spinning = body(velocity=(0, 0, 0, *(100 * turn)))
+        assert hold_wrench(spinning, body()[:12], 1.0, 0.0, STILL, 0.0, 0.0)[3 + axis] < 0
+
+    @pytest.mark.parametrize("gain", [0.0, 0.3])
+    def test_lets_go_of_all(self, gain):
+        given = body((0.001, 0.002, 0.003), (0.1, 0.1, 0.0), (1, 2, 3, 4, 5, 6))
+        whole = hold_wrench(given, body()[:12], 1.0, WEIGHT, STILL, 1e-3, 0.3)
+        part = hold_wrench(given, body()[:12], gain, WEIGHT, STILL, 1e-3, 0.3)
+        np.testing.assert_allclose(part, gain * np.array(whole))
+
+    def test_trembles(self):
+        forces = [
+            hold_wrench(body(), body()[:12], 1.0, WEIGHT, STILL, 4e-4, time)[0]
+            for time in np.arange(0, 5, 0.01)
+        ]
+        assert 0.05 < np.std(forces) < 1.0
+
+
+class TestPush:
+    @settings(deadline=None, max_examples=200)
+    @given(
+        place=st.tuples(*[st.floats(-0.05, 0.05)] * 3),
+        velocity=st.tuples(*[st.floats(-2, 2)] * 6),
+        style=st.sampled_from(STYLES),
+        elapsed=st.floats(0, 0.8),
+        rms=st.floats(0, 1e-3),
+        seed=st.integers(0, 2**16),
+    )
+    def test_never_pulls_and_never_passes_its_limit(
+        self, place, velocity, style, elapsed, rms, seed
+    ):
+        random = np.random.default_rng(seed)
+        direction = random.normal(size=3)
+        direction /= np.linalg.norm(direction)
+        arm = np.cross(direction, random.normal(0, 0.006, 3))
+        told = numbers(direction, arm)
+        out = push(body(place, velocity=velocity), told, style, rms, elapsed)
+        along = out[:3] @ direction
+        assert 0.0 <= along <= PUSH_LIMIT + 1e-9
+        np.testing.assert_allclose(out[:3], along * direction, atol=1e-9)
+        np.testing.assert_allclose(out[3:], np.cross(arm, out[:3]), atol=1e-9)
+
+    @pytest.mark.parametrize("style", STYLES)
+    def test_begins_and_ends_off_the_object(self, style):
+        for elapsed in (0.0, 0.8):
+            assert not push(body(), style=style, elapsed=elapsed).any()
+
+    @pytest.mark.parametrize("style", STYLES)
+    def test_goes_there_and_back(self, style):
+        times, told = course(style)
+        places, speeds = told.T
+        assert places[0] == pytest.approx(0.0, abs=1e-12)
+        assert places[-1] == pytest.approx(0.0, abs=1e-12)
+        assert places.min() >= -1e-12
+        assert 0.8 * (0.006 + PUSH_GAP) < places.max() <= 0.006 + PUSH_GAP + 1e-12
+        slope = np.gradient(places, times)
+        np.testing.assert_allclose(speeds[1:-1], slope[1:-1], atol=1e-4)
+
+    def test_a_still_object_is_pressed_by_the_spring(self):
+        force = push(body(), style=PUSH)[2]
+        assert force == pytest.approx(-700 * 0.006)
+
+    def test_an_object_that_went_along_is_not_pressed(self):
+        assert not push(body((0, 0, -0.0061))).any()
+        assert push(body((0, 0, -0.0059))).any()
+
+    def test_a_shake_leaves_the_object_and_comes_back(self):
+        forces = [push(body(), style=SHAKE, elapsed=t, duration=1.0)[2] for t in np.arange(0, 1, 0.002)]
+        touching = np.array(forces) < 0
+        assert (np.diff(touching.astype(int)) == 1).sum() >= 3
+
+
+class TestPlan:
+    @pytest.mark.parametrize("name", profiles())
+    @pytest.mark.parametrize("seed", range(4))
+    def test_pushes_fill_the_hold(self, name, seed):
+        chosen = profile(name)
+        pushes = draw_pushes(np.random.default_rng(seed), chosen)
+        starts = np.array([p.start for p in pushes])
+        ends = starts + [p.duration for p in pushes]
+        assert len(pushes) >= 3
+        assert starts[0] >= 1.0  # the operator's hand is off by then
+        rests = starts[1:] - ends[:-1]
+        assert (rests >= chosen.rest[0]).all()
+        assert (rests <= chosen.rest[1]).all()
+        assert ends[-1] <= chosen.hold - 1.0
+        assert chosen.hold - ends[-1] < 1.0 + chosen.rest[1] + chosen.push_duration[1]
+        assert [p.direction for p in pushes[:4]] == ["down", "up", "left", "right"][: len(pushes)]
+
+    def test_numbers_are_those_of_the_profile(self):
+        chosen = profile("reference")
+        many = [p for s in range(30) for p in draw_pushes(np.random.default_rng(s), chosen)]
+        assert {p.style for p in many} == set(STYLES)
+        for p in many:
+            direction, arm = p.numbers[:3], p.numbers[3:6]
+            assert direction @ direction == pytest.approx(1.0)
+            assert arm @ direction == pytest.approx(0.0, abs=1e-12)
+            if p.direction != "random":
+                assert tuple(direction) == DIRECTIONS[p.direction]
+            for value, span in zip(
+                [*p.numbers[6:], p.duration],
+                [chosen.push_depth, chosen.push_stiffness, chosen.shake_rate, chosen.push_duration],
+                strict=True,
+            ):
+                assert span[0] <= value <= span[1]
+
+    def test_a_calmer_person_pushes_less_far_but_the_same(self):
+        chosen = profile("reference")
+        whole = draw_pushes(np.random.default_rng(5), chosen)
+        calm = draw_pushes(np.random.default_rng(5), chosen, 0.5)
+        for one, other in zip(whole, calm, strict=True):
+            assert one[:4] == other[:4]
+            assert other.numbers[6] == pytest.approx(0.5 * one.numbers[6])
