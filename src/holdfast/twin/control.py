@@ -21,7 +21,8 @@ DERIVATIVE = 0.03
 ENCODER_STEP = 333.3 / 65536 * np.pi / 180
 """Of the joint angles [rad], by the hand's protocol."""
 TORQUE_STEP, TORQUE_NOISE, TORQUE_LIMIT = 1e-3, 1.5e-3, 0.7
-"""[N m]: step of the PWM, own choice of its noise, and the nominal limit."""
+"""[N m]: step of the PWM, own choice of its noise, and the hand's nominal limit. The clamps of the
+vendor's ROS driver (0.225 N m at the end of the thumb) would let it press with 2 N at most."""
 COMPENSATION = (0.90, 1.05)
 """Share of gravity that is compensated; drawn once for each joint."""
 GLITCH_RATE, GLITCH_ERROR, GLITCH_TICKS = 0.12, 0.08, (2, 8)

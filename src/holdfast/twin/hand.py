@@ -45,7 +45,9 @@ TIP_RADIUS, TIP_BEGIN, TIP_END = 0.0136, 0.006, 0.022
 MIRRORED = np.array([-1.0, 1.0, 1.0, 1.0] * 3 + [1.0] * 4)
 """Turns joints of one hand into those of the other in the mirrored pose: the vendor's left hand
 spreads its fingers about the same axis as the right one."""
-SHELL, FRAME, SKIN, THING = ".60 .62 .66 1", ".30 .32 .36 1", ".95 .55 .18 1", ".42 .66 .80 1"
+HINGE = (0.0106, 0.0142)
+"""Radius and half length of the motors that are drawn [m]."""
+SHELL, FRAME, SKIN, THING = ".74 .75 .78 1", ".25 .27 .31 1", ".95 .55 .18 1", ".36 .62 .80 1"
 """Colours."""
 
 Rows = list[dict[str, str]]
@@ -73,15 +75,21 @@ def hand_xml(side: str = "right", thing: Thing | None = None) -> str:
     return f"""<mujoco model="allegro {side}">
   <compiler angle="radian" eulerseq="XYZ"/>
   <option timestep="{TIMESTEP!r}" integrator="implicitfast" gravity="0 0 -9.81"/>
-  <visual><global offwidth="1280" offheight="960"/><headlight ambient=".45 .45 .45"/></visual>
+  <visual>
+    <global offwidth="1280" offheight="960"/><quality shadowsize="4096"/>
+    <headlight ambient=".42 .42 .42" diffuse=".35 .35 .35" specular=".1 .1 .1"/>
+  </visual>
   <default>
-    <geom contype="0" conaffinity="0" rgba="{FRAME}"/>
+    <geom contype="0" conaffinity="0" rgba="{SHELL}"/>
     <joint armature="{ARMATURE}" damping="{DAMPING}" frictionloss="{FRICTION}" limited="true"/>
   </default>
-  <asset><texture name="sky" type="skybox" builtin="flat" rgb1="1 1 1" rgb2="1 1 1" width="8"
-    height="8"/></asset>
+  <asset>
+    <texture type="skybox" builtin="gradient" rgb1=".93 .95 .97" rgb2=".99 .99 .99" width="256"
+      height="256"/>
+  </asset>
   <worldbody>
-    <light pos=".4 -.6 1" dir="-.3 .5 -1" diffuse=".6 .6 .6"/>
+    <light pos=".5 {-0.4 * np.sign(turn)} .9" dir="-.4 {0.35 * np.sign(turn)} -.9"
+      diffuse=".55 .55 .55"/>
     <body name="palm" euler="{turn!r} 0 0">
       {_box_xml(PALM_SIDES, PALM_MIDDLE, PALM_MASS)}
       {"".join(_link_xml(row, rows) for row in rows if row["parent"] == "palm_link")}
@@ -228,7 +236,14 @@ def _link_xml(row: dict[str, str], rows: Rows) -> str:
       euler="{row["roll"]} {row["pitch"]} {row["yaw"]}">
       <joint name="joint_{number}" axis="{row["axis_x"]} {row["axis_y"]} {row["axis_z"]}"
         range="{row["lower"]} {row["upper"]}"/>
-      {_box_xml(sides, middle, float(row["mass"]))}{tip}{children}</body>"""
+      {_box_xml(sides, middle, float(row["mass"]))}{_hinge_xml(row)}{tip}{children}</body>"""
+
+
+def _hinge_xml(row: dict[str, str]) -> str:
+    """The motor of a joint, for the looks."""
+    x, y, z = (HINGE[1] * float(row[f"axis_{a}"]) for a in "xyz")
+    ends = f"{-x:.6g} {-y:.6g} {-z:.6g} {x:.6g} {y:.6g} {z:.6g}"
+    return f'<geom type="cylinder" fromto="{ends}" size="{HINGE[0]}" mass="0" rgba="{FRAME}"/>'
 
 
 def _tip_xml(number: int) -> str:
@@ -266,12 +281,12 @@ def _looks_xml(thing: Thing) -> str:
         return f'<geom type="capsule" size="{size[0]} {half - size[0]}" {colour} mass="0"/>'
     if thing.shape == "hexagon":
         width = size[0] / np.sqrt(3)
-        return "".join(
-            f'<geom type="box" size="{size[0]} {width} {half}" euler="0 0 {turn!r}" {colour} '
-            'mass="0"/>'
-            for turn in (0.0, np.pi / 3, 2 * np.pi / 3)
+        return "".join(  # faces of equal height would flicker through one another
+            f'<geom type="box" size="{size[0]} {width} {half - 1e-4 * k}" '
+            f'euler="0 0 {k * np.pi / 3!r}" {colour} mass="0"/>'
+            for k in range(3)
         )
-    n_slices = 24
+    n_slices = 24 if thing.shape == "frustum" else 1
     foot, top = (size[0], size[1]) if thing.shape == "frustum" else (size[0], size[0])
     thick = half / n_slices
     return "".join(

@@ -25,9 +25,9 @@ STILLS = (".gif", ".png", ".webp")
 """Films that need nothing but Pillow, which comes with matplotlib; `.png` is an animated one."""
 FILMS = (*STILLS, ".mp4")
 """All films; `.mp4` needs the program ffmpeg."""
-NEWTON = 0.015
+NEWTON = 0.012
 """Length of the arrow of a force of one newton [m]."""
-ARROW = 0.0018
+ARROW = 0.002
 """Half width of an arrow [m]."""
 GLOW = (0.80, 0.10, 0.16, 1.0)
 """Colour of the arrows."""
@@ -43,10 +43,10 @@ class Camera(NamedTuple):
         elevation: of the direction of view [degrees]; negative looks down.
     """
 
-    target: tuple[float, float, float] = (0.045, -0.035, 0.005)
-    distance: float = 0.42
-    azimuth: float = 135.0
-    elevation: float = -28.0
+    target: tuple[float, float, float] = (0.07, -0.014, 0.006)
+    distance: float = 0.32
+    azimuth: float = 162.0
+    elevation: float = -36.0
 
 
 class _Context(Protocol):
@@ -105,7 +105,7 @@ class Studio:
 
         Args:
             data: of MuJoCo, positions of the bodies computed.
-            forces: (n, 6) points [m] and forces [N] in the world, drawn as arrows.
+            forces: (n, 6) points [m] and forces [N] in the world, drawn as arrows that end there.
         """
         self._context.make_current()
         mujoco.mjv_updateScene(
@@ -136,7 +136,7 @@ def render(
         width: [pixels].
         height: [pixels].
         camera: where it is taken from.
-        forces: (n, 6) points [m] and forces [N] in the world, drawn as arrows.
+        forces: (n, 6) points [m] and forces [N] in the world, drawn as arrows that end there.
 
     Returns:
         (height, width, 3) red, green, blue.
@@ -221,7 +221,8 @@ def _draw_arrow(scene: mujoco.MjvScene, point: Array, force: Array) -> None:
     geom = scene.geoms[scene.ngeom]
     kind = mujoco.mjtGeom.mjGEOM_ARROW.value
     mujoco.mjv_initGeom(geom, kind, np.zeros(3), np.zeros(3), np.zeros(9), np.array(GLOW, "f4"))
-    mujoco.mjv_connector(geom, kind, ARROW, point, point + NEWTON * force)
+    tail = point - NEWTON * force
+    mujoco.mjv_connector(geom, kind, ARROW, tail, tail + 2 * NEWTON * force)  # half of it is drawn
     scene.ngeom += 1
 
 
@@ -254,7 +255,8 @@ def _save_animation(frames: Iterable[Picture], path: Path, fps: float) -> None:
     images = (Image.fromarray(frame) for frame in frames)
     if path.suffix.lower() != ".webp":  # 256 colours keep a film small, and its memory too
         images = (image.quantize(256, dither=Image.Dither.NONE) for image in images)
-    next(images).save(path, save_all=True, append_images=images, duration=1000 / fps, loop=0)
+    first, *others = images
+    first.save(path, save_all=True, append_images=others, duration=1000 / fps, loop=0)
 
 
 def _save_mp4(frames: Iterable[Picture], path: Path, fps: float) -> None:
