@@ -1,0 +1,312 @@
+from dataclasses import replace
+
+import msgspec
+import numpy as np
+import pytest
+from scipy.spatial.transform import Rotation
+
+from holdfast.contact import Cause, ContactState, Phase
+from holdfast.features import fingertip_force
+from holdfast.io import load_recording, save_recording
+from holdfast.twin import control, hand, simulation, world
+from holdfast.twin.objects import load_things, thing
+from holdfast.twin.profile import profile
+from holdfast.twin.simulation import Grasp, simulate
+from holdfast.twin.uskin_parameters import UskinParameters
+
+FINGERS = ("thumb", "index", "middle", "ring")
+SHORT = msgspec.structs.replace(profile("reference"), idle=(0.7, 0.8), hold=6.0)
+GRAVITY = 9.81
+
+
+def made(grasp, chosen=SHORT, glitches=0.0, **modules):
+    """A recording of a short grasp whose controller has so many glitches a second."""
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(simulation, "profile", lambda _: chosen)
+        patch.setattr(control, "GLITCH_RATE", glitches)
+        for place, value in modules.items():
+            for module in (hand, world, simulation):
+                if hasattr(module, place):
+                    patch.setattr(module, place, value)
+        return simulate(grasp)
+
+
+@pytest.fixture(scope="module")
+def held():
+    return made(Grasp("can", 1, 1))
+
+
+@pytest.fixture(scope="module")
+def pushed():
+    return made(Grasp("box", 2, 1), msgspec.structs.replace(SHORT, hold=8.0))
+
+
+@pytest.fixture(scope="module")
+def dropped():
+    return made(Grasp("bottle", 1, 1), msgspec.structs.replace(SHORT, grip=0.3))
+
+
+def quiet(recording):
+    """Samples at which the object is held, settled and undisturbed."""
+    since = recording.truth.times - recording.metadata["locked_at"]
+    return (since > 1.5) & (since < SHORT.hold - 0.2)
+
+
+def turns(poses):
+    return Rotation.from_quat(poses[:, [4, 5, 6, 3]])
+
+
+def on_object(recording, span):
+    fingers = recording.truth.fingers.values()
+    return np.sum([finger["contact_force"][span] for finger in fingers], axis=0)
+
+
+class TestHeldObject:
+    @pytest.mark.parametrize("name", load_things())
+    def test_its_weight_is_the_sum_of_the_contact_forces(self, name):
+        recording = made(Grasp(name, 1, 1))
+        weight = GRAVITY * recording.metadata["object_mass"]
+        assert recording.metadata["object_mass"] == thing(name).mass
+        total = on_object(recording, quiet(recording)).mean(axis=0)
+        np.testing.assert_allclose(total, [0, 0, weight], atol=0.02 * weight)
+
+    def test_nothing_slides(self, held):
+        """While the joints relax, a node or two at a patch's edge give way; then it rests."""
+        rested = quiet(held) & (held.truth.times > held.metadata["locked_at"] + 4.0)
+        for finger in held.truth.fingers.values():
+            assert finger["slip_speed"][rested].max() < 1e-6
+            assert finger["slipping_share"][quiet(held)].max() < 0.1
+            assert finger["slip_speed"][quiet(held)].sum() / 150 < 2e-5
+
+    def test_nothing_creeps(self, held):
+        span = quiet(held)
+        times, place = held.truth.times[span], held.truth.hand["object_pose"][span]
+        for finger in held.truth.fingers.values():
+            tip = finger["tip_pose"][span]
+            seen = turns(tip).inv().apply(place[:, :3] - tip[:, :3])
+            drift = np.linalg.norm(seen[-1] - seen[0]) / (times[-1] - times[0])
+            assert drift < 1e-5
+
+    def test_nobody_else_touches_it(self, held):
+        assert not held.truth.hand["outside_force"][quiet(held)].any()
+
+    def test_the_operator_carries_it_before(self, held):
+        open_hand = held.truth.times < 0.6
+        lift = held.truth.hand["outside_force"][open_hand].mean(axis=0)
+        assert lift[2] == pytest.approx(GRAVITY * held.metadata["object_mass"], rel=0.1)
+
+    def test_half_the_time_step_gives_the_same_forces(self, held):
+        fine = made(
+            Grasp("can", 1, 1),
+            SUBSTEPS=2 * hand.SUBSTEPS,
+            TIMESTEP=hand.TIMESTEP / 2,
+            EVERY=2 * control.EVERY,
+        )
+        loads = [
+            {
+                name: np.linalg.norm(finger["contact_force"][quiet(one)], axis=1).mean()
+                for name, finger in one.truth.fingers.items()
+            }
+            for one in (held, fine)
+        ]
+        assert loads[0] == pytest.approx(loads[1], rel=0.02)
+        assert loads[0] != loads[1]
+
+
+class TestReadings:
+    def test_show_the_contact_force_in_the_fingertip_frame(self, held):
+        per_newton = np.array(UskinParameters().counts_per_newton)
+        span = quiet(held)
+        for name, module in held.modules.items():
+            finger = held.truth.fingers[name]
+            wanted = turns(finger["tip_pose"][span]).inv().apply(finger["contact_force"][span])
+            rest = module.readings[:75].mean(axis=0)
+            got = fingertip_force((module.readings - rest) / per_newton, module.sensor, tare="none")
+            wanted, got = wanted.mean(axis=0), got[span].mean(axis=0)
+            assert np.linalg.norm(got - wanted) < 0.25 * np.linalg.norm(wanted)
+            assert wanted[0] > 0.8  # presses along its x
+
+    def test_are_counts_of_the_real_sensor(self, held):
+        for module in held.modules.values():
+            assert module.readings.dtype == np.uint16
+            assert module.unit == "count"
+            assert module.readings.shape == (module.n_samples, 30, 3)
+            assert module.rate == pytest.approx(150.0)
+            assert 0.3 < module.readings[:75].std(axis=0).mean() < 2.0
+
+
+class TestTruth:
+    @pytest.fixture(params=["held", "pushed", "dropped"])
+    def any_recording(self, request):
+        return request.getfixturevalue(request.param)
+
+    def test_has_all_that_is_promised(self, any_recording):
+        truth, n = any_recording.truth, len(any_recording.truth.times)
+        assert {name: array.shape for name, array in truth.hand.items()} == {
+            "phase": (n,), "outside_force": (n, 3), "object_pose": (n, 7), "joints": (n, 16)
+        }  # fmt: skip
+        assert tuple(truth.fingers) == tuple(any_recording.modules) == FINGERS
+        for finger in truth.fingers.values():
+            assert {name: array.shape for name, array in finger.items()} == {
+                "contact_force": (n, 3), "slip_speed": (n,), "slipping_share": (n,),
+                "tip_pose": (n, 7),
+            }  # fmt: skip
+            assert all(np.isfinite(array).all() for array in finger.values())
+        for module in any_recording.modules.values():
+            np.testing.assert_array_equal(module.times, truth.times)
+
+    def test_is_possible(self, any_recording):
+        truth, item = any_recording.truth, thing(any_recording.metadata["object"])
+        assert set(truth.hand["phase"]) <= set(Phase)
+        poses = truth.hand["object_pose"]
+        np.testing.assert_allclose(np.linalg.norm(poses[:, 3:], axis=1), 1.0, atol=1e-9)
+        low, high = hand.HandModel.build(item).limits().T
+        assert (truth.hand["joints"] > low - 0.05).all()
+        assert (truth.hand["joints"] < high + 0.05).all()
+        for finger in truth.fingers.values():
+            assert (finger["slip_speed"] >= 0).all()
+            share = finger["slipping_share"]
+            assert ((share >= 0) & (share <= 1 + 1e-12)).all()
+            away = np.linalg.norm(finger["contact_force"], axis=1) == 0
+            assert not finger["slip_speed"][away].any()
+
+    def test_friction_keeps_to_coulombs_limit(self, held):
+        """On a can all normals of a fingertip lie within its patch, near that of its middle."""
+        span, mu = quiet(held), thing("can").mu_static
+        poses = held.truth.hand["object_pose"][span]
+        for finger in held.truth.fingers.values():
+            force = turns(poses).inv().apply(finger["contact_force"][span])
+            where = turns(poses).inv().apply(
+                turns(finger["tip_pose"][span]).apply([0.0, 0.0, 0.016])
+                + finger["tip_pose"][span, :3]
+                - poses[:, :3]
+            )
+            inward = -where[:, :2] / np.linalg.norm(where[:, :2], axis=1)[:, None]
+            pressed = (force[:, :2] * inward).sum(axis=1)
+            assert (pressed > 0).all()
+            assert (np.abs(force[:, 2]) <= mu * np.linalg.norm(force[:, :2], axis=1)).all()
+
+    def test_motion_follows_from_the_forces(self, pushed):
+        """Newton's law on the object, over the whole grasp: impulse is change of momentum."""
+        truth, mass = pushed.truth, pushed.metadata["object_mass"]
+        span = slice(200, None)
+        force = on_object(pushed, span) + truth.hand["outside_force"][span]
+        force[:, 2] -= GRAVITY * mass
+        place = truth.hand["object_pose"][span, :3]
+        velocity = np.gradient(place, 1 / 150, axis=0)
+        for k in range(0, len(force) - 300, 150):
+            gained = mass * (velocity[k + 299] - velocity[k])
+            given = force[k : k + 299].sum(axis=0) / 150
+            np.testing.assert_allclose(gained, given, atol=0.02)
+
+    def test_outside_forces_act_while_somebody_holds_or_pushes(self, pushed):
+        phase = pushed.truth.hand["phase"]
+        force = np.linalg.norm(pushed.truth.hand["outside_force"], axis=1)
+        troubled = np.isin(phase, [Phase.DISTURBED, Phase.SLIPPING])
+        assert force[troubled].max() > 0.5
+        since = pushed.truth.times - pushed.metadata["locked_at"]
+        alone = (phase == Phase.LOCKED) & (since > 0.3) & (since < 7.9)
+        assert not force[alone].any()
+
+
+class TestRecording:
+    def test_metadata(self, held, dropped):
+        assert held.metadata.keys() >= {
+            "object", "object_mass", "case", "repeat", "profile", "seed", "hand", "source"
+        }  # fmt: skip
+        assert held.name == "can-case1-1"
+        assert (held.metadata["case"], held.metadata["planned_case"]) == ("1", 1)
+        assert held.metadata["lost_at"] is None
+        assert held.metadata["source"] == "twin"
+
+    def test_a_failed_grasp_says_so(self, dropped):
+        assert dropped.name == "bottle-case1-1-failed1"
+        assert (dropped.metadata["case"], dropped.metadata["planned_case"]) == ("failed", 1)
+        lost = dropped.metadata["lost_at"]
+        assert lost > dropped.metadata["locked_at"]
+        after = dropped.truth.times >= lost + 0.3
+        assert not np.isin(dropped.truth.hand["phase"][after], [Phase.LOCKED, Phase.DISTURBED]).any()
+        for module in dropped.modules.values():
+            assert all(not (x.state == ContactState.STABLE and x.end > lost + 0.1) for x in module.labels)
+            assert Cause.LOST in {x.cause for x in module.labels}
+        assert dropped.truth.hand["object_pose"][-1, 2] < -0.2  # it fell, and out of the picture
+
+    def test_phases_and_labels_of_a_held_object(self, held):
+        for module in held.modules.values():
+            assert (module.label_states > 0).all()
+            causes = [label.cause for label in module.labels]
+            assert causes[0] is None
+            assert Cause.CLOSING in causes
+            assert Cause.RELEASED in causes
+            assert Cause.LOST not in causes
+            assert (module.label_states[quiet(held)] == ContactState.STABLE.code).all()
+
+    def test_a_disturbed_object_is_labelled_so(self, pushed):
+        n_pushed = 0
+        phase = pushed.truth.hand["phase"]
+        for module in pushed.modules.values():
+            troubled = np.isin(phase, [Phase.DISTURBED, Phase.SLIPPING])
+            assert troubled.any()
+            assert (module.label_states[troubled] == ContactState.UNSTABLE.code).all()
+            causes = [label.cause for label in module.labels]
+            n_pushed += causes.count(Cause.DISTURBANCE) + causes.count(Cause.SLIP)
+        assert n_pushed >= 4
+
+    def test_saves_and_loads(self, held, tmp_path):
+        path = tmp_path / f"{held.name}.parquet"
+        save_recording(held, path)
+        back = load_recording(path)
+        assert back.digest == held.digest
+        assert dict(back.metadata) == dict(held.metadata)
+        for name, array in held.truth.hand.items():
+            np.testing.assert_array_equal(back.truth.hand[name], array)
+        assert back.modules["thumb"].labels == held.modules["thumb"].labels
+
+
+class TestSeeds:
+    def test_the_same_seed_gives_the_same_bytes(self, held, tmp_path):
+        again = made(Grasp("can", 1, 1))
+        assert again.digest == held.digest
+        paths = [tmp_path / folder / f"{held.name}.parquet" for folder in ("one", "other")]
+        for recording, path in zip((held, again), paths, strict=True):
+            path.parent.mkdir()
+            save_recording(recording, path)
+        assert paths[0].read_bytes() == paths[1].read_bytes()
+
+    @pytest.mark.parametrize(
+        "change", [{"seed": 1}, {"repeat": 2}, {"attempt": 1}, {"server": True}]
+    )
+    def test_another_gives_others(self, held, change):
+        other = made(replace(Grasp("can", 1, 1), **change))
+        assert other.digest != held.digest
+        same = other.truth.hand["joints"].shape == held.truth.hand["joints"].shape and (
+            other.truth.hand["joints"] == held.truth.hand["joints"]
+        ).all()
+        assert same == ("server" in change)  # a server sends the same grasp otherwise
+        thumb = other.modules["thumb"]
+        assert (thumb.n_repeats > 0) == ("server" in change)
+        assert (np.ptp(np.diff(thumb.times)) > 1e-6) == ("server" in change)
+
+    def test_watching_changes_nothing(self, held):
+        seen = []
+        with pytest.MonkeyPatch.context() as patch:
+            patch.setattr(simulation, "profile", lambda _: SHORT)
+            patch.setattr(control, "GLITCH_RATE", 0.0)
+            watched = simulate(
+                Grasp("can", 1, 1), watch=lambda world, command: seen.append(command.phase)
+            )
+        assert watched.digest == held.digest
+        assert seen == list(held.truth.hand["phase"])
+
+
+@pytest.mark.parametrize(
+    ("grasp", "told"),
+    [
+        (Grasp("cup", 1, 1), "no object 'cup'; there are ball, box"),
+        (Grasp("can", 3, 1), "case 1 or 2 expected, 3 given"),
+        (Grasp("can", 1, 1, "rough"), "unknown profile 'rough'"),
+    ],
+)
+def test_what_there_is_not_is_refused(grasp, told):
+    with pytest.raises(ValueError, match=told):
+        simulate(grasp)
