@@ -75,7 +75,7 @@ def closing_path(thing: Thing, side: str = "right") -> ClosingPath:
     Example:
         >>> from holdfast.twin.objects import thing
         >>> path = closing_path(thing("can"))
-        >>> bool(path.misses.max() < 0.001)  # within a millimetre
+        >>> bool(path.misses.max() < 0.002)  # [m]
         True
     """
     if side not in ("right", "left"):
