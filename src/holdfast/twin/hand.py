@@ -76,7 +76,7 @@ def hand_xml(side: str = "right", thing: Thing | None = None) -> str:
   <compiler angle="radian" eulerseq="XYZ"/>
   <option timestep="{TIMESTEP!r}" integrator="implicitfast" gravity="0 0 -9.81"/>
   <visual>
-    <global offwidth="1280" offheight="960"/><quality shadowsize="4096"/>
+    <global offwidth="1280" offheight="960"/><quality shadowsize="2048"/>
     <headlight ambient=".42 .42 .42" diffuse=".35 .35 .35" specular=".1 .1 .1"/>
   </visual>
   <default>
