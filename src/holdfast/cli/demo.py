@@ -51,8 +51,9 @@ def demo(
     trained.model.save(model, force=force)
     accuracy = trained.cross_validation.pooled.accuracy
     say(f"3/4  on recordings that it has not seen: {accuracy:.1f} % of samples right")
-    say(f"4/4  replaying {names[-1]} sample by sample" + (f" at speed {speed:g}" if speed else ""))
-    shown = recordings[recordings.names.index(names[-1])]
+    name = [name for name in names if name in recordings.names][-1]  # one may have failed
+    say(f"4/4  replaying {name} sample by sample" + (f" at speed {speed:g}" if speed else ""))
+    shown = recordings[recordings.names.index(name)]
     n_updates = replay(trained.model, shown, speed)
     if as_json:
         print_json(
@@ -65,7 +66,7 @@ def demo(
             }
         )
         return
-    _farewell(out, folder, model, names[-1], time.monotonic() - start)
+    _farewell(out, folder, model, name, time.monotonic() - start)
 
 
 def _simulate(folder: Path, seed: int, force: bool) -> list[str]:

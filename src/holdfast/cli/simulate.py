@@ -101,6 +101,8 @@ def make(grasp: "Grasp", out: Path, force: bool) -> list[str]:
         names.append(recording.name)
         if recording.metadata["case"] != "failed":
             break
+    if force:
+        _clear(grasp, out, names)
     return names
 
 
@@ -146,6 +148,14 @@ def _done(grasp: "Grasp", out: Path) -> bool:
             _check_origin(grasp, existing)
             return True
     return False
+
+
+def _clear(grasp: "Grasp", out: Path, names: "Sequence[str]") -> None:
+    """Removes what is left of the grasp from before: another seed fails at other times."""
+    failed = [f"{grasp.name}-failed{attempt + 1}" for attempt in range(ATTEMPTS)]
+    for name in (grasp.name, *failed):
+        if name not in names:
+            (out / f"{name}.parquet").unlink(missing_ok=True)
 
 
 def _failed_before(grasp: "Grasp", out: Path) -> bool:

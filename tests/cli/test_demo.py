@@ -1,0 +1,75 @@
+import json
+
+import msgspec
+import pytest
+
+from holdfast.cli import demo as verb
+from holdfast.cli import main
+from holdfast.cli import simulate as simulate_verb
+from holdfast.io import load_dataset
+from holdfast.model import Model
+from holdfast.twin import simulation
+from holdfast.twin.profile import profile
+
+SHORT = msgspec.structs.replace(profile("reference"), idle=(0.7, 0.8), hold=6.0)
+
+
+
+@pytest.fixture(autouse=True)
+def small(monkeypatch):
+    """A flask, once in each case, in this process."""
+    whole = simulate_verb.make_all
+    monkeypatch.setattr(verb, "OBJECTS", "flask")
+    monkeypatch.setattr(verb, "REPEATS", 1)
+    monkeypatch.setattr(simulation, "profile", lambda name: SHORT)
+    monkeypatch.setattr(
+        simulate_verb, "make_all", lambda *given, **named: whole(*given, **{**named, "jobs": 1})
+    )
+
+
+def run(capsys, *words):
+    code = main(["demo", *map(str, words)])
+    out, err = capsys.readouterr()
+    return code, out, err
+
+
+def test_does_the_main_job(capsys, tmp_path):
+    code, out, err = run(capsys, tmp_path / "demo", "--speed", 0, "--json")
+    assert code == 0
+    told = json.loads(out)
+    recordings = load_dataset(told["recordings"])
+    assert list(recordings.names) == ["flask-case1-1", "flask-case2-1"]
+    assert tuple(Model.load(told["model"]).fingers) == ("thumb", "index", "middle", "ring")
+    assert told["updates"] == recordings[1].modules["thumb"].n_samples
+    assert 50 < told["accuracy"] <= 100
+    assert told["seconds"] > 0
+    for step in ("1/4", "2/4", "3/4", "4/4  replaying flask-case2-1"):
+        assert step in err
+    assert "hand" in err
+    assert "STABLE" in err
+
+
+def test_ends_by_telling_what_was_made_and_refuses_to_do_it_twice(capsys, tmp_path):
+    folder = tmp_path / "demo"
+    code, out, _ = run(capsys, folder, "--speed", 0)
+    assert code == 0
+    for line in (f"{folder}/recordings", "model.json", "what to try next", "holdfast detect"):
+        assert line in out
+    code, out, err = run(capsys, folder, "--speed", 0)
+    assert (code, out, err.count("\n")) == (2, "", 1)
+    assert "model.json exists already" in err
+    assert run(capsys, folder, "--speed", 0, "--seed", 1, "--force")[0] == 0
+    assert {r.metadata["seed"] for r in load_dataset(folder / "recordings")} == {1}
+
+
+@pytest.mark.parametrize("speed", ["-1", "nan"])
+def test_a_speed_that_is_none(capsys, tmp_path, speed):
+    code, out, err = run(capsys, tmp_path / "demo", f"--speed={speed}")
+    assert (code, out, err.count("\n")) == (2, "", 1)
+    assert "a speed of at least 0 expected" in err
+    assert not (tmp_path / "demo").exists()
+
+
+def test_a_negative_seed(capsys, tmp_path):
+    code, out, err = run(capsys, tmp_path / "demo", "--seed", "-1")
+    assert (code, out, err.count("\n")) == (2, "", 1)

@@ -1,0 +1,224 @@
+import errno
+import json
+import os
+import signal
+import subprocess
+import sys
+import time
+
+import msgspec
+import pytest
+
+from holdfast import files
+from holdfast.cli import main
+from holdfast.cli import simulate as verb
+from holdfast.io import load_dataset, load_recording
+from holdfast.twin import simulation
+from holdfast.twin.profile import profile
+
+SHORT = msgspec.structs.replace(profile("reference"), idle=(0.2, 0.3), hold=1.0)
+WEAK = msgspec.structs.replace(SHORT, grip=0.2)
+ONE = ("--objects", "flask", "--cases", "1", "--repeats", "1", "--jobs", "1")
+
+
+@pytest.fixture(autouse=True)
+def short(monkeypatch):
+    monkeypatch.setattr(simulation, "profile", lambda name: SHORT)
+
+
+@pytest.fixture
+def out(tmp_path):
+    return tmp_path / "twin"
+
+
+def run(capsys, *words):
+    code = main(["simulate", *map(str, words)])
+    printed, told = capsys.readouterr()
+    return code, printed, told
+
+
+def refusal(capsys, *words):
+    code, printed, told = run(capsys, *words)
+    assert (code, printed, told.count("\n")) == (2, "", 1)
+    return told.removeprefix("holdfast: ").rstrip("\n")
+
+
+def names(folder):
+    return sorted(path.name for path in folder.iterdir())
+
+
+def test_json_tells_what_was_made(capsys, out):
+    code, printed, _ = run(
+        capsys, out, "--objects", "flask,ball", "--repeats", 1, "--seed", 3, "--jobs", 1, "--json"
+    )
+    assert code == 0
+    told = json.loads(printed)
+    made = [f"{thing}-case{case}-1" for thing in ("flask", "ball") for case in (1, 2)]
+    assert told == {"out": str(out), "recordings": made, "failed": [], "profile": "reference"}
+    assert names(out) == sorted(f"{name}.parquet" for name in made)
+    for recording in load_dataset(out):
+        assert recording.metadata["seed"] == 3
+        assert recording.truth is not None
+
+
+def test_text_tells_how_many(capsys, out):
+    code, printed, _ = run(capsys, out, *ONE)
+    assert (code, printed) == (0, f"1 recordings in {out}, 0 of them of grasps that failed\n")
+
+
+def test_what_is_finished_is_not_made_again(capsys, out):
+    run(capsys, out, *ONE)
+    (path,) = out.iterdir()
+    before = (path.stat().st_mtime_ns, path.stat().st_ino)
+    code, printed, told = run(capsys, out, *ONE[:-4], "--repeats", 2, "--jobs", 1, "--json")
+    assert code == 0
+    assert json.loads(printed)["recordings"] == ["flask-case1-2"]
+    assert "1 of 2 recordings are there already" in told
+    assert (path.stat().st_mtime_ns, path.stat().st_ino) == before
+    assert json.loads(run(capsys, out, *ONE, "--json")[1])["recordings"] == []
+
+
+def test_how_many_at_a_time_changes_nothing(capsys, out, tmp_path, monkeypatch):
+    monkeypatch.undo()  # other processes know of no patch
+    other = tmp_path / "other"
+    words = ("--objects", "flask", "--cases", 1, "--repeats", 2)
+    assert run(capsys, out, *words, "--jobs", 1)[0] == 0
+    assert run(capsys, other, *words, "--jobs", 2)[0] == 0
+    assert names(out) == names(other)
+    for name in names(out):
+        assert (out / name).read_bytes() == (other / name).read_bytes()
+
+
+@pytest.mark.parametrize(
+    ("words", "told"),
+    [
+        (("--seed", "1"), "seed 0"),
+        (("--profile", "gentle"), "profile reference"),
+        (("--server",), "server False"),
+    ],
+)
+def test_one_folder_holds_what_was_made_alike(capsys, out, words, told):
+    run(capsys, out, *ONE)
+    line = refusal(capsys, out, *ONE, *words)
+    assert f"{out}/flask-case1-1.parquet was made with" in line
+    assert told in line
+    assert "--force" in line
+
+
+def test_force_makes_all_anew(capsys, out):
+    run(capsys, out, *ONE)
+    code, printed, _ = run(capsys, out, *ONE, "--seed", 1, "--force", "--json")
+    assert (code, json.loads(printed)["recordings"]) == (0, ["flask-case1-1"])
+    assert load_recording(out / "flask-case1-1.parquet").metadata["seed"] == 1
+
+
+class TestFailures:
+    @pytest.fixture
+    def weak(self, monkeypatch):
+        """Hands too weak to hold; the list of grasps that were tried."""
+        tried = []
+
+        def simulate(grasp, *_):
+            tried.append(grasp.attempt)
+            return whole(grasp)
+
+        whole = simulation.simulate
+        monkeypatch.setattr(simulation, "profile", lambda name: WEAK)
+        monkeypatch.setattr(simulation, "simulate", simulate)
+        return tried
+
+    FAILED = [f"flask-case1-1-failed{k}.parquet" for k in (1, 2, 3, 4)]
+
+    def test_are_kept_and_tried_again_but_not_for_ever(self, capsys, out, weak):
+        code, printed, _ = run(capsys, out, *ONE, "--json")
+        assert code == 0
+        assert weak == list(range(verb.ATTEMPTS))
+        assert names(out) == self.FAILED
+        assert json.loads(printed)["failed"] == [name.removesuffix(".parquet") for name in names(out)]
+        assert {r.metadata["case"] for r in load_dataset(out)} == {"failed"}
+
+    def test_are_not_made_again(self, capsys, out, weak):
+        run(capsys, out, *ONE)
+        (out / self.FAILED[2]).unlink()
+        (out / self.FAILED[3]).unlink()
+        weak.clear()
+        run(capsys, out, *ONE)
+        assert weak == [2, 3]
+        assert names(out) == self.FAILED
+        weak.clear()
+        run(capsys, out, *ONE)
+        assert weak == []
+
+    def test_of_another_seed_are_not_mixed_in(self, capsys, out, weak, monkeypatch):
+        run(capsys, out, *ONE)
+        (out / self.FAILED[3]).unlink()
+        assert "was made with" in refusal(capsys, out, *ONE, "--seed", 1)
+
+    def test_of_before_go_when_all_is_made_anew(self, capsys, out, weak, monkeypatch):
+        run(capsys, out, *ONE)
+        monkeypatch.setattr(simulation, "profile", lambda name: SHORT)
+        code, _, told = run(capsys, out, *ONE, "--seed", 1, "--force")
+        assert (code, told) == (0, "")
+        assert names(out) == ["flask-case1-1.parquet"]
+
+
+@pytest.mark.parametrize(
+    ("words", "told"),
+    [
+        (("--objects", "cup"), "no object 'cup'; there are ball, box, can"),
+        (("--objects", "can,"), "no object ''; there are"),
+        (("--profile", "rough"), "unknown profile 'rough'; there are gentle"),
+        (("--cases", "3"), "--cases 1, 2 or 1,2 expected, '3' given"),
+        (("--cases", ""), "--cases 1, 2 or 1,2 expected, '' given"),
+        (("--repeats", "0"), "repeats of at least 1"),
+        (("--seed", "-1"), "a seed of at least 0 expected; 5 and -1 given"),
+        (("--seed", "one"), "Invalid value for '--seed'"),
+        (("--video", "film.avi"), "film.avi"),
+    ],
+)
+def test_bad_input_is_one_line_and_makes_no_folder(capsys, out, words, told):
+    assert told in refusal(capsys, out, *words)
+    assert not out.exists()
+
+
+def test_a_file_for_a_folder(capsys, tmp_path):
+    (tmp_path / "file").write_text("")
+    assert "file" in refusal(capsys, tmp_path / "file", *ONE)
+
+
+def test_a_full_disk(capsys, out, monkeypatch):
+    def full(self, target):
+        raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC), str(self))
+
+    monkeypatch.setattr(files.Path, "replace", full)
+    code, printed, told = run(capsys, out, *ONE)
+    assert (code, printed) == (2, "")
+    path = out / "flask-case1-1.parquet"
+    assert told.splitlines()[-1] == f"holdfast: cannot write {path}: No space left on device"
+    assert not names(out)
+
+
+def test_a_killed_run_goes_on(capsys, out, monkeypatch):
+    monkeypatch.undo()
+    words = ["--objects", "flask", "--cases", "1", "--repeats", "4"]
+    program = "import sys; from holdfast.cli import main; sys.exit(main(sys.argv[1:]))"
+    child = subprocess.Popen(
+        [sys.executable, "-c", program, "simulate", str(out), *words, "--jobs", "1"],
+        stderr=subprocess.DEVNULL,
+    )
+    deadline = time.monotonic() + 60
+    while not (out.is_dir() and list(out.glob("[!.]*.parquet"))):
+        assert time.monotonic() < deadline
+        assert child.poll() is None
+        time.sleep(0.02)
+    child.send_signal(signal.SIGKILL)
+    child.wait()
+    finished = {path: path.stat().st_mtime_ns for path in out.glob("[!.]*.parquet")}
+    assert 0 < len(finished) < 4
+    for path in finished:
+        assert load_recording(path).complete
+    code, printed, _ = run(capsys, out, *words, "--jobs", 1, "--json")
+    assert code == 0
+    assert len(json.loads(printed)["recordings"]) == 4 - len(finished)
+    assert all(path.stat().st_mtime_ns == told for path, told in finished.items())
+    assert len(load_dataset(out)) == 4
