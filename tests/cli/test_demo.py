@@ -14,7 +14,6 @@ from holdfast.twin.profile import profile
 SHORT = msgspec.structs.replace(profile("reference"), idle=(0.7, 0.8), hold=6.0)
 
 
-
 @pytest.fixture(autouse=True)
 def small(monkeypatch):
     """A flask, once in each case, in this process."""

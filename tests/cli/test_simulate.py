@@ -134,7 +134,9 @@ class TestFailures:
         assert code == 0
         assert weak == list(range(verb.ATTEMPTS))
         assert names(out) == self.FAILED
-        assert json.loads(printed)["failed"] == [name.removesuffix(".parquet") for name in names(out)]
+        assert json.loads(printed)["failed"] == [
+            name.removesuffix(".parquet") for name in names(out)
+        ]
         assert {r.metadata["case"] for r in load_dataset(out)} == {"failed"}
 
     def test_are_not_made_again(self, capsys, out, weak):

@@ -93,7 +93,7 @@ def make(grasp: "Grasp", out: Path, force: bool) -> list[str]:
     names = []
     for attempt in range(ATTEMPTS):
         tried = replace(grasp, attempt=attempt)
-        if _failed_before(tried, out) and not force:
+        if not force and _failed_before(tried, out):
             continue
         recording = run(tried)
         path = out / f"{recording.name}.parquet"
