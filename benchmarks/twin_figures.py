@@ -126,7 +126,7 @@ def table(header: Sequence[str], rows: Sequence[Sequence[object]]) -> None:
 
 def ranged(value: float | None, interval: Sequence[float | None] | None, digits: int = 1) -> str:
     if value is None:
-        return "none"
+        return "infinite"
     if interval is None:
         return f"{value:.{digits}f}"
     low, high = (("inf" if end is None else f"{end:.{digits}f}") for end in interval)
@@ -221,6 +221,7 @@ def detail(arguments: argparse.Namespace) -> None:
         finger_table(metrics)
         event_table(metrics)
         phase_table(recordings, judged)
+        push_table(recordings, judged)
         case_table(recordings, judged)
 
 
@@ -280,16 +281,43 @@ def phase_table(recordings: Sequence[Recording], judged: Sequence[Decisions]) ->
 
 
 def phase_counts(recording: Recording, judged: Decisions, phase: Phase) -> tuple[int, int, int]:
-    """Judged samples in that phase, wrong ones, and those labelled stable, over all fingers."""
+    return counts_where(recording, judged, recording.truth.hand["phase"] == phase)
+
+
+def counts_where(recording: Recording, judged: Decisions, where: np.ndarray) -> tuple[int, ...]:
+    """Judged samples there, wrong ones, and those labelled stable, over all fingers."""
     total = np.zeros(3, dtype=np.int64)
     for finger in judged.fingers.values():
         at = np.searchsorted(recording.truth.times, finger.times + 1e-6) - 1
-        known = (finger.labels != UNKNOWN) & (finger.states != UNKNOWN)
-        known &= recording.truth.hand["phase"][at] == phase
+        known = (finger.labels != UNKNOWN) & (finger.states != UNKNOWN) & where[at]
         stable = finger.labels == STABLE
         wrong = stable != (finger.states == STABLE)
         total += [known.sum(), (known & wrong).sum(), (known & stable).sum()]
     return tuple(total.tolist())
+
+
+def push_table(recordings: Sequence[Recording], judged: Sequence[Decisions]) -> None:
+    """Disturbances while the pushing finger touches the object, and while it does not."""
+    counts = np.zeros((2, 3), dtype=np.int64)
+    waits = []
+    for recording, decisions in zip(recordings, judged, strict=True):
+        hand = recording.truth.hand
+        during = np.isin(hand["phase"], (Phase.DISTURBED, Phase.SLIPPING))
+        pushed = np.linalg.norm(hand["outside_force"], axis=1) > LabelRule().contact
+        for row, where in enumerate((during & pushed, during & ~pushed)):
+            counts[row] += counts_where(recording, decisions, where)
+        starts = np.flatnonzero(during & ~np.append(False, during[:-1]))
+        waits += [np.argmax((pushed & during)[start:]) / 150 for start in starts]
+    table(
+        ("in a disturbance", "samples", "errors %"),
+        [
+            (name, f"{n:,}", f"{100 * wrong / n:.1f}")
+            for name, (n, wrong, _) in zip(
+                ("the pushing finger touches", "it does not"), counts.tolist(), strict=True
+            )
+        ],
+    )
+    print(f"{len(waits)} disturbances; first touch after {np.median(waits):.2f} s in the median\n")
 
 
 def case_table(recordings: Sequence[Recording], judged: Sequence[Decisions]) -> None:
@@ -516,7 +544,7 @@ def slip_table() -> None:
 # Pictures
 
 TILE = (480, 400)
-CAMERA = ((0.072, -0.012, 0.010), 0.47, 165.0, -38.0)
+CAMERA = ((0.074, 0.0, 0.010), 0.52, 165.0, -38.0)
 """Thumb and fingers are both seen."""
 FIELD = 25.0
 """Of view [degrees]: a long lens keeps upright what is upright."""
