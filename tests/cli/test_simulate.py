@@ -127,13 +127,13 @@ class TestFailures:
         monkeypatch.setattr(simulation, "simulate", simulate)
         return tried
 
-    FAILED = [f"flask-case1-1-failed{k}.parquet" for k in (1, 2, 3, 4)]
+    FAILED = tuple(f"flask-case1-1-failed{k}.parquet" for k in (1, 2, 3, 4))
 
     def test_are_kept_and_tried_again_but_not_for_ever(self, capsys, out, weak):
         code, printed, _ = run(capsys, out, *ONE, "--json")
         assert code == 0
         assert weak == list(range(verb.ATTEMPTS))
-        assert names(out) == self.FAILED
+        assert names(out) == list(self.FAILED)
         assert json.loads(printed)["failed"] == [
             name.removesuffix(".parquet") for name in names(out)
         ]
@@ -146,7 +146,7 @@ class TestFailures:
         weak.clear()
         run(capsys, out, *ONE)
         assert weak == [2, 3]
-        assert names(out) == self.FAILED
+        assert names(out) == list(self.FAILED)
         weak.clear()
         run(capsys, out, *ONE)
         assert weak == []

@@ -1,3 +1,5 @@
+from itertools import pairwise
+
 import numpy as np
 import pytest
 from hypothesis import given, settings
@@ -174,12 +176,10 @@ def test_laws(data):
     times = data.times
     assert (label_states(labels, times) > 0).all()  # every sample has one
     assert labels[0].start == times[0]
-    assert all(a.end == b.start for a, b in zip(labels, labels[1:], strict=False))
+    assert all(a.end == b.start for a, b in pairwise(labels))
     whole = times[-1] - times[0] + 1 / RATE
     assert sum(label.end - label.start for label in labels) == pytest.approx(whole)
-    assert all(
-        (a.state, a.cause) != (b.state, b.cause) for a, b in zip(labels, labels[1:], strict=False)
-    )
+    assert all((a.state, a.cause) != (b.state, b.cause) for a, b in pairwise(labels))
     phase = data.hand["phase"]
     for label in labels:
         inside = (times >= label.start) & (times < label.end)

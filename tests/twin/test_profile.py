@@ -1,6 +1,5 @@
-from msgspec.structs import asdict
-
 import pytest
+from msgspec.structs import asdict
 
 from holdfast.twin.profile import Profile, profile, profiles
 
@@ -29,7 +28,7 @@ def test_profiles_disturb_in_their_order():
 
 @pytest.mark.parametrize("name", ["", "Reference", "../profile", "reference.toml"])
 def test_an_unknown_one_is_refused(name):
-    with pytest.raises(ValueError, match="unknown profile .*; there are gentle, reference"):
+    with pytest.raises(ValueError, match=r"unknown profile .*; there are gentle, reference"):
         profile(name)
 
 

@@ -176,10 +176,14 @@ class TestTruth:
         poses = held.truth.hand["object_pose"][span]
         for finger in held.truth.fingers.values():
             force = turns(poses).inv().apply(finger["contact_force"][span])
-            where = turns(poses).inv().apply(
-                turns(finger["tip_pose"][span]).apply([0.0, 0.0, 0.016])
-                + finger["tip_pose"][span, :3]
-                - poses[:, :3]
+            where = (
+                turns(poses)
+                .inv()
+                .apply(
+                    turns(finger["tip_pose"][span]).apply([0.0, 0.0, 0.016])
+                    + finger["tip_pose"][span, :3]
+                    - poses[:, :3]
+                )
             )
             inward = -where[:, :2] / np.linalg.norm(where[:, :2], axis=1)[:, None]
             pressed = (force[:, :2] * inward).sum(axis=1)
@@ -225,9 +229,13 @@ class TestRecording:
         lost = dropped.metadata["lost_at"]
         assert lost > dropped.metadata["locked_at"]
         after = dropped.truth.times >= lost + 0.3
-        assert not np.isin(dropped.truth.hand["phase"][after], [Phase.LOCKED, Phase.DISTURBED]).any()
+        assert not np.isin(
+            dropped.truth.hand["phase"][after], [Phase.LOCKED, Phase.DISTURBED]
+        ).any()
         for module in dropped.modules.values():
-            assert all(not (x.state == ContactState.STABLE and x.end > lost + 0.1) for x in module.labels)
+            assert all(
+                not (x.state == ContactState.STABLE and x.end > lost + 0.1) for x in module.labels
+            )
             assert Cause.LOST in {x.cause for x in module.labels}
         assert dropped.truth.hand["object_pose"][-1, 2] < -0.2  # it fell, and out of the picture
 
@@ -279,9 +287,10 @@ class TestSeeds:
     def test_another_gives_others(self, held, change):
         other = made(replace(Grasp("can", 1, 1), **change))
         assert other.digest != held.digest
-        same = other.truth.hand["joints"].shape == held.truth.hand["joints"].shape and (
-            other.truth.hand["joints"] == held.truth.hand["joints"]
-        ).all()
+        same = (
+            other.truth.hand["joints"].shape == held.truth.hand["joints"].shape
+            and (other.truth.hand["joints"] == held.truth.hand["joints"]).all()
+        )
         assert same == ("server" in change)  # a server sends the same grasp otherwise
         thumb = other.modules["thumb"]
         assert (thumb.n_repeats > 0) == ("server" in change)
