@@ -224,3 +224,24 @@ def test_a_killed_run_goes_on(capsys, out, monkeypatch):
     assert len(json.loads(printed)["recordings"]) == 4 - len(finished)
     assert all(path.stat().st_mtime_ns == told for path, told in finished.items())
     assert len(load_dataset(out)) == 4
+
+
+MUG = """mug = {shape = "cylinder", size = [0.036, 0.05, 0.003], mass = 0.2, friction = [0.7, 0.55],
+ texture = [10e-6, 1.5e-3], finger_height = 0.024, yaw = 0.0}""".replace("\n", "")
+
+
+def test_an_object_of_ones_own(tmp_path):
+    from holdfast.cli.simulate import grasps
+
+    table = tmp_path / "mine.toml"
+    table.write_text(MUG)
+    (grasp,) = grasps("", "1", 1, "reference", 0, table=table)
+    assert (grasp.name, grasp.thing.mass) == ("mug-case1-1", 0.2)
+
+
+def test_a_table_that_lacks_the_object(tmp_path, capsys):
+    table = tmp_path / "mine.toml"
+    table.write_text(MUG)
+    words = ["simulate", str(tmp_path / "out"), "--table", str(table), "--objects", "can"]
+    assert main(words) == 2
+    assert capsys.readouterr().err == "holdfast: no object 'can'; there are mug\n"

@@ -19,8 +19,11 @@ ATTEMPTS = 4
 def simulate(
     out: Annotated[Path, typer.Argument(help="A folder; it is made if missing.")],
     objects: Annotated[
-        str, typer.Option(help="Names, separated by commas; by default all six.")
+        str, typer.Option(help="Names, separated by commas; by default all of the table.")
     ] = "",
+    table: Annotated[
+        Path | None, typer.Option(help="Objects of your own: a .toml file like the twin's.")
+    ] = None,
     cases: Annotated[str, typer.Option(help="1: hold; 2: hold and disturb; or 1,2.")] = "1,2",
     repeats: Annotated[int, typer.Option(help="Of every object and case.")] = 5,
     profile: Annotated[str, typer.Option(help="gentle, reference or vigorous.")] = "reference",
@@ -56,7 +59,7 @@ def simulate(
 
         check_film(video)
         refuse_overwrite(video, force=force)
-    wanted = grasps(objects, cases, repeats, profile, seed, server=server)
+    wanted = grasps(objects, cases, repeats, profile, seed, server=server, table=table)
     out.mkdir(parents=True, exist_ok=True)
     made = make_all(wanted, out, jobs=jobs, force=force)
     if video is not None:
@@ -107,20 +110,25 @@ def make(grasp: "Grasp", out: Path, force: bool) -> list[str]:
 
 
 def grasps(
-    objects: str, cases: str, repeats: int, profile: str, seed: int, *, server: bool = False
+    objects: str,
+    cases: str,
+    repeats: int,
+    profile: str,
+    seed: int,
+    *,
+    server: bool = False,
+    table: Path | None = None,
 ) -> "list[Grasp]":
     """The grasps that a user asks for.
 
     Raises:
         ValueError: an unknown object, case or profile, or a number out of range.
     """
-    from holdfast.twin.objects import load_things, thing
+    from holdfast.twin.objects import load_things
     from holdfast.twin.profile import profile as known_profile
     from holdfast.twin.simulation import CASES, Grasp
 
-    names = [name.strip() for name in objects.split(",")] if objects else list(load_things())
-    for name in names:
-        thing(name)
+    names = [name.strip() for name in objects.split(",")] if objects else list(load_things(table))
     known_profile(profile)
     if not {case.strip() for case in cases.split(",")} <= {str(case) for case in CASES}:
         raise ValueError(f"--cases 1, 2 or 1,2 expected, {cases!r} given")
@@ -129,10 +137,14 @@ def grasps(
             f"repeats of at least 1 and a seed of at least 0 expected; {repeats} and {seed} given"
         )
     chosen = sorted({int(case) for case in cases.split(",")})
-    return [
-        Grasp(name, case, repeat, profile, seed, server=server)
+    source = None if table is None else str(table)
+    wanted = [
+        Grasp(name, case, repeat, profile, seed, server=server, table=source)
         for name, case, repeat in product(names, chosen, range(1, repeats + 1))
     ]
+    for grasp in wanted:
+        grasp.thing  # noqa: B018 (refuses an unknown object before any work is done)
+    return wanted
 
 
 def _done(grasp: "Grasp", out: Path) -> bool:

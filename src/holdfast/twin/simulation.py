@@ -16,7 +16,7 @@ from holdfast.twin.control import EVERY, draw_controller
 from holdfast.twin.grasp import ClosingPath, closing_path
 from holdfast.twin.hand import FINGERS, N_JOINTS, RATE, TIMESTEP, HandModel
 from holdfast.twin.labels import labels_from_truth
-from holdfast.twin.objects import thing as built_in_thing
+from holdfast.twin.objects import Thing, load_things
 from holdfast.twin.operator import draw_pushes, draw_tremor
 from holdfast.twin.profile import Profile, profile
 from holdfast.twin.protocol import Command, Plan, Protocol
@@ -51,6 +51,7 @@ class Grasp:
         seed: of the whole protocol.
         attempt: from 0 on; after a failed grasp the same is tried again.
         server: whether stamps are unsteady and packets repeat, as servers send them.
+        table: of objects of one's own, as `objects.toml`; None for the built-in ones.
     """
 
     object: str
@@ -60,6 +61,16 @@ class Grasp:
     seed: int = 0
     attempt: int = 0
     server: bool = False
+    table: str | None = None
+
+    @property
+    def thing(self) -> Thing:
+        """The object.
+
+        Raises:
+            ValueError: the table has none of that name.
+        """
+        return _thing(self.object, self.table)
 
     @property
     def name(self) -> str:
@@ -146,12 +157,14 @@ def _draw_plan(grasp: Grasp, chosen: Profile) -> Plan:
 
 
 def _world(grasp: Grasp) -> World:
-    item = built_in_thing(grasp.object)
+    item = grasp.thing
     generator = grasp.generator("world")
     controller = draw_controller(generator, LONGEST, EVERY * TIMESTEP)
     tremors = np.stack([draw_tremor(generator), draw_tremor(generator)])
     start = generator.standard_normal(4) * [*[PLACE_SPREAD] * 3, TURN_SPREAD]
-    return World(HandModel.build(item), item, _path(grasp.object), controller, tremors, start)
+    return World(
+        HandModel.build(item), item, _path(grasp.object, grasp.table), controller, tremors, start
+    )
 
 
 @cache
@@ -162,8 +175,16 @@ def _skin(seed: int, finger: str, parameters: UskinParameters) -> Uskin:
 
 
 @cache
-def _path(name: str) -> ClosingPath:
-    return closing_path(built_in_thing(name))
+def _thing(name: str, table: str | None) -> Thing:
+    things = load_things(table)
+    if name not in things:
+        raise ValueError(f"no object {name!r}; there are {', '.join(things)}")
+    return things[name]
+
+
+@cache
+def _path(name: str, table: str | None) -> ClosingPath:
+    return closing_path(_thing(name, table))
 
 
 class _Log:
@@ -212,7 +233,7 @@ def _poses(bodies: Array) -> Array:
 
 
 def _metadata(grasp: Grasp, protocol: Protocol) -> dict[str, object]:
-    item = built_in_thing(grasp.object)
+    item = grasp.thing
     return {
         "object": grasp.object,
         "object_mass": item.mass,
