@@ -4,12 +4,12 @@ import mujoco
 import numpy as np
 import pytest
 
+from holdfast.twin.contact import N_BODY
 from holdfast.twin.hand import (
     FINGERS,
     JOINTS,
     MIRRORED,
     MOUNTS,
-    N_BODY,
     N_JOINTS,
     TIMESTEP,
     TIP_MASS,

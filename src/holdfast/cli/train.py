@@ -1,15 +1,11 @@
 """`holdfast train`: a model out of labelled recordings, with figures out of fold."""
 
-from collections.abc import Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import Annotated
 
 import typer
 
 from holdfast.cli.console import print_json, progress, say, show
-
-if TYPE_CHECKING:
-    from holdfast.recordings import Recording
 
 
 def train(
@@ -59,6 +55,7 @@ def train(
     """
     from holdfast.features import Tare, parse_features
     from holdfast.files import refuse_overwrite
+    from holdfast.io import load_dataset
     from holdfast.training import Setting
     from holdfast.training import train as fit
 
@@ -75,7 +72,7 @@ def train(
         max_samples=max_samples,
     )
     refuse_overwrite(model, force=force)
-    recordings = _dataset(data)
+    recordings = load_dataset(data)
     journal = _journal(model, resume=resume, force=force)
     try:
         trained = fit(recordings, setting, journal=journal, tell=say, follow=progress, n_jobs=jobs)
@@ -95,12 +92,6 @@ def train(
         f"\n{model}: trained on {len(recordings)} recordings, judged by leaving out "
         f"{'random samples' if split == 'random' else f'one {split} at a time'}"
     )
-
-
-def _dataset(data: Path) -> "Sequence[Recording]":
-    from holdfast.io import load_dataset
-
-    return load_dataset(data)
 
 
 def _journal(model: Path, *, resume: bool, force: bool) -> Path:

@@ -13,7 +13,6 @@ import numpy as np
 
 from holdfast.compiled import compiled
 from holdfast.sensors.values import Array
-from holdfast.twin.contact import N_BODY
 from holdfast.twin.objects import Thing
 from holdfast.twin.surface import AXIS
 
@@ -23,6 +22,8 @@ SUBSTEPS = 7
 """Steps of the physics a sample."""
 TIMESTEP = 1 / (RATE * SUBSTEPS)
 
+GRAVITY = 9.81
+"""[m/s^2]"""
 FINGERS = ("thumb", "index", "middle", "ring")
 """The order of fingertips in all arrays of the twin."""
 N_JOINTS = 16
@@ -74,7 +75,7 @@ def hand_xml(side: str = "right", thing: Thing | None = None) -> str:
     body = "" if thing is None else _object_xml(thing)
     return f"""<mujoco model="allegro {side}">
   <compiler angle="radian" eulerseq="XYZ"/>
-  <option timestep="{TIMESTEP!r}" integrator="implicitfast" gravity="0 0 -9.81"/>
+  <option timestep="{TIMESTEP!r}" integrator="implicitfast" gravity="0 0 {-GRAVITY}"/>
   <visual>
     <global offwidth="1280" offheight="960"/><quality shadowsize="2048"/>
     <headlight ambient=".42 .42 .42" diffuse=".35 .35 .35" specular=".1 .1 .1"/>
@@ -294,6 +295,3 @@ def _looks_xml(thing: Thing) -> str:
         f'pos="0 0 {middle - half + (2 * k + 1) * thick}" {colour} mass="0"/>'
         for k in range(n_slices)
     )
-
-
-__all__ = ["FINGERS", "N_BODY", "HandModel", "hand_xml"]

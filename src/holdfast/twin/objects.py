@@ -114,8 +114,8 @@ def _built_in() -> dict[str, Thing]:
     return load_things(TABLE)
 
 
-def thing(name: str) -> Thing:
-    """The object of that name from the built-in table.
+def thing(name: str, table: str | Path | None = None) -> Thing:
+    """The object of that name from a table, by default the built-in one.
 
     Raises:
         ValueError: there is none; the message lists what there is.
@@ -124,7 +124,7 @@ def thing(name: str) -> Thing:
         >>> thing("can").mass
         0.24
     """
-    things = _built_in()
+    things = load_things(table)
     if name not in things:
         raise ValueError(f"no object {name!r}; there are {', '.join(things)}")
     return things[name]

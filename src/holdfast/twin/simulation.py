@@ -16,10 +16,11 @@ from holdfast.twin.control import EVERY, draw_controller
 from holdfast.twin.grasp import ClosingPath, closing_path
 from holdfast.twin.hand import FINGERS, N_JOINTS, RATE, TIMESTEP, HandModel
 from holdfast.twin.labels import labels_from_truth
-from holdfast.twin.objects import Thing, load_things
+from holdfast.twin.objects import Thing
+from holdfast.twin.objects import thing as find_thing
 from holdfast.twin.operator import draw_pushes, draw_tremor
 from holdfast.twin.profile import Profile, profile
-from holdfast.twin.protocol import Command, Plan, Protocol
+from holdfast.twin.protocol import THUMB_SHARE, Command, Plan, Protocol
 from holdfast.twin.surface import curved_fingertip
 from holdfast.twin.uskin import Uskin, with_server_effects
 from holdfast.twin.uskin_parameters import UskinParameters
@@ -35,8 +36,6 @@ PLACE_SPREAD, TURN_SPREAD = 0.002, 0.05
 """Standard deviations of how a person places the object [m] and [rad]."""
 GRIP_SPREAD = 0.1
 """Of the logarithm of the load at which a finger stops: it differs from grasp to grasp."""
-THUMB_TO_FINGERS = 0.6 * 3
-"""The thumb stops at 60 % of what three fingers press; they press it further."""
 
 
 @dataclass(frozen=True)
@@ -85,7 +84,7 @@ class Grasp:
     def generator(self, part: str) -> np.random.Generator:
         """Random numbers of one part of it; parts do not disturb each other."""
         key = f"{self.object}/{self.case}/{self.repeat}/{self.profile}/{self.attempt}/{part}"
-        return np.random.default_rng([self.seed, zlib.crc32(key.encode())])
+        return _generator(self.seed, key)
 
 
 Watch = Callable[[World, Command], None]
@@ -145,7 +144,7 @@ def simulate(
 def _draw_plan(grasp: Grasp, chosen: Profile) -> Plan:
     generator = grasp.generator("plan")
     scale = chosen.grip * np.exp(GRIP_SPREAD * generator.standard_normal())
-    grips = scale * np.array([THUMB_TO_FINGERS, 1.0, 1.0, 1.0])
+    grips = scale * np.array([THUMB_SHARE * 3, 1.0, 1.0, 1.0])
     return Plan(
         profile=chosen,
         grips=grips,
@@ -170,16 +169,18 @@ def _world(grasp: Grasp) -> World:
 @cache
 def _skin(seed: int, finger: str, parameters: UskinParameters) -> Uskin:
     """The skin of a finger: a seed is a hand, and has the same gains in all its grasps."""
-    generator = np.random.default_rng([seed, zlib.crc32(f"skin/{finger}".encode())])
-    return Uskin(parameters, sensor("uskin-curved"), curved_fingertip().nodes, generator)
+    nodes = curved_fingertip().nodes
+    return Uskin(parameters, sensor("uskin-curved"), nodes, _generator(seed, f"skin/{finger}"))
+
+
+def _generator(seed: int, key: str) -> np.random.Generator:
+    """Random numbers of their own for every key, whatever else is drawn."""
+    return np.random.default_rng([seed, zlib.crc32(key.encode())])
 
 
 @cache
 def _thing(name: str, table: str | None) -> Thing:
-    things = load_things(table)
-    if name not in things:
-        raise ValueError(f"no object {name!r}; there are {', '.join(things)}")
-    return things[name]
+    return find_thing(name, table)
 
 
 @cache

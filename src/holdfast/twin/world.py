@@ -8,13 +8,12 @@ from holdfast.sensors.values import Array
 from holdfast.twin.contact import LOAD, SLIP, constants_of, new_contact, touch
 from holdfast.twin.control import EVERY, Controller, control
 from holdfast.twin.grasp import ClosingPath, object_pose
-from holdfast.twin.hand import FINGERS, N_JOINTS, SUBSTEPS, TIMESTEP, HandModel
+from holdfast.twin.hand import FINGERS, GRAVITY, N_JOINTS, SUBSTEPS, TIMESTEP, HandModel
 from holdfast.twin.objects import Thing
 from holdfast.twin.operator import hold_wrench, push_wrench
 from holdfast.twin.protocol import OPEN, Command, Plan
 from holdfast.twin.surface import curved_fingertip
 
-GRAVITY = 9.81
 GONE = -0.3
 """Height under which a lost object is out of the picture and stays where it is [m]."""
 
