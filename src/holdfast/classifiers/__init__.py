@@ -1,16 +1,31 @@
 """Ways of fitting a classifier, by name; one file each."""
 
-from holdfast.classifiers.fitting import Parameters, Recipe, Samples
+from holdfast.classifiers.fitting import (
+    Classifier,
+    LinearRecipe,
+    Parameters,
+    Recipe,
+    Samples,
+)
 from holdfast.classifiers.linear import LinearClassifier
 from holdfast.classifiers.logreg import LogisticRegression
 from holdfast.classifiers.svm import LinearSVM
 
-RECIPES: dict[str, Recipe] = {"logreg": LogisticRegression(), "svm": LinearSVM()}
+RECIPES: dict[str, LinearRecipe] = {"logreg": LogisticRegression(), "svm": LinearSVM()}
 
-__all__ = ["RECIPES", "LinearClassifier", "Parameters", "Recipe", "Samples", "recipe"]
+__all__ = [
+    "RECIPES",
+    "Classifier",
+    "LinearClassifier",
+    "LinearRecipe",
+    "Parameters",
+    "Recipe",
+    "Samples",
+    "recipe",
+]
 
 
-def recipe(name: str) -> Recipe:
+def recipe(name: str) -> LinearRecipe:
     """The way of fitting of that name.
 
     Raises:

@@ -38,6 +38,24 @@ class Samples(NamedTuple):
         return not self.stable.any() or bool(self.stable.all())
 
 
+class Classifier(Protocol):
+    """What every way of fitting gives."""
+
+    @property
+    def n_features(self) -> int:
+        """How many features it looks at."""
+        ...
+
+    @property
+    def threshold(self) -> float:
+        """The probability from which on a contact is called stable."""
+        ...
+
+    def probability(self, features: npt.ArrayLike) -> npt.NDArray[np.float64]:
+        """The probability of stability of each row of (n, n_features); NaN for rows with NaN."""
+        ...
+
+
 class Recipe(Protocol):
     """A way of fitting a classifier."""
 
@@ -54,6 +72,14 @@ class Recipe(Protocol):
     def suggest(self, trial: "Trial") -> Parameters:
         """Parameters to try, drawn from an Optuna trial."""
         ...
+
+    def fit(self, samples: Samples, parameters: Parameters, seed: int) -> Classifier:
+        """The classifier fitted to the samples, with a calibrated probability."""
+        ...
+
+
+class LinearRecipe(Recipe, Protocol):
+    """A way of fitting a classifier that a model file can hold."""
 
     def fit(self, samples: Samples, parameters: Parameters, seed: int) -> LinearClassifier:
         """The classifier fitted to the samples, with a calibrated probability."""

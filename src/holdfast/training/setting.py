@@ -4,7 +4,7 @@ import math
 from dataclasses import dataclass, field
 from typing import Literal
 
-from holdfast.classifiers import Recipe, recipe
+from holdfast.classifiers import LinearRecipe, recipe
 from holdfast.features import DEPLOYED, FeatureSpec, Tare, parse_features
 from holdfast.features.haar import check_window
 
@@ -69,6 +69,6 @@ class Setting:
             raise ValueError(f"a contact threshold of at least 0 expected, {threshold} given")
 
     @property
-    def recipe(self) -> Recipe:
+    def recipe(self) -> LinearRecipe:
         """The way of fitting."""
         return recipe(self.classifier)

@@ -1,0 +1,133 @@
+"""What every method starts from: tared readings and forces of a hand, on its way to features."""
+
+from collections.abc import Callable, Iterator, Mapping
+from dataclasses import dataclass
+from functools import cached_property
+from itertools import pairwise
+
+import numpy as np
+
+from holdfast.features import Tare
+from holdfast.features.force import baseline_of, fingertip_force
+from holdfast.features.kernel import GAP_LIMIT
+from holdfast.recordings import Recording, Tactile
+from holdfast.sensors import Sensor
+from holdfast.sensors.values import Array
+
+
+@dataclass(frozen=True, eq=False)
+class FingerSignal:
+    """One finger over one recording.
+
+    Attributes:
+        sensor: of the finger.
+        times: (n,) [s].
+        readings: (n, n_taxels, 3) in taxel frames, less the tare [unit of the readings].
+        force: (n, 3) F_tip [unit of the readings]; NaN until the tare is complete and where a
+            reading is not finite.
+        rate: samples per second [Hz].
+    """
+
+    sensor: Sensor
+    times: Array
+    readings: Array
+    force: Array
+    rate: float
+
+    @property
+    def amplitude(self) -> Array:
+        """(n,) F_a."""
+        return np.asarray(np.linalg.norm(self.force, axis=1))
+
+    @property
+    def normal(self) -> Array:
+        """(n,) size of the force along the normal of the fingertip, |F_n|."""
+        return np.asarray(np.abs(self.force @ self.sensor.normal))
+
+    @property
+    def tangential(self) -> Array:
+        """(n,) size of the rest of the force, |F_t|."""
+        normal = self.sensor.normal
+        rest = self.force - np.outer(self.force @ normal, normal)
+        return np.asarray(np.linalg.norm(rest, axis=1))
+
+    @cached_property
+    def stretches(self) -> tuple[slice, ...]:
+        """The unbroken stretches: no gap longer than 3 sample periods, every force known."""
+        known = np.isfinite(self.force.sum(axis=1))
+        broken = np.diff(self.times) > GAP_LIMIT / self.rate
+        edges = np.flatnonzero(broken | (known[1:] != known[:-1])) + 1
+        bounds = [0, *edges.tolist(), len(known)]
+        return tuple(slice(a, b) for a, b in pairwise(bounds) if b > a and known[a])
+
+    def cut(self, rows: slice) -> "FingerSignal":
+        """The signal of some samples."""
+        return FingerSignal(
+            self.sensor, self.times[rows], self.readings[rows], self.force[rows], self.rate
+        )
+
+
+@dataclass(frozen=True, eq=False)
+class HandSignal:
+    """All fingers of one recording that a method looks at.
+
+    Attributes:
+        recording: that they come from.
+        tare: how the baseline was found.
+        fingers: by name.
+    """
+
+    recording: Recording
+    tare: Tare
+    fingers: Mapping[str, FingerSignal]
+
+    @property
+    def rate(self) -> float:
+        """Samples per second [Hz]."""
+        return self.recording.rate
+
+    def each_stretch(self, name: str) -> Iterator[tuple[slice, FingerSignal]]:
+        """The unbroken stretches of a finger: which samples, and their signal."""
+        finger = self.fingers[name]
+        for rows in finger.stretches:
+            yield rows, finger.cut(rows)
+
+
+def signal_of(
+    recording: Recording, tare: Tare, fingers: tuple[str, ...] | None = None
+) -> HandSignal:
+    """The signal of a recording's labelled fingers, or of those named.
+
+    Args:
+        recording: of any sensors.
+        tare: how the baseline is found.
+        fingers: by default those that have labels.
+    """
+    names = fingers or tuple(name for name, module in recording.modules.items() if module.labels)
+    signals = {name: _finger(recording.modules[name], tare, recording.rate) for name in names}
+    return HandSignal(recording, tare, signals)
+
+
+def stretchwise(hand: HandSignal, function: Callable[[FingerSignal], Array]) -> dict[str, Array]:
+    """The features of every finger by a function of one unbroken stretch; NaN elsewhere.
+
+    Args:
+        hand: whose fingers.
+        function: from a signal of n samples to (n, n_features).
+    """
+    found = {}
+    for name, finger in hand.fingers.items():
+        pieces = [(rows, function(piece)) for rows, piece in hand.each_stretch(name)]
+        width = pieces[0][1].shape[1] if pieces else 1
+        features = np.full((len(finger.times), width), np.nan)
+        for rows, values in pieces:
+            features[rows] = values
+        found[name] = features
+    return found
+
+
+def _finger(module: Tactile, tare: Tare, rate: float) -> FingerSignal:
+    readings = np.ascontiguousarray(module.readings, dtype=np.float64)
+    baseline, _ = baseline_of(readings, module.times, tare, 1 / rate)
+    force = fingertip_force(readings, module.sensor, tare, module.times)
+    return FingerSignal(module.sensor, module.times, readings - baseline, force, rate)
