@@ -13,6 +13,7 @@ from holdfast.twin.protocol import (
     OPEN,
     OPENING_SPEED,
     PATIENCE,
+    PERSISTENCE,
     SETTLE,
     Plan,
     Protocol,
@@ -84,9 +85,34 @@ def test_each_finger_stops_at_its_grip_and_all_settle_before_the_lock():
     locked = table.times.index(table.protocol.locked_at)
     np.testing.assert_allclose(depths[locked], expected, atol=2 * SPEED * PERIOD)
     still = (np.abs(np.diff(depths, axis=0)) == 0).all(axis=1)
-    settled = round(SETTLE / PERIOD)
+    settled = int((SETTLE + PERSISTENCE) / PERIOD)
     assert still[locked - settled : locked].all()
     assert not still[locked - settled - 3 : locked - settled].all()
+
+
+@pytest.mark.parametrize("seconds", [PERIOD, 0.9 * PERSISTENCE])
+def test_a_spike_of_load_stops_no_finger(seconds):
+    def loads(time, depths):
+        spike = 5.0 if 1.0 <= time < 1.0 + seconds else 0.0
+        return 4000 * (TOUCHED - depths) + spike * np.array([0.0, 1.0, 0.0, 0.0])
+
+    table = Table().run(loads)
+    locked = table.times.index(table.protocol.locked_at)
+    expected = TOUCHED - GRIPS / 4000
+    np.testing.assert_allclose(table.column("depths")[locked], expected, atol=2 * SPEED * PERIOD)
+
+
+def test_a_finger_over_its_grip_waits_and_has_stopped_once_that_lasts():
+    over = 1.0 + 2 * PERSISTENCE
+
+    def loads(time, depths):
+        return np.full(4, 5.0 if 1.0 <= time < over else 0.0)
+
+    table = Table().run(loads)
+    times, depths = np.array(table.times), table.column("depths")
+    halted = depths[(times >= 1.0) & (times < BEFORE + PATIENCE)]
+    assert (halted == halted[0]).all()
+    assert (halted > CLOSED).all()
 
 
 def test_fingers_close_and_open_at_their_speeds():

@@ -21,6 +21,8 @@ THUMB_SHARE = 0.6
 they do."""
 SETTLE = 0.3
 """So long all fingers have stopped before the object counts as locked [s]."""
+PERSISTENCE = 0.05
+"""So long a finger's load is over its grip before it has stopped: one spike is no grip [s]."""
 PATIENCE = 8.0
 """A grasp that is not locked after so long of closing has failed [s]."""
 HAND_OVER = 0.25
@@ -65,7 +67,7 @@ class Command(NamedTuple):
         hold: from 0 (the operator has let go) to 1.
         push: place of the disturbance under way in the plan; -1 for none.
         elapsed: since it began [s].
-        phase: what the experiment is doing.
+        phase: what the experiment is doing; a push counts from its planned start to its end.
     """
 
     depths: Array
@@ -95,6 +97,7 @@ class Protocol:
         self.anchor = np.zeros(12)
         self._period = period
         self._depths = np.full(4, OPEN)
+        self._over = np.zeros(4)
         self._stopped = np.zeros(4, dtype=np.bool_)
         self._all_stopped_at = np.inf
         self._released_at = np.inf
@@ -130,8 +133,10 @@ class Protocol:
         return self._close(time, loads, thing)
 
     def _close(self, time: float, loads: Array, thing: Array) -> Command:
-        self._stopped |= (loads >= self.plan.grips) | (self._depths <= CLOSED)
-        self._depths[~self._stopped] -= self.plan.speed * self._period
+        gripping = loads >= self.plan.grips  # such a finger waits, and goes on if that was a spike
+        self._over = np.where(gripping, self._over + self._period, 0.0)
+        self._stopped |= (self._over > PERSISTENCE) | (self._depths <= CLOSED)
+        self._depths[~self._stopped & ~gripping] -= self.plan.speed * self._period
         if self._stopped.all() and time < self._all_stopped_at:
             self._all_stopped_at = min(self._all_stopped_at, time)
         if self._released_at < np.inf:  # given up
