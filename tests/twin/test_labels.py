@@ -7,7 +7,7 @@ from hypothesis import strategies as st
 
 from holdfast.contact import Cause, ContactState, Phase
 from holdfast.recordings import Truth, label_states
-from holdfast.twin.labels import LabelRule, labels_from_truth
+from holdfast.twin.labels import LabelRule, labels_from_truth, phases_as_felt
 
 RATE = 150
 RULE = LabelRule()
@@ -85,6 +85,57 @@ def test_a_disturbance_is_an_interval_with_margins():
 def test_disturbances_soon_after_each_other_are_one(gap, n_intervals):
     data = truth(*disturbed((1.0, 0.5), (1.5 + gap, 0.5)))
     assert [row[2] for row in told(data)].count(U) == n_intervals
+
+
+def slipped_after_the_lock(rest):
+    """What slides so long after the hand has closed, beyond the margin."""
+    start = 2.0 + rest + RULE.margin
+    return truth(*GRASP, slip=[(start, start + 0.05, 0.01)])
+
+
+@pytest.mark.parametrize("rest", [0.0, 0.04, 0.15, 0.3])
+def test_a_short_rest_between_closing_and_the_first_trouble_is_not_stable(rest):
+    rows = told(slipped_after_the_lock(rest))
+    assert rows[1:3] == [
+        (1.5, 2.0, U, Cause.CLOSING),
+        (2.0, pytest.approx(2.25 + rest, abs=0.02), U, Cause.SLIP),
+    ]
+    assert rows[3][2] == S
+
+
+def test_a_longer_rest_between_closing_and_the_first_trouble_is_stable():
+    rows = told(slipped_after_the_lock(0.4))
+    assert [row[2] for row in rows] == [N, U, S, U, S, U, N]
+    assert rows[2][1] - rows[2][0] == pytest.approx(0.4, abs=0.01)
+
+
+def test_what_is_never_troubled_is_stable_from_the_lock_on():
+    assert told(truth(*GRASP), LabelRule(merge=100.0))[2] == (2.0, 5.0, S, None)
+
+
+@pytest.mark.parametrize(
+    ("push", "felt"),
+    [
+        ("......", "LLLLLL"),  # it never touches
+        (".xx...", "LDDLLL"),
+        (".x..x.", "LDDDDL"),  # off the object within a shake
+        ("xxxxxx", "DDDDDD"),
+    ],
+)
+def test_a_disturbance_lasts_from_its_first_touch_to_its_last(push, felt):
+    words = {"L": Phase.LOCKED, "D": Phase.DISTURBED, ".": 0.04, "x": 0.06}
+    plan = [Phase.LOCKED] * 2 + [Phase.DISTURBED] * 6 + [Phase.LOCKED]
+    forces = np.array([1.0, 0.0, *(words[mark] for mark in push), 1.0])
+    wanted = [Phase.LOCKED] * 2 + [words[mark] for mark in felt] + [Phase.LOCKED]
+    assert phases_as_felt(np.array(plan, dtype=str), forces, 0.05).tolist() == wanted
+
+
+def test_each_disturbance_is_felt_by_itself_and_keeps_its_slips():
+    plan = [Phase.DISTURBED, Phase.SLIPPING, Phase.LOCKED, Phase.SLIPPING, Phase.DISTURBED]
+    felt = phases_as_felt(np.array(plan, dtype=str), np.array([0.0, 1, 1, 1, 0]), 0.05)
+    assert felt.tolist() == [
+        Phase.LOCKED, Phase.SLIPPING, Phase.LOCKED, Phase.SLIPPING, Phase.LOCKED
+    ]  # fmt: skip
 
 
 def test_a_disturbance_in_which_the_finger_slides_is_a_slip_as_a_whole():
@@ -181,6 +232,10 @@ def test_laws(data):
     assert sum(label.end - label.start for label in labels) == pytest.approx(whole)
     assert all((a.state, a.cause) != (b.state, b.cause) for a, b in pairwise(labels))
     phase = data.hand["phase"]
+    for before, label, after in zip(labels, labels[1:], labels[2:], strict=False):
+        troubled = after.cause in (Cause.SLIP, Cause.DISTURBANCE)
+        if before.cause == Cause.CLOSING and label.state == S and troubled:
+            assert label.end - label.start >= RULE.merge - 1e-9
     for label in labels:
         inside = (times >= label.start) & (times < label.end)
         if label.state == S:

@@ -10,6 +10,7 @@ from hypothesis import strategies as st
 
 from holdfast.sensors.values import Array
 from holdfast.twin.objects import (
+    OTHER_OBJECTS,
     TABLE,
     Thing,
     distance_to,
@@ -207,6 +208,18 @@ def test_the_built_in_table() -> None:
         assert one.mu_kinetic < one.mu_static
         assert one.finger_height < one.half_height
         assert not one.inertia.flags.writeable
+
+
+def test_other_objects_are_others() -> None:
+    others = load_things(OTHER_OBJECTS)
+    assert len(others) == 6
+    assert not set(others) & set(THINGS)
+    looks = {(one.shape, one.size, one.mass) for one in THINGS.values()}
+    for one in others.values():
+        assert (one.shape, one.size, one.mass) not in looks
+        assert 0.05 <= one.mass <= 0.35
+        assert one.mu_kinetic < one.mu_static
+        assert one.finger_height < one.half_height
 
 
 def test_things_travel() -> None:

@@ -9,8 +9,9 @@ from holdfast.contact import Cause, ContactState, Phase
 from holdfast.features import fingertip_force
 from holdfast.io import load_recording, save_recording
 from holdfast.twin import control, hand, simulation, world
-from holdfast.twin.objects import load_things, thing
+from holdfast.twin.objects import OTHER_OBJECTS, load_things, thing
 from holdfast.twin.profile import profile
+from holdfast.twin.protocol import TOUCH
 from holdfast.twin.simulation import Grasp, simulate
 from holdfast.twin.uskin_parameters import UskinParameters
 
@@ -62,11 +63,14 @@ def on_object(recording, span):
 
 
 class TestHeldObject:
-    @pytest.mark.parametrize("name", load_things())
-    def test_its_weight_is_the_sum_of_the_contact_forces(self, name):
-        recording = made(Grasp(name, 1, 1))
+    @pytest.mark.parametrize(
+        ("name", "table"),
+        [(name, table) for table in (None, OTHER_OBJECTS) for name in load_things(table)],
+    )
+    def test_its_weight_is_the_sum_of_the_contact_forces(self, name, table):
+        recording = made(Grasp(name, 1, 1, table=table))
         weight = GRAVITY * recording.metadata["object_mass"]
-        assert recording.metadata["object_mass"] == thing(name).mass
+        assert recording.metadata["object_mass"] == thing(name, table).mass
         total = on_object(recording, quiet(recording)).mean(axis=0)
         np.testing.assert_allclose(total, [0, 0, weight], atol=0.02 * weight)
 
@@ -210,7 +214,19 @@ class TestTruth:
         assert force[troubled].max() > 0.5
         since = pushed.truth.times - pushed.metadata["locked_at"]
         alone = (phase == Phase.LOCKED) & (since > 0.3) & (since < 7.9)
-        assert not force[alone].any()
+        assert force[alone].max() < TOUCH
+
+    def test_a_disturbance_lasts_from_its_first_touch_to_its_last(self, pushed):
+        phase = pushed.truth.hand["phase"]
+        force = np.linalg.norm(pushed.truth.hand["outside_force"], axis=1)
+        troubled = np.isin(phase, [Phase.DISTURBED, Phase.SLIPPING]).astype(int)
+        edges = np.diff(np.concatenate([[0], troubled, [0]]))
+        starts, ends = np.flatnonzero(edges > 0), np.flatnonzero(edges < 0)
+        assert len(starts) >= 2
+        assert (force[starts] > TOUCH).all()
+        assert (force[ends - 1] > TOUCH).all()
+        assert (force[starts - 1] <= TOUCH).all()
+        assert (force[ends] <= TOUCH).all()
 
 
 class TestRecording:

@@ -24,7 +24,8 @@ class LabelRule:
     Attributes:
         contact: force on the object from which on a finger touches it [N].
         sliding: slip speed from which on a held contact slips [m/s].
-        merge: disturbances with a shorter rest between them are one [s].
+        merge: disturbances with a shorter rest between them are one; nor is a shorter rest
+            between closing and the first of them stable [s].
         margin: by which a disturbance is drawn longer at both ends [s].
         blip: contact or its loss for a shorter time is not told [s].
     """
@@ -61,6 +62,7 @@ def labels_from_truth(
     sliding = held & (arrays["slip_speed"] > rule.sliding)
     troubled = np.isin(phase, (Phase.DISTURBED, Phase.SLIPPING)) | sliding
     troubled = held & _grown(_closed(troubled, times, rule.merge), times, rule.margin)
+    troubled = held & _bridged(phase == Phase.CLOSING, troubled, times, rule.merge)
     lost = _since(held) & ~_since(phase == Phase.RELEASED) & (phase == Phase.FREE)
     slipped = _spans_with(troubled, sliding)
     states = [
@@ -77,6 +79,26 @@ def labels_from_truth(
     ]
     period = float(np.median(np.diff(times)))
     return labels_from_samples(times, states, period=period, evidence="truth", author="twin")
+
+
+def phases_as_felt(phase: npt.NDArray[np.str_], push: Array, touch: float) -> npt.NDArray[np.str_]:
+    """Phases in which every disturbance lasts from its first touch to its last.
+
+    The finger that pushes comes from afar and may leave the object well before it has done:
+    nobody can feel its plan.
+
+    Args:
+        phase: (n,) as planned.
+        push: (n,) force of the finger that pushes [N].
+        touch: force from which on it touches [N].
+    """
+    planned = np.isin(phase, (Phase.DISTURBED, Phase.SLIPPING))
+    felt = np.zeros_like(planned)
+    for start, end in _runs(planned):
+        touches = start + np.flatnonzero(push[start:end] > touch)
+        if len(touches):
+            felt[touches[0] : touches[-1] + 1] = True
+    return np.where(planned & ~felt, Phase.LOCKED.value, phase)
 
 
 def _state(
@@ -107,6 +129,16 @@ def _closed(mask: Mask, times: Array, gap: float) -> Mask:
         if times[start] - times[end - 1] < gap:
             filled[end:start] = True
     return filled
+
+
+def _bridged(before: Mask, mask: Mask, times: Array, gap: float) -> Mask:
+    """The mask, from the end of `before` on where it begins less than `gap` later."""
+    bridged = mask.copy()
+    for _, end in _runs(before):
+        start = end + int(np.argmax(mask[end:])) if mask[end:].any() else end
+        if start > end and times[start] - times[end] < gap:
+            bridged[end:start] = True
+    return bridged
 
 
 def _steady(mask: Mask, times: Array, blip: float) -> Mask:

@@ -31,6 +31,9 @@ from holdfast.twin.shapes import (
 )
 
 TABLE = Path(__file__).with_name("objects.toml")
+"""The objects that are built in: what models are trained on."""
+OTHER_OBJECTS = Path(__file__).with_name("other_objects.toml")
+"""Other objects, for tests with what a model has never seen."""
 
 SHAPES = {
     "sphere": ("radius",),

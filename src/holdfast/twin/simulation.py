@@ -4,6 +4,7 @@ import zlib
 from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cache
+from pathlib import Path
 
 import numpy as np
 
@@ -15,12 +16,12 @@ from holdfast.twin.contact import SHARE, SLIP
 from holdfast.twin.control import EVERY, draw_controller
 from holdfast.twin.grasp import ClosingPath, closing_path
 from holdfast.twin.hand import FINGERS, N_JOINTS, RATE, TIMESTEP, HandModel
-from holdfast.twin.labels import labels_from_truth
+from holdfast.twin.labels import labels_from_truth, phases_as_felt
 from holdfast.twin.objects import Thing
 from holdfast.twin.objects import thing as find_thing
 from holdfast.twin.operator import draw_pushes, draw_tremor
 from holdfast.twin.profile import Profile, profile
-from holdfast.twin.protocol import THUMB_SHARE, Command, Plan, Protocol
+from holdfast.twin.protocol import THUMB_SHARE, TOUCH, Command, Plan, Protocol
 from holdfast.twin.surface import curved_fingertip
 from holdfast.twin.uskin import Uskin, with_server_effects
 from holdfast.twin.uskin_parameters import UskinParameters
@@ -50,7 +51,8 @@ class Grasp:
         seed: of the whole protocol.
         attempt: from 0 on; after a failed grasp the same is tried again.
         server: whether stamps are unsteady and packets repeat, as servers send them.
-        table: of objects of one's own, as `objects.toml`; None for the built-in ones.
+        table: another table of objects, like `OTHER_OBJECTS` or one's own; None for the one
+            that is built in.
     """
 
     object: str
@@ -60,7 +62,7 @@ class Grasp:
     seed: int = 0
     attempt: int = 0
     server: bool = False
-    table: str | None = None
+    table: str | Path | None = None
 
     @property
     def thing(self) -> Thing:
@@ -179,12 +181,12 @@ def _generator(seed: int, key: str) -> np.random.Generator:
 
 
 @cache
-def _thing(name: str, table: str | None) -> Thing:
+def _thing(name: str, table: str | Path | None) -> Thing:
     return find_thing(name, table)
 
 
 @cache
-def _path(name: str, table: str | None) -> ClosingPath:
+def _path(name: str, table: str | Path | None) -> ClosingPath:
     return closing_path(_thing(name, table))
 
 
@@ -222,7 +224,9 @@ class _Log:
             for place, finger in enumerate(FINGERS)
         }
         hand = {name: np.array(rows) for name, rows in self._rows.items()}
-        return Truth(times, {"phase": np.array(self._phase, dtype=str), **hand}, fingers)
+        push = np.linalg.norm(hand["outside_force"], axis=1)  # no one else touches it meanwhile
+        phase = phases_as_felt(np.array(self._phase, dtype=str), push, TOUCH)
+        return Truth(times, {"phase": phase, **hand}, fingers)
 
 
 def _poses(bodies: Array) -> Array:
