@@ -2,6 +2,7 @@
 
     python benchmarks/twin_figures.py make twin            recordings, time, failed grasps
     python benchmarks/twin_figures.py compare twin         profiles, splits, classifiers
+    python benchmarks/twin_figures.py unseen twin          other objects, another hand, profiles
     python benchmarks/twin_figures.py detail twin          fingers, events, phases (reference)
     python benchmarks/twin_figures.py labels twin          label conventions (reference)
     python benchmarks/twin_figures.py features twin        without sigma, without F_tip (reference)
@@ -9,9 +10,10 @@
     python benchmarks/twin_figures.py truth twin           weight, creep, moment of slip
     python benchmarks/twin_figures.py objects FILE.png     a picture of every grasp
 
-`make` runs `holdfast simulate twin/PROFILE --profile PROFILE --seed 0`; the others read what it
-made. All is out of fold with the reference setting (`holdfast train --trials 0
---max-samples 20000`).
+`make` runs `holdfast simulate twin/PROFILE --profile PROFILE --seed 0`, the same with the other
+objects to twin/others, and with seed 1 to twin/fresh; the others read what it made. All is out of
+fold, `unseen` on recordings of which the model has seen none, with the reference setting
+(`holdfast train --trials 0 --max-samples 20000`).
 """
 
 import argparse
@@ -30,20 +32,26 @@ from holdfast.io import load_dataset
 from holdfast.metrics import Decisions, Metrics, bootstrap_interval, ratio_of_sums, summarise
 from holdfast.parallel import each
 from holdfast.recordings import Label, Recording, Truth, labels_from_samples
-from holdfast.training import Setting, decisions_of
+from holdfast.training import Setting, decisions_of, evaluate
 from holdfast.training.design import gather
-from holdfast.training.fitting import Material, fit_model
+from holdfast.training.fitting import Material, fit_all, fit_model
 from holdfast.training.judging import pick
 from holdfast.training.splits import divide
 from holdfast.training.survey import survey
 from holdfast.twin.control import EVERY, draw_controller
 from holdfast.twin.hand import TIMESTEP
 from holdfast.twin.labels import LabelRule, labels_from_truth
-from holdfast.twin.objects import load_things, thing
+from holdfast.twin.objects import OTHER_OBJECTS, load_things, thing
 from holdfast.twin.simulation import LONGEST, Grasp, simulate
 from holdfast.twin.uskin_parameters import UskinParameters
 
 PROFILES = ("gentle", "reference", "vigorous")
+FOLDERS = {
+    **{profile: ("--profile", profile, "--seed", "0") for profile in PROFILES},
+    "others": ("--profile", "reference", "--seed", "0", "--table", str(OTHER_OBJECTS)),
+    "fresh": ("--profile", "reference", "--seed", "1"),
+}
+"""What each folder is made with."""
 SPLITS = ("recording", "object", "random")
 CLASSIFIERS = {"logreg": "LogReg", "svm": "SVM"}
 PAPER = {"logreg": 95.3, "svm": 96.4}
@@ -67,6 +75,7 @@ def parse() -> argparse.Namespace:
     for run, given in (
         (make, "folder"),
         (compare, "folder"),
+        (unseen, "folder"),
         (detail, "folder"),
         (labels, "folder"),
         (features, "folder"),
@@ -145,30 +154,28 @@ def stable_share(metrics: Metrics) -> float:
 
 def make(arguments: argparse.Namespace) -> None:
     rows = []
-    for profile in PROFILES:
-        out = arguments.folder / profile
-        command = [Path(sys.executable).with_name("holdfast"), "simulate", out]
-        options = ["--profile", profile, "--seed", "0", "--jobs", str(arguments.jobs), "--force"]
+    for name, options in FOLDERS.items():
+        out = arguments.folder / name
+        command = [str(Path(sys.executable).with_name("holdfast")), "simulate", str(out)]
         start = time.monotonic()
-        subprocess.run([*map(str, command), *options], check=True)
-        rows.append(made_row(profile, out, time.monotonic() - start, arguments.jobs))
+        subprocess.run([*command, *options, "--jobs", str(arguments.jobs), "--force"], check=True)
+        rows.append(made_row(name, out, time.monotonic() - start))
     table(
-        ("profile", "recordings", "of them failed", "samples a finger", "of grasps that did not "
+        ("folder", "recordings", "of them failed", "samples a finger", "of grasps that did not "
          "fail", "simulated s", "wall s", f"times real time, {arguments.jobs} processes"),
         rows,
     )  # fmt: skip
 
 
-def made_row(profile: str, folder: Path, wall: float, jobs: int) -> tuple[object, ...]:
-    del jobs
+def made_row(name: str, folder: Path, wall: float) -> tuple[object, ...]:
     recordings = load(folder)
     n = np.array([len(recording.truth.times) for recording in recordings])
     failed = np.array([recording.metadata["case"] == "failed" for recording in recordings])
     seconds = n.sum() / 150
     names = ", ".join(r.name for r, bad in zip(recordings, failed, strict=True) if bad)
-    print(f"{profile}, failed: {names or 'none'}\n")
+    print(f"{name}, failed: {names or 'none'}\n")
     return (
-        profile,
+        name,
         len(recordings),
         int(failed.sum()),
         f"{n.sum():,}",
@@ -211,6 +218,21 @@ def compare_row(profile: str, classifier: str, split: str, metrics: Metrics) -> 
         f"{stable_share(metrics):.1f}",
         PAPER[classifier] if split == "random" else "",
     )
+
+
+def unseen(arguments: argparse.Namespace) -> None:
+    """A model of all of `reference` on what it has seen nothing of."""
+    recordings = load(arguments.folder / "reference")
+    rows = []
+    for classifier, title in CLASSIFIERS.items():
+        setting = Setting(classifier=classifier, trials=0, max_samples=MAX_SAMPLES)
+        model = fit_all(recordings, setting, setting.recipe.reference)
+        for name in FOLDERS:
+            if name != "reference":
+                metrics = evaluate(model, load(arguments.folder / name))
+                missed = f"{metrics.pooled.fnr:.1f}"
+                rows.append((title, *figure_row(name, metrics), missed))
+    table(("classifier", "judged on", *FIGURES[1:], "missed stable (FNR) %"), rows)
 
 
 def detail(arguments: argparse.Namespace) -> None:
@@ -299,17 +321,16 @@ def counts_where(recording: Recording, judged: Decisions, where: np.ndarray) -> 
 
 
 def push_table(recordings: Sequence[Recording], judged: Sequence[Decisions]) -> None:
-    """Disturbances while the pushing finger touches the object, and while it does not."""
+    """Within disturbances, while the pushing finger touches the object, and while it does not."""
     counts = np.zeros((2, 3), dtype=np.int64)
-    waits = []
+    n_disturbances = 0
     for recording, decisions in zip(recordings, judged, strict=True):
         hand = recording.truth.hand
         during = np.isin(hand["phase"], (Phase.DISTURBED, Phase.SLIPPING))
         pushed = np.linalg.norm(hand["outside_force"], axis=1) > LabelRule().contact
         for row, where in enumerate((during & pushed, during & ~pushed)):
             counts[row] += counts_where(recording, decisions, where)
-        starts = np.flatnonzero(during & ~np.append(False, during[:-1]))
-        waits += [np.argmax((pushed & during)[start:]) / 150 for start in starts]
+        n_disturbances += int((during & ~np.append(False, during[:-1])).sum())
     table(
         ("in a disturbance", "samples", "errors %"),
         [
@@ -319,7 +340,7 @@ def push_table(recordings: Sequence[Recording], judged: Sequence[Decisions]) -> 
             )
         ],
     )
-    print(f"{len(waits)} disturbances; first touch after {np.median(waits):.2f} s in the median\n")
+    print(f"{n_disturbances} disturbances, each from its first touch to its last\n")
 
 
 def case_table(recordings: Sequence[Recording], judged: Sequence[Decisions]) -> None:
