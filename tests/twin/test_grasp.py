@@ -90,13 +90,18 @@ def test_beyond_its_ends_the_path_stands_still(can):
     np.testing.assert_array_equal(can.targets(np.full(4, -0.2)), can.targets(np.full(4, -0.025)))
 
 
-@pytest.mark.parametrize("radius", [0.08, 0.002])
+@pytest.mark.parametrize("radius", [0.08, 0.020, 0.002])
 def test_an_object_of_another_size_is_refused_in_one_line(radius):
     item = replace(thing("can"), name="tub", size=(radius, 0.05, 0.001))
     with pytest.raises(ValueError, match=r"^the object 'tub' cannot be grasped: .*$") as refusal:
         closing_path(item)
     assert "\n" not in str(refusal.value)
-    assert "20 to 45 mm" in str(refusal.value)
+    assert "24 to 45 mm" in str(refusal.value)
+
+
+@pytest.mark.parametrize("radius", [0.024, 0.045])
+def test_objects_of_the_told_sizes_are_grasped(radius):
+    closing_path(replace(thing("can"), size=(radius, 0.058, 0.003)))
 
 
 @pytest.mark.parametrize("name", OBJECTS)

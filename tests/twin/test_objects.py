@@ -269,7 +269,7 @@ COLUMNS = "shape, size, mass, friction, texture, finger_height, yaw"
         ("0.05, 0.003", "0.05, 0.04", "size: a rounding below the other sizes expected, "
          "0.04 given"),
         ("[0.035", "[0.06", "size: it cannot be grasped: half widths from 0.02 to 0.045 m fit "
-         "between thumb and fingers, 0.06 given"),
+         "the hand, 0.06 given"),
         ('"cylinder", size = [0.035, 0.05, 0.003]', '"capsule", size = [0.035, 0.03]',
          "size: half height 0.03 is less than the radius 0.035"),
     ],

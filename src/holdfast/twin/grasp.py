@@ -186,6 +186,6 @@ def _check(thing: Thing, misses: Array, cosines: Array) -> None:
         angle = np.degrees(np.arccos(np.clip(cosines[worst], -1.0, 1.0)))
         raise ValueError(
             f"the object {thing.name!r} cannot be grasped: the pad of the {FINGERS[worst]} misses "
-            f"it by {1e3 * misses[worst]:.0f} mm, at {angle:.0f} degrees; half widths of 20 to "
-            "45 mm fit the hand"
+            f"it by {1e3 * misses[worst]:.0f} mm, at {angle:.0f} degrees; half widths of 24 to "
+            "45 mm between thumb and fingers fit the hand"
         )

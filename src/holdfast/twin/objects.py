@@ -56,7 +56,7 @@ LIMITS = {
 """Smallest and largest value of every column, in its unit."""
 
 GRASP = (0.02, 0.045)
-"""Half widths that fit between thumb and fingers [m]."""
+"""Half widths that fit the hand [m]; between thumb and fingers the path to them decides."""
 
 N_GRID = 96
 """Points of the quadrature of mass along the longest side."""
@@ -235,7 +235,7 @@ def _check(
         if not GRASP[0] <= width <= GRASP[1]:
             raise ValueError(
                 f"size: it cannot be grasped: half widths from {GRASP[0]:g} to {GRASP[1]:g} m "
-                f"fit between thumb and fingers, {width:g} given"
+                f"fit the hand, {width:g} given"
             )
 
 
