@@ -65,11 +65,7 @@ class FingerDesign:
 
     def contact_threshold(self, recordings: Sequence[int]) -> float | None:
         """Mean + 5 standard deviations of F_a over those recordings' tare stretches."""
-        n, total, squares = self.at_rest[list(recordings)].sum(axis=0)
-        if n < 2:
-            return None
-        mean = total / n
-        return float(mean + CONTACT_DEVIATIONS * np.sqrt(max(squares / n - mean**2, 0.0)))
+        return contact_threshold(self.at_rest[list(recordings)])
 
 
 def gather(
@@ -112,7 +108,7 @@ def gather(
             piles[finger].append(Samples(rows.features[kept], states[kept] == STABLE, groups))
             units[finger].append(division.units_of(place, module.n_samples)[kept])
             if plan.tare.without_contact:
-                at_rest[finger][place] = _at_rest(module, plan.tare, found.rate)
+                at_rest[finger][place] = rest_moments(module, plan.tare, found.rate)
     designs = {
         finger: FingerDesign(
             found.sensors[finger], _stack(pile), np.concatenate(units[finger]), at_rest[finger]
@@ -146,7 +142,23 @@ def _has(recording: Recording, finger: str, sensor: Sensor) -> bool:
     return module is not None and module.n_samples > 0 and module.sensor == sensor
 
 
-def _at_rest(module: Tactile, tare: Tare, rate: float) -> tuple[int, float, float]:
+def contact_threshold(moments: npt.NDArray[np.float64]) -> float | None:
+    """Mean + 5 standard deviations of F_a at rest.
+
+    Args:
+        moments: (n_recordings, 3) number, sum and sum of squares of F_a in each tare stretch.
+
+    Returns:
+        F_a from which on there is contact [unit of the readings]; None where nothing is known.
+    """
+    n, total, squares = moments.sum(axis=0)
+    if n < 2:
+        return None
+    mean = total / n
+    return float(mean + CONTACT_DEVIATIONS * np.sqrt(max(squares / n - mean**2, 0.0)))
+
+
+def rest_moments(module: Tactile, tare: Tare, rate: float) -> tuple[int, float, float]:
     """Number, sum and sum of squares of F_a in the tare stretch; none of a dead finger."""
     try:
         amplitude = tare_amplitude(module, tare, rate)
