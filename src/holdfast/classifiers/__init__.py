@@ -10,6 +10,7 @@ from holdfast.classifiers.fitting import (
 from holdfast.classifiers.linear import LinearClassifier
 from holdfast.classifiers.logreg import LogisticRegression
 from holdfast.classifiers.svm import LinearSVM
+from holdfast.classifiers.threshold import Threshold
 
 RECIPES: dict[str, LinearRecipe] = {"logreg": LogisticRegression(), "svm": LinearSVM()}
 
@@ -21,6 +22,7 @@ __all__ = [
     "Parameters",
     "Recipe",
     "Samples",
+    "Threshold",
     "recipe",
 ]
 

@@ -14,6 +14,9 @@ if TYPE_CHECKING:
 
 Parameters = Mapping[str, Any]
 
+LEAST_SLOPE = 1e-6
+"""Of a sigmoid: so little that the probability is the base rate, yet it rises."""
+
 
 class Samples(NamedTuple):
     """Training samples of one classifier.
@@ -106,3 +109,29 @@ def check_classes(samples: Samples) -> None:
             f"{n_stable} samples labelled stable and {len(samples.stable) - n_stable} labelled "
             "not stable given; both classes are needed to train"
         )
+
+
+def balance_of(stable: npt.NDArray[np.bool_]) -> float:
+    """n_0 / n_1: by how much balanced classes multiply the odds of stability."""
+    n_stable = int(stable.sum())
+    return (len(stable) - n_stable) / n_stable
+
+
+def unbalanced(probability: npt.NDArray[np.float64], balance: float) -> npt.NDArray[np.float64]:
+    """The probability whose odds are `balance` times less."""
+    return probability / (probability + balance * (1.0 - probability))
+
+
+def sigmoid(values: npt.NDArray[np.float64], stable: npt.NDArray[np.bool_]) -> tuple[float, float]:
+    """Slope and offset of the logistic function that the classes follow along the values.
+
+    The slope stays above 0; where the classes call for less, the offset is the base rate's.
+    """
+    from sklearn.linear_model import LogisticRegression
+
+    spread = float(values.std()) or 1.0
+    fit = LogisticRegression(C=1e6, max_iter=1000).fit(values[:, None] / spread, stable)
+    slope = float(fit.coef_[0, 0]) / spread
+    if slope < LEAST_SLOPE:
+        return LEAST_SLOPE, -float(np.log(balance_of(stable)))
+    return slope, float(fit.intercept_[0])

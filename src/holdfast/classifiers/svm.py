@@ -6,7 +6,13 @@ from typing import TYPE_CHECKING
 import numpy as np
 import numpy.typing as npt
 
-from holdfast.classifiers.fitting import Parameters, Samples, check_classes, standardise
+from holdfast.classifiers.fitting import (
+    Parameters,
+    Samples,
+    check_classes,
+    sigmoid,
+    standardise,
+)
 from holdfast.classifiers.linear import LinearClassifier
 
 FOLDS = 5
@@ -46,7 +52,7 @@ class LinearSVM:
         values = _held_out(samples._replace(features=features), parameters, seed)
         if values is None:
             values = features @ coefficients + intercept
-        slope, offset = _sigmoid(values, samples.stable)
+        slope, offset = sigmoid(values, samples.stable)
         return LinearClassifier(
             mean=tuple(mean.tolist()),
             scale=tuple(scale.tolist()),
@@ -85,12 +91,3 @@ def _held_out(
         coefficients, intercept = _fit(features[~rows], stable[~rows], parameters, seed)
         values[rows] = features[rows] @ coefficients + intercept
     return values
-
-
-def _sigmoid(values: npt.NDArray[np.float64], stable: npt.NDArray[np.bool_]) -> tuple[float, float]:
-    """Slope and offset of the logistic function that the classes follow along the values."""
-    from sklearn.linear_model import LogisticRegression
-
-    spread = float(values.std()) or 1.0
-    fit = LogisticRegression(C=1e6, max_iter=1000).fit(values[:, None] / spread, stable)
-    return max(float(fit.coef_[0, 0]) / spread, 1e-6), float(fit.intercept_[0])

@@ -1,10 +1,30 @@
 """Ways of judging contacts that the study compares; one file each."""
 
+from holdfast.methods.anyskin import ANYSKIN
+from holdfast.methods.difference import DIFFERENCE
+from holdfast.methods.friction import FRICTION
 from holdfast.methods.method import HAND, Method
 from holdfast.methods.paper import LOGREG, SVM
 from holdfast.methods.signals import FingerSignal, HandSignal, signal_of, stretchwise
+from holdfast.methods.slip_servo import SLIP_SERVO
+from holdfast.methods.spectrum import SPECTRUM
+from holdfast.methods.tangential import TANGENTIAL
+from holdfast.methods.zhang import ZHANG
 
-METHODS: dict[str, Method] = {each.name: each for each in (LOGREG, SVM)}
+METHODS: dict[str, Method] = {
+    each.name: each
+    for each in (
+        LOGREG,
+        SVM,
+        ZHANG,
+        FRICTION,
+        SLIP_SERVO,
+        SPECTRUM,
+        DIFFERENCE,
+        TANGENTIAL,
+        ANYSKIN,
+    )
+}
 
 __all__ = [
     "HAND",

@@ -6,6 +6,7 @@ from functools import cached_property
 from itertools import pairwise
 
 import numpy as np
+from numpy.lib.stride_tricks import sliding_window_view
 
 from holdfast.features import Tare
 from holdfast.features.force import baseline_of, fingertip_force
@@ -13,6 +14,9 @@ from holdfast.features.kernel import GAP_LIMIT
 from holdfast.recordings import Recording, Tactile
 from holdfast.sensors import Sensor
 from holdfast.sensors.values import Array
+
+NEWTONS_PER_COUNT = 0.000729
+"""Of a uSkin taxel along its normal, by the data sheet of the uSPa46 [N/count]."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -40,9 +44,14 @@ class FingerSignal:
         return np.asarray(np.linalg.norm(self.force, axis=1))
 
     @property
+    def pressing(self) -> Array:
+        """(n,) the force along the normal of the fingertip, the paper's F_x."""
+        return np.asarray(self.force @ self.sensor.normal)
+
+    @property
     def normal(self) -> Array:
-        """(n,) size of the force along the normal of the fingertip, |F_n|."""
-        return np.asarray(np.abs(self.force @ self.sensor.normal))
+        """(n,) its size, |F_n|."""
+        return np.abs(self.pressing)
 
     @property
     def tangential(self) -> Array:
@@ -50,6 +59,15 @@ class FingerSignal:
         normal = self.sensor.normal
         rest = self.force - np.outer(self.force @ normal, normal)
         return np.asarray(np.linalg.norm(rest, axis=1))
+
+    @property
+    def newton(self) -> float:
+        """What a newton is in the unit of the readings; nominal where they are counts.
+
+        No method needs it but to port a published figure in newtons. Counts are taken for those
+        of a uSkin, whatever the sensor: of most others nothing is published.
+        """
+        return 1.0 if self.sensor.unit == "N" else 1.0 / NEWTONS_PER_COUNT
 
     @cached_property
     def stretches(self) -> tuple[slice, ...]:
@@ -113,17 +131,36 @@ def stretchwise(hand: HandSignal, function: Callable[[FingerSignal], Array]) -> 
 
     Args:
         hand: whose fingers.
-        function: from a signal of n samples to (n, n_features).
+        function: from a signal of n samples to (n, n_features); n may be 0, which tells the
+            width of a finger that has no stretch.
     """
     found = {}
     for name, finger in hand.fingers.items():
-        pieces = [(rows, function(piece)) for rows, piece in hand.each_stretch(name)]
-        width = pieces[0][1].shape[1] if pieces else 1
+        width = function(finger.cut(slice(0, 0))).shape[1]
         features = np.full((len(finger.times), width), np.nan)
-        for rows, values in pieces:
-            features[rows] = values
+        for rows, piece in hand.each_stretch(name):
+            features[rows] = function(piece)
         found[name] = features
     return found
+
+
+def windowed(values: Array, window: int, function: Callable[[Array], Array]) -> Array:
+    """A function of the window that ends at each sample; NaN where it is not full.
+
+    Args:
+        values: (n, ...) of one unbroken stretch.
+        window: samples in it.
+        function: from (m, ..., window) windows, oldest sample first, to (m, n_features); m may
+            be 0.
+
+    Returns:
+        (n, n_features).
+    """
+    padding = np.zeros((max(window - len(values), 0), *values.shape[1:]))
+    windows = sliding_window_view(np.concatenate([padding, values]), window, axis=0)
+    found = function(windows[len(padding) > 0 :])
+    empty = np.full((len(values) - len(found), found.shape[1]), np.nan)
+    return np.concatenate([empty, found])
 
 
 def _finger(module: Tactile, tare: Tare, rate: float) -> FingerSignal:
