@@ -21,10 +21,10 @@ SLOW = 0.18
 """The slow force from which on nothing is called slip [N]."""
 
 SOURCE = (
-    "Romano et al., IEEE Transactions on Robotics 27:1067, 2011, with the figures of the released "
-    "code: slip where |F_hp| > clip(0.007 |F|, 0.048 N, 0.2 N) and |F_bp| < 0.18 N. Ported: F is "
-    "F_x in place of the sum over a pad's pressures; newtons are nominal where readings are counts "
-    "(0.000729 N each), so the ratio |F_hp| / clip(...), 0 where the grip changes, is compared "
+    "Romano et al. 2011, with the figures of the released code: slip where "
+    "|F_hp| > clip(0.007 |F|, 0.048 N, 0.2 N) and |F_bp| < 0.18 N. Ported: F is F_x in place "
+    "of the sum over a pad's pressures; newtons are nominal where readings are counts (0.000729 N "
+    "each), so the ratio |F_hp| / clip(...), 0 where the grip changes, is compared "
     "with a threshold found on the training set (1 in the source); the order of the band-pass, "
     "first, is our own choice. The servo is made for a held object: closing is no slip to it"
 )

@@ -18,7 +18,7 @@ FLOOR = 1e-12
 """Energy below which there is none [count^2 or N^2]: far under the noise of any sensor."""
 
 SOURCE = (
-    "after Fernandez et al., Sensors 14:12711, 2014 (abstract): energy of the spectrum in a slip "
+    "after Fernandez et al. 2014 (abstract only): energy of the spectrum in a slip "
     "band against a threshold. Own choices: 0.2 s, Hann, the three axes added, five candidate "
     "bands up to 75 Hz, of which the training set picks one, and the logarithm"
 )

@@ -14,7 +14,7 @@ EPSILON = 0.011
 of F_tip: 30 taxels of 0.9 counts each make 5 counts, and 15 counts are 0.011 N."""
 
 SOURCE = (
-    "Wong and Zhu, Frontiers in Robotics and AI, 10.3389/frobt.2026.1735467, 2026 (abstract): "
+    "Wong and Zhu, Frontiers in Robotics and AI, 10.3389/frobt.2026.1735467, 2026 (abstract only): "
     "|T_k - T_(k-1)| / max(T_(k-1), eps) above a threshold, per finger, T the tangential part of "
     "F_tip less the tare. Own choice: eps = 0.011 N (15 counts), three times the noise"
 )

@@ -13,8 +13,8 @@ from holdfast.sensors.values import Array
 WINDOW = 14
 SOURCE = (
     "Zhang et al., IEEE Sensors Journal 16:7073, 2016, as Kitouni et al. tested it: energy of the "
-    "Haar details of F_x over N_w = 14, one threshold found by a linear SVM. Zhang has a second "
-    "threshold for slip by gravity, which is left out here as there"
+    "Haar details of F_x over N_w = 14, its threshold found by a linear SVM. Zhang's were found "
+    "by experiment, one for slip by gravity, one for disturbances; here one is fitted"
 )
 
 
