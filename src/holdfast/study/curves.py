@@ -110,6 +110,7 @@ def draw_alarms(
         axes.xaxis.set_major_formatter(
             FuncFormatter(lambda rate, _: "0" if rate <= floor * 1.01 else f"{rate:g}")
         )
+        axes.xaxis.set_minor_locator(NullLocator())
         axes.set_xlim(left=floor * 0.8)
         axes.set_ylim(bottom=0)
         add_labels(axes, x if len(grid) < 3 else x.replace(" of stable", "\nof stable"), y)

@@ -1,6 +1,6 @@
 """Figures of single values with their intervals: methods compared, errors by group."""
 
-from collections.abc import Collection, Iterable, Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from itertools import chain
 from typing import NamedTuple
 
@@ -36,7 +36,7 @@ class Estimate(NamedTuple):
 
 
 def draw_dots(groups: Mapping[str, Mapping[str, Estimate]], strong: Collection[str] = ()) -> Figure:
-    """Methods compared: a dot with its interval, the best on top of the first panel.
+    """Methods compared: a dot with its interval, the highest of the first panel on top.
 
     Args:
         groups: by the label of the panel's x axis, "accuracy by object [%]": by method, its
@@ -100,13 +100,14 @@ def draw_groups(
 
 
 def _ordered(groups: Mapping[str, Mapping[str, Estimate]]) -> list[str]:
-    """All names, those of the first panel by its value, the best last (that is on top)."""
-    names = list(dict.fromkeys(chain.from_iterable(groups.values())))
+    """All names by their value in the first panel, the lowest first; then as they appear."""
     first: Mapping[str, Estimate] = next(iter(groups.values()), {})
-    return sorted(
-        reversed(names),
-        key=lambda name: _number(first[name].value, -np.inf) if name in first else -np.inf,
-    )
+
+    def value(name: str) -> float:
+        return _number(first[name].value if name in first else None, -np.inf)
+
+    names = dict.fromkeys(chain.from_iterable(groups.values()))
+    return sorted(names, key=value, reverse=True)[::-1]
 
 
 def _draw_dot(axes: Axes, row: int, estimate: Estimate, *, bold: bool) -> None:

@@ -32,7 +32,7 @@ PHASE_COLOURS = {
     Phase.RELEASED: "#e6d8ec",
 }
 PHASE_TITLES = {
-    Phase.FREE: "no contact",
+    Phase.FREE: "free",
     Phase.CLOSING: "closing",
     Phase.LOCKED: "locked",
     Phase.DISTURBED: "disturbed",
@@ -47,7 +47,7 @@ AMPLITUDE_COLOUR = COMPONENT_COLOURS["F_a"]
 MEAN_COLOUR = "#56b4e9"
 WIDE = 15.0
 """Sigma is drawn on a logarithmic axis where its peak is so many times its median."""
-N_BINS = 700
+N_BINS = 1500
 """Stretches of a curve of which the smallest and the largest value are drawn."""
 ROOM = 0.0083
 """Width of a letter of a phase's name, as a share of the axes."""
@@ -267,7 +267,7 @@ def _finish(figure: Figure, rows: Sequence[Axes], trace: Trace) -> None:
     add_labels(rows[-1], x="time [s]")
     rows[0].set_title(trace.name, fontsize=SMALL + 0.5, loc="left", pad=14, color=INK)
     figure.align_ylabels([axes for axes in rows if not axes.yaxis_inverted()])
-    add_legend(figure, _phase_handles(trace), "lower")
+    add_legend(figure, _phase_handles(trace), "outside lower center")
 
 
 def _unit(trace: Trace) -> str:

@@ -15,7 +15,7 @@ SHARP = 200
 
 _ID = re.compile(r'(?<= id=")(?=[^"]+")')
 _REFERENCE = re.compile(r'(?<=url\(#)|(?<=href="#)')
-_OPENING = re.compile(r'<svg [^>]*?width="([^"]*)"[^>]*?viewBox="([^"]*)"[^>]*>')
+_OPENING = re.compile(r'<svg [^>]*?viewBox="([^"]*)"[^>]*>')
 _PATH = re.compile(r' d="[^"]*"')
 _LONG = re.compile(r"(?<=\.\d\d)\d+")
 """Digits beyond 0.01 pt."""
@@ -56,25 +56,20 @@ def inline_image(figure: Figure, name: str, title: str) -> str:
     svg = inline_svg(svg_of(figure, name), name, title)
     if len(svg) <= LARGEST_SVG:
         return svg
-    width, _ = figure.get_size_inches()
     data = base64.b64encode(png_of(figure)).decode()
-    return (
-        f'<img alt="{html.escape(title)}" style="width:{width:.2f}in" '
-        f'src="data:image/png;base64,{data}">\n'
-    )
+    return f'<img alt="{html.escape(title)}" src="data:image/png;base64,{data}">\n'
 
 
 def inline_svg(document: str, name: str, title: str) -> str:
     """An SVG document as an element of HTML: no prologue, no metadata, ids of its own."""
     opening = _OPENING.search(document)
     if opening is None:
-        raise ValueError(f"figure {name}: no SVG with a width and a viewBox")
+        raise ValueError(f"figure {name}: no SVG with a viewBox")
     inner = _USELESS.sub("", document[opening.end() :]).replace("xlink:href", "href")
     inner = re.sub(r"\n\s*", "\n", inner)
     inner = _PATH.sub(lambda path: _LONG.sub("", path[0]), inner)
     inner = _REFERENCE.sub(f"{name}-", _ID.sub(f"{name}-", inner))
-    width, box = opening.groups()
     return (
-        f'<svg role="img" aria-label="{html.escape(title)}" viewBox="{box}" '
-        f'style="width:{width};stroke-linejoin:round;stroke-linecap:butt">{inner}'
+        f'<svg role="img" aria-label="{html.escape(title)}" viewBox="{opening[1]}" '
+        f'style="stroke-linejoin:round;stroke-linecap:butt">{inner}'
     )

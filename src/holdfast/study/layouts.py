@@ -7,7 +7,17 @@ difference, ours less the paper's.
 import html
 from collections.abc import Callable, Iterable, Sequence
 
-from holdfast.study.tables import INFINITE, MINUS, Line, Row, Table, digits_of, number_text, pivot
+from holdfast.study.tables import (
+    INFINITE,
+    MINUS,
+    NOTHING,
+    Line,
+    Row,
+    Table,
+    digits_of,
+    number_text,
+    pivot,
+)
 from holdfast.study.typeset import as_html, as_latex, as_markdown
 
 N = "recordings"
@@ -45,7 +55,8 @@ def to_html(table: Table, number: int | None = None) -> str:
         f'<figure class="table" id="table-{table.name}">\n'
         f"<figcaption>{label}{as_html(table.title)}</figcaption>\n"
         f'<div class="scroll" tabindex="0" role="region" aria-label="{html.escape(table.title)}">\n'
-        f"<table>\n<thead><tr>{''.join(heads)}</tr></thead>\n<tbody>\n"
+        f"<table>\n<thead>{_html_over(table, len(grid.columns))}<tr>{''.join(heads)}</tr></thead>\n"
+        "<tbody>\n"
         + "\n".join(body)
         + "\n</tbody>\n</table>\n</div>\n"
         + "".join(f'<p class="note">{as_html(note)}</p>\n' for note in notes(table))
@@ -54,9 +65,10 @@ def to_html(table: Table, number: int | None = None) -> str:
 
 
 def to_latex(table: Table) -> str:
-    r"""The table as a LaTeX `table`; it needs `\usepackage{booktabs}` and UTF-8 alone.
+    r"""The table as a LaTeX `table`; it needs the packages booktabs and graphicx.
 
-    The interval, and the paper's figure with the difference, stand in lines of their own.
+    The interval, and the paper's figure with the difference, stand in lines of their own. What
+    is wider than the text is made smaller.
     """
     grid = pivot(table)
     counted = _n_varies(table)
@@ -77,13 +89,15 @@ def to_latex(table: Table) -> str:
             r"\setlength{\tabcolsep}{4pt}",
             rf"\caption{{{as_latex(caption)}}}",
             rf"\label{{tab:{table.name}}}",
+            r"\resizebox{\ifdim\width>\linewidth\linewidth\else\width\fi}{!}{%",
             rf"\begin{{tabular}}{{{align}}}",
             r"\toprule",
+            *_latex_over(table, len(grid.columns)),
             rf"{' & '.join(heads)} \\",
             r"\midrule",
             *body,
             r"\bottomrule",
-            r"\end{tabular}",
+            r"\end{tabular}}",
             rf"\end{{{place}}}",
             "",
         ]
@@ -94,7 +108,8 @@ def to_markdown(table: Table) -> str:
     """The table as GitHub's Markdown, with its title above and its notes below."""
     grid = pivot(table)
     counted = _n_varies(table)
-    lines = [[as_markdown(text) for text in (*table.lines, *grid.columns, *[N] * counted)]]
+    columns = [f"{_over(table)} {column}".strip() for column in grid.columns]
+    lines = [[as_markdown(text) for text in (*table.lines, *columns, *[N] * counted)]]
     lines.append(["---"] * len(table.lines) + ["--:"] * (len(grid.columns) + counted))
     for line in grid.lines:
         cells = [
@@ -108,9 +123,9 @@ def to_markdown(table: Table) -> str:
 
 
 def notes(table: Table) -> list[str]:
-    """What stands below the table: its own note, and what its cells are."""
+    """What stands below the table: its own note; what its cells rest on and mean."""
     counts = {row.n for row in table.rows if row.n is not None}
-    found = [table.note.strip()] if table.note.strip() else []
+    found = []
     if len(counts) == 1:
         (n,) = counts
         found.append(f"On {n} recording{'s' * (n != 1)}.")
@@ -118,7 +133,31 @@ def notes(table: Table) -> list[str]:
         found.append(INTERVALS)
     if any(row.paper is not None for row in table.rows):
         found.append(PAPERS)
-    return found
+    return [note for note in (table.note.strip(), " ".join(found)) if note]
+
+
+def _over(table: Table) -> str:
+    """What the columns are, where they do not say it themselves."""
+    return "" if table.column == "figure" else table.column
+
+
+def _html_over(table: Table, n_columns: int) -> str:
+    if not _over(table):
+        return ""
+    blank = "<td></td>" * len(table.lines)
+    over = f'<th colspan="{n_columns}" scope="colgroup" class="over">{as_html(_over(table))}</th>'
+    return f"<tr>{blank}{over}</tr>\n"
+
+
+def _latex_over(table: Table, n_columns: int) -> list[str]:
+    if not _over(table):
+        return []
+    first = len(table.lines) + 1
+    return [
+        "& " * len(table.lines)
+        + rf"\multicolumn{{{n_columns}}}{{c}}{{{as_latex(_over(table))}}} \\",
+        rf"\cmidrule(lr){{{first}-{first + n_columns - 1}}}",
+    ]
 
 
 def _html_line(line: Line, before: Line | None, cells: Iterable[str]) -> str:
@@ -137,8 +176,8 @@ def _html_cell(row: Row | None, digits: int) -> str:
     if row is None:
         return f'<td class="none">{number_text(None, 0)}</td>'
     text = f'<span class="ours">{number_text(row.ours, digits)}</span>'
-    if row.interval is not None:
-        text += f'<span class="interval">{_interval_text(row, digits)}</span>'
+    if interval := _interval_text(row, digits):
+        text += f'<span class="interval">{interval}</span>'
     if row.paper is not None:
         difference = _difference_text(row, digits)
         text += f'<span class="paper">{PAPER} {number_text(row.paper, digits)}'
@@ -164,9 +203,9 @@ def _latex_lines(
     intervals = [rf"\scriptsize {text}" if text else "" for text in texts(_interval_text)]
     if any(intervals):
         lines.append([*blank, "", *intervals, *[""] * counted])
-    papers = [rf"\itshape {text}" if text else "" for text in texts(_paper_text)]
+    papers = [rf"\scriptsize\itshape {text}" if text else "" for text in texts(_paper_text)]
     if any(papers):
-        lines.append([*blank, rf"\quad\itshape {PAPER}", *papers, *[""] * counted])
+        lines.append([*blank, rf"\quad\scriptsize\itshape {PAPER}", *papers, *[""] * counted])
     return [rf"{' & '.join(cells)} \\" for cells in lines]
 
 
@@ -174,8 +213,8 @@ def _markdown_cell(row: Row | None, digits: int) -> str:
     if row is None:
         return number_text(None, digits)
     parts = [number_text(row.ours, digits)]
-    if row.interval is not None:
-        parts.append(f"<sub>{_interval_text(row, digits)}</sub>")
+    if interval := _interval_text(row, digits):
+        parts.append(f"<sub>{interval}</sub>")
     if row.paper is not None:
         parts.append(f"*{PAPER} {_paper_text(row, digits)}*")
     return "<br>".join(parts)
@@ -184,14 +223,10 @@ def _markdown_cell(row: Row | None, digits: int) -> str:
 def _interval_text(row: Row, digits: int) -> str:
     if row.interval is None:
         return ""
-    low, high = (_end_text(end, digits) for end in row.interval)
-    if low == high:
-        return low
+    low, high = (number_text(end, digits).replace(INFINITE, "∞") for end in row.interval)
+    if (low, high) in ((NOTHING, NOTHING), ("∞", "∞")):
+        return ""
     return f"{low} to {high}" if MINUS in low + high else f"{low}–{high}"
-
-
-def _end_text(end: float | None, digits: int) -> str:
-    return number_text(end, digits).replace(INFINITE, "∞")
 
 
 def _paper_text(row: Row, digits: int) -> str:

@@ -68,8 +68,8 @@ def report(title: str, facts: Mapping[str, object], sections: Sequence[Section])
         '<meta name="viewport" content="width=device-width, initial-scale=1">\n'
         '<meta name="color-scheme" content="light dark">\n'
         f"<title>{html.escape(title)}</title>\n<style>\n{style}</style>\n</head>\n<body>\n"
-        f"{_contents(sections)}<main>\n<header>\n<h1>{as_html(title)}</h1>\n{_facts(facts)}"
-        f"</header>\n{''.join(body)}</main>\n</body>\n</html>\n"
+        f"<header>\n<h1>{as_html(title)}</h1>\n{_facts(facts)}</header>\n"
+        f"{_contents(sections)}<main>\n{''.join(body)}</main>\n</body>\n</html>\n"
     )
 
 

@@ -1,7 +1,7 @@
 """The look of the study's figures: one page wide, colours for all eyes, no screen needed."""
 
 from collections.abc import Collection, Iterable, Mapping, Sequence
-from typing import NamedTuple
+from typing import Literal, NamedTuple
 
 from matplotlib.artist import Artist
 from matplotlib.axes import Axes
@@ -19,7 +19,8 @@ GREY = "#999999"
 FAINT = "#e6e6e6"
 PAPER = "the paper"
 """A series of this name is what the paper prints: drawn black and dashed everywhere."""
-_DASHES = ("-", (0, (5, 1.5)), (0, (1.5, 1.2)))
+Dashes = Literal["-"] | tuple[float, tuple[float, ...]]
+_DASHES: tuple[Dashes, ...] = ("-", (0, (5, 1.5)), (0, (1.5, 1.2)))
 
 
 class Style(NamedTuple):
@@ -27,7 +28,7 @@ class Style(NamedTuple):
 
     color: str
     marker: str
-    linestyle: str | tuple[int, tuple[float, ...]]
+    linestyle: Dashes
 
 
 def styles_of(names: Iterable[str]) -> dict[str, Style]:
@@ -90,15 +91,18 @@ def add_labels(axes: Axes, x: str | None = None, y: str | None = None) -> None:
 
 
 def add_legend(
-    figure: Figure, handles: Sequence[Artist], place: str = "upper", per_row: int = 8
+    figure: Figure,
+    handles: Sequence[Artist],
+    place: Literal["outside upper center", "outside lower center"] = "outside upper center",
+    per_row: int = 8,
 ) -> None:
-    """A legend above all axes, or below ("lower")."""
+    """A legend above all axes, or below."""
     if not handles:
         return
     n_lines = -(-len(handles) // per_row)
     figure.legend(
-        handles=handles, loc=f"outside {place} center", ncols=-(-len(handles) // n_lines),
-        fontsize=SMALL, frameon=False, handlelength=2.0, columnspacing=1.3, borderaxespad=0.3,
+        handles=handles, loc=place, ncols=-(-len(handles) // n_lines),
+        fontsize=SMALL, frameon=False, handlelength=2.8, columnspacing=1.3, borderaxespad=0.3,
     )  # fmt: skip
 
 

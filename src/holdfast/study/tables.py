@@ -62,8 +62,8 @@ class Table(msgspec.Struct, frozen=True):
         digits_of: of single columns, where they differ.
 
     Raises:
-        ValueError: a name that is no file name, a key with the name of a measured column, a
-            row without its column, or two rows for one cell.
+        ValueError: a name that is no file name, no keys that name a line, a key with the name
+            of a measured column, a row without its column, or two rows for one cell.
     """
 
     name: str
@@ -78,12 +78,14 @@ class Table(msgspec.Struct, frozen=True):
     def __post_init__(self) -> None:
         if not FILE_NAME.fullmatch(self.name):
             raise ValueError(f"a table's name is letters, digits, - and _; {self.name!r} given")
+        if not self.lines:
+            raise ValueError(f"table {self.name}: no key names its lines")
         taken = [key for key in _keys(self.rows) if key in MEASURED]
         if taken:
             raise ValueError(f"table {self.name}: a key may not be called {taken[0]!r}")
         seen = set()
         for row in self.rows:
-            if self.column not in row.keys:  # noqa: SIM118 (a field called keys)
+            if self.column not in row.keys:
                 raise ValueError(f"table {self.name}: a row has no {self.column!r}: {row.keys}")
             if (cell := _cell(self, row)) in seen:
                 raise ValueError(f"table {self.name}: two rows for {' / '.join(cell)}")

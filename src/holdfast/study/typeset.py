@@ -21,8 +21,7 @@ _TEX = {
     "<": r"\textless{}",
     ">": r"\textgreater{}",
     "|": r"\textbar{}",
-    '"': r"\textquotedbl{}",
-    "'": "'",
+    '"': "''",
     "[": "{[}",  # or the line break before it takes it for a length
     "]": "{]}",
     "−": "$-$",
@@ -41,6 +40,8 @@ _TEX = {
     "µ": r"$\mu$",
     "μ": r"$\mu$",
     "σ": r"$\sigma$",
+    "«": "``",
+    "»": "''",
     "“": "``",
     "”": "''",
     "‘": "`",
@@ -48,8 +49,8 @@ _TEX = {
     "\u00a0": "~",
     "\u202f": r"\,",
 }
-_LAST_LATIN = "\u017f"
-"""Letters up to here are known to any LaTeX of today."""
+_LATIN = {chr(k) for k in range(0x20, 0x100)} - set("ÐðÞþ")
+"""Letters that any LaTeX of today knows in any encoding."""
 
 
 def as_html(text: str) -> str:
@@ -103,7 +104,7 @@ def _tex(letter: str) -> str:
         return _TEX[letter]
     if letter.isspace():
         return " "
-    if letter <= _LAST_LATIN and letter.isprintable():
+    if letter in _LATIN and letter.isprintable():
         return letter
     nearest = unicodedata.normalize("NFKD", letter).encode("ascii", "ignore").decode()
     return "".join(_TEX.get(each, each) for each in nearest if each.isprintable()) or "?"
