@@ -77,7 +77,8 @@ class LinearClassifier(msgspec.Struct, frozen=True, forbid_unknown_fields=True, 
         Raises:
             ValueError: another number of features.
         """
-        standardised = (self._checked(features) - np.array(self.mean)) / np.array(self.scale)
+        rows = rows_of(features, self.n_features)
+        standardised = (rows - np.array(self.mean)) / np.array(self.scale)
         return np.asarray(standardised @ np.array(self.coefficients) + self.intercept)
 
     def probability(self, features: npt.ArrayLike) -> Array:
@@ -86,18 +87,22 @@ class LinearClassifier(msgspec.Struct, frozen=True, forbid_unknown_fields=True, 
         Raises:
             ValueError: another number of features.
         """
-        rows = self._checked(features)
+        rows = rows_of(features, self.n_features)
         probabilities = np.empty(len(rows))
         _probabilities(rows, self.weights(), probabilities)
         return probabilities
 
-    def _checked(self, features: npt.ArrayLike) -> Array:
-        rows = np.ascontiguousarray(features, dtype=np.float64)
-        if rows.ndim != 2 or rows.shape[1] != self.n_features:
-            raise ValueError(
-                f"features of shape (n, {self.n_features}) expected, {rows.shape} given"
-            )
-        return rows
+
+def rows_of(features: npt.ArrayLike, n_features: int) -> Array:
+    """The features as (n, n_features) float64, contiguous.
+
+    Raises:
+        ValueError: another number of features.
+    """
+    rows = np.ascontiguousarray(features, dtype=np.float64)
+    if rows.ndim != 2 or rows.shape[1] != n_features:
+        raise ValueError(f"features of shape (n, {n_features}) expected, {rows.shape} given")
+    return rows
 
 
 @compiled

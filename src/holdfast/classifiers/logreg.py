@@ -5,7 +5,13 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from holdfast.classifiers.fitting import Parameters, Samples, check_classes, standardise
+from holdfast.classifiers.fitting import (
+    Parameters,
+    Samples,
+    balance_of,
+    check_classes,
+    standardise,
+)
 from holdfast.classifiers.linear import LinearClassifier
 
 if TYPE_CHECKING:
@@ -48,8 +54,7 @@ class LogisticRegression:
             solver="newton-cholesky",
             max_iter=1000,
         ).fit(features, samples.stable)
-        n_stable = int(samples.stable.sum())
-        odds = (len(samples.stable) - n_stable) / n_stable if balanced else 1.0
+        odds = balance_of(samples.stable) if balanced else 1.0
         return LinearClassifier(
             mean=tuple(mean.tolist()),
             scale=tuple(scale.tolist()),

@@ -3,12 +3,15 @@
 from holdfast.methods.anyskin import ANYSKIN
 from holdfast.methods.difference import DIFFERENCE
 from holdfast.methods.friction import FRICTION
+from holdfast.methods.grover import TCN
+from holdfast.methods.james_lepora import JAMES_LEPORA
 from holdfast.methods.method import HAND, Method
 from holdfast.methods.paper import LOGREG, SVM
 from holdfast.methods.signals import FingerSignal, HandSignal, signal_of, stretchwise
 from holdfast.methods.slip_servo import SLIP_SERVO
 from holdfast.methods.spectrum import SPECTRUM
 from holdfast.methods.tangential import TANGENTIAL
+from holdfast.methods.trees import TREES
 from holdfast.methods.zhang import ZHANG
 
 METHODS: dict[str, Method] = {
@@ -23,6 +26,9 @@ METHODS: dict[str, Method] = {
         DIFFERENCE,
         TANGENTIAL,
         ANYSKIN,
+        *JAMES_LEPORA,
+        TCN,
+        TREES,
     )
 }
 
