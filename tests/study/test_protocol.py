@@ -3,6 +3,7 @@ import numpy as np
 import pytest
 
 from holdfast.classifiers import Samples, recipe
+from holdfast.classifiers.threshold import best_cut
 from holdfast.features import DEPLOYED
 from holdfast.study.corpus import corpus_of
 from holdfast.study.pools import pooled
@@ -119,6 +120,20 @@ def test_a_search_tries_more_than_the_reference(corpora, alone):
     cell = judged({"main": corpora["main"]}, thorough=False, effort=Effort(4, 500))[0]
     assert set(cell.parameters) == set(reference)
     assert cell.parameters != reference
+
+
+def test_a_threshold_has_nothing_to_search_and_calls_little_energy_stable(corpora):
+    kinds = [("threshold", ("energy",))]
+    main = {"main": corpora["main"]}
+    (cell,) = judge(main, "index", 14, kinds, EFFORT, 0, thorough=False)
+    assert cell.parameters == {}
+    pool = pooled(corpora["main"], 150.0, "index", 14, seed=0)
+    train = pool.parts >= 5
+    energy = pool.only(["energy"]).features[:, 0]
+    cut = best_cut(energy[train], pool.samples.stable[train], "below").place
+    right = (energy <= cut) == pool.samples.stable
+    tn, _, _, tp = np.sum(cell.counts[HELD_OUT], axis=0)
+    assert tn + tp == right[~train].sum()
 
 
 def test_cells_go_over_the_wire(alone):

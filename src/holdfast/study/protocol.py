@@ -10,7 +10,7 @@ import msgspec
 import numpy as np
 import numpy.typing as npt
 
-from holdfast.classifiers import Classifier, Parameters, Recipe, Samples, recipe
+from holdfast.classifiers import RECIPES, Classifier, Parameters, Recipe, Samples, Threshold
 from holdfast.study.corpus import Corpus
 from holdfast.study.counts import Counts, confusions
 from holdfast.study.pools import Integers, Pool, pooled
@@ -30,6 +30,8 @@ OBJECTS = "other objects"
 ON = (TRAINING, VALIDATED, HELD_OUT, FRESH, ELSEWHERE, OBJECTS)
 """What a figure may be measured on."""
 
+WAYS: dict[str, Recipe] = {**RECIPES, "threshold": Threshold(side="below")}
+"""How a classifier is fitted; a threshold calls stable what is below it."""
 Kind = tuple[str, tuple[str, ...]]
 """A classifier, and what it sees."""
 
@@ -139,12 +141,13 @@ def _judge(
     thorough: bool,
 ) -> Cell:
     classifier, names = kind
+    how = WAYS[classifier]
     samples, n = main.only(names), len(main.objects)
     trains = main.parts >= N_HELD
     train = samples.take(trains)
     folds = main.parts[trains] % N_FOLDS
-    parameters = _search(train, folds, recipe(classifier), effort.trials, seed)
-    fit = _Fit(recipe(classifier), parameters, effort.n_fit, seed)
+    parameters = _search(train, folds, how, effort.trials, seed)
+    fit = _Fit(how, parameters, effort.n_fit, seed)
     rule = fit(train)
     counts = {HELD_OUT: confusions(rule, samples.take(~trains), n)}
     for on, pool in tests.items():
@@ -181,6 +184,8 @@ def _without_corpora(
 
 def _search(train: Samples, folds: Integers, how: Recipe, trials: int, seed: int) -> Parameters:
     """The hyper-parameters by Bayesian optimisation over random folds, as the paper's toolbox."""
+    if not how.reference:
+        return {}
     few = ungrouped(spread(train, SEARCH_SAMPLES))
     step = max(1, -(-len(folds) // SEARCH_SAMPLES))
     masks = [folds[::step] == fold for fold in range(N_FOLDS)]
