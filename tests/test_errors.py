@@ -1,3 +1,5 @@
+import pickle
+
 import pytest
 
 from holdfast import errors
@@ -7,6 +9,7 @@ FAMILIES = (
     errors.ModelError,
     errors.TrainingError,
     errors.StreamError,
+    errors.EngineError,
     errors.OutputError,
     errors.MissingExtra,
 )
@@ -33,3 +36,8 @@ def test_a_missing_extra_tells_how_to_get_it():
     assert str(failure) == (
         'this needs the package h5py, which is not installed: pip install "holdfast[hdf5]"'
     )
+
+
+def test_a_missing_extra_comes_back_whole_from_another_process():
+    failure = errors.MissingExtra("torch", "deep")
+    assert str(pickle.loads(pickle.dumps(failure))) == str(failure)

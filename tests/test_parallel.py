@@ -1,8 +1,23 @@
 import os
+import signal
+import socket
+import sys
+import time
 
+import numpy as np
 import pytest
 
-from holdfast.parallel import each
+from holdfast import parallel
+from holdfast.errors import EngineError, MissingExtra
+from holdfast.parallel import Engine, each
+
+PRIVATE = {
+    "threads_per_worker": 1,
+    "host": "127.0.0.1",
+    "dashboard_address": "127.0.0.1:0",
+    "silence_logs": 50,
+}
+HERE, PROCESSES = Engine(1), Engine(2)
 
 
 def power(base, exponent):
@@ -11,36 +26,170 @@ def power(base, exponent):
     return base**exponent, os.getpid()
 
 
-@pytest.mark.parametrize("n_jobs", [1, 2])
-def test_results_come_in_the_order_of_the_arguments(n_jobs):
-    arguments = [(base, base % 3) for base in range(20)]
-    assert [n for n, _ in each(power, iter(arguments), n_jobs)] == [b**e for b, e in arguments]
+def total(place, array):
+    time.sleep(0.02)
+    return place + float(array.sum())
 
 
-def test_one_at_a_time_happens_here_and_when_it_is_asked_for():
-    taken = []
-
-    def arguments():
-        for base in range(3):
-            taken.append(base)
-            yield base, 1
-
-    results = each(power, arguments())
-    assert taken == []
-    assert next(results) == (0, os.getpid())
-    assert taken == [0]
+def die_once(place, folder):
+    """The process dies at every fourth call, the first time that it is made."""
+    time.sleep(0.02)
+    try:
+        (folder / str(place)).touch(exist_ok=False)
+    except FileExistsError:
+        return place, "again"
+    if place % 4 == 1:
+        os.kill(os.getpid(), signal.SIGKILL)
+    return place, "at once"
 
 
-def test_two_at_a_time_happen_elsewhere():
-    assert os.getpid() not in {pid for _, pid in each(power, [(1, 1)] * 4, n_jobs=2)}
+def die_at(place, deadly):
+    if place == deadly:
+        os.kill(os.getpid(), signal.SIGKILL)
+    return place
 
 
-@pytest.mark.parametrize("n_jobs", [1, 2])
-def test_nothing_to_do(n_jobs):
-    assert list(each(power, [], n_jobs)) == []
+@pytest.fixture(scope="module")
+def cluster():
+    """A cluster of two worker processes on this machine that nobody else can reach."""
+    distributed = pytest.importorskip("distributed")
+    from dask import config
+
+    soon = {"distributed.comm.timeouts.connect": "1s"}  # that a dead worker is given up
+    with config.set(soon), distributed.LocalCluster(n_workers=2, **PRIVATE) as cluster:
+        yield cluster
 
 
-@pytest.mark.parametrize("n_jobs", [1, 2])
-def test_a_failure_comes_through(n_jobs):
-    with pytest.raises(ValueError, match="negative"):
-        list(each(power, [(1, 1), (1, -1)], n_jobs))
+def engine_of(cluster):
+    return Engine.parse(f"dask:{cluster.scheduler_address}")
+
+
+def workers(cluster):
+    from distributed import Client
+
+    with Client(cluster.scheduler_address, set_as_default=False) as client:
+        client.wait_for_workers(2)
+        return list(client.run(os.getpid).values())
+
+
+class TestEach:
+    @pytest.mark.parametrize("n_jobs", [1, 2])
+    def test_results_come_in_the_order_of_the_arguments(self, n_jobs):
+        arguments = [(base, base % 3) for base in range(20)]
+        assert [n for n, _ in each(power, iter(arguments), n_jobs)] == [b**e for b, e in arguments]
+
+    def test_one_at_a_time_happens_here_and_when_it_is_asked_for(self):
+        taken = []
+
+        def arguments():
+            for base in range(3):
+                taken.append(base)
+                yield base, 1
+
+        results = each(power, arguments())
+        assert taken == []
+        assert next(results) == (0, os.getpid())
+        assert taken == [0]
+
+    def test_two_at_a_time_happen_elsewhere(self):
+        assert os.getpid() not in {pid for _, pid in each(power, [(1, 1)] * 4, n_jobs=2)}
+
+    @pytest.mark.parametrize("n_jobs", [1, 2])
+    def test_nothing_to_do(self, n_jobs):
+        assert list(each(power, [], n_jobs)) == []
+
+    @pytest.mark.parametrize("n_jobs", [1, 2])
+    def test_a_failure_comes_through(self, n_jobs):
+        with pytest.raises(ValueError, match="negative"):
+            list(each(power, [(1, 1), (1, -1)], n_jobs))
+
+
+class TestEngine:
+    @pytest.mark.parametrize(
+        ("text", "engine"),
+        [
+            ("loky", Engine(3)),
+            ("dask:10.0.0.1:8786", Engine(3, "10.0.0.1:8786")),
+            ("dask:tls://hub:8786", Engine(3, "tls://hub:8786")),
+        ],
+    )
+    def test_a_text_names_it(self, text, engine):
+        assert Engine.parse(text, 3) == engine
+
+    def test_as_many_jobs_as_processors_unless_told(self):
+        assert Engine.parse() == Engine(-1)
+
+    @pytest.mark.parametrize("text", ["", "dask", "dask:", "loky:2", "spark:10.0.0.1:8786"])
+    def test_another_is_refused(self, text):
+        with pytest.raises(ValueError, match=rf"^unknown engine '{text}'; there are loky and dask"):
+            Engine.parse(text)
+
+    @pytest.mark.parametrize("engine", [HERE, PROCESSES])
+    def test_results_carry_the_name_of_their_call(self, engine):
+        calls = {f"{base}²": (base, 2) for base in range(9)}
+        done = dict(engine.as_done(power, calls.items()))
+        assert {name: n for name, (n, _) in done.items()} == {f"{b}²": b**2 for b in range(9)}
+
+    def test_a_quick_call_does_not_wait_for_a_slow_one(self):
+        calls = [("slow", (1.0,)), ("quick", (0.0,))]
+        assert [name for name, _ in PROCESSES.as_done(time.sleep, calls)] == ["quick", "slow"]
+
+
+class TestProcesses:
+    def test_a_death_costs_what_was_being_done(self, tmp_path):
+        done = list(PROCESSES.each(die_once, [(place, tmp_path) for place in range(8)]))
+        assert [place for place, _ in done] == list(range(8))
+        assert [done[place][1] for place in (1, 5)] == ["again", "again"]
+
+    def test_a_call_that_always_kills_is_named(self):
+        calls = [(f"call {place}", (place, 4)) for place in range(8)]
+        done = []
+        with pytest.raises(EngineError, match=r"^call 4: its process died 3 times, killed or out"):
+            done.extend(result for _, result in PROCESSES.as_done(die_at, calls))
+
+
+class TestCluster:
+    def test_a_worker_that_is_killed_costs_nothing_but_time(self, cluster):
+        arguments = [(place, np.full(10_000, float(place))) for place in range(60)]
+        results = []
+        for result in engine_of(cluster).each(total, arguments):
+            results.append(result)
+            if len(results) == 20:
+                os.kill(workers(cluster)[0], signal.SIGKILL)
+        assert results == list(HERE.each(total, arguments))
+
+    def test_a_failure_comes_through(self, cluster):
+        with pytest.raises(ValueError, match="negative"):
+            list(engine_of(cluster).each(power, [(1, 1), (1, -1)]))
+
+    def test_a_call_that_always_kills_is_named(self, cluster):
+        with pytest.raises(EngineError, match=r"^2: its worker died again and again"):
+            list(engine_of(cluster).each(die_at, [(place, 2) for place in range(6)]))
+
+    def test_without_workers(self, monkeypatch):
+        distributed = pytest.importorskip("distributed")
+        monkeypatch.setattr(parallel, "LONELY", 0.5)
+        with distributed.LocalCluster(n_workers=0, **PRIVATE) as empty:
+            address = empty.scheduler_address
+            with pytest.raises(EngineError, match=f"^the Dask scheduler at {address} has no work"):
+                list(engine_of(empty).each(power, [(1, 1)]))
+
+    @pytest.mark.parametrize("address", ["nobody", "127.0.0.1:1", "spark://127.0.0.1:1"])
+    def test_where_nobody_answers(self, monkeypatch, address):
+        pytest.importorskip("distributed")
+        monkeypatch.setattr(parallel, "PATIENCE", 0.5)
+        with pytest.raises(EngineError, match=rf"^no Dask scheduler answers at {address}: start"):
+            list(Engine.parse(f"dask:{address}").each(power, [(1, 1)]))
+
+    def test_where_something_else_listens(self, monkeypatch):
+        pytest.importorskip("distributed")
+        monkeypatch.setattr(parallel, "PATIENCE", 0.5)
+        with socket.create_server(("127.0.0.1", 0)) as silent:
+            engine = Engine.parse("dask:{}:{}".format(*silent.getsockname()))
+            with pytest.raises(EngineError, match=r"^no Dask scheduler answers at 127\.0\.0\.1:"):
+                list(engine.each(power, [(1, 1)]))
+
+    def test_without_dask(self, monkeypatch):
+        monkeypatch.setitem(sys.modules, "distributed", None)
+        with pytest.raises(MissingExtra, match=r"needs the package distributed.*holdfast\[cluster"):
+            list(Engine.parse("dask:127.0.0.1:1").each(power, [(1, 1)]))

@@ -5,6 +5,7 @@
     ├── ModelError       a model file is refused, or does not fit the data it is given
     ├── TrainingError    the data cannot train or test a classifier (one class, one group)
     ├── StreamError      samples came that a detector cannot take
+    ├── EngineError      the processes or the cluster that do the work fail, not the work
     ├── OutputError      an output exists already or cannot be written
     └── MissingExtra     a part needs a package that is not installed
 
@@ -34,6 +35,10 @@ class StreamError(HoldfastError):
     """Samples came that a detector cannot take: mend the source, then reset."""
 
 
+class EngineError(HoldfastError):
+    """The processes or the cluster that do the work fail: mend them, then start again."""
+
+
 class OutputError(HoldfastError):
     """An output exists already or cannot be written: nothing was left half-written."""
 
@@ -42,7 +47,11 @@ class MissingExtra(HoldfastError):  # noqa: N818 (it names what to install, not 
     """A part needs an optional package: install the extra that the text names."""
 
     def __init__(self, package: str, extra: str) -> None:
-        super().__init__(
+        super().__init__(package, extra)
+
+    def __str__(self) -> str:
+        package, extra = self.args
+        return (
             f"this needs the package {package}, which is not installed: "
             f'pip install "holdfast[{extra}]"'
         )
