@@ -89,6 +89,7 @@ def to_latex(table: Table) -> str:
             r"\setlength{\tabcolsep}{4pt}",
             rf"\caption{{{as_latex(caption)}}}",
             rf"\label{{tab:{table.name}}}",
+            r"\vspace{4pt}",
             r"\resizebox{\ifdim\width>\linewidth\linewidth\else\width\fi}{!}{%",
             rf"\begin{{tabular}}{{{align}}}",
             r"\toprule",
