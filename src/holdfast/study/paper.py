@@ -210,10 +210,9 @@ def _zhang(found: _Found) -> Table:
             )
     note = (
         "Zhang: one threshold on the energy of the Haar details of F_x, by a linear SVM of one "
-        "feature, which a few large energies lead astray; beside it the threshold with the best "
-        "balanced accuracy in training. The paper gives an accuracy of 'not more than' 62.7 and "
-        "an FDR 'up to' 49.1, for no window in particular; an FDR is missing where nothing is "
-        f"called stable. {found.protocol}"
+        "feature; beside it the threshold with the best balanced accuracy in training. The paper "
+        "gives an accuracy of 'not more than' 62.7 and an FDR 'up to' 49.1, for no window in "
+        f"particular; an FDR is missing where nothing is called stable. {found.protocol}"
     )
     title = "Zhang et al. beside the paper's method [%]"
     return Table("zhang", title, note, rows, ("method", "N_w", "on"))
