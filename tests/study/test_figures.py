@@ -237,12 +237,16 @@ def test_dots_are_sorted_by_the_first_panel():
     figure = drawn(
         draw_dots(
             {
-                "by recording": {"a": Estimate(90.0, 88.0, 91.0, 95.0), "b": Estimate(92.0), "c": Estimate(None)},
+                "by recording": {
+                    "a": Estimate(90.0, 88.0, 91.0, 95.0),
+                    "b": Estimate(92.0),
+                    "c": Estimate(None),
+                },
                 "by object": {"a": Estimate(80.0), "d": Estimate(85.0)},
             },
             strong={"b"},
         )
-    )  # fmt: skip
+    )
     left, right = figure.axes
     names = [label.get_text() for label in left.get_yticklabels()]
     assert names == ["d", "c", "a", "b"]

@@ -11,11 +11,29 @@ from holdfast.study.tables import Row, Table
 
 def confusion(**options):
     rows = [
-        Row({"classifier": "LogReg", "on": "fresh & new", "figure": "Acc [%]"}, 94.25, 95.3, 60, (92.0, 96.04)),
-        Row({"classifier": "LogReg", "on": "fresh & new", "figure": "delay [s]"}, math.inf, None, 60, (0.2, math.inf)),
+        Row(
+            {"classifier": "LogReg", "on": "fresh & new", "figure": "Acc [%]"},
+            94.25,
+            95.3,
+            60,
+            (92.0, 96.04),
+        ),
+        Row(
+            {"classifier": "LogReg", "on": "fresh & new", "figure": "delay [s]"},
+            math.inf,
+            None,
+            60,
+            (0.2, math.inf),
+        ),
         Row({"classifier": "LogReg", "on": "held out", "figure": "Acc [%]"}, 95.3, 95.3, 60),
-        Row({"classifier": "SVM", "on": "held out", "figure": "delay [s]"}, 0.0123, None, 60, (-0.01, 0.02)),
-    ]  # fmt: skip
+        Row(
+            {"classifier": "SVM", "on": "held out", "figure": "delay [s]"},
+            0.0123,
+            None,
+            60,
+            (-0.01, 0.02),
+        ),
+    ]
     given = {"note": "Of <all> N_w = 14.", "digits_of": {"delay [s]": 3}} | options
     return Table("confusion", "Table I & more", rows=rows, lines=("classifier", "on"), **given)
 
@@ -97,8 +115,12 @@ def test_what_the_columns_are_is_told_above_them():
 
 
 def test_recordings_get_a_column_where_they_differ():
-    rows = [Row({"m": "a", "figure": "x"}, 1.0, n=60), Row({"m": "b", "figure": "x"}, 1.0, n=48),
-            Row({"m": "b", "figure": "y"}, 1.0, n=12), Row({"m": "c", "figure": "y"}, 1.0)]  # fmt: skip
+    rows = [
+        Row({"m": "a", "figure": "x"}, 1.0, n=60),
+        Row({"m": "b", "figure": "x"}, 1.0, n=48),
+        Row({"m": "b", "figure": "y"}, 1.0, n=12),
+        Row({"m": "c", "figure": "y"}, 1.0),
+    ]
     made = Table("t", "T", "", rows, ("m",))
     assert to_markdown(made).splitlines()[2:] == [
         "| m | x | y | recordings |",

@@ -127,12 +127,12 @@ def test_a_large_figure_comes_as_png(monkeypatch):
 
 def test_names_are_used_once():
     one, two = sections()
-    with pytest.raises(ValueError, match="^two tables of the report are called 'first'$"):
+    with pytest.raises(ValueError, match=r"^two tables of the report are called 'first'$"):
         report("x", {}, [one, one._replace(figures=[])])
-    with pytest.raises(ValueError, match="^two figures of the report are called 'curve-2'$"):
+    with pytest.raises(ValueError, match=r"^two figures of the report are called 'curve-2'$"):
         report("x", {}, [two._replace(tables=[]), two])
     with pytest.raises(
-        ValueError, match="^a figure's name is letters, digits, - and _; 'a b' given$"
+        ValueError, match=r"^a figure's name is letters, digits, - and _; 'a b' given$"
     ):
         report("x", {}, [Section("x", "", [], [Picture("a b", "", drawn())])])
 
@@ -149,10 +149,18 @@ def test_the_folder(tmp_path):
     out = tmp_path / "out"
     write(out)
     assert files(out) == [
-        "figures/curve-2.png", "figures/curve-2.svg", "figures/curve.png", "figures/curve.svg",
-        "report.html", "study.json",
-        *(f"tables/{name}.{kind}" for name in ("first", "second") for kind in ("csv", "json", "tex")),
-    ]  # fmt: skip
+        "figures/curve-2.png",
+        "figures/curve-2.svg",
+        "figures/curve.png",
+        "figures/curve.svg",
+        "report.html",
+        "study.json",
+        *(
+            f"tables/{name}.{kind}"
+            for name in ("first", "second")
+            for kind in ("csv", "json", "tex")
+        ),
+    ]
     told = json.loads((out / "study.json").read_text())
     assert told["seed"] == 0
     assert told["tables"]["first"][0] == {
@@ -178,7 +186,7 @@ def test_a_study_is_replaced_by_force_alone(tmp_path):
     (out / "tables/old.csv").touch()
     (out / "notes.txt").write_text("mine")
     with pytest.raises(
-        OutputError, match="holds a study already: choose another name, or give --force$"
+        OutputError, match=r"holds a study already: choose another name, or give --force$"
     ):
         write(out)
     write(out, force=True)
@@ -190,9 +198,9 @@ def test_a_folder_of_other_things_is_left_alone(tmp_path):
     message = r"holds other things \(notes.txt, ...\) and no study: choose a folder of its own$"
     with pytest.raises(OutputError, match=message):
         write(tmp_path, force=True)
-    with pytest.raises(OutputError, match="is a file; the study is written to a folder$"):
+    with pytest.raises(OutputError, match=r"is a file; the study is written to a folder$"):
         refuse_study(tmp_path / "notes.txt", force=True)
-    with pytest.raises(OutputError, match="no does not exist$"):
+    with pytest.raises(OutputError, match=r"no does not exist$"):
         refuse_study(tmp_path / "no/out")
 
 

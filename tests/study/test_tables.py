@@ -80,7 +80,7 @@ numbers = st.none() | st.floats(allow_nan=False)
 def test_csv_holds_every_figure_to_the_last_digit(given_rows):
     made = table(*(row(ours, paper, classifier=name) for name, ours, paper in given_rows))
     header, *lines = csv.reader(io.StringIO(to_csv(made), newline=""))
-    assert header == "classifier,figure,ours,paper,difference,n,low,high".split(",")
+    assert header == ["classifier", "figure", "ours", "paper", "difference", "n", "low", "high"]
     read = [
         (name, *(float(x) if x else None for x in (ours, paper)))
         for name, _, ours, paper, *_ in lines
@@ -116,13 +116,22 @@ def test_a_table_comes_back_from_messagepack():
 @pytest.mark.parametrize(
     ("build", "message"),
     [
-        (lambda: Table("a/b", "", "", [], ("x",)), "a table's name is letters, digits, - and _; 'a/b' given"),
+        (
+            lambda: Table("a/b", "", "", [], ("x",)),
+            "a table's name is letters, digits, - and _; 'a/b' given",
+        ),
         (lambda: Table("a", "", "", [], ()), "table a: no key names its lines"),
-        (lambda: table(Row({"paper": "x", "figure": "y"}, 1.0)), "table some: a key may not be called 'paper'"),
-        (lambda: table(Row({"classifier": "x"}, 1.0)), "table some: a row has no 'figure': {'classifier': 'x'}"),
+        (
+            lambda: table(Row({"paper": "x", "figure": "y"}, 1.0)),
+            "table some: a key may not be called 'paper'",
+        ),
+        (
+            lambda: table(Row({"classifier": "x"}, 1.0)),
+            "table some: a row has no 'figure': {'classifier': 'x'}",
+        ),
         (lambda: table(row(1), row(2)), "table some: two rows for LogReg / Acc"),
     ],
-)  # fmt: skip
+)
 def test_a_table_that_contradicts_itself_is_refused(build, message):
     with pytest.raises(ValueError) as caught:
         build()

@@ -11,7 +11,10 @@ from holdfast.study.typeset import as_html, as_latex, as_markdown
 @pytest.mark.parametrize(
     ("text", "latex"),
     [
-        ("50 % & $3 #1 a_b {x} ~ ^", r"50 \% \& \$3 \#1 a\_b \{x\} \textasciitilde{} \textasciicircum{}"),
+        (
+            "50 % & $3 #1 a_b {x} ~ ^",
+            r"50 \% \& \$3 \#1 a\_b \{x\} \textasciitilde{} \textasciicircum{}",
+        ),
         ("\\", r"\textbackslash{}"),
         ("F_a, F_tip, N_w, sigma", r"$F_{a}$, $F_{\mathrm{tip}}$, $N_{w}$, $\sigma$"),
         ("my_F_a.mcap sigmas", r"my\_F\_a.mcap sigmas"),
@@ -21,7 +24,7 @@ from holdfast.study.typeset import as_html, as_latex, as_markdown
         ("ﬁ\u2076\u0160", "fi6S"),
         ("a\n\tb", "a  b"),
     ],
-)  # fmt: skip
+)
 def test_latex(text, latex):
     assert as_latex(text) == latex
 
