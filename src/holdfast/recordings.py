@@ -160,7 +160,8 @@ class Truth:
         times: (n,) [s].
         hand: arrays of first axis n: `phase`, `outside_force` (n, 3) [N] world, `object_pose`
             (n, 7) position [m] and quaternion w x y z in the world, `joints` (n, n_joints)
-            [rad], and what else a source knows.
+            [rad], and what else a source knows (the twin: `set_point_error` (n,), the largest
+            of a joint in that sample [rad], other than 0 in a glitch of the controller).
         fingers: per finger, the same: `contact_force` (n, 3) on the object [N] world,
             `slip_speed` (n,) [m/s], `slipping_share` (n,), `tip_pose` (n, 7).
 

@@ -14,21 +14,26 @@ RULE = LabelRule()
 N, U, S = ContactState.NO_CONTACT, ContactState.UNSTABLE, ContactState.STABLE
 
 
-def truth(*spans, force=None, slip=None):
-    """Spans of (seconds, phase, touching); slip and force are [(start, end, value)]."""
+def truth(*spans, force=None, slip=None, outside=None):
+    """Spans of (seconds, phase, touching); the forces and slip are [(start, end, value)]."""
     phases, loads = [], []
     for seconds, phase, touching in spans:
         n = round(seconds * RATE)
         phases += [phase] * n
         loads += [2.0 * touching] * n
     times = np.arange(len(phases)) / RATE
-    forces, speeds = np.array(loads, dtype=float), np.zeros(len(phases))
-    for column, changes in ((forces, force or ()), (speeds, slip or ())):
+    forces, speeds, pushes = np.array(loads, dtype=float), *np.zeros((2, len(phases)))
+    changed = ((forces, force or ()), (speeds, slip or ()), (pushes, outside or ()))
+    for column, changes in changed:
         for start, end, value in changes:
             column[(times > start - 1e-9) & (times < end - 1e-9)] = value
     vectors = forces[:, None] * [0.0, 0.6, 0.8]
     finger = {"contact_force": vectors, "slip_speed": speeds}
-    return Truth(times, {"phase": np.array(phases, dtype=str)}, {"thumb": finger})
+    hand = {
+        "phase": np.array(phases, dtype=str),
+        "outside_force": pushes[:, None] * [0.0, 0.0, -1.0],
+    }
+    return Truth(times, hand, {"thumb": finger})
 
 
 GRASP = (
@@ -66,6 +71,23 @@ def test_a_grasp_without_disturbance():
         (5.0, 5.5, U, Cause.RELEASED),
         (5.5, 6.7, N, None),  # set down, not lost
     ]
+
+
+def test_while_somebody_else_holds_the_object_it_is_not_stable():
+    handed_over = truth(*GRASP, outside=[(0.0, 2.3, 3.0), (4.8, 6.7, 3.0)])
+    assert told(handed_over) == [
+        (0.0, 1.5, N, None),
+        (1.5, 2.0, U, Cause.CLOSING),
+        (2.0, pytest.approx(2.4, abs=0.011), U, Cause.DISTURBANCE),
+        (pytest.approx(2.4, abs=0.011), pytest.approx(4.7, abs=0.011), S, None),
+        (pytest.approx(4.7, abs=0.011), 5.0, U, Cause.DISTURBANCE),
+        (5.0, 5.5, U, Cause.RELEASED),
+        (5.5, 6.7, N, None),
+    ]
+
+
+def test_a_force_too_small_to_be_contact_does_not_count():
+    assert told(truth(*GRASP, outside=[(2.5, 3.0, 0.04)])) == told(truth(*GRASP))
 
 
 def test_labels_tell_where_they_come_from():

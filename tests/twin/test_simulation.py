@@ -147,7 +147,8 @@ class TestTruth:
     def test_has_all_that_is_promised(self, any_recording):
         truth, n = any_recording.truth, len(any_recording.truth.times)
         assert {name: array.shape for name, array in truth.hand.items()} == {
-            "phase": (n,), "outside_force": (n, 3), "object_pose": (n, 7), "joints": (n, 16)
+            "phase": (n,), "outside_force": (n, 3), "object_pose": (n, 7), "joints": (n, 16),
+            "set_point_error": (n,),
         }  # fmt: skip
         assert tuple(truth.fingers) == tuple(any_recording.modules) == FINGERS
         for finger in truth.fingers.values():

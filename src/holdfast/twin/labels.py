@@ -42,12 +42,14 @@ def labels_from_truth(
 ) -> tuple[Label, ...]:
     """The labels of one finger.
 
-    Stable while the object is locked, the finger touches it, nothing disturbs it and it does
-    not slide; unstable while the hand closes or opens on it and during disturbances (cause
+    Stable while the object is locked, the finger touches it, nobody else does and it does not
+    slide: the hand alone governs it, as the paper has it. So the hand-over at both ends is not
+    stable. Unstable while the hand closes or opens on it and during disturbances (cause
     slip, where it slides in them); no contact otherwise.
 
     Args:
-        truth: with `phase` of the hand, and `contact_force` and `slip_speed` of the finger.
+        truth: with `phase` and `outside_force` of the hand, and `contact_force` and `slip_speed`
+            of the finger.
         finger: whose labels.
         rule: thresholds and margins.
     """
@@ -60,7 +62,8 @@ def labels_from_truth(
     )
     held = np.isin(phase, (Phase.LOCKED, Phase.DISTURBED, Phase.SLIPPING))
     sliding = held & (arrays["slip_speed"] > rule.sliding)
-    troubled = np.isin(phase, (Phase.DISTURBED, Phase.SLIPPING)) | sliding
+    acted = held & (np.linalg.norm(truth.hand["outside_force"], axis=1) > rule.contact)
+    troubled = np.isin(phase, (Phase.DISTURBED, Phase.SLIPPING)) | sliding | acted
     troubled = held & _grown(_closed(troubled, times, rule.merge), times, rule.margin)
     troubled = held & _bridged(phase == Phase.CLOSING, troubled, times, rule.merge)
     lost = _since(held) & ~_since(phase == Phase.RELEASED) & (phase == Phase.FREE)

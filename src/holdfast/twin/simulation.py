@@ -196,7 +196,7 @@ class _Log:
     def __init__(self) -> None:
         self._phase: list[Phase] = []
         self._rows: dict[str, list[Array]] = {
-            name: [] for name in ("outside_force", "object_pose", "joints")
+            name: [] for name in ("outside_force", "object_pose", "joints", "set_point_error")
         }
         self._tips: list[Array] = []
         self._bodies: list[Array] = []
@@ -208,6 +208,7 @@ class _Log:
         pose = np.concatenate([world.bodies[-1, :3], data.qpos[N_JOINTS + 3 :]])
         self._rows["object_pose"].append(pose)
         self._rows["joints"].append(data.qpos[:N_JOINTS].copy())
+        self._rows["set_point_error"].append(np.array(world.set_point_error))
         self._tips.append(world.contact.tips.copy())
         self._bodies.append(world.bodies[:-1].copy())
 

@@ -47,6 +47,7 @@ class World:
         self.constants = constants_of(surface, thing)
         self.bodies = np.zeros((len(FINGERS) + 1, 18))
         self.outside = np.zeros(6)
+        self.set_point_error = 0.0
         self._wrench = np.zeros(6)
         self._numbers = np.zeros(9)
         self._origin = np.zeros(3)
@@ -68,6 +69,7 @@ class World:
         """One sample on: seven steps of the physics under that command."""
         data = self.hand.data
         target = self.path.targets(command.depths)
+        self.set_point_error = 0.0
         if command.push != self._push:
             self._push = command.push
             self._origin[:] = self.bodies[-1, :3]
@@ -86,6 +88,7 @@ class World:
             )  # fmt: skip
             self.hand.apply(self.contact.tips, self._wrench, self.bodies)
             if self._tick % EVERY == 0:
+                self._note_glitch(self._tick // EVERY)
                 control(
                     self.controller, self._tick // EVERY, data.qpos, data.qfrc_bias, target,
                     EVERY * TIMESTEP, data.qfrc_applied,
@@ -94,6 +97,11 @@ class World:
             mujoco.mj_step2(self.hand.model, data)
         if self.bodies[-1, 2] < GONE:
             self._freeze()
+
+    def _note_glitch(self, tick: int) -> None:
+        errors = self.controller.errors
+        error = float(np.abs(errors[min(tick, len(errors) - 1)]).max())
+        self.set_point_error = max(self.set_point_error, error)
 
     def _place(self, start: Array, side: str) -> None:
         place, turn = object_pose(self.thing, side)
