@@ -1,0 +1,72 @@
+import math
+import time
+
+import pytest
+
+from holdfast.cli import console
+from holdfast.cli.console import Bar, progress
+
+
+@pytest.fixture
+def clock(monkeypatch):
+    """A clock that the test moves on."""
+    now = [1000.0]
+    monkeypatch.setattr(console.time, "monotonic", lambda: now[0])
+
+    def wait(seconds):
+        now[0] += seconds
+
+    return wait
+
+
+def on_terminal(monkeypatch):
+    monkeypatch.setattr("sys.stderr.isatty", lambda: True, raising=False)
+
+
+def test_where_nobody_looks_a_line_a_minute(capsys, clock):
+    with Bar("working", 100.0) as bar:
+        for _ in range(4):
+            clock(50.0)
+            bar.advance(10.0)
+    assert capsys.readouterr().err.splitlines() == [
+        "working: 20%, about 7 min left",
+        "working: 40%, about 5 min left",
+    ]
+
+
+def test_without_a_total_nothing_is_foretold(capsys, clock):
+    with Bar("working") as bar:
+        clock(100.0)
+        bar.advance()
+    assert capsys.readouterr() == ("", "")
+
+
+def test_what_is_costly_weighs_more(capsys, clock):
+    for _ in progress(iter((30.0, 70.0)), "working", 100.0, cost=lambda item: item):
+        clock(90.0)
+    assert capsys.readouterr().err.splitlines() == [
+        "working: 30%, about 4 min left",
+        "working: 100%, about 0 min left",
+    ]
+
+
+def test_a_bar_appears_before_the_first_step_is_done(capsys, monkeypatch):
+    on_terminal(monkeypatch)
+    monkeypatch.setattr(console, "PATIENCE", 0.01)
+    with Bar("working", 3) as bar:
+        ends = time.monotonic() + 20
+        while bar._shown is None and time.monotonic() < ends:
+            time.sleep(0.01)
+    err = capsys.readouterr().err
+    assert "working" in err
+    assert "-:--:--" in err
+
+
+def test_a_bar_tells_the_time_left(capsys, monkeypatch, clock):
+    on_terminal(monkeypatch)
+    with Bar("working", 10) as bar:
+        clock(60.0)
+        bar.advance()
+        assert bar._lasts() == pytest.approx(600.0)
+    assert math.isnan(Bar("working", 10)._lasts())
+    assert "10%" in capsys.readouterr().err

@@ -1,0 +1,306 @@
+import contextlib
+import os
+import signal
+import subprocess
+import sys
+import time
+from pathlib import Path
+
+import msgspec
+import numpy as np
+import pytest
+
+from holdfast.cli.console import progress
+from holdfast.errors import EngineError, OutputError
+from holdfast.parallel import Engine
+from holdfast.study import work
+from holdfast.study.work import Task, Work, source_digest
+
+ENGINES = [Engine(1), Engine(2)]
+
+
+class Figure(msgspec.Struct, frozen=True):
+    value: float
+    parts: list[float]
+
+
+def figure(place, seed):
+    """What a task of the study may look like: random numbers by key, a Struct of NumPy numbers."""
+    parts = np.random.default_rng([place, seed]).normal(size=3)
+    return Figure(parts.sum(), parts)
+
+
+def noted(place, folder):
+    """Leaves one byte for each time that it is called."""
+    with (Path(folder) / str(place)).open("ab") as file:
+        file.write(b"x")
+    time.sleep(0.05)
+    return place
+
+
+def fail(place):
+    if place == 2:
+        raise ValueError("no good")
+    if place == 3:
+        raise OSError(28, "No space left on device")
+    return place
+
+
+def tasks(n=8):
+    return [Task(f"figure/{place}", figure, (place, 7), Figure) for place in range(n)]
+
+
+def noted_tasks(folder, n=12):
+    return [Task(f"noted/{place}", noted, (place, str(folder)), int) for place in range(n)]
+
+
+def calls(folder):
+    return {path.name: path.stat().st_size for path in folder.iterdir()}
+
+
+def kept(folder):
+    return sorted((folder / "work").glob("[!.]*.msgpack"))
+
+
+@pytest.fixture
+def log(tmp_path):
+    place = tmp_path / "log"
+    place.mkdir()
+    return place
+
+
+@pytest.fixture
+def expected():
+    return {f"figure/{place}": figure(place, 7) for place in range(8)}
+
+
+@pytest.mark.parametrize("engine", ENGINES)
+@pytest.mark.parametrize("order", [1, -1])
+def test_results_are_the_same_on_every_engine_in_every_order(tmp_path, engine, order, expected):
+    results = Work(tmp_path, engine).run(tasks()[::order])
+    assert list(results) == list(expected)[::order]
+    for name, result in results.items():
+        assert isinstance(result, Figure)
+        np.testing.assert_array_equal(result.parts, expected[name].parts)
+        assert result.value == expected[name].value
+
+
+def test_a_worker_of_a_cluster_that_is_killed_changes_no_result(tmp_path, log):
+    distributed = pytest.importorskip("distributed")
+    from dask import config
+
+    def follow(items, _, __, ___):
+        for place, item in enumerate(items):
+            if place == 10:
+                with distributed.Client(cluster.scheduler_address, set_as_default=False) as client:
+                    os.kill(client.run(os.getpid).popitem()[1], signal.SIGKILL)
+            yield item
+
+    with (
+        config.set({"distributed.comm.timeouts.connect": "1s"}),
+        distributed.LocalCluster(
+            n_workers=2,
+            threads_per_worker=1,
+            host="127.0.0.1",
+            dashboard_address="127.0.0.1:0",
+            silence_logs=50,
+        ) as cluster,
+    ):
+        engine = Engine.parse(f"dask:{cluster.scheduler_address}")
+        wanted = tasks() + noted_tasks(log, 32)
+        there = Work(tmp_path / "there", engine, follow).run(wanted)
+    assert there == Work(tmp_path / "here").run(wanted)
+    assert [path.name for path in kept(tmp_path / "there")] == [
+        path.name for path in kept(tmp_path / "here")
+    ]
+
+
+def test_what_is_kept_is_not_done_again(tmp_path, log):
+    told = []
+    first = Work(tmp_path).run(noted_tasks(log, 4))
+    again = Work(tmp_path, tell=told.append).run(noted_tasks(log, 6))
+    assert set(calls(log).values()) == {1}
+    assert again == {f"noted/{place}": place for place in range(6)}
+    assert first.items() <= again.items()
+    assert told == ["4 of 6 tasks are done already"]
+
+
+def test_a_study_that_is_killed_does_only_what_is_missing(tmp_path, log):
+    code = f"""if True:
+        from pathlib import Path
+        from holdfast.parallel import Engine
+        from study.test_work import Work, noted_tasks
+        Work(Path({str(tmp_path)!r}), Engine(2)).run(noted_tasks({str(log)!r}))
+    """
+    tests = str(Path(__file__).parents[1])
+    with subprocess.Popen(
+        [sys.executable, "-c", code],
+        env=os.environ | {"PYTHONPATH": tests},
+        start_new_session=True,
+    ) as study:
+        while len(kept(tmp_path)) < 5 and study.poll() is None:
+            time.sleep(0.01)
+        os.killpg(study.pid, signal.SIGKILL)
+    n_kept = len(kept(tmp_path))
+    assert 5 <= n_kept < 12
+    done = calls(log)
+    results = Work(tmp_path).run(noted_tasks(log))
+    assert results == {f"noted/{place}": place for place in range(12)}
+    again = [place for place, n in calls(log).items() if n != done.get(place, 0)]
+    assert len(again) == 12 - n_kept
+    assert max(calls(log).values()) <= 2
+
+
+@pytest.mark.parametrize(
+    "damage",
+    [
+        pytest.param(lambda data: b"", id="empty"),
+        pytest.param(lambda data: data[:-1], id="cut"),
+        pytest.param(lambda data: data[:-1] + bytes([data[-1] ^ 1]), id="a bit flipped"),
+        pytest.param(lambda data: b"\xff" * len(data), id="something else"),
+    ],
+)
+def test_a_damaged_result_is_computed_again(tmp_path, log, damage):
+    first = Work(tmp_path).run(noted_tasks(log, 3))
+    path = kept(tmp_path)[1]
+    whole = path.read_bytes()
+    path.write_bytes(damage(whole))
+    assert Work(tmp_path).run(noted_tasks(log, 3)) == first
+    assert sorted(calls(log).values()) == [1, 1, 2]
+    assert path.read_bytes() == whole
+
+
+def test_no_flipped_bit_changes_a_result(tmp_path):
+    first = Work(tmp_path).run(tasks(1))
+    (path,) = kept(tmp_path)
+    whole = path.read_bytes()
+    for place in range(len(whole)):
+        path.write_bytes(whole[:place] + bytes([whole[place] ^ 4]) + whole[place + 1 :])
+        assert Work(tmp_path).run(tasks(1)) == first
+
+
+def test_other_arguments_or_another_function_are_other_work(tmp_path):
+    Work(tmp_path).run([Task("a", figure, (1, 7), Figure)])
+    Work(tmp_path).run([Task("a", figure, (1, 8), Figure)])
+    Work(tmp_path).run([Task("a", max, (1, 7), int)])
+    assert len(kept(tmp_path)) == 3
+
+
+def test_another_source_is_other_work(tmp_path, log, monkeypatch):
+    Work(tmp_path).run(noted_tasks(log, 2))
+    monkeypatch.setattr(work, "source_digest", lambda: "another")
+    Work(tmp_path).run(noted_tasks(log, 2))
+    assert set(calls(log).values()) == {2}
+
+
+def test_a_worker_with_another_source_is_refused(tmp_path, monkeypatch):
+    monkeypatch.setattr(work, "source_digest", lambda: "another")
+    with pytest.raises(EngineError, match=r"^figure/\d: its worker has another version of holdf"):
+        Work(tmp_path, Engine(2)).run(tasks(2))
+
+
+def test_the_source_leaves_out_the_command_line(tmp_path, monkeypatch):
+    def digest(**files):
+        for name, text in files.items():
+            path = tmp_path / name.replace("__", "/")
+            path.parent.mkdir(exist_ok=True)
+            path.write_text(text)
+        source_digest.cache_clear()
+        return source_digest()
+
+    monkeypatch.setattr(work, "__file__", str(tmp_path / "study" / "work.py"))
+    try:
+        first = digest(a="1", study__b="2")
+        assert digest(cli__c="3") == first
+        assert digest(study__b="3") != first
+    finally:
+        monkeypatch.undo()
+        source_digest.cache_clear()
+
+
+def test_the_same_work_under_two_names_is_done_once(tmp_path, log):
+    twins = [Task(name, noted, (1, str(log)), int) for name in "ab"]
+    assert Work(tmp_path).run(twins) == {"a": 1, "b": 1}
+    assert calls(log) == {"1": 1}
+
+
+def test_two_tasks_of_one_name_are_refused(tmp_path):
+    with pytest.raises(ValueError, match=r"^two tasks are called figure/0$"):
+        Work(tmp_path).run(tasks(2) + tasks(1))
+
+
+@pytest.mark.parametrize("engine", ENGINES)
+def test_a_failure_names_its_task_and_the_rest_stays_kept(tmp_path, engine):
+    with pytest.raises(ValueError, match=r"^fail/2: no good$"):
+        Work(tmp_path, engine).run([Task(f"fail/{n}", fail, (n,), int) for n in (0, 1, 2)])
+    if engine.n_jobs == 1:
+        assert len(kept(tmp_path)) == 2
+
+
+@pytest.mark.parametrize("engine", ENGINES)
+def test_a_failure_of_several_parts_is_noted(tmp_path, engine):
+    with pytest.raises(OSError, match="No space left") as failure:
+        Work(tmp_path, engine).run([Task("fail/3", fail, (3,), int)])
+    assert "in the task fail/3" in failure.value.__notes__
+
+
+def test_a_result_that_is_not_as_announced(tmp_path):
+    with pytest.raises(TypeError, match=r"^figure/0 returned no <class 'int'>: Expected `int`"):
+        Work(tmp_path).run([Task("figure/0", figure, (0, 7), int)])
+    assert kept(tmp_path) == []
+
+
+def test_a_result_that_cannot_be_kept(tmp_path):
+    with pytest.raises(TypeError, match=r"^odd: a [a-zA-Z]*Path cannot be kept"):
+        Work(tmp_path).run([Task("odd", Path, ("x",), str)])
+
+
+def test_long_ones_are_begun_first_and_weigh_more(tmp_path):
+    seen = []
+
+    def follow(items, what, total, cost):
+        seen.append((what, total))
+        for item in items:
+            seen.append((item[0].name, cost(item)))
+            yield item
+
+    costs = {"short": 1.0, "long": 5.0, "middle": 2.0}
+    Work(tmp_path, follow=follow).run(
+        [Task(name, figure, (0, place), Figure, costs[name]) for place, name in enumerate(costs)]
+    )
+    assert seen == [("working", 8.0), ("long", 5.0), ("middle", 2.0), ("short", 1.0)]
+
+
+def test_the_bar_of_the_command_line_follows(tmp_path, expected):
+    assert Work(tmp_path, follow=progress).run(tasks()).keys() == expected.keys()
+
+
+def test_nothing_to_do(tmp_path):
+    assert Work(tmp_path).run([]) == {}
+
+
+def test_a_folder_that_cannot_be(tmp_path):
+    (tmp_path / "work").touch()
+    with pytest.raises(OutputError, match=r"^cannot write .*work: File exists$"):
+        Work(tmp_path).run(tasks(1))
+
+
+def test_a_result_is_stored_before_the_next_is_awaited(tmp_path, log):
+    def follow(items, *_):
+        for item in items:
+            assert len(kept(tmp_path)) == len(calls(log))
+            yield item
+
+    Work(tmp_path, follow=follow).run(noted_tasks(log, 3))
+
+
+def test_an_interrupt_costs_what_was_being_done(tmp_path, log):
+    def follow(items, *_):
+        for place, item in enumerate(items):
+            if place == 2:
+                raise KeyboardInterrupt
+            yield item
+
+    with contextlib.suppress(KeyboardInterrupt):
+        Work(tmp_path, follow=follow).run(noted_tasks(log, 6))
+    assert len(kept(tmp_path)) == 3
