@@ -53,4 +53,4 @@ def test_it_sees_nothing_that_is_to_come(rate):
 def test_what_it_is():
     method = METHODS["tcn"]
     assert (method.name, method.category, method.recipe.name) == ("tcn", "learning", "tcn")
-    assert dict(method.reference) == {"n_epochs": 12, "learning_rate": 2e-3, "dropout": 0.2}
+    assert dict(method.reference) == {"n_epochs": 20, "learning_rate": 2e-3, "dropout": 0.2}

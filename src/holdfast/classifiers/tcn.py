@@ -104,7 +104,7 @@ class TemporalConvolution:
     n_channels: int = 3
     name: str = "tcn"
     reference: Parameters = field(
-        default_factory=lambda: {"n_epochs": 12, "learning_rate": 2e-3, "dropout": 0.2}
+        default_factory=lambda: {"n_epochs": 20, "learning_rate": 2e-3, "dropout": 0.2}
     )
 
     def suggest(self, trial: "Trial") -> Parameters:
