@@ -26,6 +26,7 @@ VERBS = {
     "train": "Trains a model from labelled recordings.",
     "evaluate": "Measures a model on labelled recordings.",
     "detect": "Tells the contact state of every finger at every sample.",
+    "study": "Repeats the paper, and asks what it did not.",
     "bench": "Measures speed, against peers and against the machine.",
     "sensors": "Shows the sensors and hands that are known.",
     "doctor": "Shows what is installed and what works.",

@@ -27,6 +27,7 @@ class Corpus(msgspec.Struct, frozen=True):
         fingers: that have labels of both classes, in the order of the device.
         rate: the median over the recordings [Hz].
         tare: how the baseline is found, as `--tare` takes it.
+        n_samples: of all fingers and pads together.
     """
 
     name: str
@@ -36,6 +37,7 @@ class Corpus(msgspec.Struct, frozen=True):
     fingers: tuple[str, ...]
     rate: float
     tare: str = "0.5"
+    n_samples: int = 0
 
     def load(self) -> Dataset:
         """The recordings, each read when it is asked for.
@@ -74,9 +76,11 @@ def corpus_of(name: str, folder: str | Path, tare: str = "0.5") -> Corpus:
     dataset = load_dataset(folder)
     digest = hashlib.blake2b(digest_size=16)
     n_labelled: dict[str, Counter[bool]] = {}
+    n_samples: list[int] = []
 
     def looked_at() -> Iterator[Recording]:
         for recording in dataset:
+            n_samples.extend(len(module.times) for module in recording.modules.values())
             digest.update(content_digest(recording))
             _count(recording, n_labelled)
             yield recording
@@ -96,6 +100,7 @@ def corpus_of(name: str, folder: str | Path, tare: str = "0.5") -> Corpus:
         fingers=_judgeable(n_labelled, folder),
         rate=found.rate,
         tare=str(Tare.parse(tare)),
+        n_samples=sum(n_samples),
     )
 
 

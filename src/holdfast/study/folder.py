@@ -13,8 +13,8 @@ from holdfast.study.layouts import to_latex
 from holdfast.study.report import Section, report
 from holdfast.study.tables import Table, to_csv, to_json
 
-WORK = "work"
-"""Results of tasks, in the same folder: kept from a stopped study, and by a finished one."""
+KEPT = ("work", "data")
+"""Results of tasks, and data that were made, in the same folder: never replaced."""
 SUMMARY = "study.json"
 PARTS = ("tables", "figures", "report.html", SUMMARY)
 """What a study writes; the summary comes last, and says that it is complete."""
@@ -31,10 +31,10 @@ def write_study(
 ) -> None:
     """Writes `report.html`, `study.json`, and each table and figure, whole or not at all.
 
-    Everything is made in a folder beside first. `OUT/work` is left as it is.
+    Everything is made in a folder beside first. `OUT/work` and `OUT/data` are left as they are.
 
     Args:
-        out: the folder; it may exist where it holds nothing but `work`.
+        out: the folder; it may exist where it holds nothing but `work` and `data`.
         title: of the report.
         facts: what was run, for the head of the report.
         sections: of the report.
@@ -91,7 +91,7 @@ def _held(target: Path) -> set[str]:
     if not target.is_dir():
         return set()
     names = {path.name for path in target.iterdir()}
-    return {name for name in names if name != WORK and not name.startswith(".study.")}
+    return {name for name in names if name not in KEPT and not name.startswith(".study.")}
 
 
 def _write_parts(

@@ -1,0 +1,168 @@
+"""`holdfast study`: every table and figure of the paper, and those it should have had."""
+
+import time
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+from holdfast.cli.console import print_json, print_table, progress, say, show
+
+if TYPE_CHECKING:
+    from holdfast.parallel import Engine
+    from holdfast.study.plan import Plan
+    from holdfast.study.tables import Line, Row, Table
+
+HEADLINES = ("confusion", "methods", "events")
+"""Tables that are printed at the end."""
+LONGEST = 24
+"""Lines of a table that are printed."""
+
+
+def study(
+    data: Annotated[
+        Path | None, typer.Argument(help="A folder of labelled recordings; or --twin.")
+    ] = None,
+    out: Annotated[
+        Path, typer.Option("--out", "-o", help="The folder that the study is written to.")
+    ] = Path("study"),
+    twin: Annotated[
+        bool, typer.Option("--twin", help="Make the recordings first, by the physical twin.")
+    ] = False,
+    quick: Annotated[
+        bool, typer.Option("--quick", help="A few minutes: less of everything.")
+    ] = False,
+    engine: Annotated[
+        str, typer.Option(help="loky: processes here; dask:ADDRESS: a cluster.")
+    ] = "loky",
+    jobs: Annotated[int, typer.Option(help="Processes here; -1: one a processor.")] = -1,
+    seed: Annotated[int, typer.Option(help="Of everything random, the twin too.")] = 0,
+    tare: Annotated[
+        str, typer.Option(help="Seconds from the start, first, none, or START:END.")
+    ] = "0.5",
+    force: Annotated[
+        bool, typer.Option("--force", help="Replace a study; its data and work are kept.")
+    ] = False,
+    as_json: Annotated[bool, typer.Option("--json", help="Print study.json on stdout.")] = False,
+) -> None:
+    """Repeats the paper, and asks what it did not.
+
+    Writes OUT/report.html, every table as CSV, JSON and LaTeX, every figure as SVG and PNG, and
+    study.json. What is computed is kept in OUT/work and what the twin makes in OUT/data: the same
+    command goes on where it was stopped. Real recordings are taken from HOLDFAST_DATA or
+    ../shared/data where there are any.
+
+    Example:
+      holdfast study --twin --quick --out quick/
+      holdfast study --twin --out study/
+      holdfast study recordings/ --out mine/ --engine dask:tcp://10.0.0.1:8786
+    """
+    from holdfast.study.study import study as run
+
+    engines = _checked(data, out, engine, jobs, seed, tare, twin=twin, force=force)
+    begun = time.perf_counter()
+    try:
+        plan, left_out = _plan(data, out, seed, tare, jobs, quick=quick)
+        made_in = time.perf_counter() - begun
+        tables = run(
+            plan, out, engines, follow=progress, tell=say, force=force, made_in=made_in,
+            left_out=left_out,
+        )  # fmt: skip
+    except KeyboardInterrupt:
+        say(f"what was done so far is in {out}: the same command goes on with it")
+        raise
+    if as_json:
+        from msgspec import json
+
+        print_json(json.decode((out / "study.json").read_bytes()))
+        return
+    for table in tables:
+        if table.name in HEADLINES:
+            _show(table)
+    show(f"{out / 'report.html'}: all {len(tables)} tables, with figures")
+
+
+def _checked(
+    data: Path | None,
+    out: Path,
+    engine: str,
+    jobs: int,
+    seed: int,
+    tare: str,
+    *,
+    twin: bool,
+    force: bool,
+) -> "Engine":
+    """Refuses bad input before any work is done; the engine.
+
+    Raises:
+        ValueError: an argument is wrong.
+        OutputError: `out` holds something.
+        EngineError: no cluster answers there.
+    """
+    from holdfast.features import Tare
+    from holdfast.parallel import Engine
+    from holdfast.study.folder import refuse_study
+
+    if (data is None) != twin:
+        given = "both" if twin else "neither"
+        raise ValueError(f"a folder of recordings or --twin expected, {given} given")
+    if seed < 0 or jobs == 0:
+        raise ValueError(
+            f"a seed of at least 0 and jobs other than 0 expected; {seed} and {jobs} given"
+        )
+    Tare.parse(tare)
+    chosen = Engine.parse(engine, jobs)
+    refuse_study(out, force=force)
+    if chosen.scheduler is not None:
+        list(chosen.each(abs, [(0,)]))
+    return chosen
+
+
+def _plan(
+    data: Path | None, out: Path, seed: int, tare: str, jobs: int, *, quick: bool
+) -> "tuple[Plan, list[str]]":
+    """What is studied, and what is left out; makes the twin's recordings where it is asked to."""
+    from holdfast.cli.study_data import real_corpus, twin_corpora
+    from holdfast.study.corpus import corpus_of
+    from holdfast.study.plan import Plan
+    from holdfast.study.study import refuse_plan
+
+    if data is None:
+        made = out / "data" / "quick" if quick else out / "data"
+        corpora = twin_corpora(made, seed, quick=quick, jobs=jobs, tare=tare)
+    else:
+        corpora = {"main": corpus_of("main", data, tare)}
+    refuse_plan(Plan(corpora))
+    real, left_out = real_corpus(out / "data" / "real")
+    return Plan(corpora, real, quick, seed), left_out
+
+
+def _show(table: "Table") -> None:
+    """A table for a terminal: ours, and the paper's in parentheses."""
+    from holdfast.study.tables import digits_of, pivot
+
+    grid = pivot(table)
+    show(table.title)
+    print_table(
+        (*table.lines, *grid.columns),
+        [_texts(line, [digits_of(table, name) for name in grid.columns])
+         for line in grid.lines[:LONGEST]],
+    )  # fmt: skip
+    if len(grid.lines) > LONGEST:
+        show(f"... {len(grid.lines) - LONGEST} more lines in the report")
+    show()
+
+
+def _texts(line: "Line", digits: list[int]) -> list[str]:
+    cells = zip(line.cells, digits, strict=True)
+    return [*line.heads, *(_text(row, n) for row, n in cells)]
+
+
+def _text(row: "Row | None", digits: int) -> str:
+    from holdfast.study.tables import number_text
+
+    if row is None:
+        return "-"
+    paper = "" if row.paper is None else f" ({number_text(row.paper, digits)})"
+    return number_text(row.ours, digits) + paper
