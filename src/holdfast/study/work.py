@@ -1,13 +1,16 @@
 """Tasks whose results are kept, so that a stopped study goes on where it was stopped."""
 
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from contextlib import contextmanager
 from dataclasses import dataclass
 from functools import lru_cache
 from hashlib import sha256
 from pathlib import Path
 from typing import Any, NamedTuple, Protocol, TypeVar
 
+import numba
 from msgspec import UNSET, MsgspecError, Raw, Struct, UnsetType, msgpack
+from threadpoolctl import threadpool_limits
 
 from holdfast.errors import EngineError, OutputError
 from holdfast.files import write_whole
@@ -163,10 +166,27 @@ def _do(source: str, name: str, function: Callable[..., Any], arguments: tuple[A
     try:
         if source != source_digest():
             raise EngineError("its worker has another version of holdfast than this one")
-        return msgpack.encode(function(*arguments), enc_hook=_plain)
+        with _one_thread():
+            return msgpack.encode(function(*arguments), enc_hook=_plain)
     except Exception as failure:
         _put_before(name, failure)
         raise
+
+
+@contextmanager
+def _one_thread() -> Iterator[None]:
+    """Within it neither NumPy nor compiled kernels use threads of their own.
+
+    Workers side by side would take processors from each other; and sums of many threads round
+    otherwise than those of one.
+    """
+    before = numba.get_num_threads()
+    numba.set_num_threads(1)
+    try:
+        with threadpool_limits(1):
+            yield
+    finally:
+        numba.set_num_threads(before)
 
 
 def _put_before(name: str, failure: Exception) -> None:
