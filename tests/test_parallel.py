@@ -3,6 +3,7 @@ import signal
 import socket
 import sys
 import time
+from contextlib import contextmanager
 
 import numpy as np
 import pytest
@@ -49,14 +50,20 @@ def die_at(place, deadly):
     return place
 
 
-@pytest.fixture(scope="module")
-def cluster():
+@contextmanager
+def two_workers(**settings):
     """A cluster of two worker processes on this machine that nobody else can reach."""
     distributed = pytest.importorskip("distributed")
     from dask import config
 
     soon = {"distributed.comm.timeouts.connect": "1s"}  # that a dead worker is given up
-    with config.set(soon), distributed.LocalCluster(n_workers=2, **PRIVATE) as cluster:
+    with config.set(soon | settings), distributed.LocalCluster(n_workers=2, **PRIVATE) as cluster:
+        yield cluster
+
+
+@pytest.fixture(scope="module")
+def cluster():
+    with two_workers() as cluster:
         yield cluster
 
 
@@ -64,7 +71,7 @@ def engine_of(cluster):
     return Engine.parse(f"dask:{cluster.scheduler_address}")
 
 
-def workers(cluster):
+def pids(cluster):
     from distributed import Client
 
     with Client(cluster.scheduler_address, set_as_default=False) as client:
@@ -155,16 +162,20 @@ class TestCluster:
         for result in engine_of(cluster).each(total, arguments):
             results.append(result)
             if len(results) == 20:
-                os.kill(workers(cluster)[0], signal.SIGKILL)
+                os.kill(pids(cluster)[0], signal.SIGKILL)
         assert results == list(HERE.each(total, arguments))
 
     def test_a_failure_comes_through(self, cluster):
         with pytest.raises(ValueError, match="negative"):
             list(engine_of(cluster).each(power, [(1, 1), (1, -1)]))
 
-    def test_a_call_that_always_kills_is_named(self, cluster):
-        with pytest.raises(EngineError, match=r"^2: its worker died again and again"):
-            list(engine_of(cluster).each(die_at, [(place, 2) for place in range(6)]))
+    def test_a_call_that_always_kills_is_named(self):
+        calls = [(place, 2) for place in range(6)]
+        with (
+            two_workers(**{"distributed.scheduler.allowed-failures": 0}) as cluster,
+            pytest.raises(EngineError, match=r"^2: its worker died again and again"),
+        ):
+            list(engine_of(cluster).each(die_at, calls))
 
     def test_without_workers(self, monkeypatch):
         distributed = pytest.importorskip("distributed")

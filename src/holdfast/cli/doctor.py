@@ -14,6 +14,8 @@ from holdfast.cli.console import print_json, print_table, show
 
 PURPOSES = {
     "bench": "peers to compare speed with in holdfast bench",
+    "cluster": "work on a Dask cluster, --engine dask:ADDRESS",
+    "deep": "the network among the methods of holdfast study",
     "hdf5": "importing recordings kept in HDF5",
 }
 """What each extra is for."""
