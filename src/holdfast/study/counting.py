@@ -1,23 +1,21 @@
-"""What is counted of a recording and the decisions about it: slips, errors and where they are."""
+"""Where the errors of a recording are: in which phase, at which force, in which direction."""
 
-from collections.abc import Mapping, Sequence
-from typing import NamedTuple
+from collections.abc import Mapping
 
 import msgspec
 import numpy as np
 import numpy.typing as npt
 
 from holdfast.contact import STABLE, UNKNOWN, Phase
+from holdfast.methods import HAND
 from holdfast.metrics import Decisions, FingerDecisions
-from holdfast.metrics.events import ROUNDING, STABLE_BEFORE
+from holdfast.metrics.events import ROUNDING
 from holdfast.recordings import Truth
 from holdfast.sensors.values import Array
-from holdfast.study.expert import Seen
-from holdfast.twin.labels import LabelRule
+from holdfast.study.hearing import HELD, runs
+from holdfast.study.seen import Seen
 
 Mask = npt.NDArray[np.bool_]
-
-HELD = (Phase.LOCKED, Phase.DISTURBED, Phase.SLIPPING)
 
 AXES = {
     "down": (0.0, 0.0, -1.0),
@@ -32,19 +30,6 @@ NEAR = np.cos(np.radians(30.0))
 
 N_BINS = 10
 """Of probabilities, for the reliability curve."""
-
-
-class Slip(NamedTuple):
-    """An object begins to slide on a fingertip of a hand that holds it.
-
-    Attributes:
-        onset: first sample at which it slides [s].
-        told: when the hand was first said not to be stable, at the onset or later [s]; None
-            where it never was before the sliding ended.
-    """
-
-    onset: float
-    told: float | None
 
 
 class Grip(msgspec.Struct, frozen=True):
@@ -87,63 +72,28 @@ class Breakdown(msgspec.Struct, frozen=True):
     pushes: list[Pushed]
 
 
-def slips_of(seen: Seen, hand: FingerDecisions) -> list[Slip]:
-    """The slips of a recording, and when each was told; none where the truth is not known."""
-    if seen.truth is None or "phase" not in seen.truth.hand:
-        return []
-    times = seen.truth.times
-    sliding = _sliding(seen.truth)
-    slips, rested = [], -np.inf
-    for start, end in _runs(sliding):
-        since = max(rested, _held_since(seen.truth, start))
-        if times[start] - since >= STABLE_BEFORE - ROUNDING:
-            slips.append(_slip(float(times[start]), float(times[end - 1]), hand))
-        rested = float(times[end - 1])
-    return slips
-
-
-def _sliding(truth: Truth) -> Mask:
-    """Whether the object slides on a finger of a hand that holds it."""
-    rule = LabelRule()
-    held = np.isin(truth.hand["phase"], HELD)
-    found = np.zeros(len(truth.times), dtype=np.bool_)
-    for finger in truth.fingers.values():
-        touching = np.linalg.norm(finger["contact_force"], axis=1) > rule.contact
-        found |= touching & (finger["slip_speed"] > rule.sliding)
-    return np.asarray(held & found)
-
-
-def _held_since(truth: Truth, place: int) -> float:
-    held = np.isin(truth.hand["phase"][: place + 1], HELD)
-    free = np.flatnonzero(~held)
-    return float(truth.times[free[-1]]) if len(free) else float(truth.times[0])
-
-
-def _slip(onset: float, end: float, hand: FingerDecisions) -> Slip:
-    last = max(end, onset) + ROUNDING
-    rows = (hand.times >= onset - ROUNDING) & (hand.times <= max(last, onset + 0.2 + ROUNDING))
-    told = rows & (hand.states != STABLE) & (hand.states != UNKNOWN)
-    return Slip(onset, float(hand.times[np.argmax(told)]) if told.any() else None)
-
-
-def n_found(slips: Sequence[Slip], within: float) -> int:
-    """Slips that were told within that time [s]."""
-    return sum(s.told is not None and s.told <= s.onset + within + ROUNDING for s in slips)
-
-
 def count(seen: Seen, decided: Decisions) -> Breakdown:
-    """Where the errors are; nothing, where the truth is not known."""
+    """Where the errors are; nothing, where the truth is not known.
+
+    Of a method that judges the hand as a whole, those of the hand.
+    """
     truth = seen.truth
-    if truth is None or "phase" not in truth.hand or not decided.fingers:
+    judged = judged_of(decided)
+    if truth is None or not {"phase", "outside_force"} <= set(truth.hand) or not judged:
         return Breakdown({}, [], [])
-    return Breakdown(
-        _phases(truth, decided), _grips(truth, decided), _pushes(truth, decided.fingers)
-    )
+    return Breakdown(_phases(truth, judged), _grips(truth, judged), _pushes(truth, judged))
 
 
-def _phases(truth: Truth, decided: Decisions) -> dict[str, tuple[int, int]]:
+def judged_of(decided: Decisions) -> Mapping[str, FingerDecisions]:
+    """What a method decides itself: the fingers, or the hand under the name `HAND`."""
+    if decided.fingers or decided.hand is None:
+        return decided.fingers
+    return {HAND: decided.hand}
+
+
+def _phases(truth: Truth, fingers: Mapping[str, FingerDecisions]) -> dict[str, tuple[int, int]]:
     counts = {str(phase): np.zeros(2, dtype=np.int64) for phase in Phase}
-    for finger in decided.fingers.values():
+    for finger in fingers.values():
         known, wrong = _errors(finger)
         phase = truth.hand["phase"][_at(truth, finger.times)]
         for name, total in counts.items():
@@ -152,14 +102,14 @@ def _phases(truth: Truth, decided: Decisions) -> dict[str, tuple[int, int]]:
     return {name: (int(n), int(wrong)) for name, (n, wrong) in counts.items() if n}
 
 
-def _grips(truth: Truth, decided: Decisions) -> list[Grip]:
+def _grips(truth: Truth, fingers: Mapping[str, FingerDecisions]) -> list[Grip]:
     phase = truth.hand["phase"]
     grips = []
-    for name, finger in decided.fingers.items():
-        force = np.linalg.norm(truth.fingers[name]["contact_force"], axis=1)
-        locked = phase == Phase.LOCKED
-        if not locked.any():
+    locked = phase == Phase.LOCKED
+    for name, finger in fingers.items():
+        if name not in truth.fingers or not locked.any():
             continue
+        force = np.linalg.norm(truth.fingers[name]["contact_force"], axis=1)
         held = np.isin(phase, HELD)[_at(truth, finger.times)]
         known, wrong = _errors(finger)
         stable = finger.labels == STABLE
@@ -172,7 +122,7 @@ def _grips(truth: Truth, decided: Decisions) -> list[Grip]:
 def _pushes(truth: Truth, fingers: Mapping[str, FingerDecisions]) -> list[Pushed]:
     pushing = np.isin(truth.hand["phase"], (Phase.DISTURBED, Phase.SLIPPING))
     found = []
-    for start, end in _runs(pushing):
+    for start, end in runs(pushing):
         n = n_wrong = 0
         for finger in fingers.values():
             known, wrong = _errors(finger)
@@ -202,16 +152,10 @@ def _at(truth: Truth, times: Array) -> npt.NDArray[np.intp]:
     return np.maximum(np.searchsorted(truth.times, times + ROUNDING) - 1, 0)
 
 
-def _runs(mask: Mask) -> list[tuple[int, int]]:
-    """First sample of each run of True, and the first after it."""
-    edges = np.flatnonzero(np.diff(np.concatenate([[False], mask, [False]]).astype(np.int8)))
-    return [(int(a), int(b)) for a, b in edges.reshape(-1, 2)]
-
-
-def calibration_counts(decided: Sequence[FingerDecisions]) -> list[list[float]]:
+def calibration_counts(decided: Decisions) -> list[list[float]]:
     """(10, 3) sum of probabilities, stable samples and samples of each bin of probabilities."""
     total = np.zeros((N_BINS, 3))
-    for finger in decided:
+    for finger in judged_of(decided).values():
         known = (finger.labels != UNKNOWN) & (finger.states != UNKNOWN)
         p = finger.stable_probability[known]
         stable = (finger.labels[known] == STABLE).astype(np.float64)

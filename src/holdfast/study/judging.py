@@ -1,45 +1,52 @@
-"""One method on one corpus: fitted on some recordings, judged on others, and counted."""
+"""One method: fitted on some recordings, judged on others, and counted.
 
-from collections.abc import Iterator, Sequence
+No recording that is judged has a say in what judges it: not in its classifiers, not in its
+contact thresholds, not in the threshold for a rate of false alarms, which is chosen on the
+training recordings, each judged by a fit without it.
+"""
+
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import replace
 from typing import Literal, NamedTuple
 
 import msgspec
 import numpy as np
+import numpy.typing as npt
 
 from holdfast.methods import HAND, METHODS, Method
-from holdfast.metrics import (
-    Decisions,
-    EventMetrics,
-    FingerDecisions,
-    Metrics,
-    hand_decisions,
-    match_alarms,
-    pool_events,
-    summarise,
-)
-from holdfast.metrics.events import POSTS
+from holdfast.methods.cuts import CUTS
+from holdfast.metrics import Decisions, Metrics, summarise
 from holdfast.study.changes import Change
 from holdfast.study.corpus import Corpus
-from holdfast.study.counting import (
-    Breakdown,
-    Slip,
-    calibration_counts,
-    count,
-    n_found,
-    slips_of,
-)
-from holdfast.study.expert import Expert, Material, Opinion, Seen, groups_of, look, material_of
+from holdfast.study.counting import Breakdown, calibration_counts, count
+from holdfast.study.expert import Expert, Material, look, material_of
+from holdfast.study.hearing import Heard, after_glitch, hear, spells_of
+from holdfast.study.opinion import Opinion
+from holdfast.study.seen import Seen
 from holdfast.study.thresholds import Calm, shift_for
 
-FOLDS = 5
-"""Of whole recordings, each object spread over all of them."""
-INNER_FOLDS = 3
-"""Of the training recordings of a fold, on which its thresholds are chosen."""
 ALARM_RATES = (0.5, 1.0, 2.0, 5.0, 10.0, 20.0, 50.0)
 """False alarms per minute of stable label that thresholds are chosen for, in training."""
-CALM = 1.0
+COMPARED_AT = 1.0
 """The rate that methods are compared at."""
+
+Split = Literal["recording", "object"]
+
+
+class Effort(msgspec.Struct, frozen=True):
+    """How thoroughly a method is judged.
+
+    Attributes:
+        folds: of whole recordings, each object spread over all of them.
+        inner: folds of the training recordings of each, on which thresholds are chosen.
+        stride: only every so many-th decision is looked at.
+        max_rows: samples of a finger that a classifier is fitted to, evenly spread.
+    """
+
+    folds: int = 5
+    inner: int = 3
+    stride: int = 1
+    max_rows: int = 20_000
 
 
 class Job(msgspec.Struct, frozen=True):
@@ -48,34 +55,20 @@ class Job(msgspec.Struct, frozen=True):
     Attributes:
         method: name of it.
         train: corpus that it is fitted to.
-        test: corpus that it is judged on, after a fit to all of `train`; None: out of fold.
-        split: what a fold holds out: a fifth of the recordings, or one object.
-        change: of the recordings of both corpora.
+        splits: of that corpus: a fold holds out recordings, or one object.
+        tests: other corpora that it is judged on, after a fit to all of `train`.
+        change: of the recordings of all corpora.
+        effort: how thoroughly.
         seed: of everything random.
     """
 
     method: str
     train: Corpus
-    test: Corpus | None = None
-    split: Literal["recording", "object"] = "recording"
+    splits: tuple[Split, ...] = ("recording",)
+    tests: tuple[Corpus, ...] = ()
     change: Change = Change()
+    effort: Effort = Effort()
     seed: int = 0
-
-
-class Point(msgspec.Struct, frozen=True):
-    """Events at thresholds chosen, on training recordings, for a rate of false alarms.
-
-    Attributes:
-        per_minute: the rate asked for.
-        events: of the hand, by exact labels.
-        n_slips: how many slips there were.
-        n_found: of them, within each of `POSTS`.
-    """
-
-    per_minute: float
-    events: EventMetrics
-    n_slips: int
-    n_found: dict[str, int]
 
 
 class Judged(msgspec.Struct, frozen=True):
@@ -84,147 +77,188 @@ class Judged(msgspec.Struct, frozen=True):
     Attributes:
         names: of the recordings judged, in order.
         fingers: by sample, at the method's own threshold; None of a method for whole hands.
-        hand: of the hand at the method's own threshold, by exact labels.
-        calm: of the hand at thresholds for `CALM` false alarms a minute, by exact labels.
-        slips: at the same thresholds, of each recording.
-        curve: a point for each of `ALARM_RATES`.
-        breakdown: of errors, at the method's own threshold.
-        calibration: (10, 3) sum of probabilities, stable samples and samples of each bin.
+        hand: the same of the hand.
+        own: its alarms, by exact labels, at the same threshold, of each recording.
+        curve: the same at thresholds for each of `ALARM_RATES`.
+        spared: the same at thresholds for one false alarm per minute, where those right after a
+            jump of the controller's set point are not counted.
+        breakdown: of errors at the method's own threshold, of each recording.
+        calibration: of each recording, (10, 3) sum of probabilities, stable samples and samples
+            of each bin.
     """
 
     names: list[str]
     fingers: Metrics | None
     hand: Metrics
-    calm: Metrics
-    slips: list[list[Slip]]
-    curve: list[Point]
+    own: list[Heard]
+    curve: list[list[Heard]]
+    spared: list[Heard]
     breakdown: list[Breakdown]
-    calibration: list[list[float]]
+    calibration: list[list[list[float]]]
+
+    @property
+    def metrics(self) -> Metrics:
+        """Of what the method judges: the fingers, or the hand."""
+        return self.fingers or self.hand
+
+    @property
+    def calm(self) -> list[Heard]:
+        """At the threshold that methods are compared at."""
+        return self.curve[ALARM_RATES.index(COMPARED_AT)]
 
 
 class Fold(NamedTuple):
-    """One fit: its experts, and what they are for.
+    """A fit and its thresholds.
 
     Attributes:
         expert: fitted to all training recordings.
-        inner: fitted without one group of them each.
-        groups: (n_recordings,) the inner group of each recording of `train`; -1 of those that
-            the fold holds out.
-        tested: places of the recordings that it judges, in the corpus that is judged.
+        shifts: of its threshold, for each of `ALARM_RATES`, and for the one that is compared
+            with alarms spared.
     """
 
     expert: Expert
-    inner: Sequence[Expert]
-    groups: Sequence[int]
-    tested: frozenset[int]
+    shifts: Sequence[float]
 
 
 class Case(NamedTuple):
-    """A recording that was judged: by which fold, what was seen, what was thought of it."""
+    """A recording that was judged: what was seen, what was thought of it, and the thresholds."""
 
-    fold: int
     seen: Seen
     opinion: Opinion
-
-    def hand(self, shift: float) -> FingerDecisions:
-        """The hand by exact labels, with thresholds moved by so many log odds."""
-        return self.opinion.hand(self.seen, self.seen.exact, shift)
+    shifts: Sequence[float]
 
 
-def judge(job: Job) -> Judged:
-    """Fits the method, chooses its thresholds on what it was fitted to, and judges the rest.
+def judge(job: Job) -> dict[str, Judged]:
+    """What the method is worth by each split, and on each other corpus.
+
+    A split by object is left out where there are fewer than two, or not all are known.
+
+    Returns:
+        By the split, or the name of the corpus.
 
     Raises:
         TrainingError: a whole-hand method gets too few fingers.
     """
-    method = METHODS[job.method]
-    recordings = look(method, job.train, job.change)
-    folds = list(_folds(job, method, material_of(recordings)))
-    calms = [_calms(fold, recordings) for fold in folds]
-    tested = recordings if job.test is None else look(method, job.test, job.change)
-    cases = [_case(folds, place, seen) for place, seen in enumerate(tested)]
-    return _judged(cases, [[shift_for(calm, rate) for rate in ALARM_RATES] for calm in calms])
-
-
-def _case(folds: Sequence[Fold], place: int, seen: Seen) -> Case:
-    fold = next(k for k, fold in enumerate(folds) if place in fold.tested)
-    return Case(fold, replace(seen, features={}), folds[fold].expert.opinion(seen))
-
-
-def _folds(job: Job, method: Method, material: Material) -> Iterator[Fold]:
-    everyone = set(range(len(material.objects)))
-    if job.test is not None:
-        tested = frozenset(range(len(job.test.recordings)))
-        yield _fold(job, method, material, everyone, tested)
-        return
-    if job.split == "object":
-        names = list(dict.fromkeys(material.objects))
-        units = np.array([names.index(name) for name in material.objects])
-    else:
-        units = groups_of(material.objects, min(FOLDS, len(everyone)), job.seed)
-    for unit in np.unique(units):
-        held = frozenset(np.flatnonzero(units == unit).tolist())
-        yield _fold(job, method, material, everyone - held, held)
-
-
-def _fold(
-    job: Job, method: Method, material: Material, training: set[int], tested: frozenset[int]
-) -> Fold:
-    places = sorted(training)
-    objects = [material.objects[place] for place in places]
-    inner_groups = groups_of(objects, min(INNER_FOLDS, len(places)), job.seed + 1)
-    groups = np.full(len(material.objects), -1)
-    groups[places] = inner_groups
-    inner = [
-        Expert.fit(method, material, training - set(np.flatnonzero(groups == k)), job.seed)
-        for k in range(max(inner_groups) + 1)
-    ]
-    return Fold(Expert.fit(method, material, training, job.seed), inner, groups.tolist(), tested)
-
-
-def _calms(fold: Fold, recordings: Sequence[Seen]) -> list[Calm]:
-    """What its training recordings tell of thresholds, each judged without itself."""
-    found = []
-    for group, seen in zip(fold.groups, recordings, strict=True):
-        if group >= 0:
-            hand = hand_decisions(seen.undecided(seen.exact), len(seen.exact))
-            scores = fold.inner[group].opinion(seen).scores(seen, hand.times)
-            found.append(Calm.of(hand.times, hand.labels, scores))
+    method = method_called(job.method)
+    recordings = look(method, job.train, job.change, job.effort.stride)
+    material = material_of(recordings, job.effort.max_rows)
+    everyone = frozenset(range(len(recordings)))
+    found: dict[str, Judged] = {}
+    for split in job.splits:
+        cases: dict[int, Case] = {}
+        for held in held_out(material.objects, split, job.effort.folds, job.seed):
+            fold = _fold(job, method, material, recordings, everyone - held)
+            cases |= {place: _case(fold, recordings[place]) for place in held}
+        if cases:
+            found[split] = judged_of([cases[place] for place in sorted(cases)])
+    if job.tests:
+        fold = _fold(job, method, material, recordings, everyone)
+        for corpus in job.tests:
+            tested = look(method, corpus, job.change, job.effort.stride)
+            found[corpus.name] = judged_of([_case(fold, seen) for seen in tested])
     return found
 
 
-def _judged(cases: Sequence[Case], shifts: Sequence[Sequence[float]]) -> Judged:
+def method_called(name: str) -> Method:
+    """The method of that name, also of those that the study has for one question alone."""
+    return METHODS[name] if name in METHODS else CUTS[name]
+
+
+def held_out(
+    objects: Sequence[str | None], split: Split, n_folds: int, seed: int
+) -> Iterator[frozenset[int]]:
+    """Places of the recordings that each fold holds out; every recording is in one fold.
+
+    Args:
+        objects: of the recordings; None where it is not known.
+        split: `recording` or `object`.
+        n_folds: by recording, at most.
+        seed: of the same.
+    """
+    if split == "object":
+        names = list(dict.fromkeys(objects))
+        if len(names) < 2 or None in names:
+            return
+        units = np.array([names.index(name) for name in objects])
+    else:
+        units = groups_of(objects, min(n_folds, len(objects)), seed)
+    for unit in np.unique(units):
+        yield frozenset(np.flatnonzero(units == unit).tolist())
+
+
+def groups_of(objects: Sequence[str | None], n_groups: int, seed: int) -> npt.NDArray[np.int64]:
+    """(n_recordings,) groups of about equal size, the recordings of each object spread evenly."""
+    order = np.random.default_rng(seed).permutation(len(objects))
+    order = order[np.argsort(np.array([str(objects[k]) for k in order]), kind="stable")]
+    groups = np.empty(len(objects), dtype=np.int64)
+    groups[order] = np.arange(len(objects)) % n_groups
+    return groups
+
+
+def _fold(
+    job: Job,
+    method: Method,
+    material: Material,
+    recordings: Sequence[Seen],
+    training: frozenset[int],
+) -> Fold:
+    """The fit to the training recordings; nothing else is looked at."""
+    places = sorted(training)
+    objects = [material.objects[place] for place in places]
+    n_inner = min(job.effort.inner, len(places))
+    calms: list[tuple[Calm, Calm]] = []
+    for held in held_out(objects, "recording", n_inner, job.seed + 1) if n_inner > 1 else ():
+        left_out = {places[k] for k in held}
+        inner = Expert.fit(method, material, training - left_out, job.seed)
+        calms += [_calm(inner, recordings[place]) for place in sorted(left_out)]
+    return Fold(Expert.fit(method, material, training, job.seed), _shifts(calms))
+
+
+def _calm(expert: Expert, seen: Seen) -> tuple[Calm, Calm]:
+    """What tells its false alarms: of all, and of those that no jump of the set point caused."""
+    score, labels = expert.opinion(seen).score(seen), seen.hand(seen.exact).labels
+    spared = after_glitch(score.times, seen.truth)
+    return Calm.of(score, labels), Calm.of(score, labels, spared)
+
+
+def _shifts(calms: Sequence[tuple[Calm, Calm]]) -> list[float]:
+    if not calms:
+        return [0.0] * (1 + len(ALARM_RATES))
+    every, spared = zip(*calms, strict=True)
+    return [*(shift_for(every, rate) for rate in ALARM_RATES), shift_for(spared, COMPARED_AT)]
+
+
+def _case(fold: Fold, seen: Seen) -> Case:
+    return Case(replace(seen, features={}), fold.expert.opinion(seen), fold.shifts)
+
+
+def judged_of(cases: Sequence[Case]) -> Judged:
+    """What is counted of the recordings that were judged."""
     own = [case.opinion.decisions(case.seen, case.seen.labels) for case in cases]
-    calm = ALARM_RATES.index(CALM)
-    hands = [case.hand(shifts[case.fold][calm]) for case in cases]
+    heard = [list(_heard(case)) for case in cases]
     return Judged(
         names=[case.seen.name for case in cases],
-        fingers=summarise(own) if own[0].fingers else None,
-        hand=_summary(cases, [case.hand(0.0) for case in cases]),
-        calm=_summary(cases, hands),
-        slips=[slips_of(case.seen, hand) for case, hand in zip(cases, hands, strict=True)],
-        curve=[
-            _point(rate, cases, [case.hand(shifts[case.fold][k]) for case in cases])
-            for k, rate in enumerate(ALARM_RATES)
-        ],
+        fingers=summarise(own) if any(each.fingers for each in own) else None,
+        hand=summarise(_hands(own)),
+        own=[each[0] for each in heard],
+        curve=[[each[1 + k] for each in heard] for k in range(len(ALARM_RATES))],
+        spared=[each[-1] for each in heard],
         breakdown=[count(case.seen, each) for case, each in zip(cases, own, strict=True)],
-        calibration=calibration_counts(
-            [finger for each in own for finger in each.fingers.values()]
-        ),
+        calibration=[calibration_counts(each) for each in own],
     )
 
 
-def _summary(cases: Sequence[Case], hands: Sequence[FingerDecisions]) -> Metrics:
-    """The metrics of hands alone, each as the one finger of its recording."""
-    return summarise(
-        Decisions(case.seen.name, {HAND: hand}, hand)
-        for case, hand in zip(cases, hands, strict=True)
-    )
+def _heard(case: Case) -> Iterator[Heard]:
+    """What the alarms are worth at the method's own threshold, and at each that was chosen."""
+    seen, opinion, shifts = case
+    score, labels = opinion.score(seen), seen.hand(seen.exact).labels
+    spells = spells_of(seen.truth)
+    for shift in (0.0, *shifts):
+        yield hear(score.hand(labels, shift), seen.truth, spells)
 
 
-def _point(rate: float, cases: Sequence[Case], hands: Sequence[FingerDecisions]) -> Point:
-    matches = [match_alarms(hand.times, hand.labels, hand.states) for hand in hands]
-    pairs = zip(cases, hands, strict=True)
-    slips = [slip for case, hand in pairs for slip in slips_of(case.seen, hand)]
-    found = {str(post): n_found(slips, post) for post in POSTS}
-    return Point(rate, pool_events(matches), len(slips), found)
+def _hands(decided: Iterable[Decisions]) -> Iterator[Decisions]:
+    """The hands alone, each as the one finger of its recording."""
+    for each in decided:
+        if each.hand is not None:
+            yield Decisions(each.name, {HAND: each.hand}, each.hand)

@@ -1,9 +1,8 @@
 """Where a method's threshold has to be for so many false alarms per minute of undisturbed hold.
 
-With the margin of a sample its log odds over the method's own threshold, the score of a hand is
-the least margin of the fingers in contact: for a threshold moved by t the hand is stable where
-the score is at least t. So every sample that can raise a false alarm raises one for just the t
-between two scores, and all thresholds are counted at once.
+A sample that could raise a false alarm raises one where the hand was stable at the sample before
+and is not any more: for just the thresholds above its own score, up to that of the sample
+before. So the false alarms at all thresholds are counted at once.
 """
 
 from collections.abc import Sequence
@@ -14,19 +13,18 @@ import numpy as np
 from holdfast.contact import STABLE
 from holdfast.metrics import match_alarms
 from holdfast.metrics.decisions import Codes
-from holdfast.metrics.events import EARLY, LATE
+from holdfast.metrics.events import EARLY, LATE, ROUNDING
 from holdfast.sensors.values import Array
-
-SHIFTS = np.arange(-28.0, 12.0, 0.05)
-"""Thresholds that are tried, in log odds from the method's own."""
+from holdfast.study.opinion import Mask, Score
 
 
 class Calm(NamedTuple):
     """What tells the false alarms of one recording at any threshold.
 
     Attributes:
-        before: (m,) scores of the samples before those at which an alarm would be false.
-        after: (m,) scores of those samples.
+        before: (m,) up to which threshold the hand was stable at the sample before.
+        after: (m,) above which it is not stable at the sample; minus infinity where it holds
+            nothing, infinity where that is not known.
         minutes: of stable label [min].
     """
 
@@ -35,40 +33,49 @@ class Calm(NamedTuple):
     minutes: float
 
     @classmethod
-    def of(cls, times: Array, labels: Codes, scores: Array) -> Self:
-        """The false alarms in undisturbed hold of a hand, by its exact labels.
+    def of(cls, score: Score, labels: Codes, spared: Mask | None = None) -> Self:
+        """The false alarms under a stable label, of a hand.
 
         Args:
-            times: (n,) [s].
-            labels: (n,) codes of the hand.
-            scores: (n,) NaN where nothing is known, -inf without contact.
+            score: of the hand.
+            labels: (n,) its codes.
+            spared: (n,) where an alarm is not counted.
         """
-        found = match_alarms(times, labels, labels)
+        found = match_alarms(score.times, labels, labels)
         calm = labels == STABLE
         for event in found.events:
-            calm &= (times < event.onset - EARLY) | (times > event.end + LATE)
-        known = calm[1:] & ~np.isnan(scores[1:]) & ~np.isnan(scores[:-1])
-        return cls(scores[:-1][known], scores[1:][known], found.stable_seconds / 60)
-
-
-def false_alarm_rates(calms: Sequence[Calm]) -> Array:
-    """False alarms under a stable label, per minute of it, at each of `SHIFTS`."""
-    before = np.sort(np.concatenate([each.before for each in calms]))
-    both = np.sort(np.concatenate([np.minimum(each.before, each.after) for each in calms]))
-    n_alarms = np.searchsorted(both, SHIFTS) - np.searchsorted(before, SHIFTS)
-    return np.asarray(n_alarms / max(sum(each.minutes for each in calms), 1e-9))
+            calm &= (score.times < event.onset - EARLY - ROUNDING) | (
+                score.times > event.end + LATE + ROUNDING
+            )
+        if spared is not None:
+            calm &= ~spared
+        nothing = score.known & score.alone
+        after = np.where(nothing, -np.inf, score.least)
+        before = np.where(score.known & ~score.alone, score.least, -np.inf)
+        rows = np.flatnonzero(calm[1:] & (before[:-1] > after[1:]))
+        return cls(before[rows], after[rows + 1], found.stable_seconds / 60)
 
 
 def shift_for(calms: Sequence[Calm], per_minute: float) -> float:
     """The most watchful threshold up to which there are never more false alarms than that.
 
+    It goes no further than to the threshold with the most of them: beyond, a hand is hardly
+    ever stable, and has no alarm to give.
+
     Args:
         calms: of the recordings that the threshold is chosen on.
-        per_minute: false alarms per minute of stable label.
+        per_minute: false alarms under a stable label, per minute of it.
 
     Returns:
-        How far the threshold is moved [log odds].
+        How far the threshold is moved [log odds]; minus infinity where alarms by loss of
+        contact alone are too many, 0 where no threshold gives any.
     """
-    too_many = np.flatnonzero(false_alarm_rates(calms) > per_minute)
-    last = int(too_many[0]) - 1 if len(too_many) else len(SHIFTS) - 1
-    return float(SHIFTS[max(last, 0)])
+    before = np.sort(np.concatenate([each.before for each in calms]))
+    after = np.sort(np.concatenate([each.after for each in calms]))
+    edges = np.unique(np.concatenate([before, after]))
+    if not len(edges):
+        return 0.0
+    n_alarms = np.searchsorted(after, edges, "right") - np.searchsorted(before, edges, "right")
+    too_many = n_alarms > per_minute * sum(each.minutes for each in calms)
+    last = int(np.argmax(too_many)) if too_many.any() else int(np.argmax(n_alarms)) + 1
+    return float(edges[last])
