@@ -424,7 +424,8 @@ def by_rule(rule: LabelRule) -> Callable[[Truth, str], tuple[Label, ...]]:
 def only_slip(known: Truth, finger: str) -> tuple[Label, ...]:
     phase = known.hand["phase"]
     held = np.isin(phase, (Phase.LOCKED, Phase.DISTURBED, Phase.SLIPPING))
-    hand = {**known.hand, "phase": np.where(held, Phase.LOCKED.value, phase)}
+    nobody = np.zeros_like(known.hand["outside_force"])
+    hand = {"phase": np.where(held, Phase.LOCKED.value, phase), "outside_force": nobody}
     return labels_from_truth(Truth(known.times, hand, known.fingers), finger)
 
 
