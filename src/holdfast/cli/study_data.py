@@ -5,6 +5,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, NamedTuple
 
 from holdfast.cli.console import say
+from holdfast.cli.simulate import grasps, make_all
 
 if TYPE_CHECKING:
     from holdfast.study.corpus import Corpus
@@ -63,7 +64,6 @@ def twin_corpora(out: Path, seed: int, *, quick: bool, jobs: int, tare: str) -> 
 
 
 def _simulate(folder: Path, kind: Kind, seed: int, repeats: int, jobs: int) -> None:
-    from holdfast.cli.simulate import grasps, make_all
     from holdfast.errors import OutputError
     from holdfast.twin.objects import OTHER_OBJECTS
 
@@ -73,7 +73,10 @@ def _simulate(folder: Path, kind: Kind, seed: int, repeats: int, jobs: int) -> N
     try:
         make_all(wanted, folder, jobs=jobs, force=False)
     except OutputError as cause:
-        raise OutputError(f"{str(cause).partition(':')[0]}: choose another OUT") from cause
+        made, _, advice = str(cause).rpartition(": ")
+        if "--force" not in advice:
+            raise
+        raise OutputError(f"{made}: choose another OUT, or delete its data") from cause
 
 
 def real_corpus(out: Path) -> "tuple[Corpus | None, list[str]]":

@@ -1,0 +1,181 @@
+import json
+
+import msgspec
+import pytest
+
+from holdfast import parallel
+from holdfast.cli import main, study_data
+from holdfast.cli import study as verb
+from holdfast.contact import ContactState
+from holdfast.io import save_recording
+from holdfast.recordings import Label
+from holdfast.study import paper
+from holdfast.study import study as whole
+from holdfast.study.tables import Row, Table
+from holdfast.synthetic import synthetic_recording
+from holdfast.twin import simulation
+from holdfast.twin.profile import profile
+
+
+@pytest.fixture(autouse=True)
+def nowhere(monkeypatch, tmp_path):
+    """No real recordings, and few tasks."""
+    monkeypatch.setenv("HOLDFAST_DATA", str(tmp_path / "nothing"))
+    monkeypatch.setattr(whole, "PARTS", ("paper", "experiments"))
+    monkeypatch.setattr(paper, "QUICK_WINDOWS", (14,))
+    monkeypatch.setattr(paper, "ABLATED_AT", (14,))
+
+
+@pytest.fixture
+def data(tmp_path):
+    return written(tmp_path / "data", [synthetic_recording(f"grasp-{k}", k) for k in range(3)])
+
+
+def written(folder, recordings):
+    folder.mkdir()
+    for recording in recordings:
+        save_recording(recording, folder / f"{recording.name}.parquet")
+    return folder
+
+
+def run(capsys, *words):
+    code = main(["study", *map(str, words)])
+    printed, told = capsys.readouterr()
+    return code, printed, told
+
+
+def refusal(capsys, *words):
+    code, printed, told = run(capsys, *words)
+    assert (code, printed, told.count("\n")) == (2, "", 1)
+    return told.removeprefix("holdfast: ").rstrip("\n")
+
+
+def test_own_recordings(capsys, data, tmp_path):
+    out = tmp_path / "out"
+    code, printed, told = run(capsys, data, "--out", out, "--quick", "--jobs", 1)
+    assert code == 0
+    assert printed.startswith("Table I: confusion [%]\nclassifier  on")
+    assert printed.endswith(f"{out / 'report.html'}: all 7 tables, with figures\n")
+    assert "making tables and figures\n" in told
+    assert {path.name for path in out.iterdir()} == {
+        "report.html", "study.json", "tables", "figures", "work",
+    }  # fmt: skip
+    assert json.loads((out / "study.json").read_text())["left_out"][0].startswith(
+        "real recordings, for none are here. Get them from github.com/"
+    )
+    assert "holds a study already" in refusal(capsys, data, "--out", out, "--quick")
+    code, printed, _ = run(capsys, data, "--out", out, "--quick", "--force", "--json")
+    assert code == 0
+    assert json.loads(printed) == json.loads((out / "study.json").read_text())
+
+
+def test_the_twin_makes_the_recordings_first(capsys, monkeypatch, tmp_path):
+    brief = msgspec.structs.replace(profile("reference"), idle=(0.7, 0.8), hold=1.5)
+    monkeypatch.setattr(simulation, "profile", lambda name: brief)
+    monkeypatch.setattr(study_data, "QUICK", {"main": study_data.Kind()})
+    monkeypatch.setattr(study_data, "FEW", {"main": 1})
+    known = study_data.grasps
+    monkeypatch.setattr(study_data, "grasps", lambda _, *rest, **more: known("can", *rest, **more))
+    out = tmp_path / "out"
+    words = ("--twin", "--quick", "--jobs", 1, "--out", out, "--json")
+    code, printed, told = run(capsys, *words)
+    assert code == 0
+    assert "recordings of the twin, 1 of 1: main\n" in told
+    names = {path.stem for path in (out / "data/quick/main").iterdir()}
+    assert {"can-case1-1", "can-case2-1"} <= names
+    assert json.loads(printed)["data"]["main"]["recordings"] == len(names)
+    assert "What the twin cannot show" in (out / "report.html").read_text()
+    assert refusal_after(capsys, *words, "--force", "--seed", 3).endswith(
+        "can-case1-1.parquet was made with profile reference, seed 0, server False; profile "
+        "reference, seed 3, server False asked for: choose another OUT, or delete its data"
+    )
+
+
+def refusal_after(capsys, *words):
+    """The last line, where others tell what was begun."""
+    code, printed, told = run(capsys, *words)
+    assert (code, printed) == (2, "")
+    return told.splitlines()[-1].removeprefix("holdfast: ")
+
+
+def test_real_recordings_that_cannot_be_used_are_left_out(capsys, monkeypatch, tmp_path):
+    (tmp_path / "here" / study_data.REAL).mkdir(parents=True)
+    monkeypatch.setenv("HOLDFAST_DATA", str(tmp_path / "here"))
+    corpus, left_out = study_data.real_corpus(tmp_path / "real")
+    assert corpus is None
+    assert left_out[0].startswith("real recordings, for those of HOLDFAST_DATA cannot be used (")
+    assert "the real recordings are left out: " in capsys.readouterr().err
+
+
+def test_real_recordings_are_brought_in(data_folder, monkeypatch, tmp_path):
+    monkeypatch.setenv("HOLDFAST_DATA", str(data_folder))
+    corpus, left_out = study_data.real_corpus(tmp_path / "real")
+    assert (len(corpus.recordings), corpus.tare, left_out) == (5, "first", [])
+    again, _ = study_data.real_corpus(tmp_path / "real")
+    assert again == corpus
+
+
+class TestBadInput:
+    def test_what_is_studied(self, capsys, data, tmp_path):
+        message = "a folder of recordings or --twin expected, {} given"
+        assert refusal(capsys, "--out", tmp_path / "out") == message.format("neither")
+        assert refusal(capsys, data, "--twin") == message.format("both")
+        assert "there is no folder" in refusal(capsys, tmp_path / "no", "--out", tmp_path / "out")
+
+    def test_numbers(self, capsys, data):
+        message = "a seed of at least 0 and jobs other than 0 expected; "
+        assert refusal(capsys, data, "--seed", -1) == message + "-1 and -1 given"
+        assert refusal(capsys, data, "--jobs", 0) == message + "0 and 0 given"
+        assert "tare" in refusal(capsys, data, "--tare", "often")
+
+    def test_labels(self, capsys, tmp_path):
+        one = synthetic_recording("a", 0)
+        two = synthetic_recording("b", 1)
+        cases = {
+            "none": ([one.with_labels({}), two.with_labels({})], "has labels to train from"),
+            "class": ([stable(one), stable(two)], "a finger with both is needed"),
+            "single": ([one], "one recording with labels given (a); at least two are needed"),
+        }
+        for name, (recordings, message) in cases.items():
+            folder = written(tmp_path / name, recordings)
+            assert message in refusal(capsys, folder, "--out", tmp_path / "out")
+        assert not (tmp_path / "out").exists()
+
+    def test_fingers(self, capsys, tmp_path):
+        recordings = [synthetic_recording(f"g-{k}", k, ["index"]) for k in range(2)]
+        folder = written(tmp_path / "one", recordings)
+        assert "which need at least two" in refusal(capsys, folder, "--out", tmp_path / "out")
+
+    def test_engine(self, capsys, data, tmp_path, monkeypatch):
+        out = ("--out", tmp_path / "out")
+        assert refusal(capsys, data, *out, "--engine", "spark") == (
+            "unknown engine 'spark'; there are loky and dask:ADDRESS"
+        )
+        pytest.importorskip("distributed")
+        monkeypatch.setattr(parallel, "PATIENCE", 0.3)
+        told = refusal(capsys, data, *out, "--engine", "dask:tcp://127.0.0.1:9")
+        assert told.startswith("no Dask scheduler answers at tcp://127.0.0.1:9: start one with")
+        assert not (tmp_path / "out").exists()
+
+    def test_out(self, capsys, data, tmp_path):
+        file = data / "grasp-0.parquet"
+        assert "is a file; the study is written to a folder" in refusal(capsys, data, "-o", file)
+        assert "holds other things" in refusal(capsys, data, "-o", data)
+        assert "does not exist" in refusal(capsys, data, "-o", tmp_path / "no" / "out")
+
+
+def stable(recording):
+    labels = {
+        finger: [Label(module.times[0], module.times[-1], ContactState.STABLE)]
+        for finger, module in recording.modules.items()
+    }
+    return recording.with_labels(labels)
+
+
+def test_what_is_printed_is_short(capsys):
+    rows = [Row({"m": f"{k}", "figure": "x"}, k, 0.5 if k == 1 else None) for k in range(30)]
+    rows.append(Row({"m": "0", "figure": "y"}, None))
+    verb._show(Table("methods", "Methods [%]", "", rows, ("m",)))
+    lines = capsys.readouterr().out.splitlines()
+    assert lines[:4] == ["Methods [%]", " m  x          y", " 0  0.0        –", " 1  1.0 (0.5)  -"]
+    assert lines[-2:] == ["... 6 more lines in the report", ""]
