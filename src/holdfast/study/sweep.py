@@ -22,11 +22,11 @@ def sweep(window: Table) -> Picture:
         f"{name} [%]": _curves([r for r in rows if r.keys["figure"] == name]) for name in names
     }
     caption = (
-        "LogReg by window, the table above as curves (deployed features). Bands: 95 % intervals, "
-        "by bootstrap over recordings. Between two lines of one colour pattern lies what a "
-        "random split hides."
+        "The paper's Table II as curves: LogReg on the deployed features by window. Bands are 95 % "
+        "intervals, by bootstrap over recordings; the line 'held out' is the paper's protocol, "
+        "the others are recordings and objects that did not train."
     )
-    return Picture("window", caption, draw_lines(groups, "N_w [samples]", per_row=2))
+    return Picture("window", caption, draw_lines(groups, "$N_w$ [samples]", per_row=2))
 
 
 def _curves(rows: Sequence[Row]) -> dict[str, Curve]:
