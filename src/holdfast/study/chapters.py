@@ -75,17 +75,17 @@ twice, and why a difference to one printed figure means little.""",
 distance between a random split and these lines is what a random split flatters; it is the figure
 to quote.""",
         "",
-        ("unseen", "splits", "split-differences"),
+        ("unseen", "splits"),
     ),
     Chapter(
         "Methods compared",
         """Every method is fitted to the same recordings and judged on the same other ones, finger
 by finger or as a whole hand. Differences to the paper's method are paired, recording by
 recording: an interval that does not hold zero means that the one is better on these data, however
-wide the intervals of each alone are. A method that judges every sample alone and one that judges
-the whole hand do not have the same task: the hand's figures compare them.""",
+wide the intervals of each alone are. A method that judges fingers and one that judges the whole
+hand do not have the same task: as hands all are compared.""",
         "comparison",
-        ("methods",),
+        ("methods", "hands", "cost"),
     ),
     Chapter(
         "Events: how late, how often in vain",
@@ -95,7 +95,7 @@ one that was never found counts as infinite. False alarms are counted per minute
 hold. Each trades against the other by the threshold, so compare methods where their false alarms
 are alike: thresholds are chosen on training recordings alone.""",
         "",
-        ("events", "events-fingers", "slips", "curve", "alarms", "event-differences"),
+        ("events", "slips", "alarms"),
     ),
     Chapter(
         "Where the errors are",
@@ -104,10 +104,7 @@ the direction of the push, and by whether a probability of 0.8 is right in 80 of
 Brier score is the mean squared error of the probability; 0 is best). These are the claims that the
 paper makes and does not test.""",
         "",
-        (
-            "phases", "reliability", "brier", "calibration", "forces-claims", "grip", "directions",
-            "claims", "cost",
-        ),
+        ("phases", "force", "grip", "directions", "reliability"),
     ),
     Chapter(
         "Sensitivity",
