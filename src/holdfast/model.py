@@ -61,14 +61,18 @@ class Debounce(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     Attributes:
         min_duration: how long a new state must last before it is told [s].
         hysteresis: how far past its threshold a probability must go to change the state.
+        hold: for how long UNSTABLE is told after the rule last said so, while the finger
+            touches: one disturbance is one alarm [s].
     """
 
     min_duration: float = 0.0
     hysteresis: float = 0.0
+    hold: float = 0.0
 
     def __post_init__(self) -> None:
-        if not (math.isfinite(self.min_duration) and self.min_duration >= 0):
-            raise ModelError(f"a duration of at least 0 s expected, {self.min_duration} given")
+        for seconds in (self.min_duration, self.hold):
+            if not (math.isfinite(seconds) and seconds >= 0):
+                raise ModelError(f"a duration of at least 0 s expected, {seconds} given")
         if not 0 <= self.hysteresis < 1:
             raise ModelError(f"a hysteresis from 0 to 1 expected, {self.hysteresis} given")
 

@@ -15,6 +15,10 @@ RICH = (
     FeatureSpec("sigma", 4, "log", "finger", 0.5),
     FeatureSpec("F_a", 0, "log", "hand", 1.0),
     FeatureSpec("sigma", 8, "none", "hand"),
+    FeatureSpec("sigma_xyz", 4, "log", "finger", 0.5),
+    FeatureSpec("sigma_xyz", 12, "none", "hand"),
+    FeatureSpec("change", 8, "log", "hand", 0.5),
+    FeatureSpec("change", 4),
 )
 """Every kind, transform and scope, over several windows."""
 

@@ -27,7 +27,7 @@ class Finger:
         self.force = (NAN, NAN, NAN)
         self.sigma = self.probability = NAN
         self.state = self.candidate = "UNKNOWN"
-        self.since = NAN
+        self.since = self.unstable_at = NAN
 
     def wait(self, time):
         if self.last is not None and time - self.last > 3.0003 * self.period:
@@ -110,6 +110,12 @@ class Finger:
     def moments(self, window):
         return naive.features(self.stretch[-window:], window)[-1][4:].tolist()
 
+    @staticmethod
+    def spread(values):
+        pairs = list(zip(values[::2], values[1::2], strict=True))
+        details = [(x0 - x1) / math.sqrt(2) for x0, x1 in pairs]
+        return naive.moments(details, details, len(values))[1]
+
     def feature(self, spec, others):
         values = [self.own(spec)]
         if spec.scope == "hand":
@@ -118,7 +124,12 @@ class Finger:
 
     def own(self, spec, asker=None):
         force = self.stretch[-1]
-        if spec.kind in ("m", "sigma"):
+        if spec.kind == "sigma_xyz":
+            components = zip(*self.stretch[-spec.window :], strict=True)
+            value = math.hypot(*(self.spread(component) for component in components))
+        elif spec.kind == "change":
+            value = math.dist(force, self.stretch[-spec.window])
+        elif spec.kind in ("m", "sigma"):
             value = self.moments(spec.window)[spec.kind == "sigma"]
         else:
             value = dict(zip(("F_x", "F_y", "F_z"), force, strict=True)).get(
@@ -138,9 +149,13 @@ class Finger:
                 self.status = "tare"
         if self.status != "":
             self.state = self.candidate = "UNKNOWN"
-            self.probability = NAN
+            self.probability = self.unstable_at = NAN
             return
         state = self.judge(features, debounce.hysteresis)
+        if state == "UNSTABLE":
+            self.unstable_at = time
+        elif state == "STABLE" and time - self.unstable_at + self.period / 2 < debounce.hold:
+            state = "UNSTABLE"
         if state != self.candidate:
             self.candidate, self.since = state, time
         held = time - self.since + self.period / 2

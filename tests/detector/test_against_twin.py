@@ -53,6 +53,7 @@ MODELS = {
     "rich, first": {"features": RICH, "tare": "first"},
     "none": {"tare": "none", "threshold": 200.0},
     "debounced": {"tare": "0.1", "debounce": Debounce(0.05, 0.1), "threshold": 30.0},
+    "held": {"tare": "0.1", "debounce": Debounce(0.02, 0.05, 0.12), "threshold": 30.0},
     "long window": {"tare": "0.3", "window": 20},
 }
 

@@ -260,6 +260,16 @@ class TestDebounce:
             UNKNOWN, STABLE, STABLE, UNKNOWN, UNKNOWN, UNSTABLE,
         ]  # fmt: skip
 
+    def test_instability_is_held(self):
+        judge = by_force(debounce=Debounce(hold=0.05))
+        told = pushes(Detector(judge, {"finger1": FLAT}, RATE), [110] * 5 + [90] + [110] * 8)
+        assert told[1:] == [STABLE] * 4 + [UNSTABLE] * 5 + [STABLE] * 4
+
+    def test_a_finger_that_lets_go_is_not_held(self):
+        judge = by_force(debounce=Debounce(hold=0.5))
+        told = pushes(Detector(judge, {"finger1": FLAT}, RATE), [110] * 5 + [90] + [0] * 2 + [110])
+        assert told[1:] == [STABLE] * 4 + [UNSTABLE] + [NO_CONTACT] * 2 + [UNSTABLE]
+
     def test_hysteresis_moves_the_threshold_away(self):
         judge = by_force(debounce=Debounce(hysteresis=0.2))  # 0.3 and 0.7 are 91.5 and 108.5
         forces = [50, 50, 101, 108, 109, 101, 92, 91, 108]

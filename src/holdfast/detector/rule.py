@@ -48,7 +48,8 @@ N_REPORT = 7
 # Columns of Decision.values.
 PROBABILITY = 0
 SINCE = 1  # when the candidate began [s]
-N_DECIDED = 2
+LAST_UNSTABLE = 2  # when the rule last said so [s]
+N_DECIDED = 3
 
 
 class Rule(NamedTuple):
@@ -59,6 +60,7 @@ class Rule(NamedTuple):
     limits: Array  # (n_fingers, N_LIMITS)
     hysteresis: float
     min_duration: float
+    hold: float
     n_fingers: int
 
 
@@ -117,6 +119,7 @@ def rule_of(model: Model, plan: StreamPlan) -> Rule:
         limits=np.array(limits, dtype=np.float64),  # None becomes NaN
         hysteresis=float(model.debounce.hysteresis),
         min_duration=float(model.debounce.min_duration),
+        hold=float(model.debounce.hold),
         n_fingers=len(plan.fingers) if ANY_FINGER in model.fingers else len(model.fingers),
     )
 
@@ -138,7 +141,7 @@ def step(
         codes, decided = decision.codes[finger], decision.values[finger]
         if output.status[finger, REASON] != kernel.READY:
             codes[:] = UNKNOWN
-            decided[PROBABILITY] = math.nan
+            decided[PROBABILITY] = decided[LAST_UNSTABLE] = math.nan
         elif present[finger]:
             noise = memory.levels[finger, kernel.NOISE]
             if _is_free(output.values[finger, kernel.AMPLITUDE], noise, rule.limits[finger]):
@@ -149,6 +152,7 @@ def step(
                 decided[PROBABILITY] = linear_probability(output.features[finger], weights)
                 threshold = rule.limits[finger, THRESHOLD]
                 state = _judge(decided[PROBABILITY], threshold, rule.hysteresis, codes[TOLD])
+                state = _held(state, decided, rule.hold, time, layout.period)
             _tell(codes, decided, state, rule.min_duration, time, layout.period)
     return _hand_state(decision.codes[:, TOLD], rule.n_fingers)
 
@@ -177,7 +181,9 @@ class Live(NamedTuple):
         """The table that `step_live` takes, and the arrays that must live as long."""
         layout, rule = self.layout, self.rule
         integers = np.array([layout.tare_kind, rule.n_fingers], dtype=np.int64)
-        floats = np.array([layout.tare_seconds, layout.period, rule.hysteresis, rule.min_duration])
+        floats = np.array(
+            [layout.tare_seconds, layout.period, rule.hysteresis, rule.min_duration, rule.hold]
+        )
         arrays = [
             integers, floats, *layout[:6], *self.memory, *self.output, *rule[:3], *self.decision,
             self.readings, self.present, self.report,
@@ -198,15 +204,15 @@ def step_live(table: Integers, time: float) -> int:
     )  # fmt: skip
     memory = Memory(
         floats2(table, 8), floats2(table, 9), floats3(table, 10), integers2(table, 11),
-        floats2(table, 12), floats2(table, 13),
+        floats2(table, 12), floats2(table, 13), floats2(table, 14),
     )  # fmt: skip
-    output = Output(floats2(table, 14), floats2(table, 15), integers2(table, 16))
+    output = Output(floats2(table, 15), floats2(table, 16), integers2(table, 17))
     rule = Rule(
-        floats2(table, 17), integers1(table, 18), floats2(table, 19), numbers[2], numbers[3],
-        kind[1],
+        floats2(table, 18), integers1(table, 19), floats2(table, 20), numbers[2], numbers[3],
+        numbers[4], kind[1],
     )  # fmt: skip
-    decision = Decision(integers2(table, 20), floats2(table, 21))
-    readings, present, report = floats2(table, 22), flags1(table, 23), floats2(table, 24)
+    decision = Decision(integers2(table, 21), floats2(table, 22))
+    readings, present, report = floats2(table, 23), flags1(table, 24), floats2(table, 25)
     hand = step(layout, memory, output, rule, decision, readings, present, time)
     for f in range(len(present)):
         state, status = decision.codes[f, TOLD], output.status[f]
@@ -260,6 +266,16 @@ def _judge(probability: float, threshold: float, hysteresis: float, told: int) -
     elif told != UNKNOWN:
         threshold += hysteresis
     return STABLE if probability >= threshold else UNSTABLE
+
+
+@compiled
+def _held(state: int, decided: Array, hold: float, time: float, period: float) -> int:
+    """UNSTABLE for a while after the rule last said so."""
+    if state == UNSTABLE:
+        decided[LAST_UNSTABLE] = time
+    elif time - decided[LAST_UNSTABLE] + 0.5 * period < hold:  # False while it never said so
+        return UNSTABLE
+    return state
 
 
 @compiled

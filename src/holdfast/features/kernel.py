@@ -67,6 +67,8 @@ N_VALUES = 6
 
 FIRST_WINDOWED = 4
 """Kinds of features before it look at one sample: the channels of the history."""
+SIGMA_XYZ, CHANGE = 6, 7
+"""Kinds beyond the paper's six, in the order of holdfast.features.specs.KINDS."""
 
 # Columns of Output.status.
 REASON, FAULTS = 0, 1
@@ -95,6 +97,7 @@ class Memory(NamedTuple):
     history: Array  # (n_fingers, 4, 2 * longest) F_a, F_x, F_y, F_z, each written twice
     counts: Integers  # (n_fingers, N_COUNTS)
     levels: Array  # (n_fingers, N_LEVELS)
+    own: Array  # (n_fingers, n_features) each finger's own values, before the hand's largest
     scratch: Array  # (3, 1)
 
 
@@ -132,6 +135,9 @@ def advance(
                 layout, memory, output.values, readings, time, f
             )
     for f in range(len(present)):
+        if present[f]:
+            _own_features(layout, memory, output, f)
+    for f in range(len(present)):
         if status[f, REASON] != READY:
             output.features[f] = math.nan
         elif present[f]:
@@ -146,7 +152,7 @@ def _take(
 ) -> tuple[int, int]:
     """One finger's sample up to its force; the reason and the faults after it."""
     offsets, rotations, constants, _, _, windows, tare_kind, tare_seconds, period = layout
-    baseline, previous, history, counts, levels, scratch = memory
+    baseline, previous, history, counts, levels, _, scratch = memory
     first, last = offsets[f], offsets[f + 1]
     values[f] = math.nan
     levels[f, LAST] = time
@@ -167,7 +173,7 @@ def _take(
     x, y, z, pressing = force_of(readings, baseline, rotations, first, last)
     _remember(history, counts, levels, values, f, x, y, z)
     if counts[f, RUN] >= windows[f, SIGMA_WINDOW]:
-        moments = _moments(history, counts, f, windows[f, SIGMA_WINDOW], scratch)
+        moments = _moments(history, counts, f, 0, windows[f, SIGMA_WINDOW], scratch)
         values[f, MEAN], values[f, SIGMA] = moments
     faults = _faults(counts, levels, constants, f, period, least, most)
     if tare_kind == TARE_SECONDS and _pulled(counts, levels, f, pressing, period):
@@ -320,37 +326,65 @@ def _pulled(counts: Integers, levels: Array, f: int, pressing: float, period: fl
 
 @compiled
 def _moments(
-    history: Array, counts: Integers, f: int, window: int, scratch: Array
+    history: Array, counts: Integers, f: int, channel: int, window: int, scratch: Array
 ) -> tuple[float, float]:
-    """The m and sigma of the last `window` amplitudes; the stretch must hold so many."""
+    """The m and sigma of the last `window` values; the stretch must hold so many."""
     end = counts[f, END]
     m, sigma, spare = scratch[0], scratch[1], scratch[2]
-    haar_windows(history[f, 0, end - window : end], window, m, sigma, spare)
+    haar_windows(history[f, channel, end - window : end], window, m, sigma, spare)
     return m[0], sigma[0]
 
 
 @compiled
-def _fill_features(layout: Layout, memory: Memory, output: Output, f: int) -> None:
-    specs, floors, own = layout.specs, layout.floors, layout.windows[f, SIGMA_WINDOW]
-    _, _, history, counts, levels, scratch = memory
+def _own_features(layout: Layout, memory: Memory, output: Output, f: int) -> None:
+    """The values of a finger's features by itself; NaN where its stretch is too short."""
+    specs, floors, reported = layout.specs, layout.floors, layout.windows[f, SIGMA_WINDOW]
+    _, _, history, counts, levels, own, scratch = memory
     for place in range(specs.shape[1]):
         kind, window = specs[f, place, 0], specs[f, place, 1]
-        transform, scope = specs[f, place, 2], specs[f, place, 3]
-        value = 0.0  # in place of those that pad
-        if kind >= 0:
-            if window == own:
+        if kind < 0:
+            own[f, place] = 0.0  # in place of those that pad
+        elif counts[f, RUN] < max(window, 1):
+            own[f, place] = math.nan
+        else:
+            if window == reported and kind < SIGMA_XYZ:
                 value = output.values[f, MEAN + kind - FIRST_WINDOWED]
             else:
                 value = _feature(kind, window, history, counts, f, scratch)
-            value = _transform(value, transform, window, levels[f, NOISE], floors[f, place])
-        if kind >= 0 and scope == 1:
-            for other in range(len(counts)):
-                if counts[other, RUN] >= max(window, 1):
-                    rival = _feature(kind, window, history, counts, other, scratch)
-                    noise = levels[other, NOISE]
-                    rival = _transform(rival, transform, window, noise, floors[f, place])
-                    value = max(value, rival)
+            noise, floor = levels[f, NOISE], floors[f, place]
+            own[f, place] = _transform(value, specs[f, place, 2], window, noise, floor)
+
+
+@compiled
+def _fill_features(layout: Layout, memory: Memory, output: Output, f: int) -> None:
+    for place in range(layout.specs.shape[1]):
+        value = memory.own[f, place]
+        if layout.specs[f, place, 3] == 1:
+            for other in range(len(layout.specs)):
+                rival = _rival(layout, memory, f, place, other, value)
+                value = value if value >= rival else rival  # the rival too where it is NaN
         output.features[f, place] = value
+
+
+@compiled
+def _rival(
+    layout: Layout, memory: Memory, f: int, place: int, other: int, otherwise: float
+) -> float:
+    """What a feature of finger f would be of another finger; `otherwise` where it has none."""
+    specs, floors = layout.specs, layout.floors
+    _, _, history, counts, levels, own, scratch = memory
+    kind, window, transform = specs[f, place, 0], specs[f, place, 1], specs[f, place, 2]
+    if counts[other, RUN] < max(window, 1):
+        return otherwise
+    alike = floors[other, place] == floors[f, place]
+    for column in range(3):
+        alike &= specs[other, place, column] == specs[f, place, column]
+    if alike:
+        value = own[other, place]
+    else:
+        value = _feature(kind, window, history, counts, other, scratch)
+        value = _transform(value, transform, window, levels[other, NOISE], floors[f, place])
+    return otherwise if math.isnan(value) else float(value)
 
 
 @compiled
@@ -359,7 +393,16 @@ def _feature(
 ) -> float:
     if kind < FIRST_WINDOWED:
         return float(history[f, kind, counts[f, END] - 1])
-    return _moments(history, counts, f, window, scratch)[kind - FIRST_WINDOWED]
+    if kind < SIGMA_XYZ:
+        return _moments(history, counts, f, 0, window, scratch)[kind - FIRST_WINDOWED]
+    total = 0.0
+    for axis in range(1, 4):
+        if kind == CHANGE:
+            value = history[f, axis, counts[f, END] - 1] - history[f, axis, counts[f, END] - window]
+        else:
+            value = _moments(history, counts, f, axis, window, scratch)[1]
+        total += value * value
+    return math.sqrt(total)
 
 
 @compiled

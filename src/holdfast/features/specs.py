@@ -9,11 +9,11 @@ import numpy.typing as npt
 
 from holdfast.features.haar import FEATURE_NAMES, check_window
 
-KINDS = FEATURE_NAMES
+KINDS = (*FEATURE_NAMES, "sigma_xyz", "change")
 TRANSFORMS = ("none", "log", "noise")
 SCOPES = ("finger", "hand")
 
-WINDOWED = ("m", "sigma")
+WINDOWED = ("m", "sigma", "sigma_xyz", "change")
 """Kinds that look at a window; the others look at one sample."""
 
 DEPLOYED = ("F_a", "F_x", "F_y", "F_z", "sigma")
@@ -24,15 +24,17 @@ class FeatureSpec(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     """One feature of a finger at a sample.
 
     Attributes:
-        kind: `F_a`, `F_x`, `F_y`, `F_z`, `m` or `sigma`.
-        window: samples in its window, for `m` and `sigma`; 0 for the others.
+        kind: `F_a`, `F_x`, `F_y`, `F_z`, `m` or `sigma`, as in the paper; `sigma_xyz`, the root
+            of the sum of squares of sigma of the three components; or `change`, the size of
+            the difference of F_tip between the last sample of the window and the first.
+        window: samples in its window, for the last four; 0 for the others.
         transform: `none`; `log`, the logarithm of its root sum of squares with `floor`; or
             `noise`, the logarithm of sigma over the sigma that the sensor's noise alone gives.
         scope: `finger`; or `hand`, the largest value among all fingers of the hand.
         floor: for `log`: keeps the logarithm finite, in the unit of the readings.
     """
 
-    kind: Literal["F_a", "F_x", "F_y", "F_z", "m", "sigma"]
+    kind: Literal["F_a", "F_x", "F_y", "F_z", "m", "sigma", "sigma_xyz", "change"]
     window: int = 0
     transform: Literal["none", "log", "noise"] = "none"
     scope: Literal["finger", "hand"] = "finger"

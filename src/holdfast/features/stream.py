@@ -89,6 +89,7 @@ def new_memory(layout: Layout) -> Memory:
         history=np.zeros((n_fingers, 4, 2 * longest)),
         counts=np.zeros((n_fingers, kernel.N_COUNTS), dtype=np.int64),
         levels=levels,
+        own=np.full((n_fingers, layout.specs.shape[1]), np.nan),
         scratch=np.zeros((3, 1)),
     )
 
