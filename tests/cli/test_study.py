@@ -9,7 +9,7 @@ from holdfast.cli import study as verb
 from holdfast.contact import ContactState
 from holdfast.io import save_recording
 from holdfast.recordings import Label
-from holdfast.study import paper
+from holdfast.study import experiments, paper
 from holdfast.study import study as whole
 from holdfast.study.tables import Row, Table
 from holdfast.synthetic import synthetic_recording
@@ -21,7 +21,7 @@ from holdfast.twin.profile import profile
 def nowhere(monkeypatch, tmp_path):
     """No real recordings, and few tasks."""
     monkeypatch.setenv("HOLDFAST_DATA", str(tmp_path / "nothing"))
-    monkeypatch.setattr(whole, "PARTS", ("paper", "experiments"))
+    monkeypatch.setattr(whole, "PARTS", {"paper": paper, "experiments": experiments})
     monkeypatch.setattr(paper, "QUICK_WINDOWS", (14,))
     monkeypatch.setattr(paper, "ABLATED_AT", (14,))
 
@@ -54,7 +54,7 @@ def test_own_recordings(capsys, data, tmp_path):
     out = tmp_path / "out"
     code, printed, told = run(capsys, data, "--out", out, "--quick", "--jobs", 1)
     assert code == 0
-    assert printed.startswith("Table I: confusion [%]\nclassifier  on")
+    assert printed.startswith("The paper's Table I: confusion [%]\nclassifier  on")
     assert printed.endswith(f"{out / 'report.html'}: all 7 tables, with figures\n")
     assert "making tables and figures\n" in told
     assert {path.name for path in out.iterdir()} == {

@@ -25,8 +25,8 @@ from .build import synthetic, written
 PAPER = ("confusion", "window", "ablation", "unseen", "fingers", "zhang")
 
 
-def table(name, ours=1.0):
-    return Table(name, name, "Note.", [Row({"m": "a", "figure": "x"}, ours)], ("m",))
+def table(name, n=3):
+    return Table(name, name, "Note.", [Row({"m": "a", "figure": "x"}, 1.0, n=n)], ("m",))
 
 
 def titles(found):
@@ -54,13 +54,13 @@ class TestChapters:
 
     def test_what_the_twin_cannot_show_stands_beside_what_rests_on_it(self):
         made = {
-            "paper": Made([table("confusion"), discrepancies()], []),
+            "paper": Made([table("confusion"), table("cost", None), discrepancies()], []),
             "real": Made([table("hand")], []),
         }
         found = sections(made, [], twin=True)
         notes = {table.name: table.note for section in found for table in section.tables}
         assert notes["confusion"] == f"Note. {TWIN}"
-        assert notes["hand"] == "Note."
+        assert notes["hand"] == notes["cost"] == "Note."
         assert TWIN not in notes["discrepancies"]
         assert found[-1].title == "What the twin cannot show"
         lines = found[-1].text.split("\n\n")[1].splitlines()
@@ -127,7 +127,7 @@ def few():
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(paper, "QUICK_WINDOWS", (14,))
         patch.setattr(paper, "ABLATED_AT", (14,))
-        patch.setattr(whole, "PARTS", ("paper", "experiments"))
+        patch.setattr(whole, "PARTS", {"paper": paper, "experiments": experiments})
         yield
 
 

@@ -181,7 +181,7 @@ _NAMED = frozenset(name for chapter in CHAPTERS for name in chapter.names)
 
 def _marked(table: Table, chapter: Chapter) -> Table:
     """The table with a word on the twin, where it rests on it."""
-    if chapter.part == "real" or all(row.ours is None for row in table.rows):
+    if chapter.part == "real" or not any(row.n for row in table.rows):
         return table
     return msgspec.structs.replace(table, note=f"{table.note} {TWIN}".strip())
 

@@ -18,6 +18,8 @@ from holdfast.study.protocol import (
     Kind,
     judge,
 )
+from holdfast.study.report import Picture
+from holdfast.study.sweep import sweep
 from holdfast.study.tables import Key, Row, Table
 from holdfast.study.work import Task
 from holdfast.training.setting import MAX_SAMPLES
@@ -61,6 +63,11 @@ def tables(plan: Plan, results: Mapping[str, Any]) -> list[Table]:
     found = _Found(plan, results)
     makers = (_confusion, _window, _ablation, _unseen, _of_fingers, _zhang)
     return [*(make(found) for make in makers), printed.discrepancies()]
+
+
+def pictures(plan: Plan, results: Mapping[str, Any]) -> list[Picture]:
+    """Table II as curves."""
+    return [sweep(_window(_Found(plan, results)))]
 
 
 def first_finger(plan: Plan) -> str:
@@ -139,7 +146,9 @@ def _confusion(found: _Found) -> Table:
             *_protocol(found.plan, found.cell(("logreg", DEPLOYED))),
         ]
     )
-    return Table("confusion", "Table I: confusion [%]", note, rows, ("classifier", "on"))
+    return Table(
+        "confusion", "The paper's Table I: confusion [%]", note, rows, ("classifier", "on")
+    )
 
 
 def _window(found: _Found) -> Table:
@@ -151,7 +160,7 @@ def _window(found: _Found) -> Table:
             rows += found.rows(cell, keys, printed.RATES, printed.WINDOW[window], found.tests)
     rows.sort(key=lambda row: str(row.keys["features"]))
     note = f"All six features: with m; the deployed five: without. {found.protocol}"
-    title = "Table II: LogReg by window [%]"
+    title = "The paper's Table II: LogReg by window [%]"
     return Table("window", title, note, rows, ("features", "N_w", "on"))
 
 
@@ -163,7 +172,7 @@ def _ablation(found: _Found) -> Table:
             cell = found.cell(("logreg", columns_of(subset)), window)
             rows += found.rows(cell, keys, printed.RATES, paper, found.tests)
     note = f"The paper prints one table; for which window is not sure. {found.protocol}"
-    title = "Table III: LogReg by features [%]"
+    title = "The paper's Table III: LogReg by features [%]"
     return Table("ablation", title, note, rows, ("N_w", "features", "on"))
 
 

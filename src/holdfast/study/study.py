@@ -2,24 +2,25 @@
 
 import time
 from collections.abc import Mapping, Sequence
-from importlib import import_module
-from importlib.util import find_spec
 from pathlib import Path
 from typing import Any, Protocol
 
 from holdfast.errors import TrainingError
 from holdfast.parallel import Engine
-from holdfast.study import circumstances
+from holdfast.study import (
+    circumstances,
+    comparison,
+    experiments,
+    paper,
+    real,
+    sensitivity,
+)
 from holdfast.study.chapters import Made, sections
 from holdfast.study.folder import refuse_study, write_study
 from holdfast.study.plan import Plan
 from holdfast.study.report import Picture
-from holdfast.study.sweep import sweep
 from holdfast.study.tables import Table
 from holdfast.study.work import Follow, Task, Tell, Work
-
-PARTS = ("paper", "experiments", "comparison", "sensitivity", "real")
-"""Modules of this package; each has `tasks`, `tables` and `pictures`."""
 
 TITLE = "Slip and disturbance at the fingertips: the study"
 
@@ -38,6 +39,16 @@ class Part(Protocol):
     def pictures(self, plan: Plan, results: Mapping[str, Any]) -> list[Picture]:
         """Figures out of it."""
         ...
+
+
+PARTS: Mapping[str, Part] = {
+    "paper": paper,
+    "experiments": experiments,
+    "comparison": comparison,
+    "sensitivity": sensitivity,
+    "real": real,
+}
+"""The parts by name."""
 
 
 def study(
@@ -77,11 +88,13 @@ def study(
     refuse_study(out, force=force)
     refuse_plan(plan)
     begun = time.perf_counter()
-    parts = {name: _part(name) for name in PARTS if find_spec(f"{__package__}.{name}")}
-    tasks = [task for part in parts.values() for task in part.tasks(plan)]
+    tasks = [task for part in PARTS.values() for task in part.tasks(plan)]
     results = Work(Path(out), engine, follow, tell).run(tasks)
     tell("making tables and figures")
-    made = {name: _made(part, plan, results) for name, part in parts.items()}
+    made = {
+        name: Made(part.tables(plan, results), part.pictures(plan, results))
+        for name, part in PARTS.items()
+    }
     seconds = {"data": made_in, "study": time.perf_counter() - begun}
     summary = _summary(plan, seconds, len(tasks), left_out)
     found = sections(made, _run(summary), twin=_of_twin(plan))
@@ -101,19 +114,6 @@ def refuse_plan(plan: Plan) -> None:
             f"{plan.main.folder}: one finger with labels of both classes given ({fingers[0]}); "
             "the study compares classifiers of whole hands, which need at least two"
         )
-
-
-def _part(name: str) -> Part:
-    module: Any = import_module(f"{__package__}.{name}")
-    part: Part = module
-    return part
-
-
-def _made(part: Part, plan: Plan, results: Mapping[str, Any]) -> Made:
-    tables = part.tables(plan, results)
-    pictures = part.pictures(plan, results) if hasattr(part, "pictures") else []
-    curves = [sweep(table) for table in tables if table.name == "window"]
-    return Made(tables, [*pictures, *curves])
 
 
 def _of_twin(plan: Plan) -> bool:

@@ -112,7 +112,7 @@ class Grid(NamedTuple):
 
 
 def pivot(table: Table) -> Grid:
-    """The table as lines by columns.
+    """The table as lines by columns; lines that begin alike stand together.
 
     Example:
         >>> rows = [Row({"finger": "index", "figure": "Acc"}, 94.2),
@@ -129,9 +129,10 @@ def pivot(table: Table) -> Grid:
         *heads, column = _cell(table, row)
         cells.setdefault(tuple(heads), {})[column] = row
         columns[column] = None
+    firsts = list(dict.fromkeys(heads[0] for heads in cells))
     lines = (
         Line(heads, tuple(found.get(column) for column in columns))
-        for heads, found in cells.items()
+        for heads, found in sorted(cells.items(), key=lambda item: firsts.index(item[0][0]))
     )
     return Grid(tuple(columns), tuple(lines))
 
