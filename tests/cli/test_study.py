@@ -54,7 +54,7 @@ def test_own_recordings(capsys, data, tmp_path):
     out = tmp_path / "out"
     code, printed, told = run(capsys, data, "--out", out, "--quick", "--jobs", 1)
     assert code == 0
-    assert printed.startswith("The paper's Table I: confusion [%]\nclassifier  on")
+    assert printed.startswith("The paper's Table I: confusion [%] (in parentheses: the paper)\n")
     assert printed.endswith(f"{out / 'report.html'}: all 7 tables, with figures\n")
     assert "making tables and figures\n" in told
     assert {path.name for path in out.iterdir()} == {
@@ -173,9 +173,21 @@ def stable(recording):
 
 
 def test_what_is_printed_is_short(capsys):
-    rows = [Row({"m": f"{k}", "figure": "x"}, k, 0.5 if k == 1 else None) for k in range(30)]
-    rows.append(Row({"m": "0", "figure": "y"}, None))
-    verb._show(Table("methods", "Methods [%]", "", rows, ("m",)))
-    lines = capsys.readouterr().out.splitlines()
-    assert lines[:4] == ["Methods [%]", " m  x          y", " 0  0.0        –", " 1  1.0 (0.5)  -"]
-    assert lines[-2:] == ["... 6 more lines in the report", ""]
+    """The hardest split that most methods have, and few columns."""
+    rows = [
+        Row({"on": on, "method": method, "figure": figure}, 1.0, 0.5 if method == "a" else None)
+        for on, methods in (("by object", "a"), ("by recording", "ab"), ("fresh", "ab"))
+        for method in methods
+        for figure in ("AUC", "accuracy [%]", "Brier")
+    ]
+    rows.append(Row({"on": "by recording", "method": "c", "figure": "AUC"}, None))
+    table = Table("methods", "Methods", "", rows, ("on", "method"), digits_of={"AUC": 3})
+    verb._show(table)
+    assert capsys.readouterr().out.splitlines() == [
+        "Methods (in parentheses: the paper)",
+        "on            method  AUC            accuracy [%]",
+        "by recording  a       1.000 (0.500)  1.0 (0.5)",
+        "by recording  b       1.000          1.0",
+        "by recording  c       –              -",
+        "",
+    ]

@@ -13,10 +13,14 @@ if TYPE_CHECKING:
     from holdfast.study.plan import Plan
     from holdfast.study.tables import Line, Row, Table
 
-HEADLINES = ("confusion", "methods", "events")
-"""Tables that are printed at the end."""
-LONGEST = 24
-"""Lines of a table that are printed."""
+HEADLINES: dict[str, tuple[str, ...]] = {
+    "confusion": (),
+    "methods": ("accuracy [%]", "FDR [%]", "FNR [%]", "AUC"),
+    "events": ("missed at 50 ms [%]", "missed at 200 ms [%]", "in vain per minute"),
+}
+"""Tables that are printed at the end, and their columns; all where none are named."""
+HARDEST = ("by object", "by recording")
+"""Of the splits of main; the first that most methods have is printed."""
 
 
 def study(
@@ -142,16 +146,31 @@ def _show(table: "Table") -> None:
     """A table for a terminal: ours, and the paper's in parentheses."""
     from holdfast.study.tables import digits_of, pivot
 
-    grid = pivot(table)
-    show(table.title)
-    print_table(
-        (*table.lines, *grid.columns),
-        [_texts(line, [digits_of(table, name) for name in grid.columns])
-         for line in grid.lines[:LONGEST]],
-    )  # fmt: skip
-    if len(grid.lines) > LONGEST:
-        show(f"... {len(grid.lines) - LONGEST} more lines in the report")
+    grid = pivot(_headline(table))
+    paper = (
+        " (in parentheses: the paper)" if any(row.paper is not None for row in table.rows) else ""
+    )
+    show(f"{table.title}{paper}")
+    digits = [digits_of(table, name) for name in grid.columns]
+    lines = [_texts(line, digits) for line in grid.lines]
+    print_table((*table.lines, *grid.columns), lines)
     show()
+
+
+def _headline(table: "Table") -> "Table":
+    """The rows that are printed."""
+    from msgspec.structs import replace
+
+    columns = HEADLINES[table.name]
+    n_rows = {on: sum(row.keys.get("on") == on for row in table.rows) for on in HARDEST}
+    chosen = max(HARDEST, key=lambda on: n_rows[on])
+    rows = [
+        row
+        for row in table.rows
+        if (not columns or row.keys["figure"] in columns)
+        and (not n_rows[chosen] or row.keys["on"] == chosen)
+    ]
+    return replace(table, rows=rows)
 
 
 def _texts(line: "Line", digits: list[int]) -> list[str]:
