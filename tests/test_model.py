@@ -97,7 +97,7 @@ CHANGES = {
     "kind of classifier": (("fingers", "thumb", "classifier"), {"type": "forest"}, "forest"),
     "kind of feature": (("fingers", "thumb", "features", 0), {"kind": "F_q"}, "F_q"),
     "odd window": (("fingers", "thumb", "features", 4), {"window": 7}, "7 given"),
-    "weights": (("fingers", "thumb", "classifier"), {"mean": [0.0]}, "1 means, 14 scales"),
+    "weights": (("fingers", "thumb", "classifier"), {"mean": [0.0]}, "1 means, 15 scales"),
     "text": (("fingers", "thumb", "classifier"), {"intercept": "high"}, "Expected `float`"),
     "null": (("fingers", "thumb", "classifier"), {"intercept": None}, "Expected `float`"),
     "scale": (("fingers", "thumb", "classifier"), {"scale": [0.0] * len(RICH)}, "above 0 expected"),

@@ -19,6 +19,7 @@ RICH = (
     FeatureSpec("sigma_xyz", 12, "none", "hand"),
     FeatureSpec("change", 8, "log", "hand", 0.5),
     FeatureSpec("change", 4),
+    FeatureSpec("change", 8, "log", "finger", 0.5),
 )
 """Every kind, transform and scope, over several windows."""
 

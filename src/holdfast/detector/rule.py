@@ -180,7 +180,7 @@ class Live(NamedTuple):
     def table(self) -> tuple[Integers, list[npt.NDArray[Any]]]:
         """The table that `step_live` takes, and the arrays that must live as long."""
         layout, rule = self.layout, self.rule
-        integers = np.array([layout.tare_kind, rule.n_fingers], dtype=np.int64)
+        integers = np.array([layout.tare_kind, rule.n_fingers, layout.alike], dtype=np.int64)
         floats = np.array(
             [layout.tare_seconds, layout.period, rule.hysteresis, rule.min_duration, rule.hold]
         )
@@ -200,19 +200,20 @@ def step_live(table: Integers, time: float) -> int:
     kind, numbers = integers1(table, 0), floats1(table, 1)
     layout = Layout(
         integers1(table, 2), floats3(table, 3), floats2(table, 4), integers3(table, 5),
-        floats2(table, 6), integers2(table, 7), kind[0], numbers[0], numbers[1],
+        floats2(table, 6), integers2(table, 7), kind[2] != 0, kind[0], numbers[0],
+        numbers[1],
     )  # fmt: skip
     memory = Memory(
         floats2(table, 8), floats2(table, 9), floats3(table, 10), integers2(table, 11),
-        floats2(table, 12), floats2(table, 13), floats2(table, 14),
+        floats2(table, 12), floats2(table, 13),
     )  # fmt: skip
-    output = Output(floats2(table, 15), floats2(table, 16), integers2(table, 17))
+    output = Output(floats2(table, 14), floats2(table, 15), integers2(table, 16))
     rule = Rule(
-        floats2(table, 18), integers1(table, 19), floats2(table, 20), numbers[2], numbers[3],
+        floats2(table, 17), integers1(table, 18), floats2(table, 19), numbers[2], numbers[3],
         numbers[4], kind[1],
     )  # fmt: skip
-    decision = Decision(integers2(table, 21), floats2(table, 22))
-    readings, present, report = floats2(table, 23), flags1(table, 24), floats2(table, 25)
+    decision = Decision(integers2(table, 20), floats2(table, 21))
+    readings, present, report = floats2(table, 22), flags1(table, 23), floats2(table, 24)
     hand = step(layout, memory, output, rule, decision, readings, present, time)
     for f in range(len(present)):
         state, status = decision.codes[f, TOLD], output.status[f]

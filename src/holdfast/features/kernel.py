@@ -12,7 +12,7 @@ import numpy as np
 import numpy.typing as npt
 
 from holdfast.compiled import compiled
-from holdfast.features.haar import haar_windows
+from holdfast.features.haar import haar_window
 
 Array = npt.NDArray[np.float64]
 Integers = npt.NDArray[np.int64]
@@ -58,6 +58,9 @@ LEAST, MOST = 0, 1  # readings that the sensor can send
 LEAST_NOISE = 2  # of a force component, by the step of the readings
 N_CONSTANTS = 3
 
+# Columns of Layout.specs.
+KIND, WINDOW, TRANSFORM, SCOPE, SAME_AS = range(5)
+
 # Columns of Layout.windows.
 SIGMA_WINDOW, LONGEST = 0, 1
 
@@ -81,9 +84,10 @@ class Layout(NamedTuple):
     offsets: Integers  # (n_fingers + 1,) first taxel of each finger
     rotations: Array  # (n_taxels, 3, 3)
     constants: Array  # (n_fingers, N_CONSTANTS)
-    specs: Integers  # (n_fingers, n_features, 4) kind, window, transform, scope; -1 padding
+    specs: Integers  # (n_fingers, n_features, 5) as `spec_codes` gives them
     floors: Array  # (n_fingers, n_features)
     windows: Integers  # (n_fingers, 2) of the reported sigma, and the longest
+    alike: bool  # whether all fingers have the same features
     tare_kind: int
     tare_seconds: float
     period: float
@@ -98,7 +102,6 @@ class Memory(NamedTuple):
     counts: Integers  # (n_fingers, N_COUNTS)
     levels: Array  # (n_fingers, N_LEVELS)
     own: Array  # (n_fingers, n_features) each finger's own values, before the hand's largest
-    scratch: Array  # (3, 1)
 
 
 class Output(NamedTuple):
@@ -127,6 +130,7 @@ def advance(
     for f in range(len(present)):
         if time - memory.levels[f, LAST] > GAP_LIMIT * layout.period:  # False while LAST is NaN
             counts[f, RUN] = counts[f, FROZEN] = counts[f, PULLING] = 0
+            memory.own[f] = math.nan
             counts[f, GAPPED] = 1
             status[f, REASON], status[f, FAULTS] = GAP, 0
             output.values[f] = math.nan
@@ -151,8 +155,8 @@ def _take(
     layout: Layout, memory: Memory, values: Array, readings: Array, time: float, f: int
 ) -> tuple[int, int]:
     """One finger's sample up to its force; the reason and the faults after it."""
-    offsets, rotations, constants, _, _, windows, tare_kind, tare_seconds, period = layout
-    baseline, previous, history, counts, levels, _, scratch = memory
+    offsets, rotations, constants, _, _, windows, _, tare_kind, tare_seconds, period = layout
+    baseline, previous, history, counts, levels, _ = memory
     first, last = offsets[f], offsets[f + 1]
     values[f] = math.nan
     levels[f, LAST] = time
@@ -173,7 +177,7 @@ def _take(
     x, y, z, pressing = force_of(readings, baseline, rotations, first, last)
     _remember(history, counts, levels, values, f, x, y, z)
     if counts[f, RUN] >= windows[f, SIGMA_WINDOW]:
-        moments = _moments(history, counts, f, 0, windows[f, SIGMA_WINDOW], scratch)
+        moments = _moments(history, counts, f, 0, windows[f, SIGMA_WINDOW])
         values[f, MEAN], values[f, SIGMA] = moments
     faults = _faults(counts, levels, constants, f, period, least, most)
     if tare_kind == TARE_SECONDS and _pulled(counts, levels, f, pressing, period):
@@ -326,81 +330,73 @@ def _pulled(counts: Integers, levels: Array, f: int, pressing: float, period: fl
 
 @compiled
 def _moments(
-    history: Array, counts: Integers, f: int, channel: int, window: int, scratch: Array
+    history: Array, counts: Integers, f: int, channel: int, window: int
 ) -> tuple[float, float]:
     """The m and sigma of the last `window` values; the stretch must hold so many."""
     end = counts[f, END]
-    m, sigma, spare = scratch[0], scratch[1], scratch[2]
-    haar_windows(history[f, channel, end - window : end], window, m, sigma, spare)
-    return m[0], sigma[0]
+    return haar_window(history[f, channel, end - window : end], window)
 
 
 @compiled
 def _own_features(layout: Layout, memory: Memory, output: Output, f: int) -> None:
     """The values of a finger's features by itself; NaN where its stretch is too short."""
     specs, floors, reported = layout.specs, layout.floors, layout.windows[f, SIGMA_WINDOW]
-    _, _, history, counts, levels, own, scratch = memory
+    _, _, history, counts, levels, own = memory
     for place in range(specs.shape[1]):
-        kind, window = specs[f, place, 0], specs[f, place, 1]
+        kind, window = specs[f, place, KIND], specs[f, place, WINDOW]
         if kind < 0:
             own[f, place] = 0.0  # in place of those that pad
+        elif specs[f, place, SAME_AS] < place:
+            own[f, place] = own[f, specs[f, place, SAME_AS]]
         elif counts[f, RUN] < max(window, 1):
             own[f, place] = math.nan
         else:
             if window == reported and kind < SIGMA_XYZ:
                 value = output.values[f, MEAN + kind - FIRST_WINDOWED]
             else:
-                value = _feature(kind, window, history, counts, f, scratch)
+                value = _feature(kind, window, history, counts, f)
             noise, floor = levels[f, NOISE], floors[f, place]
-            own[f, place] = _transform(value, specs[f, place, 2], window, noise, floor)
+            own[f, place] = _transform(value, specs[f, place, TRANSFORM], window, noise, floor)
 
 
 @compiled
 def _fill_features(layout: Layout, memory: Memory, output: Output, f: int) -> None:
+    own = memory.own
     for place in range(layout.specs.shape[1]):
-        value = memory.own[f, place]
-        if layout.specs[f, place, 3] == 1:
-            for other in range(len(layout.specs)):
-                rival = _rival(layout, memory, f, place, other, value)
-                value = value if value >= rival else rival  # the rival too where it is NaN
+        value = own[f, place]
+        if layout.specs[f, place, SCOPE] == 1:
+            for other in range(len(own)):
+                rival = own[other, place]
+                if not layout.alike:
+                    rival = _of_other(layout, memory, f, place, other)
+                if rival > value or math.isnan(value):
+                    value = rival
         output.features[f, place] = value
 
 
 @compiled
-def _rival(
-    layout: Layout, memory: Memory, f: int, place: int, other: int, otherwise: float
-) -> float:
-    """What a feature of finger f would be of another finger; `otherwise` where it has none."""
-    specs, floors = layout.specs, layout.floors
-    _, _, history, counts, levels, own, scratch = memory
-    kind, window, transform = specs[f, place, 0], specs[f, place, 1], specs[f, place, 2]
-    if counts[other, RUN] < max(window, 1):
-        return otherwise
-    alike = floors[other, place] == floors[f, place]
-    for column in range(3):
-        alike &= specs[other, place, column] == specs[f, place, column]
-    if alike:
-        value = own[other, place]
-    else:
-        value = _feature(kind, window, history, counts, other, scratch)
-        value = _transform(value, transform, window, levels[other, NOISE], floors[f, place])
-    return otherwise if math.isnan(value) else float(value)
+def _of_other(layout: Layout, memory: Memory, f: int, place: int, other: int) -> float:
+    """A feature of finger f, of another finger; NaN where its stretch is too short."""
+    kind, window = layout.specs[f, place, KIND], layout.specs[f, place, WINDOW]
+    if memory.counts[other, RUN] < max(window, 1):
+        return math.nan
+    value = _feature(kind, window, memory.history, memory.counts, other)
+    transform, floor = layout.specs[f, place, TRANSFORM], layout.floors[f, place]
+    return float(_transform(value, transform, window, memory.levels[other, NOISE], floor))
 
 
 @compiled
-def _feature(
-    kind: int, window: int, history: Array, counts: Integers, f: int, scratch: Array
-) -> float:
+def _feature(kind: int, window: int, history: Array, counts: Integers, f: int) -> float:
     if kind < FIRST_WINDOWED:
         return float(history[f, kind, counts[f, END] - 1])
     if kind < SIGMA_XYZ:
-        return _moments(history, counts, f, 0, window, scratch)[kind - FIRST_WINDOWED]
+        return _moments(history, counts, f, 0, window)[kind - FIRST_WINDOWED]
     total = 0.0
     for axis in range(1, 4):
         if kind == CHANGE:
             value = history[f, axis, counts[f, END] - 1] - history[f, axis, counts[f, END] - window]
         else:
-            value = _moments(history, counts, f, axis, window, scratch)[1]
+            value = _moments(history, counts, f, axis, window)[1]
         total += value * value
     return math.sqrt(total)
 

@@ -86,13 +86,24 @@ def parse_features(names: str | Sequence[str], window: int = 14) -> tuple[Featur
 
 
 def spec_codes(specs: Sequence[FeatureSpec], width: int) -> npt.NDArray[np.int64]:
-    """(width, 4) kind, window, transform and scope as numbers, for the kernel; -1 is padding."""
-    codes = np.full((width, 4), -1, dtype=np.int64)
-    for row, spec in zip(codes, specs, strict=False):
+    """The features as numbers, for the kernel.
+
+    Args:
+        specs: of a finger.
+        width: at least as many.
+
+    Returns:
+        (width, 5) kind, window, transform and scope, and the first place that is the same but
+        for its scope; -1 is padding.
+    """
+    codes = np.full((width, 5), -1, dtype=np.int64)
+    own = [(spec.kind, spec.window, spec.transform, spec.floor) for spec in specs]
+    for row, spec, alike in zip(codes, specs, own, strict=False):
         row[:] = (
             KINDS.index(spec.kind),
             spec.window,
             TRANSFORMS.index(spec.transform),
             SCOPES.index(spec.scope),
+            own.index(alike),
         )
     return codes

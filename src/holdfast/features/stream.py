@@ -70,6 +70,7 @@ class StreamPlan:
             specs=np.stack([spec_codes(specs, width) for specs in features]),
             floors=floors,
             windows=np.array([(self.window, most) for most in longest], dtype=np.int64),
+            alike=len({tuple(specs) for specs in features}) == 1,
             tare_kind=TARE_KINDS[self.tare.kind],
             tare_seconds=self.tare.seconds,
             period=1.0 / self.rate,
@@ -90,7 +91,6 @@ def new_memory(layout: Layout) -> Memory:
         counts=np.zeros((n_fingers, kernel.N_COUNTS), dtype=np.int64),
         levels=levels,
         own=np.full((n_fingers, layout.specs.shape[1]), np.nan),
-        scratch=np.zeros((3, 1)),
     )
 
 
