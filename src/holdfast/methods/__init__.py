@@ -4,6 +4,7 @@ from holdfast.methods.anyskin import ANYSKIN
 from holdfast.methods.difference import DIFFERENCE
 from holdfast.methods.friction import FRICTION
 from holdfast.methods.grover import TCN
+from holdfast.methods.holdfast import HOLDFAST
 from holdfast.methods.james_lepora import JAMES_LEPORA
 from holdfast.methods.method import HAND, Method
 from holdfast.methods.paper import LOGREG, SVM
@@ -19,6 +20,7 @@ METHODS: dict[str, Method] = {
     for each in (
         LOGREG,
         SVM,
+        HOLDFAST,
         ZHANG,
         FRICTION,
         SLIP_SERVO,
