@@ -58,12 +58,12 @@ EXACT = Change(margin=0.0)
 def relabelled(recording: Recording, margin: float) -> Recording:
     """The recording with labels out of its truth; as it is, where it has none."""
     truth = recording.truth
-    if truth is None or not {"phase"} <= set(truth.hand):
+    if truth is None or not {"phase", "outside_force"} <= set(truth.hand):
         return recording
     rule = LabelRule(margin=margin)
     modules = {
         name: replace(module, labels=labels_from_truth(truth, name, rule))
-        if name in truth.fingers
+        if {"contact_force", "slip_speed"} <= set(truth.fingers.get(name, ()))
         else module
         for name, module in recording.modules.items()
     }

@@ -107,7 +107,7 @@ def _grips(truth: Truth, fingers: Mapping[str, FingerDecisions]) -> list[Grip]:
     grips = []
     locked = phase == Phase.LOCKED
     for name, finger in fingers.items():
-        if name not in truth.fingers or not locked.any():
+        if "contact_force" not in truth.fingers.get(name, {}) or not locked.any():
             continue
         force = np.linalg.norm(truth.fingers[name]["contact_force"], axis=1)
         held = np.isin(phase, HELD)[_at(truth, finger.times)]

@@ -139,24 +139,26 @@ def judge(job: Job) -> dict[str, Judged]:
     Raises:
         TrainingError: a whole-hand method gets too few fingers.
     """
+    return {key: judged_of(cases) for key, cases in cases_of(job) if cases}
+
+
+def cases_of(job: Job) -> Iterator[tuple[str, list[Case]]]:
+    """By split, or corpus, the recordings and what was thought of them, in order."""
     method = method_called(job.method)
     recordings = look(method, job.train, job.change, job.effort.stride)
     material = material_of(recordings, job.effort.max_rows)
     everyone = frozenset(range(len(recordings)))
-    found: dict[str, Judged] = {}
     for split in job.splits:
         cases: dict[int, Case] = {}
         for held in held_out(material.objects, split, job.effort.folds, job.seed):
             fold = _fold(job, method, material, recordings, everyone - held)
             cases |= {place: _case(fold, recordings[place]) for place in held}
-        if cases:
-            found[split] = judged_of([cases[place] for place in sorted(cases)])
+        yield split, [cases[place] for place in sorted(cases)]
     if job.tests:
         fold = _fold(job, method, material, recordings, everyone)
         for corpus in job.tests:
             tested = look(method, corpus, job.change, job.effort.stride)
-            found[corpus.name] = judged_of([_case(fold, seen) for seen in tested])
-    return found
+            yield corpus.name, [_case(fold, seen) for seen in tested]
 
 
 def method_called(name: str) -> Method:

@@ -46,9 +46,11 @@ def tables(plan: Plan, results: Results) -> list[Table]:
         judged: Judged = results[f"real/{name}"]["recording"]
         for recording in judged.metrics.recordings:
             rows += _rows(title, recording)
+    rows.sort(key=lambda row: (str(row.keys["recording"]), str(row.keys["finger"])))
     note = f"Leave one recording out. {CAVEAT}"
     lines = ("recording", "finger", "method")
-    return [Table("real", "Real recordings: AUC", note, rows, lines, digits=2)]
+    digits = {"stable samples": 0, "other samples": 0}
+    return [Table("real", "Real recordings: AUC", note, rows, lines, digits=2, digits_of=digits)]
 
 
 def pictures(plan: Plan, results: Results) -> list[Picture]:

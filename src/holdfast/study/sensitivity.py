@@ -24,6 +24,11 @@ from holdfast.study.work import Task
 from holdfast.twin.labels import LabelRule
 
 SHOWN = ("logreg", "zhang", "trees", "holdfast")
+LEVELS = (0.0, 1.0, 2.0, 4.0, 8.0)
+"""Of noise [unit of the readings]."""
+EVERY = (1, 2, 3, 5)
+MARGINS = (0.0, 0.05, LabelRule().margin, 0.2)
+"""Of labels [s]; they are drawn with the rule's."""
 SLOW = ("trees",)
 """Methods for which every other change is enough."""
 SAMPLE = ("accuracy [%]", "FDR [%]", "AUC contact")
@@ -132,12 +137,11 @@ def sweeps(plan: Plan) -> list[Sweep]:
 
 
 def _noise(plan: Plan) -> dict[float, Change]:
-    levels = (0.0, 4.0) if plan.quick else (0.0, 1.0, 2.0, 4.0, 8.0)
-    return {level: Change(noise=level) for level in levels}
+    return {level: Change(noise=level) for level in (_ends(LEVELS) if plan.quick else LEVELS)}
 
 
 def _every(plan: Plan) -> tuple[int, ...]:
-    return (1, 3) if plan.quick else (1, 2, 3, 5)
+    return (1, 3) if plan.quick else EVERY
 
 
 def _margins(plan: Plan) -> dict[float, Change]:
@@ -146,8 +150,12 @@ def _margins(plan: Plan) -> dict[float, Change]:
     if truth is None or "phase" not in truth.hand:
         return {}
     usual = LabelRule().margin
-    margins = (0.0, usual) if plan.quick else (0.0, 0.05, usual, 0.2)
+    margins = (0.0, usual) if plan.quick else MARGINS
     return {each: Change() if each == usual else Change(margin=each) for each in margins}
+
+
+def _ends(values: Sequence[float]) -> tuple[float, float]:
+    return values[0], values[-1]
 
 
 def _changes(sweep: Sweep, method: str) -> dict[float, Change]:
