@@ -153,7 +153,7 @@ def _groups(plan: Plan, rows: Sequence[Row], key: str) -> dict[str, Mapping[str,
     """By method, its values by group, out of those judged by recording."""
     own = [row for row in rows if row.keys["on"] == SPLITS["recording"]]
     drawn = {
-        title: _estimates([row for row in own if row.keys["method"] == title], key)
+        title: _estimates([row for row in own if _short(str(row.keys["method"])) == title], key)
         for title in _shown(plan, FEW).values()
     }
     return {title: values for title, values in drawn.items() if values}
@@ -164,4 +164,9 @@ def _estimates(rows: Sequence[Row], key: str) -> dict[str, Estimate]:
 
 
 def _shown(plan: Plan, names: Sequence[str]) -> dict[str, str]:
-    return {name: title for name, title in titles(plan).items() if name in names}
+    """The titles, for legends without what stands in brackets."""
+    return {name: _short(title) for name, title in titles(plan).items() if name in names}
+
+
+def _short(title: str) -> str:
+    return title.split(" (", maxsplit=1)[0]
