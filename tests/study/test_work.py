@@ -7,8 +7,10 @@ import time
 from pathlib import Path
 
 import msgspec
+import numba
 import numpy as np
 import pytest
+from threadpoolctl import threadpool_info
 
 from holdfast.cli.console import progress
 from holdfast.errors import EngineError, OutputError
@@ -28,6 +30,11 @@ def figure(place, seed):
     """What a task of the study may look like: random numbers by key, a Struct of NumPy numbers."""
     parts = np.random.default_rng([place, seed]).normal(size=3)
     return Figure(parts.sum(), parts)
+
+
+def n_threads():
+    """Of the compiled kernels, and of each library that has threads of its own."""
+    return [numba.get_num_threads(), *(info["num_threads"] for info in threadpool_info())]
 
 
 def noted(place, folder):
@@ -113,6 +120,14 @@ def test_a_worker_of_a_cluster_that_is_killed_changes_no_result(tmp_path, log):
     assert [path.name for path in kept(tmp_path / "there")] == [
         path.name for path in kept(tmp_path / "here")
     ]
+
+
+@pytest.mark.parametrize("engine", ENGINES, ids=str)
+def test_a_task_has_one_thread(tmp_path, engine):
+    before = n_threads()
+    results = Work(tmp_path, engine).run([Task("a", n_threads, (), list[int])])
+    assert len(results["a"]) > 1 and set(results["a"]) == {1}
+    assert n_threads()[0] == before[0]
 
 
 def test_what_is_kept_is_not_done_again(tmp_path, log):
