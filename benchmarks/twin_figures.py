@@ -107,7 +107,7 @@ def out_of_fold(
     division = divide(found.entries, setting.split, setting.seed)
     designs = gather(recordings, found, setting, division)
     material = Material(found, division, designs)
-    parameters = dict.fromkeys(designs, setting.recipe.reference)
+    parameters = {finger: setting.recipe_of(finger).reference for finger in designs}
     tasks = [(material, setting, parameters, {unit}) for unit in range(len(division.units))]
     models = list(each(fit_model, tasks, jobs))
     for place, recording in enumerate(recordings):
@@ -226,7 +226,7 @@ def unseen(arguments: argparse.Namespace) -> None:
     rows = []
     for classifier, title in CLASSIFIERS.items():
         setting = Setting(classifier=classifier, trials=0, max_samples=MAX_SAMPLES)
-        model = fit_all(recordings, setting, setting.recipe.reference)
+        model = fit_all(recordings, setting, setting.recipe_of("index").reference)
         for name in FOLDERS:
             if name != "reference":
                 metrics = evaluate(model, load(arguments.folder / name))

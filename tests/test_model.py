@@ -166,7 +166,10 @@ def test_refuses_a_file_that_is_not_there(tmp_path):
 def test_refuses_an_unknown_name():
     with pytest.raises(ModelError) as raised:
         Model.load("builtin:magic")
-    assert str(raised.value) == "unknown model 'builtin:magic'; built in are builtin:noise-floor"
+    assert (
+        str(raised.value)
+        == "unknown model 'builtin:magic'; built in are builtin:twin, builtin:noise-floor"
+    )
 
 
 class TestFingers:

@@ -2,6 +2,7 @@
 
 import math
 from collections.abc import Mapping
+from importlib import resources
 from pathlib import Path
 from typing import Any, Literal, Self
 
@@ -143,7 +144,7 @@ class Model(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=Tru
 
     @classmethod
     def load(cls, path: str | Path) -> Self:
-        """The model in that file, or the built-in one of that name (`builtin:noise-floor`).
+        """The model in that file, or the built-in one of that name (`builtin:twin`).
 
         Raises:
             ModelError: no such file or name; no JSON; an unknown field, another shape, a
@@ -284,7 +285,14 @@ def built_in(name: str) -> Model:
     """
     if name not in BUILT_IN:
         raise ModelError(f"unknown model {name!r}; built in are {', '.join(BUILT_IN)}")
-    return BUILT_IN[name]
+    return BUILT_IN[name]()
+
+
+def _twin() -> Model:
+    """Trained on recordings of the twin, reference profile: see docs/training.md."""
+    data = (resources.files("holdfast") / "models" / "twin.json").read_bytes()
+    model = msgspec.json.decode(data, type=Model, dec_hook=_decode)
+    return msgspec.structs.replace(model, name="builtin:twin")
 
 
 def _noise_floor() -> Model:
@@ -302,7 +310,7 @@ def _noise_floor() -> Model:
     return Model(name="builtin:noise-floor", fingers={ANY_FINGER: finger})
 
 
-BUILT_IN = {"builtin:noise-floor": _noise_floor()}
+BUILT_IN = {"builtin:twin": _twin, "builtin:noise-floor": _noise_floor}
 
 
 def _check_sensors(data: bytes) -> None:

@@ -255,7 +255,7 @@ def test_refusals(capsys, model, grasp, save, tmp_path):
         f"cannot read the model {missing}: No such file or directory"
     )
     assert refusal(capsys, "builtin:best", grasp) == (
-        "unknown model 'builtin:best'; built in are builtin:noise-floor"
+        "unknown model 'builtin:best'; built in are builtin:twin, builtin:noise-floor"
     )
     for uri in ("xela://auto", "twin:?object=can&seed=1"):
         assert refusal(capsys, model, uri) == (

@@ -26,9 +26,12 @@ def test_names(names, expected):
 @pytest.mark.parametrize(
     ("names", "window", "message"),
     [
-        ("F_a,F_q", 14, "unknown feature 'F_q'; there are F_a, F_x, F_y, F_z, m, sigma, and F_tip"
-                        " for three"),
-        ("", 14, "unknown feature ''; there are F_a, F_x, F_y, F_z, m, sigma, and F_tip for three"),
+        ("F_a,F_q", 14, "unknown feature 'F_q'; there are F_a, F_x, F_y, F_z, m, sigma, F_tip for"
+                        " three, and holdfast alone for a list of our own"),
+        ("", 14, "unknown feature ''; there are F_a, F_x, F_y, F_z, m, sigma, F_tip for three, and"
+                 " holdfast alone for a list of our own"),
+        ("holdfast,F_a", 14, "unknown feature 'holdfast'; there are F_a, F_x, F_y, F_z, m, sigma,"
+                             " F_tip for three, and holdfast alone for a list of our own"),
         ("F_a,F_a", 14, "a feature is given twice in F_a,F_a"),
         ("F_tip,F_x", 14, "a feature is given twice in F_x,F_y,F_z,F_x"),
         ("F_a", 13, "an even window of at least 2 samples expected, 13 given"),
@@ -38,6 +41,13 @@ def test_refuses_names(names, window, message):
     with pytest.raises(ValueError) as raised:
         parse_features(names, window)
     assert str(raised.value) == message
+
+
+def test_our_own_list_has_a_name():
+    own = parse_features("holdfast", 8)
+    assert len(own) == 15
+    assert str(own[0]) == "log(F_a)"
+    assert max(spec.window for spec in own) == 64
 
 
 @pytest.mark.parametrize(

@@ -1,5 +1,6 @@
 """Ways of fitting a classifier, by name; one file each."""
 
+from holdfast.classifiers.adapted import Adapted
 from holdfast.classifiers.fitting import (
     Classifier,
     LinearRecipe,
@@ -16,6 +17,7 @@ RECIPES: dict[str, LinearRecipe] = {"logreg": LogisticRegression(), "svm": Linea
 
 __all__ = [
     "RECIPES",
+    "Adapted",
     "Classifier",
     "LinearClassifier",
     "LinearRecipe",

@@ -31,7 +31,9 @@ class RateRule(StrEnum):
 
 
 def detect(
-    model: Annotated[str, typer.Argument(help="A model's file, or builtin:noise-floor.")],
+    model: Annotated[
+        str, typer.Argument(help="A model's file, builtin:twin or builtin:noise-floor.")
+    ],
     source: Annotated[str, typer.Argument(help="The path of a recording.")],
     summary: Annotated[
         bool, typer.Option("--summary", help="Print shares of states and the events instead.")

@@ -16,7 +16,9 @@ if TYPE_CHECKING:
 
 
 def evaluate(
-    model: Annotated[str, typer.Argument(help="A model file, or builtin:noise-floor.")],
+    model: Annotated[
+        str, typer.Argument(help="A model file, builtin:twin or builtin:noise-floor.")
+    ],
     data: Annotated[Path, typer.Argument(help="A labelled recording, or a folder of them.")],
     seed: Annotated[int, typer.Option(help="Of the bootstrap.")] = 0,
     plot: Annotated[
@@ -33,7 +35,7 @@ def evaluate(
 
     Example:
       holdfast evaluate model.json recordings/
-      holdfast evaluate builtin:noise-floor recordings/ --json
+      holdfast evaluate builtin:twin recordings/ --json
     """
     import msgspec
 

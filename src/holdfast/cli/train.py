@@ -14,7 +14,7 @@ def train(
     classifier: Annotated[str, typer.Option(help="logreg or svm.")] = "logreg",
     window: Annotated[int, typer.Option(help="N_w, samples in the Haar window; even.")] = 14,
     features: Annotated[
-        str, typer.Option(help="Out of F_a, F_x, F_y, F_z, m, sigma.")
+        str, typer.Option(help="Out of F_a, F_x, F_y, F_z, m, sigma; or holdfast: our own.")
     ] = "F_a,F_x,F_y,F_z,sigma",
     tare: Annotated[
         str, typer.Option(help="Seconds from the start, first, none, or START:END.")
@@ -32,6 +32,12 @@ def train(
     contact_threshold: Annotated[
         float | None, typer.Option(help="F_a below it is no contact; by default from the tare.")
     ] = None,
+    hold: Annotated[
+        float, typer.Option(help="UNSTABLE is told so long after the last sign of it [s].")
+    ] = 0.0,
+    init: Annotated[
+        str, typer.Option(help="A model to adapt, with its features: a file, or builtin:twin.")
+    ] = "",
     resume: Annotated[
         bool, typer.Option("--resume", help="Go on with a search that was stopped.")
     ] = False,
@@ -51,26 +57,35 @@ def train(
     Example:
       holdfast train recordings/ -o model.json
       holdfast train recordings/ -o model.json --split object --classifier svm
-      holdfast train recordings/ -o model.json --trials 0 --features F_a,sigma --json
+      holdfast train recordings/ -o model.json --features holdfast --hold 0.1
+      holdfast train recordings/ -o model.json --init builtin:twin
     """
     from holdfast.features import Tare, parse_features
     from holdfast.files import refuse_overwrite
     from holdfast.io import load_dataset
+    from holdfast.model import Model
     from holdfast.training import Setting
     from holdfast.training import train as fit
 
-    setting = Setting(
-        classifier=classifier,
-        features=parse_features(features, window),
-        window=window,
-        tare=Tare.parse(tare),
-        split=split,  # type: ignore[arg-type]
-        trials=trials,
-        seed=seed,
-        shared=shared,
-        contact_threshold=contact_threshold,
-        max_samples=max_samples,
-    )
+    chosen = {
+        "split": split,
+        "trials": trials,
+        "seed": seed,
+        "shared": shared,
+        "contact_threshold": contact_threshold,
+        "max_samples": max_samples,
+        "tare": Tare.parse(tare),
+    }
+    if init:
+        setting = Setting.adapting(Model.load(init), **chosen)
+    else:
+        setting = Setting(
+            classifier=classifier,
+            features=parse_features(features, window),
+            window=window,
+            hold=hold,
+            **chosen,  # type: ignore[arg-type]
+        )
     refuse_overwrite(model, force=force)
     recordings = load_dataset(data)
     journal = _journal(model, resume=resume, force=force)

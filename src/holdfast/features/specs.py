@@ -58,11 +58,27 @@ class FeatureSpec(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
         return text if self.scope == "finger" else f"hand {text}"
 
 
+FORCE_FLOOR, SIGMA_FLOOR, CHANGE_FLOOR = 20.0, 3.0, 5.0
+"""About the noise of each on a uSkin fingertip: 30 taxels of 0.9 counts rms [count]."""
+
+
+def _rich(scope: Literal["finger", "hand"]) -> tuple[FeatureSpec, ...]:
+    return (
+        *(FeatureSpec("sigma_xyz", n, "log", scope, SIGMA_FLOOR) for n in (4, 14, 32, 64)),
+        *(FeatureSpec("change", n, "log", scope, CHANGE_FLOOR) for n in (4, 16, 64)),
+    )
+
+
+HOLDFAST = (FeatureSpec("F_a", 0, "log", floor=FORCE_FLOOR), *_rich("finger"), *_rich("hand"))
+"""Our own features, `holdfast` by name: see `holdfast.methods.holdfast`."""
+
+
 def parse_features(names: str | Sequence[str], window: int = 14) -> tuple[FeatureSpec, ...]:
     """The features of that list of names, with that window.
 
     Args:
-        names: separated by commas, out of `FEATURE_NAMES`; `F_tip` stands for F_x, F_y, F_z.
+        names: separated by commas, out of `FEATURE_NAMES`; `F_tip` stands for F_x, F_y, F_z;
+            `holdfast` alone for our own features, which have windows of their own.
         window: N_w, samples.
 
     Raises:
@@ -72,13 +88,18 @@ def parse_features(names: str | Sequence[str], window: int = 14) -> tuple[Featur
         >>> [str(feature) for feature in parse_features("F_a,sigma")]
         ['F_a', 'sigma[14]']
     """
+    if names == "holdfast":
+        return HOLDFAST
     given = names.split(",") if isinstance(names, str) else list(names)
     wanted: list[str] = []
     for name in (name.strip() for name in given):
         wanted += ["F_x", "F_y", "F_z"] if name == "F_tip" else [name]
     if unknown := [name for name in wanted if name not in FEATURE_NAMES]:
         known = ", ".join(FEATURE_NAMES)
-        raise ValueError(f"unknown feature {unknown[0]!r}; there are {known}, and F_tip for three")
+        raise ValueError(
+            f"unknown feature {unknown[0]!r}; there are {known}, F_tip for three, and holdfast "
+            "alone for a list of our own"
+        )
     if len(set(wanted)) < len(wanted):
         raise ValueError(f"a feature is given twice in {','.join(wanted)}")
     check_window(window)

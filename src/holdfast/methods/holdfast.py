@@ -12,26 +12,13 @@ The rule stays linear.
 from collections.abc import Mapping
 
 from holdfast.classifiers import recipe
-from holdfast.features import FeatureSpec
 from holdfast.features.extract import extract
+from holdfast.features.specs import HOLDFAST as FEATURES
 from holdfast.features.stream import StreamPlan
 from holdfast.methods.method import Method
 from holdfast.methods.paper import WINDOW
 from holdfast.methods.signals import HandSignal
 from holdfast.sensors.values import Array
-
-SIGMA_WINDOWS = (4, 14, 32, 64)
-CHANGE_WINDOWS = (4, 16, 64)
-FORCE_FLOOR, SIGMA_FLOOR, CHANGE_FLOOR = 20.0, 3.0, 5.0
-"""About the noise of each on a uSkin fingertip of 30 taxels of 0.9 counts [count]."""
-
-FEATURES = (
-    FeatureSpec("F_a", 0, "log", floor=FORCE_FLOOR),
-    *(FeatureSpec("sigma_xyz", n, "log", floor=SIGMA_FLOOR) for n in SIGMA_WINDOWS),
-    *(FeatureSpec("change", n, "log", floor=CHANGE_FLOOR) for n in CHANGE_WINDOWS),
-    *(FeatureSpec("sigma_xyz", n, "log", "hand", SIGMA_FLOOR) for n in SIGMA_WINDOWS),
-    *(FeatureSpec("change", n, "log", "hand", CHANGE_FLOOR) for n in CHANGE_WINDOWS),
-)
 
 
 def _features(hand: HandSignal) -> Mapping[str, Array]:

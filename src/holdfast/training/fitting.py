@@ -7,7 +7,7 @@ import numpy as np
 
 from holdfast.classifiers import Parameters
 from holdfast.errors import TrainingError
-from holdfast.model import FingerModel, Model
+from holdfast.model import Debounce, FingerModel, Model
 from holdfast.recordings import Recording
 from holdfast.training.design import FingerDesign, gather
 from holdfast.training.setting import Setting
@@ -81,7 +81,7 @@ def fit_model(
         threshold = setting.contact_threshold
         fingers[finger] = FingerModel(
             features=setting.features,
-            classifier=setting.recipe.fit(samples, parameters[finger], setting.seed),
+            classifier=setting.recipe_of(finger).fit(samples, parameters[finger], setting.seed),
             sensor=design.sensor.name,
             contact_threshold=(
                 design.contact_threshold(recordings) if threshold is None else threshold
@@ -95,6 +95,7 @@ def fit_model(
         sensors={d.sensor.name: d.sensor for d in material.designs.values()},
         window=setting.window,
         tare=str(setting.tare),
+        debounce=Debounce(hold=setting.hold),
     )
 
 

@@ -2,11 +2,13 @@
 
 import math
 from dataclasses import dataclass, field
-from typing import Literal
+from typing import Any, Literal, Self
 
-from holdfast.classifiers import LinearRecipe, recipe
+from holdfast.classifiers import Adapted, LinearRecipe, recipe
+from holdfast.errors import ModelError
 from holdfast.features import DEPLOYED, FeatureSpec, Tare, parse_features
 from holdfast.features.haar import check_window
+from holdfast.model import Model
 
 Split = Literal["recording", "object", "random"]
 SPLITS: tuple[Split, ...] = ("recording", "object", "random")
@@ -36,6 +38,8 @@ class Setting:
         contact_threshold: F_a below it is no contact [unit of the readings]; None for mean +
             5 standard deviations over the tare stretches, where they are without contact.
         max_samples: a finger that are kept in memory.
+        hold: for how long the model goes on to tell UNSTABLE after its rule last said so [s].
+        init: a model to begin from: its features, window and rule are adapted to the data.
 
     Raises:
         ValueError: an unknown name or a number out of range.
@@ -51,6 +55,8 @@ class Setting:
     shared: bool = False
     contact_threshold: float | None = None
     max_samples: int = MAX_SAMPLES
+    hold: float = 0.0
+    init: Model | None = None
 
     def __post_init__(self) -> None:
         recipe(self.classifier)
@@ -68,7 +74,30 @@ class Setting:
         if threshold is not None and not (math.isfinite(threshold) and threshold >= 0):
             raise ValueError(f"a contact threshold of at least 0 expected, {threshold} given")
 
-    @property
-    def recipe(self) -> LinearRecipe:
-        """The way of fitting."""
+    @classmethod
+    def adapting(cls, init: Model, **chosen: Any) -> Self:  # noqa: ANN401 (the fields above)
+        """The setting that adapts a model, with its features, window and tare.
+
+        Raises:
+            ModelError: its fingers have different features.
+            ValueError: as above.
+        """
+        features = {part.features for part in init.fingers.values()}
+        if len(features) > 1:
+            raise ModelError(
+                f"{init.name or 'the model'} has different features for its fingers; one list "
+                "for all expected to begin from"
+            )
+        own = {"features": features.pop(), "window": init.window, "tare": Tare.parse(init.tare)}
+        own["hold"] = init.debounce.hold
+        return cls(**{**own, **chosen}, init=init)
+
+    def recipe_of(self, finger: str) -> LinearRecipe:
+        """The way of fitting a finger's classifier.
+
+        Raises:
+            ModelError: the model to begin from has no such finger.
+        """
+        if self.init is not None:
+            return Adapted(self.init.finger(finger).classifier)
         return recipe(self.classifier)

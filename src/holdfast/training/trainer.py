@@ -131,7 +131,8 @@ class _Trainer:
         """The parameters of every finger, found without those units, for each set of units."""
         setting = self.setting
         if not setting.trials:
-            return [dict.fromkeys(self.designs, setting.recipe.reference) for _ in without]
+            reference = {finger: setting.recipe_of(finger).reference for finger in self.designs}
+            return [reference for _ in without]
         tasks = [
             (_spread(design.without(held)), setting, finger, self.journal)
             for held in without
@@ -209,14 +210,14 @@ def _search(
     """The parameters found, and a warning where no search was possible."""
     folds = inner_folds(samples, INNER_FOLDS, setting.seed)
     if len(folds) < 2:
-        return setting.recipe.reference, (
+        return setting.recipe_of(finger).reference, (
             f"{finger}: {len(folds)} of the folds by recording hold both classes, 2 needed to "
             "search for parameters; the reference setting is taken"
         )
     return search(
         samples,
         folds,
-        setting.recipe,
+        setting.recipe_of(finger),
         n_trials=setting.trials,
         seed=setting.seed,
         journal=journal,
