@@ -86,7 +86,7 @@ def job_of(plan: Plan, method: str) -> Job:
     """All that is asked of a method."""
     tests = tuple(plan.corpora[role] for role in _roles(plan, method))
     splits: tuple[Split, ...] = ("recording", "object")
-    if plan.quick and method not in CORE:
+    if method == NETWORK or (plan.quick and method not in CORE):
         splits = ("recording",)
     return Job(method, plan.main, splits, tests, Change(), effort_of(plan, method), plan.seed)
 
