@@ -146,7 +146,8 @@ def _by_direction(plan: Plan, results: Results) -> Picture | None:
         "Disturbances called stable, by the direction of the push, by recording. The paper holds "
         "that all directions are found."
     )
-    return Picture("directions", caption, draw_groups(groups, "disturbed, called stable [%]", per_row=1))
+    drawn = draw_groups(groups, "disturbed, called stable [%]", per_row=1)
+    return Picture("directions", caption, drawn)
 
 
 def _groups(plan: Plan, rows: Sequence[Row], key: str) -> dict[str, Mapping[str, Estimate]]:
