@@ -2,7 +2,8 @@
 
 The paper holds that the standard deviation of the Haar details, sigma, tells instability better
 than their energy, because noise adds to the energy. Both are taken here from the same window of
-the same signal.
+the same signal, and on a log scale: no cut changes by that, and probabilities do not saturate,
+so that those of several fits can be pooled for an AUC.
 """
 
 from collections.abc import Callable, Mapping
@@ -17,6 +18,8 @@ from holdfast.methods.signals import FingerSignal, HandSignal, stretchwise, wind
 from holdfast.methods.zhang import detail_energy
 from holdfast.sensors.values import Array
 
+LEAST = 1e-9
+"""Under it there is nothing [count or N, and their squares]."""
 SOURCE = "for one question of the study: the exact best cut on one feature, N_w = 14"
 
 
@@ -56,7 +59,9 @@ def _pressing(finger: FingerSignal) -> Array:
 def _features(
     signal: Callable[[FingerSignal], Array], measure: Callable[[Array], Array], hand: HandSignal
 ) -> Mapping[str, Array]:
-    return stretchwise(hand, lambda finger: measure(signal(finger))[:, None])
+    return stretchwise(
+        hand, lambda finger: np.log10(np.maximum(measure(signal(finger)), LEAST))[:, None]
+    )
 
 
 CUTS = {
