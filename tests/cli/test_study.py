@@ -181,6 +181,9 @@ def test_what_is_printed_is_short(capsys):
         for figure in ("AUC", "accuracy [%]", "Brier")
     ]
     rows.append(Row({"on": "by recording", "method": "c", "figure": "AUC"}, None))
+    rows += [
+        Row({"on": "by recording", "method": "d", "threshold": "for 1/min", "figure": "AUC"}, 1.0)
+    ]
     table = Table("methods", "Methods", "", rows, ("on", "method"), digits_of={"AUC": 3})
     verb._show(table)
     assert capsys.readouterr().out.splitlines() == [

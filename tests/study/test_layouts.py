@@ -140,6 +140,14 @@ def test_an_interval_that_says_nothing_is_left_out():
     assert "| a | infinite | 1.0 |" in text
 
 
+def test_an_interval_with_one_end():
+    rows = [Row({"m": "a", "figure": "x"}, 1.0, interval=(0.5, None)),
+            Row({"m": "a", "figure": "y"}, 1.0, interval=(None, 2.0))]  # fmt: skip
+    text = to_html(Table("t", "T", "", rows, ("m",)))
+    assert '<span class="interval">from 0.5</span>' in text
+    assert '<span class="interval">to 2.0</span>' in text
+
+
 def test_an_empty_table_is_laid_out():
     made = Table("t", "T", "", [], ("m",))
     assert "<tbody>" in to_html(made)

@@ -158,7 +158,7 @@ def _show(table: "Table") -> None:
 
 
 def _headline(table: "Table") -> "Table":
-    """The rows that are printed."""
+    """The rows that are printed: of one split, at each method's own threshold."""
     from msgspec.structs import replace
 
     columns = HEADLINES[table.name]
@@ -169,6 +169,7 @@ def _headline(table: "Table") -> "Table":
         for row in table.rows
         if (not columns or row.keys["figure"] in columns)
         and (not n_rows[chosen] or row.keys["on"] == chosen)
+        and row.keys.get("threshold", "own") == "own"
     ]
     return replace(table, rows=rows)
 

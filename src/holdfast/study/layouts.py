@@ -227,6 +227,8 @@ def _interval_text(row: Row, digits: int) -> str:
     low, high = (number_text(end, digits).replace(INFINITE, "∞") for end in row.interval)
     if (low, high) in ((NOTHING, NOTHING), ("∞", "∞")):
         return ""
+    if NOTHING in (low, high):
+        return f"from {low}" if high == NOTHING else f"to {high}"
     return f"{low} to {high}" if MINUS in low + high else f"{low}–{high}"
 
 
