@@ -45,8 +45,8 @@ def methods(plan: Plan, results: Results) -> Table:
         "the method's own threshold; below the contact threshold nothing is stable. The methods "
         f"for whole hands ({_whole()}) are judged, and compared, as hands. The difference is "
         "paired: a resample draws the same recordings for both. AUC is of the probabilities of all "
-        "folds and fingers together, so that it also asks whether they mean the same. The paper's figures are of its "
-        f"own data, finger and split. {network_note(plan)}"
+        "folds and fingers together, so that it also asks whether they mean the same. The "
+        f"paper's figures are of its own data, finger and split. {network_note(plan)}"
     )
     title = "Methods by sample"
     return Table("methods", title, note, rows, ("on", "method"), digits_of=DIGITS)

@@ -233,8 +233,9 @@ def _sigma_energy(plan: Plan, results: Results) -> Table:
         "One feature and one cut, the one with the best balanced accuracy in training, by "
         "recording. Sigma: the standard deviation of the Haar details; energy: their sum of "
         "squares; of the same window of 14 samples of the same signal, so that they differ by "
-        "the mean of the details alone; on a log scale, which moves no cut. AUC contact: stable against unstable, which no cut and "
-        "no contact threshold touches. The difference is paired."
+        "the mean of the details alone; on a log scale, which moves no cut. AUC contact: "
+        "stable against unstable, which no cut and no contact threshold touches. The "
+        "difference is paired."
     )
     lines = (NOISE, "measure")
     title = "Sigma beside energy as noise grows"
