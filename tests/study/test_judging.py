@@ -140,11 +140,17 @@ def test_events_are_counted_by_exact_labels(judged, corpus):
         )
 
 
-def test_every_rate_has_its_threshold_and_more_alarms_may_come_with_more(judged):
+def test_every_rate_has_its_threshold_and_more_alarms_find_more_slips(judged):
     curve = judged["recording"].curve
     assert len(curve) == len(ALARM_RATES)
-    found = [sum(heard.n_missed(0.2) for heard in point) for point in curve]
-    assert found == sorted(found, reverse=True)
+    found = [sum(heard.n_found(0.2) for heard in point) for point in curve]
+    assert found == sorted(found)
+
+
+def test_a_hand_that_is_held_gives_fewer_alarms(judged):
+    bare, held = judged["recording"].own, judged["recording"].held
+    assert sum(h.false_alarms for h in held) <= sum(h.false_alarms for h in bare)
+    assert sum(h.n_doubted for h in held) >= sum(h.n_doubted for h in bare)
 
 
 def test_a_judge_of_hands_has_no_fingers(corpus):

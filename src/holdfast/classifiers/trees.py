@@ -110,7 +110,7 @@ class GradientBoosting:
 
 def _one_thread() -> AbstractContextManager[Any]:
     """Scikit-learn's threads wait for each other: on a busy machine six times as long."""
-    from threadpoolctl import threadpool_limits  # type: ignore[import-untyped]
+    from threadpoolctl import threadpool_limits
 
     limits: AbstractContextManager[Any] = threadpool_limits(1)
     return limits

@@ -6,12 +6,13 @@ from holdfast.metrics.events import POSTS
 from holdfast.study.figuring import count_row, quantile_row, ratio_row
 from holdfast.study.hearing import AFTER_GLITCH, Heard
 from holdfast.study.jobs import SPLITS, Results, found, titles
-from holdfast.study.judging import COMPARED_AT, Judged
+from holdfast.study.judging import COMPARED_AT, HOLD, Judged
 from holdfast.study.plan import Plan
 from holdfast.study.tables import Key, Row, Table
 
 THRESHOLDS: dict[str, Callable[[Judged], list[Heard]]] = {
     "own": lambda judged: judged.own,
+    f"own, held {HOLD:g} s": lambda judged: judged.held,
     f"for {COMPARED_AT:g}/min": lambda judged: judged.calm,
     f"for {COMPARED_AT:g}/min, jumps apart": lambda judged: judged.spared,
 }
@@ -33,7 +34,9 @@ def events(plan: Plan, results: Results) -> Table:
     note = (
         "Of the hand, by labels without margin. An event: a hold of half a second that ends; an "
         "alarm: the hand is stable no more. Missed: no alarm until that long after the onset; a "
-        "missed event counts as infinitely late. Thresholds: the method's own, and the most "
+        "missed event counts as infinitely late. Thresholds: the method's own, sample by sample; "
+        f"the same where not stable is told for {HOLD:g} s more, so that one disturbance is one "
+        "alarm; and, held as long, the most "
         f"watchful one that gives {COMPARED_AT:g} false alarm per minute under a stable label in "
         "training, each training recording judged without itself; 'jumps apart': those right "
         "after a jump of the controller's set point not counted in choosing it. In vain, per "

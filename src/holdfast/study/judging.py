@@ -29,6 +29,9 @@ ALARM_RATES = (0.5, 1.0, 2.0, 5.0, 10.0, 20.0, 50.0)
 """False alarms per minute of stable label that thresholds are chosen for, in training."""
 COMPARED_AT = 1.0
 """The rate that methods are compared at."""
+HOLD = 0.1
+"""For how long a hand goes on not to be stable at those thresholds, so that one disturbance is
+one alarm, whatever the method [s]."""
 
 Split = Literal["recording", "object"]
 
@@ -79,9 +82,10 @@ class Judged(msgspec.Struct, frozen=True):
         fingers: by sample, at the method's own threshold; None of a method for whole hands.
         hand: the same of the hand.
         own: its alarms, by exact labels, at the same threshold, of each recording.
-        curve: the same at thresholds for each of `ALARM_RATES`.
-        spared: the same at thresholds for one false alarm per minute, where those right after a
-            jump of the controller's set point are not counted.
+        held: the same, held for `HOLD`.
+        curve: the same, held, at thresholds for each of `ALARM_RATES`.
+        spared: the same, held, at thresholds for one false alarm per minute, where those right
+            after a jump of the controller's set point are not counted.
         breakdown: of errors at the method's own threshold, of each recording.
         calibration: of each recording, (10, 3) sum of probabilities, stable samples and samples
             of each bin.
@@ -91,6 +95,7 @@ class Judged(msgspec.Struct, frozen=True):
     fingers: Metrics | None
     hand: Metrics
     own: list[Heard]
+    held: list[Heard]
     curve: list[list[Heard]]
     spared: list[Heard]
     breakdown: list[Breakdown]
@@ -218,7 +223,7 @@ def _fold(
 
 def _calm(expert: Expert, seen: Seen) -> tuple[Calm, Calm]:
     """What tells its false alarms: of all, and of those that no jump of the set point caused."""
-    score, labels = expert.opinion(seen).score(seen), seen.hand(seen.exact).labels
+    score, labels = expert.opinion(seen).score(seen).held(HOLD), seen.hand(seen.exact).labels
     spared = after_glitch(score.times, seen.truth)
     return Calm.of(score, labels), Calm.of(score, labels, spared)
 
@@ -243,7 +248,8 @@ def judged_of(cases: Sequence[Case]) -> Judged:
         fingers=summarise(own) if any(each.fingers for each in own) else None,
         hand=summarise(_hands(own)),
         own=[each[0] for each in heard],
-        curve=[[each[1 + k] for each in heard] for k in range(len(ALARM_RATES))],
+        held=[each[1] for each in heard],
+        curve=[[each[2 + k] for each in heard] for k in range(len(ALARM_RATES))],
         spared=[each[-1] for each in heard],
         breakdown=[count(case.seen, each) for case, each in zip(cases, own, strict=True)],
         calibration=[calibration_counts(each) for each in own],
@@ -251,12 +257,14 @@ def judged_of(cases: Sequence[Case]) -> Judged:
 
 
 def _heard(case: Case) -> Iterator[Heard]:
-    """What the alarms are worth at the method's own threshold, and at each that was chosen."""
+    """Its alarms at its own threshold, then held: at its own, and at each that was chosen."""
     seen, opinion, shifts = case
     score, labels = opinion.score(seen), seen.hand(seen.exact).labels
     spells = spells_of(seen.truth)
+    yield hear(score.hand(labels), seen.truth, spells)
+    held = score.held(HOLD)
     for shift in (0.0, *shifts):
-        yield hear(score.hand(labels, shift), seen.truth, spells)
+        yield hear(held.hand(labels, shift), seen.truth, spells)
 
 
 def _hands(decided: Iterable[Decisions]) -> Iterator[Decisions]:

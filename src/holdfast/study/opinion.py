@@ -6,7 +6,7 @@ only the least margin of the fingers in contact counts.
 """
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 import numpy.typing as npt
@@ -50,6 +50,21 @@ class Score:
         ]
         states = np.select([c for c, _ in choices], [s for _, s in choices], default=STABLE)
         return states.astype(np.int8)
+
+    def held(self, seconds: float) -> "Score":
+        """The score of a hand that goes on not to be stable for a while, as `Debounce.hold` does.
+
+        Not where too few fingers are in contact, nor where a finger is not known.
+
+        Args:
+            seconds: after the last sample at which it was not stable [s].
+        """
+        if len(self.times) < 2:
+            return self
+        n = max(1, round(seconds / float(np.median(np.diff(self.times)))))
+        padded = np.concatenate([np.full(n - 1, np.inf), self.least])
+        least = np.lib.stride_tricks.sliding_window_view(padded, n).min(axis=1)
+        return replace(self, least=np.where(self.alone | ~self.known, self.least, least))
 
     def hand(self, labels: Codes, shift: float = 0.0) -> FingerDecisions:
         """The hand's decisions beside those labels."""
