@@ -14,6 +14,9 @@ from holdfast.detector import detect
 from holdfast.errors import ModelError, OutputError
 from holdfast.features import FeatureSpec, parse_features
 from holdfast.model import ANY_FINGER, Debounce, FingerModel, Model, Training
+from holdfast.sensors import sensor as built_in_sensor
+from holdfast.synthetic import synthetic_recording
+from holdfast.training import evaluate
 
 TRAINING = Training(
     recordings={"one": "0a1b"},
@@ -269,6 +272,47 @@ def test_the_noise_floor():
     assert part.features == (FeatureSpec("sigma", 14, "noise"),)
     at = part.classifier.probability(np.log([[1.0], [3.0], [9.0]]))
     assert at == pytest.approx([0.9, 0.5, 0.1])
+
+
+class TestTwin:
+    """`builtin:twin`, trained on simulated recordings."""
+
+    def test_it_says_where_it_came_from(self):
+        judge = Model.load("builtin:twin")
+        assert judge.name == "builtin:twin"
+        assert judge.training is not None
+        assert len(judge.training.recordings) == len(set(judge.training.recordings.values())) == 60
+        assert all(len(digest) == 32 for digest in judge.training.recordings.values())
+        assert judge.training.figures["accuracy"] > 90
+
+    def test_what_it_is(self):
+        judge = Model.load("builtin:twin")
+        assert list(judge.fingers) == [ANY_FINGER]
+        part = judge.fingers[ANY_FINGER]
+        assert part.features == parse_features("holdfast")
+        assert part.sensor == "uskin-curved"
+        assert judge.sensors == {"uskin-curved": built_in_sensor("uskin-curved")}
+        assert judge.rate == pytest.approx(150.0, rel=1e-3)
+        assert judge.debounce == Debounce(hold=0.1)
+
+    def test_it_judges_a_grasp(self):
+        grasp = synthetic_recording("grasp", 5, ("thumb", "ring"))
+        metrics = evaluate(Model.load("builtin:twin"), [grasp])
+        assert list(metrics.fingers) == ["thumb", "ring"]
+        assert metrics.pooled.accuracy > 75
+        assert metrics.pooled.auc_contact > 0.9
+
+    def test_another_sensor_is_refused(self):
+        judge = Model.load("builtin:twin")
+        with pytest.raises(ModelError) as raised:
+            judge.predict_proba(recording(index=tactile()))
+        assert str(raised.value) == (
+            "the model judges fingers with the sensor 'uskin-curved'; given are index (tiny)"
+        )
+
+    def test_a_copy_in_a_file_is_the_same(self, tmp_path):
+        judge = Model.load("builtin:twin")
+        assert Model.load(saved(judge, tmp_path / "m.json")) == judge
 
 
 def test_the_plan_takes_the_models_rate():

@@ -11,11 +11,11 @@ from holdfast.classifiers import LinearClassifier
 from holdfast.cli import main
 from holdfast.cli.detect import PIECE
 from holdfast.cli.lines import json_lines
-from holdfast.contact import Fault
+from holdfast.contact import UNSTABLE, Fault
 from holdfast.detector import detect
 from holdfast.features import FeatureSpec
 from holdfast.io import load_recording, save_recording
-from holdfast.model import FingerModel, Model
+from holdfast.model import Debounce, FingerModel, Model
 from holdfast.recordings import Recording, Tactile
 from holdfast.sensors import sensor
 from holdfast.synthetic import synthetic_recording
@@ -219,6 +219,19 @@ class TestRate:
 
     def test_strict_takes_what_fits(self, capsys, model, grasp):
         assert lines(capsys, model, grasp, "--rate", "strict")[0]
+
+
+def test_the_hold_of_a_model_stays(capsys, model, grasp, tmp_path):
+    """Also where the other ways of holding back a change are chosen."""
+    path = tmp_path / "held.json"
+    held = msgspec.structs.replace(Model.load(model), debounce=Debounce(0.3, 0.2, 0.4))
+    held.save(path)
+    chosen = msgspec.structs.replace(held, debounce=Debounce(0.0, 0.2, 0.4))
+    for words, judge in (([], held), (["--debounce", 0], chosen)):
+        trace = detect(judge, load_recording(grasp)).fingers["thumb"]
+        unstable = np.mean(trace.state == UNSTABLE)
+        got = summary(capsys, path, grasp, *words)["fingers"]["thumb"]["states"]["UNSTABLE"]
+        assert got == pytest.approx(unstable, abs=1e-6)
 
 
 def test_a_tare_by_interval(capsys, model, grasp, tmp_path):

@@ -1,12 +1,17 @@
 import json
+from dataclasses import replace
 
+import msgspec
 import pytest
 
 from holdfast.cli import main
-from holdfast.io import load_dataset, save_recording
+from holdfast.io import load_dataset, load_recording, save_recording
 from holdfast.model import Model
 from holdfast.synthetic import synthetic_recording
 from holdfast.training import Setting, evaluate, train
+from holdfast.twin import simulation
+from holdfast.twin.profile import profile
+from holdfast.twin.simulation import Grasp, simulate
 
 FINGERS = ("thumb", "index")
 SAMPLE = {"n", "accuracy", "fdr", "fpr", "fnr", "auc", "auc_contact", "confusion"}
@@ -149,3 +154,47 @@ def test_a_damaged_recording(capsys, folder, tmp_path):
     )
     assert str(tmp_path / "a.parquet") in refusal(capsys, folder / "model.json", tmp_path)
     assert list(tmp_path.iterdir()) == [tmp_path / "a.parquet"]
+
+
+@pytest.fixture(scope="module")
+def twin_grasp(tmp_path_factory):
+    """A short grasp of the twin that `builtin:twin` was not trained on."""
+    short = msgspec.structs.replace(profile("reference"), idle=(0.7, 0.8), hold=4.0)
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(simulation, "profile", lambda _: short)
+        recording = simulate(Grasp("box", 2, 1, seed=7))
+    path = tmp_path_factory.mktemp("twin") / "box.parquet"
+    save_recording(recording, path)
+    return path
+
+
+def test_the_model_of_the_twin_judges_a_grasp_of_the_twin(capsys, twin_grasp):
+    code, out, err = run(capsys, "builtin:twin", twin_grasp, "--json")
+    assert (code, err) == (0, "")
+    report = json.loads(out)
+    assert list(report["fingers"]) == ["thumb", "index", "middle", "ring"]
+    assert report["trained_on"] == []
+    assert report["pooled"]["accuracy"] > 80
+    assert report["pooled"]["auc"] > 0.9
+
+
+def test_the_model_of_the_twin_detects_in_a_grasp_of_the_twin(capsys, twin_grasp):
+    assert main(["detect", "builtin:twin", str(twin_grasp), "--summary", "--json"]) == 0
+    out, err = capsys.readouterr()
+    found = json.loads(out)
+    assert (found["model"], err) == ("builtin:twin", "")
+    assert list(found["fingers"]) == ["thumb", "index", "middle", "ring"]
+    for finger in found["fingers"].values():
+        assert finger["states"]["NO_CONTACT"] > 0.05
+        assert finger["states"]["STABLE"] > 0.05
+
+
+def test_the_model_of_the_twin_refuses_another_sensor(capsys, folder, tmp_path):
+    [path, _] = sorted((folder / "new").iterdir())
+    one = load_recording(path)
+    skin = replace(one.modules["thumb"].sensor, name="flat")
+    module = replace(one.modules["thumb"], sensor=skin)
+    save_recording(replace(one, modules={"thumb": module}), tmp_path / "flat.parquet")
+    assert refusal(capsys, "builtin:twin", tmp_path / "flat.parquet") == (
+        "the model judges fingers with the sensor 'uskin-curved'; given are thumb (flat)"
+    )

@@ -5,12 +5,13 @@ import signal
 import subprocess
 import sys
 import time
+from dataclasses import replace
 
 import pytest
 
 from holdfast import files
 from holdfast.cli import main
-from holdfast.io import load_dataset, save_recording
+from holdfast.io import load_dataset, load_recording, save_recording
 from holdfast.model import Model
 from holdfast.recordings import Recording
 from holdfast.synthetic import synthetic_recording
@@ -21,6 +22,7 @@ EVENT = {
     "n_events", "stable_minutes", "missed", "delay_median", "delay_p95", "false_alarms_per_minute"
 }  # fmt: skip
 FINGERS = ("thumb", "index")
+TWIN = "builtin:twin"
 
 
 def check_metrics(metrics, fingers=FINGERS):
@@ -126,7 +128,8 @@ def test_a_model_is_not_overwritten(capsys, data, model):
         (["--split", "half"], "unknown split 'half'; there are recording, object, random"),
         (
             ["--features", "F_a,magic"],
-            "unknown feature 'magic'; there are F_a, F_x, F_y, F_z, m, sigma, and F_tip for three",
+            "unknown feature 'magic'; there are F_a, F_x, F_y, F_z, m, sigma, F_tip for three, "
+            "and holdfast alone for a list of our own",
         ),
         (
             ["--tare", "soon"],
@@ -138,6 +141,21 @@ def test_a_model_is_not_overwritten(capsys, data, model):
         ),
         (["--seed", "-1"], "a seed from 0 to 2^32 - 1 expected, -1 given"),
         (["--contact-threshold", "-2"], "a contact threshold of at least 0 expected, -2.0 given"),
+        (["--hold", "-1"], "a hold of at least 0 s expected, -1.0 given"),
+        (["--init", "builtin:twin", "--hold", "nan"], "a hold of at least 0 s expected, nan given"),
+        (
+            ["--init", "builtin:twin", "--features", "F_a"],
+            "--init brings the classifier, window and features of its model; leave out --features",
+        ),
+        (
+            ["--init", "builtin:twin", "--window", "14", "--classifier", "logreg"],
+            "--init brings the classifier, window and features of its model; leave out "
+            "--classifier and --window",
+        ),
+        (
+            ["--init", "builtin:hand"],
+            "unknown model 'builtin:hand'; built in are builtin:twin, builtin:noise-floor",
+        ),
     ],
 )
 def test_wrong_options(capsys, data, model, words, message):
@@ -255,3 +273,82 @@ def test_an_interrupt_says_how_to_go_on(capsys, data, model, monkeypatch):
         f"what the search found so far is in {model}.search: go on with --resume\n"
         "holdfast: interrupted\n"
     )
+
+
+def test_a_model_is_adapted(capsys, data, model):
+    code, out, err = run(capsys, data, "-o", model, "--trials", 0, "--init", TWIN, "--json")
+    assert (code, err) == (0, "")
+    check_metrics(json.loads(out)["cross_validation"])
+    adapted, twin = Model.load(model), Model.load(TWIN)
+    assert tuple(adapted.fingers) == FINGERS
+    assert adapted.fingers["thumb"].features == twin.fingers["*"].features
+    assert (adapted.debounce, adapted.window, adapted.tare) == (twin.debounce, 14, "0.5")
+    assert adapted.name == ""
+    setting = Setting.adapting(twin, trials=0)
+    assert adapted.fingers == train(load_dataset(data), setting).model.fingers
+
+
+def test_tare_and_hold_win_over_the_model_to_adapt(capsys, data, model):
+    words = ["--init", TWIN, "--trials", 0, "--tare", 0.3, "--hold", 0.25, "--shared"]
+    assert run(capsys, data, "-o", model, *words)[0] == 0
+    adapted = Model.load(model)
+    assert list(adapted.fingers) == ["*"]
+    assert (adapted.tare, adapted.debounce.hold) == ("0.3", 0.25)
+
+
+def test_hold_and_our_own_features(capsys, data, model):
+    words = ["--features", "holdfast", "--hold", 0.1, "--trials", 0]
+    assert run(capsys, data, "-o", model, *words)[0] == 0
+    made = Model.load(model)
+    assert made.debounce.hold == 0.1
+    assert made.fingers["thumb"].features == Model.load(TWIN).fingers["*"].features
+
+
+def test_a_model_to_adapt_that_is_not_there(capsys, data, model, tmp_path):
+    missing = tmp_path / "none.json"
+    assert refusal(capsys, data, "-o", model, "--init", missing) == (
+        f"cannot read the model {missing}: No such file or directory"
+    )
+    missing.write_text("{}")
+    assert f"{missing} is no model of" in refusal(capsys, data, "-o", model, "--init", missing)
+    assert list(tmp_path.iterdir()) == [missing]
+
+
+def test_one_for_all_from_one_for_each(capsys, data, model, tmp_path):
+    first = tmp_path / "first.json"
+    assert run(capsys, data, "-o", first, "--trials", 0)[0] == 0
+    assert refusal(capsys, data, "-o", model, "--init", first, "--shared") == (
+        f"one classifier for all fingers (shared) cannot begin from {first}, which has one for "
+        "each of thumb, index"
+    )
+
+
+def test_doubts_about_the_model_to_adapt_are_told(capsys, data, model, tmp_path):
+    """Adapted to what it was trained on; and to another sensor."""
+    first = tmp_path / "first.json"
+    assert run(capsys, data, "-o", first, "--trials", 0)[0] == 0
+    code, _, err = run(capsys, data, "-o", model, "--trials", 0, "--init", first)
+    assert (code, err) == (
+        0,
+        f"{first} has seen 3 of these 3 recordings in training (grasp-0, grasp-1, grasp-2): "
+        "figures on them flatter\n",
+    )
+    others = tmp_path / "others"
+    others.mkdir()
+    for path in data.iterdir():
+        save_recording(with_flat_skin(load_recording(path)), others / path.name)
+    words = ["--trials", 0, "--init", TWIN, "--force"]
+    code, _, err = run(capsys, others, "-o", model, *words)
+    assert (code, err) == (
+        0,
+        "thumb, index: the sensor is flat (count), builtin:twin was trained on uskin-curved "
+        "(count); its features are taken as they are, what it knows may not fit\n",
+    )
+
+
+def with_flat_skin(recording):
+    modules = {
+        name: replace(module, sensor=replace(module.sensor, name="flat"))
+        for name, module in recording.modules.items()
+    }
+    return replace(recording, modules=modules)

@@ -1,5 +1,6 @@
 import pytest
 
+from holdfast.model import Debounce
 from holdfast.training import Setting
 
 
@@ -10,6 +11,7 @@ def test_the_defaults_are_those_of_the_deployed_model():
     ]  # fmt: skip
     assert (setting.classifier, setting.window, str(setting.tare)) == ("logreg", 14, "0.5")
     assert (setting.split, setting.trials) == ("recording", 30)
+    assert (setting.debounce, setting.rate) == (Debounce(), None)
 
 
 @pytest.mark.parametrize(
@@ -35,6 +37,8 @@ def test_the_defaults_are_those_of_the_deployed_model():
             {"contact_threshold": float("nan")},
             "a contact threshold of at least 0 expected, nan given",
         ),
+        ({"hold": -0.1}, "a hold of at least 0 s expected, -0.1 given"),
+        ({"hold": float("inf")}, "a hold of at least 0 s expected, inf given"),
     ],
 )
 def test_refusals(given, message):

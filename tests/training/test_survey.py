@@ -31,6 +31,7 @@ def test_fingers_without_labels_do_not_count(grasps):
 def test_the_rate_is_the_median():
     given = [tiny_recording(seed, rate=rate) for seed, rate in enumerate([100.0, 50.0, 105.0])]
     assert survey(given).rate == pytest.approx(100.0)
+    assert survey(given, 80.0).rate == 80.0
 
 
 def same_samples():

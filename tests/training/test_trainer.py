@@ -132,7 +132,7 @@ def test_a_random_sample_is_judged_by_the_model_without_it(grasps, monkeypatch):
                 threshold=0.5,
             )
 
-    monkeypatch.setattr(Setting, "recipe", Marked())
+    monkeypatch.setattr(Setting, "recipe_of", lambda self, finger: Marked())
     told = []
     monkeypatch.setattr(trainer, "summarise", lambda judged, seed: told.extend(judged) or _some())
     train(grasps, replace(SETTING, split="random"))

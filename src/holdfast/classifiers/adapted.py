@@ -19,8 +19,8 @@ Array = npt.NDArray[np.float64]
 class Adapted:
     """Logistic regression, regularised towards the weights of a model and not towards zero.
 
-    With v_0 the intercept and the coefficients of the prior, over features standardised as in
-    its training, and n samples of balanced weight, it minimises
+    With v_0 the intercept and the coefficients of the prior's log odds, over features
+    standardised as in its training, and n samples of balanced weight, it minimises
 
         |v - v_0|^2 / 2 + C sum_i weight_i log(1 + exp(-y_i z_i(v)))
 
@@ -63,7 +63,7 @@ class Adapted:
                 f"{samples.features.shape[1]} features given, {prior.n_features} expected to adapt"
             )
         rows = (samples.features - np.array(prior.mean)) / np.array(prior.scale)
-        known = np.array([prior.intercept + _shift(prior), *prior.coefficients])
+        known = _log_odds(prior)
         odds = balance_of(samples.stable)
         found = minimize(
             _loss,
@@ -83,10 +83,13 @@ class Adapted:
         )
 
 
-def _shift(prior: LinearClassifier) -> float:
-    """What moves the decision of the prior to z = 0."""
+def _log_odds(prior: LinearClassifier) -> Array:
+    """Intercept and coefficients of the prior's log odds, less those of its threshold."""
     limit = np.clip(prior.threshold, 1e-12, 1 - 1e-12)
-    return float((prior.offset - np.log(limit / (1 - limit))) / prior.slope)
+    shift = prior.offset - np.log(limit / (1 - limit))
+    calibrated = prior.slope * np.array([prior.intercept, *prior.coefficients])
+    calibrated[0] += shift
+    return calibrated
 
 
 def _loss(

@@ -89,9 +89,11 @@ def _judge(name: str, debounce: float | None, hysteresis: float | None) -> "Mode
     from holdfast.model import Debounce, Model
 
     model = Model.load(name)
+    known = model.debounce
     held = Debounce(
-        model.debounce.min_duration if debounce is None else debounce,
-        model.debounce.hysteresis if hysteresis is None else hysteresis,
+        known.min_duration if debounce is None else debounce,
+        known.hysteresis if hysteresis is None else hysteresis,
+        known.hold,
     )
     return replace(model, debounce=held)
 

@@ -1,24 +1,41 @@
 """`holdfast train`: a model out of labelled recordings, with figures out of fold."""
 
 from pathlib import Path
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
 from holdfast.cli.console import print_json, progress, say, show
 
+if TYPE_CHECKING:
+    from holdfast.model import Model
+    from holdfast.training import Setting
+
 
 def train(
     data: Annotated[Path, typer.Argument(help="A folder of labelled recordings.")],
     model: Annotated[Path, typer.Option("--output", "-o", help="Where the model goes (JSON).")],
-    classifier: Annotated[str, typer.Option(help="logreg or svm.")] = "logreg",
-    window: Annotated[int, typer.Option(help="N_w, samples in the Haar window; even.")] = 14,
+    classifier: Annotated[
+        str | None, typer.Option(help="logreg or svm.", show_default="logreg")
+    ] = None,
+    window: Annotated[
+        int | None,
+        typer.Option(help="N_w, samples in the Haar window; even.", show_default="14"),
+    ] = None,
     features: Annotated[
-        str, typer.Option(help="Out of F_a, F_x, F_y, F_z, m, sigma; or holdfast: our own.")
-    ] = "F_a,F_x,F_y,F_z,sigma",
+        str | None,
+        typer.Option(
+            help="Out of F_a, F_x, F_y, F_z, m, sigma; or holdfast: our own.",
+            show_default="F_a,F_x,F_y,F_z,sigma",
+        ),
+    ] = None,
     tare: Annotated[
-        str, typer.Option(help="Seconds from the start, first, none, or START:END.")
-    ] = "0.5",
+        str | None,
+        typer.Option(
+            help="Seconds from the start, first, none, or START:END.",
+            show_default="0.5, or as --init",
+        ),
+    ] = None,
     split: Annotated[
         str, typer.Option(help="What is held out: recording, object, or random samples.")
     ] = "recording",
@@ -33,11 +50,16 @@ def train(
         float | None, typer.Option(help="F_a below it is no contact; by default from the tare.")
     ] = None,
     hold: Annotated[
-        float, typer.Option(help="UNSTABLE is told so long after the last sign of it [s].")
-    ] = 0.0,
+        float | None,
+        typer.Option(
+            help="UNSTABLE is told so long after the last sign of it [s].",
+            show_default="0, or as --init",
+        ),
+    ] = None,
     init: Annotated[
-        str, typer.Option(help="A model to adapt, with its features: a file, or builtin:twin.")
-    ] = "",
+        str | None,
+        typer.Option(help="A model to adapt, with its features: a file, or builtin:twin."),
+    ] = None,
     resume: Annotated[
         bool, typer.Option("--resume", help="Go on with a search that was stopped.")
     ] = False,
@@ -60,32 +82,22 @@ def train(
       holdfast train recordings/ -o model.json --features holdfast --hold 0.1
       holdfast train recordings/ -o model.json --init builtin:twin
     """
-    from holdfast.features import Tare, parse_features
     from holdfast.files import refuse_overwrite
     from holdfast.io import load_dataset
-    from holdfast.model import Model
-    from holdfast.training import Setting
     from holdfast.training import train as fit
 
-    chosen = {
-        "split": split,
-        "trials": trials,
-        "seed": seed,
-        "shared": shared,
-        "contact_threshold": contact_threshold,
-        "max_samples": max_samples,
-        "tare": Tare.parse(tare),
-    }
-    if init:
-        setting = Setting.adapting(Model.load(init), **chosen)
-    else:
-        setting = Setting(
-            classifier=classifier,
-            features=parse_features(features, window),
-            window=window,
-            hold=hold,
-            **chosen,  # type: ignore[arg-type]
-        )
+    setting = _setting(
+        init,
+        {"classifier": classifier, "window": window, "features": features},
+        tare=tare,
+        split=split,
+        trials=trials,
+        seed=seed,
+        shared=shared,
+        contact_threshold=contact_threshold,
+        hold=hold,
+        max_samples=max_samples,
+    )
     refuse_overwrite(model, force=force)
     recordings = load_dataset(data)
     journal = _journal(model, resume=resume, force=force)
@@ -107,6 +119,44 @@ def train(
         f"\n{model}: trained on {len(recordings)} recordings, judged by leaving out "
         f"{'random samples' if split == 'random' else f'one {split} at a time'}"
     )
+
+
+def _setting(init: str | None, rule: dict[str, Any], **options: Any) -> "Setting":  # noqa: ANN401
+    """How to train; options that are None were not given.
+
+    Args:
+        init: a model to adapt, which brings a rule of its own.
+        rule: classifier, window and features.
+        options: all else that `Setting` takes.
+    """
+    from holdfast.features import DEPLOYED, Tare, parse_features
+    from holdfast.training import Setting
+
+    rule, chosen = (
+        {name: value for name, value in given.items() if value is not None}
+        for given in (rule, options)
+    )
+    if "tare" in chosen:
+        chosen["tare"] = Tare.parse(chosen["tare"])
+    if init is not None:
+        return Setting.adapting(_model(init, rule), **chosen)
+    names = rule.get("features", ",".join(DEPLOYED))
+    rule["features"] = parse_features(names, rule.get("window", Setting.window))
+    return Setting(**rule, **chosen)
+
+
+def _model(init: str, rule: dict[str, Any]) -> "Model":
+    """The model to adapt, called as the user calls it."""
+    from msgspec.structs import replace
+
+    from holdfast.model import Model
+
+    if rule:
+        raise ValueError(
+            "--init brings the classifier, window and features of its model; leave out "
+            + " and ".join(f"--{name}" for name in rule)
+        )
+    return replace(Model.load(init), name=init)
 
 
 def _journal(model: Path, *, resume: bool, force: bool) -> Path:

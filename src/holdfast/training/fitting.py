@@ -7,7 +7,7 @@ import numpy as np
 
 from holdfast.classifiers import Parameters
 from holdfast.errors import TrainingError
-from holdfast.model import Debounce, FingerModel, Model
+from holdfast.model import FingerModel, Model
 from holdfast.recordings import Recording
 from holdfast.training.design import FingerDesign, gather
 from holdfast.training.setting import Setting
@@ -95,7 +95,7 @@ def fit_model(
         sensors={d.sensor.name: d.sensor for d in material.designs.values()},
         window=setting.window,
         tare=str(setting.tare),
-        debounce=Debounce(hold=setting.hold),
+        debounce=setting.debounce,
     )
 
 
@@ -118,7 +118,7 @@ def fit_all(recordings: Sequence[Recording], setting: Setting, parameters: Param
     Raises:
         TrainingError: no labels, or only one class.
     """
-    found = survey(recordings)
+    found = survey(recordings, setting.rate)
     division = divide(found.entries, "random", setting.seed)
     designs = gather(recordings, found, setting, division)
     material = Material(found, division, designs)

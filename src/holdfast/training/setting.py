@@ -8,7 +8,7 @@ from holdfast.classifiers import Adapted, LinearRecipe, recipe
 from holdfast.errors import ModelError
 from holdfast.features import DEPLOYED, FeatureSpec, Tare, parse_features
 from holdfast.features.haar import check_window
-from holdfast.model import Model
+from holdfast.model import ANY_FINGER, Debounce, Model
 
 Split = Literal["recording", "object", "random"]
 SPLITS: tuple[Split, ...] = ("recording", "object", "random")
@@ -43,6 +43,7 @@ class Setting:
 
     Raises:
         ValueError: an unknown name or a number out of range.
+        ModelError: one classifier for all fingers is asked to begin from one for each.
     """
 
     classifier: str = "logreg"
@@ -73,20 +74,31 @@ class Setting:
         threshold = self.contact_threshold
         if threshold is not None and not (math.isfinite(threshold) and threshold >= 0):
             raise ValueError(f"a contact threshold of at least 0 expected, {threshold} given")
+        if not (math.isfinite(self.hold) and self.hold >= 0):
+            raise ValueError(f"a hold of at least 0 s expected, {self.hold} given")
+        if self.shared and self.init is not None and ANY_FINGER not in self.init.fingers:
+            raise ModelError(
+                f"one classifier for all fingers (shared) cannot begin from {_name(self.init)}, "
+                f"which has one for each of {', '.join(self.init.fingers)}"
+            )
 
     @classmethod
     def adapting(cls, init: Model, **chosen: Any) -> Self:  # noqa: ANN401 (the fields above)
-        """The setting that adapts a model, with its features, window and tare.
+        """The setting that adapts a model, with its features, window, tare and hold.
+
+        Args:
+            init: the model.
+            chosen: fields that win over what the model has.
 
         Raises:
-            ModelError: its fingers have different features.
+            ModelError: its fingers have different features; or as above.
             ValueError: as above.
         """
         features = {part.features for part in init.fingers.values()}
         if len(features) > 1:
             raise ModelError(
-                f"{init.name or 'the model'} has different features for its fingers; one list "
-                "for all expected to begin from"
+                f"{_name(init)} has different features for its fingers; one list for all "
+                "expected to begin from"
             )
         own = {"features": features.pop(), "window": init.window, "tare": Tare.parse(init.tare)}
         own["hold"] = init.debounce.hold
@@ -101,3 +113,18 @@ class Setting:
         if self.init is not None:
             return Adapted(self.init.finger(finger).classifier)
         return recipe(self.classifier)
+
+    @property
+    def debounce(self) -> Debounce:
+        """How the model holds back changes of state: as the one it began from, but for the hold."""
+        known = Debounce() if self.init is None else self.init.debounce
+        return Debounce(known.min_duration, known.hysteresis, self.hold)
+
+    @property
+    def rate(self) -> float | None:
+        """The rate that the model's windows are meant for [Hz]; None for that of the data."""
+        return None if self.init is None else self.init.rate
+
+
+def _name(model: Model) -> str:
+    return model.name or "the model to begin from"

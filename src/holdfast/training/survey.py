@@ -36,14 +36,18 @@ class Survey:
     Attributes:
         entries: one for each recording, in order.
         sensors: of each finger that has labels.
+        asked_rate: that the model is to have [Hz]; None for that of the recordings.
     """
 
     entries: tuple[Entry, ...]
     sensors: dict[str, Sensor]
+    asked_rate: float | None = None
 
     @property
     def rate(self) -> float:
-        """The median rate of the recordings [Hz]."""
+        """The rate asked for, else the median rate of the recordings [Hz]."""
+        if self.asked_rate is not None:
+            return self.asked_rate
         return float(np.median([entry.rate for entry in self.entries]))
 
     @property
@@ -55,8 +59,12 @@ class Survey:
         )
 
 
-def survey(recordings: Iterable[Recording]) -> Survey:
+def survey(recordings: Iterable[Recording], rate: float | None = None) -> Survey:
     """Looks at every recording once, one at a time.
+
+    Args:
+        recordings: labelled.
+        rate: that the model is to have [Hz]; None for the median rate of the recordings.
 
     Raises:
         TrainingError: there is none, none has labels, two have the same samples or name, or
@@ -75,7 +83,7 @@ def survey(recordings: Iterable[Recording]) -> Survey:
     if not sensors:
         raise TrainingError(f"none of the {len(entries)} recordings has labels to train from")
     _refuse_copies(entries)
-    return Survey(tuple(entries), sensors)
+    return Survey(tuple(entries), sensors, rate)
 
 
 def _entry(recording: Recording) -> Entry:

@@ -16,6 +16,7 @@ from holdfast.recordings import Recording
 from holdfast.training.design import gather
 from holdfast.training.fitting import Material, fit_model, fit_whole
 from holdfast.training.judging import decisions_of, pick
+from holdfast.training.origin import doubts, seen_by
 from holdfast.training.setting import SEARCH_SAMPLES, Setting
 from holdfast.training.splits import divide, inner_folds
 from holdfast.training.survey import survey
@@ -78,6 +79,7 @@ def train(
 
     Raises:
         TrainingError: no labels, one class, or too few recordings or objects for the split.
+        ModelError: the model to begin from does not have all the fingers of the recordings.
         RecordingError: a recording cannot be read.
         OutputError: the journal cannot be written.
     """
@@ -103,7 +105,7 @@ class _Trainer:
     ) -> None:
         self.recordings, self.setting, self.journal = recordings, setting, journal
         self.tell, self.follow, self.n_jobs = tell, follow, n_jobs
-        self.found = survey(self._read("reading"))
+        self.found = survey(self._read("reading"), setting.rate)
         self.division = divide(self.found.entries, setting.split, setting.seed)
         self.designs = gather(self._read("features"), self.found, setting, self.division)
         self.material = Material(self.found, self.division, self.designs)
@@ -113,8 +115,12 @@ class _Trainer:
 
         Raises:
             TrainingError: a finger has only one class; or there is no figure at all.
+            ModelError: the model to begin from has no such finger.
         """
         self.material.check_classes()
+        if self.setting.init is not None:
+            for doubt in doubts(self.setting.init, self.found, self.designs):
+                self.tell(doubt)
         for finger, names in self.material.not_judged().items():
             some = ", ".join(names[:3]) + (" ..." if len(names) > 3 else "")
             self.tell(
@@ -166,7 +172,7 @@ class _Trainer:
         """The model with its origin written into it."""
         pooled = metrics.pooled
         training = Training(
-            recordings={entry.name: entry.digest for entry in self.found.entries},
+            recordings=seen_by(self.setting.init, self.found),
             split=self.setting.split,
             parameters={finger: dict(found) for finger, found in parameters.items()},
             figures={name: getattr(pooled, name) for name in ("accuracy", "fdr", "fnr", "auc")},

@@ -1,0 +1,158 @@
+"""Between what a model knows and what the samples say."""
+
+from dataclasses import replace
+
+import msgspec
+import numpy as np
+import pytest
+from scipy.optimize import approx_fprime
+from sklearn.linear_model import LogisticRegression
+
+from holdfast.classifiers import Adapted, LinearClassifier
+from holdfast.classifiers.adapted import _log_odds, _loss
+from holdfast.errors import TrainingError
+
+from .test_recipes import samples
+
+PRIOR = LinearClassifier(
+    mean=(5010.0, 1.01, 0.3),
+    scale=(90.0, 0.02, 2.0),
+    coefficients=(0.2, -0.4, 1.5),
+    intercept=0.6,
+)
+UNLIKE = msgspec.structs.replace(PRIOR, slope=2.5, offset=-0.7, threshold=0.2)
+"""A calibration and a threshold of its own."""
+
+GIVEN = samples(600, share=0.3)
+
+
+def adapted(C, given=GIVEN, prior=PRIOR):
+    return Adapted(prior).fit(given, {"C": C}, 0)
+
+
+def decided(rule, given=GIVEN):
+    return rule.probability(given.features) >= rule.threshold
+
+
+def rule_of(rule):
+    return np.array([rule.intercept, *rule.coefficients])
+
+
+def test_the_gradient_is_that_of_finite_differences():
+    rng = np.random.default_rng(1)
+    rows = np.column_stack([np.ones(50), rng.normal(size=(50, 3))])
+    stable = rng.random(50) < 0.3
+    known, at = rng.normal(size=(2, 4))
+    given = (rows, stable, known, {"C": 0.7})
+    expected = approx_fprime(at, lambda v: _loss(v, *given)[0], 1e-7)
+    assert _loss(at, *given)[1] == pytest.approx(expected, rel=1e-4, abs=1e-5)
+
+
+def test_the_loss_is_that_of_the_docstring():
+    rows, stable = np.array([[1.0, 2.0], [1.0, -1.0], [1.0, 0.5]]), np.array([True, False, True])
+    v, known = np.array([0.3, -0.2]), np.array([0.1, 0.4])
+    weights = (3 / 4, 3 / 2, 3 / 4)  # n / (2 n_class)
+    expected = ((v - known) ** 2).sum() / 2
+    for row, sign, weight in zip(rows, (1, -1, 1), weights, strict=True):
+        expected += 0.7 * weight * np.log(1 + np.exp(-sign * (row @ v)))
+    assert _loss(v, rows, stable, known, {"C": 0.7})[0] == pytest.approx(expected)
+
+
+@pytest.mark.parametrize("prior", [PRIOR, UNLIKE])
+def test_nearly_without_samples_the_decisions_of_the_prior_stay(prior):
+    found = adapted(1e-12, prior=prior)
+    assert np.array_equal(decided(found), decided(prior))
+    assert 0.1 < decided(prior).mean() < 0.9
+
+
+def test_the_log_odds_of_a_prior_are_those_above_its_threshold():
+    scaled = (GIVEN.features - np.array(UNLIKE.mean)) / np.array(UNLIKE.scale)
+    odds = np.column_stack([np.ones(len(scaled)), scaled]) @ _log_odds(UNLIKE)
+    p = UNLIKE.probability(GIVEN.features)
+    assert odds == pytest.approx(np.log(p / (1 - p)) - np.log(0.2 / 0.8), abs=1e-6)
+
+
+@pytest.mark.parametrize("threshold", [0.0, 1.0])
+def test_a_prior_that_always_says_the_same_can_be_adapted(threshold):
+    found = adapted(1e-12, prior=msgspec.structs.replace(PRIOR, threshold=threshold))
+    assert decided(found).all() == (threshold == 0.0)
+
+
+@pytest.mark.parametrize("prior", [PRIOR, UNLIKE])
+def test_with_much_weight_it_is_scikit_learns(prior):
+    scaled = (GIVEN.features - np.array(prior.mean)) / np.array(prior.scale)
+    peer = LogisticRegression(C=1e6, class_weight="balanced", tol=1e-10, max_iter=1000)
+    peer.fit(scaled, GIVEN.stable)
+    found = adapted(1e6, prior=prior)
+    expected = [peer.intercept_[0], *peer.coef_[0]]
+    assert rule_of(found) == pytest.approx(expected, abs=2e-3)
+    assert (found.mean, found.scale) == (prior.mean, prior.scale)
+
+
+def test_in_between_it_moves_from_the_one_to_the_other():
+    far = [np.linalg.norm(rule_of(adapted(C)) - _log_odds(PRIOR)) for C in 10.0 ** np.arange(-7, 3)]
+    assert far[0] < 1e-3
+    assert far[-1] > 1.0
+    assert (np.diff(far) > 0).all()
+
+
+def test_probabilities_are_of_the_base_rate_and_decisions_balanced():
+    """As for `logreg`: the correction for balanced classes moves the threshold along."""
+    given = samples(6000, share=0.15)
+    found = adapted(1.0, given)
+    assert found.probability(given.features).mean() == pytest.approx(0.15, abs=0.02)
+    balanced = found.decision(given.features) >= 0
+    assert np.array_equal(decided(found, given), balanced)
+
+
+def test_it_is_deterministic():
+    assert Adapted(PRIOR).fit(GIVEN, {"C": 0.1}, 1) == Adapted(PRIOR).fit(GIVEN, {"C": 0.1}, 2)
+
+
+def test_few_samples_help_a_prior_that_is_nearly_right():
+    """Forty samples, and a prior whose cut is off."""
+    world = samples(20_000, seed=7)
+    rule = adapted(1e3, world)
+    prior = msgspec.structs.replace(rule, intercept=rule.intercept + 2.0)
+    few = samples(40, seed=8)
+    test = samples(4000, seed=9)
+
+    def right(found):
+        return (decided(found, test) == test.stable).mean()
+
+    assert right(adapted(0.1, few, prior)) > right(prior) + 0.02
+
+
+@pytest.mark.parametrize("stable", [True, False])
+def test_one_class_is_refused(stable):
+    given = GIVEN._replace(stable=np.full(600, stable))
+    n = 600 if stable else 0
+    with pytest.raises(TrainingError) as raised:
+        adapted(1.0, given)
+    assert str(raised.value) == (
+        f"{n} samples labelled stable and {600 - n} labelled not stable given; both classes are "
+        "needed to train"
+    )
+
+
+def test_another_number_of_features_is_refused():
+    with pytest.raises(ValueError) as raised:
+        adapted(1.0, GIVEN._replace(features=GIVEN.features[:, :2]))
+    assert str(raised.value) == "2 features given, 3 expected to adapt"
+
+
+def test_every_prior_has_a_name_of_its_own():
+    """The journal of a search is kept by it."""
+    near = msgspec.structs.replace(PRIOR, intercept=np.nextafter(0.6, 1))
+    assert Adapted(PRIOR).name == replace(Adapted(PRIOR)).name
+    assert len({Adapted(prior).name for prior in (PRIOR, UNLIKE, near)}) == 3
+
+
+def test_the_search_covers_the_reference():
+    class Trial:
+        def suggest_float(self, name, low, high, *, log):
+            assert (name, log) == ("C", True)
+            assert low <= Adapted(PRIOR).reference["C"] <= high
+            return low
+
+    assert Adapted(PRIOR).suggest(Trial()) == {"C": 1e-6}

@@ -1,0 +1,197 @@
+"""Beginning from a model: what is kept of it, what the data change, and what is told."""
+
+from dataclasses import replace
+
+import msgspec
+import numpy as np
+import pytest
+
+from holdfast.classifiers import Samples
+from holdfast.errors import ModelError
+from holdfast.features import Tare, parse_features
+from holdfast.model import ANY_FINGER, Debounce
+from holdfast.training import Setting, evaluate, train
+from holdfast.training.trainer import _search
+
+from .build import TINY, tiny_recording
+
+FEATURES = parse_features("F_a,F_x,F_y,F_z,m,sigma", 8)
+FIRST = Setting(window=8, features=FEATURES, trials=0, shared=True, tare=Tare.parse("0.4"))
+
+
+@pytest.fixture(scope="module")
+def known():
+    """A model for any finger out of twelve recordings, with habits of its own."""
+    recordings = [tiny_recording(seed) for seed in range(30, 42)]
+    model = train(recordings, FIRST).model
+    return msgspec.structs.replace(model, debounce=Debounce(0.02, 0.05, 0.1), name="mine")
+
+
+@pytest.fixture(scope="module")
+def few():
+    return [tiny_recording(seed) for seed in (50, 51)]
+
+
+def by_finger(model):
+    parts = dict.fromkeys(("thumb", "index"), model.fingers[ANY_FINGER])
+    return msgspec.structs.replace(model, fingers=parts)
+
+
+def told_by(recordings, setting):
+    told = []
+    return train(recordings, setting, tell=told.append).model, told
+
+
+def accuracy(model, recordings):
+    return evaluate(model, recordings).pooled.accuracy
+
+
+def test_it_keeps_what_the_model_has(known, few):
+    adapted, told = told_by(few, Setting.adapting(known, trials=0))
+    assert set(adapted.fingers) == {"thumb", "index"}
+    assert {part.features for part in adapted.fingers.values()} == {FEATURES}
+    assert (adapted.window, adapted.tare, adapted.debounce) == (8, "0.4", Debounce(0.02, 0.05, 0.1))
+    scales = {part.classifier.scale for part in adapted.fingers.values()}
+    assert scales == {known.fingers[ANY_FINGER].classifier.scale}
+    assert adapted.training.parameters == {f: {"C": 1e-3} for f in ("thumb", "index")}
+    assert (adapted.name, told) == ("", [])
+
+
+def test_what_is_chosen_wins(known, few):
+    setting = Setting.adapting(known, trials=0, hold=0.3, tare=Tare.parse("first"), shared=True)
+    adapted = train(few, setting).model
+    assert set(adapted.fingers) == {ANY_FINGER}
+    assert (adapted.tare, adapted.debounce) == ("first", Debounce(0.02, 0.05, 0.3))
+
+
+def test_with_few_samples_it_beats_training_from_nothing(known):
+    """On other recordings of a hand where what is known before is right."""
+    eager = msgspec.structs.replace(known, debounce=Debounce())
+    rest = [tiny_recording(seed) for seed in range(60, 68)]
+    for seed in (70, 80, 90):
+        own = [tiny_recording(seed), tiny_recording(seed + 1)]
+        scarce = {"trials": 0, "max_samples": 8, "split": "random"}
+        adapted = train(own, Setting.adapting(eager, **scarce)).model
+        nothing = train(own, replace(FIRST, shared=False, **scarce)).model
+        assert accuracy(adapted, rest) > accuracy(nothing, rest) + 2.0
+
+
+def test_recordings_mend_what_the_model_has_wrong(known, few):
+    part = known.fingers[ANY_FINGER]
+    rule = msgspec.structs.replace(part.classifier, intercept=part.classifier.intercept + 4.0)
+    wrong = msgspec.structs.replace(
+        known,
+        fingers={ANY_FINGER: msgspec.structs.replace(part, classifier=rule)},
+        debounce=Debounce(),
+    )
+    rest = [tiny_recording(seed) for seed in range(60, 64)]
+    adapted = train(few, Setting.adapting(wrong, trials=5)).model
+    assert accuracy(adapted, rest) > accuracy(wrong, rest) + 5.0
+
+
+def test_fingers_begin_each_from_its_own(known, few):
+    own = by_finger(known)
+    part = own.fingers["index"]
+    other = msgspec.structs.replace(part.classifier, scale=(7.0,) * len(FEATURES))
+    fingers = own.fingers | {"index": msgspec.structs.replace(part, classifier=other)}
+    adapted = train(
+        few, Setting.adapting(msgspec.structs.replace(own, fingers=fingers), trials=0)
+    ).model
+    assert adapted.fingers["index"].classifier.scale == (7.0,) * len(FEATURES)
+    assert adapted.fingers["thumb"].classifier.scale == part.classifier.scale
+
+
+def test_a_search_from_another_model_is_another_search(known, tmp_path):
+    """What the journal holds of one is not taken up by the other."""
+    rng = np.random.default_rng(0)
+    stable = rng.random(80) < 0.5
+    rows = rng.normal(size=(80, len(FEATURES))) + stable[:, None]
+    samples, journal = Samples(rows, stable, np.arange(80) % 4), tmp_path / "search"
+    lines = []
+    for shift in (0.0, 0.0, 1.0):
+        part = known.fingers[ANY_FINGER]
+        rule = msgspec.structs.replace(part.classifier, intercept=shift)
+        fingers = {ANY_FINGER: msgspec.structs.replace(part, classifier=rule)}
+        init = msgspec.structs.replace(known, fingers=fingers)
+        _search(samples, Setting.adapting(init, trials=2), "thumb", journal)
+        lines.append(len(journal.read_bytes().split()))
+    assert lines == [2, 2, 4]
+
+
+def test_windows_are_meant_for_the_rate_of_the_model(known):
+    fast = [tiny_recording(seed, n=1200, rate=300.0) for seed in (50, 51)]
+    assert train(fast, Setting.adapting(known, trials=0)).model.rate == pytest.approx(100.0)
+    for_any = msgspec.structs.replace(known, rate=None)
+    assert train(fast, Setting.adapting(for_any, trials=0)).model.rate == pytest.approx(300.0)
+
+
+# --- what is told ----------------------------------------------------------------------------
+
+
+def test_another_sensor_is_told_and_taken(known):
+    other = replace(TINY, name="other", unit="N")
+    own = [tiny_recording(seed, sensor=other) for seed in (50, 51)]
+    adapted, told = told_by(own, Setting.adapting(known, trials=0))
+    assert told == [
+        "thumb, index: the sensor is other (N), mine was trained on tiny (count); its features "
+        "are taken as they are, what it knows may not fit"
+    ]
+    assert adapted.sensors == {"other": other}
+    assert {part.sensor for part in adapted.fingers.values()} == {"other"}
+
+
+@pytest.mark.parametrize("shared", [True, False])
+def test_another_sensor_is_told_in_one_line(known, shared):
+    own = [tiny_recording(seed, sensor=replace(TINY, name="other")) for seed in (50, 51)]
+    unnamed = msgspec.structs.replace(known, name="")
+    _, told = told_by(own, Setting.adapting(unnamed, trials=0, shared=shared))
+    assert len(told) == 1
+    assert "the model to begin from was trained on tiny (count)" in told[0]
+
+
+def test_a_model_for_any_sensor_has_nothing_to_tell(known, few):
+    part = msgspec.structs.replace(known.fingers[ANY_FINGER], sensor=None)
+    init = msgspec.structs.replace(known, fingers={ANY_FINGER: part}, sensors={})
+    assert told_by(few, Setting.adapting(init, trials=0))[1] == []
+
+
+def test_recordings_that_the_model_has_seen_are_told(known, few):
+    seen = tiny_recording(30)
+    adapted, told = told_by([seen, *few], Setting.adapting(known, trials=0))
+    assert told == [
+        "mine has seen 1 of these 3 recordings in training (grasp-30): figures on them flatter"
+    ]
+    assert set(known.training.recordings.values()) <= set(adapted.training.recordings.values())
+    assert adapted.training.recordings["grasp-30"] == seen.digest
+    assert adapted.training.recordings["grasp-41 (init)"] == tiny_recording(41).digest
+
+
+# --- what is refused -------------------------------------------------------------------------
+
+
+def test_one_classifier_for_all_cannot_begin_from_one_for_each(known):
+    with pytest.raises(ModelError) as raised:
+        Setting.adapting(by_finger(known), shared=True)
+    assert str(raised.value) == (
+        "one classifier for all fingers (shared) cannot begin from mine, which has one for each "
+        "of thumb, index"
+    )
+
+
+def test_fingers_with_different_features(known):
+    own = by_finger(known)
+    other = parse_features("F_a,F_x,F_y,F_z,m,sigma", 10)
+    part = msgspec.structs.replace(own.fingers["index"], features=other)
+    unlike = msgspec.structs.replace(own, fingers=own.fingers | {"index": part})
+    with pytest.raises(ModelError) as raised:
+        Setting.adapting(unlike)
+    assert str(raised.value) == (
+        "mine has different features for its fingers; one list for all expected to begin from"
+    )
+
+
+def test_a_finger_that_the_model_lacks(known):
+    own = [tiny_recording(seed, ("thumb", "ring")) for seed in (50, 51)]
+    with pytest.raises(ModelError) as raised:
+        train(own, Setting.adapting(by_finger(known), trials=3))
+    assert str(raised.value) == "the model has no finger 'ring'; it has thumb, index"
