@@ -9,9 +9,10 @@ from holdfast.cli import study as verb
 from holdfast.contact import ContactState
 from holdfast.io import save_recording
 from holdfast.recordings import Label
-from holdfast.study import experiments, paper
 from holdfast.study import study as whole
-from holdfast.study.tables import Row, Table
+from holdfast.study.paper import experiments
+from holdfast.study.paper import part as paper
+from holdfast.study.report.tables import Row, Table
 from holdfast.synthetic import synthetic_recording
 from holdfast.twin import simulation
 from holdfast.twin.profile import profile

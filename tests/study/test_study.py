@@ -9,15 +9,16 @@ import pytest
 from holdfast.contact import ContactState
 from holdfast.errors import OutputError, TrainingError
 from holdfast.parallel import Engine
-from holdfast.study import experiments, paper
 from holdfast.study import study as whole
 from holdfast.study.chapters import CHAPTERS, TWIN, Made, sections
 from holdfast.study.corpus import corpus_of
+from holdfast.study.paper import experiments
+from holdfast.study.paper import part as paper
+from holdfast.study.paper.printed import discrepancies
 from holdfast.study.plan import Plan
-from holdfast.study.printed import discrepancies
-from holdfast.study.report import Picture
+from holdfast.study.report.page import Picture
+from holdfast.study.report.tables import Row, Table
 from holdfast.study.study import refuse_plan, study
-from holdfast.study.tables import Row, Table
 from holdfast.synthetic import synthetic_recording
 
 from .build import synthetic, written

@@ -5,8 +5,8 @@ from typing import NamedTuple, TypeVar
 
 import msgspec
 
-from holdfast.study.report import Picture, Section
-from holdfast.study.tables import Table
+from holdfast.study.report.page import Picture, Section
+from holdfast.study.report.tables import Table
 
 E = TypeVar("E", Table, Picture)
 

@@ -7,19 +7,16 @@ from typing import Any, Protocol
 
 from holdfast.errors import TrainingError
 from holdfast.parallel import Engine
-from holdfast.study import (
-    circumstances,
-    comparison,
-    experiments,
-    paper,
-    real,
-    sensitivity,
-)
+from holdfast.study import circumstances
 from holdfast.study.chapters import Made, sections
-from holdfast.study.folder import refuse_study, write_study
+from holdfast.study.comparison import part as comparison
+from holdfast.study.comparison import real, sensitivity
+from holdfast.study.paper import experiments
+from holdfast.study.paper import part as paper
 from holdfast.study.plan import Plan
-from holdfast.study.report import Picture
-from holdfast.study.tables import Table
+from holdfast.study.report.folder import refuse_study, write_study
+from holdfast.study.report.page import Picture
+from holdfast.study.report.tables import Table
 from holdfast.study.work import Follow, Task, Tell, Work
 
 TITLE = "Slip and disturbance at the fingertips: the study"

@@ -1,0 +1,1 @@
+"""What the paper did not ask: methods, events, errors, sensitivities, real recordings."""

@@ -1,0 +1,46 @@
+"""Part of the study: all methods on the same recordings, by sample, by event, by circumstance."""
+
+from holdfast.study.comparison import alarms, costs, errors, methods
+from holdfast.study.comparison import pictures as drawn
+from holdfast.study.comparison.jobs import SECONDS, USUAL, Results, job_of, task_of, titles
+from holdfast.study.comparison.leak import judge_pooled
+from holdfast.study.paper.counts import Counts
+from holdfast.study.plan import Plan
+from holdfast.study.report.page import Picture
+from holdfast.study.report.tables import Table
+from holdfast.study.work import Task
+
+MAKERS = (
+    methods.methods,
+    methods.hands,
+    alarms.events,
+    alarms.slips,
+    methods.splits,
+    errors.phases,
+    errors.force,
+    errors.directions,
+    methods.reliability,
+    costs.table,
+)
+
+
+def tasks(plan: Plan) -> list[Task]:
+    """A task for each method, one for each that is also judged by a random split, and the costs."""
+    judged = [task_of(plan, name) for name in titles(plan)]
+    pooled = [_pooled(plan, name) for name in methods.leaking(plan)]
+    return [*judged, *pooled, *costs.tasks(plan)]
+
+
+def tables(plan: Plan, results: Results) -> list[Table]:
+    """The methods side by side."""
+    return [make(plan, results) for make in MAKERS]
+
+
+def pictures(plan: Plan, results: Results) -> list[Picture]:
+    """The same as figures."""
+    return drawn.pictures(plan, results)
+
+
+def _pooled(plan: Plan, name: str) -> Task:
+    cost = SECONDS.get(name, USUAL) / 4
+    return Task(f"pooled/{name}", judge_pooled, (job_of(plan, name),), Counts, cost=cost)

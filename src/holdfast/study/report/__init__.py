@@ -1,0 +1,1 @@
+"""What a reader gets: tables, figures, the page and the folder."""

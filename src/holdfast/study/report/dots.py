@@ -1,0 +1,140 @@
+"""Figures of single values with their intervals: methods compared, errors by group."""
+
+from collections.abc import Collection, Mapping, Sequence
+from itertools import chain
+from typing import NamedTuple
+
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+from matplotlib.lines import Line2D
+
+from holdfast.plots.evaluation import COLOURS
+from holdfast.sensors.values import Array
+from holdfast.study.report.style import (
+    FAINT,
+    INK,
+    PAPER,
+    Style,
+    add_labels,
+    add_legend,
+    handles_of,
+    panels,
+    sheet,
+    styles_of,
+    tidy,
+)
+
+
+class Estimate(NamedTuple):
+    """One value, its interval, and what the paper prints; NaN or None for none."""
+
+    value: float | None
+    low: float | None = None
+    high: float | None = None
+    paper: float | None = None
+
+
+def draw_dots(groups: Mapping[str, Mapping[str, Estimate]], strong: Collection[str] = ()) -> Figure:
+    """Methods compared: a dot with its interval, the highest of the first panel on top.
+
+    Args:
+        groups: by the label of the panel's x axis, "accuracy by object [%]": by method, its
+            value; what the paper prints is a hollow diamond.
+        strong: methods whose names are bold.
+    """
+    names = _ordered(groups)
+    n = max(len(groups), 1)
+    figure = sheet(0.8 + 0.21 * max(len(names), 3))
+    grid = figure.subplots(1, n, squeeze=False, sharey=True)[0]
+    for axes, (x, values) in zip(grid, groups.items(), strict=False):
+        tidy(axes)
+        axes.grid(axis="both", color=FAINT, linewidth=0.5)
+        axes.tick_params(axis="y", length=0)
+        for row, name in enumerate(names):
+            if name in values:
+                _draw_dot(axes, row, values[name], bold=name in strong)
+        add_labels(axes, x)
+    grid[0].set_yticks(range(len(names)), names)
+    grid[0].set_ylim(-0.7, len(names) - 0.3)
+    for label in grid[0].get_yticklabels():
+        label.set_fontweight("bold" if label.get_text() in strong else "normal")
+    if any(each.paper is not None for values in groups.values() for each in values.values()):
+        diamond = Line2D([], [], color=INK, marker="D", markerfacecolor="white", linestyle="")
+        diamond.set(label=PAPER, markersize=4.5)
+        add_legend(figure, [diamond])
+    return figure
+
+
+def draw_groups(
+    groups: Mapping[str, Mapping[str, Mapping[str, Estimate]]], y: str, per_row: int = 2
+) -> Figure:
+    """Dots of several methods beside each other in each group, with their intervals.
+
+    For errors by quantile of grip force and by direction.
+
+    Args:
+        groups: by the label of the panel's x axis, "grip force": by method: by group, its value.
+        y: label of the y axes, with its unit.
+        per_row: panels beside each other.
+    """
+    figure, grid = panels(len(groups), per_row, 2.6, sharey=True)
+    styles = styles_of(chain.from_iterable(groups.values()))
+    for k, (axes, (x, methods)) in enumerate(zip(grid, groups.items(), strict=True)):
+        places = list(dict.fromkeys(chain.from_iterable(methods.values())))
+        axes.grid(axis="y", color=FAINT, linewidth=0.5)
+        for rank, (name, values) in enumerate(methods.items()):
+            shift = 0.7 * ((rank + 0.5) / len(methods) - 0.5)
+            at = np.array([places.index(place) for place in values]) + shift
+            _draw_bars(axes, at, list(values.values()), styles[name])
+        axes.set_xticks(range(len(places)), places)
+        axes.set_xlim(-0.5, len(places) - 0.5)
+        for edge in range(1, len(places)):
+            axes.axvline(edge - 0.5, color=FAINT, linewidth=0.5)
+        axes.tick_params(axis="x", length=0)
+        add_labels(axes, x, y if k % max(per_row, 1) == 0 else None)
+    if grid:
+        grid[0].set_ylim(bottom=0)
+    add_legend(figure, handles_of(styles, groups.values(), lines=False), per_row=5)
+    return figure
+
+
+def _ordered(groups: Mapping[str, Mapping[str, Estimate]]) -> list[str]:
+    """All names by their value in the first panel, the lowest first; then as they appear."""
+    first: Mapping[str, Estimate] = next(iter(groups.values()), {})
+
+    def value(name: str) -> float:
+        return _number(first[name].value if name in first else None, -np.inf)
+
+    names = dict.fromkeys(chain.from_iterable(groups.values()))
+    return sorted(names, key=value, reverse=True)[::-1]
+
+
+def _draw_dot(axes: Axes, row: int, estimate: Estimate, *, bold: bool) -> None:
+    colour = COLOURS[1] if bold else COLOURS[0]
+    value = _number(estimate.value)
+    axes.hlines(
+        row, _number(estimate.low, value), _number(estimate.high, value), color=colour,
+        linewidth=1.3,
+    )  # fmt: skip
+    axes.plot(value, row, "o", color=colour, markersize=4.5)
+    if estimate.paper is not None:
+        axes.plot(
+            estimate.paper, row, "D", color=INK, markerfacecolor="white", markersize=4.5, zorder=1.9
+        )
+
+
+def _draw_bars(axes: Axes, at: Array, values: Sequence[Estimate], style: Style) -> None:
+    heights = np.array([_number(each.value) for each in values])
+    low = np.array([_number(each.low, each.value) for each in values])
+    high = np.array([_number(each.high, each.value) for each in values])
+    axes.vlines(at, low, high, color=style.color, linewidth=1.1)
+    axes.plot(at, heights, color=style.color, marker=style.marker, linestyle="", markersize=4)
+
+
+def _number(value: float | None, otherwise: float | None = None) -> float:
+    """The value where it is finite, else the other, else NaN."""
+    for each in (value, otherwise):
+        if each is not None and not np.isnan(each):
+            return float(each)
+    return float("nan")

@@ -1,0 +1,78 @@
+from dataclasses import replace
+
+import msgspec
+import numpy as np
+import pytest
+
+from holdfast.contact import ContactState
+from holdfast.methods import METHODS
+from holdfast.recordings import Label
+from holdfast.study.comparison import real
+from holdfast.study.corpus import corpus_of
+from holdfast.study.plan import Plan
+from holdfast.study.report.layouts import to_html
+from holdfast.synthetic import synthetic_recording
+from study.build import written
+
+SHAKEN = [
+    Label(3.0, 5.3, ContactState.STABLE),
+    Label(5.3, 6.5, ContactState.UNSTABLE),
+    Label(6.5, 8.0, ContactState.STABLE),
+]
+CALM = [Label(3.0, 8.0, ContactState.STABLE)]
+
+
+def run(plan):
+    results = {}
+    for task in real.tasks(plan):
+        data = msgspec.msgpack.encode(task.function(*task.arguments))
+        results[task.name] = msgspec.msgpack.decode(data, type=task.result)
+    return real.tables(plan, results)
+
+
+@pytest.fixture(scope="module")
+def corpus(tmp_path_factory):
+    """Held from the first sample on; in two of four recordings nothing happens."""
+    recordings = []
+    for seed in range(4):
+        recording = held_part(synthetic_recording(f"pick-{seed}", seed, ("finger1", "finger2")))
+        recording = recording.with_labels(dict.fromkeys(recording.modules, SHAKEN))
+        if seed > 1:
+            recording = recording.with_labels(dict.fromkeys(recording.modules, CALM))
+        recordings.append(recording)
+    folder = written(tmp_path_factory.mktemp("real") / "real", recordings)
+    return corpus_of("real", folder, tare="first")
+
+
+def held_part(recording):
+    """From 3 s to 8 s, about the shaking, without what tells the object."""
+    modules = {}
+    for name, module in recording.modules.items():
+        rows = slice(450, 1200)
+        modules[name] = replace(
+            module, times=module.times[rows], readings=np.array(module.readings[rows]), labels=()
+        )
+    return replace(recording, modules=modules, metadata={})
+
+
+def test_each_recording_is_judged_by_the_others(corpus, monkeypatch):
+    names = ("logreg", "zhang", "jl_global_logreg")
+    monkeypatch.setattr(real, "METHODS", {name: METHODS[name] for name in names})
+    plan = Plan({"main": corpus}, real=corpus)
+    (job,) = (task.arguments[0] for task in real.tasks(plan) if task.name == "real/logreg")
+    assert job.effort.folds == 4
+    (table,) = run(plan)
+    assert table.name == "real"
+    assert to_html(table)
+    seen = {(row.keys["recording"], row.keys["finger"]) for row in table.rows}
+    fingers = ("finger1", "finger2", "hand")
+    assert seen == {(f"pick-{k}", finger) for k in (0, 1) for finger in fingers}
+    areas = [row.ours for row in table.rows if row.keys["figure"] == "AUC contact"]
+    assert all(0 <= area <= 1 for area in areas)
+    sigma = [r for r in table.rows if r.keys["method"] == METHODS["zhang"].title]
+    assert all(row.ours > 0.8 for row in sigma if row.keys["figure"] == "AUC")
+
+
+def test_without_real_recordings_there_is_nothing_to_do(corpus):
+    plan = Plan({"main": corpus})
+    assert (real.tasks(plan), real.tables(plan, {}), real.pictures(plan, {})) == ([], [], [])
