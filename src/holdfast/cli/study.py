@@ -11,7 +11,7 @@ from holdfast.cli.console import print_json, print_table, progress, say, show
 if TYPE_CHECKING:
     from holdfast.parallel import Engine
     from holdfast.study.plan import Plan
-    from holdfast.study.tables import Line, Row, Table
+    from holdfast.study.report.tables import Line, Row, Table
 
 HEADLINES: dict[str, tuple[str, ...]] = {
     "confusion": (),
@@ -106,7 +106,7 @@ def _checked(
     """
     from holdfast.features import Tare
     from holdfast.parallel import Engine
-    from holdfast.study.folder import refuse_study
+    from holdfast.study.report.folder import refuse_study
 
     if (data is None) != twin:
         given = "both" if twin else "neither"
@@ -144,7 +144,7 @@ def _plan(
 
 def _show(table: "Table") -> None:
     """A table for a terminal: ours, and the paper's in parentheses."""
-    from holdfast.study.tables import digits_of, pivot
+    from holdfast.study.report.tables import digits_of, pivot
 
     grid = pivot(_headline(table))
     paper = (
@@ -180,7 +180,7 @@ def _texts(line: "Line", digits: list[int]) -> list[str]:
 
 
 def _text(row: "Row | None", digits: int) -> str:
-    from holdfast.study.tables import number_text
+    from holdfast.study.report.tables import number_text
 
     if row is None:
         return "-"
