@@ -158,7 +158,7 @@ def test_the_folder(tmp_path):
         *(
             f"tables/{name}.{kind}"
             for name in ("first", "second")
-            for kind in ("csv", "json", "tex")
+            for kind in ("csv", "json", "md", "tex")
         ),
     ]
     told = json.loads((out / "study.json").read_text())

@@ -9,7 +9,7 @@ import msgspec
 
 from holdfast.errors import OutputError
 from holdfast.study.report.images import png_of, svg_of
-from holdfast.study.report.layouts import to_latex
+from holdfast.study.report.layouts import to_latex, to_markdown
 from holdfast.study.report.page import Section, report
 from holdfast.study.report.tables import Table, to_csv, to_json
 
@@ -120,6 +120,7 @@ def _write_table(folder: Path, table: Table) -> None:
     (folder / f"{table.name}.json").write_bytes(_json(told))
     (folder / f"{table.name}.csv").write_text(to_csv(table), encoding="utf-8", newline="")
     (folder / f"{table.name}.tex").write_text(to_latex(table), encoding="utf-8")
+    (folder / f"{table.name}.md").write_text(to_markdown(table), encoding="utf-8")
 
 
 def _json(value: object) -> bytes:
