@@ -70,8 +70,9 @@ class Adapted:
             known,
             args=(np.column_stack([np.ones(len(rows)), rows]), samples.stable, known, parameters),
             jac=True,
-            method="L-BFGS-B",
-            options={"maxiter": 500, "ftol": 1e-12, "gtol": 1e-8},
+            hess=_curvature,
+            method="trust-exact",
+            options={"gtol": 1e-8 * (1.0 + parameters["C"] * len(rows))},
         )
         return LinearClassifier(
             mean=prior.mean,
@@ -96,11 +97,27 @@ def _loss(
     v: Array, rows: Array, stable: npt.NDArray[np.bool_], known: Array, parameters: Parameters
 ) -> tuple[float, Array]:
     """The regularised loss and its gradient."""
-    n, n_stable = len(stable), int(stable.sum())
-    weight = parameters["C"] * np.where(stable, n / (2 * n_stable), n / (2 * (n - n_stable)))
+    weight = _weights(stable, parameters)
     sign = np.where(stable, 1.0, -1.0)
     margin = sign * (rows @ v)
     away = v - known
     loss = 0.5 * away @ away + weight @ np.logaddexp(0.0, -margin)
     pull = -weight * sign * np.exp(-np.logaddexp(0.0, margin))
     return float(loss), away + rows.T @ pull
+
+
+def _curvature(
+    v: Array, rows: Array, stable: npt.NDArray[np.bool_], _: Array, parameters: Parameters
+) -> Array:
+    """The Hessian of the loss."""
+    probability = np.exp(-np.logaddexp(0.0, -(rows @ v)))
+    weight = _weights(stable, parameters) * probability * (1.0 - probability)
+    found: Array = np.eye(len(v)) + (rows * weight[:, None]).T @ rows
+    return found
+
+
+def _weights(stable: npt.NDArray[np.bool_], parameters: Parameters) -> Array:
+    """Of each sample: both classes together count as much."""
+    n, n_stable = len(stable), int(stable.sum())
+    share = np.where(stable, n / (2 * n_stable), n / (2 * (n - n_stable)))
+    return np.asarray(parameters["C"] * share)
