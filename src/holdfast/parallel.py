@@ -4,6 +4,7 @@ A process that dies costs the calls that it was at: they are done again. Results
 on where or in which order the work is done.
 """
 
+import warnings
 from collections.abc import Callable, Hashable, Iterable, Iterator
 from contextlib import contextmanager, suppress
 from functools import partial
@@ -136,6 +137,8 @@ def _in_processes(
     from joblib import Parallel, delayed
     from joblib.externals.loky.process_executor import TerminatedWorkerError
 
+    # A worker that grew is replaced by loky with a warning; nothing is lost.
+    warnings.filterwarnings("ignore", "A worker stopped while some jobs were given")
     rest, begun = iter(calls), dict[K, Arguments]()
     ended = False
     while begun or not ended:
