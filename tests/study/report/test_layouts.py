@@ -153,3 +153,11 @@ def test_an_empty_table_is_laid_out():
     assert "<tbody>" in to_html(made)
     assert "| m |" in to_markdown(made)
     assert r"\begin{tabular}{l}" in to_latex(made)
+
+
+def test_a_figure_of_the_paper_alone_has_no_difference():
+    rows = [Row({"where": "Table II", "figure": "printed"}, None, 95.3)]
+    alone = Table("said", "What is said", "", rows, ("where",))
+    assert "| Table II | *paper 95.3* |" in to_markdown(alone)
+    assert "95.3</span>" in to_html(alone)
+    assert "95.3 (" not in to_latex(alone)

@@ -180,9 +180,10 @@ def _html_cell(row: Row | None, digits: int) -> str:
     if interval := _interval_text(row, digits):
         text += f'<span class="interval">{interval}</span>'
     if row.paper is not None:
-        difference = _difference_text(row, digits)
         text += f'<span class="paper">{PAPER} {number_text(row.paper, digits)}'
-        text += f' <b title="{DIFFERENCE}">{difference}</b></span>'
+        if row.ours is not None:
+            text += f' <b title="{DIFFERENCE}">{_difference_text(row, digits)}</b>'
+        text += "</span>"
     return f"<td>{text}</td>"
 
 
@@ -213,7 +214,8 @@ def _latex_lines(
 def _markdown_cell(row: Row | None, digits: int) -> str:
     if row is None:
         return number_text(None, digits)
-    parts = [number_text(row.ours, digits)]
+    told = row.ours is not None or row.paper is None
+    parts = [number_text(row.ours, digits)] if told else []
     if interval := _interval_text(row, digits):
         parts.append(f"<sub>{interval}</sub>")
     if row.paper is not None:
@@ -236,7 +238,8 @@ def _paper_text(row: Row, digits: int) -> str:
     """The paper's figure, and in brackets the difference."""
     if row.paper is None:
         return ""
-    return f"{number_text(row.paper, digits)} ({_difference_text(row, digits)})"
+    paper = number_text(row.paper, digits)
+    return paper if row.ours is None else f"{paper} ({_difference_text(row, digits)})"
 
 
 def _difference_text(row: Row, digits: int) -> str:
