@@ -1,5 +1,6 @@
 """A dataset larger than memory trains: one recording is held at a time, and its features."""
 
+import gc
 import os
 import subprocess
 import sys
@@ -30,6 +31,7 @@ class Lazy(Sequence):
             raise IndexError(index)
         recording = tiny_recording(index)
         self.alive.add(recording)
+        gc.collect()  # what only a circle of references holds, nobody holds
         self.most = max(self.most, len(self.alive))
         return recording
 
