@@ -1,5 +1,6 @@
 """How good decisions are: by sample, by event, pooled over recordings, with intervals."""
 
+from holdfast.metrics.calibration import calibration_sums
 from holdfast.metrics.decisions import Decisions, FingerDecisions, hand_decisions
 from holdfast.metrics.events import (
     AlarmMatch,
@@ -36,6 +37,7 @@ __all__ = [
     "RecordingMetrics",
     "SampleMetrics",
     "bootstrap_interval",
+    "calibration_sums",
     "event_metrics",
     "hand_decisions",
     "match_alarms",

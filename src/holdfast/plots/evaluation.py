@@ -8,8 +8,14 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.ticker import PercentFormatter
 
-from holdfast.contact import STABLE, UNKNOWN
-from holdfast.metrics import Decisions, EventMetrics, Metrics, SampleMetrics, match_alarms
+from holdfast.metrics import (
+    Decisions,
+    EventMetrics,
+    Metrics,
+    SampleMetrics,
+    calibration_sums,
+    match_alarms,
+)
 from holdfast.metrics.decisions import FingerDecisions
 from holdfast.metrics.events import EARLY, POSTS, event_delays
 from holdfast.sensors.values import Array
@@ -23,7 +29,6 @@ GREY = "#999999"
 N_NAMED = 25
 """Recordings that are named; of more only their number is told."""
 LONGEST_NAME = 24
-N_BINS = 10
 LONGEST_DELAY = 0.5
 """Where the curve of delays ends [s]."""
 SMALL = 7
@@ -73,12 +78,7 @@ def calibration(judged: Sequence[FingerDecisions]) -> Array:
         (m, 3) for each bin of probabilities that has labelled samples: their mean probability,
         the share of them labelled stable, and their number.
     """
-    known = [(each, (each.labels != UNKNOWN) & (each.states != UNKNOWN)) for each in judged]
-    score = np.concatenate([np.empty(0), *(each.stable_probability[rows] for each, rows in known)])
-    stable = np.concatenate([np.empty(0), *(each.labels[rows] == STABLE for each, rows in known)])
-    bins = np.clip((score * N_BINS).astype(int), 0, N_BINS - 1)
-    sums = [np.bincount(bins, weights=each) for each in (score, stable, np.ones(len(bins)))]
-    table: Array = np.column_stack(sums).astype(np.float64)  # of nothing, bincount gives integers
+    table = calibration_sums(judged)
     table = table[table[:, 2] > 0]
     table[:, :2] /= table[:, 2:]
     return table

@@ -16,6 +16,9 @@ from holdfast.sensors.values import Array
 
 Mask = npt.NDArray[np.bool_]
 
+HELD = (Phase.LOCKED, Phase.DISTURBED, Phase.SLIPPING)
+"""Phases in which the hand holds the object."""
+
 
 @dataclass(frozen=True)
 class LabelRule:
@@ -60,7 +63,7 @@ def labels_from_truth(
     touching = _steady(
         np.linalg.norm(arrays["contact_force"], axis=1) > rule.contact, times, rule.blip
     )
-    held = np.isin(phase, (Phase.LOCKED, Phase.DISTURBED, Phase.SLIPPING))
+    held = np.isin(phase, HELD)
     sliding = held & (arrays["slip_speed"] > rule.sliding)
     acted = held & (np.linalg.norm(truth.hand["outside_force"], axis=1) > rule.contact)
     troubled = np.isin(phase, (Phase.DISTURBED, Phase.SLIPPING)) | sliding | acted
@@ -97,7 +100,7 @@ def phases_as_felt(phase: npt.NDArray[np.str_], push: Array, touch: float) -> np
     """
     planned = np.isin(phase, (Phase.DISTURBED, Phase.SLIPPING))
     felt = np.zeros_like(planned)
-    for start, end in _runs(planned):
+    for start, end in runs(planned):
         touches = start + np.flatnonzero(push[start:end] > touch)
         if len(touches):
             felt[touches[0] : touches[-1] + 1] = True
@@ -118,7 +121,7 @@ def _state(
     return ContactState.UNSTABLE, Cause.LOST if lost else Cause.RELEASED
 
 
-def _runs(mask: Mask) -> npt.NDArray[np.int64]:
+def runs(mask: Mask) -> npt.NDArray[np.int64]:
     """(n_runs, 2) first sample of each run of True, and the first after it."""
     edges = np.flatnonzero(np.diff(np.concatenate([[False], mask, [False]]).astype(np.int8)))
     return edges.reshape(-1, 2)
@@ -127,8 +130,7 @@ def _runs(mask: Mask) -> npt.NDArray[np.int64]:
 def _closed(mask: Mask, times: Array, gap: float) -> Mask:
     """The mask with rests shorter than `gap` filled in between its runs."""
     filled = mask.copy()
-    runs = _runs(mask)
-    for (_, end), (start, _) in pairwise(runs):
+    for (_, end), (start, _) in pairwise(runs(mask)):
         if times[start] - times[end - 1] < gap:
             filled[end:start] = True
     return filled
@@ -137,7 +139,7 @@ def _closed(mask: Mask, times: Array, gap: float) -> Mask:
 def _bridged(before: Mask, mask: Mask, times: Array, gap: float) -> Mask:
     """The mask, from the end of `before` on where it begins less than `gap` later."""
     bridged = mask.copy()
-    for _, end in _runs(before):
+    for _, end in runs(before):
         start = end + int(np.argmax(mask[end:])) if mask[end:].any() else end
         if start > end and times[start] - times[end] < gap:
             bridged[end:start] = True
@@ -152,7 +154,7 @@ def _steady(mask: Mask, times: Array, blip: float) -> Mask:
 def _grown(mask: Mask, times: Array, margin: float) -> Mask:
     """The mask with every run longer by `margin` at both ends."""
     grown = mask.copy()
-    for start, end in _runs(mask):
+    for start, end in runs(mask):
         first = np.searchsorted(times, times[start] - margin)
         last = np.searchsorted(times, times[end - 1] + margin, side="right")
         grown[first:last] = True
@@ -162,7 +164,7 @@ def _grown(mask: Mask, times: Array, margin: float) -> Mask:
 def _spans_with(mask: Mask, wanted: Mask) -> Mask:
     """The runs of the mask in which something wanted happens."""
     found = np.zeros_like(mask)
-    for start, end in _runs(mask):
+    for start, end in runs(mask):
         found[start:end] = wanted[start:end].any()
     return found
 

@@ -7,7 +7,7 @@ from holdfast.contact import STABLE, UNKNOWN, UNSTABLE
 from holdfast.metrics import Decisions, FingerDecisions
 from holdfast.recordings import Truth
 from holdfast.study.judging.counting import calibration_counts, count
-from holdfast.study.judging.expert import Seen
+from holdfast.study.judging.seen import Seen
 from study.told import PUSH, truth_of
 
 TIMES = np.arange(1725) / 150

@@ -8,9 +8,9 @@ from holdfast.methods import HAND, METHODS
 from holdfast.metrics import FingerDecisions, hand_decisions
 from holdfast.study.corpus import corpus_of
 from holdfast.study.judging.changes import Change
-from holdfast.study.judging.expert import Expert, look, material_of
+from holdfast.study.judging.expert import Expert, material_of
 from holdfast.study.judging.opinion import Opinion
-from holdfast.study.judging.seen import Seen
+from holdfast.study.judging.seen import Seen, look
 from study.build import synthetic
 
 

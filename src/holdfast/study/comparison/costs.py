@@ -17,7 +17,8 @@ from holdfast.recordings import Recording
 from holdfast.study.comparison.jobs import Results, titles
 from holdfast.study.corpus import Corpus
 from holdfast.study.judging.changes import Change
-from holdfast.study.judging.expert import Expert, look, material_of
+from holdfast.study.judging.expert import Expert, material_of
+from holdfast.study.judging.seen import look
 from holdfast.study.plan import Plan
 from holdfast.study.report.tables import Key, Row, Table
 from holdfast.study.work import Task

@@ -9,9 +9,9 @@ import numpy.typing as npt
 from holdfast.contact import STABLE, UNKNOWN
 from holdfast.metrics import Decisions
 from holdfast.study.judging.counting import judged_of
-from holdfast.study.judging.expert import Expert, look, material_of
+from holdfast.study.judging.expert import Expert, material_of
 from holdfast.study.judging.judge import Job, method_called
-from holdfast.study.judging.seen import Seen
+from holdfast.study.judging.seen import Seen, look
 from holdfast.study.paper.counts import Counts
 
 FOLDS = 5

@@ -51,10 +51,6 @@ class Change(msgspec.Struct, frozen=True):
         )
 
 
-EXACT = Change(margin=0.0)
-"""Labels without a margin: an onset is the first instant at which something happens."""
-
-
 def relabelled(recording: Recording, margin: float) -> Recording:
     """The recording with labels out of its truth; as it is, where it has none."""
     truth = recording.truth

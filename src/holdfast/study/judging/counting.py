@@ -8,12 +8,12 @@ import numpy.typing as npt
 
 from holdfast.contact import STABLE, UNKNOWN, Phase
 from holdfast.methods import HAND
-from holdfast.metrics import Decisions, FingerDecisions
+from holdfast.metrics import Decisions, FingerDecisions, calibration_sums
 from holdfast.metrics.events import ROUNDING
 from holdfast.recordings import Truth
 from holdfast.sensors.values import Array
-from holdfast.study.judging.hearing import HELD, runs
 from holdfast.study.judging.seen import Seen
+from holdfast.twin.labels import HELD, runs
 
 Mask = npt.NDArray[np.bool_]
 
@@ -27,9 +27,6 @@ AXES = {
 }
 """Directions of a push in the world; further than 30 degrees from all of them is oblique."""
 NEAR = np.cos(np.radians(30.0))
-
-N_BINS = 10
-"""Of probabilities, for the reliability curve."""
 
 
 class Grip(msgspec.Struct, frozen=True):
@@ -154,12 +151,5 @@ def _at(truth: Truth, times: Array) -> npt.NDArray[np.intp]:
 
 def calibration_counts(decided: Decisions) -> list[list[float]]:
     """(10, 3) sum of probabilities, stable samples and samples of each bin of probabilities."""
-    total = np.zeros((N_BINS, 3))
-    for finger in judged_of(decided).values():
-        known = (finger.labels != UNKNOWN) & (finger.states != UNKNOWN)
-        p = finger.stable_probability[known]
-        stable = (finger.labels[known] == STABLE).astype(np.float64)
-        bins = np.clip((p * N_BINS).astype(np.int64), 0, N_BINS - 1)
-        for column, weights in enumerate((p, stable, np.ones(len(p)))):
-            total[:, column] += np.bincount(bins, weights=weights, minlength=N_BINS)
-    return [[float(x) for x in row] for row in total]
+    sums = calibration_sums(list(judged_of(decided).values()))
+    return [[float(x) for x in row] for row in sums]

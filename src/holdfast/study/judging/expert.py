@@ -12,10 +12,8 @@ from holdfast.contact import STABLE, UNKNOWN
 from holdfast.methods import Method
 from holdfast.sensors.values import Array
 from holdfast.study.judging.opinion import Opinion
-from holdfast.study.judging.seen import Seen, look
+from holdfast.study.judging.seen import Seen
 from holdfast.training.design import contact_threshold
-
-__all__ = ["Expert", "Material", "look", "material_of"]
 
 MAX_ROWS = 20_000
 """Samples of a finger that a classifier is fitted to, evenly spread; judged is every sample."""

@@ -8,16 +8,14 @@ import msgspec
 import numpy as np
 import numpy.typing as npt
 
-from holdfast.contact import STABLE, UNKNOWN, Phase
+from holdfast.contact import STABLE, UNKNOWN
 from holdfast.metrics import FingerDecisions, match_alarms
 from holdfast.metrics.events import POSTS, ROUNDING, STABLE_BEFORE
 from holdfast.recordings import Truth
 from holdfast.sensors.values import Array
-from holdfast.twin.labels import LabelRule
+from holdfast.twin.labels import HELD, LabelRule, runs
 
 Mask = npt.NDArray[np.bool_]
-
-HELD = (Phase.LOCKED, Phase.DISTURBED, Phase.SLIPPING)
 
 AFTER_GLITCH = 0.1
 """A false alarm within this [s] after the controller's set point jumped is due to that."""
@@ -104,12 +102,6 @@ def spells_of(truth: Truth | None) -> list[Spell]:
             spells.append(Spell(float(times[start]), float(times[end - 1])))
         rested = float(times[end - 1])
     return spells
-
-
-def runs(mask: Mask) -> list[tuple[int, int]]:
-    """First sample of each run of True, and the first after it."""
-    edges = np.flatnonzero(np.diff(np.concatenate([[False], mask, [False]]).astype(np.int8)))
-    return [(int(a), int(b)) for a, b in edges.reshape(-1, 2)]
 
 
 def _sliding(truth: Truth) -> Mask:

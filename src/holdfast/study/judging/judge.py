@@ -19,10 +19,10 @@ from holdfast.metrics import Decisions, Metrics, summarise
 from holdfast.study.corpus import Corpus
 from holdfast.study.judging.changes import Change
 from holdfast.study.judging.counting import Breakdown, calibration_counts, count
-from holdfast.study.judging.expert import Expert, Material, look, material_of
+from holdfast.study.judging.expert import Expert, Material, material_of
 from holdfast.study.judging.hearing import Heard, after_glitch, hear, spells_of
 from holdfast.study.judging.opinion import Opinion
-from holdfast.study.judging.seen import Seen
+from holdfast.study.judging.seen import Seen, look
 from holdfast.study.judging.thresholds import Calm, shift_for
 
 ALARM_RATES = (0.5, 1.0, 2.0, 5.0, 10.0, 20.0, 50.0)

@@ -15,7 +15,8 @@ from holdfast.features import Tare
 from holdfast.methods import METHODS, Method
 from holdfast.study.corpus import Corpus
 from holdfast.study.judging.changes import Change
-from holdfast.study.judging.expert import Expert, Material, look, material_of
+from holdfast.study.judging.expert import Expert, Material, material_of
+from holdfast.study.judging.seen import look
 from holdfast.study.paper.part import first_finger
 from holdfast.study.plan import Plan
 from holdfast.study.report.figures import (
