@@ -9,6 +9,7 @@ FAMILIES = (
     errors.ModelError,
     errors.TrainingError,
     errors.StreamError,
+    errors.SourceError,
     errors.EngineError,
     errors.OutputError,
     errors.MissingExtra,

@@ -14,7 +14,8 @@ PUBLIC = [
     *("Model", "Detector", "detect", "ContactEstimate", "ContactState", "HandEstimate"),
     *("StabilityClassifier", "event_metrics", "sample_metrics"),
     *("HoldfastError", "MissingExtra", "ModelError", "OutputError"),
-    *("RecordingError", "StreamError", "TrainingError"),
+    *("RecordingError", "SourceError", "StreamError", "TrainingError"),
+    *("Arrival", "Source", "open_source"),
 ]
 
 

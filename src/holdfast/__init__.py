@@ -23,6 +23,7 @@ if TYPE_CHECKING:
     from holdfast.errors import ModelError as ModelError
     from holdfast.errors import OutputError as OutputError
     from holdfast.errors import RecordingError as RecordingError
+    from holdfast.errors import SourceError as SourceError
     from holdfast.errors import StreamError as StreamError
     from holdfast.errors import TrainingError as TrainingError
     from holdfast.features import FEATURE_NAMES as FEATURE_NAMES
@@ -40,6 +41,9 @@ if TYPE_CHECKING:
     from holdfast.recordings import Truth as Truth
     from holdfast.sensors import Hand as Hand
     from holdfast.sensors import Sensor as Sensor
+    from holdfast.sources import Arrival as Arrival
+    from holdfast.sources import Source as Source
+    from holdfast.sources import open_source as open_source
     from holdfast.training import StabilityClassifier as StabilityClassifier
 
 _HOMES = {
@@ -61,6 +65,9 @@ _HOMES = {
     "ContactEstimate": "contact",
     "ContactState": "contact",
     "HandEstimate": "contact",
+    "Arrival": "sources",
+    "Source": "sources",
+    "open_source": "sources",
     "StabilityClassifier": "training",
     "event_metrics": "metrics",
     "sample_metrics": "metrics",
@@ -69,6 +76,7 @@ _HOMES = {
     "ModelError": "errors",
     "OutputError": "errors",
     "RecordingError": "errors",
+    "SourceError": "errors",
     "StreamError": "errors",
     "TrainingError": "errors",
 }

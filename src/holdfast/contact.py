@@ -43,12 +43,24 @@ class Reason(StrEnum):
 
 
 class Fault(StrEnum):
-    """What is wrong with the readings of a finger; bit i of a fault mask is place i here."""
+    """What is wrong with a finger; bit i of a fault mask is place i here.
+
+    Those up to TARE_DRIFT show in the readings, and the detector finds them. The others show
+    in how samples arrive: a source tells them.
+    """
 
     NOT_FINITE = "not_finite"
     STUCK = "stuck"
     SATURATED = "saturated"
     TARE_LOADED = "tare_loaded"
+    DEAD = "dead"
+    NOISY = "noisy"
+    OUT_OF_RANGE = "out_of_range"
+    TARE_DRIFT = "tare_drift"
+    TAXEL_COUNT = "taxel_count"
+    PACKET_GAP = "packet_gap"
+    LATE = "late"
+    CLOCK_JUMP = "clock_jump"
 
 
 class Cause(StrEnum):

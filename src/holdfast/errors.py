@@ -5,6 +5,7 @@
     ├── ModelError       a model file is refused, or does not fit the data it is given
     ├── TrainingError    the data cannot train or test a classifier (one class, one group)
     ├── StreamError      samples came that a detector cannot take
+    ├── SourceError      a source cannot be reached, says nothing, or is another than expected
     ├── EngineError      the processes or the cluster that do the work fail, not the work
     ├── OutputError      an output exists already or cannot be written
     └── MissingExtra     a part needs a package that is not installed
@@ -33,6 +34,10 @@ class TrainingError(HoldfastError):
 
 class StreamError(HoldfastError):
     """Samples came that a detector cannot take: mend the source, then reset."""
+
+
+class SourceError(HoldfastError):
+    """A source cannot be reached, says nothing or not what is expected: mend it, try again."""
 
 
 class EngineError(HoldfastError):

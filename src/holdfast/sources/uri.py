@@ -1,0 +1,129 @@
+"""Sources by what a user calls them: the path of a recording, or a URI."""
+
+import re
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from importlib import import_module
+from pathlib import Path
+from urllib.parse import parse_qsl, urlsplit
+
+from holdfast.sources.source import Source
+
+SCHEMES = {
+    "xela": "XELA's server: xela://HOST:PORT or xela://auto, ?values=counts|calibrated",
+    "twin": "the twin: twin:?object=can&seed=1&case=2&profile=reference",
+    "ros2": "a ROS 2 topic: ros2:///xServTopic",
+    "ros1": "a ROS 1 topic: ros1:///xServTopic",
+    "serial": "a serial sensor: serial:///dev/ttyACM0?sensor=anyskin",
+}
+"""Schemes of the URIs of sources, and what each is; a module of that name has its source."""
+
+_URI = re.compile(r"(?P<scheme>[a-z][a-z0-9+]+):")
+
+
+@dataclass(frozen=True)
+class Address:
+    """The parts of a URI.
+
+    Attributes:
+        text: the whole of it.
+        host: and the port, as given: "127.0.0.1:5000".
+        path: after the host.
+        parameters: by name.
+    """
+
+    text: str
+    host: str
+    path: str
+    parameters: Mapping[str, str]
+
+    def only(self, *known: str) -> None:
+        """Refuses parameters that are not known.
+
+        Raises:
+            ValueError: there is one.
+        """
+        if unknown := sorted(set(self.parameters) - set(known)):
+            raise ValueError(
+                f"{self.text}: unknown parameter {', '.join(unknown)}; there are {', '.join(known)}"
+            )
+
+    def names(self) -> dict[int, str]:
+        """What `fingers=1:thumb,2:index` calls the modules that the device numbers.
+
+        Raises:
+            ValueError: it is not of that form, or names one twice.
+        """
+        given = self.parameters.get("fingers", "")
+        names: dict[int, str] = {}
+        for part in filter(None, given.split(",")):
+            number, _, name = part.partition(":")
+            if not (number.strip().isdecimal() and name.strip()):
+                raise ValueError(f"{self.text}: fingers=1:thumb,2:index expected, {given!r} given")
+            names[int(number)] = name.strip()
+        if len(set(names.values())) < len(names):
+            raise ValueError(f"{self.text}: a name for each finger expected, {given!r} given")
+        return names
+
+
+def parse(text: str) -> tuple[str, Address]:
+    """The scheme of a URI, and its parts.
+
+    Raises:
+        ValueError: it is no URI of a known scheme, or a parameter is given twice.
+
+    Example:
+        >>> parse("twin:?object=can")[1].parameters
+        {'object': 'can'}
+    """
+    match = _URI.match(text)
+    scheme = match["scheme"] if match else ""
+    if scheme not in SCHEMES:
+        raise ValueError(
+            f"{text!r} is neither the path of a recording nor the URI of a source; there are "
+            + ", ".join(f"{name}:" for name in SCHEMES)
+        )
+    parts = urlsplit(text)
+    pairs = parse_qsl(parts.query, keep_blank_values=True)
+    if len(dict(pairs)) < len(pairs):
+        raise ValueError(f"{text}: a parameter is given twice")
+    return scheme, Address(text, parts.netloc, parts.path, dict(pairs))
+
+
+def is_uri(text: str) -> bool:
+    """Whether it names no file, but looks like a URI."""
+    return bool(_URI.match(text)) and not Path(text).exists()
+
+
+def open_source(text: str, *, speed: float = 1.0, loop: bool = False) -> Source:
+    """The source of that name; entering it connects.
+
+    Args:
+        text: the path of a recording, or a URI of one of `SCHEMES`.
+        speed: of a recording and of the twin: 1 is real time, 0 as fast as it is taken.
+        loop: a recording begins anew when it is over; the twin grasps again.
+
+    Raises:
+        ValueError: it is neither, or a parameter is not as expected.
+        MissingExtra: it needs a package that is not installed.
+
+    Example:
+        >>> with open_source("twin:?object=can&seed=1", speed=0) as source:  # doctest: +SKIP
+        ...     print(list(source.sensors))
+        ['thumb', 'index', 'middle', 'ring']
+    """
+    if not is_uri(text):
+        from holdfast.sources.replay import Replay
+
+        return Replay(text, speed=speed, loop=loop)
+    scheme, address = parse(text)
+    if scheme == "twin":
+        from holdfast.sources.twin import Twin
+
+        return Twin(address, speed=speed, loop=loop)
+    return _device(scheme, address)
+
+
+def _device(scheme: str, address: Address) -> Source:
+    make: Callable[[Address], Source] = import_module(f"holdfast.sources.{scheme}").source
+    return make(address)
