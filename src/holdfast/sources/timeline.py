@@ -8,7 +8,7 @@ from holdfast.contact import Fault
 JITTER = 0.05
 """A stamp that goes back by no more than this is taken as just after the last [s]."""
 JUMP = 0.5
-"""A clock that runs so far ahead of the host's between two packets has jumped [s]."""
+"""A stamp so far ahead of the host's clock, by the quickest sample so far, is a jump [s]."""
 LATE = 0.1
 """A sample that arrives so much later than others did is late [s]."""
 DRIFT = 1e-4
@@ -27,12 +27,50 @@ class Stamp(NamedTuple):
     faults: tuple[Fault, ...] = ()
 
 
+class Delay:
+    """How much later samples arrive than the quickest did; clocks may drift by 1e-4.
+
+    Example:
+        >>> delay = Delay()
+        >>> [round(delay.of(t, at), 2) for t, at in ((0.0, 5.0), (1.0, 6.25), (2.0, 7.0))]
+        [0.0, 0.25, 0.0]
+    """
+
+    def __init__(self) -> None:
+        self.forget()
+
+    def forget(self) -> None:
+        """Begins anew: the clock is another now."""
+        self._least = math.inf
+        self._received = math.nan
+
+    def of(self, time: float, received: float) -> float:
+        """How much later than the quickest this sample is [s]; it may be the quickest now."""
+        age = received - time
+        self._least = min(self._allowed(received), age)
+        self._received = received
+        return age - self._least
+
+    def lead(self, time: float, received: float) -> float:
+        """How much quicker than the quickest this sample is, below 0 where it is not [s]."""
+        return self._allowed(received) - (received - time)
+
+    def _allowed(self, received: float) -> float:
+        if math.isinf(self._least):
+            return self._least
+        return self._least + DRIFT * max(received - self._received, 0.0)
+
+
 class Timeline:
     """Turns the stamps of a device into strictly increasing times.
 
-    Where the device's clock jumps, time goes on by as much as passed on the host's. A sample
-    is late where it came later after its stamp than the quickest did; clocks may differ, and
-    drift by 1e-4.
+    Where the device's clock jumps, time goes on by as much as passed on the host's. A jump is
+    a stamp that goes back, or one that would be from the future: a burst after a stall, or a
+    stretch that is missing, is neither. A sample is late where it came later after its stamp
+    than the quickest did; clocks may differ, and drift by 1e-4.
+
+    Attributes:
+        offset: what is added to the device's stamps, since its clock jumped [s].
 
     Example:
         >>> timeline = Timeline()
@@ -41,9 +79,9 @@ class Timeline:
     """
 
     def __init__(self) -> None:
-        self._offset = 0.0
+        self.offset = 0.0
         self._last = self._received = math.nan
-        self._least = math.inf
+        self._delay = Delay()
 
     def stamp(self, device_time: float, received: float) -> Stamp:
         """The time of a sample.
@@ -57,26 +95,22 @@ class Timeline:
         """
         if not math.isfinite(device_time):
             raise ValueError(f"a time in seconds expected, {device_time} given")
-        time = device_time + self._offset
-        jumped = not math.isnan(self._last) and self._jumped(time, received)
+        time = device_time + self.offset
+        jumped = self._jumped(time, received)
         if jumped:
             time = self._last + max(received - self._received, 0.0)
-            self._offset = time - device_time
-            self._least = math.inf
+            self.offset = time - device_time
+            self._delay.forget()
         if time <= self._last:  # False before the first
             time = math.nextafter(self._last, math.inf)
-        late = self._is_late(time, received)
+        late = self._delay.of(time, received) > LATE
         self._last, self._received = time, received
         faults = (Fault.CLOCK_JUMP,) * jumped + (Fault.LATE,) * late
         return Stamp(time, faults)
 
     def _jumped(self, time: float, received: float) -> bool:
-        """Back, or ahead of the host's clock; a burst after a stall is neither."""
+        if math.isnan(self._last):
+            return False
         ahead = time - self._last - (received - self._received)
-        return time <= self._last - JITTER or ahead > JUMP
-
-    def _is_late(self, time: float, received: float) -> bool:
-        elapsed = 0.0 if math.isnan(self._received) else received - self._received
-        age = received - time
-        self._least = min(self._least + DRIFT * elapsed, age)
-        return age - self._least > LATE
+        from_future = ahead > JUMP and self._delay.lead(time, received) > JUMP
+        return time <= self._last - JITTER or from_future

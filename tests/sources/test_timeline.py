@@ -1,0 +1,115 @@
+import math
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from holdfast.contact import Fault
+from holdfast.sources.timeline import Delay, Timeline
+
+PERIOD = 1 / 150
+
+
+def stamps(pairs):
+    timeline = Timeline()
+    return [timeline.stamp(t, received) for t, received in pairs]
+
+
+def steady(n, *, start=1000.0, received=50.0):
+    return [(start + k * PERIOD, received + k * PERIOD) for k in range(n)]
+
+
+def test_steady_stamps_stay_as_they_are():
+    pairs = steady(300)
+    assert [s.time for s in stamps(pairs)] == [t for t, _ in pairs]
+    assert not any(s.faults for s in stamps(pairs))
+
+
+@given(
+    st.lists(
+        st.tuples(st.floats(-1e9, 1e9), st.floats(0.0, 10.0, allow_subnormal=False)),
+        min_size=2,
+        max_size=50,
+    )
+)
+def test_times_go_forward_whatever_the_device_says(given):
+    received, last = 0.0, -math.inf
+    timeline = Timeline()
+    for device_time, passed in given:
+        received += passed
+        time = timeline.stamp(device_time, received).time
+        assert time > last
+        last = time
+
+
+@pytest.mark.parametrize("jump", [-3600.0, -1.0, 1.0, 3600.0])
+def test_time_goes_on_as_on_the_host_where_the_clock_jumps(jump):
+    before, after = steady(100), steady(200)[100:]
+    given = before + [(t + jump, received) for t, received in after]
+    told = stamps(given)
+    assert [s.time for s in told] == pytest.approx([t for t, _ in before + after], abs=1e-6)
+    assert told[100].faults == (Fault.CLOCK_JUMP,)
+    assert not any(s.faults for k, s in enumerate(told) if k != 100)
+
+
+def test_a_burst_after_a_stall_is_late_and_no_jump():
+    pairs = steady(400)
+    stalled = [(t, 52.0 if 51.0 < received < 52.0 else received) for t, received in pairs]
+    told = stamps(stalled)
+    assert [s.time for s in told] == [t for t, _ in pairs]
+    late = [s.time for s in told if s.faults == (Fault.LATE,)]
+    assert late == [t for t, _ in pairs if 1001.0 < t < 1001.9 - 1e-3]
+    assert all(s.faults in ((), (Fault.LATE,)) for s in told)
+
+
+def test_what_is_missing_after_a_stall_is_no_jump():
+    """The reader stalls for 9 s; what was buffered comes, then what is new."""
+    pairs = steady(150)
+    buffered = [(1001.0 + k * PERIOD, 60.0) for k in range(1, 100)]
+    new = [(1010.0 + k * PERIOD, 60.0 + k * PERIOD) for k in range(1, 100)]
+    told = stamps(pairs + buffered + new)
+    assert [s.time for s in told] == [t for t, _ in pairs + buffered + new]
+    assert not any(Fault.CLOCK_JUMP in s.faults for s in told)
+    assert all(s.faults == (Fault.LATE,) for s in told[150:249])
+    assert not any(s.faults for s in told[249:])
+
+
+def test_a_small_step_back_is_just_after_the_last():
+    first, second, third = stamps([(10.0, 0.0), (9.96, 0.01), (10.02, 0.02)])
+    assert first.time < second.time == math.nextafter(10.0, math.inf)
+    assert third == (10.02, ())
+    assert second.faults == ()
+
+
+def test_clocks_that_drift_are_not_late():
+    told = stamps([(1000.0 + k, 50.0 + k * (1 + 5e-5)) for k in range(10_000)])
+    assert not any(s.faults for s in told)
+
+
+def test_a_clock_that_runs_away_is_late():
+    told = stamps([(1000.0 + k, 50.0 + k * 1.01) for k in range(100)])
+    assert [s.faults for s in told[:9]] == [()] * 9
+    assert all(s.faults == (Fault.LATE,) for s in told[12:])
+
+
+@pytest.mark.parametrize("wrong", [math.nan, math.inf, -math.inf])
+def test_a_stamp_that_is_not_finite_is_refused(wrong):
+    with pytest.raises(ValueError, match=f"a time in seconds expected, {wrong} given"):
+        Timeline().stamp(wrong, 0.0)
+
+
+def test_the_offset_is_what_jumps_add():
+    timeline = Timeline()
+    timeline.stamp(100.0, 0.0)
+    assert timeline.offset == 0.0
+    timeline.stamp(40.0, 1.0)
+    assert timeline.offset == 61.0
+
+
+def test_a_delay_begins_anew():
+    delay = Delay()
+    assert delay.of(0.0, 1.0) == 0.0
+    assert delay.of(1.0, 3.0) == pytest.approx(1.0, abs=1e-3)
+    delay.forget()
+    assert delay.of(2.0, 5.0) == 0.0
+    assert delay.lead(3.0, 5.5) == pytest.approx(0.5, abs=1e-3)
