@@ -1,9 +1,7 @@
 """`holdfast detect`: what a model says of every finger at every sample."""
 
-import re
 import sys
 from collections.abc import Iterator
-from enum import StrEnum
 from itertools import chain
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
@@ -11,6 +9,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from holdfast.cli.console import Bar, print_json, say
+from holdfast.cli.judging import RateRule, debounced, taxels_of, tell_missing
 
 if TYPE_CHECKING:
     from holdfast.detector import Detection
@@ -20,21 +19,12 @@ if TYPE_CHECKING:
 PIECE = 4096
 """Samples that are taken at a time: bounds the memory."""
 
-_URI = re.compile(r"[a-z][a-z0-9+]+:")
-
-
-class RateRule(StrEnum):
-    """What becomes of a source at another rate than the model's."""
-
-    RESAMPLE = "resample"
-    STRICT = "strict"
-
 
 def detect(
     model: Annotated[
         str, typer.Argument(help="A model's file, builtin:twin or builtin:noise-floor.")
     ],
-    source: Annotated[str, typer.Argument(help="The path of a recording.")],
+    source: Annotated[str, typer.Argument(help="A recording's path, or a URI: see above.")],
     summary: Annotated[
         bool, typer.Option("--summary", help="Print shares of states and the events instead.")
     ] = False,
@@ -47,6 +37,12 @@ def detect(
     hysteresis: Annotated[
         float | None, typer.Option(help="How far past its threshold a probability must go.")
     ] = None,
+    seconds: Annotated[
+        float | None, typer.Option(help="Of a live source: stop after so long [s].")
+    ] = None,
+    ignore: Annotated[
+        str, typer.Option(help="Taxels that count for nothing: index:7,index:12.")
+    ] = "",
     as_json: Annotated[
         bool, typer.Option("--json", help="Print JSON: as always, and for --summary too.")
     ] = False,
@@ -58,54 +54,50 @@ def detect(
     unit of the readings, faults; null where nothing is known. Memory stays bounded, however long
     the recording.
 
+    SOURCE is the path of a recording, judged as fast as it goes, or a live source, judged as
+    it comes until Ctrl-C: xela://HOST:PORT (or xela://auto), twin:?object=can,
+    ros2:///xServTopic, ros1:///xServTopic or serial:///dev/ttyACM0?sensor=anyskin.
+
     Example:
       holdfast detect model.json grasp.parquet > states.jsonl
+      holdfast detect builtin:twin xela://auto
       holdfast detect builtin:noise-floor grasp.mcap --summary
       holdfast detect model.json grasp.parquet --debounce 0.05 --hysteresis 0.1
     """
-    judge = _judge(model, debounce, hysteresis)
-    detections = _detections(judge, _path(source), rate)
-    if summary:
-        from holdfast.cli.tally import Tally
+    from holdfast.sources.uri import is_uri
 
-        tally = Tally()
-        for detection in detections:
-            tally.add(detection)
-        if as_json:
-            print_json({"model": model, **tally.document()})
-        else:
-            tally.print()
+    wanted, live = debounced(model, debounce, hysteresis), is_uri(source)
+    if live:
+        from holdfast.cli.detect_live import detections_live
+
+        detections = detections_live(wanted, source, rate, ignore, seconds)
+    else:
+        detections = _detections(wanted, Path(source), rate, ignore)
+    if summary:
+        _summarise(detections, model, as_json=as_json)
         return
     from holdfast.cli.lines import json_lines
 
     for detection in detections:
         for block in json_lines(detection):
             sys.stdout.write(block)
+        if live:
+            sys.stdout.flush()
 
 
-def _judge(name: str, debounce: float | None, hysteresis: float | None) -> "Model":
-    from msgspec.structs import replace
+def _summarise(detections: Iterator["Detection"], model: str, *, as_json: bool) -> None:
+    from holdfast.cli.tally import Tally
 
-    from holdfast.model import Debounce, Model
-
-    model = Model.load(name)
-    known = model.debounce
-    held = Debounce(
-        known.min_duration if debounce is None else debounce,
-        known.hysteresis if hysteresis is None else hysteresis,
-        known.hold,
-    )
-    return replace(model, debounce=held)
+    tally = Tally()
+    for detection in detections:
+        tally.add(detection)
+    if as_json:
+        print_json({"model": model, **tally.document()})
+    else:
+        tally.print()
 
 
-def _path(source: str) -> Path:
-    path = Path(source)
-    if _URI.match(source) and not path.exists():
-        raise ValueError(f"only the path of a recording can be a source yet; {source!r} given")
-    return path
-
-
-def _detections(model: "Model", path: Path, rate: RateRule) -> Iterator["Detection"]:
+def _detections(model: "Model", path: Path, rate: RateRule, ignore: str) -> Iterator["Detection"]:
     """What the model says, piece by piece."""
     from holdfast.detector import Detector
 
@@ -113,8 +105,8 @@ def _detections(model: "Model", path: Path, rate: RateRule) -> Iterator["Detecti
     with Bar("detecting") as bar:
         for piece in _pieces(model, path, rate):
             if detector is None:
-                detector = Detector.for_recording(model, piece)
-                _tell_missing(model, piece)
+                detector = Detector.for_recording(model, piece, ignore=taxels_of(ignore))
+                tell_missing(model, piece.name, piece.modules)
             yield detector.run(piece)
             bar.advance(max(module.n_samples for module in piece.modules.values()))
 
@@ -140,12 +132,3 @@ def _pieces(model: "Model", path: Path, rate: RateRule) -> Iterator["Recording"]
         raise ModelError(f"{given} within 20 % (--rate resample takes it all the same)")
     say(f"{given}: resampled")
     return iter([resample(load_recording(path, labels=False), model.rate)])
-
-
-def _tell_missing(model: "Model", recording: "Recording") -> None:
-    missing = [name for name in model.fingers if name not in ("*", *recording.modules)]
-    if missing:
-        say(
-            f"the model also judges {', '.join(missing)}; "
-            f"{recording.name} has {', '.join(recording.modules)}"
-        )

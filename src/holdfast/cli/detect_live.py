@@ -1,0 +1,52 @@
+"""`holdfast detect` on a live source: lines as they come, until Ctrl-C."""
+
+import time
+from collections.abc import Iterator
+from contextlib import suppress
+from typing import TYPE_CHECKING
+
+from holdfast.cli.console import say
+from holdfast.cli.judging import RateRule, judge_of
+
+if TYPE_CHECKING:
+    from holdfast.detector import Detection
+    from holdfast.live.judge import Decision, Judge
+    from holdfast.model import Model
+    from holdfast.sources import Arrival, Source
+
+
+def detections_live(
+    model: "Model", uri: str, rate: RateRule, ignore: str, seconds: float | None
+) -> Iterator["Detection"]:
+    """What the model says of a live source, arrival by arrival, until Ctrl-C or `seconds`."""
+    from holdfast.live.tracing import detection_of
+    from holdfast.sources import open_source
+
+    with suppress(KeyboardInterrupt), open_source(uri) as source:
+        judge = judge_of(model, source, rate, ignore)
+        for decisions in _decisions(source, judge, seconds):
+            yield detection_of(source.name, decisions)
+
+
+def _decisions(
+    source: "Source", judge: "Judge", seconds: float | None
+) -> Iterator[list["Decision"]]:
+    end = None if seconds is None else time.monotonic() + seconds
+    silent = False
+    while not source.ended and (end is None or time.monotonic() < end):
+        arrival = source.read(judge.silence)
+        if arrival is not None:
+            tell(arrival)
+            silent = silent and not arrival.samples
+            yield judge.take(arrival)
+        elif not silent and not source.ended:
+            silent = True
+            said = judge.silent()
+            yield [said] if said else []
+    yield judge.finish()
+
+
+def tell(arrival: "Arrival") -> None:
+    """Tells on stderr what a person should know."""
+    for notice in arrival.notices:
+        say(notice)

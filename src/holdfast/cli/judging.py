@@ -1,0 +1,70 @@
+"""What verbs that judge samples have in common: the model as it is wanted, and what to tell."""
+
+from collections.abc import Mapping
+from enum import StrEnum
+from typing import TYPE_CHECKING
+
+from holdfast.cli.console import say
+
+if TYPE_CHECKING:
+    from holdfast.live.judge import Judge
+    from holdfast.model import Model
+    from holdfast.sources import Source
+
+
+class RateRule(StrEnum):
+    """What becomes of a source at another rate than the model's."""
+
+    RESAMPLE = "resample"
+    STRICT = "strict"
+
+
+def debounced(name: str, debounce: float | None, hysteresis: float | None) -> "Model":
+    """The model of that name, held back as asked for where it is asked for."""
+    from msgspec.structs import replace
+
+    from holdfast.model import Debounce, Model
+
+    model = Model.load(name)
+    known = model.debounce
+    held = Debounce(
+        known.min_duration if debounce is None else debounce,
+        known.hysteresis if hysteresis is None else hysteresis,
+        known.hold,
+    )
+    return replace(model, name=model.name or name, debounce=held)
+
+
+def judge_of(model: "Model", source: "Source", rate: RateRule, ignore: str) -> "Judge":
+    """A judge of an open source; tells on stderr what the source lacks."""
+    from holdfast.live.judge import Judge
+
+    judge = Judge(model, source.sensors, strict=rate is RateRule.STRICT, ignore=taxels_of(ignore))
+    tell_missing(model, source.name, source.sensors)
+    return judge
+
+
+def tell_missing(model: "Model", name: str, modules: Mapping[str, object]) -> None:
+    """Tells on stderr which fingers of the model a source or recording lacks."""
+    missing = [finger for finger in model.fingers if finger not in ("*", *modules)]
+    if missing:
+        say(f"the model also judges {', '.join(missing)}; {name} has {', '.join(modules)}")
+
+
+def taxels_of(text: str) -> dict[str, tuple[int, ...]]:
+    """Taxels by finger, as `--ignore` gives them.
+
+    Raises:
+        ValueError: it is not of that form.
+
+    Example:
+        >>> taxels_of("index:7,index:12,thumb:0")
+        {'index': (7, 12), 'thumb': (0,)}
+    """
+    found: dict[str, tuple[int, ...]] = {}
+    for part in filter(None, text.split(",")):
+        finger, _, number = part.strip().rpartition(":")
+        if not (finger and number.isdecimal()):
+            raise ValueError(f"--ignore: FINGER:TAXEL,... expected, {text!r} given")
+        found[finger] = (*found.get(finger, ()), int(number))
+    return found

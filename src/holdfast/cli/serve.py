@@ -1,0 +1,104 @@
+"""`holdfast serve`: what a model says of a source, on a page and for other programs."""
+
+from contextlib import ExitStack
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+from holdfast.cli.console import print_json, say
+from holdfast.cli.judging import RateRule, debounced, judge_of
+
+if TYPE_CHECKING:
+    from holdfast.live.session import Session
+
+HOST, PORT = "127.0.0.1", 8080
+
+
+def serve(
+    model: Annotated[
+        str, typer.Argument(help="A model's file, builtin:twin or builtin:noise-floor.")
+    ],
+    source: Annotated[str, typer.Argument(help="A recording's path, or a URI: see above.")],
+    host: Annotated[str, typer.Option(help="Address to listen at.")] = HOST,
+    port: Annotated[int, typer.Option(help="Port; 0 finds a free one.")] = PORT,
+    token: Annotated[
+        str | None, typer.Option(help="Secret that readers must know; needed with --host.")
+    ] = None,
+    record_to: Annotated[
+        Path, typer.Option(help="Folder for the recordings that the page makes.")
+    ] = Path("recordings"),
+    speed: Annotated[float, typer.Option(help="Of a recording or the twin: 1 is real time.")] = 1.0,
+    once: Annotated[
+        bool, typer.Option("--once", help="Play a recording once, and end with it.")
+    ] = False,
+    rate: Annotated[
+        RateRule, typer.Option(help="Of a source not within 20 % of the model's rate.")
+    ] = RateRule.RESAMPLE,
+    debounce: Annotated[
+        float | None, typer.Option(help="Tell a state once it has lasted so long [s].")
+    ] = None,
+    hysteresis: Annotated[
+        float | None, typer.Option(help="How far past its threshold a probability must go.")
+    ] = None,
+    ignore: Annotated[
+        str, typer.Option(help="Taxels that count for nothing: index:7,index:12.")
+    ] = "",
+    ros2: Annotated[bool, typer.Option("--ros2", help="Publish on ROS 2 topics too.")] = False,
+    ros1: Annotated[bool, typer.Option("--ros1", help="Publish on ROS 1 topics too.")] = False,
+    as_json: Annotated[
+        bool, typer.Option("--json", help="Print where the page is as JSON.")
+    ] = False,
+) -> None:
+    """Shows what a model says of a source on a page, and tells other programs.
+
+    The page shows every finger's state, force, sigma, probability, taxels and faults; it takes
+    the tare and records. Programs read the WebSocket /api/v1/estimates (every sample) or
+    /api/v1/live (twenty times a second): docs/live.md. Only this machine reaches it, unless
+    --host says otherwise. Ctrl-C ends it.
+
+    SOURCE is the path of a recording, xela://HOST:PORT (or xela://auto), twin:?object=can,
+    ros2:///xServTopic, ros1:///xServTopic or serial:///dev/ttyACM0?sensor=anyskin.
+
+    Example:
+      holdfast serve builtin:twin twin:?object=can
+      holdfast serve model.json xela://auto --ros2
+      holdfast serve model.json grasp.parquet --host 0.0.0.0 --token SECRET
+    """
+    from holdfast.live.guard import Guard
+    from holdfast.live.server import run_server
+    from holdfast.live.service import Service
+    from holdfast.live.session import Session
+    from holdfast.sources import open_source
+
+    guard = Guard(host, token)
+    wanted = debounced(model, debounce, hysteresis)
+    with ExitStack() as stack:
+        opened = stack.enter_context(open_source(source, speed=speed, loop=not once))
+        session = Session(opened, judge_of(wanted, opened, rate, ignore))
+        stack.callback(session.stop)
+        _publish(stack, session, ros2=ros2, ros1=ros1)
+        service = Service(session, wanted, guard, record_to)
+
+        def tell(url: str) -> None:
+            page = url if token is None else f"{url}?token={token}"
+            if as_json:
+                print_json({"url": page, "model": model, "source": source})
+            say(f"{page} shows what {wanted.name} says of {source}; Ctrl-C ends it")
+
+        session.start()
+        run_server(service.app, session, host, port, tell, stay=not once)
+
+
+def _publish(stack: ExitStack, session: "Session", *, ros2: bool, ros1: bool) -> None:
+    """Has the session's estimates published on ROS topics."""
+    units = {name: sensor.unit for name, sensor in session.judge.fingers.items()}
+    if ros2:
+        from holdfast.live.ros2_publisher import Ros2Publisher
+
+        publisher = stack.enter_context(Ros2Publisher(units))
+        session.listen(publisher.put)
+    if ros1:
+        from holdfast.live.ros1_publisher import Ros1Publisher
+
+        session.listen(stack.enter_context(Ros1Publisher(units)).put)
