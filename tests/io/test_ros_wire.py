@@ -1,0 +1,151 @@
+import re
+from contextlib import suppress
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from holdfast.io.ros_wire import NUMBERS, Decoder, Field, parse_definition
+
+pytest.importorskip("rosbags", reason="rosbags is not installed")
+
+from sources.ros_build import store
+
+INNER = "bool flag\nstring name\nfloat64[2] pair\n"
+TEXT = "\n".join(f"{kind} a_{kind}\n{kind}[] many_{kind}" for kind in NUMBERS if kind != "byte")
+OUTER = f"uint8 X=3\nstring S=a # b\n{TEXT}\nInner inner\nInner[] inners\nstring[] words\n"
+ROS = pytest.mark.parametrize("ros2", [False, True], ids=["ros1", "ros2"])
+
+
+def number_of(kind, draw):
+    dtype = np.dtype(NUMBERS[kind])
+    if kind == "bool":
+        return draw(st.booleans())
+    if dtype.kind == "f":
+        return draw(st.floats(allow_nan=False, width=8 * dtype.itemsize))
+    limits = np.iinfo(dtype)
+    return draw(st.integers(int(limits.min), int(limits.max)))
+
+
+@st.composite
+def values(draw):
+    """Of all fields of OUTER, as dictionaries."""
+    words = st.text(st.characters(codec="utf-8", exclude_characters="\x00"), max_size=5)
+
+    def inner():
+        pair = [draw(st.floats(allow_nan=False)) for _ in range(2)]
+        return {"flag": draw(st.booleans()), "name": draw(words), "pair": pair}
+
+    fields = {}
+    for kind in NUMBERS:
+        if kind != "byte":
+            fields[f"a_{kind}"] = number_of(kind, draw)
+            n = draw(st.integers(0, 3))
+            fields[f"many_{kind}"] = [number_of(kind, draw) for _ in range(n)]
+    inners = [inner() for _ in range(draw(st.integers(0, 2)))]
+    return fields | {"inner": inner(), "inners": inners, "words": draw(st.lists(words, max_size=3))}
+
+
+def message_of(types, values):
+    def inner(one):
+        return types.types["p/msg/Inner"](one["flag"], one["name"], np.array(one["pair"]))
+
+    fields = {
+        name: np.array(
+            value,
+            NUMBERS[name[5:]].replace("u1", "?") if name == "many_bool" else NUMBERS[name[5:]],
+        )
+        if name.startswith("many_")
+        else value
+        for name, value in values.items()
+    }
+    fields |= {"inner": inner(values["inner"]), "inners": [inner(x) for x in values["inners"]]}
+    return types.types["p/msg/Outer"](**fields)
+
+
+def plain(value):
+    if isinstance(value, dict):
+        return {name: plain(item) for name, item in value.items()}
+    if isinstance(value, list):
+        return [plain(item) for item in value]
+    return value.tolist() if isinstance(value, np.ndarray) else value
+
+
+@pytest.fixture(scope="module", params=[False, True], ids=["ros1", "ros2"])
+def wire(request):
+    """rosbags' way to write messages, and ours to read them."""
+    ros2 = request.param
+    types = store("p", {"Outer": OUTER, "Inner": INNER}, ros2=ros2)
+    text, _ = types.generate_msgdef("p/msg/Outer", ros_version=2 if ros2 else 1)
+    write = types.serialize_cdr if ros2 else types.serialize_ros1
+    decode = Decoder(parse_definition("p/msg/Outer", text), ros2=ros2)
+    return lambda given: bytes(write(message_of(types, given), "p/msg/Outer")), decode
+
+
+@given(values())
+def test_any_message_that_rosbags_writes_is_read(wire, given):
+    write, decode = wire
+    assert plain(decode(write(given))) == given
+
+
+@given(values(), st.data())
+def test_a_cut_or_longer_message_is_refused(wire, given, data):
+    write, decode = wire
+    whole = write(given)
+    cut = data.draw(st.integers(0, len(whole) - 1))
+    with pytest.raises(ValueError, match=r"cut|left|CDR|UTF-8"):
+        decode(whole[:cut])
+    with pytest.raises(ValueError, match="bytes too many"):
+        decode(whole + bytes(4))
+
+
+@given(st.binary(max_size=200))
+def test_garbage_is_refused_or_read_but_nothing_else(wire, given):
+    _, decode = wire
+    with suppress(ValueError):
+        decode(given)
+
+
+def test_cdr_of_either_byte_order():
+    types = store("p", {"Outer": OUTER, "Inner": INNER}, ros2=True)
+    decode = Decoder(parse_definition("p/Inner", INNER), ros2=True)
+    message = types.types["p/msg/Inner"](True, "ö", np.array([0.5, -2.0]))
+    for little in (True, False):
+        data = types.serialize_cdr(message, "p/msg/Inner", little_endian=little)
+        assert plain(decode(bytes(data))) == {"flag": 1, "name": "ö", "pair": [0.5, -2.0]}
+
+
+def test_a_length_that_lies_takes_no_memory():
+    decode = Decoder(parse_definition("p/A", "B[] b\n====\nMSG: p/B\n"), ros2=False)
+    with pytest.raises(ValueError, match="b: 4294967295 given, 0 bytes left"):
+        decode(b"\xff" * 4)
+    decode = Decoder(parse_definition("p/A", "float64[] b"), ros2=False)
+    with pytest.raises(ValueError, match="cut: 4294967295 float64 expected, 3 bytes left"):
+        decode(b"\xff" * 7)
+
+
+def test_definitions():
+    fields = "Header header\nint8[<=3] some # many\nstring<=9 name 'x'\n"
+    text = fields + "=====\nMSG: std_msgs/Header\ntime stamp\n"
+    definition = parse_definition("p/msg/A", text)
+    assert definition.name == "p/A"
+    assert definition.fields == (
+        Field("header", "std_msgs/Header"),
+        Field("some", "int8", 0),
+        Field("name", "string"),
+    )
+
+
+@pytest.mark.parametrize(
+    ("text", "told"),
+    [
+        ("uint8", "p/A: 'uint8' is no field of a message"),
+        ("wstring x", "p/A: a field is of wstring, which is not defined"),
+        ("A x", "p/A holds itself, or is nested too deep"),
+        ("B[] x\n===\nMSG: p/B\nA[] y", "p/A holds itself, or is nested too deep"),
+    ],
+)
+def test_bad_definitions(text, told):
+    with pytest.raises(ValueError, match=re.escape(told)):
+        parse_definition("p/A", text)
