@@ -63,6 +63,10 @@ class Fault(StrEnum):
     CLOCK_JUMP = "clock_jump"
 
 
+SIGNAL_FAULTS = tuple(Fault)[:8]
+"""Those that show in the readings."""
+
+
 class Cause(StrEnum):
     """Why a contact is not stable."""
 

@@ -143,14 +143,14 @@ def _faults(
     """How many samples show which fault, as a detector would tell them."""
     import msgspec
 
-    from holdfast.contact import Fault
+    from holdfast.contact import SIGNAL_FAULTS
     from holdfast.detector import Detector
     from holdfast.model import Model
 
     model = msgspec.structs.replace(Model.load("builtin:noise-floor"), tare=str(tare))
     alone = replace(recording, modules={name: module}, truth=None)
     masks = Detector.for_recording(model, alone).run(alone).fingers[name].faults
-    counts = {fault: int((masks >> bit & 1).sum()) for bit, fault in enumerate(Fault)}
+    counts = {fault: int((masks >> bit & 1).sum()) for bit, fault in enumerate(SIGNAL_FAULTS)}
     return {fault.value: n for fault, n in counts.items() if n}
 
 

@@ -7,7 +7,7 @@ import numpy as np
 from msgspec import Struct
 from msgspec.json import Encoder
 
-from holdfast.contact import ContactState, Fault, Reason
+from holdfast.contact import SIGNAL_FAULTS, ContactState, Reason
 
 if TYPE_CHECKING:
     from holdfast.detector import Detection
@@ -18,8 +18,8 @@ BLOCK = 8192
 _STATES = [state.value for state in ContactState]
 _REASONS = [reason.value for reason in Reason]
 _FAULTS = [
-    [fault.value for bit, fault in enumerate(Fault) if mask >> bit & 1]
-    for mask in range(1 << len(Fault))
+    [fault.value for bit, fault in enumerate(SIGNAL_FAULTS) if mask >> bit & 1]
+    for mask in range(1 << len(SIGNAL_FAULTS))
 ]
 
 

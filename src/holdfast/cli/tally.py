@@ -8,18 +8,25 @@ import numpy as np
 import numpy.typing as npt
 
 from holdfast.cli.console import print_table, show
-from holdfast.contact import UNKNOWN, ContactEvent, ContactState, Fault, Reason
+from holdfast.contact import (
+    SIGNAL_FAULTS,
+    UNKNOWN,
+    ContactEvent,
+    ContactState,
+    Fault,
+    Reason,
+)
 from holdfast.detector import HAND
 
 if TYPE_CHECKING:
     from holdfast.detector import Detection
     from holdfast.sensors.values import Array
 
-STATES, REASONS, FAULTS = tuple(ContactState), tuple(Reason), tuple(Fault)
+STATES, REASONS, FAULTS = tuple(ContactState), tuple(Reason), SIGNAL_FAULTS
 MOST_EVENTS = 40
 """Events that are shown to a person."""
 
-_Codes = npt.NDArray[np.int8]
+_Codes = npt.NDArray[np.int8 | np.int16]
 _Numbers = npt.NDArray[np.int64]
 
 

@@ -84,7 +84,7 @@ class Traces(NamedTuple):
 
     state: npt.NDArray[np.int8]  # (n, n_fingers)
     reason: npt.NDArray[np.int8]
-    faults: npt.NDArray[np.int8]
+    faults: npt.NDArray[np.int16]
     probability: Array
     values: Array  # (n, n_fingers, N_VALUES) as in Output
     hand: npt.NDArray[np.int8]  # (n,)
@@ -96,7 +96,7 @@ class Traces(NamedTuple):
         return cls(
             state=np.zeros(shape, dtype=np.int8),
             reason=np.zeros(shape, dtype=np.int8),
-            faults=np.zeros(shape, dtype=np.int8),
+            faults=np.zeros(shape, dtype=np.int16),
             probability=np.zeros(shape),
             values=np.zeros((*shape, kernel.N_VALUES)),
             hand=np.zeros(n, dtype=np.int8),

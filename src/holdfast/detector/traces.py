@@ -7,15 +7,15 @@ from typing import NamedTuple
 import numpy as np
 import numpy.typing as npt
 
-from holdfast.contact import ContactEstimate, ContactState, Fault, Reason
+from holdfast.contact import SIGNAL_FAULTS, ContactEstimate, ContactState, Fault, Reason
 from holdfast.detector.rule import Traces, verdict_code
 from holdfast.features.kernel import SIGMA, Array
 
 STATES = tuple(ContactState)
 REASONS = tuple(Reason)
 FAULTS = tuple(
-    tuple(fault for bit, fault in enumerate(Fault) if mask >> bit & 1)
-    for mask in range(1 << len(Fault))
+    tuple(fault for bit, fault in enumerate(SIGNAL_FAULTS) if mask >> bit & 1)
+    for mask in range(1 << len(SIGNAL_FAULTS))
 )
 """The faults of every mask."""
 VERDICTS: dict[float, tuple[ContactState, Reason, tuple[Fault, ...]]] = {
@@ -46,7 +46,7 @@ class FingerTrace(NamedTuple):
     stable_probability: Array
     instability: Array
     force: Array
-    faults: npt.NDArray[np.int8]
+    faults: npt.NDArray[np.int16]
 
     def __len__(self) -> int:
         return len(self.times)
