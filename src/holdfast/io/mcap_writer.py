@@ -24,8 +24,8 @@ class RecordingWriter:
     """Writes a recording while it is made; a kill loses at most half a second.
 
     Samples go to disk in messages of at most 0.1 s and chunks of at most 0.3 s of the
-    stream's own time: the writer has no clock. It is a context manager and is to be used by
-    one thread.
+    stream's own time: the writer has no clock, so that `flush` is for streams that may fall
+    silent. It is a context manager and is to be used by one thread.
 
     Args:
         path: of the MCAP file.
@@ -107,18 +107,34 @@ class RecordingWriter:
             if parts and parts[0][0][0] <= self._newest - MESSAGE_SECONDS:
                 self._write(name, before=self._newest - MESSAGE_SECONDS)
 
-    def mark(self, time: float, text: str) -> None:
-        """Writes a marker at once.
+    def mark(self, time: float, text: str, *, at_once: bool = True) -> None:
+        """Writes a marker.
 
         Args:
             time: on the clock of the samples [s].
             text: what happened.
+            at_once: False leaves it to the next `flush`, or to the samples that follow.
 
         Raises:
             OutputError: the disk refuses.
         """
         self._log.text(MARKERS_TOPIC, time, text)
+        if at_once:
+            self._log.flush()
+
+    def flush(self) -> None:
+        """Writes all that was given so far: a kill from now on does not lose it.
+
+        Raises:
+            OutputError: the disk refuses.
+        """
+        self._write_all()
         self._log.flush()
+
+    @property
+    def n_bytes(self) -> int:
+        """How long the file is."""
+        return self._log.n_bytes
 
     def close(self) -> None:
         """Writes what is left and the end of the file; again, it does nothing.
@@ -127,9 +143,8 @@ class RecordingWriter:
             OutputError: the disk refuses.
         """
         try:
-            for name, parts in self._pending.items():
-                if parts and not self._log.closed:
-                    self._write(name, before=np.inf)
+            if not self._log.closed:
+                self._write_all()
         finally:
             self._log.close()
 
@@ -161,6 +176,11 @@ class RecordingWriter:
         steps = np.diff(times, prepend=self._last[module])
         if not (np.isfinite(times).all() and (steps > 0).all()):
             raise RecordingError(f"{module}: finite, strictly increasing times expected")
+
+    def _write_all(self) -> None:
+        for name, parts in self._pending.items():
+            if parts:
+                self._write(name, before=np.inf)
 
     def _write(self, module: str, before: float) -> None:
         """Writes the spans that begin no later than `before`; the rest stays pending."""

@@ -38,7 +38,8 @@ class MessageLog:
         closed: whether the file has ended.
 
     Raises:
-        OutputError: the file exists already or cannot be written.
+        OutputError: the file exists already or cannot be written. After a refusal nothing more
+            is written: what came before can be read, as of a file that was cut.
     """
 
     def __init__(self, path: Path, header: Header, *, force: bool = False) -> None:
@@ -52,8 +53,9 @@ class MessageLog:
         self.closed = False
         with _refusals(path):
             self._file = path.open("wb" if force else "xb", buffering=0)
+            self._direct = _Direct(self._file)
             self._writer = Writer(
-                cast("IO[bytes]", _Direct(self._file)),
+                cast("IO[bytes]", self._direct),
                 _MOST_CHUNK,
                 CompressionType.ZSTD,
                 enable_data_crcs=True,
@@ -82,6 +84,11 @@ class MessageLog:
         with _refusals(self._path):
             self._writer.flush()  # type: ignore[no-untyped-call]
         self._span = (np.inf, -np.inf)
+
+    @property
+    def n_bytes(self) -> int:
+        """How long the file is."""
+        return self._direct.n_bytes
 
     def close(self) -> None:
         """Ends the file."""
@@ -123,21 +130,37 @@ class MessageLog:
 class _Direct:
     """A stream without a buffer, which `mcap` would put around a plain file.
 
+    What the disk refused once is refused from then on: an end after a piece that is missing
+    would make a damaged file of one that is merely cut.
+
     Args:
         file: opened with `buffering=0`.
+
+    Attributes:
+        n_bytes: that were written.
     """
 
     def __init__(self, file: FileIO) -> None:
+        self.n_bytes = 0
         self._file = file
+        self._refused: OSError | None = None
 
     def write(self, data: bytes) -> int:
+        if self._refused:
+            raise OSError(*self._refused.args)
         left = memoryview(data)
-        while left:
-            left = left[self._file.write(left) :]
+        try:
+            while left:
+                n = self._file.write(left)
+                self.n_bytes += n
+                left = left[n:]
+        except OSError as error:
+            self._refused = error
+            raise
         return len(data)
 
     def tell(self) -> int:
-        return self._file.tell()
+        return self.n_bytes
 
     def flush(self) -> None:
         """Does nothing: all is written already."""
