@@ -122,3 +122,54 @@ def test_a_full_disk_is_told(tmp_path, monkeypatch):
     with pytest.raises(OutputError, match="No space left on device"):
         writer.close()
     writer.close()
+
+
+def test_what_is_flushed_is_there(tmp_path):
+    path = tmp_path / "a.mcap"
+    with RecordingWriter(path, {"thumb": ANYSKIN, "index": ANYSKIN}) as writer:
+        for k in range(30):
+            writer.append("thumb", [k / 150], readings(1))
+            writer.mark(k / 150, str(k), at_once=False)
+            writer.flush()
+            recording = load_recording(path)
+            assert recording.modules["thumb"].n_samples == len(recording.markers) == k + 1
+            assert writer.n_bytes == path.stat().st_size
+    recording = load_recording(path)
+    assert (recording.complete, recording.modules["thumb"].n_samples) == (True, 30)
+
+
+def test_a_marker_that_may_wait_comes_with_what_follows(tmp_path):
+    path = tmp_path / "a.mcap"
+    with RecordingWriter(path, {"thumb": ANYSKIN}) as writer:
+        before = writer.n_bytes
+        writer.mark(0.0, "later", at_once=False)
+        assert writer.n_bytes == before
+        writer.append("thumb", np.arange(100) / 100, readings(100))
+        assert load_recording(path).markers == ((0.0, "later"),)
+
+
+def test_after_a_refusal_nothing_more_is_written(tmp_path, monkeypatch):
+    """An end would make a damaged file of one that is merely cut."""
+    path = tmp_path / "a.mcap"
+    writer = RecordingWriter(path, {"thumb": ANYSKIN})
+    writer.append("thumb", np.arange(100) * 0.01, readings(100))
+    writer.flush()
+    size = path.stat().st_size
+    disk = writer._log._direct._file
+
+    class Full:
+        def write(self, data):
+            if len(data) > 10:
+                return disk.write(data[:10])
+            raise OSError(errno.ENOSPC, "No space left on device")
+
+    monkeypatch.setattr(writer._log._direct, "_file", Full())
+    with pytest.raises(OutputError, match="No space left on device"):
+        writer.mark(1.0, "full")
+    monkeypatch.undo()
+    for late in (lambda: writer.mark(1.0, "again"), writer.flush, writer.close):
+        with pytest.raises(OutputError, match=r"cannot write .*a\.mcap: No space left on device"):
+            late()
+    assert size < path.stat().st_size == writer.n_bytes
+    recording = load_recording(path)
+    assert (recording.complete, recording.modules["thumb"].n_samples) == (False, 100)

@@ -263,7 +263,7 @@ class Recorder:
         n = self._n_overflown - self._n_told
         if n:
             self._n_told += n
-            self._intake.mark(math.nan, f"note: {n} samples dropped: the disk is too slow")
+            self._intake.mark(self._newest, f"note: {n} samples dropped: the disk is too slow")
 
     def _check_file(self) -> None:
         if _identity(self.path) != self._file:

@@ -1,0 +1,335 @@
+import math
+import os
+import re
+import shutil
+import subprocess
+import sys
+import threading
+import time
+
+import numpy as np
+import pytest
+
+from holdfast.contact import Fault
+from holdfast.errors import OutputError, RecordingError
+from holdfast.io import load_recording
+from holdfast.io.mcap_writer import RecordingWriter
+from holdfast.live import recorder as module
+from holdfast.live.recorder import Recorder
+from holdfast.sensors import sensor
+from holdfast.sources import Arrival
+from holdfast.sources.source import word
+
+ANYSKIN = sensor("anyskin")
+TWO = {"thumb": ANYSKIN, "index": ANYSKIN}
+PATIENCE = 30.0
+
+
+def readings(k, number=np.uint16):
+    return np.full((5, 3), k, number)
+
+
+def arrival(k, *names, time=None, **fields):
+    at = k / 100 if time is None else time
+    samples = {name: readings(k) for name in names or ("thumb",)}
+    return Arrival(at, samples, received=at, **fields)
+
+
+def until(condition):
+    """Waits for the thread; a failure where nothing comes of it."""
+    end = time.monotonic() + PATIENCE
+    while not condition():
+        assert time.monotonic() < end, "waited in vain"
+        time.sleep(0.01)
+
+
+@pytest.fixture
+def path(tmp_path):
+    return tmp_path / "a.mcap"
+
+
+@pytest.fixture
+def stuck(monkeypatch):
+    """A disk that does not go on until it is told to."""
+    go, entered = threading.Event(), threading.Event()
+    append = RecordingWriter.append
+
+    def slow(self, *given):
+        entered.set()
+        go.wait(PATIENCE)
+        append(self, *given)
+
+    monkeypatch.setattr(RecordingWriter, "append", slow)
+    go.entered = entered
+    yield go
+    go.set()
+
+
+def test_what_arrives_is_recorded_with_the_times_of_each_module(path):
+    with Recorder(path, TWO, name="grasp", metadata={"object": "can"}) as recorder:
+        for k in range(300):
+            recorder.put(arrival(k, *("thumb", "index")[: 1 + (k % 3 == 0)]))
+    recording = load_recording(path)
+    assert recording.complete
+    assert (recording.name, dict(recording.metadata)) == ("grasp", {"object": "can"})
+    for name, ks in (("thumb", np.arange(300)), ("index", np.arange(0, 300, 3))):
+        module = recording.modules[name]
+        np.testing.assert_array_equal(module.times, ks / 100)
+        np.testing.assert_array_equal(module.readings[:, 4, 2], ks)
+        assert module.readings.dtype == np.uint16
+
+
+def test_it_tells_how_far_it_is(path):
+    with Recorder(path, TWO) as recorder:
+        assert recorder.status.seconds == 0.0
+        for k in [*range(100), *range(150, 200)]:
+            recorder.put(arrival(k, "thumb", n_lost=k == 150, n_refused=2 * (k == 7)))
+        until(lambda: recorder.status.n_samples == 150)
+        assert recorder.status.rate > 0
+        recorder.mark("one")
+    status = recorder.status
+    assert status.seconds == pytest.approx(1.99)
+    assert status.modules == {"thumb": 150, "index": 0}
+    assert (status.n_gaps, status.n_lost, status.n_refused, status.n_dropped) == (1, 1, 2, 0)
+    assert (status.n_markers, status.n_bytes) == (1, path.stat().st_size)
+    assert (status.failure, recorder.failed) == ("", False)
+
+
+def test_gaps_are_judged_by_the_rate_that_is_there(path):
+    with Recorder(path, TWO) as recorder:  # 10 Hz, where the sensor promises 100 Hz
+        for k in range(50):
+            recorder.put(arrival(k, time=k / 10 + (k > 30)))
+    assert recorder.status.n_gaps == load_recording(path).modules["thumb"].n_gaps == 1
+
+
+def test_all_is_on_disk_soon_though_the_source_falls_silent(path):
+    with Recorder(path, TWO) as recorder:
+        recorder.put(arrival(0))
+        recorder.put(arrival(1))
+        recorder.mark("silence")
+        until(lambda: recorder.status.n_markers)
+        copy = path.with_name("copy.mcap")
+        until(lambda: shutil.copy(path, copy) and path.stat().st_size == recorder.status.n_bytes)
+        recording = load_recording(copy)
+    assert recording.modules["thumb"].times.tolist() == [0.0, 0.01]
+    assert recording.markers == ((0.01, "silence"),)
+
+
+def test_markers_stand_where_they_were_set(path):
+    with Recorder(path, TWO) as recorder:
+        recorder.mark("early")
+        recorder.mark("before", 0.5)
+        recorder.put(arrival(100))
+        recorder.mark("at\nthe  newest\x00\ud800")
+        recorder.put(arrival(101))
+        recorder.mark("nowhere", math.inf)
+        recorder.mark("x" * 1000, 1.005)
+    assert load_recording(path).markers == (
+        (1.0, "early"),
+        (0.5, "before"),
+        (1.0, "at the newest??"),
+        (1.01, "nowhere"),
+        (1.005, "x" * 200),
+    )
+
+
+def test_faults_and_notices_become_markers(path):
+    gap = {"index": (Fault.PACKET_GAP,)}
+    with Recorder(path, TWO) as recorder:
+        recorder.put(arrival(0, "thumb", "index"))
+        recorder.put(arrival(1, "thumb", "index", faults=gap))
+        recorder.put(arrival(2, "thumb", "index", faults=gap))
+        recorder.put(word(0.02, "connection lost"))
+        recorder.put(word(0.03, faults={"thumb": (Fault.LATE,), "index": (Fault.LATE,)}))
+        recorder.put(arrival(200, "thumb", "index"))
+        recorder.put(arrival(300, "thumb", "index", faults=gap))
+    assert load_recording(path).markers == (
+        (0.01, "fault index packet_gap"),
+        (0.02, "note: connection lost"),
+        (0.02, "fault all late"),
+        (3.0, "fault index packet_gap"),
+    )
+    assert recorder.status.faults == {Fault.PACKET_GAP: 3, Fault.LATE: 1}
+
+
+def test_the_faults_of_the_last_second_are_there_now(path):
+    now = time.monotonic()
+    old = {"thumb": (Fault.LATE,), "elsewhere": (Fault.LATE,)}
+    new = {"index": (Fault.PACKET_GAP, Fault.LATE)}
+    with Recorder(path, TWO) as recorder:
+        recorder.put(word(now - 1.5, faults=old))
+        recorder.put(word(now + PATIENCE, faults=new))
+    assert recorder.status.faulty == {"index": (Fault.PACKET_GAP, Fault.LATE)}
+
+
+def test_the_same_words_are_a_marker_once_a_second(path):
+    with Recorder(path, TWO) as recorder:
+        for k in range(250):
+            recorder.put(arrival(k, notices=("noise",)))
+            recorder.put(word(k / 100, f"babble {k}", f"babble {-k}"))
+    markers = load_recording(path).markers
+    assert [time for time, text in markers if text == "note: noise"] == [0.0, 1.0, 2.0]
+    assert len(markers) <= 303
+
+
+def test_what_no_file_can_hold_is_dropped_and_told(path):
+    wrong = [
+        (0.0, readings(1)),
+        (-1.0, readings(1)),
+        (math.nan, readings(1)),
+        (math.inf, readings(1)),
+        (9.0, readings(1)[:4]),
+        (9.0, readings(0.5, np.float32)),
+        (9.0, readings(-1, np.int64)),
+        (9.0, readings(np.nan, np.float64)),
+        (9.0, readings(1, np.complex128)),
+        (9.0, readings("a", "U1")),
+    ]
+    right = [readings(7, np.int64), readings(8.0, np.float32), readings(9, ">u2")]
+    with Recorder(path, TWO) as recorder:
+        recorder.put(arrival(0))
+        for when, values in wrong:
+            recorder.put(Arrival(when, {"thumb": values}, received=when))
+        for k, values in enumerate(right):
+            recorder.put(Arrival(1.0 + k, {"thumb": values, "pinky": values}, received=0.0))
+    thumb = load_recording(path).modules["thumb"]
+    assert thumb.times.tolist() == [0.0, 1.0, 2.0, 3.0]
+    assert thumb.readings[:, 0, 0].tolist() == [0, 7, 8, 9]
+    assert thumb.readings.dtype == np.uint16
+    assert recorder.status.n_dropped == len(wrong)
+    assert (0.0, "note: a sample of thumb is unfit: dropped") in load_recording(path).markers
+
+
+def test_half_precision_is_no_number_type_of_a_file(path):
+    with Recorder(path, TWO) as recorder:
+        recorder.put(Arrival(0.0, {"thumb": readings(1, np.float16)}, received=0.0))
+        recorder.put(Arrival(1.0, {"thumb": readings(1, np.float32)}, received=1.0))
+    assert recorder.status.n_dropped == 1
+    assert load_recording(path).modules["thumb"].readings.dtype == np.float32
+
+
+def test_a_slow_disk_holds_nobody_up_and_fills_no_memory(path, stuck, monkeypatch):
+    monkeypatch.setattr(module, "MOST_WAITING", 50)
+    with Recorder(path, TWO) as recorder:
+        recorder.put(arrival(0))
+        assert stuck.entered.wait(PATIENCE)
+        for k in range(1, 201):
+            recorder.put(arrival(k))  # would wait for ever, if it did wait
+        assert recorder.status.n_dropped == 150
+        stuck.set()
+        until(lambda: recorder.status.n_samples == 51)
+        recorder.put(arrival(300))
+    recording = load_recording(path)
+    assert recording.modules["thumb"].readings[:, 0, 0].tolist() == [*range(51), 300]
+    assert (0.5, "note: 150 samples dropped: the disk is too slow") in recording.markers
+
+
+def test_markers_find_room_where_samples_do_not_but_not_without_end(path, stuck, monkeypatch):
+    monkeypatch.setattr(module, "MOST_WAITING", 5)
+    monkeypatch.setattr(module, "_MOST_MARKERS", 3)
+    with Recorder(path, TWO) as recorder:
+        recorder.put(arrival(0))
+        assert stuck.entered.wait(PATIENCE)
+        for k in range(1, 10):
+            recorder.put(arrival(k))
+        for k in range(10):
+            recorder.mark(f"mark {k}")
+        stuck.set()
+    texts = [text for _, text in load_recording(path).markers if text.startswith("mark")]
+    assert texts == ["mark 0", "mark 1", "mark 2"]
+
+
+def test_who_is_patient_loses_nothing(path, monkeypatch):
+    monkeypatch.setattr(module, "MOST_WAITING", 5)
+    with Recorder(path, TWO) as recorder:
+        for k in range(100):
+            recorder.put(arrival(k), patient=True)
+    assert (recorder.status.n_dropped, recorder.status.n_samples) == (0, 100)
+
+
+def test_after_the_end_nothing_is_taken(path):
+    recorder = Recorder(path, TWO)
+    recorder.put(arrival(0))
+    recorder.close()
+    recorder.put(arrival(1), patient=True)
+    recorder.mark("late")
+    recorder.close()
+    assert recorder.status.n_dropped == 1
+    assert load_recording(path).modules["thumb"].n_samples == 1
+
+
+def test_what_is_there_is_kept_unless_forced(path):
+    path.write_text("mine")
+    with pytest.raises(OutputError, match=r"a\.mcap exists already"):
+        Recorder(path, TWO)
+    assert path.read_text() == "mine"
+    with Recorder(path, TWO, force=True) as recorder:
+        recorder.put(arrival(0))
+    assert load_recording(path).complete
+
+
+def test_metadata_that_no_file_can_hold_are_refused(path):
+    with pytest.raises(RecordingError, match="plain JSON values"):
+        Recorder(path, TWO, metadata={"a": object()})
+    assert not path.exists()
+
+
+def test_a_file_that_is_taken_away_is_told(path):
+    recorder = Recorder(path, TWO)
+    path.unlink()
+    until(lambda: recorder.failed)
+    recorder.put(arrival(0))
+    told = f"cannot write {path}: it was removed while it was recorded"
+    assert recorder.status.failure == told
+    with pytest.raises(OutputError, match=re.escape(told)):
+        recorder.close()
+    assert recorder.status.n_dropped == 1
+
+
+def test_a_bug_in_the_thread_comes_out_at_the_end(path, monkeypatch):
+    monkeypatch.setattr(RecordingWriter, "append", lambda *_: 1 / 0)
+    recorder = Recorder(path, TWO)
+    recorder.put(arrival(0))
+    until(lambda: recorder.failed)
+    with pytest.raises(ZeroDivisionError):
+        recorder.close()
+
+
+FULL = """
+import resource, sys, time
+import numpy as np
+from holdfast.errors import OutputError
+from holdfast.live.recorder import Recorder
+from holdfast.sensors import sensor
+from holdfast.sources import Arrival
+
+recorder = Recorder(sys.argv[1], {"thumb": sensor("anyskin")})
+noise = np.random.default_rng(0)
+resource.setrlimit(resource.RLIMIT_FSIZE, (30_000, resource.RLIM_INFINITY))
+end = time.monotonic() + 30
+for k in range(10**9):
+    values = noise.integers(0, 65535, (5, 3)).astype(np.uint16)
+    values[0, 0] = k
+    recorder.put(Arrival(k / 100, {"thumb": values}, received=0.0), patient=True)
+    if recorder.failed or time.monotonic() > end:
+        break
+resource.setrlimit(resource.RLIMIT_FSIZE, (resource.RLIM_INFINITY, resource.RLIM_INFINITY))
+try:
+    recorder.close()
+except OutputError as error:
+    print(error)
+"""
+
+
+@pytest.mark.skipif(not hasattr(os, "fork"), reason="needs limits of POSIX")
+def test_of_a_full_disk_what_went_before_stays(path):
+    """Also where there is room again by the end: an end would make the file damaged."""
+    done = subprocess.run(
+        [sys.executable, "-c", FULL, str(path)], capture_output=True, text=True, check=True
+    )
+    assert done.stdout == f"cannot write {path}: File too large\n"
+    recording = load_recording(path)
+    assert not recording.complete
+    thumb = recording.modules["thumb"]
+    np.testing.assert_array_equal(thumb.readings[:, 0, 0], np.arange(thumb.n_samples))
+    assert 10_000 < path.stat().st_size <= 30_000
