@@ -89,7 +89,7 @@ class Session:
 
     def leave(self, listener: Listener) -> None:
         """Has it called no more."""
-        self._listeners = [one for one in self._listeners if one is not listener]
+        self._listeners = [one for one in self._listeners if one != listener]
 
     def start(self) -> None:
         """Begins to read."""

@@ -1,0 +1,145 @@
+"""From packet to decision: 368 taxels at 150 Hz over a socket, for as long as you like.
+
+`holdfast play` sends the whole hand from one process; this one judges it, with a slow and a
+quick reader on its WebSocket if asked. It tells the latency from the last byte of a packet in
+hand to the decision, packets lost, and how the memory grew.
+
+    uv run python benchmarks/live.py --minutes 10
+    uv run python benchmarks/live.py --minutes 1 --page
+"""
+
+import argparse
+import asyncio
+import json
+import resource
+import subprocess
+import sys
+import threading
+import time
+from pathlib import Path
+from tempfile import TemporaryDirectory
+
+import numpy as np
+
+from holdfast.io import save_recording
+from holdfast.live.guard import Guard
+from holdfast.live.judge import Judge
+from holdfast.live.service import Service
+from holdfast.live.session import Session
+from holdfast.model import Model
+from holdfast.sources import open_source
+from holdfast.synthetic import synthetic_recording
+
+FINGERS = ("thumb", "index", "middle", "ring")
+
+
+def main() -> None:
+    options = _options()
+    with TemporaryDirectory() as folder:
+        path = Path(folder) / "hand.parquet"
+        save_recording(synthetic_recording("hand", 0, FINGERS), path)
+        player = _player(path, options.port)
+        try:
+            report = _measure(options)
+        finally:
+            player.terminate()
+            player.wait()
+    print(json.dumps(report, indent=1))
+
+
+def _options() -> argparse.Namespace:
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("--minutes", type=float, default=1.0)
+    parser.add_argument("--port", type=int, default=5055)
+    parser.add_argument("--page", action="store_true", help="serve, with two readers")
+    return parser.parse_args()
+
+
+def _player(path: Path, port: int) -> "subprocess.Popen[bytes]":
+    words = ("play", str(path), "--whole-hand", "--port", str(port))
+    holdfast = Path(sys.executable).with_name("holdfast")
+    return subprocess.Popen([holdfast, *words], stderr=subprocess.DEVNULL)
+
+
+def _measure(options: argparse.Namespace) -> dict[str, object]:
+    model = Model.load("builtin:twin")
+    with _connected(options.port) as source:
+        session = Session(source, Judge(model, source.sensors))
+        notes = np.zeros((int(60 * options.minutes * 400) + 10_000, 2))  # so that it never grows
+        session.listen(lambda said: _note(said, notes, session.n_packets))
+        if options.page:
+            threading.Thread(target=_serve, args=(session, model), daemon=True).start()
+        session.start()
+        time.sleep(5.0)
+        begin, n_begin = _resident(), session.n_packets
+        end = time.monotonic() + 60 * options.minutes
+        half = 0.0
+        while time.monotonic() < end:
+            time.sleep(1.0)
+            if not half and end - time.monotonic() < 30 * options.minutes:
+                half = _resident()
+        session.stop()
+    seen, times = notes[n_begin : session.n_packets].T
+    steps = np.diff(times)
+    return {
+        "taxels": sum(sensor.n_taxels for sensor in source.sensors.values()),
+        "minutes": options.minutes,
+        "page": options.page,
+        "packets": len(seen),
+        "rate": round(1 / float(np.median(steps)), 2),
+        "lost": session.n_lost,
+        "refused": session.n_refused,
+        "failure": repr(session.failure),
+        "latency": {
+            name: float(np.percentile(seen, share))
+            for name, share in (("p50", 50), ("p99", 99), ("p99.9", 99.9), ("max", 100))
+        },
+        "resident_megabytes": {"begin": begin, "half": half, "end": _resident()},
+    }
+
+
+def _connected(port: int):
+    for _ in range(60):
+        try:
+            source = open_source(f"xela://127.0.0.1:{port}")
+            source.open()
+        except Exception:
+            time.sleep(0.5)
+        else:
+            return source
+    raise SystemExit("the player did not start")
+
+
+def _note(said, notes, n_packets: int) -> None:
+    """Writes down the latency and the time of packet `n_packets`."""
+    if said.arrival is not None and said.arrival.samples:
+        notes[n_packets - 1] = time.monotonic() - said.arrival.received, said.arrival.time
+
+
+def _serve(session: Session, model: Model) -> None:
+    """The web service with a reader that reads and one that never does."""
+
+    async def run() -> None:
+        from aiohttp import ClientSession, web
+
+        runner = web.AppRunner(Service(session, model, Guard("127.0.0.1")).app)
+        await runner.setup()
+        site = web.TCPSite(runner, "127.0.0.1", 0)
+        await site.start()
+        url = f"http://127.0.0.1:{runner.addresses[0][1]}/api/v1/live"
+        async with ClientSession() as client, client.ws_connect(url) as quick:
+            async with client.ws_connect(url.replace("live", "estimates")):  # never read
+                async for _ in quick:
+                    pass
+
+    asyncio.run(run())
+
+
+def _resident() -> float:
+    """Resident memory of this process [MB]."""
+    pages = int(Path("/proc/self/statm").read_text().split()[1])
+    return round(pages * resource.getpagesize() / 1e6, 1)
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,143 @@
+import threading
+import time
+
+import pytest
+
+from holdfast.contact import ContactState, Fault
+from holdfast.detector import detect
+from holdfast.errors import ModelError, SourceError, StreamError
+from holdfast.live.judge import Judge
+from holdfast.live.session import Session
+
+from . import build
+
+PATIENCE = 30.0
+
+
+def session_of(source):
+    return Session(source, Judge(build.model(), source.sensors))
+
+
+def wait_for(condition):
+    end = time.monotonic() + PATIENCE
+    while not condition():
+        if time.monotonic() > end:
+            pytest.fail("what was waited for did not happen")
+        time.sleep(0.005)
+
+
+@pytest.fixture
+def start():
+    running = []
+
+    def begin(source, *listeners):
+        session = session_of(source)
+        for listener in listeners:
+            session.listen(listener)
+        session.start()
+        running.append(session)
+        return session
+
+    yield begin
+    for session in running:
+        session.stop()
+
+
+def test_listeners_hear_everything_in_order(start):
+    recording = build.grasp()
+    heard = []
+    session = start(build.Script.of(recording), heard.append)
+    wait_for(lambda: session.ended)
+    decisions = [decision for said in heard for decision in said.decisions]
+    expected = detect(build.model(), recording)
+    assert [d.estimate.state.code for d in decisions] == expected.hand.tolist()
+    assert session.n_packets == len(expected.hand)
+    assert session.failure is None
+
+
+def test_events_are_the_changes_of_state(start):
+    heard = []
+    session = start(build.Script.of(build.grasp()), heard.append)
+    wait_for(lambda: session.ended)
+    events = [event for said in heard for event in said.events if event.finger == "hand"]
+    assert {event.state for event in events} == set(ContactState) - {ContactState.UNKNOWN}
+    assert all(one.state is two.previous for one, two in zip(events, events[1:], strict=False))
+
+
+def test_a_silent_source_is_told_once_and_its_return_ends_it(start):
+    recording = build.grasp()
+    arrivals = build.arrivals_of(recording)
+    steps = [*arrivals[:400], None, None, None, *arrivals[400:]]
+    heard = []
+    session = start(build.Script.of(recording, steps), heard.append)
+    wait_for(lambda: session.ended)
+    gaps = [s for s in heard if s.arrival is None and s.decisions]
+    assert len(gaps) == 1
+    estimate = gaps[0].decisions[0].estimate
+    assert all(f.faults == (Fault.PACKET_GAP,) for f in estimate.fingers.values())
+    assert not session.silent
+    after = heard[heard.index(gaps[0]) + 1].decisions[0].estimate
+    assert after.fingers["thumb"].state is not ContactState.UNKNOWN
+
+
+def test_the_tare_is_taken_in_the_session_and_refused_in_contact(start):
+    recording = build.grasp()
+    arrivals = build.arrivals_of(recording)
+    source = build.Script.of(recording, arrivals[:200], patient=True)
+    session = start(source)
+    wait_for(lambda: session.n_packets == 200)
+    session.tare()
+    source.steps.extend(arrivals[200:600])
+    wait_for(lambda: session.n_packets == 600)
+    with pytest.raises(StreamError, match="in contact"):
+        session.tare()
+
+
+def test_no_tare_after_the_end(start):
+    session = start(build.Script.of(build.grasp(), []))
+    wait_for(lambda: session.ended)
+    with pytest.raises(SourceError, match=r"^the source has ended: no tare can be taken$"):
+        session.tare()
+
+
+def test_a_failure_is_kept_and_ends_the_session(start):
+    recording = build.grasp()
+    slow = [one._replace(time=one.time * 3) for one in build.arrivals_of(recording)]
+    source = build.Script.of(recording, slow)
+    session = Session(source, Judge(build.model(), source.sensors, strict=True))
+    session.start()
+    wait_for(lambda: session.ended)
+    session.stop()
+    assert isinstance(session.failure, ModelError)
+
+
+def test_stopping_closes_the_source_and_leaves_no_thread():
+    source = build.Script.of(build.grasp(), [], patient=True)
+    session = session_of(source)
+    session.start()
+    session.stop()
+    session.stop()
+    assert source.n_closed >= 1
+    assert not [t for t in threading.enumerate() if t.name == "holdfast-detector"]
+
+
+def test_latencies_are_of_the_decisions(start):
+    session = session_of(build.Script.of(build.grasp(), []))
+    assert session.latency().p99 != session.latency().p99
+    session = start(build.Script.of(build.grasp()))
+    wait_for(lambda: session.ended)
+    latency = session.latency()
+    assert 0 < latency.p50 <= latency.p99 <= latency.largest
+
+
+def test_who_leaves_hears_no_more(start):
+    recording = build.grasp()
+    source = build.Script.of(recording, build.arrivals_of(recording)[:100], patient=True)
+    heard = []
+    session = start(source, heard.append)
+    wait_for(lambda: session.n_packets == 100)
+    session.leave(heard.append)
+    n_heard = len(heard)
+    source.steps.extend(build.arrivals_of(recording)[100:200])
+    wait_for(lambda: session.n_packets == 200)
+    assert len(heard) == n_heard
