@@ -1,13 +1,16 @@
 """Messages of tactile sensors in ROS: their definitions, and the readings in them."""
 
 from collections.abc import Callable, Mapping, Sequence
+from dataclasses import replace
 from typing import Any, NamedTuple
 
 import numpy as np
 import numpy.typing as npt
 
 from holdfast.io.ros_wire import Decoder, Definition, parse_definition, short_name
-from holdfast.sensors.values import Array
+from holdfast.io.xela_models import module_sensors
+from holdfast.sensors import Sensor, sensor
+from holdfast.sensors.values import Array, Unit
 
 _LINE = "\n" + "=" * 80 + "\nMSG: "
 
@@ -241,3 +244,45 @@ def _seconds(stamp: Mapping[str, int]) -> float | None:
     """A stamp of ROS 1 or ROS 2 [s]; None where nobody set it."""
     whole, nanoseconds = stamp.values()
     return whole + nanoseconds * 1e-9 if whole or nanoseconds else None
+
+
+def sensors_of(message: Message, unit: Unit) -> dict[str, Sensor]:
+    """Sensors of a device by module, as `module_sensors`.
+
+    Raises:
+        ValueError: it has another number of taxels than its model.
+    """
+    readings = readings_of(message, unit)
+    if message.counts is None:
+        pillars = sensor(PAPILLARRAY)
+        if len(readings) != pillars.n_taxels:
+            raise ValueError(
+                f"{len(readings)} taxels given, {pillars.n_taxels} expected ({PAPILLARRAY})"
+            )
+        return {"": pillars}
+    sensors = module_sensors(message.model, len(readings))
+    if unit == "count":
+        return sensors
+    return {name: replace(one, unit=unit, limits=None) for name, one in sensors.items()}
+
+
+def readings_of(message: Message, unit: Unit) -> npt.NDArray[Any]:
+    """(n_taxels, 3) of a message: counts, or newtons where they are wanted or all there is."""
+    return message.forces if unit == "N" or message.counts is None else message.counts
+
+
+def module_name(finger: str, part: str, *, named: bool) -> str:
+    """What a module is called: of a hand by its part, else as the finger.
+
+    Args:
+        finger: of the device.
+        part: of a hand, or empty.
+        named: somebody called the device so: its name comes before the part.
+
+    Example:
+        >>> [module_name("left", "thumb", named=True), module_name("finger1", "", named=False)]
+        ['left/thumb', 'finger1']
+    """
+    if not part:
+        return finger
+    return f"{finger}/{part}" if named else part

@@ -15,6 +15,7 @@ FORMATS = {
     "xela-log": "CSV of a whole hand: a time column and 368 x 3 columns in flat taxel order",
     "gtac": "CSV of the GTac gripper: 15 magnetic nodes",
     "arq-crisp": "HDF5 of the ARQ-CRISP slip data sets of 2021 and 2023 (extra: hdf5)",
+    "rosbag": "bags of ROS 1 and ROS 2 with topics of XELA or Contactile (extra: bags)",
     "csv": "the generic CSV of docs/formats.md",
 }
 """The formats that can be imported, and what they are; sniffed in this order."""
@@ -58,7 +59,7 @@ def import_recordings(
 
 
 def _importer(name: str) -> ModuleType:
-    module = "generic_csv" if name == "csv" else name.replace("-", "_")
+    module = {"csv": "generic_csv", "rosbag": "ros_bag"}.get(name, name.replace("-", "_"))
     return import_module(f"holdfast.io.importers.{module}")
 
 
