@@ -1,11 +1,12 @@
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import assume, given, settings
 from hypothesis import strategies as st
 
 from holdfast.contact import ContactState
+from holdfast.errors import StreamError
 from holdfast.recordings import Label, Recording, Tactile
-from holdfast.resampling import resample
+from holdfast.resampling import Resampler, resample
 from holdfast.sensors import Sensor
 
 SENSOR = Sensor("one", [[0.0, 0.0, 0.0]], [np.eye(3)], [0.0, 0.0, 1.0], 100.0)
@@ -139,6 +140,101 @@ def test_every_value_rests_on_samples_up_to_the_first_at_or_after_it(cut, pair, 
     one, two = after(signal, times, rate), after(changed, times, rate)
     known = one.times < times[cut - 1] - 2e-3 / rate
     assert np.array_equal(one.readings[known], two.readings[known])
+
+
+def fed(module, rate):
+    """What a `Resampler` says of a module, sample by sample."""
+    resampler = Resampler(1 / module.period, rate)
+    told = [
+        one
+        for time, reading in zip(module.times, module.readings, strict=True)
+        for one in resampler.push(time, reading)
+    ]
+    return np.array([time for time, _ in told]), np.array([reading for _, reading in told])
+
+
+def uneven(source, jitter, gaps, seed, start=0.0, n=300):
+    """Samples at uneven times with gaps, some values not finite, two now and then at once."""
+    rng = np.random.default_rng(seed)
+    steps = 1 + jitter * rng.uniform(-1, 1, size=n)
+    steps[rng.random(n) < 0.02] = 1e-3
+    for gap in gaps:
+        steps[gap] = rng.uniform(1.5, 40)
+    signal = rng.normal(size=n)
+    signal[rng.integers(n)] = np.nan
+    return made(signal, start + steps.cumsum() / source).modules["thumb"]
+
+
+@given(
+    pair=st.sampled_from([*RATES, (2000, 100), (20, 1000), (150, 149)]),
+    jitter=st.floats(0, 0.9),
+    gaps=st.lists(st.integers(1, 299), max_size=4),
+    start=st.sampled_from([0.0, -3.7, 1.7e9]),
+    seed=st.integers(0, 999),
+)
+@settings(deadline=None)
+def test_live_is_offline(pair, jitter, gaps, start, seed):
+    source, rate = pair
+    module = uneven(source, jitter, gaps, seed, start)
+    assume(abs(rate * module.period - 1) > 1e-9)  # where either way is right
+    expected = resample(Recording("made", {"thumb": module}), rate).modules["thumb"]
+    times, readings = fed(module, rate)
+    assert np.array_equal(times, expected.times)
+    assert np.array_equal(readings, expected.readings, equal_nan=True)
+
+
+@given(pair=st.sampled_from(RATES), n=st.integers(1, 300), seed=st.integers(0, 99))
+@settings(deadline=None)
+def test_live_says_what_it_knows_at_once(pair, n, seed):
+    """Of the first samples of a recording it says as much as is said of them offline."""
+    source, rate = pair
+    module = uneven(source, 0.4, [100, 200], seed)
+    assume(abs(rate * module.period - 1) > 1e-9)
+    first = Tactile(SENSOR, module.times[:n], module.readings[:n])
+    resampler = Resampler(1 / module.period, rate)
+    told = [x for k in range(n) for x in resampler.push(module.times[k], module.readings[k])]
+    whole = resample(Recording("made", {"thumb": module}), rate).modules["thumb"].times
+    until = first.times[-1] + 1e-3 / rate
+    assert [time for time, _ in told] == [time for time in whole if time <= until]
+
+
+def test_live_readings_are_its_own():
+    resampler, reading = Resampler(100.0, 150.0), np.ones((1, 3))
+    told = resampler.push(0.0, reading)
+    reading[:] = 5.0
+    told += resampler.push(0.01, reading)
+    reading[:] = 9.0
+    assert [value[0, 0] for _, value in told] == pytest.approx([1.0, 1 + 4 * 2 / 3])
+
+
+@pytest.mark.parametrize(
+    ("time", "after"),
+    [
+        (0.5, " after 0.5 s"),
+        (0.4, " after 0.5 s"),
+        (np.nan, " after 0.5 s"),
+        (np.inf, " after 0.5 s"),
+    ],
+)
+def test_live_refuses_times_that_do_not_go_forward(time, after):
+    resampler = Resampler(100.0, 150.0)
+    resampler.push(0.5, np.ones((1, 3)))
+    with pytest.raises(StreamError) as raised:
+        resampler.push(time, np.ones((1, 3)))
+    assert str(raised.value) == (
+        f"time {time} s given{after}; finite times that go forward expected"
+    )
+    with pytest.raises(StreamError) as raised:
+        Resampler(100.0, 150.0).push(np.nan, np.ones((1, 3)))
+    assert str(raised.value) == "time nan s given; finite times that go forward expected"
+
+
+@pytest.mark.parametrize("rates", [(0.0, 100.0), (np.nan, 100.0), (100.0, -1.0)])
+def test_live_refuses_rates(rates):
+    with pytest.raises(ValueError) as raised:
+        Resampler(*rates)
+    bad = next(rate for rate in rates if not rate > 0)
+    assert str(raised.value) == f"a rate above 0 Hz expected, {bad} given"
 
 
 @pytest.mark.parametrize("rate", [0.0, -1.0, np.nan, np.inf])

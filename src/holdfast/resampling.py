@@ -1,13 +1,16 @@
-"""Recordings at another rate."""
+"""Recordings and streams at another rate."""
 
 from dataclasses import replace
 from itertools import pairwise
 
 import numpy as np
+import numpy.typing as npt
 
+from holdfast.errors import StreamError
 from holdfast.recordings import GAP_PERIODS, Recording, Tactile
 from holdfast.sensors.values import Array
 
+Integers = npt.NDArray[np.int64]
 TOLERANCE = 1e-3
 """Of a period of the wanted rate: rounding of times, 1e-7 s since 1970, moves no sample."""
 
@@ -18,7 +21,7 @@ def resample(recording: Recording, rate: float) -> Recording:
     Linear between samples; where the source is faster, each new sample is the mean of those
     since the one before, so that noise and vibration do not fold. Each stretch between gaps
     begins at its own first sample; labels stay as they are, up to the last sample. Every value
-    rests on samples up to the first one at or after its time, so it can be had live.
+    rests on samples up to the first one at or after its time: `Resampler` has it live.
 
     Args:
         recording: at any rate.
@@ -27,8 +30,7 @@ def resample(recording: Recording, rate: float) -> Recording:
     Raises:
         ValueError: a rate that is not above 0.
     """
-    if not (np.isfinite(rate) and rate > 0):
-        raise ValueError(f"a rate above 0 Hz expected, {rate} given")
+    _check_rate(rate)
     modules = {name: _resample(module, rate) for name, module in recording.modules.items()}
     return replace(recording, modules=modules)
 
@@ -50,18 +52,128 @@ def _resample(module: Tactile, rate: float) -> Tactile:
 def _resample_stretch(module: Tactile, first: int, last: int, rate: float) -> tuple[Array, Array]:
     times = module.times[first:last]
     readings = np.asarray(module.readings[first:last], dtype=np.float64)
-    tolerance = TOLERANCE / rate
-    n_steps = int((times[-1] - times[0] + tolerance) * rate)
-    wanted = times[0] + np.arange(n_steps + 1) / rate
-    if rate * module.period >= 1:  # slower source: linear between its samples
-        after = np.clip(np.searchsorted(times, wanted), 1, max(len(times) - 1, 1))
-        if len(times) == 1:
-            return wanted[:1], readings
-        share = (wanted - times[after - 1]) / (times[after] - times[after - 1])
-        share = np.clip(share, 0, 1)[:, None, None]
-        return wanted, (1 - share) * readings[after - 1] + share * readings[after]
-    ends = np.searchsorted(times, wanted + tolerance, side="right")
-    starts = np.concatenate([[0], ends[:-1]])
-    kept = ends > starts
-    sums = np.add.reduceat(readings[: ends[-1]], starts[kept], axis=0)
-    return wanted[kept], sums / (ends - starts)[kept, None, None]
+    reached = ((times - times[0] + TOLERANCE / rate) * rate).astype(np.int64)
+    if rate * module.period >= 1:
+        return _interpolated(times, readings, reached, rate)
+    return _averaged(times, readings, reached, rate)
+
+
+def _interpolated(
+    times: Array, readings: Array, reached: Integers, rate: float
+) -> tuple[Array, Array]:
+    """Of a slower source: each new sample between the first that reaches it and the one before."""
+    steps = np.arange(1, reached[-1] + 1)
+    after = np.searchsorted(reached, steps)
+    wanted = times[0] + steps / rate
+    share = (wanted - times[after - 1]) / (times[after] - times[after - 1])
+    share = np.clip(share, 0, 1)[:, None, None]
+    between = (1 - share) * readings[after - 1] + share * readings[after]
+    return np.concatenate([times[:1], wanted]), np.concatenate([readings[:1], between])
+
+
+def _averaged(times: Array, readings: Array, reached: Integers, rate: float) -> tuple[Array, Array]:
+    """Of a faster source: each new sample the mean since the one before, where there are any."""
+    closing = np.diff(reached, prepend=-1) > 0
+    at_it = times <= times[0] + reached / rate + TOLERANCE / rate
+    steps = np.where(closing & at_it, reached, reached + 1)  # the new sample it is a part of
+    steps = steps[steps <= reached[-1]]
+    kept, starts, counts = np.unique(steps, return_index=True, return_counts=True)
+    sums = readings[starts]
+    for k in range(1, int(counts.max())):  # one after the other, as live: the rounding is the same
+        more = counts > k
+        sums[more] += readings[starts[more] + k]
+    return times[0] + kept / rate, sums / counts[:, None, None]
+
+
+class Resampler:
+    """The same as `resample`, sample by sample, for one module.
+
+    Args:
+        source_rate: of the module [Hz], as it was measured.
+        rate: wanted [Hz].
+
+    Raises:
+        ValueError: a rate that is not above 0.
+
+    Example:
+        >>> resampler = Resampler(source_rate=200.0, rate=100.0)
+        >>> [resampler.push(k / 200, np.full((1, 3), k)) != [] for k in range(5)]
+        [True, False, True, False, True]
+    """
+
+    def __init__(self, source_rate: float, rate: float) -> None:
+        for given in (source_rate, rate):
+            _check_rate(given)
+        self._rate = rate
+        self._gap = GAP_PERIODS / source_rate
+        self._push = self._interpolate if rate / source_rate >= 1 else self._average
+        self._start = self._last = -np.inf
+        self._step = 0  # the next new sample
+        self._reading: Array = np.empty(0)  # the last one; where they are averaged, their sum
+        self._n_summed = 0
+
+    def push(self, time: float, reading: npt.ArrayLike) -> list[tuple[float, Array]]:
+        """Takes a sample.
+
+        Args:
+            time: later than the last [s].
+            reading: (n_taxels, 3).
+
+        Returns:
+            The new samples that are known now, oldest first, each with its time [s].
+
+        Raises:
+            StreamError: a time that does not go forward.
+        """
+        time = float(time)
+        if not self._last < time < np.inf:
+            after = "" if self._last == -np.inf else f" after {self._last:.15g} s"
+            raise StreamError(
+                f"time {time:.15g} s given{after}; finite times that go forward expected"
+            )
+        values = np.array(reading, dtype=np.float64)
+        if time - self._last > self._gap:
+            self._start, self._step, self._n_summed = time, 1, 0
+            self._last, self._reading = time, values
+            return [(time, values.copy())]
+        reached = int((time - self._start + TOLERANCE / self._rate) * self._rate)
+        found = self._push(time, values, reached)
+        self._last = time
+        return found
+
+    def _interpolate(self, time: float, values: Array, reached: int) -> list[tuple[float, Array]]:
+        found = []
+        while self._step <= reached:
+            wanted = self._start + self._step / self._rate
+            share = min(max((wanted - self._last) / (time - self._last), 0.0), 1.0)
+            found.append((wanted, (1 - share) * self._reading + share * values))
+            self._step += 1
+        self._reading = values
+        return found
+
+    def _average(self, time: float, values: Array, reached: int) -> list[tuple[float, Array]]:
+        found = []
+        at_it = time <= self._start + reached / self._rate + TOLERANCE / self._rate
+        if reached >= self._step:
+            if self._n_summed and (reached > self._step or not at_it):
+                found.append(self._mean(self._step))
+            self._step = reached + 1
+            if at_it:
+                self._add(values)
+                return [*found, self._mean(reached)]
+        self._add(values)
+        return found
+
+    def _add(self, values: Array) -> None:
+        self._reading = self._reading + values if self._n_summed else values
+        self._n_summed += 1
+
+    def _mean(self, step: int) -> tuple[float, Array]:
+        mean = self._reading / self._n_summed
+        self._n_summed = 0
+        return self._start + step / self._rate, mean
+
+
+def _check_rate(rate: float) -> None:
+    if not (np.isfinite(rate) and rate > 0):
+        raise ValueError(f"a rate above 0 Hz expected, {rate} given")
