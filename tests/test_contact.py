@@ -13,9 +13,13 @@ from holdfast.contact import (
     UNSTABLE,
     ContactEstimate,
     ContactState,
+    Fault,
     HandEstimate,
     Reason,
+    faults_of,
     hand_state,
+    taxels_of,
+    with_faults,
 )
 
 NAMES = {"-": NO_CONTACT, "S": STABLE, "U": UNSTABLE, "?": UNKNOWN}
@@ -83,6 +87,70 @@ def test_estimates_are_values_that_json_takes():
         "instability": 2.0,
         "force": [1.0, 0.0, 0.0],
         "faults": [],
+        "faulty_taxels": [],
     }
     with pytest.raises(AttributeError):
         finger.state = ContactState.UNSTABLE
+
+
+@given(st.sets(st.integers(0, 62)))
+def test_bits_are_taxels(taxels):
+    assert taxels_of(sum(1 << taxel for taxel in taxels)) == tuple(sorted(taxels))
+
+
+@given(st.sets(st.sampled_from(Fault)))
+def test_bits_are_faults(faults):
+    places = list(Fault)
+    found = faults_of(sum(1 << places.index(fault) for fault in faults))
+    assert found == tuple(fault for fault in Fault if fault in faults)
+
+
+def hand(states, faults=()):
+    fingers = {
+        name: ContactEstimate(3.0, state, Reason.NONE, 0.5, 2.0, (1.0, 2.0, 3.0), faults, (7,))
+        for name, state in states.items()
+    }
+    codes = np.array([state.code for state in states.values()], dtype=np.int64)
+    return HandEstimate(3.5, tuple(ContactState)[hand_state(codes, len(states))], fingers)
+
+
+HELD = hand({"thumb": ContactState.STABLE, "index": ContactState.STABLE})
+
+
+class TestWithFaults:
+    def test_the_named_finger_is_unknown_and_the_hand_with_it(self):
+        found = with_faults(HELD, {"index": (Fault.LATE,)}, 2)
+        index = found.fingers["index"]
+        assert (index.state, index.reason, index.faults) == (
+            ContactState.UNKNOWN, Reason.FAULT, (Fault.LATE,),
+        )  # fmt: skip
+        assert np.isnan(index.stable_probability)
+        assert (index.time, index.instability, index.force) == (3.0, 2.0, (1.0, 2.0, 3.0))
+        assert index.faulty_taxels == (7,)
+        assert found.fingers["thumb"] is HELD.fingers["thumb"]
+        assert (found.time, found.state) == (3.5, ContactState.UNKNOWN)
+        assert HELD.fingers["index"].state is ContactState.STABLE
+
+    def test_an_unstable_finger_still_makes_the_hand_unstable(self):
+        shaken = hand({"thumb": ContactState.UNSTABLE, "index": ContactState.STABLE})
+        assert with_faults(shaken, {"index": (Fault.LATE,)}, 2).state is ContactState.UNSTABLE
+
+    def test_a_reason_of_ones_own(self):
+        found = with_faults(HELD, {"thumb": (Fault.PACKET_GAP,)}, 2, Reason.GAP)
+        assert found.fingers["thumb"].reason is Reason.GAP
+
+    def test_no_faults_are_a_fault_all_the_same(self):
+        assert with_faults(HELD, {"thumb": ()}, 2).fingers["thumb"].state is ContactState.UNKNOWN
+
+    @pytest.mark.parametrize("named", [{}, {"ring": (Fault.LATE,)}])
+    def test_nothing_named_that_is_there(self, named):
+        assert with_faults(HELD, named, 2) is HELD
+
+    @given(
+        before=st.lists(st.sampled_from(Fault), unique=True),
+        more=st.lists(st.sampled_from(Fault)),
+    )
+    def test_faults_are_in_order_and_once(self, before, more):
+        one = hand({"thumb": ContactState.STABLE}, tuple(before))
+        found = with_faults(one, {"thumb": tuple(more)}, 1).fingers["thumb"].faults
+        assert list(found) == [fault for fault in Fault if fault in before or fault in more]

@@ -4,8 +4,10 @@ Arrays of states hold codes: the place of the state in `ContactState`. Labels us
 codes, and an instant without a label is UNKNOWN, so that labels and decisions compare.
 """
 
+import math
 from collections.abc import Mapping
 from enum import StrEnum
+from functools import cache, lru_cache
 from typing import Any, NamedTuple
 
 import msgspec
@@ -99,7 +101,9 @@ class ContactEstimate(msgspec.Struct, frozen=True, gc=False):
         instability: sigma, the standard deviation of the Haar details, in the unit of the
             readings; NaN without a full window.
         force: F_tip = (F_x, F_y, F_z) in the fingertip frame, in the unit of the readings.
-        faults: what is wrong with the readings.
+        faults: what is wrong with the readings, or with how they arrive.
+        faulty_taxels: places in the module, from 0, of taxels that are at fault by themselves;
+            none where the finger as a whole is.
     """
 
     time: float
@@ -109,6 +113,7 @@ class ContactEstimate(msgspec.Struct, frozen=True, gc=False):
     instability: float
     force: tuple[float, float, float]
     faults: tuple[Fault, ...] = ()
+    faulty_taxels: tuple[int, ...] = ()
 
 
 class HandEstimate(msgspec.Struct, frozen=True, gc=False):
@@ -168,3 +173,64 @@ def hand_state(codes: npt.NDArray[np.integer[Any]], n_model_fingers: int) -> int
     if n_unknown > 0:
         return UNKNOWN
     return STABLE if n_stable >= min(2, n_model_fingers) else NO_CONTACT
+
+
+@cache
+def faults_of(mask: int) -> tuple[Fault, ...]:
+    """The faults whose bits a mask has, in the order of `Fault`."""
+    return tuple(fault for bit, fault in enumerate(Fault) if mask >> bit & 1)
+
+
+@lru_cache(maxsize=4096)
+def taxels_of(mask: int) -> tuple[int, ...]:
+    """The taxels whose bits a mask has: bit i is taxel i."""
+    return tuple(taxel for taxel in range(mask.bit_length()) if mask >> taxel & 1)
+
+
+def with_faults(
+    estimate: HandEstimate,
+    faults: Mapping[str, tuple[Fault, ...]],
+    n_model_fingers: int,
+    reason: Reason = Reason.FAULT,
+) -> HandEstimate:
+    """The estimate with what is wrong with how samples arrive.
+
+    Args:
+        estimate: by the readings alone.
+        faults: of the fingers that become UNKNOWN; of others nothing is known, and they are
+            passed over.
+        n_model_fingers: how many fingers the model has.
+        reason: that those fingers are given.
+
+    Returns:
+        The same object where no finger of it is named.
+
+    Example:
+        >>> finger = ContactEstimate(1.0, ContactState.STABLE, Reason.NONE, 0.9, 2.0, (1, 0, 0))
+        >>> hand = HandEstimate(1.0, ContactState.STABLE, {"thumb": finger})
+        >>> late = with_faults(hand, {"thumb": (Fault.LATE,)}, n_model_fingers=1)
+        >>> late.state, late.fingers["thumb"].faults
+        (<ContactState.UNKNOWN: 'UNKNOWN'>, (<Fault.LATE: 'late'>,))
+    """
+    named = estimate.fingers.keys() & faults.keys()
+    if not named:
+        return estimate
+    fingers = {
+        name: _with_faults(finger, faults[name], reason) if name in named else finger
+        for name, finger in estimate.fingers.items()
+    }
+    codes = np.array([finger.state.code for finger in fingers.values()], dtype=np.int64)
+    return HandEstimate(estimate.time, _STATES[hand_state(codes, n_model_fingers)], fingers)
+
+
+def _with_faults(
+    finger: ContactEstimate, faults: tuple[Fault, ...], reason: Reason
+) -> ContactEstimate:
+    both = {*finger.faults, *faults}
+    return msgspec.structs.replace(
+        finger,
+        state=ContactState.UNKNOWN,
+        reason=reason,
+        stable_probability=math.nan,
+        faults=tuple(fault for fault in Fault if fault in both),
+    )

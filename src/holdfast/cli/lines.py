@@ -7,7 +7,7 @@ import numpy as np
 from msgspec import Struct
 from msgspec.json import Encoder
 
-from holdfast.contact import SIGNAL_FAULTS, ContactState, Reason
+from holdfast.contact import ContactState, Reason, faults_of, taxels_of
 
 if TYPE_CHECKING:
     from holdfast.detector import Detection
@@ -17,10 +17,6 @@ BLOCK = 8192
 
 _STATES = [state.value for state in ContactState]
 _REASONS = [reason.value for reason in Reason]
-_FAULTS = [
-    [fault.value for bit, fault in enumerate(SIGNAL_FAULTS) if mask >> bit & 1]
-    for mask in range(1 << len(SIGNAL_FAULTS))
-]
 
 
 class Line(Struct, gc=False):
@@ -33,7 +29,8 @@ class Line(Struct, gc=False):
     stable_probability: float
     instability: float
     force: list[float]
-    faults: list[str]
+    faults: tuple[str, ...]
+    faulty_taxels: tuple[int, ...]
 
 
 def json_lines(detection: "Detection") -> Iterator[str]:
@@ -43,7 +40,7 @@ def json_lines(detection: "Detection") -> Iterator[str]:
     if not traces:
         return
     which = np.repeat(np.arange(len(names)), [len(trace) for trace in traces])
-    times, state, reason, probability, sigma, force, faults = (
+    times, state, reason, probability, sigma, force, faults, taxels = (
         np.concatenate(column) for column in zip(*traces, strict=True)
     )
     order = np.argsort(times, kind="stable")
@@ -59,6 +56,7 @@ def json_lines(detection: "Detection") -> Iterator[str]:
             probability[rows].tolist(),
             sigma[rows].tolist(),
             force[rows].tolist(),
-            [_FAULTS[k] for k in faults[rows].tolist()],
+            [faults_of(mask) for mask in faults[rows].tolist()],
+            [taxels_of(mask) for mask in taxels[rows].tolist()],
         )
         yield encoder.encode_lines(list(lines)).decode()

@@ -8,21 +8,14 @@ import numpy as np
 import numpy.typing as npt
 
 from holdfast.cli.console import print_table, show
-from holdfast.contact import (
-    SIGNAL_FAULTS,
-    UNKNOWN,
-    ContactEvent,
-    ContactState,
-    Fault,
-    Reason,
-)
+from holdfast.contact import UNKNOWN, ContactEvent, ContactState, Fault, Reason
 from holdfast.detector import HAND
 
 if TYPE_CHECKING:
     from holdfast.detector import Detection
     from holdfast.sensors.values import Array
 
-STATES, REASONS, FAULTS = tuple(ContactState), tuple(Reason), SIGNAL_FAULTS
+STATES, REASONS, FAULTS = tuple(ContactState), tuple(Reason), tuple(Fault)
 MOST_EVENTS = 40
 """Events that are shown to a person."""
 

@@ -4,24 +4,32 @@ Offline detection is the same detector fed with a recording: one kernel computes
 one the probability, one rule turns it into a state.
 """
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
 from itertools import pairwise
 from typing import Self
 
 import numpy as np
 import numpy.typing as npt
 
-from holdfast.contact import ContactEstimate, ContactEvent, ContactState, HandEstimate
+from holdfast.contact import (
+    ContactEstimate,
+    ContactEvent,
+    ContactState,
+    HandEstimate,
+    taxels_of,
+)
 from holdfast.detector.rule import N_REPORT, Live, Traces, new_decision, rule_of, run, step_live
 from holdfast.detector.traces import STATES, VERDICTS, Detection, detection_of
 from holdfast.errors import ModelError, StreamError
-from holdfast.features.kernel import Array
+from holdfast.features.kernel import TARED, TAXELS, Array
 from holdfast.features.stream import StreamPlan, give_baseline, new_memory, new_output, samples_of
 from holdfast.model import Model
 from holdfast.recordings import Recording
 from holdfast.resampling import resample
 from holdfast.sensors import Sensor
 
+Ignored = Mapping[str, Sequence[int]]
 HAND = "hand"
 """Name of the hand as a whole among the fingers of events and metrics."""
 MAX_EVENTS = 1000
@@ -36,10 +44,12 @@ class Detector:
         fingers: sensor of each finger, for a model that serves any finger; by default all
             fingers that the model names.
         rate: of the source [Hz], for a model that takes any.
+        ignore: taxels by finger, from 0, that contribute nothing and cause no fault.
 
     Raises:
         ModelError: the model serves any finger and `fingers` is missing, one of them has
             another sensor, or the model's tare is an interval, which nobody can know live.
+        ValueError: `ignore` names a finger or a taxel that there is not.
 
     Example:
         >>> from holdfast.sensors import sensor
@@ -54,10 +64,12 @@ class Detector:
         model: Model,
         fingers: Mapping[str, Sensor] | None = None,
         rate: float | None = None,
+        *,
+        ignore: Ignored | None = None,
     ) -> None:
         sensors = model.fingers_of(fingers) if fingers is not None else _own_fingers(model)
         first = next(iter(sensors.values()))
-        plan = model.plan(sensors, rate or first.rate)
+        plan = _without(model.plan(sensors, rate or first.rate), ignore)
         if plan.tare.kind == "interval":
             raise ModelError(
                 f"the model's tare is the interval {model.tare} s of a recording; "
@@ -66,21 +78,25 @@ class Detector:
         self._start(model, plan)
 
     @classmethod
-    def for_recording(cls, model: Model, recording: Recording) -> Self:
+    def for_recording(
+        cls, model: Model, recording: Recording, *, ignore: Ignored | None = None
+    ) -> Self:
         """The detector for a recording, whose tare may be an interval of it.
 
         Args:
             model: that judges.
             recording: whose fingers and rate it is for; or its first piece, where `run` gets
                 it in pieces (a tare by interval then needs that interval in the first).
+            ignore: taxels by finger, from 0, that contribute nothing and cause no fault.
 
         Raises:
             ModelError: the recording has none of the model's fingers, or another sensor.
-            ValueError: a tare by interval finds no samples.
+            ValueError: a tare by interval finds no samples, or `ignore` names a finger or a
+                taxel that there is not.
         """
         detector = cls.__new__(cls)
         sensors = model.fingers_of({name: m.sensor for name, m in recording.modules.items()})
-        detector._start(model, model.plan(sensors, recording.rate))
+        detector._start(model, _without(model.plan(sensors, recording.rate), ignore))
         if detector._plan.tare.kind == "interval":
             give_baseline(detector._plan, detector._memory, recording)
         return detector
@@ -106,6 +122,22 @@ class Detector:
     def __getstate__(self) -> object:
         # A copy would share memory with this one, by address.
         raise TypeError("a detector is not copied or pickled; make another of the same model")
+
+    @property
+    def n_fingers(self) -> int:
+        """How many fingers the model has: the hand's state depends on it."""
+        return self._rule.n_fingers
+
+    def baselines(self) -> dict[str, Array]:
+        """(n_taxels, 3) the tare of each finger [unit of the readings], once it is complete."""
+        bounds = pairwise(self._layout.offsets.tolist())
+        return {
+            finger: self._memory.baseline[start:stop].copy()
+            for finger, (start, stop), n in zip(
+                self._plan.fingers, bounds, self._memory.counts[:, TARED], strict=True
+            )
+            if n < 0
+        }
 
     def reset(self) -> None:
         """Forgets everything, the tare included."""
@@ -229,10 +261,11 @@ class Detector:
         for place, row in enumerate(self._report.tolist()):
             seen, code, probability, sigma, x, y, z = row
             state, reason, faults = VERDICTS[code]
+            taxels = taxels_of(int(self._output.status[place, TAXELS])) if faults else ()
             if state is not told[place]:
                 self._note(place, state, time)
             fingers[self._names[place]] = ContactEstimate(
-                seen, state, reason, probability, sigma, (x, y, z), faults
+                seen, state, reason, probability, sigma, (x, y, z), faults, taxels
             )
         hand = STATES[hand_code]
         if hand is not told[-1]:
@@ -272,3 +305,19 @@ def _own_fingers(model: Model) -> dict[str, Sensor]:
             "has, and with which sensors"
         )
     return {name: model.sensors[str(part.sensor)] for name, part in model.fingers.items()}
+
+
+def _without(plan: StreamPlan, ignore: Ignored | None) -> StreamPlan:
+    """The plan without those taxels."""
+    for finger, taxels in (ignore or {}).items():
+        if finger not in plan.sensors:
+            raise ValueError(
+                f"taxels of {finger!r} to be ignored; the model judges {', '.join(plan.fingers)}"
+            )
+        n_taxels = plan.sensors[finger].n_taxels
+        for taxel in taxels:
+            if not 0 <= taxel < n_taxels:
+                raise ValueError(
+                    f"{finger}: taxel {taxel} to be ignored; it has the taxels 0 to {n_taxels - 1}"
+                )
+    return replace(plan, ignore=ignore or {})

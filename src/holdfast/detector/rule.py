@@ -20,7 +20,17 @@ from holdfast.detector.table import (
     table_of,
 )
 from holdfast.features import kernel
-from holdfast.features.kernel import FAULTS, REASON, Array, Flags, Integers, Layout, Memory, Output
+from holdfast.features.kernel import (
+    FAULTS,
+    REASON,
+    TAXELS,
+    Array,
+    Flags,
+    Integers,
+    Layout,
+    Memory,
+    Output,
+)
 from holdfast.features.stream import StreamPlan
 from holdfast.model import ANY_FINGER, Model
 
@@ -85,6 +95,7 @@ class Traces(NamedTuple):
     state: npt.NDArray[np.int8]  # (n, n_fingers)
     reason: npt.NDArray[np.int8]
     faults: npt.NDArray[np.int16]
+    taxels: Integers  # bits of those at fault
     probability: Array
     values: Array  # (n, n_fingers, N_VALUES) as in Output
     hand: npt.NDArray[np.int8]  # (n,)
@@ -97,6 +108,7 @@ class Traces(NamedTuple):
             state=np.zeros(shape, dtype=np.int8),
             reason=np.zeros(shape, dtype=np.int8),
             faults=np.zeros(shape, dtype=np.int16),
+            taxels=np.zeros(shape, dtype=np.int64),
             probability=np.zeros(shape),
             values=np.zeros((*shape, kernel.N_VALUES)),
             hand=np.zeros(n, dtype=np.int8),
@@ -246,6 +258,7 @@ def run(
         traces.state[k] = decision.codes[:, TOLD]
         traces.reason[k] = output.status[:, REASON]
         traces.faults[k] = output.status[:, FAULTS]
+        traces.taxels[k] = output.status[:, TAXELS]
         traces.probability[k] = decision.values[:, PROBABILITY]
         traces.values[k] = output.values
 

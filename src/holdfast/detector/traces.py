@@ -7,22 +7,25 @@ from typing import NamedTuple
 import numpy as np
 import numpy.typing as npt
 
-from holdfast.contact import SIGNAL_FAULTS, ContactEstimate, ContactState, Fault, Reason
+from holdfast.contact import (
+    SIGNAL_FAULTS,
+    ContactEstimate,
+    ContactState,
+    Fault,
+    Reason,
+    faults_of,
+    taxels_of,
+)
 from holdfast.detector.rule import Traces, verdict_code
 from holdfast.features.kernel import SIGMA, Array
 
 STATES = tuple(ContactState)
 REASONS = tuple(Reason)
-FAULTS = tuple(
-    tuple(fault for bit, fault in enumerate(SIGNAL_FAULTS) if mask >> bit & 1)
-    for mask in range(1 << len(SIGNAL_FAULTS))
-)
-"""The faults of every mask."""
 VERDICTS: dict[float, tuple[ContactState, Reason, tuple[Fault, ...]]] = {
-    verdict_code(state.code, reason, mask): (state, REASONS[reason], FAULTS[mask])
+    verdict_code(state.code, reason, mask): (state, REASONS[reason], faults_of(mask))
     for state in STATES
     for reason in range(len(REASONS))
-    for mask in range(len(FAULTS))
+    for mask in range(1 << len(SIGNAL_FAULTS))
 }
 """State, reason and faults by their common code."""
 
@@ -38,6 +41,7 @@ class FingerTrace(NamedTuple):
         instability: (n,) sigma, in the unit of the readings.
         force: (n, 3) in the fingertip frame, in the unit of the readings.
         faults: (n,) bits in the order of `Fault`.
+        faulty_taxels: (n,) bit i is taxel i, of those at fault by themselves.
     """
 
     times: Array
@@ -47,6 +51,7 @@ class FingerTrace(NamedTuple):
     instability: Array
     force: Array
     faults: npt.NDArray[np.int16]
+    faulty_taxels: npt.NDArray[np.int64]
 
     def __len__(self) -> int:
         return len(self.times)
@@ -60,7 +65,8 @@ class FingerTrace(NamedTuple):
             float(self.stable_probability[k]),
             float(self.instability[k]),
             tuple(self.force[k].tolist()),
-            FAULTS[self.faults[k]],
+            faults_of(int(self.faults[k])),
+            taxels_of(int(self.faulty_taxels[k])),
         )
 
 
@@ -104,5 +110,6 @@ def detection_of(
                 traces.values[rows, place, SIGMA],
                 traces.values[rows, place, :3],
                 traces.faults[rows, place],
+                traces.taxels[rows, place],
             )
     return Detection(name, found, times, traces.hand)

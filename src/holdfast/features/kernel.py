@@ -75,7 +75,8 @@ SIGMA_XYZ, CHANGE = 6, 7
 
 # Columns of Output.status.
 REASON, FAULTS = 0, 1
-N_STATUS = 2
+TAXELS = 2  # bit i is taxel i of the finger, where it is at fault by itself
+N_STATUS = 3
 
 
 class Layout(NamedTuple):

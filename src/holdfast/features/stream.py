@@ -1,7 +1,7 @@
 """A stream of samples of a hand on its way to features: layout, memory, and their feeding."""
 
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from functools import reduce
 from typing import Any, NamedTuple
 
@@ -40,6 +40,7 @@ class StreamPlan:
         window: N_w of the sigma that is reported [samples].
         tare: how the baseline is found.
         rate: samples per second [Hz].
+        ignore: taxels by finger, from 0, that contribute nothing and cause no fault.
     """
 
     sensors: Mapping[str, Sensor]
@@ -47,6 +48,7 @@ class StreamPlan:
     window: int
     tare: Tare
     rate: float
+    ignore: Mapping[str, Sequence[int]] = field(default_factory=dict)
 
     @property
     def fingers(self) -> tuple[str, ...]:
