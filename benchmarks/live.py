@@ -127,10 +127,13 @@ def _serve(session: Session, model: Model) -> None:
         site = web.TCPSite(runner, "127.0.0.1", 0)
         await site.start()
         url = f"http://127.0.0.1:{runner.addresses[0][1]}/api/v1/live"
-        async with ClientSession() as client, client.ws_connect(url) as quick:
-            async with client.ws_connect(url.replace("live", "estimates")):  # never read
-                async for _ in quick:
-                    pass
+        async with (
+            ClientSession() as client,
+            client.ws_connect(url) as quick,
+            client.ws_connect(url.replace("live", "estimates")),  # never reads
+        ):
+            async for _ in quick:
+                pass
 
     asyncio.run(run())
 

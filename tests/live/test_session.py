@@ -1,3 +1,4 @@
+import itertools
 import threading
 import time
 
@@ -61,7 +62,7 @@ def test_events_are_the_changes_of_state(start):
     wait_for(lambda: session.ended)
     events = [event for said in heard for event in said.events if event.finger == "hand"]
     assert {event.state for event in events} == set(ContactState) - {ContactState.UNKNOWN}
-    assert all(one.state is two.previous for one, two in zip(events, events[1:], strict=False))
+    assert all(one.state is two.previous for one, two in itertools.pairwise(events))
 
 
 def test_a_silent_source_is_told_once_and_its_return_ends_it(start):

@@ -1,12 +1,16 @@
 """`holdfast demo`: the main job in one go, on data of its own."""
 
+import sys
 import time
 from pathlib import Path
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
 from holdfast.cli.console import print_json, say, show
+
+if TYPE_CHECKING:
+    from holdfast.model import Model
 
 OBJECTS, REPEATS = "can,box", 2
 """What is grasped in the demo, and how often in each case."""
@@ -20,6 +24,10 @@ def demo(
         float, typer.Option(help="Of the replay: 1 is real time, 0 as fast as it goes.")
     ] = 1.0,
     seed: Annotated[int, typer.Option(help="Of the recordings.")] = 0,
+    browser: Annotated[
+        bool,
+        typer.Option("--browser/--no-browser", help="Replay on a page, or in the terminal."),
+    ] = True,
     force: Annotated[bool, typer.Option("--force", help="Overwrite an earlier demo.")] = False,
     as_json: Annotated[bool, typer.Option("--json", help="Print JSON on stdout.")] = False,
 ) -> None:
@@ -27,13 +35,14 @@ def demo(
 
     Simulates grasps of a can and a box with the physical twin, trains a model on them, tells how
     good it is on recordings that it has not seen, and replays one of those sample by sample, as
-    a hand would send it.
+    a hand would send it: on a page of its own, or in the terminal.
 
     Example:
       holdfast demo
+      holdfast demo --no-browser
       holdfast demo tried/ --speed 0 --json
     """
-    from holdfast.cli.replay import replay
+    from holdfast.cli.replay import calmer, replay
     from holdfast.files import refuse_overwrite
     from holdfast.io import load_dataset
     from holdfast.training import Setting, train
@@ -53,8 +62,12 @@ def demo(
     say(f"3/4  on recordings that it has not seen: {accuracy:.1f} % of samples right")
     name = [name for name in names if name in recordings.names][-1]  # one may have failed
     say(f"4/4  replaying {name} sample by sample" + (f" at speed {speed:g}" if speed else ""))
-    shown = recordings[recordings.names.index(name)]
-    n_updates = replay(trained.model, shown, speed)
+    shown, judged = folder / f"{name}.parquet", calmer(trained.model)
+    n_updates = 0
+    if browser and speed and not as_json:
+        _show_page(judged, shown, out, speed)
+    else:
+        n_updates = replay(judged, shown, speed)
     if as_json:
         print_json(
             {
@@ -79,6 +92,22 @@ def _simulate(folder: Path, seed: int, force: bool) -> list[str]:
     return [grasp.name for grasp in wanted]
 
 
+def _show_page(model: "Model", path: Path, out: Path, speed: float) -> None:
+    """The replay on a page; it stays until Ctrl-C where somebody sits before a terminal."""
+    from holdfast.cli.page import open_page, show_page
+    from holdfast.sources import open_source
+
+    stay = sys.stdin.isatty()
+    with open_source(str(path), speed=speed, loop=stay) as source:
+
+        def tell(url: str) -> None:
+            opened = open_page(url)
+            say(f"     {url} {'has opened' if opened else 'shows it: open it in a browser'}")
+            say("     Ctrl-C ends it" if stay else "     it ends with the recording")
+
+        show_page(model, source, tell, port=0, folder=out / "recorded", stay=stay)
+
+
 def _farewell(out: Path, folder: Path, model: Path, name: str, seconds: float) -> None:
     show(f"made in {seconds:.0f} s, in {out}:")
     show(f"  {folder}: recordings of the twin, {model}: the model")
@@ -86,5 +115,7 @@ def _farewell(out: Path, folder: Path, model: Path, name: str, seconds: float) -
     show(f"  holdfast info {folder}/{name}.parquet --plot grasp.png")
     show(f"  holdfast evaluate {model} {folder}")
     show(f"  holdfast detect {model} {folder}/{name}.parquet | head")
+    show(f"  holdfast serve {model} twin:?object=ball    (the page, live)")
+    show("  holdfast serve builtin:twin xela://auto    (your own hand)")
     show("  holdfast simulate twin/      (the whole protocol: six objects, 60 grasps)")
     show("  holdfast import YOUR-DATA recordings/    (holdfast import --help lists the formats)")

@@ -13,9 +13,12 @@ import typer
 from holdfast.cli.console import print_json, print_table, show
 
 PURPOSES = {
+    "bags": "importing bags of ROS 1 and ROS 2",
     "bench": "peers to compare speed with in holdfast bench",
     "cluster": "work on a Dask cluster, --engine dask:ADDRESS",
     "deep": "the network among the methods of holdfast study",
+    "ros2": "ROS 2 topics, without a ROS installation",
+    "serial": "sensors at a serial port",
     "hdf5": "importing recordings kept in HDF5",
 }
 """What each extra is for."""

@@ -3,6 +3,7 @@
 import sys
 import time
 from collections.abc import Iterator
+from pathlib import Path
 from typing import TYPE_CHECKING
 
 from holdfast.cli.console import say
@@ -11,9 +12,8 @@ if TYPE_CHECKING:
     from rich.table import Table
 
     from holdfast.contact import ContactEstimate, HandEstimate
-    from holdfast.detector import Detector
     from holdfast.model import Model
-    from holdfast.recordings import Recording
+    from holdfast.sources import Source
 
 REFRESH = 0.1
 """How often the terminal is redrawn [s]."""
@@ -23,49 +23,57 @@ BAR_WIDTH = 20
 COLOURS = {"UNKNOWN": "dim", "NO_CONTACT": "white", "UNSTABLE": "bold red", "STABLE": "green"}
 
 
-def replay(model: "Model", recording: "Recording", speed: float) -> int:
-    """Feeds a recording, sample by sample, to a debounced detector, and shows what it says.
+def calmer(model: "Model") -> "Model":
+    """The model with its states held back for the eye."""
+    from msgspec.structs import replace
+
+    from holdfast.model import Debounce
+
+    return replace(model, debounce=Debounce(*DEBOUNCE))
+
+
+def replay(model: "Model", path: Path, speed: float) -> int:
+    """Feeds a recording, sample by sample, to a detector, and shows what it says.
 
     On a terminal a table follows the states; elsewhere every change of the hand is one line.
 
     Args:
         model: that judges.
-        recording: whose modules share their times.
+        path: of the recording.
         speed: 1 is real time, 0 as fast as it goes.
 
     Returns:
         How many updates there were.
     """
-    import msgspec
+    from holdfast.sources import open_source
 
-    from holdfast.detector import Detector
-    from holdfast.model import Debounce
+    with open_source(str(path), speed=speed) as source:
+        estimates = _estimates(model, source)
+        if speed and sys.stderr.isatty():
+            return _follow(estimates)
+        return _tell_changes(estimates)
 
-    calmer = msgspec.structs.replace(model, debounce=Debounce(*DEBOUNCE))
-    detector = Detector(calmer)
-    estimates = _estimates(detector, recording, speed)
-    if speed and sys.stderr.isatty():
-        return _follow(estimates)
+
+def _estimates(model: "Model", source: "Source") -> "Iterator[HandEstimate]":
+    from holdfast.live.judge import Judge
+
+    judge = Judge(model, source.sensors)
+    for arrival in source:
+        for decision in judge.take(arrival):
+            yield decision.estimate
+    for decision in judge.finish():
+        yield decision.estimate
+
+
+def _tell_changes(estimates: "Iterator[HandEstimate]") -> int:
+    told: str = "UNKNOWN"
     n_updates = 0
-    for _ in estimates:
+    for estimate in estimates:
         n_updates += 1
-        for event in detector.events():
-            if event.finger == "hand":
-                say(f"  {event.time:7.3f} s  hand {event.previous} -> {event.state}")
+        if estimate.state != told:
+            say(f"  {estimate.time:7.3f} s  hand {told} -> {estimate.state}")
+            told = estimate.state
     return n_updates
-
-
-def _estimates(
-    detector: "Detector", recording: "Recording", speed: float
-) -> "Iterator[HandEstimate]":
-    first = next(iter(recording.modules.values()))
-    began = time.monotonic()
-    for k, moment in enumerate(first.times.tolist()):
-        wait = began + moment / speed - time.monotonic() if speed else 0.0
-        if wait > 0:
-            time.sleep(wait)
-        samples = {name: module.readings[k] for name, module in recording.modules.items()}
-        yield detector.update(samples, moment)
 
 
 def _follow(estimates: "Iterator[HandEstimate]") -> int:

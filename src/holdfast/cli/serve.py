@@ -1,5 +1,7 @@
 """`holdfast serve`: what a model says of a source, on a page and for other programs."""
 
+import sys
+from collections.abc import Iterator
 from contextlib import ExitStack
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
@@ -8,11 +10,10 @@ import typer
 
 from holdfast.cli.console import print_json, say
 from holdfast.cli.judging import RateRule, debounced, judge_of
+from holdfast.cli.page import HOST, PORT, show_page
 
 if TYPE_CHECKING:
-    from holdfast.live.session import Session
-
-HOST, PORT = "127.0.0.1", 8080
+    from holdfast.live.judge import Judge
 
 
 def serve(
@@ -66,39 +67,37 @@ def serve(
       holdfast serve model.json grasp.parquet --host 0.0.0.0 --token SECRET
     """
     from holdfast.live.guard import Guard
-    from holdfast.live.server import run_server
-    from holdfast.live.service import Service
-    from holdfast.live.session import Session
     from holdfast.sources import open_source
 
     guard = Guard(host, token)
     wanted = debounced(model, debounce, hysteresis)
+
+    def tell(url: str) -> None:
+        page = url if token is None else f"{url}?token={token}"
+        if as_json:
+            print_json({"url": page, "model": wanted.name, "source": source})
+            sys.stdout.flush()
+        say(f"{page} shows what {wanted.name} says of {source}; Ctrl-C ends it")
+
     with ExitStack() as stack:
         opened = stack.enter_context(open_source(source, speed=speed, loop=not once))
-        session = Session(opened, judge_of(wanted, opened, rate, ignore))
-        stack.callback(session.stop)
-        _publish(stack, session, ros2=ros2, ros1=ros1)
-        service = Service(session, wanted, guard, record_to)
-
-        def tell(url: str) -> None:
-            page = url if token is None else f"{url}?token={token}"
-            if as_json:
-                print_json({"url": page, "model": model, "source": source})
-            say(f"{page} shows what {wanted.name} says of {source}; Ctrl-C ends it")
-
-        session.start()
-        run_server(service.app, session, host, port, tell, stay=not once)
+        judge = judge_of(wanted, opened, rate, ignore)
+        publishers = [stack.enter_context(one) for one in _publishers(judge, ros2=ros2, ros1=ros1)]
+        show_page(
+            wanted, opened, tell,
+            judge=judge, host=host, port=port, guard=guard, folder=record_to,
+            listeners=[publisher.put for publisher in publishers], stay=not once,
+        )  # fmt: skip
 
 
-def _publish(stack: ExitStack, session: "Session", *, ros2: bool, ros1: bool) -> None:
-    """Has the session's estimates published on ROS topics."""
-    units = {name: sensor.unit for name, sensor in session.judge.fingers.items()}
+def _publishers(judge: "Judge", *, ros2: bool, ros1: bool) -> "Iterator[RosPublisher]":
+    """Those of the estimates on ROS topics that are asked for."""
+    units = {name: sensor.unit for name, sensor in judge.fingers.items()}
     if ros2:
         from holdfast.live.ros2_publisher import Ros2Publisher
 
-        publisher = stack.enter_context(Ros2Publisher(units))
-        session.listen(publisher.put)
+        yield Ros2Publisher(units)
     if ros1:
         from holdfast.live.ros1_publisher import Ros1Publisher
 
-        session.listen(stack.enter_context(Ros1Publisher(units)).put)
+        yield Ros1Publisher(units)

@@ -1,0 +1,75 @@
+"""A source on a page: a session, the web service, and a browser where there is one."""
+
+import os
+import sys
+import webbrowser
+from collections.abc import Callable, Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    from holdfast.live.guard import Guard
+    from holdfast.live.judge import Judge
+    from holdfast.live.session import Listener
+    from holdfast.model import Model
+    from holdfast.sources import Source
+
+HOST, PORT = "127.0.0.1", 8080
+
+
+def show_page(
+    model: "Model",
+    source: "Source",
+    tell: Callable[[str], None],
+    *,
+    judge: "Judge | None" = None,
+    host: str = HOST,
+    port: int = PORT,
+    guard: "Guard | None" = None,
+    folder: Path | None = None,
+    listeners: Sequence["Listener"] = (),
+    stay: bool = True,
+) -> None:
+    """Serves the page of a source until Ctrl-C, or until the source ends where not `stay`.
+
+    Args:
+        model: that judges.
+        source: that is open.
+        tell: is given the address once the page can be opened.
+        judge: of the source; one without options by default.
+        host: address to listen at.
+        port: 0 for any that is free.
+        guard: who may come in; this machine by default.
+        folder: where recordings go.
+        listeners: what else hears what is said.
+        stay: go on when the source has ended.
+
+    Raises:
+        OutputError: the address cannot be listened at.
+    """
+    from holdfast.live.guard import Guard
+    from holdfast.live.judge import Judge
+    from holdfast.live.server import run_server
+    from holdfast.live.service import Service
+    from holdfast.live.session import Session
+
+    session = Session(source, judge or Judge(model, source.sensors))
+    service = Service(session, model, guard or Guard(host), folder)
+    for listener in listeners:
+        session.listen(listener)
+    session.start()
+    try:
+        run_server(service.app, session, host, port, tell, stay=stay)
+    finally:
+        session.stop()
+
+
+def open_page(url: str) -> bool:
+    """Whether a browser with windows has been told to open a page; text browsers are not."""
+    windows = sys.platform in ("win32", "darwin")
+    if not (windows or os.environ.get("DISPLAY") or os.environ.get("WAYLAND_DISPLAY")):
+        return False
+    try:
+        return webbrowser.open(url)
+    except webbrowser.Error:
+        return False
