@@ -1,0 +1,106 @@
+// Where the taxels of a sensor go on a flat map, and which way "up" and "right" are there.
+// Pure functions of positions [m], rotations and the sensor's normal; any sensor, any unit.
+
+const dot = (a, b) => a[0] * b[0] + a[1] * b[1] + a[2] * b[2];
+const cross = (a, b) => [
+  a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0],
+];
+const scaled = (a, by) => a.map((x) => x * by);
+const unit = (a) => scaled(a, 1 / (Math.hypot(...a) || 1));
+const plus = (a, b) => a.map((x, k) => x + b[k]);
+const column = (rotation, c) => rotation.map((row) => row[c]);
+
+/** Right, up and out of the map: seen from outside, the distal axis (z, or y of a flat patch) up. */
+export function viewOf(normal) {
+  const out = unit(normal);
+  const axis = Math.abs(out[2]) < 0.9 ? [0, 0, 1] : [0, 1, 0];
+  const up = unit(plus(axis, scaled(out, -dot(axis, out))));
+  return { right: cross(up, out), up, out };
+}
+
+// Least squares radius of the circle that has these places and these directions of its normals.
+function radius(sines, cosines, across, depth) {
+  const centred = (values) => {
+    const mean = values.reduce((sum, x) => sum + x, 0) / values.length;
+    return values.map((x) => x - mean);
+  };
+  const along = [...centred(sines), ...centred(cosines)];
+  const places = [...centred(across), ...centred(depth)];
+  const spread = along.reduce((sum, x) => sum + x * x, 0);
+  const product = along.reduce((sum, x, k) => sum + x * places[k], 0);
+  return spread > 1e-6 ? Math.max(0, product / spread) : 0;
+}
+
+/**
+ * The map of a sensor: a curved one is unrolled, so that its walls lie beside its pad.
+ *
+ * Around the up axis a taxel whose normal is turned by theta moves outwards by r (theta - sin
+ * theta), r being the radius that fits the sensor; likewise over the tip. A flat patch stays.
+ *
+ * @returns {{places: number[][], right: number[][], up: number[][], spacing: number}}
+ *   places [m] as (right, up); the directions in the fingertip frame that are right and up on
+ *   the map at each taxel; the distance between neighbours [m].
+ */
+export function layout(positions, rotations, normal) {
+  const view = viewOf(normal);
+  const normals = rotations.map((rotation) => column(rotation, 2));
+  const n = normals.map((v) => [dot(v, view.right), dot(v, view.up), dot(v, view.out)]);
+  const p = positions.map((v) => [dot(v, view.right), dot(v, view.up), dot(v, view.out)]);
+  const level = n.map(([a, , c]) => Math.hypot(a, c));
+  // A normal straight along the axis has no direction around it.
+  const theta = n.map(([a, , c], k) => (level[k] > 0.1 ? Math.atan2(a, c) : 0));
+  const psi = n.map(([, b], k) => Math.atan2(b, level[k]));
+  const pick = (values, axis) => values.map((v) => v[axis]);
+  const around = radius(pick(n, 0), pick(n, 2), pick(p, 0), pick(p, 2));
+  const over = radius(pick(n, 1), level, pick(p, 1), pick(p, 2));
+  const places = spreadOut(p.map(([across, up], k) => [
+    across + around * (theta[k] - Math.sin(theta[k])),
+    up + over * (psi[k] - Math.sin(psi[k])),
+  ]));
+  const right = theta.map((t) => plus(scaled(view.right, Math.cos(t)), scaled(view.out, -Math.sin(t))));
+  const up = right.map((v, k) => cross(normals[k], v));
+  return { places, right, up, spacing: spacing(places) };
+}
+
+/** The smallest distance between two places; 1 mm for a single taxel. */
+export function spacing(places) {
+  let least = Infinity;
+  places.forEach((a, k) => {
+    for (const b of places.slice(k + 1)) {
+      least = Math.min(least, Math.hypot(a[0] - b[0], a[1] - b[1]));
+    }
+  });
+  return Number.isFinite(least) ? least : 1e-3;
+}
+
+// Sensors that do not say where their taxels are (all in one place) get a square grid.
+function spreadOut(places) {
+  const extent = Math.max(...[0, 1].map((axis) => {
+    const values = places.map((place) => place[axis]);
+    return Math.max(...values) - Math.min(...values);
+  }));
+  if (places.length < 2 || spacing(places) > 0.02 * extent) return places;
+  const side = Math.ceil(Math.sqrt(places.length));
+  return places.map((_, k) => [5e-3 * (k % side), -5e-3 * Math.floor(k / side)]);
+}
+
+/** A reading in the taxel frame as (right, up, normal) of the map. */
+export function turned(reading, rotation, right, up) {
+  const tangent = [0, 1, 2].map((k) => rotation[k][0] * reading[0] + rotation[k][1] * reading[1]);
+  return [dot(tangent, right), dot(tangent, up), reading[2]];
+}
+
+/** The convex hull of the places, counter-clockwise: the outline of the sensor. */
+export function hull(places) {
+  const sorted = [...places].sort((a, b) => a[0] - b[0] || a[1] - b[1]);
+  const turn = (o, a, b) => (a[0] - o[0]) * (b[1] - o[1]) - (a[1] - o[1]) * (b[0] - o[0]);
+  const half = (points) => {
+    const chain = [];
+    for (const point of points) {
+      while (chain.length > 1 && turn(chain.at(-2), chain.at(-1), point) <= 0) chain.pop();
+      chain.push(point);
+    }
+    return chain.slice(0, -1);
+  };
+  return sorted.length < 3 ? sorted : [...half(sorted), ...half(sorted.reverse())];
+}

@@ -1,0 +1,91 @@
+// Words, numbers and names as people read them. Pure functions.
+
+// By the code of a state in the series: its place in holdfast's list of states.
+export const STATES = ["UNKNOWN", "NO_CONTACT", "UNSTABLE", "STABLE"];
+export const UNKNOWN = 0, NO_CONTACT = 1, UNSTABLE = 2, STABLE = 3;
+
+const REASONS = {
+  tare: "taking the tare",
+  warm_up: "filling the window",
+  gap: "gap in the samples",
+  fault: "faulty readings",
+};
+
+const FAULTS = {
+  not_finite: "not a number",
+  stuck: "stuck",
+  saturated: "saturated",
+  tare_loaded: "loaded at tare",
+  dead: "dead",
+  noisy: "noisy",
+  out_of_range: "out of range",
+  tare_drift: "tare drifts",
+  taxel_count: "wrong number of taxels",
+  packet_gap: "packets missing",
+  late: "late",
+  clock_jump: "clock jumped",
+};
+
+// What nobody has named yet is shown as it came, underscores apart.
+const plain = (word) => String(word).replaceAll("_", " ");
+
+/** The key of a state in class names, shapes and colours: "no-contact". */
+export const stateKey = (state) =>
+  STATES.includes(state) ? state.toLowerCase().replace("_", "-") : "unknown";
+
+export const stateWord = (state) => plain(state ?? "UNKNOWN");
+export const reasonWord = (reason) => (reason ? REASONS[reason] ?? plain(reason) : "");
+export const faultWord = (fault) => FAULTS[fault] ?? plain(fault);
+
+const MINUS = "\u2212";
+export const NOTHING = "\u2013";
+
+/** A number to three or four digits, with a real minus; a dash for none. */
+export function number(value) {
+  if (value === null || value === undefined || !Number.isFinite(value)) return NOTHING;
+  const size = Math.abs(value);
+  let text;
+  if (size >= 99999.5) text = `${(size / 1000).toFixed(0)}k`;
+  else if (size >= 99.95) text = size.toFixed(0);
+  else if (size >= 9.995) text = size.toFixed(1);
+  else text = size.toFixed(2);
+  return (value < 0 && Number(text) !== 0 ? MINUS : "") + text;
+}
+
+export const unitWord = (unit) => (unit === "count" ? "counts" : unit ?? "");
+
+export const percent = (value) =>
+  value === null || value === undefined ? NOTHING : `${Math.round(100 * value)} %`;
+
+/** A length of time in few characters: "0.8 s", "12 s", "3 min", "2 h". */
+export function span(seconds) {
+  if (seconds < 9.95) return `${Math.max(0, seconds).toFixed(1)} s`;
+  if (seconds < 99.5) return `${seconds.toFixed(0)} s`;
+  if (seconds < 5970) return `${Math.round(seconds / 60)} min`;
+  return `${Math.round(seconds / 3600)} h`;
+}
+
+/** A latency: "0.21 ms", "12 ms", "1.3 s". */
+export function delay(seconds) {
+  if (seconds === null || seconds === undefined) return NOTHING;
+  if (seconds >= 1) return `${seconds.toFixed(1)} s`;
+  const ms = 1000 * seconds;
+  return `${ms < 0.995 ? ms.toFixed(2) : ms < 9.95 ? ms.toFixed(1) : ms.toFixed(0)} ms`;
+}
+
+/** Elapsed time as a clock: "0:07", "1:02:03". */
+export function clock(seconds) {
+  const whole = Math.floor(seconds), two = (n) => String(n).padStart(2, "0");
+  const [h, m, s] = [Math.floor(whole / 3600), Math.floor(whole / 60) % 60, whole % 60];
+  return h ? `${h}:${two(m)}:${two(s)}` : `${m}:${two(s)}`;
+}
+
+export function bytes(n) {
+  const units = ["B", "kB", "MB", "GB", "TB"];
+  let place = 0;
+  while (n >= 999.5 && place < units.length - 1) { n /= 1000; place += 1; }
+  return `${place && n < 9.95 ? n.toFixed(1) : n.toFixed(0)} ${units[place]}`;
+}
+
+/** Wall-clock time of a notice. */
+export const wall = (epoch) => new Date(1000 * epoch).toLocaleTimeString("en-GB");
