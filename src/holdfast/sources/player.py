@@ -70,7 +70,7 @@ class Player(Source):
     def read(self, timeout: float) -> Arrival | None:
         """What is due next, or None where nothing is due within `timeout` [s] or it has ended."""
         now = time.monotonic()
-        moment = self._peek() or self._next_recording(now, timeout)
+        moment = self._peek() or self._next_recording(timeout)
         if moment is None:
             return None
         due = self._due(moment.time, now)
@@ -115,7 +115,7 @@ class Player(Source):
                 self._next = Moment(self._last - self._shift, {}, f"the rest is lost: {cause}")
         return self._next
 
-    def _next_recording(self, now: float, timeout: float) -> Moment | None:
+    def _next_recording(self, timeout: float) -> Moment | None:
         """The first moment of the next one, where there is one within `timeout` [s]."""
         if not (self._goes_on and self._is_ready(self._number + 1, timeout)):
             return None
@@ -126,6 +126,7 @@ class Player(Source):
         if first is not None and self._goes_on:
             self._shift = self._last + PAUSE - first.time
             # One that was not ready in time is not hurried through.
+            now = time.monotonic()
             self._began = max(now, self._due(first.time, now)), self._last + PAUSE
         return first
 
