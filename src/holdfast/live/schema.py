@@ -10,8 +10,8 @@ SCHEMA = "holdfast.live/1"
 """Fields may be added under this name; none changes its meaning or goes away."""
 
 Vector = tuple[float, float, float]
-Number = float
-"""A number, or null in JSON where nothing is known."""
+Number = float | None
+"""A number, or null where nothing is known (NaN is written as null)."""
 
 
 class FingerInfo(Struct, frozen=True, kw_only=True):
@@ -73,7 +73,7 @@ class Finger(Struct, frozen=True, kw_only=True, gc=False):
     reason: Reason
     stable_probability: Number
     instability: Number
-    force: Vector
+    force: tuple[Number, Number, Number]
     faults: tuple[Fault, ...]
     faulty_taxels: tuple[int, ...]
     taxels: list[Vector] | None = None

@@ -3,7 +3,7 @@
 import asyncio
 import time
 from collections.abc import AsyncIterator, Callable
-from contextlib import asynccontextmanager, suppress
+from contextlib import suppress
 from importlib import resources
 from pathlib import Path
 from typing import TypeVar
@@ -21,10 +21,13 @@ from holdfast.model import Model
 
 DOCUMENTS_PER_SECOND = 20.0
 """How often readers are told how things stand [Hz]."""
-WAITING = 32
-"""So many documents wait for a slow reader; then it misses the oldest."""
+WAITING = {"live": 32, "estimates": 1024}
+"""So many documents wait for a slow reader, a second or more; then it misses the oldest."""
 HEARTBEAT = 10.0
 """A reader that does not answer within half of it is let go [s]."""
+
+PAGE = Path(str(resources.files("holdfast.live") / "page"))
+"""The page's files."""
 
 T = TypeVar("T")
 
@@ -34,9 +37,9 @@ _encode = msgspec.json.Encoder().encode
 class Reader:
     """One WebSocket: documents wait in a short queue, so that a slow one holds nobody up."""
 
-    def __init__(self, socket: web.WebSocketResponse) -> None:
+    def __init__(self, socket: web.WebSocketResponse, waiting: int) -> None:
         self._socket = socket
-        self._waiting: asyncio.Queue[str] = asyncio.Queue(WAITING)
+        self._waiting: asyncio.Queue[str] = asyncio.Queue(waiting)
 
     def put(self, text: str) -> None:
         """Takes a document; the oldest goes where there are too many."""
@@ -86,12 +89,11 @@ class Service:
         self.app.cleanup_ctx.append(self._running)
 
     def _routes(self) -> list[web.AbstractRouteDef]:
-        page = Path(str(resources.files("holdfast.live") / "page"))
         return [
-            web.get("/", lambda _: _file(page / "index.html")),
-            web.static("/page", page),
-            web.get("/api/v1/live", lambda request: self._read(request, "live")),
-            web.get("/api/v1/estimates", lambda request: self._read(request, "estimates")),
+            web.get("/", _page),
+            web.static("/page", PAGE),
+            web.get("/api/v1/live", self._read_live),
+            web.get("/api/v1/estimates", self._read_estimates),
             web.get("/api/v1/info", self._info),
             web.get("/api/v1/state", self._tell),
             web.get("/api/v1/schema", _schema),
@@ -101,7 +103,6 @@ class Service:
             web.post("/api/v1/markers", self._mark),
         ]
 
-    @asynccontextmanager
     async def _running(self, _: web.Application) -> AsyncIterator[None]:
         loop = asyncio.get_running_loop()
 
@@ -136,10 +137,16 @@ class Service:
             for reader in self._readers["estimates"]:
                 reader.put(text)
 
+    async def _read_live(self, request: web.Request) -> web.WebSocketResponse:
+        return await self._read(request, "live")
+
+    async def _read_estimates(self, request: web.Request) -> web.WebSocketResponse:
+        return await self._read(request, "estimates")
+
     async def _read(self, request: web.Request, what: str) -> web.WebSocketResponse:
         socket = web.WebSocketResponse(heartbeat=HEARTBEAT, compress=False, max_msg_size=1024)
         await socket.prepare(request)
-        reader = Reader(socket)
+        reader = Reader(socket, WAITING[what])
         reader.put(_encode(self._hello()).decode())
         readers = self._readers[what]
         readers.add(reader)
@@ -202,8 +209,8 @@ def _json(value: object, status: int = 200) -> web.Response:
     return web.Response(body=_encode(value), content_type="application/json", status=status)
 
 
-async def _file(path: Path) -> web.FileResponse:
-    return web.FileResponse(path)
+async def _page(_: web.Request) -> web.FileResponse:
+    return web.FileResponse(PAGE / "index.html")
 
 
 async def _schema(_: web.Request) -> web.Response:

@@ -1,0 +1,342 @@
+import asyncio
+import json
+import time
+from contextlib import asynccontextmanager
+
+import msgspec
+import numpy as np
+import pytest
+from aiohttp import ClientSession, WSServerHandshakeError, web
+
+from holdfast.detector import detect
+from holdfast.io import load_recording
+from holdfast.live import schema
+from holdfast.live.guard import Guard
+from holdfast.live.judge import Judge
+from holdfast.live.service import Service
+from holdfast.live.session import Session
+
+from . import build
+
+PATIENCE = 30.0
+
+
+@asynccontextmanager
+async def served(source, token=None, host="127.0.0.1", folder=None, start=True):
+    """A client of the service of a source, its address, and the session."""
+    session = Session(source, Judge(build.model(), source.sensors))
+    service = Service(session, build.model(), Guard(host, token), folder)
+    runner = web.AppRunner(service.app, shutdown_timeout=0.5)
+    await runner.setup()
+    await web.TCPSite(runner, "127.0.0.1", 0).start()
+    url = f"http://127.0.0.1:{runner.addresses[0][1]}"
+    if start:
+        session.start()
+    try:
+        async with ClientSession(base_url=url) as client:
+            yield client, session
+    finally:
+        await runner.cleanup()
+        if start:
+            session.stop()
+
+
+async def wait_for(condition):
+    end = time.monotonic() + PATIENCE
+    while not condition():
+        if time.monotonic() > end:
+            pytest.fail("what was waited for did not happen")
+        await asyncio.sleep(0.01)
+
+
+def patient(n, recording=None):
+    recording = recording or build.grasp()
+    return build.Script.of(recording, build.arrivals_of(recording)[:n], patient=True)
+
+
+def run(work):
+    return asyncio.run(asyncio.wait_for(work, PATIENCE))
+
+
+def test_the_first_document_says_what_there_is(tmp_path):
+    async def work():
+        async with served(patient(10), folder=tmp_path) as (client, _):
+            async with client.ws_connect("/api/v1/live") as socket:
+                hello = await socket.receive_json()
+            async with client.get("/api/v1/info") as answer:
+                assert await answer.json() == hello
+            return hello
+
+    hello = run(work())
+    assert (hello["schema"], hello["type"]) == ("holdfast.live/1", "hello")
+    assert hello["model"] == "builtin:twin"
+    assert hello["modules"] == dict.fromkeys(build.FINGERS, 30)
+    assert list(hello["fingers"]) == list(build.FINGERS)
+    thumb = hello["fingers"]["thumb"]
+    assert np.shape(thumb["positions"]) == (30, 3)
+    assert np.shape(thumb["rotations"]) == (30, 3, 3)
+    assert hello["can_record"] is True
+    msgspec.convert(hello, schema.Hello)
+
+
+def test_documents_hold_every_sample_once_and_what_is_newest():
+    recording = build.grasp()
+
+    async def work():
+        source = build.Script.of(recording)
+        async with served(source, start=False) as (client, session):
+            async with client.ws_connect("/api/v1/live") as socket:
+                await socket.receive_json()
+                session.start()
+                found = []
+                while not found or not found[-1]["ended"]:
+                    found.append(await socket.receive_json())
+                found.append(await socket.receive_json())
+            session.stop()
+            return found
+
+    found = run(work())
+    for document in found:
+        msgspec.convert(document, schema.Live, strict=False)
+    expected = detect(build.model(), recording)
+    times = [t for one in found for t in one["series"]["times"]]
+    assert times == expected.times.tolist()
+    for name, trace in expected.fingers.items():
+        series = [one["series"]["fingers"][name] for one in found]
+        states = [s for one in series for s in one["state"]]
+        assert states == trace.state.tolist()
+        sigma = np.array([x for one in series for x in one["instability"]], dtype=float)
+        np.testing.assert_array_equal(sigma, trace.instability)
+        force = np.concatenate([np.array(one["force"], dtype=float) for one in series], axis=1)
+        np.testing.assert_array_equal(force.T, trace.force)
+    events = [event for one in found for event in one["events"] if event["finger"] == "hand"]
+    assert {event["state"] for event in events} >= {"STABLE", "UNSTABLE", "NO_CONTACT"}
+    last = found[-1]
+    assert last["health"]["n_packets"] == len(times)
+    assert np.shape(last["fingers"]["index"]["taxels"]) == (30, 3)
+
+
+def test_estimates_are_told_one_by_one():
+    recording = build.grasp()
+    n = 600
+
+    async def work():
+        source = patient(n, recording)
+        async with (
+            served(source, start=False) as (client, session),
+            client.ws_connect("/api/v1/estimates") as socket,
+        ):
+            await socket.receive_json()
+            session.start()
+            found = [await socket.receive_json() for _ in range(n)]
+            session.stop()
+            return found
+
+    expected = detect(build.model(), recording)
+    for k, one in enumerate(run(work())):
+        msgspec.convert(one, schema.Estimate, strict=False)
+        assert one["time"] == expected.times[k]
+        assert one["hand"] == ("UNKNOWN", "NO_CONTACT", "UNSTABLE", "STABLE")[expected.hand[k]]
+        assert set(one["fingers"]) == set(build.FINGERS)
+
+
+def test_a_reader_that_does_not_read_holds_nobody_up():
+    recording = build.grasp()
+
+    async def work():
+        source = build.Script.of(recording, patient=True)
+        async with (
+            served(source, start=False) as (client, session),
+            client.ws_connect("/api/v1/estimates"),  # and never reads
+        ):
+            session.start()
+            await wait_for(lambda: session.n_packets == len(build.arrivals_of(recording)))
+            session.stop()
+            return session.latency()
+
+    latency = run(work())
+    assert latency.p50 < 1.0  # a decision does not wait for a socket
+
+
+def test_the_tare(tmp_path):
+    async def work():
+        recording = build.grasp()
+        source = patient(200, recording)
+        async with served(source) as (client, session):
+            await wait_for(lambda: session.n_packets == 200)
+            async with client.post("/api/v1/tare") as answer:
+                first = answer.status, await answer.json()
+            source.steps.extend(build.arrivals_of(recording)[200:600])
+            await wait_for(lambda: session.n_packets == 600)
+            async with client.post("/api/v1/tare") as answer:
+                return first, (answer.status, await answer.json())
+
+    free, touching = run(work())
+    assert free == (200, {})
+    assert touching[0] == 409
+    assert touching[1]["error"].startswith("thumb, index, middle in contact")
+
+
+def test_a_recording_is_made_marked_and_ended(tmp_path):
+    recording = build.grasp()
+
+    async def work():
+        source = patient(100, recording)
+        async with served(source, folder=tmp_path) as (client, session):
+            await wait_for(lambda: session.n_packets == 100)
+            async with client.post("/api/v1/markers", json={"text": "early"}) as answer:
+                assert answer.status == 409
+            async with client.delete("/api/v1/recording") as answer:
+                assert answer.status == 409
+            async with client.post("/api/v1/recording", json={"name": "mine"}) as answer:
+                assert (await answer.json())["path"] == str(tmp_path / "mine.mcap")
+            async with client.post("/api/v1/recording", json={"name": "other"}) as answer:
+                assert answer.status == 409
+                assert "mine.mcap is being recorded already" in (await answer.json())["error"]
+            source.steps.extend(build.arrivals_of(recording)[100:300])
+            await wait_for(lambda: session.n_packets == 300)
+            async with client.post("/api/v1/markers", json={"text": "closing"}) as answer:
+                assert answer.status == 200
+            async with client.get("/api/v1/state") as answer:
+                told = await answer.json()
+            async with client.delete("/api/v1/recording") as answer:
+                ended = await answer.json()
+            async with client.post("/api/v1/recording", json={"name": "mine"}) as answer:
+                assert answer.status == 409
+                assert "exists already" in (await answer.json())["error"]
+            return told, ended
+
+    _, ended = run(work())
+    assert ended["path"] == str(tmp_path / "mine.mcap")
+    found = load_recording(tmp_path / "mine.mcap")
+    assert found.complete
+    assert [text for _, text in found.markers] == ["closing"]
+    for name, module in recording.modules.items():
+        np.testing.assert_array_equal(found.modules[name].readings, module.readings[100:300])
+        np.testing.assert_array_equal(found.modules[name].times, module.times[100:300])
+
+
+@pytest.mark.parametrize("name", ["../up", "a/b", "", ".hidden", "x" * 200])
+def test_names_that_no_recording_has(tmp_path, name):
+    async def work():
+        async with (
+            served(patient(10), folder=tmp_path) as (client, _),
+            client.post("/api/v1/recording", json={"name": name}) as answer,
+        ):
+            return answer.status, await answer.json()
+
+    status, answer = run(work())
+    if name:
+        assert status == 409
+        assert "a name of letters" in answer["error"]
+        assert list(tmp_path.iterdir()) == []
+    else:
+        assert status == 200  # the date and time
+
+
+def test_no_folder_no_recordings():
+    async def work():
+        async with (
+            served(patient(10)) as (client, _),
+            client.post("/api/v1/recording") as answer,
+        ):
+            return answer.status, (await answer.json())["error"]
+
+    assert run(work()) == (409, "no folder for recordings: start with --record-to FOLDER")
+
+
+@pytest.mark.parametrize("body", [b"{", b"[]", b'{"name": 3}', b'{"nam": "a"}'])
+def test_bodies_that_make_no_sense(tmp_path, body):
+    async def work():
+        async with (
+            served(patient(10), folder=tmp_path) as (client, _),
+            client.post("/api/v1/recording", data=body) as answer,
+        ):
+            return answer.status, await answer.json()
+
+    status, answer = run(work())
+    assert status == 400
+    assert answer["error"].startswith("/api/v1/recording: ")
+
+
+@pytest.mark.parametrize(
+    ("headers", "status"),
+    [
+        ({}, 200),
+        ({"Host": "localhost:1"}, 200),
+        ({"Host": "evil.example"}, 403),
+        ({"Origin": "http://evil.example"}, 403),
+        ({"Origin": "null"}, 403),
+    ],
+)
+def test_other_origins_and_names_are_refused(headers, status):
+    async def work():
+        async with served(patient(10)) as (client, _):
+            async with client.post("/api/v1/tare", headers=headers) as answer:
+                first = answer.status
+            try:
+                async with client.ws_connect("/api/v1/live", headers=headers):
+                    second = 200
+            except WSServerHandshakeError as refusal:
+                second = refusal.status
+            return first, second
+
+    assert run(work()) == (status, status)
+
+
+def test_the_token_is_needed_and_taken_in_either_way():
+    async def work():
+        found = []
+        async with served(patient(10), token="secret") as (client, _):
+            for words in (
+                {},
+                {"headers": {"Authorization": "Bearer wrong"}},
+                {"headers": {"Authorization": "Bearer secret"}},
+                {"params": {"token": "secret"}},
+                {"params": {"token": "sécret"}},
+            ):
+                async with client.get("/api/v1/info", **words) as answer:
+                    found.append(answer.status)
+            async with client.ws_connect("/api/v1/live?token=secret") as socket:
+                assert (await socket.receive_json())["type"] == "hello"
+            async with client.get("/") as answer:
+                assert answer.status == 200  # the page itself holds no secret
+        return found
+
+    assert run(work()) == [401, 401, 200, 200, 401]
+
+
+def test_the_page_may_load_nothing_from_elsewhere():
+    async def work():
+        async with served(patient(10)) as (client, _), client.get("/") as answer:
+            return answer.status, dict(answer.headers), await answer.text()
+
+    status, headers, text = run(work())
+    assert status == 200
+    assert "default-src 'self'" in headers["Content-Security-Policy"]
+    assert headers["X-Content-Type-Options"] == "nosniff"
+    assert "holdfast" in text
+    assert "https://" not in text
+
+
+def test_the_schema_is_that_of_the_documents():
+    async def work():
+        async with (
+            served(patient(10)) as (client, _),
+            client.get("/api/v1/schema") as answer,
+        ):
+            return await answer.json()
+
+    told = run(work())
+    assert {"Hello", "Live", "Estimate"} <= set(told["$defs"])
+    assert json.dumps(told)
+
+
+def test_listening_to_the_network_needs_a_token():
+    with pytest.raises(ValueError, match=r"^--host 0\.0\.0\.0 opens the service to the network"):
+        Guard("0.0.0.0")
+    with pytest.raises(ValueError, match=r"^--token: some text expected, none given$"):
+        Guard("127.0.0.1", " ")
+    Guard("0.0.0.0", "secret")
+    Guard("::1")
+    Guard("localhost")
