@@ -1,0 +1,1 @@
+"""Labels: proposed by rules, drawn by people, compared and audited."""
