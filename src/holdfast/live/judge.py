@@ -82,6 +82,7 @@ class Judge:
         self._ignore = ignore
         self._kept: list[Arrival] = []
         self._detector: Detector | None = None
+        Detector(model, self.fingers, 100.0, ignore=ignore)  # refuses what it must, and compiles
         self._resamplers: dict[str, Resampler] = {}
         self._faults: dict[str, tuple[Fault, ...]] = {}
         self._last: HandEstimate | None = None
