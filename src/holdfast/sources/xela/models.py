@@ -1,0 +1,165 @@
+"""What a sensor of XELA's server consists of, by its model: the modules that it becomes."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field, replace
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+from holdfast.errors import SourceError
+from holdfast.io.xela_models import module_sensors, whole_hand
+from holdfast.sensors import Hand, Sensor
+from holdfast.sensors.layouts import UINT16
+
+PITCH = 4.7e-3
+"""Between the taxels of a sensor that is not known; it stands for none in particular [m]."""
+RATE = 100.0
+"""Of a sensor that is not known [Hz]; times tell the true one."""
+
+
+@dataclass(frozen=True, eq=False)
+class Skin:
+    """A sensor of the server, and the modules that it consists of.
+
+    Attributes:
+        number: the server's.
+        model: as the server calls it.
+        modules: their sensors by name.
+        order: (n_taxels,) where each taxel stands in the packet, module after module; None
+            where it is one module, in the packet's order.
+        notices: what a person should know of it.
+    """
+
+    number: int
+    model: str
+    modules: Mapping[str, Sensor]
+    order: npt.NDArray[np.int64] | None = None
+    notices: tuple[str, ...] = ()
+    n_taxels: int = field(init=False)
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "n_taxels", sum(s.n_taxels for s in self.modules.values()))
+
+    def split(self, readings: npt.NDArray[Any]) -> dict[str, npt.NDArray[Any]]:
+        """The readings of each module, out of those in the order of the packet."""
+        if self.order is None:
+            return dict.fromkeys(self.modules, readings)
+        ordered = readings[self.order]
+        samples, first = {}, 0
+        for name, module in self.modules.items():
+            samples[name] = ordered[first : first + module.n_taxels]
+            first += module.n_taxels
+        return samples
+
+
+def skins(
+    found: Mapping[int, tuple[str, int]],
+    names: Mapping[int, str],
+    given: Sensor | None = None,
+    *,
+    calibrated: bool = False,
+) -> dict[int, Skin]:
+    """The sensors of a server, by number.
+
+    Args:
+        found: model and number of taxels, by the server's number.
+        names: what a user calls them.
+        given: of the separate sensors with that number of taxels, whatever their model.
+        calibrated: readings are in newtons.
+
+    Raises:
+        SourceError: a model has another number of taxels, nothing fits `names` or `given`, or
+            two modules would have one name.
+    """
+    hands = {number: whole for number, (model, _) in found.items() if (whole := whole_hand(model))}
+    made = {}
+    for number, (model, n_taxels) in found.items():
+        if number in hands:
+            prefix = f"hand{number}/" if len(hands) > 1 else ""
+            skin = _hand(number, model, n_taxels, hands[number], prefix)
+        else:
+            name = names.get(number, f"finger{number}")
+            skin = _separate(number, name, model, n_taxels, given)
+        made[number] = _in_newtons(skin) if calibrated else skin
+    _check(made, names, given)
+    return made
+
+
+def unknown(name: str, n_taxels: int) -> Sensor:
+    """A flat sensor of so many taxels, as near to a square as rows of one length allow.
+
+    Example:
+        >>> float(unknown("uspa35", 15).positions[:, 1].max())
+        0.0047
+    """
+    n_rows = max(k for k in range(1, int(n_taxels**0.5) + 1) if n_taxels % k == 0)
+    n_columns = n_taxels // n_rows
+    row, column = np.divmod(np.arange(n_taxels), n_columns)
+    x, y = column - (n_columns - 1) / 2, (n_rows - 1) / 2 - row
+    positions = PITCH * np.column_stack([x, y, np.zeros(n_taxels)])
+    turns = np.tile(np.eye(3), (n_taxels, 1, 1))
+    return Sensor(name, positions, turns, np.array([0.0, 0.0, 1.0]), RATE, limits=UINT16)
+
+
+def _hand(number: int, model: str, n_taxels: int, whole: Hand, prefix: str) -> Skin:
+    modules = _built_in(number, model, n_taxels)
+    order = np.concatenate([whole.modules[name].flat_indices for name in modules])
+    return Skin(number, model, {prefix + name: one for name, one in modules.items()}, order)
+
+
+def _separate(number: int, name: str, model: str, n_taxels: int, given: Sensor | None) -> Skin:
+    if given is not None and given.n_taxels == n_taxels:
+        return Skin(number, model, {name: given})
+    if _is_known(model):
+        (known,) = _built_in(number, model, n_taxels).values()
+        return Skin(number, model, {name: known})
+    notice = (
+        f"{name}: where the {n_taxels} taxels of a {model or 'sensor without a model'} sit is not "
+        "known; taken as flat (sensor=FILE.json in the URI tells it)"
+    )
+    flat = unknown(model.lower() or "unknown", n_taxels)
+    return Skin(number, model, {name: flat}, notices=(notice,))
+
+
+def _is_known(model: str) -> bool:
+    """Whether the model has a layout: then it refuses a number of taxels that no layout has."""
+    try:
+        module_sensors(model, 1)
+    except ValueError:
+        return True
+    return False
+
+
+def _built_in(number: int, model: str, n_taxels: int) -> dict[str, Sensor]:
+    try:
+        return module_sensors(model, n_taxels)
+    except ValueError as cause:
+        raise SourceError(
+            f"sensor {number}: {cause}; sensor=FILE.json in the URI tells of another layout"
+        ) from cause
+
+
+def _in_newtons(skin: Skin) -> Skin:
+    modules = {
+        name: replace(module, unit="N", limits=None) for name, module in skin.modules.items()
+    }
+    return replace(skin, modules=modules)
+
+
+def _check(made: Mapping[int, Skin], names: Mapping[int, str], given: Sensor | None) -> None:
+    separate = [skin for skin in made.values() if skin.order is None]
+    there = ", ".join(f"{skin.number} ({skin.model})" for skin in made.values())
+    if strangers := sorted(set(names) - {skin.number for skin in separate}):
+        raise SourceError(
+            f"fingers= names {', '.join(map(str, strangers))}; separate sensors have names, "
+            f"the server has {there}"
+        )
+    if given is not None and all(given.n_taxels != skin.n_taxels for skin in separate):
+        raise SourceError(
+            f"sensor= has {given.n_taxels} taxels and fits none that the server has: "
+            + ", ".join(f"{skin.number} ({skin.n_taxels} taxels)" for skin in made.values())
+        )
+    modules = [name for skin in made.values() for name in skin.modules]
+    if len(set(modules)) < len(modules):
+        raise SourceError(f"two modules of one name: {', '.join(modules)}; fingers= tells others")
