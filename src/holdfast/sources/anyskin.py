@@ -3,8 +3,9 @@
 A board sends one packet a sample, binary or text, by its firmware (the sketches of ReSkin's
 authors). Binary: of each magnetometer four float32, little endian: temperature, x, y, z; then
 CR LF. Text: of each x, y, z and temperature, apart by tabs; then CR LF. x, y, z are in
-microtesla. Nothing marks where a packet begins, and CR LF may be in a number: a place is taken
-as one where the end is where it should be, and every number is plausible.
+microtesla. Nothing but the end of the last one marks where a packet begins, and CR LF may be in
+a number: what begins after CR LF is a packet where it ends where it should, and every number is
+plausible.
 """
 
 import math
@@ -50,14 +51,14 @@ class Decoded(NamedTuple):
 class Decoder:
     r"""Finds packets in bytes that come in pieces of any size.
 
-    What comes before the first packet is not counted as refused, up to the length of one.
+    What comes first may be half a packet: it is dropped, and not counted as refused.
 
     Args:
         n_mags: magnetometers of the board.
 
     Example:
         >>> packet = np.arange(1, 9, dtype="<f4").tobytes() + b"\r\n"
-        >>> Decoder(2).feed(b"..." + packet).samples[0].tolist()
+        >>> Decoder(2).feed(b"...\r\n" + packet).samples[0].tolist()
         [[2.0, 3.0, 4.0], [6.0, 7.0, 8.0]]
     """
 
@@ -93,20 +94,20 @@ class Decoder:
 
     def _step(self, at: int, samples: list[Sample]) -> int | None:
         """Where what is at a place ends; None where more has to come to tell."""
-        begins_line = self._held[at - 1 : at] == b"\n" if at else self._after_line
-        line = _LINE.match(self._held, at) if begins_line else None
-        if line and (numbers := _numbers(line[0])) is not None:
-            self._take_line(numbers, samples)
-            return line.end()
-        if len(self._held) - at < self._length:
+        begins = self._held[at - 1 : at] == b"\n" if at else self._after_line
+        if begins and (line := _LINE.match(self._held, at)):
+            numbers = _numbers(line[0])
+            if numbers is not None:
+                self._take_line(numbers, samples)
+                return line.end()
+        n_left = len(self._held) - at
+        if not n_left or (begins and (n_left < self._length or self._is_half_line(at))):
             return None
-        sample = _packet(self._held, at, self._n_mags)
+        sample = _packet(self._held, at, self._n_mags) if begins else None
         if sample is not None:
             self._take(sample, samples)
             return at + self._length
-        if begins_line and self._is_half_line(at):
-            return None
-        end = self._next(at)
+        end = self._held.find(b"\n", at) + 1 or len(self._held)
         self._skip(end - at)
         return end
 
@@ -128,15 +129,6 @@ class Decoder:
         match = _IN_LINE.match(self._held, at)
         end = match.end() if match else at
         return end == len(self._held) and end - at <= LONGEST_LINE
-
-    def _next(self, at: int) -> int:
-        """The next place after one where a packet may begin."""
-        ends = [len(self._held) - self._length + 1]
-        if (end := self._held.find(END, at + self._length - 1)) >= 0:
-            ends.append(end + len(END) - self._length)
-        if (end := self._held.find(b"\n", at)) >= 0:
-            ends.append(end + 1)
-        return min(ends)
 
     def _skip(self, n_bytes: int) -> None:
         """Counts as refused what begins another packet's length."""
