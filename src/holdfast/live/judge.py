@@ -75,7 +75,6 @@ class Judge:
             )
         self.model = model
         self.fingers = dict(model.fingers_of(sensors))
-        self.missing = tuple(sorted(set(self.fingers) - set(sensors)))
         self.rate = math.nan
         self.resampled = False
         self._strict = strict
@@ -110,7 +109,10 @@ class Judge:
         if not kept or kept[-1].time - kept[0].time < RATE_SECONDS:
             return []
         rate = _rate(kept, self.fingers)
-        return [] if rate is None else self._begin(rate)
+        if rate is None:  # nothing of the model's fingers yet
+            self._kept = [arrival]
+            return []
+        return self._begin(rate)
 
     def finish(self) -> list[Decision]:
         """What is to be said of a source that ended before its rate was known."""
