@@ -92,7 +92,7 @@ class Keys:
             if not select.select([self._stdin], [], [], 0)[0]:
                 return b""
             data = os.read(self._stdin, _MOST_LINE)
-        except OSError:
+        except (OSError, ValueError):  # it is closed, or nothing that can be waited for
             data = b""
         if not data:  # nothing will come any more
             self._stdin = None

@@ -67,10 +67,10 @@ def record(
     force: Annotated[bool, typer.Option("--force", help="Overwrite what is there.")] = False,
     as_json: Annotated[bool, typer.Option("--json", help="Print JSON on stdout.")] = False,
 ) -> None:
-    """Records what a source sends, with markers, to an MCAP file.
+    """Records a source, and loses at most half a second whatever happens.
 
-    All modules are recorded with their own times. Whatever happens, what came until half a
-    second before stays readable. Keys set markers: c closing, l locked, d disturbance,
+    Writes MCAP, of all modules with their own times. What was killed or cut stays readable
+    (holdfast info, import). Keys set markers: c closing, l locked, d disturbance,
     r released, space or 1-9 a mark; q stops. Where stdin is a pipe, each line is a marker. Faults
     and notices of the source become markers too. A device that goes away is waited for.
 

@@ -1,0 +1,416 @@
+import json
+import os
+import pty
+import re
+import select
+import signal
+import subprocess
+import sys
+import termios
+import threading
+import time
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from holdfast import sources
+from holdfast.cli import main
+from holdfast.cli import record as verb
+from holdfast.contact import Fault
+from holdfast.errors import SourceError
+from holdfast.io import load_recording, save_recording
+from holdfast.live.recorder import Recorder
+from holdfast.sensors import sensor
+from holdfast.sources import Arrival
+from holdfast.sources.source import Source, word
+from holdfast.synthetic import synthetic_recording
+
+ANYSKIN = sensor("anyskin")
+PATIENCE = 30.0
+RUN = """
+import os, sys
+from holdfast.cli import main
+if sys.stdin.isatty():
+    os.close(os.open(os.ttyname(0), os.O_RDWR))  # our terminal, we being in the foreground
+sys.exit(main())
+"""
+FULL = """
+import resource, sys
+from holdfast.cli import main
+resource.setrlimit(resource.RLIMIT_FSIZE, (60_000, 60_000))
+sys.exit(main())
+"""
+
+
+@pytest.fixture(scope="module")
+def grasp(tmp_path_factory):
+    path = tmp_path_factory.mktemp("grasp") / "grasp.parquet"
+    save_recording(synthetic_recording("grasp", 1, ("thumb", "index")), path)
+    return path
+
+
+class Device(Source):
+    """Gives what it is told to, then falls silent, or ends."""
+
+    name = "xela://fake"
+    paced = False
+
+    def __init__(self, arrivals, ends=True):
+        self.sensors = {"thumb": ANYSKIN, "thumb/1": ANYSKIN}
+        self.metadata = {"source": "xela://fake", "hand": "allegro"}
+        self.left = list(arrivals)
+        self.ends = ends
+
+    def open(self):
+        if self.left == ["away"]:
+            raise SourceError("xela://fake cannot be reached")
+
+    def read(self, timeout):
+        if self.left:
+            return self.left.pop(0)
+        time.sleep(timeout)
+        return None
+
+    @property
+    def ended(self):
+        return self.ends and not self.left
+
+    def close(self):
+        self.left = []
+
+
+@pytest.fixture
+def device(monkeypatch):
+    """Has `open_source` give a device with these arrivals."""
+
+    def arrange(*arrivals, ends=True):
+        made = Device(arrivals, ends)
+        monkeypatch.setattr(sources, "open_source", lambda text, speed=1.0, loop=False: made)
+        return made
+
+    return arrange
+
+
+def arrival(k, **fields):
+    values = np.full((5, 3), k, np.uint16)
+    return Arrival(k / 100, {"thumb": values, "thumb/1": values}, k / 100, **fields)
+
+
+def run(capsys, *words):
+    code = main(["record", *map(str, words)])
+    printed, told = capsys.readouterr()
+    return code, printed, told
+
+
+def refusal(capsys, *words):
+    code, printed, told = run(capsys, *words)
+    assert (code, printed) == (2, "")
+    *_, last = told.splitlines()
+    return last.removeprefix("holdfast: ")
+
+
+def test_records_a_recording_as_it_is(capsys, grasp, tmp_path):
+    out = tmp_path / "copy.mcap"
+    code, printed, told = run(capsys, grasp, out, "--speed", "0")
+    copy, want = load_recording(out), load_recording(grasp)
+    assert code == 0
+    assert copy.complete
+    for name, module in want.modules.items():
+        np.testing.assert_array_equal(copy.modules[name].times, module.times)
+        np.testing.assert_array_equal(copy.modules[name].readings, module.readings)
+        assert copy.modules[name].readings.dtype == module.readings.dtype
+        assert copy.modules[name].sensor == module.sensor
+    n = want.modules["thumb"].n_samples
+    assert re.fullmatch(
+        rf"{want.duration:.2f} s, {n} samples of 2 modules in {re.escape(str(out))} \(.* kB\)\n",
+        printed,
+    )
+    assert told.splitlines() == [
+        f"recording {grasp} to {out}",
+        "Ctrl-C stops",
+        f"go on with: holdfast info {out}",
+    ]
+
+
+def test_tells_machines_what_came(capsys, device, tmp_path):
+    gap = {"thumb": (Fault.PACKET_GAP,)}
+    came = [arrival(k) for k in range(50)]
+    came += [arrival(k, faults=gap, n_lost=20, n_refused=1) for k in (70,)]
+    came += [arrival(k) for k in range(71, 121)]
+    device(*came, arrival(3))
+    out = tmp_path / "a.mcap"
+    code, printed, _ = run(capsys, "xela://fake", out, "--json")
+    assert code == 0
+    assert json.loads(printed) == {
+        "path": str(out),
+        "seconds": 1.2,
+        "n_samples": {"thumb": 101, "thumb/1": 101},
+        "rate": pytest.approx(100 / 1.2),
+        "n_gaps": 1,
+        "n_lost": 20,
+        "n_refused": 1,
+        "n_dropped": 1,
+        "n_bytes": out.stat().st_size,
+        "n_markers": len(load_recording(out).markers),
+        "faults": {"packet_gap": 1},
+        "complete": True,
+    }
+
+
+def test_what_a_person_says_of_it_goes_with_it(capsys, device, tmp_path):
+    device(arrival(0))
+    out = tmp_path / "a.mcap"
+    words = ("--object", "can", "--case", "2", "--note", "wet", "--set", "operator=Ann=Bo")
+    run(capsys, "xela://fake", out, *words, "--set", "repeat=3", "--set", "object_mass=0.25")
+    metadata = dict(load_recording(out).metadata)
+    assert re.fullmatch(r"\d{4}-\d\d-\d\dT\d\d:\d\d:\d\dZ", metadata.pop("recorded_at"))
+    assert metadata == {
+        "source": "xela://fake",
+        "hand": "allegro",
+        "object": "can",
+        "case": "2",
+        "note": "wet",
+        "operator": "Ann=Bo",
+        "repeat": 3,
+        "object_mass": 0.25,
+    }
+
+
+def test_pads_can_be_left_out(capsys, device, tmp_path):
+    device(arrival(0), arrival(1))
+    run(capsys, "xela://fake", tmp_path / "a.mcap", "--fingers-only")
+    recording = load_recording(tmp_path / "a.mcap")
+    assert {name: m.n_samples for name, m in recording.modules.items()} == {"thumb": 2}
+
+
+def test_it_stops_by_itself(capsys, device, tmp_path):
+    device(*(arrival(k) for k in range(100, 1000)), ends=False)
+    run(capsys, "xela://fake", tmp_path / "a.mcap", "--seconds", "2")
+    times = load_recording(tmp_path / "a.mcap").modules["thumb"].times
+    np.testing.assert_array_equal(times, np.arange(100, 300) / 100)
+
+
+def test_it_stops_by_itself_though_the_source_is_silent(capsys, device, tmp_path, monkeypatch):
+    monkeypatch.setattr(verb, "GRACE", 0.1)
+    device(arrival(0), word(0.0, "connection\x1b lost"), ends=False)
+    code, _, told = run(capsys, "xela://fake", tmp_path / "a.mcap", "--seconds", "0.3")
+    assert code == 0
+    assert "connection? lost" in told.splitlines()
+    recording = load_recording(tmp_path / "a.mcap")
+    assert (recording.complete, recording.modules["thumb"].n_samples) == (True, 1)
+
+
+def test_where_nothing_came_nothing_is_left(capsys, device, tmp_path):
+    out = tmp_path / "a.mcap"
+    device(word(0.0, "hello"))
+    assert refusal(capsys, "xela://fake", out) == (
+        "xela://fake sent no samples: nothing was recorded"
+    )
+    device("away")
+    assert refusal(capsys, "xela://fake", out) == "xela://fake cannot be reached"
+    device("away")
+    assert refusal(capsys, "xela://fake", tmp_path / "new") == "xela://fake cannot be reached"
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_what_is_there_is_kept_unless_forced(capsys, device, tmp_path):
+    out = tmp_path / "a.mcap"
+    out.write_text("mine")
+    device(arrival(0))
+    assert refusal(capsys, "xela://fake", out) == (
+        f"{out} exists already: choose another name, or give --force"
+    )
+    assert out.read_text() == "mine"
+    device("away")
+    refusal(capsys, "xela://fake", out, "--force")
+    assert out.read_text() == "mine"
+    device(arrival(0))
+    assert run(capsys, "xela://fake", out, "--force")[0] == 0
+    assert load_recording(out).complete
+
+
+def test_bad_words_are_refused(capsys, device, grasp, tmp_path):
+    device(arrival(0))
+    out = tmp_path / "a.mcap"
+    copy = tmp_path / "grasp.mcap"
+    save_recording(load_recording(grasp), copy)
+    for words, message in [
+        (("xela://fake", out, "--seconds", "0"), "--seconds: more than 0 s expected, 0 given"),
+        (("xela://fake", out, "--seconds", "nan"), "--seconds: more than 0 s expected, nan given"),
+        (("twin:", out, "--speed", "-1"), "--speed: at least 0 expected, -1 given"),
+        (
+            ("xela://fake", out, "--speed", "2"),
+            "--speed is for recordings and the twin; xela://fake has its own",
+        ),
+        (("xela://fake", out, "--set", "a"), "--set KEY=VALUE expected, 'a' given"),
+        (("xela://fake", out, "--set", "=a"), "--set KEY=VALUE expected, '=a' given"),
+        (
+            ("xela://fake", out, "--object", "can", "--set", "object=ball"),
+            "--set: object is given twice",
+        ),
+        (
+            ("xela://fake", tmp_path / "a.parquet"),
+            f"{tmp_path}/a.parquet: a recording is captured to NAME.mcap; "
+            "holdfast import makes others of it",
+        ),
+        (
+            ("xela://fake", tmp_path / "no" / "a.mcap"),
+            f"cannot write {tmp_path}/no/a.mcap: the folder {tmp_path}/no does not exist",
+        ),
+        ((copy, copy, "--force"), f"{copy} is the source itself: choose another name"),
+        ((copy, tmp_path, "--force"), f"{copy} is the source itself: choose another name"),
+    ]:
+        assert refusal(capsys, *words) == message
+    assert list(tmp_path.iterdir()) == [copy]
+    made = device(arrival(0))
+    made.sensors = {"palm/1": ANYSKIN}
+    assert refusal(capsys, "xela://fake", out, "--fingers-only") == (
+        "no fingers: xela://fake has palm/1"
+    )
+
+
+@pytest.mark.parametrize(
+    ("source", "words", "pattern"),
+    [
+        ("xela://fake", (), r"xela-\d{8}-\d{6}\.mcap"),
+        ("xela://fake", ("--object", "../a can/"), r"a_can-\d{8}-\d{6}\.mcap"),
+        ("grasp.parquet", (), r"grasp\.mcap"),
+    ],
+)
+def test_in_a_folder_it_finds_a_name(source, words, pattern, capsys, device, tmp_path):
+    device(arrival(0))
+    code, printed, _ = run(capsys, source, tmp_path / "new" / "folder", *words, "--json")
+    assert code == 0
+    path = Path(json.loads(printed)["path"])
+    assert [path] == list((tmp_path / "new" / "folder").iterdir())
+    assert re.fullmatch(pattern, path.name)
+
+
+def test_a_file_that_is_taken_away_is_told(capsys, device, tmp_path, monkeypatch):
+    out = tmp_path / "a.mcap"
+    put = Recorder.put
+
+    def take_away(self, *given, **named):
+        put(self, *given, **named)
+        out.unlink(missing_ok=True)
+
+    monkeypatch.setattr(Recorder, "put", take_away)
+    device(arrival(0), ends=False)
+    assert refusal(capsys, "xela://fake", out) == (
+        f"cannot write {out}: it was removed while it was recorded"
+    )
+
+
+class Child:
+    """The verb in a process of its own, on a terminal of its own."""
+
+    def __init__(self, *words, stdin=None):
+        self.master, self.terminal = pty.openpty()
+        self.before = termios.tcgetattr(self.terminal)
+        self.told = b""
+        self.process = subprocess.Popen(
+            [sys.executable, "-c", RUN, "record", *map(str, words)],
+            stdin=self.terminal if stdin is None else stdin,
+            stdout=subprocess.PIPE,
+            stderr=self.terminal,
+            start_new_session=True,
+            env=os.environ | {"TERM": "xterm", "COLUMNS": "200"},
+        )
+
+    def wait_for(self, *words):
+        end = time.monotonic() + PATIENCE
+        while not all(one in self.told for one in words):
+            assert time.monotonic() < end, self.told
+            if select.select([self.master], [], [], 0.1)[0]:
+                self.told += os.read(self.master, 65536)
+
+    def finish(self):
+        """The exit code, and what was printed; the terminal is as it was before."""
+        reader = threading.Thread(target=self._swallow, daemon=True)
+        reader.start()
+        printed = self.process.communicate(timeout=PATIENCE)[0]
+        assert termios.tcgetattr(self.terminal) == self.before
+        os.close(self.terminal)
+        reader.join(PATIENCE)
+        os.close(self.master)
+        return self.process.returncode, printed.decode()
+
+    def _swallow(self):
+        try:
+            while data := os.read(self.master, 65536):
+                self.told += data
+        except OSError:
+            pass
+
+
+def test_keys_mark_and_stop_and_the_terminal_comes_back(grasp, tmp_path):
+    out = tmp_path / "a.mcap"
+    child = Child(grasp, out, "--json")
+    child.wait_for(b"keys: c closing", b" Hz")
+    os.write(child.master, b"cl")
+    child.wait_for(b"2 markers")
+    os.write(child.master, b"D r3xq")
+    code, printed = child.finish()
+    assert (code, json.loads(printed)["n_markers"]) == (0, 6)
+    recording = load_recording(out)
+    assert [text for _, text in recording.markers] == [
+        *("closing", "locked", "disturbance", "mark", "released", "mark 3")
+    ]
+
+
+@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM, signal.SIGHUP])
+def test_a_signal_ends_it_well(number, grasp, tmp_path):
+    out = tmp_path / "a.mcap"
+    child = Child(grasp, out)
+    child.wait_for(b" Hz")
+    os.kill(child.process.pid, number)
+    code, printed = child.finish()
+    assert code == 0
+    assert f" samples of 2 modules in {out}" in printed
+    assert f"go on with: holdfast info {out}" in child.told.decode().replace("\r\n", "\n")
+    assert load_recording(out).complete
+
+
+def test_ctrl_c_on_the_terminal_ends_it_well(grasp, tmp_path):
+    child = Child(grasp, tmp_path / "a.mcap")
+    child.wait_for(b" Hz")
+    os.write(child.master, b"\x03")
+    assert child.finish()[0] == 0
+    assert load_recording(tmp_path / "a.mcap").complete
+
+
+def test_a_script_marks_by_lines(grasp, tmp_path):
+    out = tmp_path / "a.mcap"
+    words = [sys.executable, "-c", RUN, "record", str(grasp), str(out), "--seconds", "3"]
+    with subprocess.Popen(
+        words, stdin=subprocess.PIPE, stdout=subprocess.PIPE, stderr=subprocess.PIPE
+    ) as process:
+        process.stdin.write(b"closing\n\nq\n\xff half a ")
+        process.stdin.flush()
+        assert process.stderr.readline()
+        process.stdin.write(b"line")
+        process.stdin.close()
+        assert b"Ctrl-C stops" in process.stderr.read()
+    assert process.returncode == 0
+    texts = [text for _, text in load_recording(out).markers]
+    assert texts == ["closing", "q", "\ufffd half a line"]
+
+
+def test_of_a_full_disk_what_went_before_stays(grasp, tmp_path):
+    out = tmp_path / "a.mcap"
+    words = [sys.executable, "-c", FULL, "record", str(grasp), str(out), "--speed", "0"]
+    done = subprocess.run(
+        words, stdin=subprocess.DEVNULL, capture_output=True, text=True, check=False
+    )
+    assert (done.returncode, done.stdout) == (2, "")
+    assert done.stderr.splitlines()[-1] == (
+        f"holdfast: cannot write {out}: File too large; for what was kept: holdfast info {out}"
+    )
+    recording, want = load_recording(out), load_recording(grasp)
+    n = recording.modules["thumb"].n_samples
+    assert 0 < n < want.modules["thumb"].n_samples
+    assert not recording.complete
+    np.testing.assert_array_equal(
+        recording.modules["thumb"].readings, want.modules["thumb"].readings[:n]
+    )

@@ -1,0 +1,97 @@
+import io
+
+import pytest
+
+from holdfast.cli import record_line
+from holdfast.cli.record_line import RecordLine, line
+from holdfast.contact import Fault
+from holdfast.live.recorder import RecorderStatus
+
+WELL = RecorderStatus(
+    seconds=12.34,
+    n_samples=1851,
+    modules={"thumb": 1851},
+    rate=149.96,
+    n_gaps=0,
+    n_lost=0,
+    n_refused=0,
+    n_dropped=0,
+    n_bytes=2_500_000,
+    n_markers=2,
+    faults={},
+    faulty={},
+    failure="",
+)
+BAD = WELL._replace(
+    rate=0.0, n_gaps=1, n_lost=3, n_dropped=4, faulty={"index": (Fault.LATE, Fault.PACKET_GAP)}
+)
+
+
+class Terminal(io.StringIO):
+    def isatty(self):
+        return True
+
+
+class Still:
+    """A recorder of which one thing is known."""
+
+    def __init__(self, status):
+        self.status = status
+
+
+def words(status):
+    return "   ".join(text for text, _ in line(status))
+
+
+def test_it_says_how_far_it_is_and_what_is_wrong():
+    assert words(WELL) == "12.3 s   150.0 Hz   0 gaps   0 lost   2.5 MB   2 markers"
+    assert words(BAD) == (
+        "12.3 s   no samples   1 gaps   3 lost   4 dropped   2.5 MB   2 markers   "
+        "index late packet_gap"
+    )
+    assert [text for text, bad in line(WELL) if bad] == []
+    assert [text for text, bad in line(BAD) if bad] == [
+        *("no samples", "1 gaps", "3 lost", "4 dropped", "index late packet_gap")
+    ]
+
+
+def test_elsewhere_than_on_a_terminal_it_tells_a_line_now_and_then(monkeypatch, capsys):
+    now = [100.0]
+    monkeypatch.setattr(record_line.time, "monotonic", lambda: now[0])
+    with RecordLine(Still(WELL)) as shown:
+        shown.say("begun")
+        for second in range(25):
+            now[0] = 100.0 + second
+            shown.update()
+    assert capsys.readouterr().err.splitlines() == ["begun", words(WELL), words(WELL)]
+
+
+@pytest.mark.parametrize(("colours", "red"), [({}, True), ({"NO_COLOR": "1"}, False)])
+def test_on_a_terminal_it_is_rewritten_in_place(colours, red, monkeypatch):
+    terminal = Terminal()
+    monkeypatch.setattr("sys.stderr", terminal)
+    monkeypatch.delenv("NO_COLOR", raising=False)
+    for name, value in ({"TERM": "xterm", "COLUMNS": "200"} | colours).items():
+        monkeypatch.setenv(name, value)
+    with RecordLine(Still(BAD)) as shown:
+        shown.say("[bold]begun")
+        shown.update()
+        drawn = terminal.getvalue()
+        shown.update()  # too soon
+        assert terminal.getvalue() == drawn
+    told = terminal.getvalue()
+    assert "[bold]begun" in told
+    assert told.count("no samples") == 2  # and once more at the end
+    assert told.endswith("\x1b[2K")  # then it goes
+    assert ("31m" in told) is red
+
+
+def test_a_narrow_terminal_cuts_it(monkeypatch):
+    terminal = Terminal()
+    monkeypatch.setattr("sys.stderr", terminal)
+    monkeypatch.setenv("TERM", "xterm")
+    monkeypatch.setenv("COLUMNS", "30")
+    with RecordLine(Still(BAD)) as shown:
+        shown.update()
+    assert "no samples" in terminal.getvalue()
+    assert "markers" not in terminal.getvalue()
