@@ -12,7 +12,7 @@ from websockets.exceptions import ConnectionClosed
 
 from holdfast.errors import OutputError
 from holdfast.sources import Arrival, Source
-from holdfast.sources.xela.encoder import Encoder, Version
+from holdfast.sources.xela.encoder import NEW, Encoder
 
 HOST, PORT = "127.0.0.1", 5000
 PATIENCE = 0.2
@@ -59,7 +59,7 @@ class XelaServer:
         self,
         source: Source,
         *,
-        version: str = Version.NEW,
+        version: str = NEW,
         host: str = HOST,
         port: int = PORT,
         whole_hand: bool = False,

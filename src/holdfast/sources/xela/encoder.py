@@ -1,7 +1,6 @@
 """Samples become packets as XELA's server sends them. No I/O and no clock: times are given."""
 
 from collections.abc import Mapping, Sequence
-from enum import StrEnum
 from typing import Any
 
 import msgspec
@@ -15,6 +14,8 @@ REST = np.array([32768, 32768, 36000])
 """What a taxel tells that nothing touches [count]."""
 RESOLUTION = np.array([0.000628, 0.000628, 0.000729])
 """Of the uSPa46 by its data sheet [N/count]; makes counts of what is in newtons."""
+OLD, NEW = VERSIONS = ("1.7", "1.8")
+"""Of the server that can be acted."""
 WHOLE_HAND = "XR23AHRCPP"
 MODELS = {"uskin-curved": "uSCuAH", "uskin-4x4": "uSPa44", "uskin-4x6": "uSPa46"}
 """Models of the built-in sensors; others go by the name of the sensor."""
@@ -25,13 +26,6 @@ NOISE, SPREAD, N_RESTS = 2, 250, 64
 """Of taxels that no recording has: from sample to sample, and from taxel to taxel [count]."""
 
 Samples = Mapping[str, npt.NDArray[Any]]
-
-
-class Version(StrEnum):
-    """Of the server that is acted."""
-
-    OLD = "1.7"
-    NEW = "1.8"
 
 
 class Encoder:
@@ -53,7 +47,8 @@ class Encoder:
         modules: by the server's number, those that it consists of.
 
     Raises:
-        ValueError: `whole_hand` is asked for and a module is none of the hand's.
+        ValueError: there is no such version, or `whole_hand` is asked for and a module is none
+            of the hand's.
 
     Example:
         >>> from holdfast.sensors import sensor
@@ -67,10 +62,12 @@ class Encoder:
         self,
         sensors: Mapping[str, Sensor],
         *,
-        version: str = Version.NEW,
+        version: str = NEW,
         whole_hand: bool = False,
     ) -> None:
-        self._version = Version(version)
+        if version not in VERSIONS:
+            raise ValueError(f"version {' or '.join(VERSIONS)} expected, {version!r} given")
+        self._version = version
         allegro = hand("allegro-uskin")
         if whole_hand:
             _check_modules(sensors, allegro)
@@ -92,7 +89,7 @@ class Encoder:
 
     def welcome(self) -> bytes:
         """What a client is told first."""
-        version = {"version": VERSION_TEXT} if self._version is Version.NEW else {}
+        version = {"version": VERSION_TEXT} if self._version == NEW else {}
         return msgspec.json.encode({"message": "Welcome", **version})
 
     def packet(self, samples: Samples, time: float, sent: float) -> bytes:
@@ -113,7 +110,7 @@ class Encoder:
                 told[str(number)] = self._sensor(number, part, *readings, constant, time)
         top: dict[str, Any] = {"message": self._counter, "time": time, "sensors": len(told)}
         self._counter = (self._counter + 1) % COUNTER
-        if self._version is Version.OLD:
+        if self._version == OLD:
             return msgspec.json.encode(top | told)
         top |= {"type": "routine", "version": VERSION_TEXT}
         return msgspec.json.encode(top | told | {"sendtime": sent})
@@ -130,7 +127,7 @@ class Encoder:
         flat = counts.ravel()
         data = flat.astype(">u2").tobytes().hex(",", 2).upper()
         calibrated = None if newtons is None else newtons.ravel().tolist()
-        if self._version is Version.OLD:
+        if self._version == OLD:
             return {
                 "data": data,
                 "sensor": str(number),
