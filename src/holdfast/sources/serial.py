@@ -250,8 +250,8 @@ def _modules(address: Address, n_mags: int, kind: Sensor) -> tuple[str, ...]:
             f"of {kind.name} there are {n_modules}"
         )
     names = tuple(given.get(k, f"finger{k}") for k in range(1, n_modules + 1))
-    if len(set(names)) < n_modules:
-        raise ValueError(f"{address.text}: two fingers would be called {given}")
+    if twice := sorted({name for name in names if names.count(name) > 1}):
+        raise ValueError(f"{address.text}: two fingers would be called {twice[0]}")
     return names
 
 

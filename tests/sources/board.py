@@ -1,0 +1,63 @@
+"""A board of magnetometers at a pseudo terminal, as if it were plugged in."""
+
+import os
+import threading
+import tty
+
+import numpy as np
+
+
+def packet(sample, temperature=25.0):
+    """A binary packet of a sample (n_mags, 3)."""
+    rows = np.column_stack([np.full(len(sample), temperature), sample])
+    return rows.astype("<f4").tobytes() + b"\r\n"
+
+
+def some(n, n_mags=5, seed=0):
+    """(n, n_mags, 3) readings."""
+    rng = np.random.default_rng(seed)
+    return rng.normal(0, 300, (n, n_mags, 3)).astype(np.float32)
+
+
+class Board:
+    """Sends what it is told to; its port is a path that stays when it is plugged in again."""
+
+    def __init__(self, folder):
+        self.path = folder / "ttyACM0"
+        self._stop = threading.Event()
+        self._thread = None
+        self.plug()
+
+    def plug(self):
+        self._master, self._slave = os.openpty()
+        tty.setraw(self._slave)
+        self.path.symlink_to(os.ttyname(self._slave))
+
+    def unplug(self):
+        self.hush()
+        self.path.unlink()
+        os.close(self._slave)
+        os.close(self._master)
+
+    def send(self, *parts):
+        for part in parts:
+            os.write(self._master, part)
+
+    def keep_sending(self, parts, period=0.005):
+        """Sends each part, one after the other, until it is hushed."""
+
+        def work():
+            for part in parts:
+                self.send(part)
+                if self._stop.wait(period):
+                    return
+
+        self._stop.clear()
+        self._thread = threading.Thread(target=work)
+        self._thread.start()
+
+    def hush(self):
+        self._stop.set()
+        if self._thread is not None:
+            self._thread.join()
+            self._thread = None
