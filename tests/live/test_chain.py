@@ -1,0 +1,114 @@
+"""The whole chain on loopback: a recording played as a XELA server, judged, shown."""
+
+import json
+import signal
+import subprocess
+import sys
+import threading
+import urllib.request
+from contextlib import contextmanager
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from holdfast.detector import detect
+from holdfast.live.judge import Judge
+from holdfast.sources import open_source
+
+from . import build
+
+HOLDFAST = Path(sys.executable).with_name("holdfast")
+PATIENCE = 120.0
+
+
+@contextmanager
+def verb(*words):
+    """A verb in a process of its own, ended as Ctrl-C does; gives what it says in JSON first."""
+    process = subprocess.Popen(
+        [HOLDFAST, *map(str, words), "--json"],
+        stdout=subprocess.PIPE,
+        stderr=subprocess.PIPE,
+        text=True,
+    )
+    late = threading.Timer(PATIENCE, process.kill)
+    late.start()
+    try:
+        line = process.stdout.readline()
+        if not line:
+            pytest.fail(f"holdfast {words[0]} said nothing: {process.stderr.read()}")
+        yield json.loads(line)
+    finally:
+        process.send_signal(signal.SIGINT)
+        process.communicate()
+        late.cancel()
+
+
+def address(told):
+    return f"xela://{told['uri'].removeprefix('ws://').removeprefix('xela://')}"
+
+
+FINGERS = ("thumb", "index", "middle", "ring")
+NAMES = "?fingers=1:thumb,2:index,3:middle,4:ring"
+
+
+@pytest.mark.parametrize(
+    ("words", "names"), [((), NAMES), (("--whole-hand", "--version", "1.7"), "")]
+)
+def test_decisions_over_the_wire_are_those_of_the_recording(tmp_path, words, names):
+    path, recording = build.grasp_file(tmp_path, fingers=FINGERS)
+    model = build.model()
+    with (
+        verb("play", path, "--once", "--speed", 3, "--port", 0, *words) as told,
+        open_source(address(told) + names) as source,
+    ):
+        judge = Judge(model, source.sensors)
+        decisions = []
+        for arrival in source:
+            decisions += judge.take(arrival)
+            if len(decisions) == recording.modules["thumb"].n_samples:
+                break
+    assert arrival.n_lost == 0
+    expected = detect(model, recording)
+    assert tuple(judge.fingers) == FINGERS
+    for name, trace in expected.fingers.items():
+        mine = [decision.estimate.fingers[name] for decision in decisions]
+        assert [one.state.code for one in mine] == trace.state.tolist()
+        probabilities = [one.stable_probability for one in mine]
+        np.testing.assert_array_equal(probabilities, trace.stable_probability)
+        np.testing.assert_array_equal([one.instability for one in mine], trace.instability)
+        np.testing.assert_array_equal([one.force for one in mine], trace.force)
+
+
+def test_the_page_shows_what_a_server_sends(tmp_path):
+    sync_api = pytest.importorskip("playwright.sync_api", reason="needs playwright")
+    chromium = Path("/usr/bin/chromium")
+    if not chromium.exists():
+        pytest.skip("needs Debian's chromium")
+    path, _ = build.grasp_file(tmp_path, fingers=FINGERS)
+    with (
+        verb("play", path, "--port", 0, "--whole-hand") as player,
+        verb("serve", build.TWIN, address(player), "--port", 0, "--record-to", tmp_path) as server,
+        sync_api.sync_playwright() as playwright,
+    ):
+        browser = playwright.chromium.launch(
+            executable_path=str(chromium),
+            args=["--no-sandbox", "--disable-gpu", "--disable-background-networking"],
+        )
+        try:
+            page = browser.new_page(viewport={"width": 1280, "height": 720})
+            complaints = []
+            page.on("console", lambda m: complaints.append(m.text) if m.type == "error" else None)
+            page.on("pageerror", lambda error: complaints.append(str(error)))
+            page.goto(server["url"])
+            for word in ("STABLE", "UNSTABLE"):
+                page.get_by_text(word, exact=True).first.wait_for(timeout=60_000)
+            picture = page.screenshot(path=str(tmp_path / "page.png"))
+            assert len(picture) > 20_000
+            with urllib.request.urlopen(f"{server['url']}api/v1/state") as answer:
+                state = json.load(answer)
+            assert set(state["fingers"]) == set(FINGERS)
+            assert state["health"]["n_lost"] == 0
+            assert complaints == []
+        finally:
+            browser.close()
