@@ -4,9 +4,10 @@ import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
-from .build import NEW, OLD, WELCOME, sensor, text
 
 from holdfast.sources.xela.packet import Refusal, read_packet, read_sensor
+
+from .build import NEW, OLD, WELCOME, sensor, text
 
 
 def readings(part, *, calibrated=False):
@@ -17,9 +18,9 @@ def readings(part, *, calibrated=False):
 
 def test_real_packets_say_what_their_integers_say(real_packets):
     assert len(real_packets) == 7
-    for given in real_packets.values():
-        told = json.loads(given)
-        packet = read_packet(given)
+    for whole in real_packets.values():
+        told = json.loads(whole)
+        packet = read_packet(whole)
         assert (packet.counter, packet.time) == (told["message"], told["time"])
         assert packet.version == told["version"]
         assert sorted(packet.sensors) == list(range(1, told["sensors"] + 1))
