@@ -1,0 +1,5 @@
+"""Rules that propose labels from evidence, for a person to check."""
+
+
+
+
