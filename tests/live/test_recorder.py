@@ -18,7 +18,7 @@ from holdfast.io.mcap_writer import RecordingWriter
 from holdfast.live import recorder as module
 from holdfast.live.recorder import Recorder
 from holdfast.sensors import sensor
-from holdfast.sources import Arrival
+from holdfast.sources import Arrival, open_source
 from holdfast.sources.source import word
 
 ANYSKIN = sensor("anyskin")
@@ -151,6 +151,21 @@ def test_faults_and_notices_become_markers(path):
         (3.0, "fault index packet_gap"),
     )
     assert recorder.status.faults == {Fault.PACKET_GAP: 3, Fault.LATE: 1}
+
+
+def test_markers_of_a_recording_stay_markers_when_it_is_recorded_again(path):
+    first = path.with_name("first.mcap")
+    with Recorder(first, TWO) as recorder:
+        for k in range(100):
+            recorder.put(arrival(k))
+        for time, text in ((0.1, "closing"), (0.5, "mark"), (0.51, "mark"), (0.9, "note: a")):
+            recorder.mark(text, time)
+    with open_source(str(first), speed=0) as source, Recorder(path, TWO) as recorder:
+        for one in source:
+            recorder.put(one, patient=True)
+    got, want = load_recording(path).markers, load_recording(first).markers
+    assert [text for _, text in got] == [text for _, text in want]
+    np.testing.assert_allclose([t for t, _ in got], [t for t, _ in want], atol=0.011)
 
 
 def test_the_faults_of_the_last_second_are_there_now(path):

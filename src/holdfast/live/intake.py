@@ -26,6 +26,8 @@ MOST_MARKERS = 2048
 MOST_TEXT = 200
 """Longer markers are cut."""
 
+_MARKER = "marker: "
+"""How a recording that is played tells of its own markers."""
 _N_STEPS = 32
 _N_STEPS_LEAST = 4
 
@@ -122,7 +124,10 @@ class Intake:
         if arrival.faults or self._there:
             self._take_faults(arrival)
         for notice in arrival.notices:
-            self.say(f"note: {notice}", arrival.received)
+            if notice.startswith(_MARKER):
+                self.mark(math.nan, notice.removeprefix(_MARKER))
+            else:
+                self.say(f"note: {notice}", arrival.received)
 
     def mark(self, time: float, text: str) -> None:
         """Takes a marker; where the time is not finite, at the newest sample."""
