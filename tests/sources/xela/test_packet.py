@@ -158,6 +158,7 @@ def test_packets_that_make_no_sense(given, why):
         ({"data": "0001,0002,0003", "integer": [1, 2, 3, 4]}, "data and integer differ"),
         ({"taxels": "1"}, "Expected `int | null`, got `str`"),
         ({"model": 5}, "Expected `str`, got `int`"),
+        ({"model": "x" * 65}, "Expected `str` of length <= 64"),
         ({"time": "now"}, "Expected `float | null`, got `str`"),
         ({"time": 1e300}, "its time is thousands of years away"),
         ([], "Expected `object`, got `array`"),

@@ -3,7 +3,7 @@
 import re
 from array import array
 from collections.abc import Mapping
-from typing import Any, NamedTuple
+from typing import Annotated, Any, NamedTuple
 
 import msgspec
 import numpy as np
@@ -17,8 +17,13 @@ ROUTINE = "routine"
 """The type of packets with samples, where a packet has a type (from 1.8 on)."""
 
 _NOT_A_NUMBER = re.compile(rb"-?\b(?:NaN|Infinity)\b")
+_NAME = 64
+"""Letters that the name of a model or version has at the most."""
 _WORDS = 160
 """Letters of the decoder's complaint that are passed on."""
+
+
+Model = Annotated[str, msgspec.Meta(max_length=_NAME)]
 
 
 class Refusal(ValueError):  # noqa: N818 (it says what was done with the packet)
@@ -46,7 +51,7 @@ class Counts(msgspec.Struct):
 
     taxels: int | None = None
     time: float | None = None
-    model: str = ""
+    model: Model = ""
     data: str | None = None
     integer: list[int] | None = None
 
@@ -69,7 +74,7 @@ class Calibrated(msgspec.Struct):
 
     taxels: int | None = None
     time: float | None = None
-    model: str = ""
+    model: Model = ""
     calibrated: list[float | None] | None = None
 
     def readings(self) -> npt.NDArray[np.float64] | None:
@@ -112,7 +117,8 @@ def read_packet(text: str | bytes) -> Packet | None:
     time = _value(fields, "time")
     version = _value(fields, "version")
     ordered = dict(sorted(sensors.items()))
-    return Packet(counter, _stamp(time), version if isinstance(version, str) else "", ordered)
+    known = version[:_NAME] if isinstance(version, str) else ""
+    return Packet(counter, _stamp(time), known, ordered)
 
 
 def read_sensor(raw: msgspec.Raw, *, calibrated: bool) -> Counts | Calibrated:
