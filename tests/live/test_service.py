@@ -11,10 +11,10 @@ from aiohttp import ClientSession, WSServerHandshakeError, web
 from holdfast.detector import detect
 from holdfast.io import load_recording
 from holdfast.live import schema
-from holdfast.live.guard import Guard
 from holdfast.live.judge import Judge
 from holdfast.live.service import Service
 from holdfast.live.session import Session
+from holdfast.web.guard import Guard
 
 from . import build
 

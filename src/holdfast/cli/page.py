@@ -8,11 +8,11 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
-    from holdfast.live.guard import Guard
     from holdfast.live.judge import Judge
     from holdfast.live.session import Listener
     from holdfast.model import Model
     from holdfast.sources import Source
+    from holdfast.web.guard import Guard
 
 HOST, PORT = "127.0.0.1", 8080
 
@@ -46,12 +46,13 @@ def show_page(
 
     Raises:
         OutputError: the address cannot be listened at.
+        Exception: that which made the session fail.
     """
-    from holdfast.live.guard import Guard
     from holdfast.live.judge import Judge
-    from holdfast.live.server import run_server
     from holdfast.live.service import Service
     from holdfast.live.session import Session
+    from holdfast.web.guard import Guard
+    from holdfast.web.server import run_server
 
     session = Session(source, judge or Judge(model, source.sensors))
     service = Service(session, model, guard or Guard(host), folder)
@@ -59,9 +60,14 @@ def show_page(
         session.listen(listener)
     session.start()
     try:
-        run_server(service.app, session, host, port, tell, stay=stay)
+        run_server(
+            service.app, host, port, tell,
+            lambda: session.ended and not (stay and session.failure is None),
+        )  # fmt: skip
     finally:
         session.stop()
+    if session.failure is not None:
+        raise session.failure
 
 
 def open_page(url: str) -> bool:

@@ -66,8 +66,8 @@ def serve(
       holdfast serve model.json xela://auto --ros2
       holdfast serve model.json grasp.parquet --host 0.0.0.0 --token SECRET
     """
-    from holdfast.live.guard import Guard
     from holdfast.sources import open_source
+    from holdfast.web.guard import Guard
 
     guard = Guard(host, token)
     wanted = debounced(model, debounce, hysteresis)

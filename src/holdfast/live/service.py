@@ -14,10 +14,10 @@ from aiohttp import WSMsgType, web
 from holdfast.errors import HoldfastError
 from holdfast.live import schema
 from holdfast.live.feed import Feed, finger_of, hello, recording_info
-from holdfast.live.guard import Guard
 from holdfast.live.recordings import Recordings
 from holdfast.live.session import Said, Session
 from holdfast.model import Model
+from holdfast.web.guard import Guard
 
 DOCUMENTS_PER_SECOND = 20.0
 """How often readers are told how things stand [Hz]."""

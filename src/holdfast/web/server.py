@@ -8,50 +8,42 @@ from contextlib import suppress
 from aiohttp import web
 
 from holdfast.errors import OutputError
-from holdfast.live.session import Session
 
 LOOK_EVERY = 0.2
-"""How often the session is looked after [s]."""
+"""How often it is asked whether all is over [s]."""
 SHUTDOWN = 1.0
 """How long readers have to leave [s]."""
 
 
 def run_server(
     app: web.Application,
-    session: Session,
     host: str,
     port: int,
     tell: Callable[[str], None],
-    *,
-    stay: bool = True,
+    over: Callable[[], bool] = lambda: False,
 ) -> None:
     """Serves until Ctrl-C or SIGTERM, and then ends in order.
 
     Args:
         app: what is served.
-        session: behind it.
         host: address to listen at.
         port: 0 for any that is free.
         tell: is given the address of the page once it can be opened.
-        stay: go on serving when the session has ended well.
+        over: whether there is nothing to serve any more; asked a few times a second.
 
     Raises:
         OutputError: the address cannot be listened at.
-        Exception: that which made the session fail.
     """
     with suppress(KeyboardInterrupt):
-        asyncio.run(_serve(app, session, host, port, tell, stay))
-    if session.failure is not None:
-        raise session.failure
+        asyncio.run(_serve(app, host, port, tell, over))
 
 
 async def _serve(
     app: web.Application,
-    session: Session,
     host: str,
     port: int,
     tell: Callable[[str], None],
-    stay: bool,
+    over: Callable[[], bool],
 ) -> None:
     runner = web.AppRunner(app, access_log=None, shutdown_timeout=SHUTDOWN)
     await runner.setup()
@@ -60,9 +52,7 @@ async def _serve(
         tell(_address(runner, host))
         stopped = asyncio.Event()
         asyncio.get_running_loop().add_signal_handler(signal.SIGTERM, stopped.set)
-        while not stopped.is_set() and (stay or not session.ended):
-            if session.failure is not None:
-                break
+        while not stopped.is_set() and not over():
             with suppress(TimeoutError):
                 await asyncio.wait_for(stopped.wait(), LOOK_EVERY)
     finally:

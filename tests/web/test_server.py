@@ -1,0 +1,64 @@
+import os
+import signal
+import socket
+import threading
+import urllib.request
+
+import pytest
+from aiohttp import web
+
+from holdfast.errors import OutputError
+from holdfast.web.server import run_server
+
+
+def app():
+    async def hello(_):
+        return web.Response(text="hello")
+
+    made = web.Application()
+    made.router.add_get("/", hello)
+    return made
+
+
+def test_serves_until_all_is_over():
+    found = []
+
+    def tell(url):
+        def ask():
+            with urllib.request.urlopen(url) as answer:
+                found.append(answer.read())
+
+        threading.Thread(target=ask).start()
+
+    run_server(app(), "127.0.0.1", 0, tell, lambda: bool(found))
+    assert found == [b"hello"]
+
+
+@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
+def test_ends_in_order_when_told_to(number):
+    told = []
+
+    def tell(url):
+        told.append(url)
+        threading.Timer(0.1, os.kill, (os.getpid(), number)).start()
+
+    run_server(app(), "127.0.0.1", 0, tell)
+    assert told[0].startswith("http://127.0.0.1:")
+
+
+def test_a_port_in_use():
+    with socket.socket() as taken:
+        taken.bind(("127.0.0.1", 0))
+        taken.listen()
+        port = taken.getsockname()[1]
+        text = (
+            rf"^cannot listen at 127\.0\.0\.1:{port} \(it is in use\); --port 0 finds a free port$"
+        )
+        with pytest.raises(OutputError, match=text):
+            run_server(app(), "127.0.0.1", port, print)
+
+
+@pytest.mark.parametrize("port", [70000, -1])
+def test_a_port_that_is_none(port):
+    with pytest.raises(OutputError, match=r"^cannot listen at 127\.0\.0\.1:"):
+        run_server(app(), "127.0.0.1", port, print)
