@@ -3,10 +3,11 @@
 import time
 from abc import ABC, abstractmethod
 from collections import deque
+from collections.abc import Callable
 from typing import NamedTuple
 
 from holdfast.errors import SourceError
-from holdfast.io.ros_messages import Message, Unpacker
+from holdfast.io.ros_messages import Message
 from holdfast.sensors import Sensor, built_in_sensors, sensor
 from holdfast.sensors.values import Unit
 from holdfast.sources.ros.translator import Translator
@@ -25,18 +26,22 @@ BACKOFF, LONGEST_BACKOFF = 0.5, 2.0
 """Before the first and before later attempts to mend a link [s]; it doubles."""
 
 
+class Stranger(ValueError):  # noqa: N818 (it names what came, not what broke)
+    """A message is of a type that nobody knows; its text says so."""
+
+
 class Packet(NamedTuple):
     """A message as it came.
 
     Attributes:
         data: its bytes.
         received: when it was in hand, by `time.monotonic` [s].
-        unpack: takes readings out of it.
+        unpack: takes readings out of it; raises a `ValueError` where there are none.
     """
 
     data: bytes
     received: float
-    unpack: Unpacker
+    unpack: Callable[[bytes], list[Message]]
 
 
 class Link(ABC):
@@ -145,6 +150,8 @@ class TopicSource(Source):
                 continue
             try:
                 messages = [m for m in packet.unpack(packet.data) if _has_taxels(m)]
+            except Stranger as why:
+                raise SourceError(str(why)) from why
             except ValueError as why:
                 refusal = why
                 continue

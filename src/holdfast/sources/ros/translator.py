@@ -83,7 +83,9 @@ class Translator:
         for number, message in found.items():
             self._check_readings(number, message)
         self.skins = self._skins(found)
-        self._clock = next((c for c in _CLOCKS if any(map(c, found.values()))), None)
+        self._clock = next(
+            (c for c in _CLOCKS if any(c(message) is not None for message in found.values())), None
+        )
         self._devices = {number: _Device() for number in self.skins}
 
     def take(self, messages: Iterable[Message], received: float) -> list[Arrival]:
