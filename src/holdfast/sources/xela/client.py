@@ -57,6 +57,7 @@ class XelaSource(Source):
     ) -> None:
         self.name = name
         self._places = places
+        self._place = places[0]
         self._options = (names, calibrated, sensor)
         self._decoder = self._new_decoder()
         self._connection: ClientConnection | None = None
@@ -115,9 +116,12 @@ class XelaSource(Source):
         failures: list[Exception] = []
         for place in self._places:
             try:
-                return _connect(place)
+                connection = _connect(place)
             except (OSError, WebSocketException) as failure:
                 failures.append(failure)
+            else:
+                self._place = place
+                return connection
         raise SourceError(self._unreachable(failures)) from failures[-1]
 
     def _first(self) -> tuple[bytes, float]:
@@ -135,11 +139,11 @@ class XelaSource(Source):
             except TimeoutError:
                 break
             except ConnectionClosed as why:
-                raise SourceError(f"{self._where} closed the connection: {why}") from why
+                raise SourceError(f"{self._place} closed the connection: {why}") from why
         if refusal is not None:
-            raise SourceError(f"what {self._where} sends makes no sense: {refusal}") from refusal
+            raise SourceError(f"what {self._place} sends makes no sense: {refusal}") from refusal
         raise SourceError(
-            f"connected to {self._where}, but no samples came in {PATIENCE:g} s: is it a XELA "
+            f"connected to {self._place}, but no samples came in {PATIENCE:g} s: is it a XELA "
             "server, with its sensors plugged in?"
         )
 
@@ -209,14 +213,6 @@ class XelaSource(Source):
         keepalive = getattr(connection, "keepalive_thread", None)
         if keepalive is not None:
             keepalive.join(CONNECT)
-
-    @property
-    def _where(self) -> str:
-        if self._connection is None:
-            return " or ".join(map(str, self._places))
-        with suppress(OSError):
-            return str(Place(*self._connection.remote_address[:2]))
-        return self.name
 
     def _unreachable(self, failures: list[Exception]) -> str:
         where = " or ".join(map(str, self._places))
