@@ -12,6 +12,7 @@ from holdfast.features import Tare, fingertip_force
 from holdfast.features.tare import TareArgument
 from holdfast.labelling.rules.masks import (
     BLIP,
+    MERGE,
     Mask,
     filled,
     known_between,
@@ -70,24 +71,27 @@ class FingerForce:
         if self.threshold is None:
             return self.known
         touching = self.known & (self.amplitude > max(self.threshold, SEEN * self._grip))
-        return steady(touching & ~self._creep(), n_samples(BLIP, self.period))
+        return steady(touching & ~self._creep(), self._n(BLIP))
 
     @cached_property
     def _grip(self) -> float:
-        """The usual F_a over the threshold in the whole recording."""
-        over = self.amplitude[self.known & (self.amplitude > (self.threshold or 0.0))]
-        return float(np.median(over)) if len(over) else 0.0
+        """The largest F_a that lasts, in the whole recording: a knock does not."""
+        lasting = minimum_filter1d(np.where(self.known, self.amplitude, 0.0), self._n(MERGE))
+        return float(lasting.max())
+
+    def _n(self, duration: float) -> int:
+        return n_samples(duration, self.period)
 
     def _creep(self) -> Mask:
         """Where a finger that was loaded only gives back what its skin kept."""
         loaded = np.logical_or.accumulate(self.known & (self.amplitude > self._grip / 2))
         rate = np.abs(np.gradient(self.amplitude, self.period))
-        slow = smoothed(rate, n_samples(BLIP, self.period)) < CREEP_RATE * self._grip
+        slow = smoothed(rate, self._n(BLIP)) < CREEP_RATE * self._grip
         return np.asarray(loaded & slow & (self.amplitude < CREEP_LEVEL * self._grip))
 
     def change(self, window: float) -> Array:
         """(n,) by how much the force changes within a window about each instant."""
-        n = n_samples(window, self.period)
+        n = self._n(window)
         span = maximum_filter1d(self.force, n, axis=0) - minimum_filter1d(self.force, n, axis=0)
         return np.asarray(np.linalg.norm(span, axis=1))
 
