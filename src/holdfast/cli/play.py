@@ -37,7 +37,7 @@ def play(
         typer.Option("--json", help="Print where it listens, and at the end how much it sent."),
     ] = False,
 ) -> None:
-    """Acts as a XELA server, for a recording or the twin.
+    """Acts as a XELA server for a recording or the twin.
 
     Programs that read xela_server read this instead: the same packets over a WebSocket, at the
     pace of the recording, whose times they carry, shifted to now. Fingertips become the

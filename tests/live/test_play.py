@@ -1,0 +1,280 @@
+import asyncio
+import json
+import socket
+import threading
+import time
+from contextlib import ExitStack, contextmanager
+
+import numpy as np
+import pytest
+from websockets.sync.client import connect
+
+from holdfast.errors import OutputError
+from holdfast.live import play as module
+from holdfast.live.play import XelaServer
+from holdfast.sensors import hand, sensor
+from holdfast.sources import Arrival, Source, open_source
+from holdfast.sources.source import word
+from holdfast.sources.xela import client
+
+TIPS = dict.fromkeys(("thumb", "index", "middle", "ring"), sensor("uskin-curved"))
+WHOLE = {name: one.sensor for name, one in hand("allegro-uskin").modules.items()}
+PERIOD = 1 / 500
+PATIENCE = 20.0
+"""So long a test waits before it fails [s]."""
+
+
+class Made(Source):
+    """Samples out of a random generator, every 2 ms; so many, or without end."""
+
+    def __init__(self, sensors=TIPS, n=None, first=0):
+        self.sensors = sensors
+        self.n = n
+        self.k = first
+
+    def open(self):
+        self.sensors = dict(self.sensors)
+
+    @property
+    def ended(self):
+        return self.n is not None and self.k >= self.n
+
+    def read(self, timeout):
+        if self.ended:
+            return None
+        time.sleep(PERIOD)
+        self.k += 1
+        return Arrival(time_of(self.k - 1), samples_of(self.sensors, self.k - 1), time.monotonic())
+
+    def close(self):
+        pass
+
+
+def time_of(k):
+    return 3.0 + k * PERIOD
+
+
+def samples_of(sensors, k):
+    dice = np.random.default_rng(k)
+    return {
+        name: dice.integers(0, 65536, (one.n_taxels, 3), dtype=np.uint16)
+        for name, one in sensors.items()
+    }
+
+
+@pytest.fixture(autouse=True)
+def tidy():
+    """No thread is left behind."""
+    before = set(threading.enumerate())
+    yield
+    left = [thread for thread in threading.enumerate() if thread not in before]
+    for thread in left:
+        thread.join(PATIENCE)
+    assert not [thread for thread in left if thread.is_alive()]
+
+
+@contextmanager
+def played(source, **options):
+    with source, XelaServer(source, port=options.pop("port", 0), **options) as server:
+        yield server
+
+
+def taken(source, n):
+    """The next `n` arrivals with samples."""
+    arrivals = []
+    deadline = time.monotonic() + PATIENCE
+    while len(arrivals) < n and time.monotonic() < deadline:
+        arrival = source.read(0.1)
+        if arrival is not None and arrival.samples:
+            arrivals.append(arrival)
+    assert len(arrivals) == n
+    return arrivals
+
+
+def eventually(true):
+    deadline = time.monotonic() + PATIENCE
+    while not true() and time.monotonic() < deadline:
+        time.sleep(0.01)
+    return true()
+
+
+@pytest.mark.parametrize("version", ["1.7", "1.8"])
+@pytest.mark.parametrize("sensors", [TIPS, WHOLE], ids=["tips", "hand"])
+def test_a_client_receives_everything_in_order(version, sensors):
+    n = 200
+    with played(Made(sensors, n), version=version, wait=True) as server:
+        with open_source(server.uri) as source:
+            assert source.sensors == sensors
+            arrivals = taken(source, n)
+        assert server.wait(PATIENCE)
+    assert (server.n_packets, server.failure) == (n, None)
+    shift = arrivals[0].time - time_of(0)
+    assert abs(arrivals[0].time - time.time()) < 3600
+    for k, arrival in enumerate(arrivals):
+        assert arrival.time - shift == pytest.approx(time_of(k), abs=1e-6)
+        assert arrival.n_lost == arrival.n_refused == 0
+        expected = samples_of(sensors, k)
+        assert arrival.samples.keys() == expected.keys()
+        for name, readings in expected.items():
+            np.testing.assert_array_equal(arrival.samples[name], readings)
+    assert (np.diff([a.time for a in arrivals]) > 0).all()
+
+
+def test_fingertips_inside_a_hand():
+    with played(Made(), whole_hand=True) as server, open_source(server.uri) as source:
+        assert list(source.sensors) == list(WHOLE)
+        assert "?" not in server.uri
+        assert set(TIPS) < set(taken(source, 1)[0].samples)
+
+
+def test_several_clients_receive_the_same():
+    with played(Made()) as server, ExitStack() as stack:
+        sources = [stack.enter_context(open_source(server.uri)) for _ in range(3)]
+        assert eventually(lambda: server.n_clients == 3)
+        seen = [{a.time: a.samples["thumb"] for a in taken(one, 100)} for one in sources]
+    common = set(seen[0]) & set(seen[1]) & set(seen[2])
+    assert len(common) > 20
+    for when in common:
+        for one in seen[1:]:
+            np.testing.assert_array_equal(one[when], seen[0][when])
+
+
+def test_who_leaves_is_forgotten():
+    with played(Made()) as server:
+        with open_source(server.uri):
+            assert eventually(lambda: server.n_clients == 1)
+        assert eventually(lambda: server.n_clients == 0)
+
+
+def test_the_first_word_is_welcome_and_commands_do_nothing():
+    with played(Made()) as server:
+        with connect(server.uri.replace("xela", "ws").split("?")[0], compression=None) as one:
+            assert json.loads(one.recv())["message"] == "Welcome"
+            one.send("anything")
+            assert isinstance(json.loads(one.recv())["message"], int)
+        assert server.failure is None
+
+
+def test_waiting_for_the_first_client():
+    made = Made(n=10)
+    with played(made, wait=True) as server:
+        assert not server.wait(0.3)
+        assert made.k == 0
+        with open_source(server.uri) as source:
+            assert taken(source, 10)[0].time == pytest.approx(time.time(), abs=3600)
+        assert server.wait(PATIENCE)
+
+
+def test_without_waiting_it_ends_alone():
+    with played(Made(n=5)) as server:
+        assert server.wait(PATIENCE)
+    assert server.ended
+    assert server.n_packets == 5
+
+
+def test_word_without_samples_is_no_packet():
+    class Talks(Made):
+        def read(self, timeout):
+            self.k += 1
+            return word(0.0, "a notice") if self.k % 2 else super().read(timeout)
+
+    with played(Talks(n=20)) as server:
+        assert server.wait(PATIENCE)
+    assert 0 < server.n_packets < 20
+
+
+def test_a_client_that_does_not_read_is_dropped_and_holds_up_nobody(monkeypatch):
+    monkeypatch.setattr(module, "BACKLOG", 100_000)
+    with played(Made(WHOLE)) as server, socket.socket() as lazy:
+        lazy.setsockopt(socket.SOL_SOCKET, socket.SO_RCVBUF, 4096)
+        lazy.connect(("127.0.0.1", int(server.uri.rsplit(":", maxsplit=1)[1])))
+        lazy.sendall(
+            b"GET / HTTP/1.1\r\nHost: x\r\nUpgrade: websocket\r\nConnection: Upgrade\r\n"
+            b"Sec-WebSocket-Key: AAAAAAAAAAAAAAAAAAAAAA==\r\nSec-WebSocket-Version: 13\r\n\r\n"
+        )
+        assert eventually(lambda: server.n_clients == 1)
+        with open_source(server.uri) as source:
+            assert eventually(lambda: server.n_clients == 2)
+            while server.n_clients == 2:
+                assert all(a.n_lost == 0 for a in taken(source, 10))
+
+
+def test_a_client_goes_on_after_a_restart(monkeypatch):
+    monkeypatch.setattr(client, "BACKOFF", 0.01)
+    monkeypatch.setattr(client, "LONGEST_BACKOFF", 0.05)
+    with ExitStack() as stack:
+        with played(Made()) as server:
+            source = stack.enter_context(open_source(server.uri))
+            port = int(server.uri.split("?")[0].rsplit(":", maxsplit=1)[1])
+            before = taken(source, 50)
+        with played(Made(first=1000), port=port):
+            after = taken(source, 300)
+    times = [a.time for a in before + after]
+    assert (np.diff(times) > 0).all()
+    assert not any(a.n_lost for a in after)
+    newest = after[-1].samples["ring"]
+    assert any((samples_of(TIPS, k)["ring"] == newest).all() for k in range(1000, 1600))
+
+
+def test_a_port_that_is_taken():
+    with socket.create_server(("127.0.0.1", 0)) as other:
+        port = other.getsockname()[1]
+        with pytest.raises(OutputError) as refusal, played(Made(), port=port):
+            pass
+    assert str(refusal.value) == (
+        f"cannot listen at 127.0.0.1:{port} (it is in use); --port 0 finds a free port"
+    )
+
+
+@pytest.mark.parametrize(("host", "port"), [("127.0.0.1", 70000), ("203.0.113.1", 0)])
+def test_an_address_that_there_is_not(host, port):
+    told = f"cannot listen at {host}:{port} "
+    with pytest.raises(OutputError, match=told), played(Made(), host=host, port=port):
+        pass
+
+
+def test_readings_that_are_no_counts_end_it():
+    class Newtons(Made):
+        def read(self, timeout):
+            arrival = super().read(timeout)
+            return arrival._replace(samples={"thumb": np.full((30, 3), -1.5)})
+
+    with played(Newtons()) as server:
+        assert server.wait(PATIENCE)
+    assert isinstance(server.failure, ValueError)
+    assert str(server.failure).startswith("thumb: readings from 0 to 65535 counts expected")
+
+
+@pytest.mark.parametrize(
+    ("host", "expected"),
+    [("127.0.0.1", "127.0.0.1"), ("0.0.0.0", "127.0.0.1"), ("::1", "[::1]"), ("::", "127.0.0.1")],
+)
+def test_by_which_it_is_found(host, expected):
+    with Made({"thumb": TIPS["thumb"]}) as source:
+        server = XelaServer(source, host=host, port=5001)
+        assert server.uri == f"xela://{expected}:5001?fingers=1:thumb"
+        assert not server.ended
+
+
+def test_the_end_waits_for_clients_that_are_behind(monkeypatch):
+    behind = [1]
+    monkeypatch.setattr(module, "_behind", lambda client: behind[0])
+    with played(Made(n=5), wait=True) as server, open_source(server.uri):
+        assert eventually(lambda: server.n_packets == 5)
+        assert not server.wait(0.3)
+        behind[0] = 0
+        assert server.wait(PATIENCE)
+
+
+def test_the_end_does_not_wait_for_ever(monkeypatch):
+    monkeypatch.setattr(module, "_behind", lambda client: 1)
+    monkeypatch.setattr(module, "FAREWELL", 0.1)
+    with played(Made(n=5), wait=True) as server, open_source(server.uri):
+        assert server.wait(PATIENCE)
+
+
+def test_nothing_is_left_of_the_loop():
+    with played(Made()) as server:
+        loop = server._loop
+        assert isinstance(loop, asyncio.AbstractEventLoop)
+    assert loop.is_closed()
