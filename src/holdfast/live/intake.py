@@ -206,4 +206,6 @@ def _as(readings: npt.NDArray[Any], number: np.dtype[Any] | None) -> npt.NDArray
         return None
     with np.errstate(invalid="ignore", over="ignore"):
         cast = readings.astype(number)
-    return cast if np.array_equal(cast, readings, equal_nan=number.kind == "f") else None
+        back = cast.astype(readings.dtype)  # comparing int64 with float64 rounds
+    same = all(np.array_equal(one, readings, equal_nan=number.kind == "f") for one in (cast, back))
+    return cast if same else None

@@ -1,0 +1,119 @@
+import math
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from holdfast.contact import Fault
+from holdfast.live import intake as module
+from holdfast.live.intake import Intake, Track, plain
+from holdfast.recordings import Tactile
+from holdfast.sensors import sensor
+from holdfast.sources import Arrival
+from holdfast.sources.source import word
+
+ANYSKIN = sensor("anyskin")
+TIMES = st.lists(st.floats(-1e9, 1e9) | st.sampled_from([math.nan, math.inf, -math.inf]))
+NUMBERS = ("uint8", "uint16", "int16", "int64", "float32", "float64", "bool")
+
+
+@given(TIMES, st.lists(st.booleans()))
+def test_times_of_a_track_increase_and_nothing_else_is_refused(times, drains):
+    track, kept, last = Track(ANYSKIN), [], -math.inf
+    for k, time in enumerate(times):
+        assert track.take(time, np.zeros((5, 3))) is (last < time < math.inf)
+        last = max(last, time) if math.isfinite(time) else last
+        if k < len(drains) and drains[k]:
+            kept += track.drain()[0].tolist()
+    kept += track.drain()[0].tolist()
+    assert np.all(np.diff(kept) > 0)
+    assert len(kept) == track.n_samples
+    assert set(kept) <= set(times)
+
+
+@given(
+    st.sampled_from(NUMBERS),
+    st.lists(st.tuples(st.sampled_from(NUMBERS), st.integers(-300, 70_000)), max_size=8),
+)
+def test_readings_keep_their_number_type_and_their_values(number, others):
+    track = Track(ANYSKIN)
+    track.take(0.0, np.ones((5, 3), number))
+    want = [np.ones((5, 3))]
+    for k, (other, value) in enumerate(others):
+        readings = np.full((5, 3), value).astype(other)
+        if track.take(1.0 + k, readings):
+            want.append(readings)
+        else:
+            assert not np.array_equal(readings.astype(number), readings)
+    _, readings = track.drain()
+    assert readings.dtype == number
+    np.testing.assert_array_equal(readings, want)
+
+
+def test_what_a_float_rounds_it_does_not_hold():
+    track = Track(ANYSKIN)
+    track.take(0.0, np.zeros((5, 3)))
+    assert track.take(1.0, np.full((5, 3), 2**53))
+    assert not track.take(2.0, np.full((5, 3), 2**53 + 1))
+
+
+@given(st.sets(st.integers(20, 200), max_size=20), st.lists(st.integers(0, 200), max_size=20))
+def test_gaps_are_those_of_the_recording_however_it_was_drained(missing, cuts):
+    track = Track(ANYSKIN)
+    times = [k / 40 for k in range(220) if k // 4 * 4 not in missing]  # four at a time
+    for k, time in enumerate(times):
+        track.take(time, np.zeros((5, 3)))
+        if k in cuts:
+            track.drain()
+    track.drain()
+    assert track.n_gaps == Tactile(ANYSKIN, times, np.zeros((len(times), 5, 3))).n_gaps
+
+
+def test_faults_last_until_an_arrival_clears_them():
+    sorted_ = Intake({"thumb": ANYSKIN, "index": ANYSKIN})
+    late, values = {"thumb": (Fault.LATE,)}, {"thumb": np.zeros((5, 3))}
+    told = []
+    for k, (samples, faults) in enumerate(
+        [
+            (values, late),  # begins
+            ({"index": values["thumb"]}, {}),  # says nothing of the thumb
+            (values, late),  # goes on
+            (values, {}),  # over
+            (values, late),  # begins again
+            ({}, {"thumb": ()}),  # over
+            ({}, late),  # begins again
+        ]
+    ):
+        sorted_.take(Arrival(10.0 * k, samples, 10.0 * k, faults))
+        told.append([text for _, text in sorted_.drain_markers()])
+    begins = ["fault thumb late"]
+    assert told == [begins, [], [], [], begins, [], begins]
+    assert sorted_.faults == {Fault.LATE: 4}
+
+
+def test_a_device_that_babbles_fills_no_memory(monkeypatch):
+    monkeypatch.setattr(module, "MOST_MARKERS", 500)
+    babbled = Intake({"thumb": ANYSKIN})
+    for k in range(10_000):
+        babbled.take(word(0.01 * k, f"noise {k}", n_refused=1))
+    assert babbled.n_refused == 10_000
+    assert len(babbled._said) <= module.MOST_WORDS
+    assert babbled.drain_markers() == []  # before the first sample
+    babbled.take(Arrival(0.0, {"thumb": np.zeros((5, 3))}, 200.0))
+    assert len(babbled.drain_markers()) == 500
+
+
+@pytest.mark.parametrize(
+    ("text", "want"),
+    [
+        ("a\n b\t", "a b"),
+        ("\x1b[31mred\x00", "?[31mred?"),
+        ("\ud800", "?"),
+        ("schließt 閉", "schließt 閉"),
+        ("x" * 300, "x" * 200),
+    ],
+)
+def test_texts_are_made_plain(text, want):
+    assert plain(text) == want
+    plain(text).encode()
