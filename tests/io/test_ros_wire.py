@@ -6,70 +6,11 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from holdfast.io.ros_wire import NUMBERS, Decoder, Field, parse_definition
+from holdfast.io.ros_wire import Decoder, Field, parse_definition
 
 pytest.importorskip("rosbags", reason="rosbags is not installed")
 
-from sources.ros_build import store
-
-INNER = "bool flag\nstring name\nfloat64[2] pair\n"
-TEXT = "\n".join(f"{kind} a_{kind}\n{kind}[] many_{kind}" for kind in NUMBERS if kind != "byte")
-OUTER = f"uint8 X=3\nstring S=a # b\n{TEXT}\nInner inner\nInner[] inners\nstring[] words\n"
-ROS = pytest.mark.parametrize("ros2", [False, True], ids=["ros1", "ros2"])
-
-
-def number_of(kind, draw):
-    dtype = np.dtype(NUMBERS[kind])
-    if kind == "bool":
-        return draw(st.booleans())
-    if dtype.kind == "f":
-        return draw(st.floats(allow_nan=False, width=8 * dtype.itemsize))
-    limits = np.iinfo(dtype)
-    return draw(st.integers(int(limits.min), int(limits.max)))
-
-
-@st.composite
-def values(draw):
-    """Of all fields of OUTER, as dictionaries."""
-    words = st.text(st.characters(codec="utf-8", exclude_characters="\x00"), max_size=5)
-
-    def inner():
-        pair = [draw(st.floats(allow_nan=False)) for _ in range(2)]
-        return {"flag": draw(st.booleans()), "name": draw(words), "pair": pair}
-
-    fields = {}
-    for kind in NUMBERS:
-        if kind != "byte":
-            fields[f"a_{kind}"] = number_of(kind, draw)
-            n = draw(st.integers(0, 3))
-            fields[f"many_{kind}"] = [number_of(kind, draw) for _ in range(n)]
-    inners = [inner() for _ in range(draw(st.integers(0, 2)))]
-    return fields | {"inner": inner(), "inners": inners, "words": draw(st.lists(words, max_size=3))}
-
-
-def message_of(types, values):
-    def inner(one):
-        return types.types["p/msg/Inner"](one["flag"], one["name"], np.array(one["pair"]))
-
-    fields = {
-        name: np.array(
-            value,
-            NUMBERS[name[5:]].replace("u1", "?") if name == "many_bool" else NUMBERS[name[5:]],
-        )
-        if name.startswith("many_")
-        else value
-        for name, value in values.items()
-    }
-    fields |= {"inner": inner(values["inner"]), "inners": [inner(x) for x in values["inners"]]}
-    return types.types["p/msg/Outer"](**fields)
-
-
-def plain(value):
-    if isinstance(value, dict):
-        return {name: plain(item) for name, item in value.items()}
-    if isinstance(value, list):
-        return [plain(item) for item in value]
-    return value.tolist() if isinstance(value, np.ndarray) else value
+from sources.ros_build import INNER, OUTER, message_of, plain, store, values
 
 
 @pytest.fixture(scope="module", params=[False, True], ids=["ros1", "ros2"])

@@ -1,7 +1,10 @@
 """Messages for the tests, written by rosbags: a program that knows nothing of ours."""
 
 import numpy as np
+from hypothesis import strategies as st
 from rosbags.typesys import Stores, get_types_from_msg, get_typestore
+
+from holdfast.io.ros_wire import NUMBERS
 
 SENSOR_FULL = """uint32 message
 float64 time
@@ -115,3 +118,62 @@ def sensor_state(types, package, tus, stamp, forces, *, ros2):
 
 def counts(n_taxels, seed=0):
     return np.random.default_rng(seed).integers(0, 65536, (n_taxels, 3)).astype(np.uint16)
+
+
+INNER = "bool flag\nstring name\nfloat64[2] pair\n"
+TEXT = "\n".join(f"{kind} a_{kind}\n{kind}[] many_{kind}" for kind in NUMBERS if kind != "byte")
+OUTER = f"uint8 X=3\nstring S=a # b\n{TEXT}\nInner inner\nInner[] inners\nstring[] words\n"
+
+
+def number_of(kind, draw):
+    dtype = np.dtype(NUMBERS[kind])
+    if kind == "bool":
+        return draw(st.booleans())
+    if dtype.kind == "f":
+        return draw(st.floats(allow_nan=False, width=8 * dtype.itemsize))
+    limits = np.iinfo(dtype)
+    return draw(st.integers(int(limits.min), int(limits.max)))
+
+
+@st.composite
+def values(draw):
+    """Of all fields of OUTER, as dictionaries."""
+    words = st.text(st.characters(codec="utf-8", exclude_characters="\x00"), max_size=5)
+
+    def inner():
+        pair = [draw(st.floats(allow_nan=False)) for _ in range(2)]
+        return {"flag": draw(st.booleans()), "name": draw(words), "pair": pair}
+
+    fields = {}
+    for kind in NUMBERS:
+        if kind != "byte":
+            fields[f"a_{kind}"] = number_of(kind, draw)
+            n = draw(st.integers(0, 3))
+            fields[f"many_{kind}"] = [number_of(kind, draw) for _ in range(n)]
+    inners = [inner() for _ in range(draw(st.integers(0, 2)))]
+    return fields | {"inner": inner(), "inners": inners, "words": draw(st.lists(words, max_size=3))}
+
+
+def message_of(types, values):
+    def inner(one):
+        return types.types["p/msg/Inner"](one["flag"], one["name"], np.array(one["pair"]))
+
+    fields = {
+        name: np.array(
+            value,
+            NUMBERS[name[5:]].replace("u1", "?") if name == "many_bool" else NUMBERS[name[5:]],
+        )
+        if name.startswith("many_")
+        else value
+        for name, value in values.items()
+    }
+    fields |= {"inner": inner(values["inner"]), "inners": [inner(x) for x in values["inners"]]}
+    return types.types["p/msg/Outer"](**fields)
+
+
+def plain(value):
+    if isinstance(value, dict):
+        return {name: plain(item) for name, item in value.items()}
+    if isinstance(value, list):
+        return [plain(item) for item in value]
+    return value.tolist() if isinstance(value, np.ndarray) else value
