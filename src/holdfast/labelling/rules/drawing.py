@@ -52,6 +52,10 @@ class Drawing:
         self.causes[mask] = _CAUSES.index(cause)
         self.ratio[mask] = np.broadcast_to(ratio, mask.shape)[mask]
 
+    def recause(self, mask: Mask, cause: Cause) -> None:
+        """Sets another cause where the mask is."""
+        self.causes[mask] = _CAUSES.index(cause)
+
 
 @dataclass(frozen=True)
 class Pen:

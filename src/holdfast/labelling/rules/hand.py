@@ -9,6 +9,7 @@ from scipy.ndimage import maximum_filter1d, minimum_filter1d
 
 from holdfast.errors import RecordingError
 from holdfast.features import Tare, fingertip_force
+from holdfast.features.force import baseline_of
 from holdfast.features.tare import TareArgument
 from holdfast.labelling.rules.masks import (
     BLIP,
@@ -183,6 +184,30 @@ def _threshold(module: Tactile, tare: Tare) -> float | None:
     if not tare.without_contact:
         return None
     return contact_threshold(np.array([rest_moments(module, tare, module.rate)]))
+
+
+def pressed_at(module: Tactile, tare: TareArgument | Tare, hand: HandForce) -> Array:
+    """The centre of pressure of a finger on the grid: its taxels by what presses on them.
+
+    Args:
+        module: readings of the finger.
+        tare: how the baseline is found.
+        hand: its forces.
+
+    Returns:
+        (n, 3) in the finger's frame [m]; the mean over the recording where nothing presses.
+    """
+    baseline, _ = baseline_of(
+        np.asarray(module.readings, dtype=np.float64), module.times,
+        _offline(Tare.parse(tare), module), module.period,
+    )  # fmt: skip
+    pressing = np.nan_to_num(np.maximum(module.readings[:, :, 2] - baseline[:, 2], 0.0))
+    load = np.column_stack([pressing @ module.sensor.positions, pressing.sum(axis=1)])
+    smooth = smoothed(load, n_samples(SMOOTHING, module.period))
+    mean = load[:, :3].sum(axis=0) / max(load[:, 3].sum(), np.finfo(float).tiny)
+    light = smooth[:, 3] < SEEN * smooth[:, 3].max()
+    place = np.where(light[:, None], mean, smooth[:, :3] / np.maximum(smooth[:, 3:], 1e-300))
+    return np.stack([np.interp(hand.times, module.times, column) for column in place.T], axis=1)
 
 
 def grip(finger: FingerForce, mask: Mask) -> float:
