@@ -349,7 +349,7 @@ def test_keys_mark_and_stop_and_the_terminal_comes_back(grasp, tmp_path):
     child = Child(grasp, out, "--json")
     child.wait_for(b"keys: c closing", b" Hz")
     os.write(child.master, b"cl")
-    child.wait_for(b"2 markers")
+    child.wait_for(b"markers 2")
     os.write(child.master, b"D r3xq")
     code, printed = child.finish()
     assert (code, json.loads(printed)["n_markers"]) == (0, 6)

@@ -44,14 +44,14 @@ def words(status):
 
 
 def test_it_says_how_far_it_is_and_what_is_wrong():
-    assert words(WELL) == "12.3 s   150.0 Hz   0 gaps   0 lost   2.5 MB   2 markers"
+    assert words(WELL) == "12.3 s   150.0 Hz   gaps 0   lost 0   2.5 MB   markers 2"
     assert words(BAD) == (
-        "12.3 s   no samples   1 gaps   3 lost   4 dropped   2.5 MB   2 markers   "
+        "12.3 s   no samples   gaps 1   lost 3   dropped 4   2.5 MB   markers 2   "
         "index late packet_gap"
     )
     assert [text for text, bad in line(WELL) if bad] == []
     assert [text for text, bad in line(BAD) if bad] == [
-        *("no samples", "1 gaps", "3 lost", "4 dropped", "index late packet_gap")
+        *("no samples", "gaps 1", "lost 3", "dropped 4", "index late packet_gap")
     ]
 
 

@@ -82,11 +82,11 @@ def line(status: "RecorderStatus") -> list[tuple[str, bool]]:
     return [
         (f"{status.seconds:.1f} s", False),
         (f"{status.rate:.1f} Hz", False) if status.rate else ("no samples", True),
-        (f"{status.n_gaps} gaps", status.n_gaps > 0),
-        (f"{status.n_lost} lost", status.n_lost > 0),
-        *([(f"{status.n_dropped} dropped", True)] if status.n_dropped else []),
+        (f"gaps {status.n_gaps}", status.n_gaps > 0),
+        (f"lost {status.n_lost}", status.n_lost > 0),
+        *([(f"dropped {status.n_dropped}", True)] if status.n_dropped else []),
         (size(status.n_bytes), False),
-        (f"{status.n_markers} markers", False),
+        (f"markers {status.n_markers}", False),
         *((text, True) for text in faults),
     ]
 
