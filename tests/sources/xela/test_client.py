@@ -210,6 +210,15 @@ class TestReading:
         assert notices == ["no new sample for 0.05 s"]
 
 
+def test_closing_while_packets_wait():
+    words = [text(k, [sensor(counts(368, k), "XR23AHRCPP")]) for k in range(20)] * 50
+    with server(words) as (port, _), open_source(f"xela://127.0.0.1:{port}") as source:
+        assert source.read(PATIENCE) is not None
+        time.sleep(0.3)  # the queue fills, and the sockets' buffers
+        source.close()
+        source.close()
+
+
 class TestReconnecting:
     def test_the_connection_is_made_again(self, quick):
         with server([patch(1)]) as (port, said), open_source(f"xela://127.0.0.1:{port}") as source:

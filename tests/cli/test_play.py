@@ -1,0 +1,233 @@
+import json
+import signal
+import socket
+import subprocess
+import sys
+import threading
+import time
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from holdfast.cli import main
+from holdfast.cli import play as verb
+from holdfast.contact import Fault
+from holdfast.detector import Detector, detect
+from holdfast.errors import SourceError
+from holdfast.io import save_recording
+from holdfast.model import Model
+from holdfast.recordings import Recording, Tactile
+from holdfast.sensors import sensor
+from holdfast.sources import open_source
+from holdfast.synthetic import synthetic_recording
+
+PATIENCE = 30.0
+"""So long a test waits before it fails [s]."""
+FAST = 8
+
+
+@pytest.fixture(scope="module")
+def recording():
+    """Six seconds, from before the grasp to after the shaking."""
+    whole = synthetic_recording("grasp", 3, ("thumb", "index", "middle", "ring"))
+    return replace(whole, modules={n: m.slice(100, 1000) for n, m in whole.modules.items()})
+
+
+@pytest.fixture(scope="module")
+def path(recording, tmp_path_factory):
+    path = tmp_path_factory.mktemp("play") / "grasp.parquet"
+    save_recording(recording, path)
+    return path
+
+
+def free_port():
+    with socket.socket() as one:
+        one.bind(("127.0.0.1", 0))
+        return one.getsockname()[1]
+
+
+class Listener(threading.Thread):
+    """A client in a thread of its own: connects as soon as it can, and takes `n` samples."""
+
+    def __init__(self, uri, n):
+        super().__init__()
+        self.uri, self.n = uri, n
+        self.arrivals, self.sensors = [], {}
+        self.start()
+
+    def run(self):
+        deadline = time.monotonic() + PATIENCE
+        while time.monotonic() < deadline and not self.arrivals:
+            try:
+                with open_source(self.uri) as source:
+                    self.sensors = source.sensors
+                    while len(self.arrivals) < self.n and time.monotonic() < deadline:
+                        arrival = source.read(0.1)
+                        if arrival is not None and arrival.samples:
+                            self.arrivals.append(arrival)
+            except SourceError:
+                time.sleep(0.02)
+
+
+def play(capsys, *words):
+    code = main(["play", *map(str, words)])
+    out, err = capsys.readouterr()
+    return code, out, err
+
+
+def refusal(capsys, *words):
+    code, out, err = play(capsys, *words)
+    assert (code, out, err.count("\n")) == (2, "", 1)
+    return err.removeprefix("holdfast: ").rstrip("\n")
+
+
+@pytest.mark.parametrize(
+    "options",
+    [("--version", "1.7"), (), ("--whole-hand",), ("--whole-hand", "--version", "1.7")],
+    ids=" ".join,
+)
+def test_a_client_decides_as_on_the_recording(capsys, path, recording, options):
+    """Sample by sample, over a socket, at eight times the pace."""
+    port = free_port()
+    names = "" if "--whole-hand" in options else "?fingers=1:thumb,2:index,3:middle,4:ring"
+    n = recording.modules["thumb"].n_samples
+    listener = Listener(f"xela://127.0.0.1:{port}{names}", n)
+    code, out, err = play(capsys, path, "--port", port, "--once", "--speed", FAST, *options)
+    listener.join()
+    assert (code, out) == (0, "")
+    told = err.splitlines()
+    version = "1.7" if "1.7" in options else "1.8"
+    uri = f"xela://127.0.0.1:{port}{names}"
+    assert told[0] == f"{uri} plays {path} as a XELA server {version}; Ctrl-C ends it"
+    assert told[-1] == f"{n} packets sent"
+
+    arrivals = listener.arrivals
+    assert len(arrivals) == n
+    assert not any(a.n_lost or a.n_refused for a in arrivals)
+    assert not any(Fault.CLOCK_JUMP in f for a in arrivals for f in a.faults.values())
+    model = Model.load("builtin:noise-floor")
+    detector = Detector.for_recording(model, recording)
+    offline = detect(model, recording)
+    for k, arrival in enumerate(arrivals):
+        samples = {name: arrival.samples[name] for name in recording.modules}
+        live = detector.update(samples, arrival.time)
+        for name, trace in offline.fingers.items():
+            expected = trace.estimate(k)
+            one = live.fingers[name]
+            assert (one.state, one.reason, one.faults) == (
+                expected.state,
+                expected.reason,
+                expected.faults,
+            )
+            np.testing.assert_array_equal(one.force, expected.force)
+            np.testing.assert_array_equal(one.instability, expected.instability)
+            np.testing.assert_array_equal(one.stable_probability, expected.stable_probability)
+    assert {state for trace in offline.fingers.values() for state in trace.state} >= {2, 3}
+
+
+def test_json_tells_where_and_how_much(capsys, path):
+    port = free_port()
+    listener = Listener(f"xela://127.0.0.1:{port}", 900)
+    code, out, _ = play(capsys, path, "--port", port, "--once", "--speed", FAST, "--json")
+    listener.join()
+    assert code == 0
+    begin, end = map(json.loads, out.splitlines())
+    assert begin == {
+        "uri": f"xela://127.0.0.1:{port}?fingers=1:thumb,2:index,3:middle,4:ring",
+        "version": "1.8",
+        "sensors": {"1": ["thumb"], "2": ["index"], "3": ["middle"], "4": ["ring"]},
+        "source": str(path),
+    }
+    assert end == {"packets": 900}
+
+
+@pytest.mark.parametrize("ending", [signal.SIGINT, signal.SIGTERM])
+def test_it_plays_again_and_again_until_it_is_interrupted(path, ending):
+    command = (
+        "import signal, sys; signal.signal(signal.SIGINT, signal.default_int_handler); "
+        "from holdfast.cli import main; sys.exit(main())"
+    )
+    words = ["play", str(path), "--port", "0", "--speed", "50", "--json"]
+    with subprocess.Popen(
+        [sys.executable, "-c", command, *words],
+        stdout=subprocess.PIPE,
+        stderr=subprocess.PIPE,
+        text=True,
+    ) as process:
+        try:
+            uri = json.loads(process.stdout.readline())["uri"]
+            listener = Listener(uri, 1500)  # more than the recording has
+            listener.join()
+        finally:
+            process.send_signal(ending)
+        out, err = process.communicate(timeout=PATIENCE)
+    assert process.returncode == 0
+    assert json.loads(out)["packets"] >= 1500
+    assert err.splitlines()[-1].endswith(" packets sent")
+    assert "Traceback" not in err
+    times = [a.time for a in listener.arrivals]
+    assert (np.diff(times) > 0).all()
+    assert len(times) == 1500
+
+
+def test_who_listens_is_told(capsys, path, monkeypatch):
+    monkeypatch.setattr(verb, "LOOK_EVERY", 0.02)
+    port = free_port()
+    listener = Listener(f"xela://127.0.0.1:{port}", 900)
+    _, _, err = play(capsys, path, "--port", port, "--once", "--speed", FAST)
+    listener.join()
+    assert "1 client" in err.splitlines()
+
+
+def test_a_terminal_shows_the_rate(capsys, path, monkeypatch):
+    monkeypatch.setattr(verb.sys.stderr, "isatty", lambda: True, raising=False)
+    monkeypatch.setattr(verb, "REFRESH", 0.1)
+    monkeypatch.setattr(verb, "LOOK_EVERY", 0.02)
+    port = free_port()
+    listener = Listener(f"xela://127.0.0.1:{port}", 900)
+    _, _, err = play(capsys, path, "--port", port, "--once", "--speed", FAST)
+    listener.join()
+    assert "\r1 client, " in err
+    assert " packets/s" in err
+
+
+class TestRefusals:
+    def test_a_source_that_there_is_not(self, capsys, tmp_path):
+        assert "nothing.parquet does not exist" in refusal(capsys, tmp_path / "nothing.parquet")
+
+    def test_a_uri_that_there_is_not(self, capsys):
+        assert refusal(capsys, "can:3").startswith("'can:3' is neither the path of a recording")
+
+    @pytest.mark.parametrize("speed", ["0", "-1"])
+    def test_a_speed_that_is_none(self, capsys, path, speed):
+        told = refusal(capsys, path, "--speed", speed)
+        assert told == f"--speed: a speed above 0 expected, {speed} given"
+
+    def test_a_version_that_there_is_not(self, capsys, path):
+        told = refusal(capsys, path, "--version", "2.0", "--port", 0)
+        assert told == "version 1.7 or 1.8 expected, '2.0' given"
+
+    def test_a_port_that_is_taken(self, capsys, path):
+        with socket.create_server(("127.0.0.1", 0)) as other:
+            port = other.getsockname()[1]
+            told = refusal(capsys, path, "--port", port)
+        assert told == (
+            f"cannot listen at 127.0.0.1:{port} (it is in use); --port 0 finds a free port"
+        )
+
+    def test_fingertips_of_no_hand(self, capsys, tmp_path):
+        one = Tactile(sensor("uskin-4x4"), np.arange(3.0), np.zeros((3, 16, 3)))
+        save_recording(Recording("x", {"finger1": one}), tmp_path / "x.parquet")
+        told = refusal(capsys, tmp_path / "x.parquet", "--whole-hand")
+        assert told.startswith("--whole-hand: finger1 is no module of allegro-uskin; it has thumb")
+
+    def test_readings_that_are_no_counts(self, capsys, tmp_path):
+        one = Tactile(sensor("uskin-4x4"), np.arange(3.0), np.full((3, 16, 3), -2.0))
+        save_recording(Recording("x", {"finger1": one}), tmp_path / "x.parquet")
+        code, out, err = play(capsys, tmp_path / "x.parquet", "--port", 0)
+        assert (code, out) == (2, "")
+        assert err.splitlines()[-1] == (
+            "holdfast: finger1: readings from 0 to 65535 counts expected, -2 to -2 given; "
+            "packets of a XELA server hold no others"
+        )
