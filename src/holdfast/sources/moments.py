@@ -3,11 +3,13 @@
 import heapq
 from collections.abc import Iterable, Iterator, Mapping
 from functools import reduce
+from operator import itemgetter
 from typing import Any, NamedTuple
 
 import numpy as np
 import numpy.typing as npt
 
+from holdfast.errors import RecordingError
 from holdfast.recordings import Recording
 from holdfast.sensors.values import Array
 
@@ -42,22 +44,33 @@ def moments(pieces: Iterable[Recording]) -> Iterator[Moment]:
 
     Args:
         pieces: as `read_chunks` gives them.
+
+    Raises:
+        RecordingError: as `pieces` does, when what came before has been given.
+        OSError: the same.
     """
     held: dict[str, Run] = {}
     markers: list[tuple[float, str]] = []
     last = -np.inf
-    for piece in pieces:
-        held = {name: _joined(held.get(name), run) for name, run in _runs(piece).items()}
-        markers += piece.markers
-        until = max(times[-1] for times, _ in held.values() if len(times)) - HOLD
-        ready, held = _cut(held, until)
-        due = [marker for marker in markers if marker[0] < until]
-        if any(len(times) for times, _ in ready.values()):
-            markers = [marker for marker in markers if not marker[0] < until]
-            yield from _merged(ready, due, last)
-            last = max(last, *(times[-1] for times, _ in ready.values() if len(times)))
-    if held:
-        yield from _merged(held, markers, last)
+    try:
+        for piece in pieces:
+            held |= {name: _joined(held.get(name), run) for name, run in _runs(piece).items()}
+            markers += piece.markers
+            until = _newest(held) - HOLD
+            ready, held = _cut(held, until)
+            if _newest(ready) > -np.inf:
+                yield from _merged(ready, [m for m in markers if m[0] < until], last)
+                markers = [m for m in markers if not m[0] < until]
+                last = max(last, _newest(ready))
+    except (RecordingError, OSError):
+        yield from _merged(held, markers, last)  # what was read is sound
+        raise
+    yield from _merged(held, markers, last)
+
+
+def _newest(runs: Mapping[str, Run]) -> float:
+    """The time of the last sample [s]; minus infinity where there is none."""
+    return max((float(times[-1]) for times, _ in runs.values() if len(times)), default=-np.inf)
 
 
 def _runs(piece: Recording) -> dict[str, Run]:
@@ -93,13 +106,13 @@ def _merged(
         for name, (times, readings) in runs.items()
     }
     n_refused = sum(len(runs[name][0]) - len(forward[name][0]) for name in runs)
-    times = reduce(np.union1d, (times for times, _ in forward.values()))
+    times = reduce(np.union1d, (times for times, _ in forward.values()), np.empty(0))
     if not len(times):
         return
     first, end = float(times[0]), float(times[-1])
     words = [
         Moment(min(end, max(first, moment)), {}, f"marker: {' '.join(text.split())}")
-        for moment, text in sorted(markers)
+        for moment, text in sorted(markers, key=itemgetter(0))
     ]
     merged = heapq.merge(_instants(times, forward), words, key=lambda moment: moment.time)
     yield next(merged)._replace(n_refused=n_refused)

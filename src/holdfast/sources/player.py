@@ -48,8 +48,8 @@ class Player(Source):
             RecordingError: it cannot be read, or has no samples.
         """
         self.close()
-        pieces = iter(self._begin(0))
         try:
+            pieces = iter(self._begin(0))
             first = next(pieces, None)
         except OSError as cause:
             raise RecordingError(f"cannot read {self.name}: {cause.strerror or cause}") from cause
@@ -144,7 +144,11 @@ class Player(Source):
 
     def _given(self, moment: Moment) -> Arrival:
         received = time.monotonic()
-        notices = (*self._notices, *([moment.notice] if moment.notice else []))
+        if moment.n_refused:
+            self._notices.append(f"samples lie back in time: {moment.n_refused} were left out")
+        if moment.notice:
+            self._notices.append(moment.notice)
+        notices = tuple(self._notices)
         self._notices.clear()
         self._next = None
         if not moment.samples:

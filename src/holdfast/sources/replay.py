@@ -33,9 +33,10 @@ class Replay(Player):
         super().__init__(str(path), speed=speed, loop=loop)
 
     def _begin(self, number: int) -> Iterable[Recording]:
+        pieces = read_chunks(self.name, PIECE, labels=False)
         if number:
             self._notices.append(f"{self.name} begins anew")
-        return read_chunks(self.name, PIECE, labels=False)
+        return pieces
 
     def _metadata(self, first: Recording) -> dict[str, object]:
         """The recording's own, under the source that it is played from now."""
