@@ -10,7 +10,7 @@ import numpy.typing as npt
 
 from holdfast.errors import RecordingError
 from holdfast.io.importers.table import read_table
-from holdfast.labelling.rules.masks import Mask
+from holdfast.labelling.masks import Mask
 from holdfast.recordings import Recording, Truth
 from holdfast.sensors.values import Array
 from holdfast.twin.labels import runs
@@ -106,7 +106,9 @@ def poses_from_truth(recording: Recording) -> Poses:
     """
     truth = recording.truth
     if truth is not None and "object_pose" in truth.hand:
-        tips = {f: arrays["tip_pose"] for f, arrays in truth.fingers.items() if "tip_pose" in arrays}
+        tips = {
+            f: arrays["tip_pose"] for f, arrays in truth.fingers.items() if "tip_pose" in arrays
+        }
         if tips:
             tracks = {finger: _track(truth.times, pose) for finger, pose in tips.items()}
             return Poses("truth", _track(truth.times, truth.hand["object_pose"]), tracks)

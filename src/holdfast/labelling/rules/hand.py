@@ -11,11 +11,10 @@ from holdfast.errors import RecordingError
 from holdfast.features import Tare, fingertip_force
 from holdfast.features.force import baseline_of
 from holdfast.features.tare import TareArgument
-from holdfast.labelling.rules.masks import (
+from holdfast.labelling.masks import (
     BLIP,
     MERGE,
     Mask,
-    filled,
     known_between,
     n_samples,
     smoothed,
@@ -24,7 +23,6 @@ from holdfast.labelling.rules.masks import (
 from holdfast.recordings import GAP_PERIODS, Recording, Tactile
 from holdfast.sensors.values import Array
 from holdfast.training.design import contact_threshold, rest_moments
-from holdfast.twin.labels import runs
 
 SMOOTHING = 0.05
 """Over which the force is averaged before anything is read off it [s]: its noise goes, a push,
@@ -114,7 +112,8 @@ class HandForce:
     @cached_property
     def n_touching(self) -> Array:
         """(n,) how many fingers touch."""
-        return np.sum([finger.contact for finger in self.fingers.values()], axis=0)
+        touching = [finger.contact for finger in self.fingers.values()]
+        return np.asarray(np.sum(touching, axis=0))
 
 
 def hand_force(recording: Recording, tare: TareArgument | Tare = 0.5) -> HandForce:

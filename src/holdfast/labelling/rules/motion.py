@@ -7,7 +7,7 @@ from scipy.ndimage import convolve1d
 from scipy.spatial.transform import Rotation
 
 from holdfast.labelling.poses import Track
-from holdfast.labelling.rules.masks import Mask, known_between, n_samples
+from holdfast.labelling.masks import Mask, known_between, n_samples
 from holdfast.sensors.values import Array
 
 BRIDGED = 0.1

@@ -21,7 +21,7 @@ from holdfast.labelling.rules.hand import (
     hand_force,
     lost_at,
 )
-from holdfast.labelling.rules.masks import (
+from holdfast.labelling.masks import (
     MARGIN,
     MERGE,
     Mask,
@@ -128,7 +128,7 @@ def _grasps(hand: HandForce, rule: SignalRule) -> list[tuple[int, int]]:
 
 def _free(hand: HandForce, finger: FingerForce) -> Drawing:
     drawing = Drawing.blank(hand.times)
-    ratio = 2.0
+    ratio: Array | float = 2.0
     if finger.threshold is not None:
         ratio = finger.threshold / np.maximum(finger.amplitude, np.finfo(float).tiny)
     drawing.paint(~finger.contact & finger.known, NO_CONTACT, None, ratio)

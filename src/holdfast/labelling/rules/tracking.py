@@ -19,7 +19,7 @@ from holdfast.labelling.poses import Poses, Track, names_of, poses_of
 from holdfast.labelling.rules.clocks import Offset, offset_of
 from holdfast.labelling.rules.drawing import Drawing, Pen
 from holdfast.labelling.rules.hand import FingerForce, HandForce, hand_force, lost_at, pressed_at
-from holdfast.labelling.rules.masks import (
+from holdfast.labelling.masks import (
     MARGIN,
     MERGE,
     Mask,
@@ -37,6 +37,11 @@ from holdfast.twin.labels import LabelRule, runs
 AUTHOR = "rule:tracking"
 NOISE_TIMES = 5.0
 """Standard deviations of the speed of a body at rest that no threshold may be below."""
+GONE = 0.5
+"""An object that is out of sight for so long after the force has ended is lost [s]; and where it
+was out of sight before, it was being lost for so long at most."""
+LOST_TIMES = 2.0
+"""Times over a threshold that the end of the force without the object in sight counts as."""
 REST = 0.3
 """For how long nothing moves before the pose counts as that of the grasp [s]."""
 
@@ -71,9 +76,7 @@ class TrackingRule:
 
     def __post_init__(self) -> None:
         if self.measure not in ("speed", "displacement"):
-            raise ValueError(
-                f"measure 'speed' or 'displacement' expected, {self.measure!r} given"
-            )
+            raise ValueError(f"measure 'speed' or 'displacement' expected, {self.measure!r} given")
 
 
 def propose(
@@ -161,9 +164,10 @@ class _Judge:
         held = self._contact & motion.known
         drawing.paint(held, STABLE, None, 1 / np.maximum(ratio, 1e-9))
         drawing.paint(held & moving, UNSTABLE, Cause.SLIP, ratio)
+        self._paint_free(drawing)
         for start, end in runs(self._contact):
             self._paint_ends(drawing, start, end)
-        self._paint_free(drawing)
+            self._paint_loss(drawing, motion.known, start, end)
         return drawing
 
     def _ratio(self, motion: Motion, point: Array | None) -> Array:
@@ -213,6 +217,20 @@ class _Judge:
         inside[start + last : end] = unstable[last:]
         drawing.recause(inside, Cause.RELEASED)
 
+    def _paint_loss(self, drawing: Drawing, known: Mask, start: int, end: int) -> None:
+        """The object is lost where it is out of sight when the force ends, and stays so."""
+        n = n_samples(GONE, self._finger.period)
+        seen = np.flatnonzero(known[start:end])
+        if not len(seen) or end == len(known) or known[max(end - 1, start) : end + n].any():
+            return
+        blind = np.zeros(len(known), dtype=bool)
+        blind[max(start + seen[-1] + 1, end - n) : end] = True
+        drawing.paint(blind & self._finger.known, UNSTABLE, Cause.LOST, LOST_TIMES)
+        after = drawing.codes[end:] != NO_CONTACT
+        blind[:] = False
+        blind[end : end + int(np.argmax(after)) if after.any() else len(known)] = True
+        drawing.recause(blind, Cause.LOST)
+
     def _paint_free(self, drawing: Drawing) -> None:
         finger = self._finger
         free = ~self._contact & finger.known
@@ -232,10 +250,12 @@ def _pen(poses: Poses, clock: Offset, rule: TrackingRule) -> Pen:
     what = "moves" if rule.measure == "speed" else "away from where it was grasped"
 
     def evidence(state: ContactState, cause: Cause | None, ratio: float) -> str:
+        if cause is Cause.LOST and state is ContactState.UNSTABLE:
+            return "object out of sight, and the force ends"
         if state is ContactState.NO_CONTACT:
-            return "force dropped for good" if cause else f"force {ratio:.3g} times under contact"
+            lost = "object out of sight, " if cause else ""
+            return f"{lost}force {ratio:.3g} times under contact"
         limit = "over" if state is ContactState.UNSTABLE else "under"
         return f"object {what} against the finger: {ratio:.3g} times {limit} the limit"
 
     return Pen(AUTHOR, evidence, 1.0 if clock.believed else 0.5, note)
-

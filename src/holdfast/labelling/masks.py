@@ -65,14 +65,6 @@ def smoothed(values: Array, n: int) -> Array:
     return np.asarray(uniform_filter1d(values, n, axis=0, mode="nearest"))
 
 
-def filled(values: Array) -> Array:
-    """Values (n, k) without NaN: rows that are not finite are linear between their neighbours."""
-    finite = np.isfinite(values).all(axis=1)
-    every = np.arange(len(values))
-    columns = [np.interp(every, every[finite], column[finite]) for column in values.T]
-    return np.stack(columns, axis=1)
-
-
 def known_between(grid: Array, times: Array, longest: float) -> Mask:
     """Where on a grid there are times around that are not further apart than `longest` [s].
 
