@@ -74,17 +74,19 @@ class _Ahead:
 
     def __init__(self) -> None:
         self._folder = TemporaryDirectory(prefix="holdfast-")
+        self._path = self._before = Path(self._folder.name) / "none"
 
     def start(self, grasp: Grasp) -> None:
-        """Begins to simulate a grasp."""
+        """Begins to simulate a grasp; the one before the last is played, and forgotten."""
+        self._before.unlink(missing_ok=True)
+        self._before, self._path = self._path, self._path.with_name(f"{grasp.name}.parquet")
         self._grasp = grasp
-        self._path = Path(self._folder.name) / f"{grasp.name}.parquet"
-        self._process = subprocess.Popen(
-            [sys.executable, "-c", WORK, json.dumps(asdict(grasp)), str(self._path)],
-            stdin=subprocess.DEVNULL,
-            stdout=subprocess.DEVNULL,
-            stderr=subprocess.DEVNULL,
-        )
+        self._process = self._run(json.dumps(asdict(grasp)))
+
+    def _run(self, grasp: str) -> subprocess.Popen[bytes]:
+        silent = subprocess.DEVNULL
+        work = [sys.executable, "-c", WORK, grasp, str(self._path)]
+        return subprocess.Popen(work, stdin=silent, stdout=silent, stderr=silent)
 
     def is_ready(self, timeout: float) -> bool:
         """Whether it is over within `timeout` [s]."""

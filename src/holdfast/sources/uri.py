@@ -60,9 +60,9 @@ class Address:
             number, _, name = part.partition(":")
             if not (number.strip().isdecimal() and name.strip()):
                 raise ValueError(f"{self.text}: fingers=1:thumb,2:index expected, {given!r} given")
+            if int(number) in names or name.strip() in names.values():
+                raise ValueError(f"{self.text}: a name for each finger expected, {given!r} given")
             names[int(number)] = name.strip()
-        if len(set(names.values())) < len(names):
-            raise ValueError(f"{self.text}: a name for each finger expected, {given!r} given")
         return names
 
 
@@ -70,7 +70,8 @@ def parse(text: str) -> tuple[str, Address]:
     """The scheme of a URI, and its parts.
 
     Raises:
-        ValueError: it is no URI of a known scheme, or a parameter is given twice.
+        ValueError: it is no URI of a known scheme, or a parameter is given twice or has no
+            value.
 
     Example:
         >>> parse("twin:?object=can")[1].parameters
@@ -83,11 +84,23 @@ def parse(text: str) -> tuple[str, Address]:
             f"{text!r} is neither the path of a recording nor the URI of a source; there are "
             + ", ".join(f"{name}:" for name in SCHEMES)
         )
-    parts = urlsplit(text)
-    pairs = parse_qsl(parts.query, keep_blank_values=True)
+    try:
+        parts = urlsplit(text)
+    except ValueError as cause:
+        raise ValueError(f"{text} is no URI: {cause}") from cause
+    if parts.fragment:
+        raise ValueError(f"{text}: nothing after # expected, {parts.fragment!r} given")
+    return scheme, Address(text, parts.netloc, parts.path, _parameters(text, parts.query))
+
+
+def _parameters(text: str, query: str) -> dict[str, str]:
+    for part in filter(None, query.split("&")):
+        if "=" not in part:
+            raise ValueError(f"{text}: name=value expected, {part!r} given")
+    pairs = parse_qsl(query, keep_blank_values=True)
     if len(dict(pairs)) < len(pairs):
         raise ValueError(f"{text}: a parameter is given twice")
-    return scheme, Address(text, parts.netloc, parts.path, dict(pairs))
+    return dict(pairs)
 
 
 def is_uri(text: str) -> bool:
