@@ -3,7 +3,7 @@
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from itertools import pairwise
-from typing import Literal, NamedTuple
+from typing import NamedTuple
 
 import msgspec
 import numpy as np
@@ -12,6 +12,7 @@ from scipy.optimize import linear_sum_assignment
 
 from holdfast.contact import ContactState
 from holdfast.errors import RecordingError
+from holdfast.labelling.spans import ROUNDING, Span, spans_of
 from holdfast.metrics.statistics import quantile
 from holdfast.recordings import Label, label_states
 from holdfast.sensors.values import Array
@@ -22,19 +23,7 @@ MATCHED = 0.5
 TOUCHING = 0.1
 """A label follows on the one before where the gap is at most this [s]: drawn by hand."""
 
-ROUNDING = 1e-6
-"""Times that differ by less [s] are equal."""
-
 Counts = npt.NDArray[np.int64]
-State = Literal["no_contact", "unstable", "stable"]
-
-
-class Span(msgspec.Struct, frozen=True):
-    """An interval of one state, [start, end) [s]."""
-
-    start: float
-    end: float
-    state: State
 
 
 class OnsetDifferences(msgspec.Struct, frozen=True):
@@ -240,7 +229,7 @@ def _in_order(labels: Sequence[Label]) -> list[Label]:
 def _count(a: Sequence[Label], b: Sequence[Label], times: Array) -> _Counted:
     one, two = label_states(a, times), label_states(b, times)
     table = np.bincount(4 * one.astype(np.int64) + two, minlength=16).reshape(4, 4)
-    runs_a, runs_b = _runs(a), _runs(b)
+    runs_a, runs_b = spans_of(a), spans_of(b)
     return _Counted(
         confusion=table[1:, 1:],
         n_samples=len(times),
@@ -332,33 +321,10 @@ def _match(a: Array, b: Array) -> _Onsets:
     return _Onsets(values, len(a) - len(values), len(b) - len(values))
 
 
-def _runs(labels: Sequence[Label]) -> list[Span]:
-    """Intervals with touching ones of the same state joined."""
-    runs: list[Span] = []
-    for label in labels:
-        state = _NAMES[label.state]
-        if runs and runs[-1].state == state and label.start - runs[-1].end <= ROUNDING:
-            runs[-1] = Span(runs[-1].start, label.end, state)
-        else:
-            runs.append(Span(label.start, label.end, state))
-    return runs
-
-
 def _without_counterpart(runs: Sequence[Span], others: Sequence[Span]) -> list[Span]:
     """The runs that no run of the same state among the others overlaps."""
     return [
         run
         for run in runs
-        if not any(
-            other.state == run.state
-            and min(run.end, other.end) - max(run.start, other.start) > ROUNDING
-            for other in others
-        )
+        if not any(other.state == run.state and run.overlap(other) > ROUNDING for other in others)
     ]
-
-
-_NAMES: dict[ContactState, State] = {
-    ContactState.NO_CONTACT: "no_contact",
-    ContactState.UNSTABLE: "unstable",
-    ContactState.STABLE: "stable",
-}
