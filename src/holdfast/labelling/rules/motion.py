@@ -6,8 +6,8 @@ import numpy as np
 from scipy.ndimage import convolve1d
 from scipy.spatial.transform import Rotation
 
-from holdfast.labelling.poses import Track
 from holdfast.labelling.masks import Mask, known_between, n_samples
+from holdfast.labelling.poses import Track
 from holdfast.sensors.values import Array
 
 BRIDGED = 0.1

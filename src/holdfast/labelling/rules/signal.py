@@ -12,6 +12,14 @@ import numpy as np
 from holdfast.contact import NO_CONTACT, STABLE, UNSTABLE, Cause, ContactState
 from holdfast.features import Tare
 from holdfast.features.tare import TareArgument
+from holdfast.labelling.masks import (
+    MARGIN,
+    MERGE,
+    Mask,
+    closed,
+    lasting,
+    n_samples,
+)
 from holdfast.labelling.rules.drawing import Drawing, Pen
 from holdfast.labelling.rules.hand import (
     SEEN,
@@ -20,14 +28,6 @@ from holdfast.labelling.rules.hand import (
     grip,
     hand_force,
     lost_at,
-)
-from holdfast.labelling.masks import (
-    MARGIN,
-    MERGE,
-    Mask,
-    closed,
-    lasting,
-    n_samples,
 )
 from holdfast.recordings import Label, Recording
 from holdfast.sensors.values import Array
@@ -42,7 +42,7 @@ NOISE_TIMES = 6.0
 """Standard deviations of a component of the smoothed force that its change in a window exceeds
 neither by chance nor in an hour: three components of about ten independent values each."""
 REST_TIMES = 3.0
-"""How often the change in the calmest fifth of a contact: a hand that trembles all the time."""
+"""Where no tare tells the noise and the grip: how often the change in the calmest fifth."""
 
 
 @dataclass(frozen=True)
@@ -102,12 +102,10 @@ def _change(finger: FingerForce, rule: SignalRule) -> Array:
     touching = finger.contact
     if not touching.any():
         return np.zeros_like(change)
-    usual = grip(finger, touching) if finger.threshold is not None else 0.0
-    least = max(
-        rule.share * usual,
-        NOISE_TIMES * finger.noise,
-        REST_TIMES * float(np.quantile(change[touching], 0.2)),
-    )
+    if finger.threshold is None:
+        least = REST_TIMES * float(np.quantile(change[touching], 0.2))
+    else:
+        least = max(rule.share * grip(finger, touching), NOISE_TIMES * finger.noise)
     return np.where(touching, change / max(least, np.finfo(float).tiny), 0.0)
 
 
@@ -147,20 +145,21 @@ class _Grasp:
         rule: SignalRule,
     ) -> None:
         self._hand, self._change, self._troubled = hand, change, troubled
+        self._rule = rule
         self._inside = np.zeros(len(hand.times), dtype=bool)
         self._inside[span] = True
         self._begun_held = all(each.threshold is None for each in hand.fingers.values())
         self._end = span.stop
-        self._locked = span.start if self._begun_held else self._lock(rule)
+        self._locked = span.start if self._begun_held else self._lock()
 
-    def _lock(self, rule: SignalRule) -> int:
+    def _lock(self) -> int:
         """Where all fingers that touch have been at rest for long enough for the first time."""
         hand = self._hand
         ever = sum((each.contact & self._inside).any() for each in hand.fingers.values())
         calm = self._inside & (hand.n_touching >= min(2, ever))
         for mask in self._troubled.values():
             calm &= ~mask
-        rests = runs(lasting(calm, n_samples(rule.settle, hand.period)))
+        rests = runs(lasting(calm, self._n(self._rule.settle)))
         return int(rests[0][0]) if len(rests) else self._end
 
     def paint(self, name: str, drawing: Drawing) -> None:
@@ -174,24 +173,32 @@ class _Grasp:
         before = np.arange(len(touching)) < self._locked
         drawing.paint(touching & before, UNSTABLE, Cause.CLOSING, self._over(finger))
         if not self._begun_held:
-            self._paint_end(finger, touching, drawing, ratio)
+            self._paint_end(name, touching, drawing)
 
     def _over(self, finger: FingerForce) -> Array | float:
         return 2.0 if finger.threshold is None else finger.amplitude / finger.threshold
 
-    def _paint_end(
-        self, finger: FingerForce, touching: Mask, drawing: Drawing, ratio: Array
-    ) -> None:
+    def _paint_end(self, name: str, touching: Mask, drawing: Drawing) -> None:
         """The last fall of the force, from the last of the grip; lost where there is no fall."""
+        finger, every = self._hand.fingers[name], np.arange(len(touching))
         last = int(np.flatnonzero(touching)[-1])
-        held = touching & (np.arange(len(touching)) >= self._locked)
+        held = touching & (every >= self._locked)
         strong = np.flatnonzero(held & (finger.amplitude >= LET_GO * grip(finger, held)))
         if not len(strong) or last + 1 >= len(touching) or not finger.known[last + 1]:
             return
         onset = int(strong[-1])
-        let_go = touching & (np.arange(len(touching)) > onset)
-        dropped = last - onset < n_samples(DROPPED, self._hand.period)
-        drawing.paint(let_go, UNSTABLE, Cause.LOST if dropped else Cause.RELEASED, ratio)
+        cause = Cause.LOST if last - onset < self._n(DROPPED) else Cause.RELEASED
+        begun = self._begun(self._troubled[name] & held, onset)
+        drawing.paint(touching & (every >= begun), UNSTABLE, cause, self._change[name])
+
+    def _begun(self, troubled: Mask, onset: int) -> int:
+        """Where the trouble that ends in a fall begins, unless it is a disturbance of its own."""
+        calm = np.flatnonzero(~troubled[: onset + 1])
+        start = int(calm[-1]) + 1 if len(calm) else 0
+        return start if onset - start < self._n(self._rule.merge) else onset + 1
+
+    def _n(self, duration: float) -> int:
+        return n_samples(duration, self._hand.period)
 
 
 def _paint_loss(hand: HandForce, drawings: Mapping[str, Drawing]) -> None:

@@ -15,10 +15,6 @@ from holdfast.contact import NO_CONTACT, STABLE, UNSTABLE, Cause, ContactState
 from holdfast.errors import RecordingError
 from holdfast.features import Tare
 from holdfast.features.tare import TareArgument
-from holdfast.labelling.poses import Poses, Track, names_of, poses_of
-from holdfast.labelling.rules.clocks import Offset, offset_of
-from holdfast.labelling.rules.drawing import Drawing, Pen
-from holdfast.labelling.rules.hand import FingerForce, HandForce, hand_force, lost_at, pressed_at
 from holdfast.labelling.masks import (
     MARGIN,
     MERGE,
@@ -29,6 +25,10 @@ from holdfast.labelling.masks import (
     n_samples,
     with_hysteresis,
 )
+from holdfast.labelling.poses import Poses, Track, names_of, poses_of
+from holdfast.labelling.rules.clocks import Offset, offset_of
+from holdfast.labelling.rules.drawing import Drawing, Pen
+from holdfast.labelling.rules.hand import FingerForce, HandForce, hand_force, lost_at, pressed_at
 from holdfast.labelling.rules.motion import Motion, motion_of, relative
 from holdfast.recordings import Label, Recording
 from holdfast.sensors.values import Array

@@ -1,0 +1,192 @@
+from dataclasses import replace
+
+import hypothesis.strategies as st
+import numpy as np
+import pytest
+from hypothesis import given, settings
+
+from holdfast.contact import Cause
+from holdfast.errors import RecordingError
+from holdfast.labelling.rules import signal
+from holdfast.recordings import Recording, label_states
+
+from .build import (
+    CLOSING,
+    DURATION,
+    FREE,
+    GRIP,
+    PUSH,
+    PUSHED,
+    RELEASE,
+    SPANS,
+    check,
+    clock,
+    drawn,
+    grasp,
+    module,
+    profile,
+)
+
+EDGE = 0.2  # the window that changes are seen in, and a little for noise
+
+
+def test_a_grasp_is_drawn_as_a_person_would():
+    for labels in signal.propose(grasp()).values():
+        check(labels, EDGE)
+        causes = [label.cause for label in labels]
+        expected = [None, Cause.CLOSING, None, Cause.DISTURBANCE, None, Cause.RELEASED, None]
+        assert causes == expected
+
+
+def test_labels_are_signed_and_say_what_they_rest_on():
+    labels = signal.propose(grasp())["thumb"]
+    assert {label.author for label in labels} == {"rule:signal"}
+    assert all(label.evidence.startswith("force ") for label in labels)
+    assert all(0 < label.confidence < 1 for label in labels)
+
+
+@given(start=st.floats(-1e3, 1e9))
+@settings(max_examples=5, deadline=None)
+def test_another_start_of_the_clock_moves_the_labels(start):
+    here = drawn(signal.propose(grasp())["thumb"])
+    there = drawn(signal.propose(grasp(start))["thumb"])
+    assert [state for state, *_ in there] == [state for state, *_ in here]
+    moved = np.array([row[1:] for row in there]) - start
+    assert moved == pytest.approx(np.array([row[1:] for row in here]), abs=0.011)
+
+
+@given(power=st.integers(-8, 8))
+@settings(max_examples=5, deadline=None)
+def test_another_unit_of_force_changes_nothing(power):
+    here = drawn(signal.propose(grasp())["thumb"])
+    assert drawn(signal.propose(grasp(scale=2.0**power))["thumb"]) == here
+
+
+def test_neither_labels_nor_truth_are_looked_at():
+    recording = grasp()
+    blind = Recording("another", {n: replace(m, labels=()) for n, m in recording.modules.items()})
+    labelled = recording.with_labels({"thumb": signal.propose(recording)["index"]})
+    assert signal.propose(labelled) == signal.propose(blind)
+
+
+def test_a_push_too_faint_for_one_finger_is_drawn_where_two_others_show_it():
+    times = clock()
+    modules = {
+        name: module(times, GRIP * profile(times, push), seed)
+        for seed, (name, push) in enumerate([("thumb", 0.2), ("index", 0.2), ("ring", 0.0)])
+    }
+    codes = label_states(signal.propose(Recording("push", modules))["ring"], times)
+    assert (codes[(times > PUSH) & (times < PUSHED)] == 2).mean() > 0.9
+
+
+def test_a_change_of_one_finger_is_its_own():
+    times = clock()
+    modules = {
+        name: module(times, GRIP * profile(times, push), seed)
+        for seed, (name, push) in enumerate([("thumb", 0.2), ("index", 0.0)])
+    }
+    labels = signal.propose(Recording("slip", modules))
+    check(labels["thumb"], EDGE)
+    assert "DISTURBANCE" not in [label.cause and label.cause.name for label in labels["index"]]
+
+
+def test_a_stronger_push_is_surer():
+    def surety(push):
+        labels = signal.propose(grasp(push=push))["thumb"]
+        return next(x.confidence for x in labels if x.cause is Cause.DISTURBANCE)
+
+    assert surety(0.02) < surety(0.05) < surety(0.5)
+
+
+def test_what_the_skin_keeps_of_its_load_is_no_contact():
+    times = clock()
+    force = GRIP * profile(times)
+    after = times > FREE
+    force[after, 2] += 0.05 * GRIP * np.exp(-(times[after] - FREE) / 2)
+    for labels in signal.propose(Recording("creep", {"thumb": module(times, force)})).values():
+        check(labels, EDGE)
+
+
+def test_a_drifting_baseline_is_no_contact():
+    times = clock()
+    force = GRIP * profile(times)
+    force[:, 2] += 0.01 * GRIP * times / DURATION
+    for labels in signal.propose(Recording("drift", {"thumb": module(times, force)})).values():
+        check(labels, EDGE)
+
+
+def test_two_grasps_are_two():
+    times = clock()
+    once = profile(times)
+    twice = GRIP * np.concatenate([once, once])
+    both = np.concatenate([times, times + DURATION])
+    labels = signal.propose(Recording("twice", {"thumb": module(both, twice)}))["thumb"]
+    states = [state for state, _, _ in SPANS]
+    assert [label.state.value for label in labels] == [*states, *states[1:]]
+
+
+def test_a_grasp_that_never_settles_is_closing_to_its_end():
+    times = clock()
+    wobble = 0.3 * np.sin(2 * np.pi * times) * (times > CLOSING) * (times < FREE)
+    force = GRIP * (profile(times, 0.0) + wobble[:, None] * [1, 0, 0])
+    labels = signal.propose(Recording("wobbly", {"thumb": module(times, force)}))["thumb"]
+    assert "STABLE" not in [label.state.value for label in labels]
+
+
+def test_an_object_that_is_gone_at_once_is_lost():
+    times = clock()
+    force = GRIP * profile(times, 0.0) * (times < RELEASE - 1)[:, None]
+    labels = signal.propose(Recording("dropped", {"thumb": module(times, force)}))["thumb"]
+    assert labels[-2].cause is Cause.LOST
+    assert abs(labels[-1].start - (RELEASE - 1)) < EDGE
+
+
+def test_a_recording_that_begins_in_contact_is_held_until_the_force_drops_for_good():
+    times = clock()
+    held = GRIP * (1 + 0.2 * (profile(times) - profile(times, 0.0)))
+    held[times > RELEASE] = 0
+    labels = signal.propose(Recording("held", {"thumb": module(times, held)}), tare="first")
+    (*_, last) = labels["thumb"]
+    assert labels["thumb"][0].state == "STABLE"
+    assert (last.state, last.cause) == ("NO_CONTACT", Cause.LOST)
+    assert abs(last.start - RELEASE) < EDGE
+
+
+def test_a_gap_has_no_label():
+    times = clock()
+    kept = (times < 4.0) | (times > 5.0)
+    part = module(times[kept], GRIP * profile(times)[kept])
+    labels = signal.propose(Recording("gap", {"thumb": part}))["thumb"]
+    assert (label_states(labels, np.linspace(4.05, 4.95, 50)) == 0).all()
+    assert (label_states(labels, np.array([3.5, 5.5])) == 3).all()
+
+
+def test_samples_that_are_no_numbers_are_a_gap():
+    recording = grasp(fingers=("thumb",))
+    readings = recording.modules["thumb"].readings.copy()
+    readings[400:500] = np.nan
+    broken = Recording("nan", {"thumb": replace(recording.modules["thumb"], readings=readings)})
+    labels = signal.propose(broken)["thumb"]
+    assert (label_states(labels, np.linspace(4.05, 4.95, 50)) == 0).all()
+
+
+def test_a_dead_finger_has_no_labels_and_disturbs_nobody():
+    recording = grasp()
+    dead = replace(
+        recording.modules["index"],
+        readings=np.full_like(recording.modules["index"].readings, np.nan),
+    )
+    labels = signal.propose(Recording("dead", {**recording.modules, "index": dead}))
+    assert set(labels) == {"thumb"}
+    check(labels["thumb"], EDGE)
+
+
+def test_labels_fit_the_recording_they_are_for():
+    recording = grasp()
+    assert recording.with_labels(signal.propose(recording)).modules["thumb"].labels
+
+
+def test_nothing_to_take_the_tare_from():
+    recording = grasp(fingers=("thumb",))
+    with pytest.raises(RecordingError, match=r"no finite sample to take the tare from \(20:21\)"):
+        signal.propose(recording, tare=(20, 21))
