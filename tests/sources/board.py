@@ -1,6 +1,7 @@
 """A board of magnetometers at a pseudo terminal, as if it were plugged in."""
 
 import os
+import select
 import threading
 import tty
 
@@ -31,6 +32,7 @@ class Board:
     def plug(self):
         self._master, self._slave = os.openpty()
         tty.setraw(self._slave)
+        os.set_blocking(self._master, False)
         self.path.symlink_to(os.ttyname(self._slave))
 
     def unplug(self):
@@ -40,8 +42,14 @@ class Board:
         os.close(self._master)
 
     def send(self, *parts):
-        for part in parts:
-            os.write(self._master, part)
+        for left in parts:
+            while left:
+                try:
+                    left = left[os.write(self._master, left) :]
+                except BlockingIOError:  # nobody reads
+                    ready = select.select([], [self._master], [], 0.05)[1]
+                    if not ready and self._stop.is_set():
+                        return
 
     def keep_sending(self, parts, period=0.005):
         """Sends each part, one after the other, until it is hushed."""

@@ -1,12 +1,13 @@
 """Every source, made ready to be opened: what `test_contract.py` holds to one contract."""
 
+import os
 from collections.abc import Callable
 from contextlib import contextmanager
 from dataclasses import dataclass
 from functools import cache
 from importlib.util import find_spec
 from socket import create_server
-from threading import Event
+from threading import Event, Thread
 
 import numpy as np
 import pytest
@@ -14,6 +15,8 @@ import pytest
 import holdfast.sources.serial
 import holdfast.sources.twin
 from holdfast.io import save_recording
+from holdfast.io.ros_messages import known_definition
+from holdfast.io.ros_write import Encoder
 from holdfast.live.play import XelaServer
 from holdfast.recordings import Recording, Tactile
 from holdfast.sensors import sensor
@@ -162,19 +165,48 @@ class _Pads(Source):
 
 @contextmanager
 def ros1(folder, monkeypatch):
-    if find_spec("rospy") is None:
-        pytest.skip("rospy is not installed: ROS 1 comes with its own Python")
-    pytest.skip("needs a roscore")
+    pytest.skip("rospy comes with ROS 1 alone, and needs its master")
     yield
 
 
 @contextmanager
 def ros2(folder, monkeypatch):
-    """PLACE FOR ROS 2: a publisher over loopback, as tests/sources/ros has one."""
     if find_spec("cyclonedds") is None:
         pytest.skip("cyclonedds is not installed")
-    pytest.skip("no publisher here yet")
-    yield
+    monkeypatch.setenv("ROS_LOCALHOST_ONLY", "1")
+    from holdfast.sources.ros import dds
+
+    domain = 201 + os.getpid() % 30  # tests of ROS 2 itself take those below
+    definition = known_definition("xela_server_ros2/SensStream", ros2=True)
+    node = dds.Node(domain)
+    write, encode = node.writer("/xServTopic", definition), Encoder(definition)
+    quiet = Event()
+
+    def publish():
+        for k in range(10_000):
+            write(encode({"sensors": [_sensor_full(k, number) for number in (1, 2)]}))
+            if quiet.wait(0.01):
+                return
+
+    thread = Thread(target=publish)
+    thread.start()
+    try:
+        yield Ready(open_source(f"ros2:///xServTopic?domain={domain}&fingers=1:thumb"), quiet.set)
+    finally:
+        quiet.set()
+        thread.join()
+
+
+def _sensor_full(k, number):
+    """Sample `k` of a 4 x 4 patch, as XELA's server tells it in ROS 2."""
+    return {
+        "message": k,
+        "time": 1000.0 + k / 100,
+        "model": "uSPa44",
+        "sensor_pos": number,
+        "taxels": [{"x": k % 65536, "y": taxel, "z": 7} for taxel in range(16)],
+        "forces": [],
+    }
 
 
 EVERY = {
