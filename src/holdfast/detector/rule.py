@@ -20,6 +20,7 @@ from holdfast.detector.table import (
     table_of,
 )
 from holdfast.features import kernel
+from holdfast.features.faults import TARE_DRIFT
 from holdfast.features.kernel import (
     FAULTS,
     REASON,
@@ -30,6 +31,7 @@ from holdfast.features.kernel import (
     Layout,
     Memory,
     Output,
+    noise_sigma,
 )
 from holdfast.features.stream import StreamPlan
 from holdfast.model import ANY_FINGER, Model
@@ -51,7 +53,9 @@ N_LIMITS = 3
 # Columns of Decision.codes: states as codes of holdfast.contact.
 TOLD = 0
 CANDIDATE = 1  # a state that has not lasted long enough yet
-N_CODES = 2
+ABOVE = 2  # of F_a: UNDER the threshold of contact, over it by a TOUCH, or by DRIFT of the tare
+N_CODES = 3
+UNDER, TOUCH, DRIFT = range(3)
 
 N_REPORT = 7
 
@@ -59,7 +63,14 @@ N_REPORT = 7
 PROBABILITY = 0
 SINCE = 1  # when the candidate began [s]
 LAST_UNSTABLE = 2  # when the rule last said so [s]
-N_DECIDED = 3
+SLOW = 3  # F_a, smoothed over DRIFT_SECONDS [unit of the readings]
+ROUSED = 4  # when the finger was last not calm [s]
+N_DECIDED = 5
+
+DRIFT_SECONDS = 1.0
+"""What brings F_a over the threshold of contact takes less time, but for a drift [s]."""
+CALM = 3.0
+"""So many times the sigma that noise alone gives: what is more is a transient."""
 
 
 class Rule(NamedTuple):
@@ -151,19 +162,27 @@ def step(
     kernel.advance(layout, memory, output, readings, present, time)
     for finger in range(len(present)):
         codes, decided = decision.codes[finger], decision.values[finger]
-        if output.status[finger, REASON] != kernel.READY:
-            codes[:] = UNKNOWN
+        ready = output.status[finger, REASON] == kernel.READY
+        threshold = _contact(memory.levels[finger, kernel.NOISE], rule.limits[finger])
+        if (
+            ready
+            and present[finger]
+            and _drifted(layout, memory, output, decision, finger, threshold, time)
+        ):
+            output.status[finger, REASON], output.status[finger, FAULTS] = kernel.FAULT, TARE_DRIFT
+            ready = False
+        if not ready:
+            codes[TOLD] = codes[CANDIDATE] = UNKNOWN
             decided[PROBABILITY] = decided[LAST_UNSTABLE] = math.nan
         elif present[finger]:
-            noise = memory.levels[finger, kernel.NOISE]
-            if _is_free(output.values[finger, kernel.AMPLITUDE], noise, rule.limits[finger]):
+            if output.values[finger, kernel.AMPLITUDE] < threshold:
                 decided[PROBABILITY] = 0.0
                 state = NO_CONTACT
             else:
                 weights = rule.weights[finger, : rule.n_weights[finger]]
                 decided[PROBABILITY] = linear_probability(output.features[finger], weights)
-                threshold = rule.limits[finger, THRESHOLD]
-                state = _judge(decided[PROBABILITY], threshold, rule.hysteresis, codes[TOLD])
+                limit = rule.limits[finger, THRESHOLD]
+                state = _judge(decided[PROBABILITY], limit, rule.hysteresis, codes[TOLD])
                 state = _held(state, decided, rule.hold, time, layout.period)
             _tell(codes, decided, state, rule.min_duration, time, layout.period)
     return _hand_state(decision.codes[:, TOLD], rule.n_fingers)
@@ -197,7 +216,7 @@ class Live(NamedTuple):
             [layout.tare_seconds, layout.period, rule.hysteresis, rule.min_duration, rule.hold]
         )
         arrays = [
-            integers, floats, *layout[:6], *self.memory, *self.output, *rule[:3], *self.decision,
+            integers, floats, *layout[:7], *self.memory, *self.output, *rule[:3], *self.decision,
             self.readings, self.present, self.report,
         ]  # fmt: skip
         return table_of(arrays), arrays
@@ -212,20 +231,20 @@ def step_live(table: Integers, time: float) -> int:
     kind, numbers = integers1(table, 0), floats1(table, 1)
     layout = Layout(
         integers1(table, 2), floats3(table, 3), floats2(table, 4), integers3(table, 5),
-        floats2(table, 6), integers2(table, 7), kind[2] != 0, kind[0], numbers[0],
-        numbers[1],
+        floats2(table, 6), integers2(table, 7), flags1(table, 8), kind[2] != 0, kind[0],
+        numbers[0], numbers[1],
     )  # fmt: skip
     memory = Memory(
-        floats2(table, 8), floats2(table, 9), floats3(table, 10), integers2(table, 11),
-        floats2(table, 12), floats2(table, 13),
+        floats2(table, 9), floats2(table, 10), floats2(table, 11), floats3(table, 12),
+        integers2(table, 13), floats2(table, 14), floats2(table, 15),
     )  # fmt: skip
-    output = Output(floats2(table, 14), floats2(table, 15), integers2(table, 16))
+    output = Output(floats2(table, 16), floats2(table, 17), integers2(table, 18))
     rule = Rule(
-        floats2(table, 17), integers1(table, 18), floats2(table, 19), numbers[2], numbers[3],
+        floats2(table, 19), integers1(table, 20), floats2(table, 21), numbers[2], numbers[3],
         numbers[4], kind[1],
     )  # fmt: skip
-    decision = Decision(integers2(table, 20), floats2(table, 21))
-    readings, present, report = floats2(table, 22), flags1(table, 23), floats2(table, 24)
+    decision = Decision(integers2(table, 22), floats2(table, 23))
+    readings, present, report = floats2(table, 24), flags1(table, 25), floats2(table, 26)
     hand = step(layout, memory, output, rule, decision, readings, present, time)
     for f in range(len(present)):
         state, status = decision.codes[f, TOLD], output.status[f]
@@ -264,12 +283,44 @@ def run(
 
 
 @compiled
-def _is_free(amplitude: float, noise: float, limits: Array) -> bool:
-    """Whether F_a is under the threshold of contact; never, where there is none."""
-    threshold = limits[CONTACT]
-    if math.isnan(threshold):
-        threshold = limits[CONTACT_NOISE] * noise
-    return bool(amplitude < threshold)
+def _contact(noise: float, limits: Array) -> float:
+    """The threshold of contact of F_a; NaN, which nothing is under, where there is none."""
+    if math.isnan(limits[CONTACT]):
+        return float(limits[CONTACT_NOISE] * noise)
+    return float(limits[CONTACT])
+
+
+@compiled
+def _drifted(
+    layout: Layout,
+    memory: Memory,
+    output: Output,
+    decision: Decision,
+    f: int,
+    threshold: float,
+    time: float,
+) -> bool:
+    """Whether F_a crept over the threshold of contact: a touch is neither so slow nor so calm."""
+    codes, decided, values = decision.codes[f], decision.values[f], output.values[f]
+    window = layout.windows[f, kernel.SIGMA_WINDOW]
+    amplitude, mean = values[kernel.AMPLITUDE], math.sqrt(2.0) * values[kernel.MEAN]
+    if math.isnan(decided[SLOW]):
+        decided[SLOW], decided[ROUSED] = amplitude, time
+    slow = decided[SLOW]
+    decided[SLOW] += min(1.0, layout.period / DRIFT_SECONDS) * (amplitude - slow)
+    noise = memory.levels[f, kernel.NOISE]
+    quiet = window > 2 and values[kernel.SIGMA] <= CALM * noise_sigma(noise, window)
+    calm = quiet and abs(mean - slow) <= 0.5 * threshold
+    if not calm:
+        decided[ROUSED] = time
+    if amplitude < threshold:
+        codes[ABOVE] = UNDER
+    elif not calm:
+        codes[ABOVE] = TOUCH
+    elif codes[ABOVE] == UNDER:
+        long = time - decided[ROUSED] + 0.5 * layout.period >= DRIFT_SECONDS
+        codes[ABOVE] = DRIFT if long else TOUCH
+    return bool(codes[ABOVE] == DRIFT)
 
 
 @compiled

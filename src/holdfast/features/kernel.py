@@ -8,33 +8,54 @@ row of an array, and columns have names: a slice would cost as much as the sum i
 import math
 from typing import NamedTuple
 
+import numba
 import numpy as np
 import numpy.typing as npt
 
 from holdfast.compiled import compiled
+from holdfast.features.faults import (
+    LEAST_TAXELS,
+    NOISE_SMOOTHING,
+    NOISY,
+    NOT_FINITE,
+    OUT_OF_RANGE,
+    SATURATED,
+    SPOILING,
+    STUCK,
+    STUCK_SECONDS,
+    TARE_LOADED,
+    bit_of,
+    differ,
+    forget_noise,
+    is_noisy,
+    outside,
+    still_taxels,
+    survey,
+    watch_taxels,
+)
 from holdfast.features.haar import haar_window
+
+_inlined = numba.njit(error_model="numpy", inline="always")
+"""For steps that take all arrays: handing them over costs as much as the step."""
 
 Array = npt.NDArray[np.float64]
 Integers = npt.NDArray[np.int64]
 Flags = npt.NDArray[np.bool_]
 
-# Codes of holdfast.contact.Reason and bits of holdfast.contact.Fault.
+# Codes of holdfast.contact.Reason.
 READY, TARE, WARM_UP, GAP, FAULT = range(5)
-NOT_FINITE, STUCK, SATURATED, TARE_LOADED = 1, 2, 4, 8
 
 TARE_SECONDS, TARE_FIRST, TARE_NONE, TARE_GIVEN = range(4)
 
 NOISE_SECONDS = 0.5
 """How long the noise of a sensor is watched where the tare takes no time [s]."""
-STUCK_SECONDS = 0.5
-"""Readings that changed for so long and then have not for so long are stuck [s]."""
 LOADED_SECONDS = 0.25
 """Pulling for so long means that the tare was taken under load: nothing pulls a skin [s]."""
 GAP_LIMIT = 3.0003
 """Sample periods; a longer step is a gap. The part over 3 is for the rounding of times."""
 
 # Columns of Memory.counts.
-SEEN = 0  # finite samples
+SEEN = 0  # samples that made sense
 RUN = 1  # forces in the present stretch
 GAPPED = 2  # 1 while a stretch that follows a gap warms up
 TARED = 3  # samples in the baseline so far; -1 once it is frozen
@@ -42,7 +63,9 @@ FROZEN = 4  # samples since the readings last changed
 CHANGES = 5  # samples that changed the readings
 PULLING = 6  # samples since the normal readings together turned negative
 END = 7  # one past the newest value in the history, before which a window is contiguous
-N_COUNTS = 8
+WRONG = 8  # faults of taxels by themselves, by the last sample that changed any
+WRONG_TAXELS = 9  # bits of those taxels
+N_COUNTS = 10
 
 # Columns of Memory.levels.
 FIRST = 0  # time of the first finite sample [s]
@@ -50,13 +73,15 @@ LAST = 1  # time of the last sample [s]
 STEPS = 2  # sum of squared steps of the force, while the noise is measured
 N_STEPS = 3  # their number
 NOISE = 4  # standard deviation of a force component by noise alone; NaN while unknown
-LARGEST = 5  # largest F_a so far
+LARGEST = 5  # largest F_a so far, of samples that nothing spoiled
 N_LEVELS = 6
 
 # Columns of Layout.constants.
 LEAST, MOST = 0, 1  # readings that the sensor can send
 LEAST_NOISE = 2  # of a force component, by the step of the readings
-N_CONSTANTS = 3
+ROUNDING = 3  # noise of a reading by its step; NaN where the step is not known
+N_USED = 4  # taxels that are not ignored
+N_CONSTANTS = 5
 
 # Columns of Layout.specs.
 KIND, WINDOW, TRANSFORM, SCOPE, SAME_AS = range(5)
@@ -88,6 +113,7 @@ class Layout(NamedTuple):
     specs: Integers  # (n_fingers, n_features, 5) as `spec_codes` gives them
     floors: Array  # (n_fingers, n_features)
     windows: Integers  # (n_fingers, 2) of the reported sigma, and the longest
+    ignored: Flags  # (n_taxels,) those that contribute nothing
     alike: bool  # whether all fingers have the same features
     tare_kind: int
     tare_seconds: float
@@ -98,7 +124,8 @@ class Memory(NamedTuple):
     """What a stream remembers."""
 
     baseline: Array  # (n_taxels, 3) a sum while the tare runs, then the mean
-    previous: Array  # (n_taxels, 3) last finite readings
+    previous: Array  # (n_taxels, 3) readings of the last sample that made sense
+    taxels: Array  # (n_taxels, N_TAXEL) of holdfast.features.faults
     history: Array  # (n_fingers, 4, 2 * longest) F_a, F_x, F_y, F_z, each written twice
     counts: Integers  # (n_fingers, N_COUNTS)
     levels: Array  # (n_fingers, N_LEVELS)
@@ -123,7 +150,8 @@ def advance(
         layout: of the hand.
         memory: is changed.
         output: is filled.
-        readings: (n_taxels, 3) of all fingers; those of absent ones are not looked at.
+        readings: (n_taxels, 3) of all fingers; those of absent ones are not looked at, and
+            those of ignored taxels become zero.
         present: (n_fingers,) which fingers have a sample.
         time: of the sample [s].
     """
@@ -133,10 +161,10 @@ def advance(
             counts[f, RUN] = counts[f, FROZEN] = counts[f, PULLING] = 0
             memory.own[f] = math.nan
             counts[f, GAPPED] = 1
-            status[f, REASON], status[f, FAULTS] = GAP, 0
+            status[f, REASON], status[f, FAULTS], status[f, TAXELS] = GAP, 0, 0
             output.values[f] = math.nan
         if present[f]:
-            status[f, REASON], status[f, FAULTS] = _take(
+            status[f, REASON], status[f, FAULTS], status[f, TAXELS] = _take(
                 layout, memory, output.values, readings, time, f
             )
     for f in range(len(present)):
@@ -151,44 +179,95 @@ def advance(
                 status[f, REASON] = TARE
 
 
-@compiled
+@_inlined
 def _take(
     layout: Layout, memory: Memory, values: Array, readings: Array, time: float, f: int
-) -> tuple[int, int]:
-    """One finger's sample up to its force; the reason and the faults after it."""
-    offsets, rotations, constants, _, _, windows, _, tare_kind, tare_seconds, period = layout
-    baseline, previous, history, counts, levels, _ = memory
-    first, last = offsets[f], offsets[f + 1]
+) -> tuple[int, int, int]:
+    """One finger's sample up to its force; the reason, the faults and their taxels after it."""
+    counts, levels, constants, ignored = (
+        memory.counts,
+        memory.levels,
+        layout.constants,
+        layout.ignored,
+    )
+    first, last = layout.offsets[f], layout.offsets[f + 1]
+    low, high = constants[f, LEAST], constants[f, MOST]
     values[f] = math.nan
+    fresh = time - levels[f, LAST] > GAP_LIMIT * layout.period
     levels[f, LAST] = time
-    total, changed, least, most = _survey(readings, previous, first, last)
+    total, least, most = survey(readings, ignored, first, last)
     if not math.isfinite(total):
         counts[f, RUN] = 0
-        return FAULT, NOT_FINITE
-    _watch(counts, levels, f, changed, time)
-    elapsed = time - levels[f, FIRST] + 0.5 * period  # half a period: rounding moves no sample
-    if math.isnan(levels[f, NOISE]):
-        watched = elapsed >= (tare_seconds if tare_kind == TARE_SECONDS else NOISE_SECONDS)
-        _listen(layout, memory, readings, f, watched)
-    previous[first:last] = readings[first:last]
-    if counts[f, TARED] >= 0:
-        running = elapsed < tare_seconds or counts[f, TARED] == 0  # one sample at least
-        if not _tare(readings, baseline, counts, f, first, last, tare_kind, running):
-            return TARE, 0
-    x, y, z, pressing = force_of(readings, baseline, rotations, first, last)
-    _remember(history, counts, levels, values, f, x, y, z)
+        return FAULT, NOT_FINITE, outside(readings, ignored, first, last, -math.inf, math.inf)
+    if least < low or most > high:
+        counts[f, RUN] = 0
+        low, high = np.nextafter(low, -math.inf), np.nextafter(high, math.inf)
+        return FAULT, OUT_OF_RANGE, outside(readings, ignored, first, last, low, high)
+    _watch(layout, memory, readings, f, time, fresh)
+    elapsed = time - levels[f, FIRST] + 0.5 * layout.period  # half: rounding moves no sample
+    if not _prepared(layout, memory, readings, f, elapsed):
+        return TARE, 0, 0
+    faults, bits = counts[f, WRONG], counts[f, WRONG_TAXELS]
+    if least <= low or most >= high:
+        faults |= SATURATED
+        bits |= outside(readings, ignored, first, last, low, high)
+    return _feel(layout, memory, values, readings, f, faults, bits)
+
+
+@_inlined
+def _feel(
+    layout: Layout, memory: Memory, values: Array, readings: Array, f: int, faults: int, bits: int
+) -> tuple[int, int, int]:
+    """The force of a sample, with its faults so far; what `_take` returns."""
+    counts, levels, windows = memory.counts, memory.levels, layout.windows
+    first, last = layout.offsets[f], layout.offsets[f + 1]
+    x, y, z, pressing = force_of(readings, memory.baseline, layout.rotations, first, last)
+    _remember(memory.history, counts, values, f, x, y, z)
+    if _stuck(counts, f, layout.period):
+        faults |= STUCK
+    if faults & SPOILING:
+        counts[f, RUN] = counts[f, PULLING] = 0
+        return FAULT, faults, bits
+    levels[f, LARGEST] = max(levels[f, LARGEST], values[f, AMPLITUDE])
     if counts[f, RUN] >= windows[f, SIGMA_WINDOW]:
-        moments = _moments(history, counts, f, 0, windows[f, SIGMA_WINDOW])
+        moments = _moments(memory.history, counts, f, 0, windows[f, SIGMA_WINDOW])
         values[f, MEAN], values[f, SIGMA] = moments
-    faults = _faults(counts, levels, constants, f, period, least, most)
-    if tare_kind == TARE_SECONDS and _pulled(counts, levels, f, pressing, period):
+    if layout.tare_kind == TARE_SECONDS and _pulled(counts, levels, f, pressing, layout.period):
         faults |= TARE_LOADED
     if faults:
-        return FAULT, faults
+        return FAULT, faults, bits
     if counts[f, RUN] < windows[f, LONGEST]:
-        return GAP if counts[f, GAPPED] else WARM_UP, 0
+        return GAP if counts[f, GAPPED] else WARM_UP, 0, 0
     counts[f, GAPPED] = 0
-    return READY, 0
+    return READY, 0, 0
+
+
+@_inlined
+def _watch_taxels(layout: Layout, memory: Memory, readings: Array, f: int, fresh: bool) -> None:
+    """Takes a sample that changed something, and finds the taxels that are at fault."""
+    first, last, period = layout.offsets[f], layout.offsets[f + 1], layout.period
+    taxels, constants, counts = memory.taxels, layout.constants, memory.counts
+    n_changes, long = counts[f, CHANGES], STUCK_SECONDS / period
+    share = min(1.0, period / NOISE_SMOOTHING)
+    any_still, alone, which = watch_taxels(
+        readings, memory.previous, taxels, first, last, n_changes, long, share
+    )
+    if fresh:
+        forget_noise(taxels, first, last)
+    counts[f, WRONG] = counts[f, WRONG_TAXELS] = 0
+    if any_still:
+        low, high, ignored = constants[f, LEAST], constants[f, MOST], layout.ignored
+        at_limit = outside(readings, ignored, first, last, low, high)
+        counts[f, WRONG], counts[f, WRONG_TAXELS] = still_taxels(
+            taxels, ignored, first, last, n_changes, period, at_limit
+        )
+    if alone and constants[f, N_USED] >= LEAST_TAXELS:
+        quiet = constants[f, ROUNDING]
+        if math.isnan(quiet):  # its share in the noise of the finger
+            quiet = memory.levels[f, NOISE] / math.sqrt(constants[f, N_USED])
+        if is_noisy(taxels, which, quiet):
+            counts[f, WRONG] |= NOISY
+            counts[f, WRONG_TAXELS] |= bit_of(which - first)
 
 
 @compiled
@@ -208,34 +287,37 @@ def force_of(
     return fx, fy, fz, pressing
 
 
-@compiled
-def _survey(
-    readings: Array, previous: Array, first: int, last: int
-) -> tuple[float, bool, float, float]:
-    """A sum that is finite where all readings are, whether any changed, smallest and largest."""
-    total = 0.0
-    n_changed = 0
-    least, most = math.inf, -math.inf
-    for i in range(first, last):
-        for axis in range(3):
-            value = readings[i, axis]
-            total += value
-            n_changed += value != previous[i, axis]
-            least = min(least, value)
-            most = max(most, value)
-    return total, n_changed > 0, least, most
-
-
-@compiled
-def _watch(counts: Integers, levels: Array, f: int, changed: bool, time: float) -> None:
+@_inlined
+def _watch(
+    layout: Layout, memory: Memory, readings: Array, f: int, time: float, fresh: bool
+) -> None:
+    """Counts the sample, and what it changes."""
+    counts = memory.counts
+    first, last = layout.offsets[f], layout.offsets[f + 1]
     if counts[f, SEEN] == 0:
-        levels[f, FIRST] = time
-    elif changed:
+        memory.levels[f, FIRST] = time
+    elif differ(readings, memory.previous, first, last):
         counts[f, FROZEN] = 0
         counts[f, CHANGES] += 1
+        _watch_taxels(layout, memory, readings, f, fresh)
     else:
         counts[f, FROZEN] += 1
     counts[f, SEEN] += 1
+
+
+@_inlined
+def _prepared(layout: Layout, memory: Memory, readings: Array, f: int, elapsed: float) -> bool:
+    """Whether the tare is complete; takes the sample into it, and into the noise, until then."""
+    counts, kind, seconds = memory.counts, layout.tare_kind, layout.tare_seconds
+    first, last = layout.offsets[f], layout.offsets[f + 1]
+    if math.isnan(memory.levels[f, NOISE]):
+        watched = elapsed >= (seconds if kind == TARE_SECONDS else NOISE_SECONDS)
+        _listen(layout, memory, readings, f, watched)
+    memory.previous[first:last] = readings[first:last]
+    if counts[f, TARED] < 0:
+        return True
+    running = elapsed < seconds or counts[f, TARED] == 0  # one sample at least
+    return bool(_tare(readings, memory.baseline, counts, f, first, last, kind, running))
 
 
 @compiled
@@ -280,7 +362,6 @@ def _tare(
 def _remember(
     history: Array,
     counts: Integers,
-    levels: Array,
     values: Array,
     f: int,
     x: float,
@@ -298,27 +379,14 @@ def _remember(
     history[f, 3, place] = history[f, 3, place + length] = z
     values[f, 0], values[f, 1], values[f, 2] = x, y, z
     values[f, AMPLITUDE] = amplitude
-    levels[f, LARGEST] = max(levels[f, LARGEST], amplitude)
 
 
 @compiled
-def _faults(
-    counts: Integers,
-    levels: Array,
-    constants: Array,
-    f: int,
-    period: float,
-    least: float,
-    most: float,
-) -> int:
-    faults = 0
+def _stuck(counts: Integers, f: int, period: float) -> bool:
+    """Whether nothing of the finger changes any more, though it used to."""
     lively = 2 * counts[f, CHANGES] > counts[f, SEEN] - 1 - counts[f, FROZEN]
     long = STUCK_SECONDS / period
-    if lively and counts[f, FROZEN] >= long and counts[f, CHANGES] >= long:
-        faults |= STUCK
-    if least <= constants[f, LEAST] or most >= constants[f, MOST]:
-        faults |= SATURATED
-    return faults
+    return bool(lively and counts[f, FROZEN] >= long and counts[f, CHANGES] >= long)
 
 
 @compiled
@@ -342,7 +410,7 @@ def _moments(
 def _own_features(layout: Layout, memory: Memory, output: Output, f: int) -> None:
     """The values of a finger's features by itself; NaN where its stretch is too short."""
     specs, floors, reported = layout.specs, layout.floors, layout.windows[f, SIGMA_WINDOW]
-    _, _, history, counts, levels, own = memory
+    _, _, _, history, counts, levels, own = memory
     for place in range(specs.shape[1]):
         kind, window = specs[f, place, KIND], specs[f, place, WINDOW]
         if kind < 0:
@@ -408,5 +476,11 @@ def _transform(value: float, transform: int, window: int, noise: float, floor: f
         return float(value)
     if transform == 1:
         return math.log(math.sqrt(value * value + floor * floor))
-    expected = noise * math.sqrt((window - 2.0) / (2.0 * window))
+    expected = noise_sigma(noise, window)
     return math.log(max(value, 1e-3 * expected) / expected)
+
+
+@compiled
+def noise_sigma(noise: float, window: int) -> float:
+    """The sigma that noise alone gives."""
+    return noise * math.sqrt((window - 2.0) / (2.0 * window))

@@ -3,12 +3,13 @@
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import reduce
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 import numpy.typing as npt
 
 from holdfast.features import kernel
+from holdfast.features.faults import CHANGED_AT, N_TAXEL
 from holdfast.features.force import baseline_of
 from holdfast.features.kernel import Array, Layout, Memory, Output
 from holdfast.features.specs import FeatureSpec, spec_codes
@@ -22,7 +23,7 @@ TARE_KINDS = {
     "none": kernel.TARE_NONE,
     "interval": kernel.TARE_GIVEN,
 }
-COUNT_STEP_NOISE = 1 / np.sqrt(12)
+COUNT_STEP_NOISE = float(1 / np.sqrt(12))
 """Standard deviation of rounding to whole counts: no sensor in counts is more quiet."""
 NEWTON_NOISE = 1e-6
 """The same for readings in newtons, whose step nobody knows [N]."""
@@ -64,19 +65,31 @@ class StreamPlan:
         floors = np.zeros((len(sensors), width))
         for row, specs in zip(floors, features, strict=True):
             row[: len(specs)] = [spec.floor for spec in specs]
-        constants = [(*(s.limits or (-np.inf, np.inf)), _least_noise(s)) for s in sensors]
+        ignored = [self._ignored(finger) for finger in self.fingers]
+        rotations = [
+            np.where(i[:, None, None], 0, s.rotations)
+            for i, s in zip(ignored, sensors, strict=True)
+        ]
         return Layout(
             offsets=np.cumsum([0, *(sensor.n_taxels for sensor in sensors)]),
-            rotations=np.concatenate([sensor.rotations for sensor in sensors]),
-            constants=np.array(constants),
+            rotations=np.concatenate(rotations),
+            constants=np.array(
+                [_constants(s, int((~i).sum())) for i, s in zip(ignored, sensors, strict=True)]
+            ),
             specs=np.stack([spec_codes(specs, width) for specs in features]),
             floors=floors,
             windows=np.array([(self.window, most) for most in longest], dtype=np.int64),
+            ignored=np.concatenate(ignored),
             alike=len({tuple(specs) for specs in features}) == 1,
             tare_kind=TARE_KINDS[self.tare.kind],
             tare_seconds=self.tare.seconds,
             period=1.0 / self.rate,
         )
+
+    def _ignored(self, finger: str) -> npt.NDArray[np.bool_]:
+        flags = np.zeros(self.sensors[finger].n_taxels, dtype=np.bool_)
+        flags[list(self.ignore.get(finger, ()))] = True
+        return flags
 
 
 def new_memory(layout: Layout) -> Memory:
@@ -85,10 +98,13 @@ def new_memory(layout: Layout) -> Memory:
     n_taxels = len(layout.rotations)
     longest = int(layout.windows[:, kernel.LONGEST].max())
     levels = np.zeros((n_fingers, kernel.N_LEVELS))
+    taxels = np.zeros((n_taxels, N_TAXEL))
+    taxels[layout.ignored, CHANGED_AT] = np.inf  # never long ago
     levels[:, [kernel.FIRST, kernel.LAST, kernel.NOISE]] = np.nan
     return Memory(
         baseline=np.zeros((n_taxels, 3)),
         previous=np.zeros((n_taxels, 3)),
+        taxels=taxels,
         history=np.zeros((n_fingers, 4, 2 * longest)),
         counts=np.zeros((n_fingers, kernel.N_COUNTS), dtype=np.int64),
         levels=levels,
@@ -174,7 +190,8 @@ def give_baseline(plan: StreamPlan, memory: Memory, recording: Recording) -> Non
             continue
         module = recording.modules[finger]
         rows = slice(*np.searchsorted(module.times, plan.tare.interval))
-        readings = np.asarray(module.readings[rows], dtype=np.float64)
+        readings = np.array(module.readings[rows], dtype=np.float64)
+        readings[:, list(plan.ignore.get(finger, ()))] = 0.0
         try:
             baseline, _ = baseline_of(readings, module.times[rows], plan.tare, 1 / plan.rate)
         except ValueError as cause:
@@ -185,7 +202,9 @@ def give_baseline(plan: StreamPlan, memory: Memory, recording: Recording) -> Non
         memory.baseline[end - sensor.n_taxels : end] = baseline
 
 
-def _least_noise(sensor: Sensor) -> float:
-    """Of a force component: the rounding of all taxels together [unit of the readings]."""
-    step: Any = COUNT_STEP_NOISE if sensor.unit == "count" else NEWTON_NOISE
-    return float(step * np.sqrt(sensor.n_taxels))
+def _constants(sensor: Sensor, n_used: int) -> tuple[float, ...]:
+    """A row of `Layout.constants`; the taxels that are used round their readings each."""
+    low, high = sensor.limits or (-np.inf, np.inf)
+    step = COUNT_STEP_NOISE if sensor.unit == "count" else NEWTON_NOISE
+    known = step if sensor.unit == "count" else np.nan
+    return low, high, float(step * np.sqrt(n_used)), known, n_used
