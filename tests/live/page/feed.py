@@ -1,6 +1,6 @@
 """A service that is none: it plays a tape to the page, and does what a test wants of it.
 
-By hand, to look at the page: `python -m tests.live.page.feed RECORDING [PORT]`.
+By hand, to look at the page: `PYTHONPATH=tests python -m live.page.feed RECORDING [PORT]`.
 """
 
 import asyncio

@@ -35,7 +35,7 @@ export class Cards {
     this.scales.clear();
     const entries = Object.entries(hello.fingers);
     this.cards = new Map(entries.map(([name, sensor], k) => {
-      if (!this.scales.has(sensor.unit)) this.scales.set(sensor.unit, new Scale(sensor.unit));
+      if (!this.scales.has(sensor.unit)) this.scales.set(sensor.unit, { disc: new Scale(sensor.unit), arrow: new Scale(sensor.unit) });
       return [name, new Card(name, sensor, this.scales.get(sensor.unit), k, () => this.choose(name))];
     }));
     this.section.replaceChildren(...[...this.cards.values()].map((card) => card.element));
@@ -45,24 +45,31 @@ export class Cards {
 
   // As many columns as fit, and lines of equal length: six fingers are 3 + 3, not 5 + 1.
   arrange() {
-    const n = this.cards.size || 1, fit = Math.max(1, Math.floor((this.section.clientWidth + 8) / 228));
+    const n = this.cards.size || 1, fit = Math.max(1, Math.floor((this.section.clientWidth + 8) / 208));
     const lines = Math.ceil(n / fit);
-    this.section.style.setProperty("--columns", Math.ceil(n / lines));
-    this.section.style.setProperty("--lines", lines);
+    this.section.parentElement.style.setProperty("--columns", Math.ceil(n / lines));
+    this.section.parentElement.style.setProperty("--lines", lines);
   }
 
   update(message) {
-    for (const scale of this.scales.values()) if (!this.frozen) scale.decay(message.time);
+    if (!this.frozen) this.decay(message.time);
     for (const [name, card] of this.cards) {
       const finger = message.fingers[name];
       if (finger) card.update(finger, this.frozen);
     }
   }
 
+  decay(now) {
+    for (const { disc, arrow } of this.scales.values()) for (const scale of [disc, arrow]) scale.decay(now);
+  }
+
   /** Nothing is known while nobody tells: an old STABLE must not stand there. */
   forget(reason) {
     for (const card of this.cards.values()) card.tell("UNKNOWN", reason);
   }
+
+  /** Whether what is shown is no longer so. */
+  stale(stale) { this.section.classList.toggle("stale", stale); }
 
   draw() {
     for (const card of this.cards.values()) card.map.draw();
@@ -79,7 +86,7 @@ export class Cards {
 }
 
 class Card {
-  constructor(name, sensor, scale, place, choose) {
+  constructor(name, sensor, scales, place, choose) {
     this.sensor = sensor;
     const swatch = make("i", "swatch");
     swatch.style.background = fingerColour(place);
@@ -89,14 +96,14 @@ class Card {
     this.reason = make("span", "reason");
     const title = make("span", "name", swatch, make("span", "", name));
     title.title = name;
-    this.head = make("button", "head", this.shape, make("span", "says", title, this.word), this.reason);
+    this.head = make("button", "head", this.shape, make("span", "says", make("span", "top-line", title, this.reason), this.word));
     this.head.type = "button";
     this.head.title = `Plots of ${name} (${place + 1})`;
     this.head.addEventListener("click", choose);
     const canvas = make("canvas");
     canvas.setAttribute("role", "img");
     canvas.setAttribute("aria-label", `Taxel map of ${name}`);
-    this.map = new TaxelMap(canvas, sensor, scale);
+    this.map = new TaxelMap(canvas, sensor, scales);
     this.faults = make("ul", "faults");
     this.faults.hidden = true;
     const body = make("div", "body", make("div", "map", canvas), this.figures());
@@ -149,14 +156,16 @@ class Card {
     const told = JSON.stringify([faults, taxels]);
     if (told === this.told) return;
     this.told = told;
-    const badges = faults.map((fault) => make("li", "", faultWord(fault)));
+    const words = faults.map(faultWord);
     if (taxels.length) {
       const few = taxels.slice(0, 4).map((k) => k + 1).join(", ");
-      badges.push(make("li", "", `${taxels.length > 1 ? "taxels" : "taxel"} ${few}${taxels.length > 4 ? " …" : ""}`));
+      words.push(`${taxels.length > 1 ? "taxels" : "taxel"} ${few}${taxels.length > 4 ? " …" : ""}`);
     }
-    this.faults.replaceChildren(...badges);
-    this.faults.title = badges.map((badge) => badge.textContent).join("; ");
-    this.faults.hidden = !badges.length;
+    // Three have room; the tooltip has them all.
+    const shown = words.length > 3 ? [...words.slice(0, 2), `${words.length - 2} more`] : words;
+    this.faults.replaceChildren(...shown.map((word) => make("li", "", word)));
+    this.faults.title = words.join("; ");
+    this.faults.hidden = !words.length;
   }
 }
 

@@ -36,7 +36,7 @@ export class Events {
   }
 
   put(time, ...parts) {
-    const item = make("li", "", make("time"), ...parts);
+    const item = make("li", "", make("time", "", span(0)), ...parts);
     this.times.set(item, time);
     putFirst(this.list, item);
   }

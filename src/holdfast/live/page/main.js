@@ -64,7 +64,11 @@ class Page {
     this.state.silent = Boolean(message.health?.silent);
     this.now = message.time;
     this.store.append(message.series, Math.max(0, STATES.indexOf(message.hand)), this.gap);
-    this.hand.tell(message.hand);
+    const { ended, silent } = this.state;
+    // An old STABLE must not be read as one of now.
+    if (ended || silent) this.hand.tell("UNKNOWN", ended ? "SOURCE ENDED" : "NO SAMPLES");
+    else this.hand.tell(message.hand);
+    this.cards.stale(ended || silent);
     this.cards.update(message);
     for (const event of message.events ?? []) this.events.add(event);
     for (const notice of message.notices ?? []) this.notices.add(notice);
@@ -83,6 +87,7 @@ class Page {
     if (link === "open") return;
     this.hand.tell("UNKNOWN", "NO CONNECTION");
     this.cards.forget("no connection");
+    this.cards.stale(true);
   }
 
   tellLink() {

@@ -12,7 +12,7 @@ const AXES = [["fx", "x"], ["fy", "y"], ["fz", "z"]];
 
 // Steps that leave the ends of an axis where they are while the data change a little.
 function rounded(low, high, least) {
-  const size = Math.max(high - low, least), step = 10 ** Math.floor(Math.log10(size)) / 2;
+  const size = Math.max(high - low, least), step = 10 ** Math.floor(Math.log10(size)) / 4;
   return [Math.floor(low / step) * step, Math.ceil(high / step) * step];
 }
 
@@ -55,6 +55,7 @@ export class Plots {
 
   kinds() {
     const unit = unitWord((this.fingers[this.chosen ?? this.names[0]] ?? {}).unit);
+    const brief = this.chosen === null; // the names stand at the first plot, or on the buttons
     const own = (column) => (this.chosen === null
       ? this.names.map((name, k) => ({ finger: name, column, label: name, colour: fingerColour(k) }))
       : [{ finger: this.chosen, column, label: this.chosen, colour: fingerColour(this.names.indexOf(this.chosen)) }]);
@@ -65,9 +66,9 @@ export class Plots {
         lines: AXES.map(([column, axis]) => ({ finger: this.chosen, column, label: `F${axis}`, colour: colours[`axis-${axis}`] })),
       };
     return [
-      { ...force, key: "force", unit },
-      { key: "sigma", title: "Instability σ", unit, lines: own("sigma"), range: decades, log: true },
-      { key: "probability", title: "P(stable)", unit: "", lines: own("probability"), range: () => [-0.04, 1.04] },
+      { ...force, key: "force", unit, brief: brief && this.names.length > 4 },
+      { key: "sigma", title: "Instability σ", brief, lines: own("sigma"), range: decades, log: true },
+      { key: "probability", title: "P(stable)", brief, lines: own("probability"), range: () => [-0.04, 1.04] },
     ];
   }
 
@@ -80,14 +81,14 @@ export class Plots {
 
   row(kind, last) {
     const values = kind.lines.map(() => make("span", "value", number(null)));
-    const legend = make("div", kind.lines.length > 3 ? "legend two" : "legend", ...kind.lines.map((entry, k) => {
+    const legend = make("div", kind.brief ? "legend brief" : "legend", ...kind.lines.map((entry, k) => {
       const swatch = make("i", "swatch");
       swatch.style.background = entry.colour;
       const item = make("span", "entry", swatch, make("span", "label", entry.label), values[k]);
       item.title = entry.label;
       return item;
     }));
-    const title = make("h3", "", kind.title, make("small", "", kind.unit));
+    const title = make("h3", "", kind.title, make("small", "", kind.unit ?? ""));
     const holder = make("div", "holder");
     const box = make("div", `plot ${kind.key}${last ? " last" : ""}`, make("div", "gutter", title, legend), holder);
     this.stack.append(box);
@@ -100,7 +101,7 @@ export class Plots {
     const axis = { font: FONT, stroke: colours.muted, grid: { stroke: colours.grid, width: 1 }, ticks: { show: false } };
     const { kind } = row;
     return {
-      width: 300, height: 100, padding: [4, 14, last ? 0 : 2, 0], legend: { show: false },
+      width: 300, height: 100, padding: [8, 14, last ? 0 : 2, 0], legend: { show: false },
       cursor: { sync: { key: "time" }, drag: { x: false, y: false }, y: false, points: { size: 6 } },
       scales: {
         x: { time: false, range: () => [-this.window, 0] },
@@ -111,6 +112,7 @@ export class Plots {
         {
           ...axis, size: 50, gap: 5, space: kind.log ? 16 : 22,
           ...(kind.key === "probability" ? { splits: [0, 0.5, 1] } : {}),
+          ...(kind.log ? { splits: powers, filter: (_, ticks) => ticks } : {}),
           values: (_, ticks) => ticks.map((v) => (v === null ? null : tick(v))),
         },
       ],
@@ -168,6 +170,13 @@ export class Plots {
       if (width > 50 && height > 20) plot.setSize({ width: Math.floor(width), height: Math.floor(height) });
     }
   }
+}
+
+// Whole decades, every second one where they stand close.
+function powers(plot, _, low, high) {
+  const [from, to] = [low, high].map((value) => Math.round(Math.log10(value)));
+  const step = Math.max(1, Math.ceil((15 * (to - from)) / Math.max(16, plot.height - 14)));
+  return Array.from({ length: Math.floor((to - from) / step) + 1 }, (__, k) => 10 ** (from + k * step));
 }
 
 const seconds = (t) => (t === 0 ? "now" : `${String(t).replace("-", "−")} s`);

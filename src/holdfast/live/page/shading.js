@@ -1,8 +1,9 @@
 // What lies behind and over the lines of the plots: states, thresholds, markers.
 
 import { colours, stateColour } from "./theme.js";
-import { STATES, UNKNOWN, stateKey } from "./words.js";
+import { NO_CONTACT, STABLE, STATES, UNKNOWN, UNSTABLE, stateKey } from "./words.js";
 
+const ALPHA = { [UNKNOWN]: 0.3, [NO_CONTACT]: 0.1, [UNSTABLE]: 0.34, [STABLE]: 0.16 };
 const KEYS = STATES.map(stateKey);
 export const RIBBON = 6; // [px], with its gap
 
@@ -41,7 +42,8 @@ export function shade(plot, x, codes) {
   for (const [code, from, to] of runs(x, codes)) {
     const [a, b] = [from, to].map((at) => Math.min(left + width, Math.max(left, plot.valToPos(at, "x", true))));
     pen.fillStyle = pen.strokeStyle = stateColour(KEYS[code] ?? "unknown");
-    pen.globalAlpha = code === UNKNOWN ? 0.25 : 0.2;
+    // Of different lightness too: red and green are one to many people.
+    pen.globalAlpha = ALPHA[code] ?? 0.2;
     if (code === UNKNOWN) hatch(pen, a, top, b - a, height);
     else pen.fillRect(a, top, b - a, height);
   }

@@ -8,10 +8,9 @@ import { number, unitWord } from "./words.js";
 const FLOORS = { count: 50, N: 0.1 };
 const DECAY = 6; // [s] to fall to 1/e: discs keep their meaning while a grasp changes
 
-/** The reading that fills a disc, common to all fingers of one unit: 1, 2 or 5 times a power of ten. */
+/** A round number that the largest readings fill, common to all fingers of one unit. */
 export class Scale {
   constructor(unit) {
-    this.unit = unit;
     this.peak = this.floor = FLOORS[unit] ?? 1e-3;
     this.last = null;
     this.full = this.floor;
@@ -35,14 +34,15 @@ export class Scale {
 
 export function nice(value) {
   const power = 10 ** Math.floor(Math.log10(value));
-  return [1, 2, 5, 10].find((step) => step * power >= value * 0.999) * power;
+  return [1, 1.5, 2, 3, 4, 5, 7, 10].find((step) => step * power >= value * 0.999) * power;
 }
 
 export class TaxelMap {
-  constructor(canvas, sensor, scale) {
+  /** @param scales {disc, arrow}: shears are smaller than presses, and have a scale of their own. */
+  constructor(canvas, sensor, scales) {
     this.canvas = canvas;
     this.sensor = sensor;
-    this.scale = scale;
+    this.scales = scales;
     this.layout = layout(sensor.positions, sensor.rotations, sensor.normal);
     this.hull = hull(this.layout.places);
     this.values = sensor.positions.map(() => [0, 0, 0]);
@@ -59,7 +59,9 @@ export class TaxelMap {
     if (!this.known) return;
     this.values = taxels.map((reading, k) => turned(reading, this.sensor.rotations[k], right[k], up[k]));
     this.values.forEach(([x, y, z], k) => {
-      if (!this.faulty.has(k)) this.scale.take(Math.max(Math.abs(z), Math.hypot(x, y)));
+      if (this.faulty.has(k)) return;
+      this.scales.disc.take(Math.abs(z));
+      this.scales.arrow.take(Math.hypot(x, y));
     });
   }
 
@@ -98,7 +100,7 @@ export class TaxelMap {
     pen.setTransform(ratio, 0, 0, ratio, 0, 0);
     pen.clearRect(0, 0, width, height);
     const { zoom, at } = this.fit();
-    const most = 0.47 * zoom * this.layout.spacing;
+    const most = 0.49 * zoom * this.layout.spacing;
     this.outline(pen, at, most);
     const places = this.layout.places.map(at);
     places.forEach((place, k) => this.disc(pen, place, k, most));
@@ -127,7 +129,7 @@ export class TaxelMap {
     pen.strokeStyle = colours.outline;
     pen.stroke();
     if (this.faulty.has(k)) return this.cross(pen, x, y, 0.7 * most);
-    const normal = this.values[k][2], share = Math.min(1, Math.abs(normal) / this.scale.full);
+    const normal = this.values[k][2], share = Math.min(1, Math.abs(normal) / this.scales.disc.full);
     if (!this.known || !(share > 0.002)) return undefined;
     pen.beginPath();
     pen.arc(x, y, Math.max(1, most * Math.sqrt(share)), 0, 2 * Math.PI);
@@ -153,9 +155,9 @@ export class TaxelMap {
   }
 
   arrow(pen, [x, y], k, most) {
-    const [right, up] = this.values[k], size = Math.hypot(right, up) / this.scale.full;
-    // Two discs long at full scale; shorter than its head it would be a blot.
-    const length = 4 * most * Math.min(1, size);
+    const [right, up] = this.values[k], size = Math.hypot(right, up) / this.scales.arrow.full;
+    // One and a half discs long at full scale; shorter than its head it would be a blot.
+    const length = 3 * most * Math.min(1, size);
     if (this.faulty.has(k) || !(length > 3)) return;
     const head = Math.min(6, 0.45 * length), angle = Math.atan2(-up, right);
     pen.save();
@@ -181,7 +183,9 @@ export class TaxelMap {
     pen.textAlign = "center";
     pen.textBaseline = "alphabetic";
     pen.fillStyle = colours.muted;
-    const full = number(this.scale.full).replace(/\.0+$/, "");
-    pen.fillText(this.known ? `full disc ${full} ${unitWord(this.sensor.unit)}` : "no readings", width / 2, height - 2);
+    const [disc, arrow] = [this.scales.disc, this.scales.arrow].map((scale) => number(scale.full).replace(/\.0+$/, ""));
+    const long = `full disc ${disc}, arrow ${arrow} ${unitWord(this.sensor.unit)}`;
+    const text = pen.measureText(long).width < width ? long : `● ${disc}  → ${arrow}`;
+    pen.fillText(this.known ? text : "no readings", width / 2, height - 2);
   }
 }

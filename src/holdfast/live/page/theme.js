@@ -24,7 +24,7 @@ export const fingerColour = (place) => colours[`finger-${place % 6}`];
 export const stateColour = (key) => colours[`${key}-line`];
 
 // From dim to bright, in even steps of lightness: legible to the colour-blind and in print.
-const DARK = [[39, 56, 112], [44, 108, 150], [48, 160, 150], [140, 205, 100], [253, 231, 76]];
+const DARK = [[62, 96, 190], [46, 134, 190], [48, 176, 164], [150, 212, 96], [253, 231, 76]];
 const LIGHT = [[176, 205, 230], [110, 170, 210], [50, 130, 170], [40, 85, 140], [45, 20, 95]];
 
 /** The colour of a share from 0 to 1 of the full scale. */

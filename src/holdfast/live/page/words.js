@@ -5,10 +5,10 @@ export const STATES = ["UNKNOWN", "NO_CONTACT", "UNSTABLE", "STABLE"];
 export const UNKNOWN = 0, NO_CONTACT = 1, UNSTABLE = 2, STABLE = 3;
 
 const REASONS = {
-  tare: "taking the tare",
-  warm_up: "filling the window",
-  gap: "gap in the samples",
-  fault: "faulty readings",
+  tare: "taking tare",
+  warm_up: "warming up",
+  gap: "gap in samples",
+  fault: "faulty",
 };
 
 const FAULTS = {
@@ -55,7 +55,7 @@ export function number(value) {
 export const unitWord = (unit) => (unit === "count" ? "counts" : unit ?? "");
 
 export const percent = (value) =>
-  value === null || value === undefined ? NOTHING : `${Math.round(100 * value)} %`;
+  value === null || value === undefined ? NOTHING : `${Math.round(100 * value)}\u202f%`;
 
 /** A length of time in few characters: "0.8 s", "12 s", "3 min", "2 h". */
 export function span(seconds) {

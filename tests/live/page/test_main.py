@@ -1,0 +1,330 @@
+"""The page as a whole, in a browser, against a service that is made up."""
+
+import json
+import re
+
+import pytest
+
+from live.page.feed import Service, Tape, made_up
+
+SIZES = [(1280, 720), (1024, 768), (768, 1024), (1920, 1080)]
+HOSTILE = "<img src=x onerror=alert(1)>"
+
+
+def shows(page, selector, text):
+    """Waits until the element's text matches; a pattern."""
+    page.wait_for_function(
+        "([selector, text]) => new RegExp(text).test(document.querySelector(selector).innerText)",
+        arg=[selector, text],
+    )
+
+
+def change(service, **fields):
+    service.tape.change = {name: fields for name in service.tape.tracks}
+
+
+def told(service):
+    return [(method, path) for method, path, _ in service.calls]
+
+
+def drawn(page):
+    """What the plots and maps show."""
+    return page.evaluate(
+        """() => [...holdfast.plots.rows.map((row) => JSON.stringify(row.plot.data)),
+                  ...[...document.querySelectorAll(".map canvas")].map((c) => c.toDataURL())]"""
+    )
+
+
+def arrived(page):
+    return page.evaluate("holdfast.store.end + holdfast.store.moved")
+
+
+def wait_for_samples(page, n=30):
+    page.wait_for_function(f"holdfast.store.end + holdfast.store.moved > {arrived(page) + n}")
+
+
+@pytest.mark.parametrize("scheme", ["dark", "light"])
+@pytest.mark.parametrize("size", SIZES)
+def test_everything_fits_without_scrolling(visit, service, size, scheme, tmp_path):
+    page = visit(service.url, size, scheme)
+    shows(page, "#hand-word", "STABLE|UNKNOWN")
+    wait_for_samples(page)
+    page.screenshot(path=tmp_path / "page.png")
+    extent = "[document.documentElement.scrollWidth, document.documentElement.scrollHeight]"
+    assert page.evaluate(extent) == list(size)
+    clipped = page.evaluate(
+        """() => [...document.querySelectorAll(".figures, .figures *, .word, .name span, #hand-word, .entry, button")]
+          .filter((e) => e.scrollWidth > e.clientWidth + 1 && getComputedStyle(e).display !== "inline")
+          .map((e) => `${e.className} ${e.textContent}`)"""
+    )
+    assert clipped == []
+    hidden = page.evaluate(
+        """() => [...document.querySelectorAll(".card")].filter((card) => {
+          const inside = card.querySelector(".figures .force").getBoundingClientRect();
+          return inside.bottom > card.getBoundingClientRect().bottom;
+        }).length"""
+    )
+    assert hidden == 0
+    small = page.evaluate(
+        """() => [...document.querySelectorAll("button, input")].filter((e) => e.offsetParent)
+          .map((e) => e.getBoundingClientRect()).filter((r) => Math.min(r.width, r.height) < 43.9).length"""
+    )
+    assert small == 0
+
+
+def test_cards_show_the_state_and_follow_it(visit, service):
+    change(service, state="STABLE", stable_probability=0.876, instability=3.3, force=[3, 4, 12])
+    page = visit(service.url)
+    shows(page, "#hand-word", "^STABLE$")
+    shows(page, '[aria-label="index"] .word', "^STABLE$")
+    shows(page, '[aria-label="index"] .figures', r"88\s%[^]*3.30[^]*13.0[^]*3.00[^]*4.00[^]*12.0")
+    assert page.locator(".card").count() == 4
+    change(service, state="UNKNOWN", reason="tare", stable_probability=None, instability=None,
+           force=[None] * 3, faults=["stuck", "saturated"], faulty_taxels=[3, 11], taxels=None)  # fmt: skip
+    shows(page, "#hand-word", "^UNKNOWN$")
+    shows(page, '[aria-label="ring"] .head', "taking tare")
+    shows(page, '[aria-label="ring"] .faults', r"stuck\s*saturated\s*taxels 4, 12")
+    shows(page, '[aria-label="ring"] .figures', "–[^]*–[^]*–")
+    shape = page.locator('[aria-label="ring"] .head use').get_attribute("href")
+    assert shape == "#shape-unknown"
+
+
+def test_a_screen_reader_is_told(visit, service):
+    change(service, state="UNSTABLE")
+    page = visit(service.url)
+    shows(page, "#hand-word", "UNSTABLE")
+    page.wait_for_function("document.getElementById('hand-spoken').textContent === 'Hand: unstable'")
+    assert page.locator("#hand-spoken").get_attribute("aria-live") == "polite"
+
+
+def test_pause_freezes_what_is_drawn_and_nothing_else(visit, service):
+    page = visit(service.url)
+    wait_for_samples(page)
+    page.keyboard.press("Space")
+    shows(page, "#paused", "PAUSED")
+    still = drawn(page)
+    wait_for_samples(page)
+    assert drawn(page) == still
+    change(service, state="UNSTABLE")  # states go on being told
+    shows(page, "#hand-word", "UNSTABLE")
+    page.click("#windows button:first-child")  # and what is frozen can be looked at
+    assert drawn(page)[0] != still[0] or page.evaluate("holdfast.plots.window") == 5
+    page.click("#pause")
+    assert page.locator("#paused").is_hidden()
+    page.wait_for_function(
+        "(still) => JSON.stringify(holdfast.plots.rows[0].plot.data) !== still", arg=still[0]
+    )
+
+
+def test_the_window_is_chosen(visit, service):
+    service.speed = 20
+    page = visit(service.url)
+    wait_for_samples(page, 9000)
+    for seconds in (60, 5, 30, 10):
+        page.get_by_role("button", name=f"{seconds} s", exact=True).click()
+        low, high, first = page.evaluate(
+            """() => { const { plot } = holdfast.plots.rows[1];
+                       return [plot.scales.x.min, plot.scales.x.max, plot.data[0][0]]; }"""
+        )
+        assert (low, high) == (-seconds, 0)
+        assert first == pytest.approx(-seconds, abs=0.2)
+        pressed = page.locator('#windows [aria-pressed="true"]')
+        assert pressed.all_inner_texts() == [f"{seconds} s"]
+
+
+def test_a_finger_is_chosen(visit, service):
+    page = visit(service.url)
+    wait_for_samples(page)
+    labels = "[...document.querySelectorAll('.plot.force .label')].map((e) => e.textContent)"
+    assert page.evaluate(labels) == ["thumb", "index", "middle", "ring"]
+    page.keyboard.press("2")
+    assert page.evaluate(labels) == ["Fx", "Fy", "Fz"]
+    assert page.locator(".card.chosen").get_attribute("aria-label") == "index"
+    page.click("#fingers button:last-child")
+    assert page.locator(".card.chosen").get_attribute("aria-label") == "ring"
+    page.click('[aria-label="ring"] .head')  # once more: all again
+    assert page.evaluate(labels) == ["thumb", "index", "middle", "ring"]
+    page.keyboard.press("9")
+    page.keyboard.press("0")
+    assert page.evaluate(labels) == ["thumb", "index", "middle", "ring"]
+
+
+def test_the_tare(visit, service):
+    page = visit(service.url)
+    wait_for_samples(page)
+    page.click("#tare")
+    shows(page, "#toasts", "Taking the tare")
+    service.refusal = "the index is touched: <b>let go</b>"
+    page.keyboard.press("t")
+    shows(page, ".toast.bad", "^the index is touched: <b>let go</b>$")
+    assert told(service) == [("POST", "tare"), ("POST", "tare")]
+
+
+def test_a_recording_starts_and_stops(visit, service):
+    page = visit(service.url)
+    wait_for_samples(page)
+    page.keyboard.press("r")
+    shows(page, "#record", r"Stop 0:0\d · \d+ kB")
+    shows(page, "#toasts", "Recording to grasps/")
+    assert page.locator("#record").get_attribute("aria-pressed") == "true"
+    page.click("#record")
+    shows(page, "#record", "^Record$")
+    shows(page, "#toasts", "recorded: grasps/")
+    assert told(service) == [("POST", "recording"), ("DELETE", "recording")]
+
+
+def test_what_cannot_record_offers_no_recording(visit, service):
+    hello = service.tape.hello
+    service.tape.hello = lambda: hello() | {"can_record": False}
+    page = visit(service.url)
+    wait_for_samples(page)
+    assert page.locator("#record").is_disabled()
+    assert page.locator("#mark").is_disabled()
+    assert page.locator("#tare").is_enabled()
+
+
+def test_markers(visit, service):
+    page = visit(service.url)
+    wait_for_samples(page)
+    page.fill("#marker-text", "m 1 pushed <i>")  # letters and digits are typed, not obeyed
+    page.press("#marker-text", "Enter")
+    shows(page, "#events", "pushed <i>")
+    page.keyboard.press("Escape")
+    page.keyboard.press("m")
+    page.wait_for_function("holdfast.plots.marks.length === 2")
+    assert [json.loads(body) for _, _, body in service.calls] == [{"text": "m 1 pushed <i>"}] * 2
+    assert page.evaluate("holdfast.plots.chosen") is None
+    service.refusal = "no recording runs"
+    page.keyboard.press("m")
+    shows(page, ".toast.bad", "no recording runs")
+    assert page.evaluate("holdfast.plots.marks.length") == 2
+
+
+def test_help(visit, service):
+    page = visit(service.url)
+    wait_for_samples(page)
+    page.keyboard.press("?")
+    shows(page, "#help-box", r"builtin:twin[^]*twin:\?object=can[^]*thumb \(30\)")
+    page.keyboard.press("r")  # keys do nothing behind it
+    page.keyboard.press("Escape")
+    assert page.locator("#help-box").is_hidden()
+    assert service.calls == []
+
+
+def test_it_comes_back_by_itself(visit):
+    with Service(Tape(*made_up())) as first:
+        page = visit(first.url)
+        wait_for_samples(page)
+    shows(page, "#alert", "Connection lost, trying again")
+    shows(page, "#hand-word", "NO CONNECTION")  # no old STABLE stands there
+    assert set(page.locator(".card .word").all_inner_texts()) == {"UNKNOWN"}
+    assert page.locator("#tare").is_disabled()
+    with Service(Tape(*made_up(("left", "right"))), port=first.port) as second:
+        second.at = 4.0
+        shows(page, "#health", "^connected")
+        shows(page, "#hand-word", "STABLE")
+        assert page.locator("#alert").is_hidden()
+        assert page.locator(".card").count() == 2
+        assert page.locator("#tare").is_enabled()
+
+
+def test_the_end_of_the_source_is_told(visit, service):
+    page = visit(service.url)
+    wait_for_samples(page)
+    service.patch = {"ended": True}
+    shows(page, "#alert", "Source ended")
+    shows(page, "#hand-word", "SOURCE ENDED")
+    shows(page, "#health", "^source ended")
+
+
+def test_a_silent_source_is_told(visit, service):
+    page = visit(service.url)
+    wait_for_samples(page)
+    health = {"rate": None, "n_packets": 12, "n_lost": 3, "n_refused": 1, "n_dropped": 0,
+              "silent": True, "latency": {"p50": None, "p99": None, "max": None}}  # fmt: skip
+    service.patch = {"health": health}
+    shows(page, "#alert", "No samples")
+    shows(page, "#health", r"rate –\s*latency p50 –[^]*packets 12\s*lost 3\s*refused 1")
+    assert page.locator("#health .bad").all_inner_texts() == ["lost 3", "refused 1"]
+
+
+def test_a_token_is_passed_on(visit):
+    with Service(Tape(*made_up()), token="a secret") as service:  # noqa: S106
+        page = visit(service.url)
+        shows(page, "#alert", "wants its token")
+        page = visit(f"{service.url}?token=a%20secret")
+        wait_for_samples(page)
+        page.click("#tare")
+        shows(page, "#toasts", "Taking the tare")
+
+
+def test_another_schema_is_refused(visit, service):
+    hello = service.tape.hello
+    service.tape.hello = lambda: hello() | {"schema": "holdfast.live/9"}
+    page = visit(service.url)
+    shows(page, "#alert", r"speaks holdfast.live/9, this page holdfast.live/1")
+
+
+def test_names_are_texts(visit):
+    with Service(Tape(*made_up((HOSTILE, "thumb")))) as service:
+        service.at = 3.5
+        page = visit(service.url)
+        wait_for_samples(page)
+        service.notices = [{"time": 1e9, "text": HOSTILE}]
+        service.tape.change = {HOSTILE: {"faults": [HOSTILE], "reason": HOSTILE, "state": HOSTILE}}
+        shows(page, ".name", re.escape(HOSTILE))
+        shows(page, "#fingers", re.escape(HOSTILE))
+        shows(page, "#notices", re.escape(HOSTILE))
+        shows(page, ".faults", re.escape(HOSTILE))
+        page.keyboard.press("1")
+        page.keyboard.press("?")
+        shows(page, "#stream", re.escape(HOSTILE))
+        assert page.locator("img").count() == 0
+
+
+@pytest.mark.parametrize("layout", ["uskin-4x6", "papillarray", "anyskin", "gtac"])
+@pytest.mark.parametrize("n", [1, 2, 6])
+def test_other_hands(visit, n, layout):
+    names = [f"finger{k + 1} of a long name" for k in range(n)]
+    with Service(Tape(*made_up(names, layout))) as service:
+        service.at = 3.5
+        page = visit(service.url)
+        wait_for_samples(page)
+        assert page.locator(".card").count() == n
+        assert page.evaluate("document.documentElement.scrollWidth") == 1280
+        # The maps are drawn: some of their pixels are not empty.
+        inked = page.evaluate(
+            """() => [...document.querySelectorAll(".map canvas")].map((c) =>
+              c.getContext("2d").getImageData(0, 0, c.width, c.height).data.some((v) => v > 0))"""
+        )
+        assert inked == [True] * n
+
+
+def test_messages_out_of_shape_do_no_harm(visit, service):
+    page = visit(service.url)
+    wait_for_samples(page)
+    service.tape.change = {"index": {"taxels": [[1, 2, 3]], "faulty_taxels": [99]},
+                           "thumb": {"faults": [], "force": [None, 1.0, 2.0]}}  # fmt: skip
+    wait_for_samples(page)
+    service.patch = {"notices": [], "events": [], "recording": None,
+                     "series": {"times": [1e6, 1e6 + 0.01], "fingers": {}}}  # fmt: skip
+    page.wait_for_function("holdfast.store.latest > 9e5")
+
+
+def test_memory_is_bounded(visit, service):
+    service.speed = 60  # three seconds in each message
+    page = visit(service.url)
+    wait_for_samples(page, 10)
+    before = page.evaluate("holdfast.store.bytes")
+    for k in range(4):
+        service.notices = [{"time": 1e9 + i, "text": f"notice {k} {i}"} for i in range(30)]
+        wait_for_samples(page, 9000)  # a minute each
+    end, capacity, after = page.evaluate(
+        "[holdfast.store.end, holdfast.store.capacity, holdfast.store.bytes]"
+    )
+    assert after == before
+    assert capacity == 12000
+    assert end <= 2 * capacity
+    assert page.locator("#notices li").count() == 50
+    assert page.locator("#events li").count() <= 50
+    assert page.evaluate("holdfast.plots.rows[0].plot.data[0].length") < 1300

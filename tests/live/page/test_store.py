@@ -1,0 +1,101 @@
+"""store.js: rings that never grow, and what is drawn of them."""
+
+import pytest
+
+# A store of `capacity` samples that takes samples k = 0, 1, ... of value k at 100 Hz.
+STORE = """async ([capacity, chunks, bins, window]) => {
+  const { Store, reduce } = await import("/page/store.js");
+  const store = new Store(["a"], capacity), before = store.bytes;
+  let k = 0;
+  for (const n of chunks) {
+    const places = Array.from({ length: n }, () => k++);
+    const own = { force: [places, places, places], instability: places.map((p) => p % 1000 === 77 ? 9e9 : p),
+                  stable_probability: places.map(() => null), state: places.map((p) => p % 4) };
+    store.append({ times: places.map((p) => p / 100), fingers: { a: own } }, 3, 0.05);
+  }
+  const a = store.fingers.get("a"), kept = (array) => [...array.subarray(store.start, store.end)];
+  const { x, columns, picks } = reduce(store, window, bins, [a.fx, a.sigma, a.probability]);
+  return { times: kept(store.times), fx: kept(a.fx), state: kept(a.state), hand: kept(store.hand),
+           same: before === store.bytes, x, columns, picks };
+}"""
+FEED = """async ([parts, gap]) => {
+  const { Store, reduce } = await import("/page/store.js");
+  const store = new Store(["a"], 100);
+  for (const times of parts) {
+    const values = times.map(() => 1);
+    store.append({ times, fingers: { a: { force: [values, values, values], state: times.map(() => 3) } } }, 3, gap);
+  }
+  const { x, columns } = reduce(store, 100, 500, [store.fingers.get("a").fx]);
+  return [x, columns[0]];
+}"""
+
+
+@pytest.fixture
+def module(visit, service):
+    return visit(service.url)
+
+
+@pytest.mark.parametrize("chunks", [[1000], [7] * 143, [1] * 205, [99, 1, 100, 250, 3], [50]])
+def test_it_keeps_the_newest_whatever_the_pieces(module, chunks):
+    found = module.evaluate(STORE, [100, chunks, 1000, 100])
+    n = sum(chunks)
+    newest = list(range(max(0, n - 100), n))
+    assert found["fx"] == newest
+    assert found["times"] == pytest.approx([k / 100 for k in newest])
+    assert found["state"] == [k % 4 for k in newest]
+    assert found["hand"] == [3] * len(newest)
+    assert found["same"]
+
+
+def test_few_samples_are_drawn_one_by_one(module):
+    found = module.evaluate(STORE, [100, [60], 1000, 0.2])
+    assert found["columns"][0] == list(range(38, 60))
+    assert found["x"][-1] == 0
+    assert found["columns"][2] == [None] * 22
+
+
+@pytest.mark.parametrize("n", [4000, 4001, 4013, 9999])
+def test_bins_keep_short_peaks_and_their_order(module, n):
+    found = module.evaluate(STORE, [12000, [n], 300, 30])
+    assert len(found["x"]) <= 2 * 301
+    assert found["x"] == sorted(found["x"])
+    # One sample of each thousand is huge.
+    first = max(0, n - 3000)
+    assert found["columns"][1].count(9e9) == len([k for k in range(first, n) if k % 1000 == 77])
+    assert found["columns"][0] == sorted(found["columns"][0])
+
+
+def test_bins_stay_on_their_samples(module):
+    one, two = (module.evaluate(STORE, [1200, [n], 300, 30]) for n in (4000, 4001))
+    assert len(set(map(tuple, zip(*one["columns"][:2], strict=True))) - set(
+        map(tuple, zip(*two["columns"][:2], strict=True))
+    )) <= 3  # fmt: skip
+
+
+def test_a_gap_breaks_the_line(module):
+    x, values = module.evaluate(FEED, [[[0, 0.01, 0.02], [0.5, 0.51]], 0.05])
+    assert values == [1, 1, 1, None, 1, 1]
+    assert x == pytest.approx([-0.51, -0.5, -0.49, -0.25, -0.01, 0])
+
+
+def test_times_that_go_back_begin_anew(module):
+    x, _ = module.evaluate(FEED, [[[5, 5.1, 5.2], [0, 0.1]], 1])
+    assert x == pytest.approx([-0.1, 0])
+
+
+def test_a_frozen_copy_stays(module):
+    same = module.evaluate("""async () => {
+      const { Store } = await import("/page/store.js");
+      const store = new Store(["a"], 10), give = (t) => store.append({ times: [t], fingers: {} }, 1, 9);
+      for (let t = 0; t < 15; t += 1) give(t);
+      const copy = store.frozen();
+      for (let t = 15; t < 60; t += 1) give(t);
+      return [copy.latest, copy.times[copy.start], copy.find(7.5) - copy.start, store.latest];
+    }""")
+    assert same == [14, 5, 3, 59]
+
+
+@pytest.mark.parametrize(("rate", "capacity"), [("null", 12000), (150, 12000), (5000, 60000)])
+def test_it_is_sized_by_the_rate_within_bounds(module, rate, capacity):
+    script = f"import('/page/store.js').then((m) => m.capacityFor({rate}))"
+    assert module.evaluate(script) == capacity
