@@ -25,7 +25,9 @@ def play(
     version: Annotated[str, typer.Option(help="Of the server: 1.7 or 1.8.")] = "1.8",
     host: Annotated[str, typer.Option(help="Address to listen at.")] = "127.0.0.1",
     port: Annotated[int, typer.Option(help="Port; 0 finds a free one.")] = 5000,
-    speed: Annotated[float, typer.Option(help="Of a recording or the twin: 1 is real time.")] = 1.0,
+    speed: Annotated[
+        float, typer.Option(help="1 is real time; slower, clients take the samples as late.")
+    ] = 1.0,
     once: Annotated[
         bool, typer.Option("--once", help="Wait for a client, play once, and end.")
     ] = False,

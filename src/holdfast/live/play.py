@@ -17,7 +17,7 @@ from holdfast.sources.xela.encoder import NEW, Encoder
 HOST, PORT = "127.0.0.1", 5000
 PATIENCE = 0.2
 """How long the source is waited for before it is looked whether to stop [s]."""
-BACKLOG = 8 * 2**20
+BACKLOG = 32 * 2**20
 """A client that is so many bytes behind is dropped; nobody waits for it."""
 CLOSING = 1.0
 """How long clients have to say goodbye [s]."""
@@ -150,7 +150,9 @@ class XelaServer:
     async def _emptied(self) -> None:
         """Waits until the last packet is on its way to everybody."""
         until = time.monotonic() + FAREWELL
-        while any(_behind(client) for client in self._clients) and time.monotonic() < until:
+        while any(_behind(client) for client in self._clients):
+            if self._stopping.is_set() or time.monotonic() > until:
+                return
             await asyncio.sleep(0.01)
 
     def _serve(self) -> None:

@@ -6,7 +6,7 @@ from collections import deque
 from collections.abc import Mapping
 from contextlib import suppress
 
-from websockets.exceptions import ConnectionClosed, WebSocketException
+from websockets.exceptions import ConnectionClosed, ConnectionClosedOK, WebSocketException
 from websockets.sync.client import ClientConnection, connect
 
 from holdfast.errors import SourceError
@@ -22,14 +22,15 @@ CONNECT = 1.0
 """How long one attempt to connect may take [s]; a read may last so much longer than asked."""
 BACKOFF, LONGEST_BACKOFF = 0.5, 2.0
 """Before the first and before later attempts to connect again [s]; it doubles."""
-SILENCE = 1.0
-"""Without a new sample for so long, a connected server is silent [s]."""
+SILENCE = 1.5
+"""Without a new sample for so long, a connected server is silent [s]; it may pause for 1 s."""
 PING, PONG = 10.0, 5.0
 """How often the server is asked whether it is there, and how long it may take [s]."""
 LARGEST = 2**20
 """A packet of more bytes is refused, with its connection; that of a whole hand has 20,000."""
-QUEUED = 256
-"""Packets that wait here for a reader that is busy; more wait at the server."""
+QUEUED = 4096
+"""Packets that wait here for a reader that is busy (of a whole hand 80 MB, for 27 s); more
+wait at the server, which may drop a client that does not answer."""
 
 _QUIET = logging.getLogger("holdfast.sources.xela")
 _QUIET.addHandler(logging.NullHandler())
@@ -184,7 +185,8 @@ class XelaSource(Source):
         now = self._lost_at = time.monotonic()
         self._backoff = BACKOFF
         self._again_at = now + self._backoff
-        self._pending.append(word(now, f"connection lost ({why})"))
+        reason = "the server ended it" if isinstance(why, ConnectionClosedOK) else why
+        self._pending.append(word(now, f"connection lost ({reason})"))
 
     def _try_again(self, timeout: float) -> None:
         """Waits until it is time to connect again, and does; within `timeout` and `CONNECT`."""

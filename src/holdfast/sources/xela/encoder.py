@@ -206,6 +206,8 @@ def _readings(name: str, sensor: Sensor, given: npt.NDArray[Any]) -> _Readings |
     if sensor.unit == "N":
         made = np.nan_to_num(REST + given / RESOLUTION, nan=float(REST[0]))
         return np.rint(np.clip(made, 0, 65535)).astype(np.uint16), given.astype(np.float64)
+    if given.dtype == np.uint16:
+        return given.astype(np.uint16), None
     if not np.isfinite(given).all():
         return None
     low, high = given.min(), given.max()
