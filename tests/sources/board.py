@@ -42,7 +42,8 @@ class Board:
         os.close(self._master)
 
     def send(self, *parts):
-        for left in parts:
+        for part in parts:
+            left = part
             while left:
                 try:
                     left = left[os.write(self._master, left) :]

@@ -20,6 +20,7 @@ from holdfast.sources.twin import ATTEMPTS, Twin, grasp_of, write
 from holdfast.sources.uri import parse
 from holdfast.twin.simulation import Grasp, simulate
 
+RUN = module._Ahead._run
 BALL = "twin:?object=ball&case=1&seed=3"
 
 
@@ -155,6 +156,14 @@ def test_a_process_that_dies_costs_only_time(quick):
         source._ahead._path.unlink()
         arrivals = list(itertools.islice(source, 10))
     assert {int(a.samples["thumb"][0, 0]) for a in arrivals} == {20}
+
+
+def test_without_another_process_it_is_simulated_here(quick, monkeypatch):
+    monkeypatch.setattr(module.sys, "executable", "/nowhere/python")
+    monkeypatch.setattr(module._Ahead, "_run", RUN)
+    with open_source("twin:", speed=0, loop=True) as source:
+        arrivals = list(itertools.islice(source, 20))
+    assert [int(a.samples["thumb"][0, 0]) for a in arrivals[::10]] == [10, 20]
 
 
 def test_a_process_is_ended_with_the_source(monkeypatch):

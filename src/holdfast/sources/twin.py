@@ -75,13 +75,15 @@ class _Ahead:
     def __init__(self) -> None:
         self._folder = TemporaryDirectory(prefix="holdfast-")
         self._path = self._before = Path(self._folder.name) / "none"
+        self._process: subprocess.Popen[bytes] | None = None
 
     def start(self, grasp: Grasp) -> None:
         """Begins to simulate a grasp; the one before the last is played, and forgotten."""
         self._before.unlink(missing_ok=True)
         self._before, self._path = self._path, self._path.with_name(f"{grasp.name}.parquet")
-        self._grasp = grasp
-        self._process = self._run(json.dumps(asdict(grasp)))
+        self._grasp, self._process = grasp, None
+        with suppress(OSError):  # where no process can be made, it is simulated here
+            self._process = self._run(json.dumps(asdict(grasp)))
 
     def _run(self, grasp: str) -> subprocess.Popen[bytes]:
         silent = subprocess.DEVNULL
@@ -90,20 +92,23 @@ class _Ahead:
 
     def is_ready(self, timeout: float) -> bool:
         """Whether it is over within `timeout` [s]."""
+        if self._process is None:
+            return True
         with suppress(subprocess.TimeoutExpired):
             self._process.wait(max(timeout, 0.0))
         return self._process.poll() is not None
 
     def pieces(self) -> Iterator[Recording]:
-        """The grasp; simulated here where the process died."""
-        if self._process.wait() or not self._path.exists():
-            return iter([grasped(self._grasp)])
-        return read_chunks(self._path, labels=False)
+        """The grasp, when it is ready; simulated here where the process died."""
+        if self._path.exists():
+            return read_chunks(self._path, labels=False)
+        return iter([grasped(self._grasp)])
 
     def close(self) -> None:
         """Ends the process, and removes its files."""
-        self._process.kill()
-        self._process.wait()
+        if self._process is not None:
+            self._process.kill()
+            self._process.wait()
         self._folder.cleanup()
 
 
