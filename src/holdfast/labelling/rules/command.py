@@ -13,13 +13,14 @@ What a marker says holds until the next one that says something:
 | `released` | unstable, released; no contact after `opening` |
 | `free` | no contact |
 
-A finger that does not touch, by its force, has no contact whatever the marker says; where the
+A word that is said again changes nothing. A disturbance is sure where it is said once and its end
+is said; otherwise it is doubtful. A finger that does not touch, by its force, has no contact whatever the marker says; where the
 force tells nothing of contact (tare `first` or `none`), the markers alone count.
 """
 
 import re
 from collections.abc import Iterator
-from itertools import pairwise
+from itertools import groupby, pairwise
 from typing import NamedTuple
 
 import numpy as np
@@ -58,7 +59,7 @@ _STATES: dict[str, tuple[int, Cause | None]] = {
     "free": (NO_CONTACT, None),
 }
 _SURE = 5.0  # times over a threshold that a marker counts as: nine in ten are right
-_VAGUE = 1.5  # a disturbance that nobody said the end of
+_VAGUE = 1.5  # a disturbance without a word of its end, or with many of its begin
 
 
 class Order(NamedTuple):
@@ -145,10 +146,12 @@ def _drawing(finger: FingerForce, hand: HandForce, orders: list[Order], opening:
 
 
 def _spans(orders: list[Order]) -> Iterator[tuple[Order, float, float]]:
-    """Each order, when the next begins, and how sure it is."""
-    for one, two in pairwise([*orders, Order(np.inf, "")]):
-        over = two.word in ("locked", "lost", "released")
-        yield one, two.time, _SURE if one.word != "disturbance" or over else _VAGUE
+    """Each order that is not the one before again, until when it holds, and how sure it is."""
+    runs = [list(run) for _, run in groupby(orders, key=lambda order: order.word)]
+    for run, following in pairwise([*runs, [Order(np.inf, "")]]):
+        ended = len(run) == 1 and following[0].word in ("locked", "lost")
+        vague = run[0].word == "disturbance" and not ended
+        yield run[0], following[0].time, _VAGUE if vague else _SURE
 
 
 def _correct(drawing: Drawing, finger: FingerForce, told: Mask) -> None:

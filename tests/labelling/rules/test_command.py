@@ -1,0 +1,116 @@
+import pytest
+
+from holdfast.contact import Cause
+from holdfast.errors import RecordingError
+from holdfast.labelling.rules import command
+
+from .build import CLOSING, DURATION, FREE, LOCKED, PUSH, PUSHED, RELEASE, check, drawn, grasp
+
+MARKERS = (
+    (CLOSING - 0.5, "closing"),
+    (LOCKED, "locked"),
+    (PUSH, "disturbance"),
+    (PUSHED, "locked"),
+    (RELEASE, "released"),
+)
+EDGE = 0.1
+
+
+def test_markers_of_the_protocol():
+    for labels in command.propose(grasp(markers=MARKERS)).values():
+        check(labels, EDGE)
+        causes = [label.cause for label in labels]
+        expected = [None, Cause.CLOSING, None, Cause.DISTURBANCE, None, Cause.RELEASED, None]
+        assert causes == expected
+        assert {label.author for label in labels} == {"rule:command"}
+        assert [label.evidence for label in labels][2:4] == [
+            "marker: locked",
+            "marker: disturbance",
+        ]
+
+
+def test_case_order_and_other_words_do_not_matter():
+    spoken = (
+        (RELEASE, "OPENING the hand"),
+        (0.5, "mark 3"),
+        (CLOSING - 0.5, "Hand closing"),
+        (LOCKED, "  LOCKED!"),
+        (PUSH, "push from the left"),
+        (PUSHED, "End of disturbance"),
+        (5.0, "battery low"),
+    )
+    here, there = command.propose(grasp(markers=MARKERS)), command.propose(grasp(markers=spoken))
+    assert drawn(there["thumb"]) == drawn(here["thumb"])
+
+
+@pytest.mark.parametrize(
+    ("text", "word"),
+    [
+        ("c", None),
+        ("mark", None),
+        ("", None),
+        ("no contact", "free"),
+        ("slip", "slip"),
+        ("slip over", "locked"),
+        ("disturbance stopped", "locked"),
+        ("released", "released"),
+        ("object lost", "lost"),
+        ("Grasp", "closing"),
+    ],
+)
+def test_what_a_marker_says(text, word):
+    assert command.word_of(text) == word
+
+
+def test_a_disturbance_that_nobody_ends_is_doubtful():
+    ended = command.propose(grasp(markers=MARKERS))["thumb"][3]
+    again = [*MARKERS[:3], (PUSH + 0.4, "disturbance"), *MARKERS[3:]]
+    open_end = command.propose(grasp(markers=again))["thumb"][3]
+    assert (ended.start, ended.end) == (open_end.start, open_end.end)
+    assert open_end.confidence < ended.confidence
+
+
+def test_whoever_is_late_is_put_right():
+    late = tuple((time + 0.4, text) for time, text in MARKERS)
+    check(command.propose(grasp(markers=late), delay=0.4)["thumb"], EDGE)
+
+
+def test_before_a_first_marker_that_is_not_closing_nobody_knows():
+    labels = command.propose(grasp(markers=((LOCKED, "locked"), (RELEASE, "released"))))["thumb"]
+    assert labels[0].state == "STABLE"
+    assert labels[0].start == pytest.approx(LOCKED, abs=0.02)
+
+
+def test_contact_that_the_force_shows_makes_no_contact_doubtful():
+    early = ((4.0, "closing"), (LOCKED + 2, "locked"))
+    labels = command.propose(grasp(markers=early))["thumb"]
+    assert labels[0].state == "NO_CONTACT"
+    assert labels[0].confidence <= 0.5 or "against" in labels[0].evidence
+
+
+def test_without_a_threshold_of_contact_the_markers_alone_count():
+    labels = command.propose(grasp(markers=MARKERS), tare="none", opening=0.7)["thumb"]
+    assert drawn(labels)[-1] == ("NO_CONTACT", pytest.approx(RELEASE + 0.7, abs=0.02), DURATION)
+    assert drawn(labels)[0] == ("NO_CONTACT", 0.0, pytest.approx(CLOSING - 0.5, abs=0.02))
+
+
+def test_a_lost_object():
+    labels = command.propose(grasp(markers=(*MARKERS[:4], (FREE, "lost"))))["thumb"]
+    assert (labels[-1].state, labels[-1].cause) == ("NO_CONTACT", Cause.LOST)
+
+
+def test_labels_fit_the_recording():
+    recording = grasp(markers=MARKERS)
+    recording.with_labels(command.propose(recording))
+
+
+@pytest.mark.parametrize(
+    ("markers", "shown"),
+    [
+        ((), "it has none"),
+        (((1.0, "mark"), (2.0, "mark 1"), (3.0, "mark")), "it has 'mark', 'mark 1'"),
+    ],
+)
+def test_no_marker_says_anything(markers, shown):
+    with pytest.raises(RecordingError, match=f"no marker of the protocol: one of closing.*{shown}"):
+        command.propose(grasp(markers=markers))

@@ -1,0 +1,260 @@
+import re
+from dataclasses import replace
+
+import hypothesis.strategies as st
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from scipy.spatial.transform import Rotation
+
+from holdfast.contact import Cause
+from holdfast.errors import RecordingError
+from holdfast.io import import_recordings
+from holdfast.labelling.poses import Poses, Track, in_sight
+from holdfast.labelling.rules import tracking
+from holdfast.labelling.rules.tracking import TrackingRule
+from holdfast.recordings import Recording, Truth, label_states
+
+from .build import (
+    CLOSING,
+    DURATION,
+    GRIP,
+    LOCKED,
+    PUSH,
+    PUSHED,
+    RELEASE,
+    check,
+    clock,
+    drawn,
+    grasp,
+    module,
+    moved,
+    poses,
+    slide,
+    tracked,
+)
+
+EDGE = 0.25  # margin, smoothing, and a sample
+MOVES = ((CLOSING, LOCKED), (PUSH, PUSHED), (RELEASE, 9.5))
+
+
+def sliding(jitter=0.0, **more):
+    times = clock()
+    return tracked(poses(times, slide(times, MOVES), jitter=jitter), **more)
+
+
+def test_a_grasp_is_drawn_by_what_moves():
+    for labels in tracking.propose(sliding()).values():
+        check(labels, EDGE)
+        causes = [label.cause for label in labels]
+        expected = [None, Cause.CLOSING, None, Cause.SLIP, None, Cause.RELEASED, None]
+        assert causes == expected
+
+
+def test_labels_are_signed_and_say_what_they_rest_on():
+    labels = tracking.propose(sliding())["thumb"]
+    assert {label.author for label in labels} == {"rule:tracking"}
+    assert "against the finger" in labels[3].evidence
+    assert all("poses: truth" in label.evidence for label in labels)
+
+
+@given(rotation=st.integers(0, 2**31), shift=st.floats(-5, 5))
+@settings(max_examples=5, deadline=None)
+def test_another_frame_of_the_world_changes_nothing(rotation, shift):
+    turn = Rotation.random(rng=rotation)
+    times = clock()
+    tip = poses(times, 0 * times)
+    here = tracked(poses(times, slide(times, MOVES)), tip)
+    there = tracked(moved(poses(times, slide(times, MOVES)), turn, shift), moved(tip, turn, shift))
+    a, b = tracking.propose(here)["thumb"], tracking.propose(there)["thumb"]
+    assert [row[0] for row in drawn(a)] == [row[0] for row in drawn(b)]
+    assert [row[1] for row in drawn(a)] == pytest.approx([row[1] for row in drawn(b)], abs=0.011)
+
+
+def test_a_hand_that_carries_the_object_is_no_motion():
+    times = clock()
+    carried = 0.5 * np.sin(times)[:, None] * [1.0, 0.2, 0.0]
+    thing, tip = poses(times, slide(times, MOVES)), poses(times, 0 * times)
+    thing[:, :3] += carried
+    tip[:, :3] += carried
+    check(tracking.propose(tracked(thing, tip))["thumb"], EDGE)
+
+
+def test_another_start_of_the_clock_moves_the_labels():
+    times = clock()
+    late = tracked(poses(times, slide(times, MOVES)), start=1e5)
+    check(tracking.propose(late)["thumb"], EDGE, start=1e5)
+
+
+def test_turning_on_the_spot_is_motion():
+    times = clock()
+    turn = slide(times, MOVES, speed=0.5)
+    check(tracking.propose(tracked(poses(times, 0 * times, turn)))["thumb"], EDGE)
+
+
+def test_what_is_slower_than_the_threshold_rests():
+    times = clock()
+    crawl = poses(times, slide(times, ((0, DURATION),), speed=0.0005))
+    states = {label.state.value for label in tracking.propose(tracked(crawl))["thumb"]}
+    assert states == {"NO_CONTACT", "STABLE"}
+
+
+def test_jitter_of_the_poses_is_no_motion():
+    times = clock()
+    still = tracked(poses(times, 0 * times, jitter=0.0003))
+    states = {label.state.value for label in tracking.propose(still)["thumb"]}
+    assert states == {"NO_CONTACT", "STABLE"}
+
+
+def test_motion_is_found_in_jitter():
+    check(tracking.propose(sliding(jitter=0.0003))["thumb"], EDGE)
+
+
+def test_a_gap_in_the_poses_is_bridged_or_has_no_label():
+    times = clock()
+    thing = poses(times, slide(times, MOVES))
+    thing[420:428] = np.nan
+    thing[750:800] = np.nan
+    codes = label_states(tracking.propose(tracked(thing))["thumb"], times)
+    assert (codes[415:435] == 3).all()
+    assert (codes[752:798] == 0).all()
+    assert (codes[740:749] == 3).all()
+
+
+def test_a_lost_object_is_out_of_sight_while_the_force_ends():
+    times = clock()
+    thing = poses(times, slide(times, ((CLOSING, LOCKED),)))
+    thing[times > RELEASE + 0.2] = np.nan
+    *_, last, gone = tracking.propose(tracked(thing))["thumb"]
+    assert (last.state, last.cause) == ("UNSTABLE", Cause.LOST)
+    assert (gone.state, gone.cause) == ("NO_CONTACT", Cause.LOST)
+    assert gone.evidence.startswith("object out of sight, force")
+
+
+def test_an_object_out_of_sight_in_a_steady_grip_has_no_label():
+    times = clock()
+    thing = poses(times, slide(times, ((CLOSING, LOCKED),)))
+    thing[(times > 4) & (times < 8)] = np.nan
+    codes = label_states(tracking.propose(tracked(thing))["thumb"], times)
+    assert (codes[(times > 4.1) & (times < 7.9)] == 0).all()
+
+
+def test_a_frozen_marker_is_neither_motion_nor_rest():
+    times = clock()
+    pose = poses(times, slide(times, MOVES), jitter=1e-5)
+    pose[400:600] = pose[400]
+    recording = grasp(truth=Truth(times, {"marker_pose": pose}))
+    codes = label_states(tracking.propose(recording)["thumb"], times)
+    assert (codes[405:595] == 0).all()
+    assert (codes[320:395] == 3).all()
+
+
+def test_a_marker_at_the_sentinel_is_lost():
+    times = clock()
+    held = GRIP * np.where(times < 8, 1.0, 0.0)[:, None] * [0, 0, 1]
+    held[:, 2] += np.random.default_rng(0).normal(0, GRIP / 100, len(times))
+    pose = poses(times, slide(times, ((5, 6),)), jitter=1e-5)
+    pose[times > 8, :3] = 10.0
+    truth = Truth(times, {"marker_pose": pose})
+    recording = Recording("lost", {"finger1": module(times, held)}, truth=truth)
+    states = drawn(tracking.propose(recording, tare="first")["finger1"])
+    assert [state for state, *_ in states] == ["STABLE", "UNSTABLE", "STABLE", "NO_CONTACT"]
+    assert states[-1][1] == pytest.approx(8, abs=EDGE)
+
+
+@pytest.mark.parametrize("offset", [-0.3, 0.0, 0.22])
+def test_another_clock_is_found(offset):
+    times = clock()
+    # A push moves the object as it shows in the force: forth and back.
+    way = 0.01 * np.where((times > PUSH) & (times < PUSHED), np.sin(5 * np.pi * (times - PUSH)), 0)
+    way = way + slide(times, ((CLOSING, LOCKED), (RELEASE, 9.5)))
+    pose = poses(times, way, jitter=1e-5)
+    other = Poses("file", Track(times - offset, pose[:, :3], pose[:, 3:]), same_clock=False)
+    labels = tracking.propose(grasp(), tracking=other)["thumb"]
+    check(labels, EDGE)
+    told = re.search("later by (.*) s", labels[0].evidence)
+    assert (float(told[1]) if told else 0.0) == pytest.approx(offset, abs=0.05)
+    given = tracking.propose(grasp(), tracking=other, offset=offset)["thumb"]
+    assert [x.start for x in given] == pytest.approx([x.start for x in labels], abs=0.05)
+
+
+def test_clocks_that_nothing_aligns_halve_the_confidence():
+    times = clock()
+    pose = poses(times, 0 * times, jitter=1e-4)
+    other = Poses("file", Track(times, pose[:, :3], pose[:, 3:]), same_clock=False)
+    free = {n: module(times, np.zeros((len(times), 3)), k) for k, n in enumerate(["thumb"])}
+    (label,) = tracking.propose(Recording("nothing", free), tracking=other)["thumb"]
+    assert "clocks not aligned" in label.evidence
+    assert label.confidence <= 0.5
+
+
+def test_displacement_is_trouble_until_the_object_is_back():
+    times = clock()
+    way = slide(times, ((PUSH, PUSHED),)) - slide(times, ((8.0, 8.8),))
+    rule = TrackingRule(measure="displacement", distance=0.008)
+    labels = tracking.propose(tracked(poses(times, way)), rule=rule)["thumb"]
+    states = drawn(labels)
+    assert [state for state, *_ in states] == [
+        "NO_CONTACT", "STABLE", "UNSTABLE", "STABLE", "NO_CONTACT",
+    ]  # fmt: skip
+    assert states[2][1:] == pytest.approx([PUSH + 0.4, 8.6], abs=EDGE)
+
+
+def test_labels_fit_the_recording_and_do_not_rest_on_its_own():
+    recording = sliding()
+    labels = tracking.propose(recording)
+    assert tracking.propose(recording.with_labels(labels)) == labels
+
+
+def test_a_finger_without_poses_has_no_labels():
+    recording = sliding(fingers=("thumb", "index", "ring"))
+    assert set(tracking.propose(recording)) == {"thumb", "index"}
+
+
+def test_no_poses():
+    with pytest.raises(
+        RecordingError, match="no poses in 'made-up': it has no truth; truth with object_pose"
+    ):
+        tracking.propose(grasp())
+
+
+def test_poses_of_another_time():
+    with pytest.raises(
+        RecordingError, match=r"has poses from 5000 to 5011\.99 s; recording 'made-up'"
+    ):
+        tracking.propose(replace(sliding(), truth=replace_times(sliding().truth, 5000.0)))
+
+
+def replace_times(truth, offset):
+    return Truth(truth.times + offset, truth.hand, truth.fingers)
+
+
+def test_an_object_that_is_never_in_sight():
+    times = clock()
+    lost = np.full((len(times), 7), np.nan)
+    with pytest.raises(RecordingError, match="truth: the object is never in sight twice"):
+        tracking.propose(tracked(lost))
+
+
+def test_an_unknown_measure():
+    with pytest.raises(ValueError, match="measure 'speed' or 'displacement' expected, 'way' given"):
+        TrackingRule(measure="way")
+
+
+def test_real_marker_is_never_in_sight_at_the_sentinel(data_folder):
+    (lost,) = [
+        recording
+        for recording in import_recordings(data_folder / "uskin_pick_move")
+        if recording.name.endswith("08-10-01")
+    ]
+    labels = tracking.propose(lost, tare="first")["finger1"]
+    assert (labels[-1].state, labels[-1].cause) == ("NO_CONTACT", Cause.LOST)
+    own = next(x for x in lost.modules["finger1"].labels if x.cause is Cause.LOST)
+    assert labels[-1].start == pytest.approx(own.start, abs=0.1)
+
+
+def test_in_sight_is_what_the_recording_of_the_twin_needs_not():
+    still = np.tile([0, 0, 0, 1.0, 0, 0, 0], (100, 1))
+    track = Track(clock()[:100], still[:, :3], still[:, 3:])
+    assert track.seen.all()
+    assert not in_sight(track).seen.any()

@@ -1,0 +1,42 @@
+import hypothesis.strategies as st
+import pytest
+from hypothesis import given
+
+from holdfast.labelling.doubt import doubtful
+from holdfast.recordings import Label
+
+
+def label(start, end, confidence):
+    return Label(start, end, "STABLE", confidence=confidence)
+
+
+def test_the_most_doubtful_comes_first():
+    labels = {
+        "thumb": (label(0, 1, 0.9), label(1, 2, 0.5), label(2, 3, 0.79)),
+        "index": (label(0, 1, 0.1), label(1, 2, 0.8)),
+    }
+    found = [(finger, each.confidence) for finger, each in doubtful(labels)]
+    assert found == [("index", 0.1), ("thumb", 0.5), ("thumb", 0.79)]
+
+
+def test_of_equals_the_longest_comes_first_and_then_the_earliest():
+    labels = {"b": [label(5, 6, 0.3), label(0, 2, 0.3)], "a": [label(0, 1, 0.3)]}
+    found = [(finger, each.start) for finger, each in doubtful(labels)]
+    assert found == [("b", 0), ("a", 0), ("b", 5)]
+
+
+@given(st.dictionaries(st.text(max_size=3), st.lists(st.floats(0, 1)), max_size=3), st.floats(0, 1))
+def test_all_below_and_nothing_else(confidences, below):
+    labels = {
+        finger: [label(k, k + 1, each) for k, each in enumerate(given)]
+        for finger, given in confidences.items()
+    }
+    found = [(finger, each.confidence) for finger, each in doubtful(labels, below)]
+    every = [(finger, c) for finger, given in confidences.items() for c in given if c < below]
+    assert sorted(found) == sorted(every)
+    assert [c for _, c in found] == sorted(c for _, c in found)
+
+
+def test_a_confidence_that_is_none():
+    with pytest.raises(ValueError, match="a confidence from 0 to 1 expected, 80 given"):
+        doubtful({}, below=80)
