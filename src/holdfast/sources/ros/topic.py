@@ -122,6 +122,7 @@ class TopicSource(Source):
             left = deadline - time.monotonic()
             packet = self._link.take(max(min(left, self._until_word()), 0.0))
             if packet is not None:
+                self._end_loneliness()
                 self._take(packet)
             self._watch(idle=packet is None)
             if left <= 0:
@@ -195,23 +196,28 @@ class TopicSource(Source):
         if idle and not self._silent and now - self._heard_at >= SILENCE:
             self._silent = True
             self._tell(f"no new sample for {SILENCE:g} s")
-        if now - self._seen_at >= BACKOFF or self._alone:
+        if idle and (self._alone or now - self._seen_at >= BACKOFF):
             self._seen_at = now
-            self._count_publishers(now)
+            self._look_for_publishers(now)
 
-    def _count_publishers(self, now: float) -> None:
-        alone = self._link.n_publishers() == 0
-        if alone and not self._alone:
+    def _look_for_publishers(self, now: float) -> None:
+        if self._link.n_publishers() > 0:
+            self._end_loneliness()
+            return
+        if not self._alone:
+            self._alone = True
             self._backoff, self._mend_at = BACKOFF, now + BACKOFF
             self._tell("nobody publishes any more")
-        if self._alone and not alone:
-            self._translator.reconnected()
-            self._tell("somebody publishes again")
-        self._alone = alone
-        if alone and now >= self._mend_at:
+        if now >= self._mend_at:
             self._backoff = min(2 * self._backoff, LONGEST_BACKOFF)
             self._link.mend()
             self._mend_at = time.monotonic() + self._backoff
+
+    def _end_loneliness(self) -> None:
+        if self._alone:
+            self._alone = False
+            self._translator.reconnected()
+            self._tell("somebody publishes again")
 
     def _tell(self, notice: str) -> None:
         self._pending.append(word(time.monotonic(), notice))

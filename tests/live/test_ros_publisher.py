@@ -1,0 +1,201 @@
+import threading
+import time
+
+import pytest
+
+from holdfast.contact import ContactState, Fault, Reason
+from holdfast.live import ros_publisher
+from holdfast.live.judge import Decision
+from holdfast.live.ros_publisher import ERROR, OK, WARN, RosPublisher, statuses_of, topic_names
+from holdfast.live.session import Said
+
+from .estimates import UNITS, estimate, finger
+
+
+class Noted(RosPublisher):
+    """Notes what it is to publish."""
+
+    def __init__(self, **given):
+        super().__init__(UNITS, **given)
+        self.said = []
+        self.log = []
+        self.gate = threading.Event()
+        self.gate.set()
+        self.broken = False
+
+    def _connect(self, topics):
+        self.kinds = dict(topics)
+
+    def _disconnect(self):
+        self.log.append("ended")
+
+    def _note(self, topic, what):
+        assert self.gate.wait(20)
+        if self.broken:
+            raise RuntimeError("no network")
+        self.said.append((topic, what))
+
+    def _text(self, topic, text):
+        self._note(topic, text)
+
+    def _number(self, topic, number):
+        self._note(topic, number)
+
+    def _force(self, topic, stamp, finger, force, *, newtons):
+        self._note(topic, (finger, force, newtons))
+        self.stamp = stamp
+
+    def _diagnostics(self, stamp, statuses):
+        self._note("/diagnostics", [(one.name, one.level) for one in statuses])
+
+    def of(self, topic):
+        return [what for name, what in self.said if name == topic]
+
+
+def test_what_is_published_and_where():
+    before = time.time()
+    with Noted(namespace="/robot/hand_1/") as publisher:
+        publisher.publish(estimate())
+    assert [topic.removeprefix("/robot/hand_1") for topic in publisher.kinds] == [
+        "/hand/state", "/diagnostics",
+        "/thumb/state", "/thumb/stable_probability", "/thumb/instability", "/thumb/force",
+        "/index_1/state", "/index_1/stable_probability", "/index_1/instability",
+        "/index_1/force",
+    ]  # fmt: skip
+    assert publisher.kinds["/robot/hand_1/thumb/force"] == "geometry_msgs/WrenchStamped"
+    assert publisher.kinds["/robot/hand_1/index_1/force"] == "geometry_msgs/Vector3Stamped"
+    said = {topic: what for topic, what in publisher.said if topic != "/diagnostics"}
+    assert said == {
+        "/robot/hand_1/hand/state": "UNSTABLE",
+        "/robot/hand_1/thumb/state": "STABLE",
+        "/robot/hand_1/thumb/stable_probability": 0.75,
+        "/robot/hand_1/thumb/instability": 0.5,
+        "/robot/hand_1/thumb/force": ("thumb", (1.0, -2.0, 3.0), True),
+        "/robot/hand_1/index_1/state": "UNSTABLE",
+        "/robot/hand_1/index_1/stable_probability": 0.75,
+        "/robot/hand_1/index_1/instability": 0.5,
+        "/robot/hand_1/index_1/force": ("index/1", (100.0, 0.0, -5.5), False),
+    }
+    assert before <= publisher.stamp <= time.time()
+    assert publisher.log == ["ended"]
+
+
+def test_a_listener_of_a_session_publishes_what_is_new():
+    with Noted() as publisher:
+        decisions = [Decision(estimate(7.0), ("thumb",)), Decision(estimate(8.0), ("index/1",))]
+        publisher.put(Said(None, decisions, []))
+    assert len(publisher.of("/holdfast/thumb/state")) == 1
+    assert len(publisher.of("/holdfast/index_1/state")) == 1
+    assert len(publisher.of("/holdfast/hand/state")) == 2
+
+
+def test_it_never_holds_up_and_drops_the_oldest(monkeypatch):
+    monkeypatch.setattr(ros_publisher, "N_QUEUED", 4)
+    with Noted() as publisher:
+        publisher.gate.clear()
+        for k in range(20):
+            publisher.publish(estimate(thumb=finger(instability=k)), ("thumb",))
+        publisher.gate.set()
+    told = publisher.of("/holdfast/thumb/instability")
+    assert told[-4:] == [16, 17, 18, 19]
+    assert len(told) + publisher.n_dropped == 20
+
+
+def test_a_middleware_that_fails_ends_nothing():
+    with Noted() as publisher:
+        publisher.broken = True
+        publisher.publish(estimate())
+        while not publisher.n_failed:
+            time.sleep(0.005)
+        publisher.broken = False
+        publisher.publish(estimate())
+    assert publisher.of("/holdfast/thumb/state") == ["STABLE"]
+
+
+def test_diagnostics_when_faults_change_and_now_and_then(monkeypatch):
+    monkeypatch.setattr(ros_publisher, "DIAGNOSTICS_PERIOD", 1000.0)
+    well = estimate(thumb=finger())
+    with Noted() as publisher:
+        for one in (well, well, estimate(), estimate(), well):
+            publisher.publish(one)
+    told = [[level for _, level in statuses] for statuses in publisher.of("/diagnostics")]
+    assert told[-3:] == [[OK, OK, OK], [WARN, WARN, OK], [OK, OK, OK]]
+    assert len(told) <= 4  # the first may say that there is no estimate yet
+    monkeypatch.setattr(ros_publisher, "DIAGNOSTICS_PERIOD", 0.01)
+    with Noted() as publisher:
+        publisher.publish(well)
+        while len(publisher.of("/diagnostics")) < 5:
+            time.sleep(0.005)
+
+
+def test_opened_again_and_closed_twice():
+    publisher = Noted()
+    publisher.close()
+    for _ in range(2):
+        with publisher:
+            publisher.publish(estimate(), ())
+    publisher.close()
+    assert publisher.log == ["ended", "ended"]
+
+
+class TestStatuses:
+    def of(self, **fingers):
+        return {s.name: s for s in statuses_of((estimate(**fingers), 100.0), 100.5)}
+
+    def test_of_a_hand_that_is_well(self):
+        found = self.of(thumb=finger())
+        assert [s.level for s in found.values()] == [OK, OK, OK]
+        assert found["hand"].message == "all fingers are well"
+        assert found["thumb"].message == "well"
+
+    def test_of_a_finger_that_is_judged_in_spite_of_a_fault(self):
+        found = self.of()
+        assert (found["thumb"].level, found["thumb"].message) == (WARN, "dead")
+        assert (found["hand"].level, found["hand"].message) == (WARN, "look at thumb")
+
+    @pytest.mark.parametrize(
+        ("reason", "faults", "told"),
+        [
+            (Reason.FAULT, (Fault.STUCK, Fault.LATE), "stuck, late"),
+            (Reason.GAP, (), "gap"),
+        ],
+    )
+    def test_of_a_finger_of_which_nothing_is_known(self, reason, faults, told):
+        blind = finger(ContactState.UNKNOWN, reason=reason, faults=faults)
+        found = self.of(**{"index/1": blind})
+        assert (found["index/1"].level, found["index/1"].message) == (ERROR, told)
+        assert (found["hand"].level, found["hand"].message) == (ERROR, "look at index/1")
+
+    def test_of_a_finger_that_is_tared(self):
+        found = self.of(thumb=finger(ContactState.UNKNOWN, reason=Reason.TARE))
+        assert found["thumb"].level == OK
+
+    def test_before_and_after_estimates(self):
+        (before,) = statuses_of(None, 100.0)
+        assert before[:3] == ("hand", WARN, "no estimate yet")
+        (after,) = statuses_of((estimate(), 100.0), 103.2)
+        assert after[:3] == ("hand", ERROR, "no estimates any more")
+        assert after.values == (("seconds_since_estimate", "3"),)
+
+
+def test_names_that_ros_allows():
+    names = topic_names(["thumb", "index/1", "palm/2", "left/thumb", "1st", "a b-ä", "_x"], "")
+    assert names == {
+        "thumb": "/thumb",
+        "index/1": "/index_1",
+        "palm/2": "/palm_2",
+        "left/thumb": "/left/thumb",
+        "1st": "/finger_1st",
+        "a b-ä": "/a_b_",
+        "_x": "/finger_x",
+    }
+
+
+def test_names_that_are_refused():
+    with pytest.raises(ValueError, match="fingers index/1, index_1 would share topics: rename one"):
+        topic_names(["index/1", "index_1"], "/holdfast")
+    with pytest.raises(ValueError, match="fingers hand would share topics"):
+        topic_names(["hand"], "/holdfast")
+    for bad in ("holdfast", "/1", "/a b", "/a//b"):
+        with pytest.raises(ValueError, match=f"a namespace as /holdfast expected, '{bad}' given"):
+            topic_names(["thumb"], bad)

@@ -1,0 +1,80 @@
+import time
+
+import numpy as np
+import pytest
+
+from holdfast.sources import open_source
+from holdfast.sources.ros.rospy_node import published
+from sources.ros1_master import lines, running_master
+
+N = 300
+
+
+@pytest.fixture
+def master(tmp_path):
+    with running_master(tmp_path) as running:
+        yield running
+
+
+def heard(child):
+    """What a source gave, after it was open."""
+    first, *others = lines(child)
+    assert first == "open"
+    (told,) = others
+    return told
+
+
+def test_xela_from_another_process(master):
+    master.peer("publish", N)
+    told = heard(master.peer("source", "ros1:///xServTopic?fingers=1:thumb", 4))
+    assert told["sensors"] == {
+        "thumb": ["uskin-curved", "count"],
+        "finger2": ["uskin-curved", "count"],
+    }
+    numbers = told["numbers"]
+    assert numbers[-1] == N - 1
+    assert np.all(np.diff(numbers) > 0)
+    assert len(numbers) + told["n_lost"] == N - numbers[0]
+    assert len(numbers) > 0.9 * N
+    assert np.all(np.diff(told["times"]) > 0)
+    assert told["sample"] == [N - 1, 1, 65535]
+    assert told["notices"][:1] == ["nobody publishes any more"]
+
+
+def test_a_master_that_is_started_again(master):
+    master.peer("publish", 30)
+    uri = f"ros1:///xServTopic?values=calibrated&master={master.uri}/"
+    child = master.peer("source", uri, 9)
+    assert next(lines(child)) == "open"
+    master.stop()
+    master.start()
+    master.peer("publish", 1500)
+    (told,) = lines(child)
+    assert "nobody publishes any more" in told["notices"]
+    assert "somebody publishes again" in told["notices"]
+    assert told["sensors"]["finger1"] == ["uskin-curved", "N"]
+    assert told["sample"][1:] == [1.0, 2.0]
+    assert len(told["numbers"]) > 40
+    assert np.all(np.diff(told["times"]) > 0)
+
+
+def test_topics_of_others(master):
+    master.peer("chatter")
+    while "/chatter" not in published(master.uri):
+        time.sleep(0.05)
+    (told,) = lines(master.peer("source", "ros1:///xServTopic", 1))
+    assert told["error"].startswith(
+        f"nobody publishes /xServTopic at the ROS master {master.uri}; there are "
+        "/chatter (std_msgs/String), /rosout"
+    )
+    (told,) = lines(master.peer("source", "ros1:///chatter", 1))
+    assert told["error"].startswith(
+        "/chatter has std_msgs/String, in which holdfast knows no samples; it takes xela_server"
+    )
+
+
+def test_unknown_parameters():
+    with pytest.raises(ValueError, match="unknown parameter domain; there are master, values, fin"):
+        open_source("ros1:///a?domain=0")
+    with pytest.raises(ValueError, match=r"a master as http://localhost:11311 expected, 'x' given"):
+        open_source("ros1:///a?master=x")
