@@ -1,0 +1,292 @@
+"""Labels out of Label Studio's JSON export: one label group a finger, times in seconds.
+
+A task is one recording, found by the hash or name that our own export writes into its data, or
+by the name of its CSV file. Each annotator's annotation of it is a labelling, each prediction
+another. Regions of other kinds (choices, texts) are no labels and left alone.
+"""
+
+import re
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+from urllib.parse import unquote
+
+import msgspec
+
+from holdfast.contact import Cause, ContactState
+from holdfast.errors import RecordingError
+from holdfast.recordings import Label, Recording
+
+STATES = (ContactState.STABLE, ContactState.UNSTABLE, ContactState.NO_CONTACT)
+
+Labels = dict[str, tuple[Label, ...]]
+
+
+@dataclass(frozen=True)
+class Annotation:
+    """One labelling of one recording.
+
+    Attributes:
+        annotator: email or number of the person, or version of the model; "" where nobody is
+            named.
+        prediction: whether a model made it.
+        labels: by finger.
+    """
+
+    annotator: str
+    prediction: bool
+    labels: Labels
+
+
+class _Value(msgspec.Struct):
+    start: float
+    end: float
+    timeserieslabels: list[str]
+    instant: bool = False
+
+
+class _Result(msgspec.Struct):
+    type: str = ""
+    from_name: str = ""
+    origin: str = ""
+    value: Any = None
+    score: float | None = None
+    meta: Any = None
+
+
+class _Annotation(msgspec.Struct):
+    id: int | str | None = None
+    completed_by: Any = None
+    was_cancelled: bool = False
+    result: list[_Result] = []
+
+
+class _Prediction(msgspec.Struct):
+    model_version: str | None = None
+    result: list[_Result] = []
+
+
+class _Task(msgspec.Struct):
+    id: int | str | None = None
+    data: dict[str, Any] = {}
+    file_upload: str | None = None
+    annotations: list[_Annotation] = []
+    predictions: list[_Prediction | int] = []
+    """Numbers where the export leaves predictions out."""
+
+
+def label_name(state: ContactState, cause: Cause | None = None) -> str:
+    """What a label is called in Label Studio.
+
+    Example:
+        >>> label_name(ContactState.UNSTABLE, Cause.SLIP)
+        'UNSTABLE (slip)'
+    """
+    return f"{state}" if cause is None else f"{state} ({cause})"
+
+
+def state_of(name: str) -> tuple[ContactState, Cause | None]:
+    """The state and cause that a label is called by.
+
+    Raises:
+        ValueError: another name.
+
+    Example:
+        >>> state_of("UNSTABLE (slip)")
+        (<ContactState.UNSTABLE: 'UNSTABLE'>, <Cause.SLIP: 'slip'>)
+    """
+    match = re.fullmatch(r"\s*(\w+)\s*(?:\(\s*(\w+)\s*\))?\s*", name)
+    state, cause = match.groups() if match else ("", None)
+    if state.upper() not in STATES or (cause and cause.lower() not in tuple(Cause)):
+        raise ValueError(
+            f"unknown label {name!r}; there are {', '.join(STATES)}, "
+            f"alone or with a cause in brackets ({', '.join(Cause)})"
+        )
+    return ContactState(state.upper()), Cause(cause.lower()) if cause else None
+
+
+def is_label_studio(data: bytes) -> bool:
+    """Whether the JSON is a list of tasks, or one task."""
+    try:
+        document = msgspec.json.decode(data)
+    except (ValueError, RecursionError):  # msgspec's own errors are ValueErrors
+        return False
+    first = document[0] if isinstance(document, list) and document else document
+    return isinstance(first, dict) and "data" in first
+
+
+def annotations_of(path: str | Path, recording: Recording) -> list[Annotation]:
+    """Every labelling of a recording in an export: annotations, then predictions.
+
+    Annotations that were cancelled are left out.
+
+    Args:
+        path: of the JSON export.
+        recording: whose labels are wanted.
+
+    Raises:
+        RecordingError: the file is no such export or has no task of the recording, a label is
+            unknown, reversed, outside the recording or overlaps another, or a label group is
+            no finger.
+    """
+    task = _task_of(_tasks(Path(path)), recording, Path(path))
+    found = []
+    for each in task.annotations:
+        if not each.was_cancelled:
+            who = _annotator(each.completed_by)
+            number = "an annotation" if each.id is None else f"annotation {each.id}"
+            where = f"{path}, {recording.name!r}, {number}"
+            found.append(Annotation(who, False, _labels(each.result, recording, where, who)))
+    for made in task.predictions:
+        if isinstance(made, _Prediction):
+            who = made.model_version or ""
+            where = f"{path}, {recording.name!r}, prediction {who!r}"
+            found.append(Annotation(who, True, _labels(made.result, recording, where, who)))
+    return found
+
+
+def labels_from_label_studio(
+    path: str | Path, recording: Recording, annotator: str | None = None
+) -> Labels:
+    """The labels of one annotator, or model, by finger.
+
+    Args:
+        path: of the JSON export.
+        recording: whose labels are wanted.
+        annotator: email or number of a person, or version of a model. By default the only
+            person who labelled the recording, or the only model where nobody did.
+
+    Raises:
+        RecordingError: as `annotations_of`, or it is not clear whose labels are meant.
+    """
+    every = annotations_of(path, recording)
+    if annotator is None:
+        found = [each for each in every if not each.prediction] or every
+    else:
+        found = [each for each in every if each.annotator == annotator]
+    if len(found) == 1:
+        return found[0].labels
+    there = ", ".join(
+        f"{each.annotator or 'nobody named'}{' (prediction)' * each.prediction}" for each in every
+    )
+    wanted = "one annotation" if annotator is None else f"one annotation by {annotator!r}"
+    raise RecordingError(
+        f"{path}: {wanted} of {recording.name!r} expected, {len(found)} found; "
+        f"it has been labelled by {there or 'nobody'}"
+    )
+
+
+def _tasks(path: Path) -> list[_Task]:
+    try:
+        document = msgspec.json.decode(path.read_bytes())
+        tasks = document if isinstance(document, list) else [document]
+        return msgspec.convert(tasks, list[_Task])
+    except OSError as cause:
+        raise RecordingError(f"cannot read {path}: {cause.strerror}") from cause
+    except (ValueError, RecursionError) as cause:
+        raise RecordingError(f"{path} is no JSON export of Label Studio: {cause}") from cause
+
+
+def _task_of(tasks: Sequence[_Task], recording: Recording, path: Path) -> _Task:
+    """The task of a recording, by its hash or else by name."""
+    named = [task for task in tasks if recording.name in _names(task)]
+    known = [task for task in tasks if task.data.get("digest") == recording.digest]
+    if not known and any("digest" in task.data for task in named):
+        raise RecordingError(
+            f"{path}: the task of {recording.name!r} is of another recording of that name "
+            f"(hash {str(named[0].data['digest'])[:12]}, not {recording.digest[:12]})"
+        )
+    found = known or named
+    if len(found) == 1:
+        return found[0]
+    there = ", ".join(dict.fromkeys(name for task in tasks for name in _names(task)[:1]))
+    raise RecordingError(
+        f"{path}: one task of {recording.name!r} expected, {len(found)} found; "
+        f"its {len(tasks)} tasks are of {there or 'recordings without a name'}"
+    )
+
+
+def _names(task: _Task) -> list[str]:
+    """What the recording of a task may be called."""
+    given = task.data.get("recording")
+    texts = [each for each in task.data.values() if isinstance(each, str)]
+    files = [*texts, task.file_upload or ""]
+    stems = [_stem(each) for each in files if each.lower().endswith((".csv", ".tsv"))]
+    bare = [re.sub(r"^[0-9a-f]{8}-", "", stem) for stem in stems]  # as uploaded by hand
+    return [*([given] if isinstance(given, str) else []), *bare, *stems]
+
+
+def _stem(url: str) -> str:
+    name = re.split(r"[/\\=]", unquote(url))[-1]
+    return re.sub(r"(\.signals)?\.[ct]sv$", "", name, flags=re.IGNORECASE)
+
+
+def _annotator(completed_by: object) -> str:
+    if isinstance(completed_by, dict):
+        named = completed_by.get("email") or completed_by.get("username") or completed_by.get("id")
+        return "" if named is None else str(named)
+    return "" if completed_by is None else str(completed_by)
+
+
+def _labels(results: Sequence[_Result], recording: Recording, where: str, who: str) -> Labels:
+    labels: dict[str, list[Label]] = {}
+    for finger, label in _each(results, recording, where, who):
+        labels.setdefault(finger, []).append(label)
+    try:
+        checked = recording.with_labels(labels)
+    except RecordingError as cause:
+        raise RecordingError(f"{where}: {cause}") from cause
+    return {
+        finger: checked.modules[finger].labels for finger in recording.modules if finger in labels
+    }
+
+
+def _each(
+    results: Sequence[_Result], recording: Recording, where: str, who: str
+) -> Iterator[tuple[str, Label]]:
+    for result in results:
+        if result.type != "timeserieslabels":
+            continue
+        finger = result.from_name
+        if finger not in recording.modules:
+            raise RecordingError(
+                f"{where}: label group {finger!r} is no finger; one group for each of "
+                f"{', '.join(recording.modules)} expected"
+            )
+        try:
+            yield finger, _label(result, who)
+        except ValueError as cause:
+            raise RecordingError(f"{where}, {finger}: {cause}") from cause
+
+
+def _label(result: _Result, who: str) -> Label:
+    """The label that a region stands for.
+
+    Raises:
+        ValueError: it stands for none.
+    """
+    try:
+        value = msgspec.convert(result.value, _Value)
+    except msgspec.ValidationError as cause:
+        raise ValueError(
+            f"start and end in seconds and one label expected ({cause}); a labelling config "
+            "with a timeFormat exports dates: leave it out"
+        ) from cause
+    if value.instant or value.start == value.end:
+        raise ValueError(f"an instant at {value.start:.15g} s given, an interval expected")
+    if len(value.timeserieslabels) != 1:
+        given = ", ".join(value.timeserieslabels) or "none"
+        raise ValueError(f"one label for an interval expected, given: {given}")
+    state, cause_of = state_of(value.timeserieslabels[0])
+    meta = result.meta if isinstance(result.meta, dict) else {}
+    changed = result.origin == "prediction-changed"
+    return Label(
+        value.start,
+        value.end,
+        state,
+        cause_of,
+        evidence=str(meta.get("evidence", "")),
+        confidence=1.0 if result.score is None else result.score,
+        author=who if changed else str(meta.get("author", who)),
+    )
