@@ -14,8 +14,9 @@ What a marker says holds until the next one that says something:
 | `free` | no contact |
 
 A word that is said again changes nothing. A disturbance is sure where it is said once and its end
-is said; otherwise it is doubtful. A finger that does not touch, by its force, has no contact whatever the marker says; where the
-force tells nothing of contact (tare `first` or `none`), the markers alone count.
+is said; otherwise it is doubtful. A finger that does not touch, by its force, has no contact
+whatever the marker says; where the force tells nothing of contact (tare `first` or `none`), the
+markers alone count.
 """
 
 import re

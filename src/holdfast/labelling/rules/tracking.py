@@ -29,7 +29,7 @@ from holdfast.labelling.poses import Poses, Track, names_of, poses_of
 from holdfast.labelling.rules.clocks import Offset, offset_of
 from holdfast.labelling.rules.drawing import Drawing, Pen
 from holdfast.labelling.rules.hand import FingerForce, HandForce, hand_force, lost_at, pressed_at
-from holdfast.labelling.rules.motion import Motion, motion_of, relative
+from holdfast.labelling.rules.motion import SMOOTHING, Motion, motion_of, relative
 from holdfast.recordings import Label, Recording
 from holdfast.sensors.values import Array
 from holdfast.twin.labels import LabelRule, runs
@@ -200,8 +200,9 @@ class _Judge:
         moving = lasting(with_hysteresis(ratio, rule.release, 1.0), n_samples(rule.least, period))
         if rule.measure == "displacement":
             return moving
-        moving = closed(moving, n_samples(rule.merge, period))
-        return grown(moving, n_samples(rule.margin, period))
+        # The smoothing has drawn motion longer by half of itself at both ends already.
+        moving = closed(moving, n_samples(rule.merge - SMOOTHING, period))
+        return grown(moving, n_samples(rule.margin - SMOOTHING / 2, period))
 
     def _paint_ends(self, drawing: Drawing, start: int, end: int) -> None:
         """Motion at the beginning of a contact is closing, at its end release."""
