@@ -74,6 +74,22 @@ def test_what_is_missing_after_a_stall_is_no_jump():
     assert not any(s.faults for s in told[249:])
 
 
+def test_clocks_that_drifted_over_a_long_pause_did_not_jump():
+    told = stamps([*steady(10), (11_000.0 + 0.9, 10_050.0)])
+    assert told[-1] == (11_000.9, ())
+
+
+def test_a_jump_after_a_late_sample_leaves_nothing_late():
+    """Sample 100 comes 0.3 s late; those up to 145 are missing, then the clock has jumped."""
+    pairs = steady(300)
+    t, received = pairs[100]
+    after = [(t + 3600.0, received) for t, received in pairs[146:]]
+    told = stamps([*pairs[:100], (t, received + 0.3), *after])
+    assert told[100].faults == (Fault.LATE,)
+    assert told[101].faults == (Fault.CLOCK_JUMP,)
+    assert not any(s.faults for s in told[102:])
+
+
 def test_a_small_step_back_is_just_after_the_last():
     first, second, third = stamps([(10.0, 0.0), (9.96, 0.01), (10.02, 0.02)])
     assert first.time < second.time == math.nextafter(10.0, math.inf)

@@ -47,18 +47,17 @@ class Delay:
     def of(self, time: float, received: float) -> float:
         """How much later than the quickest this sample is [s]; it may be the quickest now."""
         age = received - time
-        self._least = min(self._allowed(received), age)
+        self._least = min(self._least + self._drift(received), age)
         self._received = received
         return age - self._least
 
     def lead(self, time: float, received: float) -> float:
-        """How much quicker than the quickest this sample is, below 0 where it is not [s]."""
-        return self._allowed(received) - (received - time)
+        """How much quicker than the quickest this sample is, drift aside; mostly below 0 [s]."""
+        return self._least - (received - time) - self._drift(received)
 
-    def _allowed(self, received: float) -> float:
-        if math.isinf(self._least):
-            return self._least
-        return self._least + DRIFT * max(received - self._received, 0.0)
+    def _drift(self, received: float) -> float:
+        """By how much the clocks may have drifted apart since the last sample [s]."""
+        return DRIFT * max(received - self._received, 0.0) if math.isfinite(self._least) else 0.0
 
 
 class Timeline:
@@ -111,6 +110,5 @@ class Timeline:
     def _jumped(self, time: float, received: float) -> bool:
         if math.isnan(self._last):
             return False
-        ahead = time - self._last - (received - self._received)
-        from_future = ahead > JUMP and self._delay.lead(time, received) > JUMP
+        from_future = self._delay.lead(time, received) > JUMP
         return time <= self._last - JITTER or from_future

@@ -34,7 +34,7 @@ def server(first=(), *, port=0, broken=False):
                 if connection.state is not State.OPEN:  # it is for whoever came after
                     said.put(word)
                     return
-                connection.send(word)
+                connection.send(word, text=True)  # bytes too, be they no UTF-8
         except ConnectionClosed:
             pass
 

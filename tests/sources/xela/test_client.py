@@ -195,8 +195,9 @@ class TestReading:
                 assert source.read(0.02) is None
             said.put(patch(2))
             *_, again, sample = until(source, lambda a: a.samples)
-        assert again.notices[0].startswith("samples again after 0.")
-        np.testing.assert_array_equal(sample.samples["finger1"], counts(16, 2))
+            assert again.notices[0].startswith("samples again after 0.")
+            np.testing.assert_array_equal(sample.samples["finger1"], counts(16, 2))
+            until(source, says("no new sample for 0.05 s"))  # another silence
 
     def test_repeats_are_silence_too(self, quick):
         with server([patch(1)]) as (port, said), open_source(f"xela://127.0.0.1:{port}") as source:
