@@ -41,7 +41,7 @@ def visit(browser):
         )
         contexts.append(context)
         page = context.new_page()
-        page.set_default_timeout(30_000)
+        page.set_default_timeout(10_000)
         page.on("console", lambda message: message.type == "error" and note(message.text))
         page.on("pageerror", lambda error: complaints.append(str(error)))
         page.on("dialog", lambda dialog: (complaints.append(dialog.message), dialog.dismiss()))
@@ -63,3 +63,13 @@ def service():
     with Service(Tape(*made_up())) as service:
         service.at = 3.5  # all fingers hold
         yield service
+
+
+@pytest.fixture(scope="module")
+def module(browser):
+    """A page whose modules are called one by one, as functions."""
+    with Service(Tape(*made_up())) as service:
+        page = browser.new_page()
+        page.goto(service.url)
+        yield page
+        page.close()

@@ -233,7 +233,7 @@ class Service:
 
     def app(self):
         app = web.Application(middlewares=[self.guard])
-        app.router.add_get("/", lambda _: web.FileResponse(PAGE / "index.html"))
+        app.router.add_get("/", self.index)
         app.router.add_static("/page", PAGE)
         app.router.add_get("/api/v1/live", self.live)
         app.router.add_get("/api/v1/info", self.info)
@@ -258,6 +258,9 @@ class Service:
             answer.headers["Content-Security-Policy"] = POLICY
             answer.headers["X-Content-Type-Options"] = "nosniff"
         return answer
+
+    async def index(self, _):
+        return web.FileResponse(PAGE / "index.html")
 
     async def info(self, _):
         return web.json_response(self.tape.hello())

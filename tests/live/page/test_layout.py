@@ -10,11 +10,6 @@ TURNED = "async (given) => (await import('/page/layout.js')).turned(...given)"
 HULL = "async (given) => (await import('/page/layout.js')).hull(given)"
 
 
-@pytest.fixture
-def module(visit, service):
-    return visit(service.url)
-
-
 def laid_out(page, layout):
     found = page.evaluate(
         LAYOUT, [layout.positions.tolist(), layout.rotations.tolist(), layout.normal.tolist()]
@@ -40,7 +35,7 @@ def test_the_curved_fingertip_shows_all_its_taxels(module):
     near = (straight > 0) & (straight < 9e-3)
     assert apart[~np.eye(30, dtype=bool)].min() > 5e-3
     assert (apart[near] / straight[near]).min() > 0.9
-    assert (apart[near] / straight[near]).max() < 1.5
+    assert (apart[near] / straight[near]).max() < 1.8  # no dome is flattened without stretching
     # Left is the mirror of right: the table lists the right side first, in the same order.
     for left, right in ((16, 10), (17, 11), (21, 15), (22, 6), (25, 9), (26, 1), (30, 5)):
         assert places[left - 1] == pytest.approx(places[right - 1] * [-1, 1], abs=1e-9)

@@ -5,11 +5,6 @@ import pytest
 CALL = "async ([name, value]) => (await import('/page/words.js'))[name](value)"
 
 
-@pytest.fixture
-def module(visit, service):
-    return visit(service.url)
-
-
 @pytest.mark.parametrize(
     ("name", "value", "text"),
     [

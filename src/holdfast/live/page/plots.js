@@ -4,10 +4,9 @@ import uPlot from "./uplot/uPlot.esm.js";
 import { make, write } from "./dom.js";
 import { RIBBON, level, markers, ribbons, shade } from "./shading.js";
 import { reduce } from "./store.js";
-import { colours, fingerColour } from "./theme.js";
+import { FONT, colours, fingerColour } from "./theme.js";
 import { number, unitWord } from "./words.js";
 
-const FONT = "11px system-ui, sans-serif";
 const AXES = [["fx", "x"], ["fy", "y"], ["fz", "z"]];
 
 // Steps that leave the ends of an axis where they are while the data change a little.

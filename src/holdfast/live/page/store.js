@@ -44,7 +44,9 @@ export class Store {
     // A source that begins anew (a replay in a loop, another clock) has no common past.
     if (last !== null && times[0] <= last) this.end = 0;
     else if (last !== null && times[0] - last > gap) this.lift(0.5 * (last + times[0]), hand);
-    for (let k = Math.max(0, times.length - this.capacity); k < times.length; k += 1) {
+    const skipped = Math.max(0, times.length - this.capacity);
+    this.moved += skipped;
+    for (let k = skipped; k < times.length; k += 1) {
       const place = this.next(times[k], hand);
       for (const [name, own] of this.fingers) fill(own, place, series.fingers[name], k);
     }

@@ -1,7 +1,7 @@
 // The map of one sensor on a canvas: a disc for the normal reading, an arrow for the shear.
 
 import { hull, layout, turned } from "./layout.js";
-import { colours, heat } from "./theme.js";
+import { FONT, colours, heat } from "./theme.js";
 import { number, unitWord } from "./words.js";
 
 // Readings under this are noise: the scale never gets finer.
@@ -179,7 +179,7 @@ export class TaxelMap {
   }
 
   label(pen, width, height) {
-    pen.font = "11px system-ui, sans-serif";
+    pen.font = FONT;
     pen.textAlign = "center";
     pen.textBaseline = "alphabetic";
     pen.fillStyle = colours.muted;

@@ -10,6 +10,9 @@ const light = window.matchMedia("(prefers-color-scheme: light)");
 
 export const colours = {};
 
+/** The page's own font, small, for canvases. */
+export const FONT = `11px ${getComputedStyle(document.documentElement).fontFamily}`;
+
 function read() {
   const style = getComputedStyle(document.documentElement);
   for (const name of NAMES) colours[name] = style.getPropertyValue(`--${name}`).trim();
