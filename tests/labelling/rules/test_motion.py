@@ -1,0 +1,132 @@
+import hypothesis.strategies as st
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from scipy.spatial.transform import Rotation
+
+from holdfast.labelling.poses import Track
+from holdfast.labelling.rules.motion import BRIDGED, motion_of, relative, slope
+
+GRID = np.arange(0, 3, 0.01)
+INSIDE = slice(20, -20)
+
+
+def track(places, turns, times=GRID):
+    return Track(times, places, np.roll(turns.as_quat(), 1, axis=1))
+
+
+def turning(rate, axis, times=GRID):
+    return Rotation.from_rotvec(np.outer(times * rate, axis))
+
+
+def nowhere(times=GRID):
+    return np.zeros((len(times), 3))
+
+
+def test_a_steady_velocity():
+    thing = track(np.outer(GRID, [0.03, 0.04, 0]), turning(0, [0, 0, 1]))
+    motion = motion_of(thing, GRID)
+    assert motion.speed[INSIDE] == pytest.approx(0.05)
+    assert motion.spin[INSIDE] == pytest.approx(0, abs=1e-9)
+
+
+@given(rate=st.floats(0.1, 3), seed=st.integers(0, 1000))
+@settings(max_examples=20)
+def test_a_steady_spin_and_the_speed_at_the_contact(rate, seed):
+    axis = Rotation.random(rng=seed).apply([0, 0, 1])
+    point = np.tile([0.02, 0.01, -0.03], (len(GRID), 1))
+    motion = motion_of(track(nowhere(), turning(rate, axis)), GRID, point)
+    assert motion.spin[INSIDE] == pytest.approx(rate, rel=0.02)
+    lever = np.linalg.norm(np.cross(axis, point[0]))
+    assert motion.speed[INSIDE] == pytest.approx(rate * lever, rel=0.02, abs=1e-6)
+
+
+def test_rolling_has_no_speed_at_the_contact():
+    radius = 0.03
+    thing = track(np.outer(GRID, [0.02, 0, 0]), turning(0.02 / radius, [0, 1, 0]))
+    point = np.outer(GRID, [0.02, 0, 0]) - [0, 0, radius]
+    motion = motion_of(thing, GRID, point)
+    assert motion.speed[INSIDE] == pytest.approx(0, abs=1e-4)
+    assert motion.spin[INSIDE] == pytest.approx(0.02 / radius, rel=0.01)
+
+
+@given(seed=st.integers(0, 1000))
+@settings(max_examples=20)
+def test_relative_motion_knows_no_world(seed):
+    rng = np.random.default_rng(seed)
+    places, carried = rng.normal(size=(2, 300, 3)).cumsum(axis=1) * 1e-3
+    turns, tip_turns = (Rotation.from_rotvec(v * 3) for v in (carried, places))
+    world, shift = Rotation.random(rng=seed), rng.normal(size=3)
+    here = relative(track(places, turns), track(carried, tip_turns))
+    there = relative(
+        track(world.apply(places) + shift, world * turns),
+        track(world.apply(carried) + shift, world * tip_turns),
+    )
+    assert here.positions == pytest.approx(there.positions, abs=1e-12)
+    same = np.abs((here.quaternions * there.quaternions).sum(axis=1))
+    assert same == pytest.approx(1)
+
+
+def test_a_tip_at_other_times_is_taken_between_its_poses():
+    late = GRID[:-1] + 0.004
+    thing = track(np.outer(GRID, [0.1, 0, 0]), turning(1, [0, 0, 1]))
+    tip = track(np.outer(late, [0.1, 0, 0]), turning(1, [0, 0, 1], late), late)
+    found = relative(thing, tip)
+    assert found.positions[5:-5] == pytest.approx(0, abs=1e-9)
+
+
+def test_quaternions_of_either_sign_are_one_rotation():
+    tip = track(nowhere(), turning(1, [0, 0, 1]))
+    tip.quaternions[100:200] *= -1
+    thing = track(np.tile([0.1, 0, 0], (len(GRID), 1)), turning(1, [0, 0, 1]))
+    speeds = motion_of(relative(thing, tip), GRID + 0.001).speed[INSIDE]
+    assert np.nanmax(speeds) == pytest.approx(0.1, rel=0.02)
+
+
+def test_where_poses_are_missing_nothing_is_known():
+    places = nowhere()
+    places[100:105] = places[200:250] = np.nan
+    motion = motion_of(track_with_nan(places), GRID)
+    assert motion.known[95:110].all()
+    assert not motion.known[201:249].any()
+    assert np.isnan(motion.speed[201:249]).all()
+    assert pytest.approx(0.1) == BRIDGED
+
+
+def track_with_nan(places):
+    quaternions = np.tile([1.0, 0, 0, 0], (len(places), 1))
+    return Track(GRID, places, quaternions)
+
+
+@given(jitter=st.floats(1e-5, 1e-2))
+@settings(max_examples=10)
+def test_the_noise_of_the_speed_is_what_a_body_at_rest_shows(jitter):
+    times = np.arange(0, 30, 0.01)
+    places = np.random.default_rng(0).normal(0, jitter, (len(times), 3))
+    still = track(places, turning(0, [0, 0, 1], times), times)
+    motion = motion_of(still, times)
+    shown = np.sqrt((motion.speed[INSIDE] ** 2).mean())
+    assert motion.speed_noise == pytest.approx(shown, rel=0.1)
+
+
+def test_smooth_motion_is_no_noise():
+    times = np.arange(0, 30, 0.01)
+    swung = np.outer(0.01 * np.sin(2 * np.pi * times), [1, 0, 0])
+    motion = motion_of(track(swung, turning(0, [0, 0, 1], times), times), times)
+    assert motion.speed_noise < 0.01 * motion.speed.max()
+
+
+def test_how_far_it_is_from_a_pose():
+    thing = track(np.outer(GRID, [0.01, 0, 0]), turning(0.2, [0, 0, 1]))
+    far, turned = motion_of(thing, GRID).away_from(np.zeros(3), np.eye(3), None)
+    assert far == pytest.approx(0.01 * GRID, abs=1e-9)
+    assert turned == pytest.approx(0.2 * GRID, abs=1e-9)
+    at, _ = motion_of(track(nowhere(), turning(0.2, [0, 0, 1])), GRID).away_from(
+        np.zeros(3), np.eye(3), np.array([0.05, 0, 0])
+    )
+    assert at == pytest.approx(2 * 0.05 * np.sin(0.1 * GRID), abs=1e-9)
+
+
+def test_the_slope_of_a_line_is_its_slope():
+    line = np.outer(GRID, [2.0, -1.0]) + 5
+    assert slope(line, 0.01)[INSIDE] == pytest.approx(np.tile([2.0, -1.0], (260, 1)))
