@@ -30,7 +30,7 @@ class Noted(RosPublisher):
         self.log.append("ended")
 
     def _note(self, topic, what):
-        assert self.gate.wait(20)
+        assert self.gate.wait(60)
         if self.broken:
             raise RuntimeError("no network")
         self.said.append((topic, what))

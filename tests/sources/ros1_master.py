@@ -50,7 +50,7 @@ class Master:
 
     def start(self):
         self._master = self._spawn(["rosmaster", "--core", "-p", str(self.port)])
-        end = time.monotonic() + 15
+        end = time.monotonic() + 60
         while True:
             with suppress(SourceError):
                 return rospy_node.check_master(self.uri)

@@ -57,30 +57,38 @@ def chatter():
         time.sleep(0.1)
 
 
-def source(uri, seconds):
+def source(uri, until, patience=5.0):
+    """Ends soon after a notice, or after 60 s."""
     from holdfast.errors import HoldfastError
     from holdfast.sources import open_source
+    from holdfast.sources.ros import topic
 
+    topic.PATIENCE = float(patience)
     told = {"numbers": [], "times": [], "n_lost": 0, "notices": []}
     try:
         with open_source(uri) as opened:
             told["sensors"] = {name: [s.name, s.unit] for name, s in opened.sensors.items()}
             tell("open")
-            end = time.monotonic() + float(seconds)
-            while time.monotonic() < end:
+            end = time.monotonic() + 60
+            n_after = 0
+            while time.monotonic() < end and n_after < 3:
                 arrival = opened.read(0.2)
-                if arrival is None:
-                    continue
-                told["notices"] += arrival.notices
-                told["n_lost"] += arrival.n_lost
-                if arrival.samples:
-                    first = next(iter(arrival.samples.values()))
-                    told["numbers"].append(float(first[0, 0]))
-                    told["times"].append(arrival.time)
-                    told["sample"] = first[1].tolist()
+                if arrival is not None:
+                    note(told, arrival)
+                n_after += any(notice.startswith(until) for notice in told["notices"])
     except HoldfastError as error:
         told["error"] = str(error)
     tell(told)
+
+
+def note(told, arrival):
+    told["notices"] += arrival.notices
+    told["n_lost"] += arrival.n_lost
+    if arrival.samples:
+        first = next(iter(arrival.samples.values()))
+        told["numbers"].append(float(first[0, 0]))
+        told["times"].append(arrival.time)
+        told["sample"] = first[1].tolist()
 
 
 def read():

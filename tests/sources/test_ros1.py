@@ -8,6 +8,7 @@ from holdfast.sources.ros.rospy_node import published
 from sources.ros1_master import lines, running_master
 
 N = 300
+ALONE, AGAIN = "nobody publishes any more", "samples again after"
 
 
 @pytest.fixture
@@ -26,7 +27,7 @@ def heard(child):
 
 def test_xela_from_another_process(master):
     master.peer("publish", N)
-    told = heard(master.peer("source", "ros1:///xServTopic?fingers=1:thumb", 4))
+    told = heard(master.peer("source", "ros1:///xServTopic?fingers=1:thumb", ALONE))
     assert told["sensors"] == {
         "thumb": ["uskin-curved", "count"],
         "finger2": ["uskin-curved", "count"],
@@ -38,23 +39,23 @@ def test_xela_from_another_process(master):
     assert len(numbers) > 0.9 * N
     assert np.all(np.diff(told["times"]) > 0)
     assert told["sample"] == [N - 1, 1, 65535]
-    assert told["notices"][:1] == ["nobody publishes any more"]
+    assert ALONE in told["notices"]
 
 
 def test_a_master_that_is_started_again(master):
     master.peer("publish", 30)
     uri = f"ros1:///xServTopic?values=calibrated&master={master.uri}/"
-    child = master.peer("source", uri, 9)
+    child = master.peer("source", uri, AGAIN)
     assert next(lines(child)) == "open"
     master.stop()
     master.start()
     master.peer("publish", 1500)
     (told,) = lines(child)
-    assert "nobody publishes any more" in told["notices"]
+    assert ALONE in told["notices"]
     assert "somebody publishes again" in told["notices"]
     assert told["sensors"]["finger1"] == ["uskin-curved", "N"]
     assert told["sample"][1:] == [1.0, 2.0]
-    assert len(told["numbers"]) > 40
+    assert told["numbers"][-1] < 20  # of the new one
     assert np.all(np.diff(told["times"]) > 0)
 
 
@@ -62,12 +63,12 @@ def test_topics_of_others(master):
     master.peer("chatter")
     while "/chatter" not in published(master.uri):
         time.sleep(0.05)
-    (told,) = lines(master.peer("source", "ros1:///xServTopic", 1))
+    (told,) = lines(master.peer("source", "ros1:///xServTopic", ALONE, 1))
     assert told["error"].startswith(
         f"nobody publishes /xServTopic at the ROS master {master.uri}; there are "
         "/chatter (std_msgs/String), /rosout"
     )
-    (told,) = lines(master.peer("source", "ros1:///chatter", 1))
+    (told,) = lines(master.peer("source", "ros1:///chatter", ALONE))
     assert told["error"].startswith(
         "/chatter has std_msgs/String, in which holdfast knows no samples; it takes xela_server"
     )

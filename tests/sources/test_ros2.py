@@ -45,7 +45,7 @@ def publishing(domain, n=N):
         peer.wait()
 
 
-def until(source, wanted, seconds=20.0):
+def until(source, wanted, seconds=60.0):
     """Arrivals until one is as wanted."""
     end = time.monotonic() + seconds
     arrivals = []

@@ -7,11 +7,13 @@ from collections import deque
 from collections.abc import Iterable, Mapping
 from threading import Condition, Thread
 from types import TracebackType
-from typing import NamedTuple, Self
+from typing import TYPE_CHECKING, NamedTuple, Self
 
 from holdfast.contact import ContactEstimate, ContactState, HandEstimate, Reason
-from holdfast.live.session import Said
 from holdfast.sensors.values import Unit
+
+if TYPE_CHECKING:
+    from holdfast.live.session import Said
 
 N_QUEUED = 64
 """Estimates that wait for ROS; then the oldest goes."""
@@ -108,7 +110,7 @@ class RosPublisher(ABC):
             thread.join()
             self._disconnect()
 
-    def put(self, said: Said) -> None:
+    def put(self, said: "Said") -> None:
         """Publishes what a session says; a listener of it."""
         for decision in said.decisions:
             self.publish(decision.estimate, decision.fingers)
