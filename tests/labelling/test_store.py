@@ -1,0 +1,246 @@
+import json
+from dataclasses import replace
+
+import pytest
+
+from holdfast.contact import Cause, ContactState
+from holdfast.errors import OutputError, RecordingError
+from holdfast.io import labels_path, load_labels, load_recording, save_labels, save_recording
+from holdfast.labelling.store import (
+    ConflictError,
+    GivenLabel,
+    ReadOnlyError,
+    checked,
+    is_read_only,
+    labels_from,
+    read_stored,
+    revision_of,
+    save_stored,
+)
+from holdfast.recordings import Label
+from holdfast.synthetic import synthetic_recording
+
+HELD = Label(3.0, 4.0, ContactState.STABLE)
+LOST = Label(4.0, 5.0, ContactState.UNSTABLE, Cause.LOST, "seen", 0.7, "eve")
+NOW = "2026-01-02T03:04:05+00:00"
+
+
+@pytest.fixture(params=["parquet", "mcap"])
+def place(request, tmp_path):
+    """A recording with labels inside, and its path."""
+    recording = synthetic_recording("grasp", 0, ("thumb", "index"))
+    path = tmp_path / f"grasp.{request.param}"
+    save_recording(recording, path)
+    return recording, path
+
+
+@pytest.fixture
+def bare(tmp_path):
+    """A recording without labels, and its path."""
+    recording = synthetic_recording("bare", 0, ("thumb", "index")).with_labels({})
+    path = tmp_path / "bare.parquet"
+    save_recording(recording, path)
+    return recording, path
+
+
+def save(place, labels, revision="none", **words):
+    recording, path = place
+    given = {"author": "ada", "time": NOW, "note": "nice", **words}
+    return save_stored(path, recording, labels, revision=revision, **given)
+
+
+def test_what_is_saved_is_read(place):
+    recording, path = place
+    stored = save(place, {"thumb": [LOST, HELD]})
+    assert stored.labels == {"thumb": (replace(HELD, author="ada"), LOST), "index": ()}
+    assert read_stored(path, recording) == stored
+    assert (stored.author, stored.time, stored.note) == ("ada", NOW, "nice")
+    assert (stored.origin, stored.revision) == ("file", revision_of(path))
+    assert load_recording(path).modules["thumb"].labels == stored.labels["thumb"]
+    assert load_recording(path).modules["index"].labels == ()
+    assert load_labels(labels_path(path)).time == NOW
+
+
+def test_the_file_is_as_save_labels_writes_it(bare):
+    recording, path = bare
+    save(bare, {"thumb": [replace(HELD, author="ada")]})
+    own = labels_path(path).read_bytes()
+    labelled = recording.with_labels({"thumb": [replace(HELD, author="ada")]})
+    save_labels(labelled, path, author="ada", time=NOW, notes="nice", force=True)
+    assert labels_path(path).read_bytes() == own
+
+
+def test_labels_inside_and_none(place, bare):
+    recording, path = place
+    inside = read_stored(path, recording)
+    assert (inside.origin, inside.revision, inside.time) == ("inside", "none", "")
+    assert inside.labels["thumb"] == recording.modules["thumb"].labels
+    assert read_stored(bare[1], bare[0]).origin == "none"
+
+
+def test_an_old_revision_is_refused_and_nothing_is_written(bare):
+    recording, path = bare
+    first = save(bare, {"thumb": [HELD]})
+    second = save(bare, {"thumb": [LOST]}, first.revision)
+    with pytest.raises(ConflictError, match=r"^bare\.labels\.json was changed by .* read$") as told:
+        save(bare, {"index": [HELD]}, first.revision)
+    assert told.value.revision == second.revision == revision_of(path)
+    assert read_stored(path, recording) == second
+    labels_path(path).unlink()
+    with pytest.raises(ConflictError) as told:
+        save(bare, {"index": [HELD]}, second.revision)
+    assert told.value.revision == "none"
+    assert not labels_path(path).exists()
+
+
+def test_saving_the_same_again_changes_no_revision(bare):
+    first = save(bare, {"thumb": [HELD]})
+    assert save(bare, {"thumb": [HELD]}, first.revision) == first
+    assert save(bare, {"thumb": [HELD]}, first.revision, note="other").revision != first.revision
+
+
+def test_a_label_file_of_another_recording(bare):
+    recording, path = bare
+    other = synthetic_recording("other", 1, ("thumb", "index"))
+    save_labels(other, path)
+    before = labels_path(path).read_bytes()
+    text = r"bare\.labels\.json labels another recording \('other', hash \w+\) than bare\.parquet"
+    with pytest.raises(RecordingError, match=text):
+        read_stored(path, recording)
+    with pytest.raises(RecordingError, match=text):
+        save(bare, {"thumb": [HELD]}, revision_of(path))
+    assert labels_path(path).read_bytes() == before
+
+
+@pytest.mark.parametrize(
+    ("content", "text"),
+    [
+        (b"{", r"bare\.labels\.json is no label file: "),
+        (b'{"schema": "holdfast.labels/9"}', r"is no label file: "),
+    ],
+)
+def test_a_damaged_label_file_is_left_alone(bare, content, text):
+    recording, path = bare
+    labels_path(path).write_bytes(content)
+    with pytest.raises(RecordingError, match=text):
+        read_stored(path, recording)
+    with pytest.raises(RecordingError, match=text):
+        save(bare, {"thumb": [HELD]}, revision_of(path))
+    assert labels_path(path).read_bytes() == content
+
+
+@pytest.mark.parametrize(
+    ("finger", "spans", "text"),
+    [
+        ("pinky", [(3.0, 4.0)], "labels for pinky given; recording 'bare' has thumb, index"),
+        ("thumb", [(3.0, 4.0), (3.5, 4.5)], "stable [3, 4) s and stable [3.5, 4.5) s overlap"),
+        ("thumb", [(-1.0, 4.0)], "label [-1, 4) s lies outside the recording"),
+        ("thumb", [(3.0, 99.0)], "label [3, 99) s lies outside the recording"),
+    ],
+)
+def test_labels_in_the_file_that_do_not_fit(bare, finger, spans, text):
+    recording, path = bare
+    save(bare, {})
+    document = json.loads(labels_path(path).read_bytes())
+    document["modules"][finger] = [
+        {"start": start, "end": end, "state": "stable"} for start, end in spans
+    ]
+    labels_path(path).write_text(json.dumps(document))
+    with pytest.raises(RecordingError) as told:
+        read_stored(path, recording)
+    assert str(told.value).startswith(f"{labels_path(path)}: ")
+    assert finger in str(told.value)
+    assert text in str(told.value)
+
+
+@pytest.mark.parametrize(
+    ("labels", "text"),
+    [
+        ({"pinky": [HELD]}, r"^labels for pinky given; recording 'bare' has thumb, index$"),
+        (
+            {"thumb": [HELD, Label(3.5, 4.5, ContactState.UNSTABLE)]},
+            r"^thumb: stable \[3, 4\) s and unstable \[3\.5, 4\.5\) s overlap$",
+        ),
+        (
+            {"index": [Label(3.0, 99.0, ContactState.STABLE)]},
+            r"^index: label \[3, 99\) s lies outside the recording, which runs from 0 to 11\.\d+ s",
+        ),
+    ],
+)
+def test_labels_that_contradict(bare, labels, text):
+    recording, path = bare
+    with pytest.raises(ValueError, match=text):
+        checked(recording, labels)
+    with pytest.raises(ValueError, match=text):
+        save(bare, labels)
+    assert not labels_path(path).exists()
+
+
+@pytest.mark.parametrize(
+    ("given", "text"),
+    [
+        (
+            GivenLabel(1, 2, "firm"),
+            r"^thumb, \[1, 2\) s: state stable, unstable, no_contact expected, 'firm' given$",
+        ),
+        (GivenLabel(1, 2, "unknown"), r"'unknown' given$"),
+        (
+            GivenLabel(1, 2, "unstable", "magic"),
+            r"^thumb, \[1, 2\) s: cause closing, disturbance, slip, lost, released or none, "
+            r"'magic' given$",
+        ),
+        (GivenLabel(2, 1, "stable"), r"^thumb: a label ends after its start; \[2, 1\) s given$"),
+        (GivenLabel(2, 2, "stable"), r"^thumb: a label ends after its start"),
+        (GivenLabel(float("nan"), 2, "stable"), r"^thumb: a label ends after its start"),
+        (GivenLabel(1, float("inf"), "stable"), r"^thumb: a label ends after its start"),
+        (
+            GivenLabel(1, 2, "stable", confidence=1.5),
+            r"^thumb: confidence from 0 to 1 expected, 1\.5",
+        ),
+    ],
+)
+def test_labels_that_are_none(given, text):
+    with pytest.raises(ValueError, match=text):
+        labels_from({"thumb": [given]})
+
+
+def test_labels_that_are_given():
+    given = GivenLabel(4.0, 5.0, "unstable", "lost", "seen", 0.7, "eve")
+    assert labels_from({"thumb": [given], "index": []}) == {"thumb": (LOST,), "index": ()}
+
+
+def test_a_read_only_file(bare):
+    recording, path = bare
+    first = save(bare, {"thumb": [HELD]})
+    assert not is_read_only(path)
+    labels_path(path).chmod(0o444)
+    assert is_read_only(path)
+    with pytest.raises(ReadOnlyError, match=r"bare\.labels\.json cannot be written: .* read-only$"):
+        save(bare, {}, first.revision)
+    assert read_stored(path, recording) == first
+
+
+def test_a_read_only_folder(bare):
+    _, path = bare
+    path.parent.chmod(0o555)
+    try:
+        assert is_read_only(path)
+        with pytest.raises(ReadOnlyError):
+            save(bare, {"thumb": [HELD]})
+    finally:
+        path.parent.chmod(0o755)
+    assert not labels_path(path).exists()
+
+
+def test_a_disk_that_refuses_leaves_what_was_there(bare, monkeypatch):
+    recording, path = bare
+    first = save(bare, {"thumb": [HELD]})
+
+    def full(*_):
+        raise OSError(28, "No space left on device")
+
+    monkeypatch.setattr("pathlib.Path.write_bytes", full)
+    with pytest.raises(OutputError, match=r"cannot write .*: No space left on device$"):
+        save(bare, {"thumb": [LOST]}, first.revision)
+    assert read_stored(path, recording) == first
+    assert sorted(p.name for p in path.parent.iterdir()) == ["bare.labels.json", "bare.parquet"]
