@@ -276,9 +276,12 @@ def test_the_end_does_not_wait_for_ever(monkeypatch):
 def test_who_closes_it_waits_for_nobody(monkeypatch):
     monkeypatch.setattr(module, "_behind", lambda client: 1)
     monkeypatch.setattr(module, "FAREWELL", 1e6)
-    with played(Made(n=5), wait=True) as server, open_source(server.uri):
-        assert eventually(lambda: server.n_packets == 5)
-    assert server.ended
+    with ExitStack() as stack:
+        with played(Made(n=5), wait=True) as server:
+            stack.enter_context(open_source(server.uri))
+            assert eventually(lambda: server.n_packets == 5)
+            assert not server.wait(0.2)
+        assert server.ended
 
 
 def test_nothing_is_left_of_the_loop():
