@@ -36,11 +36,21 @@ Rule = Callable[[Recording], Labels]
 
 REFERENCE = {"C": 1.0, "class_weight": "balanced"}
 ANGLES = (0.02, 0.03, 0.05, 0.07, 0.1, 0.14, 0.2, 0.3)
+DOUBT = (0.5, 0.7, 0.8)
 FAR = 1.0  # [m]: with it, displacement is the angle alone
 
 
 def main() -> None:
     arguments = parse()
+    table(
+        "Where the wrong labels are",
+        (
+            "recordings",
+            "labels by",
+            *(f"below {below}: time %, of what is wrong %" for below in DOUBT),
+        ),
+        (row for folder in arguments.folder for row in doubt_rows(folder, arguments.every)),
+    )
     table(
         "Agreement with the twin's truth",
         ("recordings", "labels by", "kappa", "kappa, stable against the rest", "onsets found",
@@ -141,6 +151,32 @@ def agreement_cells(found: PooledAgreement) -> Iterator[str]:
     yield str(onsets.only_b)
     yield f"{onsets.median * 1000:+.0f} ms"
     yield f"{onsets.p95 * 1000:.0f} ms"
+
+
+def doubt_rows(folder: Path, every: int) -> Iterator[tuple[str, ...]]:
+    """How much of the time, and of the time that is labelled wrongly, doubtful labels hold."""
+    recordings = load_dataset(folder)
+    chosen = range(0, len(recordings), every)
+    for name in ("signal", "tracking, poses as they are"):
+        counts = np.concatenate([right_or_wrong(recordings[k], RULES[name]) for k in chosen])
+        cells = []
+        for below in DOUBT:
+            doubtful = counts[counts[:, 0] < below, 1:].sum(axis=0)
+            time, wrong = 100 * doubtful / counts[:, 1:].sum(axis=0)
+            cells.append(f"{time:.0f}, {wrong:.0f}")
+        yield f"{folder.name}, {len(chosen)}", name, *cells
+
+
+def right_or_wrong(recording: Recording, rule: Rule) -> np.ndarray:
+    """(n_labels, 3) confidence, samples, and samples that the truth labels otherwise."""
+    rows = []
+    for name, labels in rule(recording).items():
+        module = recording.modules[name]
+        for label in labels:
+            first, last = np.searchsorted(module.times, (label.start, label.end))
+            wrong = (module.label_states[first:last] != label.state.code).sum()
+            rows.append((label.confidence, last - first, wrong))
+    return np.array(rows)
 
 
 # Training

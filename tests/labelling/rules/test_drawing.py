@@ -24,7 +24,7 @@ def test_what_is_painted_is_drawn():
         (4, 6, "UNSTABLE", "slip"),
         (6, 8, "STABLE", None),
     ]
-    assert found[1].evidence == "UNSTABLE slip 4.75; made up"
+    assert found[1].evidence == "UNSTABLE slip 4.25; made up"
     assert found[0].author == "rule:test"
 
 

@@ -15,6 +15,9 @@ from holdfast.sensors.values import Array
 SHORT = 0.2
 """Duration at which a label keeps 63 % of its confidence [s]."""
 
+WEAKEST = 0.25
+"""Share of a label's time that its evidence is judged by: the time where that is weakest."""
+
 _CAUSES = (None, *Cause)
 _STATES = tuple(ContactState)
 
@@ -30,7 +33,7 @@ class Drawing:
         times: (n,) a sample period apart [s].
         codes: (n,) of the state; UNKNOWN where there is no label.
         causes: (n,) place of the cause, 0 for none.
-        ratio: (n,) how many times the evidence is over (or under) its threshold; above 1.
+        ratio: (n,) how many times the evidence is over (or under) its threshold; 1 at it.
     """
 
     times: Array
@@ -88,9 +91,7 @@ class Pen:
     def _label(self, drawing: Drawing, part: slice, start: float, end: float) -> Label:
         state = _STATES[drawing.codes[part.start]]
         cause = _CAUSES[drawing.causes[part.start]]
-        # Trouble may rest for a moment within its interval; rest may not be troubled within its.
-        level = 0.75 if state is ContactState.UNSTABLE else 0.25
-        ratio = max(float(np.quantile(drawing.ratio[part], level)), 1.0)
+        ratio = max(float(np.quantile(drawing.ratio[part], WEAKEST)), 1.0)
         confidence = self.trust * certainty(ratio, end - start)
         text = self.evidence(state, cause, ratio) + (f"; {self.note}" if self.note else "")
         return Label(start, end, state, cause, text, round(confidence, 3), self.author)
