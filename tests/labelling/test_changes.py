@@ -20,12 +20,12 @@ def grasp():
 
 
 @pytest.mark.parametrize("noise", [0.0, 0.5])
-def test_kinks_are_found_where_they_are(noise):
+def test_changes_are_found_where_they_are(noise):
     times, amplitude = grasp()
     found = change_points(times, force_of(amplitude, noise), PERIOD)
-    for corner in (2, 3, 5, 5.15, 5.3, 8, 8.4):
-        assert np.abs(found - corner).min() <= 0.03, corner
-    assert len(found) <= 12
+    for corner in (2, 3, 5, 5.3, 8, 8.4):
+        assert np.abs(found - corner).min() <= 0.04, corner
+    assert len(found) <= 8
 
 
 def test_a_steady_force_has_none():
@@ -47,6 +47,6 @@ def test_unknown_forces_are_left_out():
     force = force_of(amplitude)
     force[:75] = np.nan
     found = change_points(times, force, PERIOD)
-    assert np.abs(found - 2).min() <= 0.03
+    assert np.abs(found - 2).min() <= 0.04
     assert len(change_points(times, np.full_like(force, np.nan), PERIOD)) == 0
     assert len(change_points(times[:3], force[-3:], PERIOD)) == 0

@@ -121,9 +121,9 @@ def test_what_is_drawn(tmp_path):
     inside = times[(times >= 3.0) & (times <= 3.5)].tolist()
     assert near[1]["fingers"]["index"]["t"][1:-1] == inside
     assert max(map(len, whole[1]["fingers"]["thumb"].values())) <= 200
-    for finger in FINGERS:  # closing begins at 1.5 s, the shaking at 5.3 s
-        found = np.array(changes[1]["fingers"][finger])
-        assert np.abs(found - 5.3).min() < 0.1
+    for finger in FINGERS:  # closing, held, shaken, held, let go, free
+        found = changes[1]["fingers"][finger]
+        assert found == pytest.approx([1.5, 2.3, 5.3, 6.5, 9.5, 10.0], abs=0.06)
 
 
 @pytest.mark.parametrize(

@@ -1,22 +1,31 @@
 """Where a force begins or ends to change: the places that edges of labels snap to.
 
-A force that is steady and then grows has a kink where the growth begins, and another where it
-ends; so has a push. A kink is told by the slopes before and after an instant.
+A force that is steady and then grows, jumps or trembles moves far from where it is within the
+next instants, and did not in the instants before; where it comes to rest it is the other way
+round.
 """
 
+import math
+
 import numpy as np
-from scipy.ndimage import convolve1d, maximum_filter1d
+from scipy.ndimage import maximum_filter1d, uniform_filter1d
 
 from holdfast.sensors.values import Array
 
-REACH = 0.1
-"""How long a slope is looked at, before and after [s]."""
-APART = 0.05
-"""Two kinks are at least so far apart [s]: of nearer ones the sharper counts."""
-NOISE_TIMES = 6.0
-"""How often the median difference of slopes a kink has at least: chance gives none in an hour."""
-LEAST_CHANGE = 0.01
-"""Share of the largest force by which it bends within `REACH` at least: less is not seen."""
+SMOOTHING = 0.03
+"""Over which the force is averaged first [s]: its noise goes, an edge stays where it is."""
+REACH = 0.2
+"""How far is looked ahead and back [s]."""
+STEPS = 16
+"""Instants that are looked at in either direction, at most."""
+APART = 0.1
+"""Two places are at least so far apart [s]: of nearer ones the clearer counts."""
+TIMES = 2.5
+"""How many times more the force moves on one side than on the other."""
+NOISE_TIMES = 2.0
+"""How often the median movement counts as none."""
+LEAST = 0.01
+"""Share of the largest force that counts as no movement: less is not seen on a plot."""
 
 
 def change_points(times: Array, force: Array, period: float) -> Array:
@@ -35,33 +44,28 @@ def change_points(times: Array, force: Array, period: float) -> Array:
         >>> ramp = np.clip((times - 0.5) / 0.5, 0, 1)
         >>> force = np.column_stack([ramp, 0 * ramp, 0 * ramp])
         >>> change_points(times, force, 1 / 150).round(2).tolist()
-        [0.5, 1.0]
+        [0.49, 1.01]
     """
     known = np.isfinite(force).all(axis=1)
-    n = max(round(REACH / period), 2)
-    if known.sum() <= 2 * n:
-        return np.empty(0)
     own, values = times[known], force[known]
-    bend = np.linalg.norm(_bend(values, n), axis=1)
-    limit = max(
-        NOISE_TIMES * float(np.median(bend)),
-        LEAST_CHANGE * float(np.quantile(np.linalg.norm(values, axis=1), 0.99)),
-        float(np.finfo(float).tiny),
-    )
+    n = max(round(REACH / period), 1)
+    if len(own) <= 2 * n:
+        return np.empty(0)
+    values = uniform_filter1d(values, 2 * round(SMOOTHING / period / 2) + 1, axis=0)
+    ahead, back = _movement(values, n), _movement(values[::-1], n)[::-1]
+    largest = float(np.quantile(np.linalg.norm(values, axis=1), 0.99))
+    calm = max(NOISE_TIMES * float(np.median(ahead)), LEAST * largest, float(np.finfo(float).tiny))
+    contrast = np.abs(np.log((ahead + calm) / (back + calm)))
     width = 2 * max(round(APART / period), 1) + 1
-    peaks = (bend >= limit) & (bend == maximum_filter1d(bend, width))
-    peaks[1:] &= ~(peaks[:-1] & peaks[1:])  # of a flat top the first
+    peaks = (contrast >= math.log(TIMES)) & (contrast == maximum_filter1d(contrast, width))
     return np.asarray(own[peaks])
 
 
-def _bend(force: Array, n: int) -> Array:
-    """(n_samples, 3) how far n samples on the force is from where it was going.
-
-    The slope over the n samples after an instant less the slope over those before, by least
-    squares, times n.
-    """
-    steps = np.arange(n + 1) - n / 2
-    slope = steps / (steps @ steps)
-    weights = np.concatenate([-slope[:-1], [-slope[-1] + slope[0]], slope[1:]]) * n
-    bend: Array = convolve1d(force, weights[::-1], axis=0, mode="nearest")
-    return bend
+def _movement(force: Array, n: int) -> Array:
+    """(n_samples,) mean distance of the force from its next n samples, of the last to the end."""
+    steps = np.unique(np.linspace(1, n, min(n, STEPS)).round().astype(int))
+    moved = np.zeros(len(force))
+    for step in steps.tolist():
+        moved[:-step] += np.linalg.norm(force[step:] - force[:-step], axis=1)
+        moved[-step:] += np.linalg.norm(force[-1] - force[-step:], axis=1)
+    return moved / len(steps)
