@@ -29,6 +29,7 @@ from holdfast.labelling.rules.hand import (
     hand_force,
     lost_at,
 )
+from holdfast.labelling.rules.limits import check_positive
 from holdfast.recordings import Label, Recording
 from holdfast.sensors.values import Array
 from holdfast.twin.labels import runs
@@ -56,12 +57,18 @@ class SignalRule:
             change and ends half of it after its last.
         settle: for how long nothing changes before the object counts as locked [s].
         merge: two disturbances with a shorter rest between them are one [s].
+
+    Raises:
+        ValueError: one is not above 0.
     """
 
     share: float = SEEN
     window: float = 2 * MARGIN
     settle: float = MERGE
     merge: float = MERGE
+
+    def __post_init__(self) -> None:
+        check_positive(self)
 
 
 def propose(

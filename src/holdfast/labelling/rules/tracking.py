@@ -29,6 +29,7 @@ from holdfast.labelling.poses import Poses, Track, names_of, poses_of
 from holdfast.labelling.rules.clocks import Offset, offset_of
 from holdfast.labelling.rules.drawing import Drawing, Pen
 from holdfast.labelling.rules.hand import FingerForce, HandForce, hand_force, lost_at, pressed_at
+from holdfast.labelling.rules.limits import check_positive
 from holdfast.labelling.rules.motion import SMOOTHING, Motion, motion_of, relative
 from holdfast.recordings import Label, Recording
 from holdfast.sensors.values import Array
@@ -62,6 +63,9 @@ class TrackingRule:
         least: motion of a shorter time is not told [s].
         merge: motions with a shorter rest between them are one [s].
         margin: by which motion is drawn longer at both ends [s].
+
+    Raises:
+        ValueError: an unknown measure, or a number that is not above 0.
     """
 
     measure: Literal["speed", "displacement"] = "speed"
@@ -77,6 +81,7 @@ class TrackingRule:
     def __post_init__(self) -> None:
         if self.measure not in ("speed", "displacement"):
             raise ValueError(f"measure 'speed' or 'displacement' expected, {self.measure!r} given")
+        check_positive(self)
 
 
 def propose(
