@@ -158,6 +158,12 @@ def test_a_publisher_that_says_nothing(domain, monkeypatch):
     del write
 
 
+def test_a_configuration_of_dds_that_is_none(domain, monkeypatch):
+    monkeypatch.setenv("CYCLONEDDS_URI", "<CycloneDDS><Domain><Nonsense/></Domain></CycloneDDS>")
+    with pytest.raises(SourceError, match=f"^ROS domain {domain} cannot be joined: "):
+        open_source("ros2:///a").open()
+
+
 @pytest.mark.parametrize("given", ["-1", "233", "zero"])
 def test_bad_domains(given, monkeypatch):
     with pytest.raises(ValueError, match=f"a ROS domain from 0 to 232 expected, '{given}' given"):

@@ -253,6 +253,26 @@ def test_found_by_content_and_in_folders(tmp_path, bag):
         assert not is_recording(file)
 
 
+@pytest.mark.parametrize("storage", ["sqlite3", "mcap"])
+def test_a_bag_whose_recorder_was_killed_has_no_metadata(tmp_path, storage):
+    with Bag(tmp_path / "grasp", storage, "xela_server_ros2", XELA) as given:
+        for k in range(3):
+            given.xela(EPOCH + k, (1, "uSPa44", k, EPOCH + k, counts(16, k), []))
+    (given.path / "metadata.yaml").unlink()
+    assert read(given.path).modules["finger1"].n_samples == 3
+
+
+def test_mcap_of_others_is_no_bag(tmp_path):
+    from mcap.writer import Writer
+
+    with (tmp_path / "other.mcap").open("wb") as file:
+        writer = Writer(file)
+        writer.start("robot", "other")
+        writer.finish()
+    with pytest.raises(RecordingError, match=r"other\.mcap is no bag of ROS; a \.bag"):
+        read(tmp_path / "other.mcap", format="rosbag")
+
+
 def test_recordings_of_our_own_are_no_bags(tmp_path):
     save_recording(synthetic_recording("own", 0, ["thumb"]), tmp_path / "own.mcap")
     with pytest.raises(RecordingError, match="is of no format that holdfast knows"):

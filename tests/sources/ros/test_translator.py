@@ -177,7 +177,7 @@ class TestPackets:
     def test_that_make_no_sense(self):
         translator = learned(uskin(0))
         (one,) = translator.refuse("cut", 50.0)
-        (two,) = translator.refuse("cut", 50.5)
+        (two,) = translator.refuse("cut elsewhere", 50.5)
         (three,) = translator.refuse("cut", 51.0)
         assert [a.n_refused for a in (one, two, three)] == [1, 1, 1]
         told = ("a message makes no sense: cut",)

@@ -4,6 +4,7 @@ A bag's messages are decoded by the definitions in it, as data. Topics of other 
 out.
 """
 
+import re
 from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -13,7 +14,7 @@ import numpy as np
 import numpy.typing as npt
 
 from holdfast.errors import MissingExtra, RecordingError
-from holdfast.io import mcap, xela_models
+from holdfast.io import xela_models
 from holdfast.io.importers.table import natural
 from holdfast.io.ros_messages import (
     Message,
@@ -28,8 +29,12 @@ from holdfast.recordings import Recording, Tactile
 from holdfast.sensors.values import Array
 
 METADATA = "metadata.yaml"
-ROS1_MAGIC = b"#ROSBAG V"
-SQLITE_MAGIC = b"SQLite format 3\x00"
+MAGICS = {
+    ".bag": re.compile(rb"#ROSBAG V"),
+    ".db3": re.compile(rb"SQLite format 3\x00"),
+    ".mcap": re.compile(rb"\x89MCAP0\r\n\x01.{8}\x04\x00\x00\x00ros2", re.DOTALL),
+}
+"""How the files of bags begin; MCAP with the profile of ROS 2, which is not ours."""
 CLOCKS = ("device", "header", "bag")
 """Whose stamps the times of a recording are, the best first."""
 APART = 1.0
@@ -65,21 +70,16 @@ def read(path: Path) -> Iterator[Recording]:
 def _bags(path: Path) -> list[Path]:
     if _is_bag(path):
         return [path]
-    return sorted((inside for inside in path.glob("*") if _is_inner_bag(inside)), key=natural)
-
-
-def _is_inner_bag(path: Path) -> bool:
-    return (path.is_dir() or path.suffix == ".bag") and _is_bag(path)
+    return sorted((inside for inside in path.glob("*") if _is_bag(inside)), key=natural)
 
 
 def _is_bag(path: Path) -> bool:
     if path.is_dir():
         return (path / METADATA).is_file()
-    magic = {".bag": ROS1_MAGIC, ".db3": SQLITE_MAGIC}.get(path.suffix)
-    if magic is None:
-        return path.suffix == ".mcap" and path.is_file() and mcap.is_foreign(path)
+    if path.suffix not in MAGICS or not path.is_file():
+        return False
     with path.open("rb") as file:
-        return file.read(len(magic)) == magic
+        return MAGICS[path.suffix].match(file.read(64)) is not None
 
 
 def _recording(path: Path) -> Recording:

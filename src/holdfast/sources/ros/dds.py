@@ -70,7 +70,7 @@ class Node:
 
     def __init__(self, domain: int) -> None:
         try:
-            if os.environ.get("ROS_LOCALHOST_ONLY") == "1" and domain not in _domains:
+            if _is_local() and domain not in _domains:
                 _domains[domain] = Domain(domain, LOOPBACK)
             self._participant = DomainParticipant(domain)
             self._publications = BuiltinDataReader(self._participant, BuiltinTopicDcpsPublication)
@@ -90,7 +90,8 @@ class Node:
     def reader(self, topic: str, definition: Definition) -> "Reader":
         """Subscribes to a topic."""
         qos = _qos(Policy.Reliability.BestEffort, N_QUEUED)  # takes reliable ones as well
-        return Reader(DataReader(self._participant, self._topic(topic, definition, qos), qos=qos))
+        reader = DataReader(self._participant, self._topic(topic, definition, qos), qos=qos)
+        return Reader(reader, WaitSet(self._participant))
 
     def writer(self, topic: str, definition: Definition) -> Callable[[bytes], None]:
         """Publishes on a topic, as ROS 2 does by default; what it returns takes messages."""
@@ -107,11 +108,11 @@ class Node:
 class Reader:
     """A subscription to one topic."""
 
-    def __init__(self, reader: DataReader[Any]) -> None:
+    def __init__(self, reader: DataReader[Any], wait: WaitSet) -> None:
         self._reader = reader
         new = ViewState.Any | SampleState.NotRead | InstanceState.Any
         self._new = ReadCondition(reader, new)
-        self._wait = WaitSet(reader.participant)
+        self._wait = wait
         self._wait.attach(self._new)
 
     def take(self, timeout: float) -> list[bytes]:
@@ -133,6 +134,11 @@ def _qos(reliability: object, depth: int) -> Qos:
         Policy.Durability.Volatile,
         Policy.History.KeepLast(depth),
     )
+
+
+def _is_local() -> bool:
+    """Whether ROS is to stay on this machine, and Cyclone DDS has no configuration of its own."""
+    return os.environ.get("ROS_LOCALHOST_ONLY") == "1" and not os.environ.get("CYCLONEDDS_URI")
 
 
 def domain_of(given: str | None) -> int:

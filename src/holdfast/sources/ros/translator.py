@@ -26,7 +26,7 @@ _CLOCKS: tuple[Callable[[Message], float | None], ...] = (
     lambda message: message.stamp,
 )
 QUIET = 1.0
-"""The same complaint is not told again sooner [s]."""
+"""A complaint about the same thing is not told again sooner [s]."""
 
 
 class Translator:
@@ -108,13 +108,13 @@ class Translator:
                 self._hear(message, time, received, heard, Fault.CLOCK_JUMP in now.faults)
         elif fresh:
             heard.n_refused += 1
-            self._complain(heard, "a message has no time, others had", received)
+            self._complain(heard, "time", "a message has no time, others had", received)
         return self._told_of(heard, received)
 
     def refuse(self, why: str, received: float) -> list[Arrival]:
         """Word of a packet that makes no sense."""
         heard = _Heard(n_refused=1)
-        self._complain(heard, f"a message makes no sense: {why}", received)
+        self._complain(heard, "sense", f"a message makes no sense: {why}", received)
         return self._told_of(heard, received)
 
     def reconnected(self) -> None:
@@ -156,13 +156,13 @@ class Translator:
         if skin is None or device is None:
             if _is_there(message):
                 what = f"sensor {number} was not there at the beginning: open the source anew"
-                self._complain(heard, what, received)
+                self._complain(heard, f"new {number}", what, received)
             return False
         n_taxels = len(readings_of(message, self._unit))
         if n_taxels != skin.n_taxels:
             heard.faults.update(dict.fromkeys(skin.modules, (Fault.TAXEL_COUNT,)))
             what = f"sensor {number} sends {n_taxels} taxels, {skin.n_taxels} expected"
-            self._complain(heard, what, received)
+            self._complain(heard, f"taxels {number}", what, received)
             return False
         return device.is_new(message)
 
@@ -177,10 +177,9 @@ class Translator:
         faults = (Fault.CLOCK_JUMP,) * jumped + (Fault.LATE,) * late
         heard.faults.update(dict.fromkeys(samples, faults))
 
-    def _complain(self, heard: "_Heard", what: str, received: float) -> None:
-        if received - self._told.get(what, -math.inf) >= QUIET:
-            self._told = {w: at for w, at in self._told.items() if received - at < QUIET}
-            self._told[what] = received
+    def _complain(self, heard: "_Heard", about: str, what: str, received: float) -> None:
+        if received - self._told.get(about, -math.inf) >= QUIET:
+            self._told[about] = received
             heard.notices.append(what)
 
     def _told_of(self, heard: "_Heard", received: float) -> list[Arrival]:
