@@ -12,7 +12,9 @@ OPTIONS = (
     "--disable-component-update", "--disable-sync", "--no-first-run",
 )  # fmt: skip
 # The browser itself notes every refusal and every lost connection; the page cannot help it.
-NOTED = re.compile(r"Failed to load resource: .*(\b40[19]\b|ERR_CONNECTION)|WebSocket connection to")
+NOTED = re.compile(
+    r"Failed to load resource: .*(\b40[19]\b|ERR_CONNECTION)|WebSocket connection to"
+)
 
 
 # Of a module and no wider: while Playwright runs, its thread has an event loop, and asyncio.run

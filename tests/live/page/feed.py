@@ -21,11 +21,12 @@ from holdfast.detector import detect
 from holdfast.io import load_recording
 from holdfast.model import Model
 from holdfast.sensors import sensor
+from holdfast.web.guard import POLICY
 
 PAGE = Path(str(resources.files("holdfast.live"))) / "page"
 STATES = [state.value for state in ContactState]
 FAULTS = list(Fault)
-POLICY = "default-src 'self'; frame-ancestors 'none'"
+
 PERIOD = 0.05
 
 
@@ -55,7 +56,9 @@ def made_up(names=("thumb", "index", "middle", "ring"), layout="uskin-curved", r
         near = np.exp(-np.sum((layout.positions - centre) ** 2, axis=1) / 1e-4)
         pull = 0.4 * shake * np.sin(60 * times)
         shares = np.stack([0.3 * press + pull, 0.2 * press, press + 0.2 * pull], axis=1)
-        taxels = 900 * near[None, :, None] * shares[:, None, :] + rng.normal(0, 1, (n, len(near), 3))
+        taxels = 900 * near[None, :, None] * shares[:, None, :] + rng.normal(
+            0, 1, (n, len(near), 3)
+        )
         force = np.einsum("kij,nkj->ni", layout.rotations, taxels)
         sigma = 3 + 200 * shake + rng.exponential(0.5, n)
         probability = np.where(state == 3, 0.95, 0.08) + rng.uniform(-0.04, 0.04, n)
@@ -246,17 +249,21 @@ class Service:
     @web.middleware
     async def guard(self, request, handler):
         given = request.headers.get("Authorization"), request.query.get("token")
-        allowed = self.token is None or given in ((f"Bearer {self.token}", None), (None, self.token))
+        allowed = self.token is None or given in (
+            (f"Bearer {self.token}", None),
+            (None, self.token),
+        )
         if request.path.startswith("/api") and not allowed:
             return web.json_response({"error": "token expected"}, status=401)
         if request.method != "GET":
-            self.calls.append((request.method, request.path.removeprefix("/api/v1/"), await request.text()))
+            self.calls.append(
+                (request.method, request.path.removeprefix("/api/v1/"), await request.text())
+            )
             if self.refusal is not None:
                 return web.json_response({"error": self.refusal}, status=409)
         answer = await handler(request)
         if not answer.prepared:
-            answer.headers["Content-Security-Policy"] = POLICY
-            answer.headers["X-Content-Type-Options"] = "nosniff"
+            answer.headers.update(POLICY)
         return answer
 
     async def index(self, _):
@@ -269,7 +276,13 @@ class Service:
         return web.json_response({})
 
     async def start_recording(self, _):
-        self.recording = {"path": "grasps/2026-11-21-grasp-0007.mcap", "seconds": 0.0, "n_bytes": 0, "n_markers": 0, "n_dropped": 0}
+        self.recording = {
+            "path": "grasps/2026-11-21-grasp-0007.mcap",
+            "seconds": 0.0,
+            "n_bytes": 0,
+            "n_markers": 0,
+            "n_dropped": 0,
+        }
         return web.json_response({"path": self.recording["path"]})
 
     async def stop_recording(self, _):
@@ -310,6 +323,8 @@ class Service:
 
 
 if __name__ == "__main__":
-    with Service(Tape(*played(sys.argv[1])), port=int(sys.argv[2]) if sys.argv[2:] else 8765) as fake:
+    with Service(
+        Tape(*played(sys.argv[1])), port=int(sys.argv[2]) if sys.argv[2:] else 8765
+    ) as fake:
         sys.stderr.write(f"{fake.url}\n")
         fake.thread.join()

@@ -70,7 +70,8 @@ def test_a_push_to_the_tip_points_up_on_every_taxel_of_the_wall(module):
         reading = layout.rotations[k].T @ [0, 0, 2.0]
         rotation = layout.rotations[k].tolist()
         arrow = module.evaluate(
-            TURNED, [reading.tolist(), rotation, found["right"][k].tolist(), found["up"][k].tolist()]
+            TURNED,
+            [reading.tolist(), rotation, found["right"][k].tolist(), found["up"][k].tolist()],
         )
         assert arrow == pytest.approx([0, 2, 0], abs=1e-6)
 

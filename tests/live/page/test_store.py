@@ -9,7 +9,8 @@ STORE = """async ([capacity, chunks, bins, window]) => {
   let k = 0;
   for (const n of chunks) {
     const places = Array.from({ length: n }, () => k++);
-    const own = { force: [places, places, places], instability: places.map((p) => p % 1000 === 77 ? 2 ** 33 : p),
+    const own = { force: [places, places, places],
+                  instability: places.map((p) => p % 1000 === 77 ? 2 ** 33 : p),
                   stable_probability: places.map(() => null), state: places.map((p) => p % 4) };
     store.append({ times: places.map((p) => p / 100), fingers: { a: own } }, 3, 0.05);
   }
@@ -23,7 +24,8 @@ FEED = """async ([parts, gap]) => {
   const store = new Store(["a"], 100);
   for (const times of parts) {
     const values = times.map(() => 1);
-    store.append({ times, fingers: { a: { force: [values, values, values], state: times.map(() => 3) } } }, 3, gap);
+    const own = { force: [values, values, values], state: times.map(() => 3) };
+    store.append({ times, fingers: { a: own } }, 3, gap);
   }
   const { x, columns } = reduce(store, 100, 500, [store.fingers.get("a").fx]);
   return [x, columns[0]];
@@ -81,7 +83,8 @@ def test_times_that_go_back_begin_anew(module):
 def test_a_frozen_copy_stays(module):
     same = module.evaluate("""async () => {
       const { Store } = await import("/page/store.js");
-      const store = new Store(["a"], 10), give = (t) => store.append({ times: [t], fingers: {} }, 1, 9);
+      const store = new Store(["a"], 10);
+      const give = (t) => store.append({ times: [t], fingers: {} }, 1, 9);
       for (let t = 0; t < 15; t += 1) give(t);
       const copy = store.frozen();
       for (let t = 15; t < 60; t += 1) give(t);
@@ -94,3 +97,23 @@ def test_a_frozen_copy_stays(module):
 def test_it_is_sized_by_the_rate_within_bounds(module, rate, capacity):
     script = f"import('/page/store.js').then((m) => m.capacityFor({rate}))"
     assert module.evaluate(script) == capacity
+
+
+def test_fingers_that_take_turns_have_lines_without_holes(module):
+    found = module.evaluate("""async () => {
+      const { Store } = await import("/page/store.js");
+      const store = new Store(["a", "b"], 100);
+      const track = (own) => ({ force: [own, own, own],
+                                state: own.map((v) => v === null ? null : 3) });
+      const times = [0, 0.01, 0.02, 0.03, 0.04, 0.3];
+      const a = track([0, null, 2, null, 4, null]), b = track([null, 1, null, 3, null, 5]);
+      store.append({ times, fingers: { a, b } }, 3, 0.05);
+      const plain = (values) => values.map((v) => Number.isNaN(v) ? null : v);
+      return ["a", "b"].map((name) => ["fx", "state"].map(
+        (key) => plain([...store.fingers.get(name)[key].subarray(0, 6)])));
+    }""")
+    # The last comes after a gap, and the first has nothing before it.
+    assert found == [
+        [[0, 0, 2, 2, 4, None], [3, 3, 3, 3, 3, 0]],
+        [[None, 1, 1, 3, 3, 5], [0, 3, 3, 3, 3, 3]],
+    ]

@@ -109,6 +109,7 @@ class Card {
     const body = make("div", "body", make("div", "map", canvas), this.figures());
     this.element = make("article", "card", this.head, body, this.faults);
     this.element.setAttribute("aria-label", name);
+    this.tell("UNKNOWN", "");
   }
 
   figures() {

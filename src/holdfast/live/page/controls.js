@@ -92,9 +92,9 @@ export class Controls {
   }
 
   mark() {
-    const field = byId("marker-text"), text = field.value.trim() || "marker";
+    const field = byId("marker-text"), text = field.value.trim();
     return this.ask(byId("mark"), async () => {
-      await call("POST", "markers", { text });
+      await call("POST", "markers", { text: text || "marker" });
       this.marked(text);
     });
   }

@@ -30,7 +30,7 @@ export class Events {
   }
 
   addMarker(time, text) {
-    const words = make("span", "change", text || "marker");
+    const words = make("span", "change", text);
     words.title = text;
     this.put(time, make("b", "finger marked", "marker"), words);
   }

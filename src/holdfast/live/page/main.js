@@ -109,7 +109,7 @@ class Page {
     if (!this.frozen) {
       this.cards.draw();
       if (this.store.end) this.plots.draw(this.store);
-    } else if (this.now !== undefined) {
+    } else if (Number.isFinite(this.now)) {
       write(byId("paused"), `PAUSED · ${span(this.now - this.frozen.latest)} ago`);
     }
     if (performance.now() - this.told < 250) return;
@@ -162,7 +162,7 @@ class Page {
   }
 
   mark(text) {
-    if (this.now === undefined) return;
+    if (!Number.isFinite(this.now)) return;
     this.plots.mark(this.now);
     this.events.addMarker(this.now, text);
   }

@@ -17,6 +17,7 @@ export class Store {
     this.capacity = capacity;
     this.end = 0; // one past the newest sample
     this.moved = 0; // by how much places have been moved, so that bins stay where they are
+    this.seen = new Map(); // when each finger had its last sample [s]
     this.times = new Float64Array(2 * capacity);
     this.hand = new Uint8Array(2 * capacity);
     this.fingers = new Map(fingers.map((name) => [name, {
@@ -42,14 +43,29 @@ export class Store {
     const times = series.times, last = this.latest;
     if (!times.length) return;
     // A source that begins anew (a replay in a loop, another clock) has no common past.
-    if (last !== null && times[0] <= last) this.end = 0;
+    if (last !== null && times[0] <= last) this.forget();
     else if (last !== null && times[0] - last > gap) this.lift(0.5 * (last + times[0]), hand);
     const skipped = Math.max(0, times.length - this.capacity);
     this.moved += skipped;
     for (let k = skipped; k < times.length; k += 1) {
       const place = this.next(times[k], hand);
-      for (const [name, own] of this.fingers) fill(own, place, series.fingers[name], k);
+      for (const [name, own] of this.fingers) {
+        const from = series.fingers[name];
+        if (from?.state?.[k] === null && this.holds(name, times[k], place, gap)) hold(own, place);
+        else fill(own, place, from, k);
+        if (typeof from?.state?.[k] === "number") this.seen.set(name, times[k]);
+      }
     }
+  }
+
+  // Fingers may come one by one: between its samples a finger is as it was.
+  holds(name, time, place, gap) {
+    return place > 0 && time - (this.seen.get(name) ?? -Infinity) < gap;
+  }
+
+  forget() {
+    this.end = 0;
+    this.seen.clear();
   }
 
   // A sample without values: the lines break where samples are missing.
@@ -93,6 +109,10 @@ export class Store {
     }
     return low;
   }
+}
+
+function hold(own, place) {
+  for (const array of Object.values(own)) array[place] = array[place - 1];
 }
 
 const value = (values, k) => values?.[k] ?? NaN;
