@@ -1,6 +1,6 @@
 import numpy as np
 import pytest
-from hypothesis import example, given
+from hypothesis import example, given, settings
 from hypothesis import strategies as st
 
 from holdfast.sources.anyskin import Decoder
@@ -50,6 +50,7 @@ def test_five_magnetometers_are_82_bytes():
     assert len(decoder.feed(data[-1:]).samples) == 1
 
 
+@settings(deadline=None)
 @given(
     st.lists(st.lists(READING, min_size=6, max_size=6), min_size=1, max_size=5),
     st.integers(1, 80),
@@ -64,6 +65,7 @@ def test_pieces_of_any_size_give_the_same(rows, piece, temperature):
     assert n_refused == 0
 
 
+@settings(deadline=None)
 @given(
     st.lists(
         st.one_of(
@@ -86,6 +88,7 @@ def test_garbage_gives_the_same_in_pieces_of_any_size(parts, piece):
     np.testing.assert_array_equal(whole[0][-28:], some(30, 2)[-28:])
 
 
+@settings(deadline=None)
 @given(st.binary(min_size=1, max_size=300))
 def test_garbage_costs_the_packet_that_it_runs_into(garbage):
     given = some(6)
