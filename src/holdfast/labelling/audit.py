@@ -10,6 +10,7 @@ import msgspec
 import numpy as np
 
 from holdfast.contact import UNKNOWN, ContactState
+from holdfast.errors import TrainingError
 from holdfast.features import parse_features
 from holdfast.labelling.confident import Codes, confident_thresholds, contradictions
 from holdfast.labelling.edges import REACH, Edge, edges_of, shift_of, typical_shifts
@@ -147,7 +148,7 @@ def audit(
         n_jobs: fits at a time; -1 for as many as there are processors.
 
     Raises:
-        TrainingError: no labels, one state only, or one recording only.
+        TrainingError: no labels, one state only, one recording only, or nothing can be judged.
         RecordingError: a recording cannot be read.
         ValueError: the setting's split is random, or there are fewer than two folds.
     """
@@ -157,7 +158,13 @@ def audit(
         for recording, found in out_of_fold(recordings, setting, n_folds=n_folds, n_jobs=n_jobs)
         for finger, probabilities in found.items()
     ]
-    return Audit(len(recordings), sum(each.judged for each in judged), suspects(judged))
+    length = sum(each.judged for each in judged)
+    if not length:
+        raise TrainingError(
+            f"none of the labels of {len(recordings)} recordings can be judged: a finger needs "
+            "two states, after tare and first window, in at least two recordings"
+        )
+    return Audit(len(recordings), length, suspects(judged))
 
 
 def default_setting(recordings: Sequence[Recording]) -> Setting:

@@ -5,7 +5,8 @@ all labels, the other stable from unstable, over the labels in contact:
 
     p(no contact) = 1 - c,    p(unstable) = c (1 - s),    p(stable) = c s
 
-Where the labels of a finger know only one answer to a question, c or s is that answer.
+Where the labels of a finger know only one answer to a question, or only one where there are
+features (not before the tare and the first window), c or s is that answer.
 """
 
 from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
@@ -74,8 +75,11 @@ def out_of_fold(
             recording,
             {
                 finger: _joined(
-                    contact.get(finger, np.array([1.0])),
-                    stability.get(finger, np.array([float(ContactState.STABLE in seen[finger])])),
+                    contact.get(finger, touching.certain.get(finger, 1.0)),
+                    stability.get(
+                        finger,
+                        holding.certain.get(finger, float(ContactState.STABLE in seen[finger])),
+                    ),
                     module.n_samples,
                 )
                 for finger, module in recording.modules.items()
@@ -116,12 +120,14 @@ class _Judges:
     """The answers to one question, by a model for each group of recordings.
 
     Attributes:
-        fingers: those of which the labels know both answers.
+        fingers: those of which the labelled samples with features know both answers.
+        certain: the answer, 0 or 1, of those of which they know one.
         models: of each fold; None where no finger has both classes without it.
         fold_of: the fold that each recording is held out in.
     """
 
     fingers: frozenset[str]
+    certain: Mapping[str, float]
     models: Sequence[Model | None]
     fold_of: Sequence[int]
 
@@ -130,10 +136,11 @@ class _Judges:
         cls, recordings: _Relabelled, *, setting: Setting, n_folds: int, n_jobs: int
     ) -> "_Judges":
         if not recordings.fingers:
-            return cls(frozenset(), [None], [0] * len(recordings))
+            return cls(frozenset(), {}, [None], [0] * len(recordings))
         found = survey(recordings, setting.rate)
         division = divide(found.entries, setting.split, setting.seed)
         material = Material(found, division, gather(recordings, found, setting, division))
+        certain = _certain(material, recordings.fingers)
         order = np.random.default_rng(setting.seed).permutation(len(division.units))
         fold_of = (np.argsort(order) % n_folds)[division.group_of].tolist()
         parameters = {f: setting.recipe_of(f).reference for f in material.designs}
@@ -141,7 +148,8 @@ class _Judges:
             (material, setting, parameters, set(order[fold::n_folds].tolist()))
             for fold in range(min(n_folds, len(order)))
         ]
-        return cls(recordings.fingers, list(each(fit_model, tasks, n_jobs)), fold_of)
+        fingers = recordings.fingers - certain.keys()
+        return cls(fingers, certain, list(each(fit_model, tasks, n_jobs)), fold_of)
 
     def judge(self, place: int, recording: Recording) -> Probabilities:
         """(n,) of class 1 for each finger in question; NaN where there is none."""
@@ -157,6 +165,13 @@ class _Judges:
                 latest = np.maximum(np.searchsorted(times, at, side="right") - 1, 0)
                 found[finger] = probability[latest]
         return found
+
+
+def _certain(material: Material, fingers: Collection[str]) -> dict[str, float]:
+    """The answer for each finger whose labelled samples with features know only one."""
+    designs = material.designs
+    samples = {f: designs[f if f in designs else ANY_FINGER].samples for f in fingers}
+    return {f: float(own.stable.any()) for f, own in samples.items() if own.one_class}
 
 
 _CONTACT = (
@@ -216,7 +231,7 @@ def _check(recordings: Sequence[Recording], setting: Setting, n_folds: int) -> N
         )
 
 
-def _joined(contact: Array, stability: Array, n_samples: int) -> Array:
+def _joined(contact: Array | float, stability: Array | float, n_samples: int) -> Array:
     """(n, 3) of no contact, unstable and stable."""
     columns = (1 - contact, contact * (1 - stability), contact * stability)
     return np.stack([np.broadcast_to(column, n_samples) for column in columns], axis=1)
