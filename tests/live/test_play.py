@@ -127,6 +127,51 @@ def test_fingertips_inside_a_hand():
         assert set(TIPS) < set(taken(source, 1)[0].samples)
 
 
+class InTurn(Made):
+    """Modules have their samples one after the other, half a millisecond apart."""
+
+    def read(self, timeout):
+        if self.ended:
+            return None
+        names = list(self.sensors)
+        k, place = divmod(self.k, len(names))
+        time.sleep(PERIOD / len(names))
+        self.k += 1
+        name = names[place]
+        samples = {name: samples_of(self.sensors, k)[name]}
+        return Arrival(time_of(k) + place * PERIOD / len(names), samples, time.monotonic())
+
+
+@pytest.mark.parametrize(
+    ("version", "sensors", "whole_hand"),
+    [("1.8", TIPS, False), ("1.7", TIPS, False), ("1.8", TIPS, True), ("1.8", WHOLE, False)],
+)
+def test_modules_with_instants_of_their_own(version, sensors, whole_hand):
+    """Whoever comes learns of all modules, and has every sample of each once."""
+    n = 50
+    made = InTurn(sensors, n * len(sensors))
+    seen = {name: [] for name in sensors}
+    with ExitStack() as stack:
+        server = stack.enter_context(
+            played(made, version=version, whole_hand=whole_hand, wait=True)
+        )
+        source = stack.enter_context(open_source(server.uri))
+        assert set(sensors) <= set(source.sensors)
+        deadline = time.monotonic() + PATIENCE
+        while len(seen["ring"]) < n and time.monotonic() < deadline:
+            arrival = source.read(0.1)
+            for name in seen.keys() & (arrival.samples if arrival else {}):
+                seen[name].append((arrival.time, arrival.samples[name]))
+    shift = seen["thumb"][0][0] - time_of(0)
+    for place, (name, got) in enumerate(seen.items()):
+        assert len(got) == n
+        for k, (when, readings) in enumerate(got):
+            np.testing.assert_array_equal(readings, samples_of(sensors, k)[name])
+            if server.encoder.has_own_stamps:
+                expected = time_of(k) + place * PERIOD / len(sensors)
+                assert when - shift == pytest.approx(expected, abs=2e-6)
+
+
 def test_several_clients_receive_the_same():
     with played(Made()) as server, ExitStack() as stack:
         sources = [stack.enter_context(open_source(server.uri)) for _ in range(3)]

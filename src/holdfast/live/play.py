@@ -3,6 +3,7 @@
 import asyncio
 import logging
 import time
+from collections.abc import Iterator
 from contextlib import suppress
 from threading import Event, Thread
 from typing import Self
@@ -11,8 +12,9 @@ from websockets.asyncio.server import ServerConnection, broadcast, serve
 from websockets.exceptions import ConnectionClosed
 
 from holdfast.errors import OutputError
-from holdfast.sources import Arrival, Source
+from holdfast.sources import Source
 from holdfast.sources.xela.encoder import NEW, Encoder
+from holdfast.sources.xela.gathering import Gathered, Gathering
 
 HOST, PORT = "127.0.0.1", 5000
 PATIENCE = 0.2
@@ -66,6 +68,7 @@ class XelaServer:
         wait: bool = False,
     ) -> None:
         self.encoder = Encoder(source.sensors, version=version, whole_hand=whole_hand)
+        self._gathering = Gathering(source.sensors, own_stamps=self.encoder.has_own_stamps)
         self._source = source
         self._address = host, port
         self.n_packets = 0
@@ -130,7 +133,8 @@ class XelaServer:
             while not self._stopping.is_set() and not self._source.ended:
                 arrival = self._source.read(PATIENCE)
                 if arrival is not None and arrival.samples:
-                    self._loop.call_soon_threadsafe(self._send, self._packet(arrival))
+                    self._tell(self._gathering.add(arrival.samples, arrival.time))
+            self._tell(self._gathering.rest())
         except Exception as failure:  # told by whoever started it
             self.failure = failure
         finally:
@@ -138,11 +142,17 @@ class XelaServer:
                 self._wait_for_readers()
             self._over.set()
 
-    def _packet(self, arrival: Arrival) -> str:
+    def _tell(self, due: Iterator[Gathered]) -> None:
+        for gathered in due:
+            self._loop.call_soon_threadsafe(self._send, self._packet(gathered))
+
+    def _packet(self, gathered: Gathered) -> str:
         now = time.time()
         if self._shift is None:
-            self._shift = now - arrival.time
-        return self.encoder.packet(arrival.samples, arrival.time + self._shift, now).decode()
+            self._shift = now - gathered.time
+        times = {name: one + self._shift for name, one in gathered.times.items()}
+        packet = self.encoder.packet(gathered.samples, gathered.time + self._shift, now, times)
+        return packet.decode()
 
     def _wait_for_readers(self) -> None:
         asyncio.run_coroutine_threadsafe(self._emptied(), self._loop).result()

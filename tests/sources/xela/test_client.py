@@ -211,6 +211,15 @@ class TestReading:
         assert notices == ["no new sample for 0.05 s"]
 
 
+def test_a_source_that_is_closed_gives_nothing():
+    with server([patch(1), patch(2)]) as (port, _):
+        source = open_source(f"xela://127.0.0.1:{port}")
+        assert source.read(0.01) is None
+        with source:
+            assert source.read(PATIENCE) is not None
+        assert source.read(0.01) is None
+
+
 def test_closing_while_packets_wait():
     words = [text(k, [sensor(counts(368, k), "XR23AHRCPP")]) for k in range(20)] * 50
     with server(words) as (port, _), open_source(f"xela://127.0.0.1:{port}") as source:

@@ -82,11 +82,12 @@ class XelaSource(Source):
         first, *others = self._decoder.take(text, received)
         self._pending.append(first._replace(notices=(*notices, *first.notices)))
         self._pending.extend(others)
+        self._is_open = True
 
     def read(self, timeout: float) -> Arrival | None:
         """What arrived next, or None where nothing did within `timeout` [s]."""
         deadline = time.monotonic() + timeout
-        while not self._pending:
+        while self._is_open and not self._pending:
             left = deadline - time.monotonic()
             if self._connection is None:
                 self._try_again(left)
@@ -107,6 +108,7 @@ class XelaSource(Source):
         return Decoder(names, calibrated=calibrated, sensor=sensor)
 
     def _forget(self) -> None:
+        self._is_open = False
         self._lost_at = self._heard_at = time.monotonic()
         self._again_at = 0.0
         self._backoff = BACKOFF

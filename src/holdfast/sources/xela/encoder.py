@@ -87,18 +87,30 @@ class Encoder:
         """Whether it is sent as a whole hand, which names its own modules."""
         return isinstance(self._parts[0], _WholeHand)
 
+    @property
+    def has_own_stamps(self) -> bool:
+        """Whether packets tell the time of each module's sample."""
+        return self._version == NEW and not self.is_hand
+
     def welcome(self) -> bytes:
         """What a client is told first."""
         version = {"version": VERSION_TEXT} if self._version == NEW else {}
         return msgspec.json.encode({"message": "Welcome", **version})
 
-    def packet(self, samples: Samples, time: float, sent: float) -> bytes:
+    def packet(
+        self,
+        samples: Samples,
+        time: float,
+        sent: float,
+        times: Mapping[str, float] | None = None,
+    ) -> bytes:
         """The next packet.
 
         Args:
-            samples: of one instant, (n_taxels, 3) by module.
-            time: of that instant, since 1970 [s].
+            samples: (n_taxels, 3) by module.
+            time: of the newest of them, since 1970 [s].
             sent: now, since 1970 [s].
+            times: of each module's sample, where they differ; told by version 1.8 only.
 
         Raises:
             ValueError: counts are out of range, or have another shape.
@@ -107,7 +119,8 @@ class Encoder:
         for number, (part, constant) in enumerate(zip(self._parts, self._constant, strict=True), 1):
             readings = part.readings(samples)
             if readings is not None:
-                told[str(number)] = self._sensor(number, part, *readings, constant, time)
+                own = time if times is None or self.is_hand else times[part.names[0]]
+                told[str(number)] = self._sensor(number, part, *readings, constant, own)
         top: dict[str, Any] = {"message": self._counter, "time": time, "sensors": len(told)}
         self._counter = (self._counter + 1) % COUNTER
         if self._version == OLD:
