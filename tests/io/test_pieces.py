@@ -1,4 +1,5 @@
 from dataclasses import replace
+from itertools import pairwise
 
 import numpy as np
 import pytest
@@ -80,3 +81,11 @@ def test_a_module_that_stops_has_no_samples_in_later_pieces(make_recording, tmp_
 def test_no_samples_a_piece_is_an_error(tmp_path):
     with pytest.raises(ValueError, match="at least 1 sample a piece expected, 0 given"):
         read_chunks(tmp_path / "a.parquet", 0)
+
+
+@pytest.mark.parametrize("suffix", [".parquet", ".mcap"])
+@pytest.mark.parametrize("n_samples", [7, 100, 10_000])
+def test_pieces_do_not_overlap_in_time(make_recording, tmp_path, suffix, n_samples):
+    save_recording(make_recording(), tmp_path / f"a{suffix}")
+    pieces = list(read_chunks(tmp_path / f"a{suffix}", n_samples))
+    assert all(one.end < two.start for one, two in pairwise(pieces))

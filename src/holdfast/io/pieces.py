@@ -17,6 +17,9 @@ from holdfast.io.spans import spans
 from holdfast.recordings import Label, Recording
 from holdfast.sensors.values import Array
 
+LAG = 1.0
+"""An MCAP file has modules one after the other: what is newer may not be whole yet [s]."""
+
 _Buffer = dict[str, tuple[Array, npt.NDArray[Any]]]
 
 
@@ -69,12 +72,15 @@ def _cuts(groups: Iterable[Samples], n_samples: int) -> Iterator[tuple[Samples, 
         for topic, (times, _) in group.items():
             n_held[topic] = n_held.get(topic, 0) + len(times)
         if max((n for topic, n in n_held.items() if _is_tactile(topic)), default=0) > n_samples:
-            *whole, rest = _split(_joined(parts), n_samples)
-            starts = [_start(piece) for piece in [*whole[1:], rest]]
-            yield from zip(whole, starts, strict=True)
+            found = _split(_joined(parts), n_samples)
+            starts = [_start(piece) for piece in found]
+            n_whole = int(np.searchsorted(starts[1:], _end(found[-1]) - LAG))
+            yield from zip(found[:n_whole], starts[1:], strict=False)
+            rest = _joined(found[n_whole:])
             parts, n_held = [rest], {topic: len(times) for topic, (times, _) in rest.items()}
     if parts:
-        yield _joined(parts), np.inf
+        found = _split(_joined(parts), n_samples)
+        yield from zip(found, [*(_start(piece) for piece in found[1:]), np.inf], strict=True)
 
 
 def _split(samples: _Buffer, n_samples: int) -> list[_Buffer]:
@@ -99,6 +105,10 @@ def _joined(parts: list[Samples]) -> _Buffer:
 
 def _start(samples: Samples) -> float:
     return min(float(times[0]) for times, _ in samples.values() if len(times))
+
+
+def _end(samples: Samples) -> float:
+    return max(float(times[-1]) for times, _ in samples.values() if len(times))
 
 
 def _is_tactile(topic: str) -> bool:
