@@ -162,20 +162,20 @@ def step(
     kernel.advance(layout, memory, output, readings, present, time)
     for finger in range(len(present)):
         codes, decided = decision.codes[finger], decision.values[finger]
+        noise, values = memory.levels[finger, kernel.NOISE], output.values[finger]
+        threshold = _contact(noise, rule.limits[finger])
         ready = output.status[finger, REASON] == kernel.READY
-        threshold = _contact(memory.levels[finger, kernel.NOISE], rule.limits[finger])
-        if (
-            ready
-            and present[finger]
-            and _drifted(layout, memory, output, decision, finger, threshold, time)
-        ):
-            output.status[finger, REASON], output.status[finger, FAULTS] = kernel.FAULT, TARE_DRIFT
-            ready = False
+        if ready and present[finger]:
+            quiet = noise_sigma(noise, layout.windows[finger, kernel.SIGMA_WINDOW])
+            if _drifted(values, codes, decided, threshold, quiet, time, layout.period):
+                output.status[finger, REASON] = kernel.FAULT
+                output.status[finger, FAULTS] = TARE_DRIFT
+                ready = False
         if not ready:
             codes[TOLD] = codes[CANDIDATE] = UNKNOWN
             decided[PROBABILITY] = decided[LAST_UNSTABLE] = math.nan
         elif present[finger]:
-            if output.values[finger, kernel.AMPLITUDE] < threshold:
+            if values[kernel.AMPLITUDE] < threshold:
                 decided[PROBABILITY] = 0.0
                 state = NO_CONTACT
             else:
@@ -292,25 +292,24 @@ def _contact(noise: float, limits: Array) -> float:
 
 @compiled
 def _drifted(
-    layout: Layout,
-    memory: Memory,
-    output: Output,
-    decision: Decision,
-    f: int,
+    values: Array,
+    codes: Integers,
+    decided: Array,
     threshold: float,
+    quiet: float,
     time: float,
+    period: float,
 ) -> bool:
-    """Whether F_a crept over the threshold of contact: a touch is neither so slow nor so calm."""
-    codes, decided, values = decision.codes[f], decision.values[f], output.values[f]
-    window = layout.windows[f, kernel.SIGMA_WINDOW]
+    """Whether F_a crept over the threshold of contact: a touch is neither so slow nor so calm.
+
+    `quiet` is the sigma that noise alone gives; a window of two samples has none.
+    """
     amplitude, mean = values[kernel.AMPLITUDE], math.sqrt(2.0) * values[kernel.MEAN]
     if math.isnan(decided[SLOW]):
         decided[SLOW], decided[ROUSED] = amplitude, time
-    slow = decided[SLOW]
-    decided[SLOW] += min(1.0, layout.period / DRIFT_SECONDS) * (amplitude - slow)
-    noise = memory.levels[f, kernel.NOISE]
-    quiet = window > 2 and values[kernel.SIGMA] <= CALM * noise_sigma(noise, window)
-    calm = quiet and abs(mean - slow) <= 0.5 * threshold
+    away = abs(mean - decided[SLOW])
+    decided[SLOW] += min(1.0, period / DRIFT_SECONDS) * (amplitude - decided[SLOW])
+    calm = quiet > 0.0 and values[kernel.SIGMA] <= CALM * quiet and away <= 0.5 * threshold
     if not calm:
         decided[ROUSED] = time
     if amplitude < threshold:
@@ -318,7 +317,7 @@ def _drifted(
     elif not calm:
         codes[ABOVE] = TOUCH
     elif codes[ABOVE] == UNDER:
-        long = time - decided[ROUSED] + 0.5 * layout.period >= DRIFT_SECONDS
+        long = time - decided[ROUSED] + 0.5 * period >= DRIFT_SECONDS
         codes[ABOVE] = DRIFT if long else TOUCH
     return bool(codes[ABOVE] == DRIFT)
 

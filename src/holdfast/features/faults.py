@@ -135,10 +135,13 @@ def watch_taxels(
         square = x * x + y * y + z * z
         rough, rougher = (1.0 - share) * taxels[i, ROUGH], (1.0 - share) * taxels[i, ROUGHER]
         if square > 0.0:
-            dx, dy, dz = x - taxels[i, STEP], y - taxels[i, STEP + 1], z - taxels[i, STEP + 2]
-            rough += share * square
-            rougher += share * (dx * dx + dy * dy + dz * dz)
-            taxels[i, STEP], taxels[i, STEP + 1], taxels[i, STEP + 2] = x, y, z
+            if _has_reading(readings, i) and _has_reading(previous, i):
+                dx, dy, dz = x - taxels[i, STEP], y - taxels[i, STEP + 1], z - taxels[i, STEP + 2]
+                rough += share * square
+                rougher += share * (dx * dx + dy * dy + dz * dz)
+                taxels[i, STEP], taxels[i, STEP + 1], taxels[i, STEP + 2] = x, y, z
+            else:
+                taxels[i, STEP] = taxels[i, STEP + 1] = taxels[i, STEP + 2] = 0.0
             taxels[i, N_CHANGED] += 1.0
             taxels[i, CHANGED_AT] = n_changes
         elif n_changes - taxels[i, CHANGED_AT] >= long:
@@ -148,6 +151,12 @@ def watch_taxels(
         if rougher > loudest:
             loudest, which = rougher, i
     return any_still, loudest >= LONE * total, which
+
+
+@compiled
+def _has_reading(readings: Array, i: int) -> bool:
+    """False for zeros: a sensor with a dead band jumps to and from them, which is no noise."""
+    return bool(readings[i, 0] != 0.0 or readings[i, 1] != 0.0 or readings[i, 2] != 0.0)
 
 
 @compiled

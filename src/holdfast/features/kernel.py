@@ -406,7 +406,7 @@ def _moments(
     return haar_window(history[f, channel, end - window : end], window)
 
 
-@compiled
+@_inlined
 def _own_features(layout: Layout, memory: Memory, output: Output, f: int) -> None:
     """The values of a finger's features by itself; NaN where its stretch is too short."""
     specs, floors, reported = layout.specs, layout.floors, layout.windows[f, SIGMA_WINDOW]
@@ -428,7 +428,7 @@ def _own_features(layout: Layout, memory: Memory, output: Output, f: int) -> Non
             own[f, place] = _transform(value, specs[f, place, TRANSFORM], window, noise, floor)
 
 
-@compiled
+@_inlined
 def _fill_features(layout: Layout, memory: Memory, output: Output, f: int) -> None:
     own = memory.own
     for place in range(layout.specs.shape[1]):
