@@ -7,6 +7,7 @@ import { Feed } from "./feed.js";
 import { Hand, Health, alert } from "./hand.js";
 import { listen } from "./keys.js";
 import { Events, Notices } from "./lists.js";
+import { Pace } from "./pace.js";
 import { Plots } from "./plots.js";
 import { Store, capacityFor } from "./store.js";
 import { fingerColour, onTheme } from "./theme.js";
@@ -27,6 +28,7 @@ class Page {
     this.store = null;
     this.frozen = null; // what is looked at while paused
     this.dirty = false;
+    this.pace = new Pace();
     this.told = -Infinity; // when ages were last written
     choice(byId("windows"), WINDOWS.map((value) => ({ value, label: `${value} s`, title: `Show ${value} seconds` })),
       this.plots.window, (value) => this.look(value));
@@ -104,8 +106,9 @@ class Page {
 
   draw() {
     requestAnimationFrame(() => this.draw());
-    if (!this.store || !this.dirty) return;
+    if (!this.pace.may() || !this.store || !this.dirty) return;
     this.dirty = false;
+    this.pace.drawn();
     if (!this.frozen) {
       this.cards.draw();
       if (this.store.end) this.plots.draw(this.store);
@@ -131,6 +134,7 @@ class Page {
 
   look(seconds) {
     this.plots.window = seconds;
+    if (this.store) this.plots.build();
     press(byId("windows"), seconds);
     this.redraw();
   }

@@ -116,7 +116,8 @@ export class Plots {
         },
       ],
       series: [{}, ...kind.lines.map((entry) => ({
-        stroke: entry.colour, width: 1.75, points: { show: false }, spanGaps: false,
+        // Jagged lines of more than a pixel are slow to paint without a graphics card.
+        stroke: entry.colour, width: this.window > 10 ? 1 : 1.75, points: { show: false }, spanGaps: false,
       }))],
       hooks: {
         drawClear: [(plot) => this.behind(plot, row)],
