@@ -354,7 +354,7 @@ def test_proposals_that_are_labelled_are_done(tmp_path):
         ({"parameters": {"tare": "soon"}}, "tare: seconds above 0"),
         (
             {"rule": "tracking", "parameters": {"tracking": "/etc/passwd"}},
-            "parameter 'tracking' given; a page may give tare, offset, delay, opening",
+            "parameter 'tracking' given, which a page may not give",
         ),
         ({"parameters": {"delay": 1.0}}, "rule 'signal' knows no delay"),
         ({"rule": "command", "parameters": {"delay": "x"}}, ""),

@@ -24,8 +24,8 @@ from holdfast.recordings import Label, Recording
 IN_MEMORY = 3
 """So many recordings are kept in memory: the one that is looked at, and its neighbours."""
 
-PARAMETERS = ("tare", "offset", "delay", "opening")
-"""What a page may ask of a rule; files are named where the service is started."""
+NO_PARAMETERS = ("tracking", "rule")
+"""What a page may not ask of a rule: files are named where the service is started."""
 
 Proposals = dict[str, tuple[Label, ...]]
 
@@ -174,15 +174,14 @@ class Shelf:
         Args:
             place: of the recording.
             rule: one of `RULES`; empty for tracking where there are poses, else signal.
-            parameters: of the rule, out of `PARAMETERS`.
+            parameters: of the rule, but none of `NO_PARAMETERS`.
 
         Raises:
             RecordingError: the recording has not what the rule rests on.
             ValueError: an unknown rule or parameter.
         """
-        if unknown := sorted(set(parameters) - set(PARAMETERS)):
-            known = ", ".join(PARAMETERS)
-            raise ValueError(f"parameter {unknown[0]!r} given; a page may give {known}")
+        if refused := [name for name in NO_PARAMETERS if name in parameters]:
+            raise ValueError(f"parameter {refused[0]!r} given, which a page may not give")
         work = self.work(place)
         with self.computing:
             chosen = rule or default_rule(work.recording, self._poses)

@@ -1,0 +1,187 @@
+"""`holdfast label --compare A B`: how far two labellings agree."""
+
+from collections.abc import Callable, Iterator, Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from holdfast.cli.console import print_json, print_table, progress, say, show
+from holdfast.cli.label_common import Asking
+
+if TYPE_CHECKING:
+    from holdfast.labelling.compare import (
+        Agreement,
+        FingerAgreement,
+        PooledAgreement,
+        RecordingAgreement,
+    )
+    from holdfast.recordings import Label, Recording
+
+LabelsOf = Callable[["Recording"], "dict[str, tuple[Label, ...]]"]
+
+
+def compare_labels(
+    paths: Sequence[Path], asking: Asking, annotator: str | None, *, as_json: bool
+) -> None:
+    """Tells how far A and B agree, per recording and finger.
+
+    Recordings that A or B does not label are left out, and named.
+
+    Args:
+        paths: A and B: each a file or folder of labels or labelled recordings, or a rule's name.
+        asking: what a rule is given.
+        annotator: whose labels of an export of Label Studio.
+        as_json: print JSON.
+
+    Raises:
+        ValueError: not two paths, or two rules.
+        RecordingError: no recording is labelled by both.
+    """
+    from msgspec import to_builtins
+
+    from holdfast.labelling.compare import pool
+
+    if len(paths) != 2:
+        raise ValueError(f"--compare A B: two paths expected, {len(paths)} given")
+    a, b = paths
+    files = _recordings(a, b)
+    both = (_labels_of(a, asking, annotator), _labels_of(b, asking, annotator))
+    every = dict(_each(files, both))
+    found = [each for each in every.values() if not isinstance(each, str)]
+    left_out = {name: each for name, each in every.items() if isinstance(each, str)}
+    if not found:
+        raise _nothing(left_out)
+    agreement = pool(found)
+    if as_json:
+        told = to_builtins(agreement)
+        print_json({"a": str(a), "b": str(b), **told, "left_out": left_out})
+        return
+    _tell(agreement)
+    for name, text in left_out.items():
+        say(f"{name} is left out: {text}")
+
+
+def _nothing(left_out: dict[str, str]) -> Exception:
+    from holdfast.errors import RecordingError
+
+    name, text = next(iter(left_out.items()))
+    more = f" (and {len(left_out) - 1} other recordings)" if len(left_out) > 1 else ""
+    return RecordingError(f"nothing to compare: {name}: {text}{more}")
+
+
+def _each(
+    files: Sequence[Path], both: tuple[LabelsOf, LabelsOf]
+) -> "Iterator[tuple[str, RecordingAgreement | str]]":
+    """The name of each recording with its agreement, or with why there is none."""
+    from holdfast.errors import RecordingError
+    from holdfast.io import load_recording
+    from holdfast.labelling.compare import compare
+
+    for path in progress(files, "comparing"):
+        try:
+            recording = load_recording(path, labels=False)
+            one, other = (labels_of(recording) for labels_of in both)
+            if not (any(one.values()) and any(other.values())):
+                who = "B" if any(one.values()) else "A"
+                yield recording.name, f"{who} has no label of it"
+                continue
+            times = {name: module.times for name, module in recording.modules.items()}
+            yield recording.name, compare(one, other, times, recording.name)
+        except RecordingError as cause:
+            yield path.stem, str(cause)
+
+
+def _labels_of(place: Path, asking: Asking, annotator: str | None) -> LabelsOf:
+    from holdfast.labelling.files import labels_of
+
+    if _is_rule(place):
+        return lambda recording: asking.propose(str(place), recording)
+    return lambda recording: labels_of(place, recording, annotator)
+
+
+def _is_rule(place: Path) -> bool:
+    from holdfast.labelling.rules import RULES
+
+    return str(place) in RULES and not place.exists()
+
+
+def _recordings(a: Path, b: Path) -> list[Path]:
+    """The recordings that labels are compared of: those in A, else those in B.
+
+    Raises:
+        RecordingError: there are none in either.
+        ValueError: both are rules.
+    """
+    from holdfast.errors import RecordingError
+
+    if _is_rule(a) and _is_rule(b):
+        raise ValueError(f"rules {a} and {b} given; one of A and B says which recordings")
+    for place in (a, b):
+        if not _is_rule(place) and not place.exists():
+            raise RecordingError(f"{place} does not exist; labels, recordings or a rule expected")
+    for place in (a, b):
+        if not _is_rule(place) and (found := _found(place)):
+            return found
+    raise RecordingError(
+        f"no recording beside the labels in {a} or {b}; what is compared needs its samples"
+    )
+
+
+def _found(place: Path) -> list[Path]:
+    """The recordings in a folder, at a path, or beside a label file."""
+    from holdfast.errors import RecordingError
+    from holdfast.io import load_dataset
+    from holdfast.io.files import SUFFIXES
+    from holdfast.io.labels import SUFFIX, load_labels
+
+    if place.is_dir():
+        try:
+            return list(load_dataset(place).paths)
+        except RecordingError:
+            return []
+    if place.suffix in SUFFIXES:
+        return [place]
+    stems = [place.stem]
+    if place.name.endswith(SUFFIX):
+        stems = [place.name.removesuffix(SUFFIX), load_labels(place).name]
+    beside = [place.with_name(stem + suffix) for stem in stems for suffix in SUFFIXES]
+    return [path for path in beside if path.is_file()][:1]
+
+
+def _tell(agreement: "Agreement") -> None:
+    header = (
+        "recording", "finger", "kappa", "kappa stable", "onsets", "median [ms]", "p95 [ms]",
+        "only A [%]", "only B [%]", "not in A", "not in B",
+    )  # fmt: skip
+    rows = [
+        (one.name, finger, *_row(each), len(each.missing_in_a), len(each.missing_in_b))
+        for one in agreement.recordings
+        for finger, each in one.fingers.items()
+    ]
+    pooled = {**agreement.fingers, "all": agreement.pooled}
+    if len(agreement.recordings) > 1:
+        rows += [
+            ("all", finger, *_row(each), each.n_missing_in_a, each.n_missing_in_b)
+            for finger, each in pooled.items()
+        ]
+    print_table(header, rows)
+    show(
+        "\nonsets of not-stable that both have, B minus A; intervals that A or B has no "
+        "counterpart of"
+    )
+
+
+def _row(each: "FingerAgreement | PooledAgreement") -> tuple[str, ...]:
+    onsets = each.onset_differences
+    return (
+        _number(each.kappa, 3),
+        _number(each.kappa_stable, 3),
+        f"{onsets.n}",
+        _number(onsets.median, 0, 1e3),
+        _number(onsets.p95, 0, 1e3),
+        f"{100 * each.only_a:.1f}",
+        f"{100 * each.only_b:.1f}",
+    )
+
+
+def _number(value: float | None, digits: int, scale: float = 1.0) -> str:
+    return "-" if value is None else f"{scale * value:.{digits}f}"

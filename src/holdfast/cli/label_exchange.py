@@ -1,0 +1,117 @@
+"""`holdfast label --export` and `--import`: labels from and for other programs."""
+
+from collections.abc import Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from holdfast.cli.console import print_json, progress, show
+from holdfast.cli.label_auto import finish, label_all, refuse_persons, tell, write
+from holdfast.cli.label_common import login_name, recordings_at
+
+if TYPE_CHECKING:
+    from holdfast.labelling.store import Labels
+    from holdfast.recordings import Recording
+
+FORMATS = ("label-studio", "csv")
+
+
+def export_labels(
+    paths: Sequence[Path], kind: str, out: Path, *, force: bool, as_json: bool
+) -> None:
+    """Writes labels for Label Studio, or as CSV, one file a recording.
+
+    Args:
+        paths: of recordings, or folders of them.
+        kind: one of `FORMATS`.
+        out: folder that is written to.
+        force: replace what is there.
+        as_json: print JSON.
+
+    Raises:
+        ValueError: an unknown format.
+        OutputError: a file exists or cannot be written.
+        RecordingError: a recording cannot be read.
+    """
+    from holdfast.io import Dataset
+
+    if kind not in FORMATS:
+        raise ValueError(f"--export {' or '.join(FORMATS)} expected, {kind!r} given")
+    recordings = Dataset(recordings_at(paths))
+    if kind == "csv":
+        written = _export_csv(recordings, out, force)
+    else:
+        from holdfast.labelling.label_studio_export import CONFIG, save_label_studio
+
+        tasks = save_label_studio(progress(recordings, "exporting"), out, force=force)
+        written = [tasks, tasks.with_name(CONFIG)]
+    if as_json:
+        print_json({"format": kind, "written": [str(path) for path in written]})
+    else:
+        for path in written:
+            show(str(path))
+
+
+def _export_csv(recordings: "Sequence[Recording]", out: Path, force: bool) -> list[Path]:
+    from holdfast.files import refuse_overwrite, write_whole
+    from holdfast.io import labels_to_csv
+
+    out.mkdir(parents=True, exist_ok=True)
+    written = []
+    for recording in progress(recordings, "exporting"):
+        target = out / f"{recording.name}.labels.csv"
+        refuse_overwrite(target, force=force)
+        labels = {name: module.labels for name, module in recording.modules.items()}
+        write_whole(target, labels_to_csv(labels).encode(), force=force)
+        written.append(target)
+    return written
+
+
+def import_labels(
+    paths: Sequence[Path],
+    source: Path,
+    *,
+    annotator: str | None,
+    author: str | None,
+    dry_run: bool,
+    force: bool,
+    as_json: bool,
+) -> None:
+    """Takes the labels of recordings out of an export of Label Studio, a CSV file or a folder.
+
+    Args:
+        paths: of recordings, or folders of them.
+        source: the file or folder.
+        annotator: whose labels, of an export of Label Studio.
+        author: who signs the label files.
+        dry_run: write nothing.
+        force: replace a person's labels.
+        as_json: print JSON.
+
+    Raises:
+        ValueError: one CSV file for many recordings.
+        OutputError: a person labelled one of the recordings, or a file cannot be written.
+        RecordingError: the labels cannot be read or do not fit.
+    """
+    from holdfast.errors import RecordingError
+    from holdfast.labelling.files import labels_of
+
+    files = recordings_at(paths)
+    if not source.exists():
+        raise RecordingError(f"{source} does not exist; labels of Label Studio or CSV expected")
+    if source.is_file() and source.suffix == ".csv" and len(files) > 1:
+        raise ValueError(f"{source} holds labels of one recording; {len(files)} recordings given")
+    if not (dry_run or force):
+        refuse_persons(files)
+
+    def label(path: Path, recording: "Recording") -> "Labels":
+        labels = labels_of(source, recording, annotator)
+        if not dry_run:
+            write(path, recording, labels, author or annotator or login_name())
+        return labels
+
+    documents = label_all(files, label)
+    if as_json:
+        print_json({"source": str(source), "written": not dry_run, "recordings": documents})
+    else:
+        tell(documents)
+    finish(documents)

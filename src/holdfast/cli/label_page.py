@@ -1,0 +1,75 @@
+"""`holdfast label`: the page on which labels are drawn."""
+
+import sys
+from collections.abc import Sequence
+from contextlib import suppress
+from pathlib import Path
+from threading import Thread
+from typing import TYPE_CHECKING
+
+from holdfast.cli.console import print_json, say
+from holdfast.cli.label_common import Asking, Serving, login_name, now, recordings_at
+from holdfast.cli.page import open_page
+
+if TYPE_CHECKING:
+    from holdfast.labelling.audit import Suspect
+    from holdfast.labelling.shelf import Shelf
+
+
+def show_label_page(
+    paths: Sequence[Path],
+    asking: Asking,
+    serving: Serving,
+    author: str | None,
+    suspects: "Sequence[Suspect]" = (),
+) -> None:
+    """Serves the label page of recordings until Ctrl-C.
+
+    Args:
+        paths: of recordings, or folders of them.
+        asking: what rules are given.
+        serving: where, and to whom.
+        author: who labels; the login name by default.
+        suspects: labels that an audit contradicts.
+
+    Raises:
+        RecordingError: there is no recording.
+        ValueError: the network may not be served without a token.
+        OutputError: the address cannot be listened at.
+    """
+    from holdfast.features import Tare
+    from holdfast.labelling.poses import poses_from_csv
+    from holdfast.labelling.service import Service
+    from holdfast.labelling.shelf import Shelf
+    from holdfast.web.guard import Guard
+    from holdfast.web.server import run_server
+
+    guard = Guard(serving.host, serving.token)
+    files = recordings_at(paths)
+    shelf = Shelf(
+        files,
+        author=login_name() if author is None else author,
+        clock=now,
+        tare=Tare.parse(asking.tare),
+        poses=None if asking.poses is None else poses_from_csv(asking.poses),
+        suspects=suspects,
+    )
+
+    def tell(url: str) -> None:
+        page = url if serving.token is None else f"{url}?token={serving.token}"
+        if serving.as_json:
+            print_json({"url": page, "recordings": len(files)})
+            sys.stdout.flush()
+        opened = serving.browser and open_page(page)
+        say(f"{page} {'is open' if opened else 'labels'}: {len(files)} recordings; Ctrl-C ends it")
+
+    Thread(target=_prepare, args=(shelf,), daemon=True).start()
+    run_server(Service(shelf, guard).app, serving.host, serving.port, tell)
+
+
+def _prepare(shelf: "Shelf") -> None:
+    """Reads the first recording while the browser starts."""
+    from holdfast.errors import HoldfastError
+
+    with suppress(HoldfastError, ValueError, OSError):  # the page tells
+        shelf.changes(0)
