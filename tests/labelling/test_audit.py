@@ -135,6 +135,9 @@ def test_doubtful_probabilities_tell_nothing():
     parts = [calm(f"calm {k}") for k in range(3)]
     doubtful = judged(painted(), painted((3.0, 3.4, UNSTABLE)), sure=0.5)
     assert suspects([*parts, doubtful]) == []
+    edge = painted((4.0, 10.0, UNSTABLE)), painted((4.3, 10.0, UNSTABLE))
+    assert suspects([*parts, judged(*edge, sure=0.5)]) == []
+    assert len(suspects([*parts, judged(*edge, sure=0.7)])) == 1
 
 
 def test_stretches_without_label_or_probability_tell_nothing():

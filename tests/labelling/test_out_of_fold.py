@@ -125,6 +125,17 @@ def test_a_finger_of_one_state_is_left_out(grasps):
     assert [list(found) for _, found in out_of_fold(given, SETTING)] == 4 * [["thumb"]]
 
 
+def test_labels_between_two_samples_count_for_nothing(grasps):
+    slivers = [Label(1.001, 1.002, NONE), Label(1.003, 1.004, STABLE)]
+    given = [
+        each.with_labels({"thumb": each.modules["thumb"].labels, "index": slivers})
+        for each in grasps
+    ]
+    for _, found in out_of_fold(given, SETTING):
+        assert np.isfinite(found["thumb"][150:]).all()
+        assert np.isnan(found["index"]).any(axis=1).all()
+
+
 def test_recordings_without_labels_and_fingers_are_judged_too(grasps):
     bare = tiny_recording(7).with_labels({})
     thumb = Recording("thumb only", {"thumb": tiny_recording(8).modules["thumb"]})

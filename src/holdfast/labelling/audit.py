@@ -150,6 +150,7 @@ def audit(
     Raises:
         TrainingError: no labels, one state only, one recording only, or nothing can be judged.
         RecordingError: a recording cannot be read.
+        ModelError: a finger has another sensor than where it is labelled.
         ValueError: the setting's split is random, or there are fewer than two folds.
     """
     setting = default_setting(recordings) if setting is None else setting

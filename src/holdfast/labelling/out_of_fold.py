@@ -61,31 +61,24 @@ def out_of_fold(
     Raises:
         TrainingError: no labels, one state only, or one recording only.
         RecordingError: a recording cannot be read.
+        ModelError: a finger has another sensor than where it is labelled.
         ValueError: the split is random, or there are fewer than two folds.
     """
     _check(recordings, setting, n_folds)
     seen = _states(recordings)
     fit = partial(_Judges.fitted, setting=setting, n_folds=n_folds, n_jobs=n_jobs)
-    touching = fit(_Relabelled(recordings, _ask_contact, _knowing(seen, _CONTACT)))
-    holding = fit(_Relabelled(recordings, _ask_stability, _knowing(seen, _STABILITY)))
+    touching = fit(
+        _Relabelled(recordings, _ask_contact, _knowing(seen, _CONTACT)), dict.fromkeys(seen, 1.0)
+    )
+    holding = fit(
+        _Relabelled(recordings, _ask_stability, _knowing(seen, _STABILITY)),
+        {finger: float(ContactState.STABLE in states) for finger, states in seen.items()},
+    )
     asked = touching.fingers | holding.fingers
     for place, recording in enumerate(recordings):
         contact, stability = touching.judge(place, recording), holding.judge(place, recording)
-        yield (
-            recording,
-            {
-                finger: _joined(
-                    contact.get(finger, touching.certain.get(finger, 1.0)),
-                    stability.get(
-                        finger,
-                        holding.certain.get(finger, float(ContactState.STABLE in seen[finger])),
-                    ),
-                    module.n_samples,
-                )
-                for finger, module in recording.modules.items()
-                if finger in asked
-            },
-        )
+        fingers = [finger for finger in recording.modules if finger in asked]
+        yield recording, {f: _joined(contact[f], stability[f]) for f in fingers}
 
 
 class _Relabelled(Sequence[Recording]):
@@ -121,7 +114,7 @@ class _Judges:
 
     Attributes:
         fingers: those of which the labelled samples with features know both answers.
-        certain: the answer, 0 or 1, of those of which they know one.
+        certain: the answer, 0 or 1, of all others.
         models: of each fold; None where no finger has both classes without it.
         fold_of: the fold that each recording is held out in.
     """
@@ -133,14 +126,20 @@ class _Judges:
 
     @classmethod
     def fitted(
-        cls, recordings: _Relabelled, *, setting: Setting, n_folds: int, n_jobs: int
+        cls,
+        recordings: _Relabelled,
+        certain: Mapping[str, float],
+        *,
+        setting: Setting,
+        n_folds: int,
+        n_jobs: int,
     ) -> "_Judges":
         if not recordings.fingers:
-            return cls(frozenset(), {}, [None], [0] * len(recordings))
+            return cls(frozenset(), certain, [None], [0] * len(recordings))
         found = survey(recordings, setting.rate)
         division = divide(found.entries, setting.split, setting.seed)
         material = Material(found, division, gather(recordings, found, setting, division))
-        certain = _certain(material, recordings.fingers)
+        one_sided = _one_sided(material, recordings.fingers)
         order = np.random.default_rng(setting.seed).permutation(len(division.units))
         fold_of = (np.argsort(order) % n_folds)[division.group_of].tolist()
         parameters = {f: setting.recipe_of(f).reference for f in material.designs}
@@ -148,36 +147,40 @@ class _Judges:
             (material, setting, parameters, set(order[fold::n_folds].tolist()))
             for fold in range(min(n_folds, len(order)))
         ]
-        fingers = recordings.fingers - certain.keys()
-        return cls(fingers, certain, list(each(fit_model, tasks, n_jobs)), fold_of)
+        fingers = recordings.fingers - one_sided.keys()
+        models = list(each(fit_model, tasks, n_jobs))
+        return cls(fingers, {**certain, **one_sided}, models, fold_of)
 
     def judge(self, place: int, recording: Recording) -> Probabilities:
-        """(n,) of class 1 for each finger in question; NaN where there is none."""
-        model = self.models[self.fold_of[place]]
-        modules = recording.modules
-        found = {f: np.full(modules[f].n_samples, np.nan) for f in self.fingers & set(modules)}
+        """(n,) of class 1 for each finger; NaN where there is none."""
+        model, modules = self.models[self.fold_of[place]], recording.modules
+        found = {
+            f: np.full(m.n_samples, np.nan if f in self.fingers else self.certain[f])
+            for f, m in modules.items()
+        }
         if model is None or not (ANY_FINGER in model.fingers or set(model.fingers) & set(modules)):
             return found
         given = recording if model.rate is None else at_rate(recording, model.rate)
         for finger, probability in model.predict_proba(given).items():
-            if finger in found:
+            if finger in self.fingers:
                 at, times = modules[finger].times, given.modules[finger].times
                 latest = np.maximum(np.searchsorted(times, at, side="right") - 1, 0)
                 found[finger] = probability[latest]
         return found
 
 
-def _certain(material: Material, fingers: Collection[str]) -> dict[str, float]:
+def _one_sided(material: Material, fingers: Collection[str]) -> dict[str, float]:
     """The answer for each finger whose labelled samples with features know only one."""
-    designs = material.designs
-    samples = {f: designs[f if f in designs else ANY_FINGER].samples for f in fingers}
-    return {f: float(own.stable.any()) for f, own in samples.items() if own.one_class}
+    every = material.designs.get(ANY_FINGER)
+    designs = {f: material.designs.get(f, every) for f in fingers}
+    return {
+        f: float(design.samples.stable.any())
+        for f, design in designs.items()
+        if design and design.samples.one_class
+    }
 
 
-_CONTACT = (
-    {ContactState.NO_CONTACT},
-    {ContactState.UNSTABLE, ContactState.STABLE},
-)
+_CONTACT = ({ContactState.NO_CONTACT}, {ContactState.UNSTABLE, ContactState.STABLE})
 _STABILITY = ({ContactState.UNSTABLE}, {ContactState.STABLE})
 """The states that answer a question with no, and with yes."""
 
@@ -231,7 +234,7 @@ def _check(recordings: Sequence[Recording], setting: Setting, n_folds: int) -> N
         )
 
 
-def _joined(contact: Array | float, stability: Array | float, n_samples: int) -> Array:
+def _joined(contact: Array, stability: Array) -> Array:
     """(n, 3) of no contact, unstable and stable."""
     columns = (1 - contact, contact * (1 - stability), contact * stability)
-    return np.stack([np.broadcast_to(column, n_samples) for column in columns], axis=1)
+    return np.stack(columns, axis=1)
