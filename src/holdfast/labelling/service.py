@@ -23,12 +23,9 @@ MOST_BYTES = 64 << 20
 _HOME = Path(str(resources.files("holdfast")))
 PAGE = _HOME / "labelling" / "page"
 """The page's files."""
-FILES = {
-    "/page": PAGE,
-    "/web/uplot": _HOME / "live" / "page" / "uplot",
-    "/web": _HOME / "web" / "static",
-}
-"""Files by the beginning of their address; what all pages share is under /web."""
+SHARED = _HOME / "web" / "static"
+"""Files that all pages share."""
+_UPLOT = _HOME / "live" / "page" / "uplot"
 
 T = TypeVar("T")
 
@@ -54,7 +51,7 @@ class Service:
         one = r"/api/v1/recordings/{id:\d+}"
         return [
             web.get("/", _page),
-            *(web.static(url, folder) for url, folder in FILES.items() if folder.is_dir()),
+            *_files(),
             web.get("/api/v1/recordings", self._list),
             web.get(one, self._open),
             web.get(one + "/signals", self._draw),
@@ -117,6 +114,12 @@ class Service:
             n = len(self._shelf.paths)
             raise _refusal(web.HTTPNotFound, f"recording {place} asked for; there are {n}, from 0")
         return place
+
+
+def _files() -> list[web.AbstractRouteDef]:
+    """The page's files, and under /web those that all pages share."""
+    shared = ("/web", SHARED) if SHARED.is_dir() else ("/web/uplot", _UPLOT)
+    return [web.static(url, folder) for url, folder in (("/page", PAGE), shared) if folder.is_dir()]
 
 
 @web.middleware

@@ -6,13 +6,12 @@ from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
 from threading import RLock
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from holdfast.errors import RecordingError
 from holdfast.features import Tare
 from holdfast.features.tare import TareArgument
 from holdfast.io import load_recording
-from holdfast.labelling.audit import Suspect
 from holdfast.labelling.changes import change_points
 from holdfast.labelling.poses import Poses, poses_of
 from holdfast.labelling.rules import propose
@@ -20,6 +19,9 @@ from holdfast.labelling.signals import Signals
 from holdfast.labelling.store import Labels, Stored, read_stored, save_stored
 from holdfast.labelling.summary import Summary, summary_of
 from holdfast.recordings import Label, Recording
+
+if TYPE_CHECKING:
+    from holdfast.labelling.audit import Suspect
 
 IN_MEMORY = 3
 """So many recordings are kept in memory: the one that is looked at, and its neighbours."""
@@ -79,7 +81,7 @@ class Shelf:
         clock: Callable[[], str],
         tare: TareArgument | Tare = 0.5,
         poses: str | Path | Poses | None = None,
-        suspects: Sequence[Suspect] = (),
+        suspects: "Sequence[Suspect]" = (),
     ) -> None:
         self.paths = tuple(paths)
         self.author = author
@@ -90,8 +92,9 @@ class Shelf:
         self._proposals: dict[int, Proposals] = {}
         self._summaries: dict[tuple[Path, int, int], Summary] = {}
         self._works: OrderedDict[tuple[Path, int, int], Work] = OrderedDict()
+        self._reading = RLock()
         self._saving = RLock()
-        self.computing = RLock()  # compiled kernels that run in parallel must not meet
+        self._computing = RLock()  # compiled kernels that run in parallel must not meet
 
     def summary(self, place: int) -> Summary:
         """What is known of a recording without reading its samples, if its header tells.
@@ -102,8 +105,7 @@ class Shelf:
         path = self.paths[place]
         key = _key(path)
         if key not in self._summaries:
-            with self.computing:
-                self._summaries[key] = summary_of(path)
+            self._summaries[key] = summary_of(path)
         return self._summaries[key]
 
     def work(self, place: int) -> Work:
@@ -114,7 +116,7 @@ class Shelf:
         """
         path = self.paths[place]
         key = _key(path)
-        with self.computing:
+        with self._reading:
             if key not in self._works:
                 while len(self._works) >= IN_MEMORY:
                     self._works.popitem(last=False)
@@ -129,7 +131,7 @@ class Shelf:
             RecordingError: it cannot be read.
         """
         work = self.work(place)
-        with self.computing:
+        with self._computing:
             return work.signals
 
     def changes(self, place: int) -> dict[str, list[float]]:
@@ -139,7 +141,7 @@ class Shelf:
             RecordingError: it cannot be read.
         """
         work = self.work(place)
-        with self.computing:
+        with self._computing:
             return dict(work.changes)
 
     def stored(self, place: int) -> Stored:
@@ -183,7 +185,7 @@ class Shelf:
         if refused := [name for name in NO_PARAMETERS if name in parameters]:
             raise ValueError(f"parameter {refused[0]!r} given, which a page may not give")
         work = self.work(place)
-        with self.computing:
+        with self._computing:
             chosen = rule or default_rule(work.recording, self._poses)
             given: dict[str, Any] = {"tare": self._tare, **parameters}
             if chosen == "tracking":
@@ -195,7 +197,7 @@ class Shelf:
         """What was proposed for a recording; nothing where no rule was asked."""
         return self._proposals.get(place, {})
 
-    def suspects(self, name: str) -> list[Suspect]:
+    def suspects(self, name: str) -> "list[Suspect]":
         """What an audit found in the recording of that name."""
         return [suspect for suspect in self._suspects if suspect.recording == name]
 

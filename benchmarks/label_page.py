@@ -1,0 +1,175 @@
+"""The label page with 250,000 samples of four fingers: how long until it is painted, and a zoom.
+
+A recording is made, `holdfast label` serves it from a process of its own, and a headless
+Chromium opens the page. Times are the browser's own: from navigation to the first paint of the
+plots, and from a turn of the wheel to the plots redrawn. The answers of the service are timed
+without a browser as well; `first` is the first of a process that has read nothing yet.
+
+    uv run python benchmarks/label_page.py
+    uv run python benchmarks/label_page.py --samples 1000000 --wheels 50
+"""
+
+import argparse
+import json
+import resource
+import shutil
+import statistics
+import subprocess
+import sys
+import time
+from contextlib import contextmanager
+from dataclasses import replace
+from pathlib import Path
+from tempfile import TemporaryDirectory
+from urllib.request import urlopen
+
+import numpy as np
+
+from holdfast.io import save_recording
+from holdfast.recordings import Recording
+from holdfast.synthetic import RATE, synthetic_recording
+
+FINGERS = ("thumb", "index", "middle", "ring")
+PATIENCE = 120_000  # [ms]
+QUIET = 0.5  # a zoom is over when nothing was drawn for so long [s]
+OPTIONS = ("--headless", "--no-sandbox", "--disable-gpu", "--no-first-run")
+
+WATCH = """
+window.bench = {painted: null, wheel: null, drawn: []};
+new MutationObserver((changes) => requestAnimationFrame(() => {
+  const now = performance.now();
+  for (const change of changes) {
+    if (change.attributeName === "data-painted") window.bench.painted ??= now;
+    else window.bench.drawn.push(now);
+  }
+})).observe(document, {
+  attributes: true, subtree: true, attributeFilter: ["data-painted", "data-drawn"],
+});
+addEventListener("wheel", () => {
+  window.bench.wheel = performance.now();
+  window.bench.drawn = [];
+}, {capture: true, passive: true});
+"""
+"""Notes in the page when something is painted: an animation's next picture is the paint."""
+
+
+def main() -> None:
+    options = _options()
+    with TemporaryDirectory() as folder:
+        path = Path(folder) / "long.parquet"
+        save_recording(_recording(options.samples), path)
+        report = {"samples": options.samples, "fingers": len(FINGERS)}
+        with _served(path) as url:
+            report["service"] = _service(url)
+        if not options.no_browser:
+            with _served(path) as url:
+                report["page"] = _page(url, options)
+    report["memory of the service, largest [MB]"] = round(
+        resource.getrusage(resource.RUSAGE_CHILDREN).ru_maxrss / 1024
+    )
+    print(json.dumps(report, indent=1))
+
+
+def _options() -> argparse.Namespace:
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("--samples", type=int, default=250_000, help="of each finger")
+    parser.add_argument("--wheels", type=int, default=20, help="how often the wheel is turned")
+    parser.add_argument("--no-browser", action="store_true", help="the service alone")
+    return parser.parse_args()
+
+
+def _recording(n: int) -> Recording:
+    """Grasp after grasp, until there are n samples."""
+    grasp = synthetic_recording("long", 0, FINGERS)
+    modules = {}
+    for name, module in grasp.modules.items():
+        times = -(-n // module.n_samples)
+        readings = np.tile(module.readings, (times, 1, 1))[:n]
+        modules[name] = replace(module, times=np.arange(n) / RATE, readings=readings, labels=())
+    return Recording("long", modules)
+
+
+@contextmanager
+def _served(path: Path):
+    """The address of the label page, in a process of its own."""
+    holdfast = Path(sys.executable).with_name("holdfast")
+    words = ("label", str(path), "--port", "0", "--no-browser", "--json")
+    process = subprocess.Popen([holdfast, *words], stdout=subprocess.PIPE, text=True)
+    try:
+        yield json.loads(process.stdout.readline())["url"]
+    finally:
+        process.terminate()
+        process.wait()
+
+
+def _service(url: str) -> dict[str, float]:
+    """How long answers take, without a browser [s]."""
+    one = f"{url}api/v1/recordings/0"
+    report = {
+        "list": _timed(f"{url}api/v1/recordings"),
+        "opened, the file read": _timed(one),
+        "first signals": _timed(f"{one}/signals?points=1200"),
+        "change points": _timed(f"{one}/changes"),
+    }
+    zooms = []
+    end = json.loads(urlopen(one).read())["end"]
+    for span in np.geomspace(end, 1.0, 40):
+        part = f"start={(end - span) / 2}&end={(end + span) / 2}"
+        zooms.append(_timed(f"{one}/signals?{part}&points=1200"))
+    report["zoom, median"] = statistics.median(zooms)
+    report["zoom, largest"] = max(zooms)
+    return {name: round(value, 4) for name, value in report.items()}
+
+
+def _timed(url: str) -> float:
+    begin = time.perf_counter()
+    with urlopen(url) as answer:
+        answer.read()
+    return time.perf_counter() - begin
+
+
+def _page(url: str, options: argparse.Namespace) -> dict[str, float]:
+    from playwright.sync_api import sync_playwright
+
+    chromium = shutil.which("chromium") or shutil.which("chromium-browser")
+    with sync_playwright() as playwright:
+        browser = playwright.chromium.launch(executable_path=chromium, args=OPTIONS)
+        page = browser.new_page(viewport={"width": 1600, "height": 1000})
+        page.add_init_script(WATCH)
+        page.goto(url)
+        page.wait_for_function("window.bench.painted !== null", timeout=PATIENCE)
+        report = {"first paint [s]": page.evaluate("window.bench.painted") / 1e3}
+        _wait_until_quiet(page)
+        box = page.locator("canvas").first.bounding_box()
+        page.mouse.move(box["x"] + box["width"] / 2, box["y"] + box["height"] / 2)
+        turns = [_turn(page, -120) for _ in range(options.wheels // 2)]
+        turns += [_turn(page, 120) for _ in range(options.wheels // 2)]
+        browser.close()
+    first, last = ([turn[k] for turn in turns] for k in (0, 1))
+    report |= {
+        "zoom to first redraw, median [s]": statistics.median(first),
+        "zoom to first redraw, largest [s]": max(first),
+        "zoom to last redraw, median [s]": statistics.median(last),
+        "zoom to last redraw, largest [s]": max(last),
+    }
+    return {name: round(value, 4) for name, value in report.items()}
+
+
+def _turn(page, delta: int) -> tuple[float, float]:
+    """From a turn of the wheel to the first and to the last time that plots are drawn [s]."""
+    page.mouse.wheel(0, delta)
+    page.wait_for_function("window.bench.drawn.length > 0", timeout=PATIENCE)
+    _wait_until_quiet(page)
+    first, last = page.evaluate(
+        "[window.bench.drawn[0], window.bench.drawn.at(-1)].map((t) => t - window.bench.wheel)"
+    )
+    return first / 1e3, last / 1e3
+
+
+def _wait_until_quiet(page) -> None:
+    quiet = f"performance.now() - (window.bench.drawn.at(-1) ?? 0) > {1e3 * QUIET}"
+    page.wait_for_function(quiet, timeout=PATIENCE)
+
+
+if __name__ == "__main__":
+    main()
