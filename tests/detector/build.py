@@ -1,5 +1,7 @@
 """Small hands, models and recordings for the tests of detectors and models."""
 
+import itertools
+
 import numpy as np
 
 from holdfast.classifiers import LinearClassifier
@@ -70,3 +72,18 @@ def tactile(n=200, seed=0, which=None, start=0.0, rate=None, times=None):
 
 def recording(**modules):
     return Recording("made", modules)
+
+
+def feed(detector, values, finger="thumb", start=0.0):
+    return [
+        detector.update({finger: sample}, start + k / RATE).fingers[finger]
+        for k, sample in enumerate(values)
+    ]
+
+
+def lively(n=200, seed=0):
+    return np.array(tactile(n, seed).readings)
+
+
+def runs(estimates, key):
+    return [(value, len(list(group))) for value, group in itertools.groupby(map(key, estimates))]

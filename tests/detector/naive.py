@@ -9,8 +9,57 @@ from features import naive
 NAN = math.nan
 
 
+ORDER = (
+    "not_finite", "stuck", "saturated", "tare_loaded", "dead", "noisy", "out_of_range",
+    "tare_drift",
+)  # fmt: skip
+
+
+class Taxel:
+    """What is remembered of one taxel: by the number of the sample that changed the finger."""
+
+    def __init__(self, share):
+        self.share = share
+        self.changed = []
+        self.steps = []  # (number, squared change, squared change of the change)
+        self.step = np.zeros(3)
+
+    def watch(self, before, now, number, fresh):
+        change = now - before
+        if change.any():
+            if self.still(number) * self.share > 1:
+                self.step = np.zeros(3)
+            self.changed.append(number)
+            if before.any() and now.any():
+                turn = change - self.step
+                self.steps.append((number, change @ change, turn @ turn))
+                self.step = change
+            else:
+                self.step = np.zeros(3)
+        if fresh:
+            self.steps, self.step = [], np.zeros(3)
+
+    def smooth(self, number, which):
+        keep = 1 - self.share
+        return sum(self.share * keep ** (number - x[0]) * x[which] for x in self.steps)
+
+    def still(self, number):
+        return number - (self.changed[-1] if self.changed else 0)
+
+    def busy(self, share):
+        return bool(self.changed) and len(self.changed) > share * self.changed[-1]
+
+
 class Finger:
-    def __init__(self, sensor, part, window, tare, period):
+    def __init__(self, sensor, part, window, tare, period, ignored=()):
+        self.used = [i for i in range(sensor.n_taxels) if i not in ignored]
+        self.taxels = {i: Taxel(min(1, period / 0.25)) for i in self.used}
+        self.rotations = sensor.rotations[self.used]
+        self.n_news = 0
+        self.wrong, self.wrong_taxels = set(), set()
+        self.faulty_taxels = ()
+        self.slow = self.roused = NAN
+        self.above = "under"
         self.sensor, self.part, self.window, self.period = sensor, part, window, period
         self.kind, self.seconds = tare.kind, tare.seconds
         self.longest = max([window, *(spec.window for spec in part.features)])
@@ -32,37 +81,58 @@ class Finger:
     def wait(self, time):
         if self.last is not None and time - self.last > 3.0003 * self.period:
             self.interrupt()
-            self.gapped, self.status, self.faults = True, "gap", ()
+            self.gapped, self.status, self.faults, self.faulty_taxels = True, "gap", (), ()
             self.frozen = self.pulling = 0
 
     def interrupt(self):
         self.stretch = []
         self.force, self.sigma = (NAN, NAN, NAN), NAN
 
-    def take(self, time, readings):
+    def refuse(self, fault, bad):
+        self.interrupt()
+        self.status, self.faults = "fault", (fault,)
+        self.faulty_taxels = tuple(i for i in self.used if bad[i].any() and i < 63)
+
+    def take(self, time, given):
+        readings = np.zeros_like(given)
+        readings[self.used] = given[self.used]
+        fresh = self.last is not None and time - self.last > 3.0003 * self.period
         self.last = time
         self.force, self.sigma = (NAN, NAN, NAN), NAN
+        low, high = self.sensor.limits or (-math.inf, math.inf)
         if not np.isfinite(readings).all():
-            self.stretch = []
-            self.status, self.faults = "fault", ("not_finite",)
-            return
+            return self.refuse("not_finite", ~np.isfinite(readings))
+        if ((readings[self.used] < low) | (readings[self.used] > high)).any():
+            return self.refuse("out_of_range", (readings < low) | (readings > high))
         if self.samples:
             changed = (self.samples[-1][1] != readings).any()
             self.changes += bool(changed)
             self.frozen = 0 if changed else self.frozen + 1
+            if changed:
+                self.watch_taxels(self.samples[-1][1], readings, fresh)
         self.samples.append((time, readings))
         elapsed = time - self.samples[0][0] + self.period / 2
         self.listen(elapsed)
         if self.baseline is None and not self.tared(elapsed):
-            self.status, self.faults = "tare", ()
-            return
-        force = naive.force(readings, self.baseline, self.sensor.rotations)
+            self.status, self.faults, self.faulty_taxels = "tare", (), ()
+            return None
+        return self.feel(readings)
+
+    def feel(self, readings):
+        force = naive.force(readings[self.used], self.baseline[self.used], self.rotations)
         self.force = tuple(force)
-        self.stretch.append(force)
-        self.largest = max(self.largest, math.hypot(*force))
-        if len(self.stretch) >= self.window:
-            self.sigma = self.moments(self.window)[1]
-        self.faults = tuple(self.find_faults(readings))
+        faults, taxels = self.find_faults(readings)
+        if faults & {"stuck", "noisy"}:
+            self.stretch, self.pulling = [], 0
+        else:
+            self.stretch.append(force)
+            self.largest = max(self.largest, math.hypot(*force))
+            if len(self.stretch) >= self.window:
+                self.sigma = self.moments(self.window)[1]
+            if self.loaded(readings):
+                faults = faults | {"tare_loaded"}
+        self.faults = tuple(fault for fault in ORDER if fault in faults)
+        self.faulty_taxels = tuple(sorted(taxels)) if faults else ()
         if self.faults:
             self.status = "fault"
         elif len(self.stretch) < self.longest:
@@ -70,17 +140,54 @@ class Finger:
         else:
             self.status, self.gapped = "", False
 
+    def watch_taxels(self, before, now, fresh):
+        self.n_news += 1
+        for i, taxel in self.taxels.items():
+            taxel.watch(before[i], now[i], self.n_news, fresh)
+        low, high = self.sensor.limits or (-math.inf, math.inf)
+        dead, stuck, moving = set(), set(), 0
+        long = 0.5 / self.period
+        for i, taxel in self.taxels.items():
+            still = taxel.still(self.n_news)
+            if 2 * still < long:
+                moving += taxel.busy(0.5)
+            elif not taxel.changed and still >= 2 / self.period:
+                dead.add(i)
+            elif ((now[i] <= low) | (now[i] >= high)).any():
+                continue  # saturated
+            elif still >= long and len(taxel.changed) >= long and taxel.busy(0.9):
+                stuck.add(i)
+        if moving < 0.8 * len(self.used):
+            dead, stuck = set(), set()
+        noisy = self.noisy()
+        named = {"dead": dead, "stuck": stuck, "noisy": noisy}
+        self.wrong = {fault for fault, taxels in named.items() if taxels}
+        self.wrong_taxels = {i for i in dead | stuck | noisy if i < 63}
+
+    def noisy(self):
+        if len(self.used) < 4:
+            return set()
+        rough = {i: taxel.smooth(self.n_news, 1) for i, taxel in self.taxels.items()}
+        rougher = {i: taxel.smooth(self.n_news, 2) for i, taxel in self.taxels.items()}
+        i = max(rougher, key=lambda i: rougher[i])
+        quiet = 1 / math.sqrt(12)
+        if self.sensor.unit == "N":
+            quiet = self.noise / math.sqrt(len(self.used))
+        alone = rougher[i] >= 0.9 * sum(rougher.values())
+        loud = math.sqrt(rougher[i] / 6) > 100 * quiet
+        return {i} if alone and loud and rougher[i] > 2.5 * rough[i] else set()
+
     def listen(self, elapsed):
         enough = self.seconds if self.kind == "seconds" else 0.5
         if not math.isnan(self.noise) or elapsed < enough:
             return
-        values = [sample for _, sample in self.samples[:-1]]
+        values = [sample[self.used] for _, sample in self.samples[:-1]]
         zero = np.zeros_like(values[0])
-        forces = np.array([naive.force(v, zero, self.sensor.rotations) for v in values])
+        forces = np.array([naive.force(v, zero, self.rotations) for v in values])
         steps = np.diff(forces, axis=0)
         heard = math.sqrt((steps**2).sum() / (6 * max(len(steps), 1)))
         rounding = 1 / math.sqrt(12) if self.sensor.unit == "count" else 1e-6
-        self.noise = max(heard, rounding * math.sqrt(self.sensor.n_taxels))
+        self.noise = max(heard, rounding * math.sqrt(len(self.used)))
 
     def tared(self, elapsed):
         if self.kind == "first":
@@ -93,19 +200,24 @@ class Finger:
 
     def find_faults(self, readings):
         half_a_second = 0.5 / self.period
+        faults, taxels = set(self.wrong), set(self.wrong_taxels)
         transitions = len(self.samples) - 1 - self.frozen
         lively = 2 * self.changes > transitions and self.changes >= half_a_second
         if lively and self.frozen >= half_a_second:
-            yield "stuck"
+            faults.add("stuck")
         low, high = self.sensor.limits or (-math.inf, math.inf)
-        if (readings <= low).any() or (readings >= high).any():
-            yield "saturated"
-        if self.kind == "seconds":
-            pressing = float((readings - self.baseline)[:, 2].sum())
-            pulled = pressing < -max(20 * self.noise, 0.1 * self.largest)
-            self.pulling = self.pulling + 1 if pulled else 0
-            if self.pulling * self.period >= 0.25:
-                yield "tare_loaded"
+        at_limit = {i for i in self.used if ((readings[i] <= low) | (readings[i] >= high)).any()}
+        if at_limit:
+            faults.add("saturated")
+        return faults, taxels | {i for i in at_limit if i < 63}
+
+    def loaded(self, readings):
+        if self.kind != "seconds":
+            return False
+        pressing = float((readings - self.baseline)[self.used, 2].sum())
+        pulled = pressing < -max(20 * self.noise, 0.1 * self.largest)
+        self.pulling = self.pulling + 1 if pulled else 0
+        return self.pulling * self.period >= 0.25
 
     def moments(self, window):
         return naive.features(self.stretch[-window:], window)[-1][4:].tolist()
@@ -147,6 +259,8 @@ class Finger:
             features = [self.feature(spec, fingers) for spec in self.part.features]
             if any(math.isnan(value) for value in features):
                 self.status = "tare"
+            elif self.drifted(time):
+                self.status, self.faults = "fault", ("tare_drift",)
         if self.status != "":
             self.state = self.candidate = "UNKNOWN"
             self.probability = self.unstable_at = NAN
@@ -162,11 +276,33 @@ class Finger:
         if self.state == "UNKNOWN" or held >= debounce.min_duration:
             self.state = state
 
+    def contact(self):
+        if self.part.contact_threshold is not None:
+            return self.part.contact_threshold
+        return NAN if self.part.contact_noise is None else self.part.contact_noise * self.noise
+
+    def drifted(self, time):
+        amplitude, threshold = math.hypot(*self.force), self.contact()
+        mean = sum(math.hypot(*force) for force in self.stretch[-self.window :]) / self.window
+        if math.isnan(self.slow):
+            self.slow, self.roused = amplitude, time
+        away, jump = abs(mean - self.slow), abs(amplitude - self.slow)
+        self.slow += min(1, self.period) * (amplitude - self.slow)
+        quiet = self.noise * math.sqrt((self.window - 2) / (2 * self.window))
+        calm = self.window > 2 and self.sigma <= 3 * quiet and away <= threshold / 2
+        if not calm:
+            self.roused = time
+        if amplitude < threshold:
+            self.above = "under"
+        elif not calm:
+            self.above = "touch"
+        elif self.above == "under":
+            long = time - self.roused + self.period / 2 >= 1
+            self.above = "drift" if long and jump <= threshold / 2 else "touch"
+        return self.above == "drift"
+
     def judge(self, features, hysteresis):
-        threshold = self.part.contact_threshold
-        if threshold is None and self.part.contact_noise is not None:
-            threshold = self.part.contact_noise * self.noise
-        if threshold is not None and math.hypot(*self.force) < threshold:
+        if math.hypot(*self.force) < self.contact():
             self.probability = 0.0
             return "NO_CONTACT"
         rule = self.part.classifier
@@ -175,7 +311,7 @@ class Finger:
             features, rule.coefficients, rule.mean, rule.scale, strict=True
         ):
             z += c * (value - mean) / scale
-        self.probability = 1 / (1 + math.exp(-(rule.slope * z + rule.offset)))
+        self.probability = 1 / (1 + math.exp(min(-(rule.slope * z + rule.offset), 700)))
         limit = rule.threshold
         if self.state == "STABLE":
             limit -= hysteresis
@@ -187,10 +323,11 @@ class Finger:
 class Hand:
     """Takes what `Detector` takes; tells (time, state, {finger: row})."""
 
-    def __init__(self, model, sensors, tare, rate):
+    def __init__(self, model, sensors, tare, rate, ignore=None):
         self.model = model
+        bad = ignore or {}
         self.fingers = {
-            name: Finger(which, model.finger(name), model.window, tare, 1 / rate)
+            name: Finger(which, model.finger(name), model.window, tare, 1 / rate, bad.get(name, ()))
             for name, which in sensors.items()
         }
 
@@ -208,7 +345,7 @@ class Hand:
     @staticmethod
     def row(finger):
         last = NAN if finger.last is None else finger.last
-        told = (finger.state, finger.status, finger.faults)
+        told = (finger.state, finger.status, finger.faults, finger.faulty_taxels)
         return told, (last, finger.probability, finger.sigma, *finger.force)
 
     def state(self):

@@ -43,7 +43,8 @@ def same(estimate, twin):
     assert list(estimate.fingers) == list(rows)
     for name, (told, numbers) in rows.items():
         one = estimate.fingers[name]
-        assert (str(one.state), str(one.reason), tuple(map(str, one.faults))) == told
+        faults = tuple(map(str, one.faults))
+        assert (str(one.state), str(one.reason), faults, one.faulty_taxels) == told
         found = (one.time, one.stable_probability, one.instability, *one.force)
         assert found == pytest.approx(numbers, rel=1e-9, abs=1e-9, nan_ok=True)
 

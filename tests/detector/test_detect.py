@@ -36,7 +36,8 @@ def feed(detector, made):
 
 def fields(estimate):
     numbers = (estimate.time, estimate.stable_probability, estimate.instability, *estimate.force)
-    return repr((*numbers, estimate.state, estimate.reason, estimate.faults))
+    told = (estimate.state, estimate.reason, estimate.faults, estimate.faulty_taxels)
+    return repr((*numbers, *told))
 
 
 def assert_same(detection, told):

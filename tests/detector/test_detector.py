@@ -14,26 +14,22 @@ from holdfast.errors import ModelError, StreamError
 from holdfast.features import FeatureSpec
 from holdfast.model import ANY_FINGER, Debounce, Model
 
-from .build import RATE, classifier, finger_model, model, recording, sensor, tactile
+from .build import (
+    RATE,
+    classifier,
+    feed,
+    finger_model,
+    lively,
+    model,
+    recording,
+    runs,
+    sensor,
+    tactile,
+)
 
 UNKNOWN, NO_CONTACT, UNSTABLE, STABLE = ContactState
 N_TARE = 20
 """Samples in the tare of 0.2 s."""
-
-
-def feed(detector, values, finger="thumb", start=0.0):
-    return [
-        detector.update({finger: sample}, start + k / RATE).fingers[finger]
-        for k, sample in enumerate(values)
-    ]
-
-
-def lively(n=200, seed=0):
-    return np.array(tactile(n, seed).readings)
-
-
-def runs(estimates, key):
-    return [(value, len(list(group))) for value, group in itertools.groupby(map(key, estimates))]
 
 
 def by_force(threshold=0.5, **options):
@@ -139,78 +135,6 @@ class TestReasons:
         one = feed(detector, values)
         two = feed(detector, values[60:], start=100.0)
         assert [e.force for e in two] == [e.force for e in one[60:]]
-
-
-class TestFaults:
-    def faults(self, values, **options):
-        return [e.faults for e in feed(Detector(model(("thumb",), **options)), values)]
-
-    def test_stuck_after_half_a_second_and_until_it_moves(self):
-        values = lively(300)
-        values[150:250] = values[150]
-        found = self.faults(values)
-        assert runs(found, lambda f: f) == [((), 200), ((Fault.STUCK,), 50), ((), 50)]
-
-    def test_the_state_is_unknown_while_stuck(self):
-        values = lively(300)
-        values[150:] = values[150]
-        told = feed(Detector(model(("thumb",))), values)[-1]
-        assert (told.state, told.reason) == (UNKNOWN, Reason.FAULT)
-        assert np.isfinite(told.force).all()
-
-    def test_a_quiet_sensor_is_not_stuck(self):
-        values = np.full((900, 2, 3), 500.0)
-        values[::70, 0, 0] += 1
-        assert set(self.faults(values)) == {()}
-
-    def test_a_sensor_that_settles_is_not_stuck(self):
-        values = np.full((300, 2, 3), 500.0)
-        values[:10] += np.arange(10)[:, None, None]
-        assert set(self.faults(values, tare="first")) == {()}
-
-    @pytest.mark.parametrize("limit", [0.0, 1000.0, -1.0, 1001.0])
-    def test_saturated_while_it_lasts(self, limit):
-        values = lively(100)
-        values[50:53, 1, 1] = limit
-        found = self.faults(values)
-        assert runs(found, lambda f: f) == [((), 50), ((Fault.SATURATED,), 3), ((), 47)]
-
-    def test_just_within_the_limits(self):
-        values = lively(100)
-        values[50, 0, 0], values[51, 0, 0] = 1.0, 999.0
-        assert set(self.faults(values)) == {()}
-
-    def test_no_limits_no_saturation(self):
-        judge = model(("thumb",), which=sensor(limits=None))
-        values = lively(60)
-        values[40:] = 1e9 * np.sign(values[40:] - 500)
-        assert Fault.SATURATED not in {f for e in feed(Detector(judge), values) for f in e.faults}
-
-    def loaded(self):
-        rng = np.random.default_rng(3)
-        values = 500 + np.rint(rng.normal(scale=2, size=(400, 2, 3)))
-        values[:100, :, 2] += 200  # pressed while the tare is taken
-        values[300:, :, 2] += 200
-        return values
-
-    def test_a_tare_under_load_shows_when_the_load_goes(self):
-        found = self.faults(self.loaded())
-        assert runs(found, lambda f: f) == [((), 124), ((Fault.TARE_LOADED,), 176), ((), 100)]
-
-    @pytest.mark.parametrize("tare", ["first", "none"])
-    def test_a_recording_may_begin_in_contact(self, tare):
-        assert set(self.faults(self.loaded(), tare=tare)) == {()}
-
-    def test_a_short_pull_is_no_loaded_tare(self):
-        values = self.loaded()[100:]
-        values[100:120, :, 2] -= 200
-        assert set(self.faults(values)) == {()}
-
-    def test_several_at_once(self):
-        values = lively(300)
-        values[150:] = values[150]
-        values[150:, 0, 0] = 1000.0
-        assert self.faults(values)[-1] == (Fault.STUCK, Fault.SATURATED)
 
 
 class TestContactThreshold:

@@ -307,7 +307,7 @@ def _drifted(
     amplitude, mean = values[kernel.AMPLITUDE], math.sqrt(2.0) * values[kernel.MEAN]
     if math.isnan(decided[SLOW]):
         decided[SLOW], decided[ROUSED] = amplitude, time
-    away = abs(mean - decided[SLOW])
+    away, jumped = abs(mean - decided[SLOW]), abs(amplitude - decided[SLOW]) > 0.5 * threshold
     decided[SLOW] += min(1.0, period / DRIFT_SECONDS) * (amplitude - decided[SLOW])
     calm = quiet > 0.0 and values[kernel.SIGMA] <= CALM * quiet and away <= 0.5 * threshold
     if not calm:
@@ -318,7 +318,7 @@ def _drifted(
         codes[ABOVE] = TOUCH
     elif codes[ABOVE] == UNDER:
         long = time - decided[ROUSED] + 0.5 * period >= DRIFT_SECONDS
-        codes[ABOVE] = DRIFT if long else TOUCH
+        codes[ABOVE] = DRIFT if long and not jumped else TOUCH
     return bool(codes[ABOVE] == DRIFT)
 
 

@@ -135,6 +135,8 @@ def watch_taxels(
         square = x * x + y * y + z * z
         rough, rougher = (1.0 - share) * taxels[i, ROUGH], (1.0 - share) * taxels[i, ROUGHER]
         if square > 0.0:
+            if (n_changes - taxels[i, CHANGED_AT]) * share > 1.0:  # to and fro takes less
+                taxels[i, STEP] = taxels[i, STEP + 1] = taxels[i, STEP + 2] = 0.0
             if _has_reading(readings, i) and _has_reading(previous, i):
                 dx, dy, dz = x - taxels[i, STEP], y - taxels[i, STEP + 1], z - taxels[i, STEP + 2]
                 rough += share * square

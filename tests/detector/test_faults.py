@@ -1,0 +1,454 @@
+"""Faults that show in the readings: what is told, when it begins and when it ends."""
+
+from itertools import pairwise
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from holdfast.contact import ContactState, Fault, Reason
+from holdfast.detector import Detector, detect
+from holdfast.features import Tare
+from holdfast.model import ANY_FINGER, Model
+from holdfast.recordings import Tactile
+
+from . import naive
+from .build import RATE, feed, finger_model, lively, model, recording, runs, sensor, tactile
+from .test_against_twin import same
+
+UNKNOWN = ContactState.UNKNOWN
+TIP = sensor(6, "tip", limits=(0.0, 65_535.0))
+IN_NEWTONS = sensor(6, "newtons", limits=None, unit="N")
+
+
+class TestFaults:
+    def faults(self, values, **options):
+        return [e.faults for e in feed(Detector(model(("thumb",), **options)), values)]
+
+    def test_stuck_after_half_a_second_and_until_it_moves(self):
+        values = lively(300)
+        values[150:250] = values[150]
+        found = self.faults(values)
+        assert runs(found, lambda f: f) == [((), 200), ((Fault.STUCK,), 50), ((), 50)]
+
+    def test_the_state_is_unknown_while_stuck(self):
+        values = lively(300)
+        values[150:] = values[150]
+        told = feed(Detector(model(("thumb",))), values)[-1]
+        assert (told.state, told.reason) == (UNKNOWN, Reason.FAULT)
+        assert np.isfinite(told.force).all()
+
+    def test_a_quiet_sensor_is_not_stuck(self):
+        values = np.full((900, 2, 3), 500.0)
+        values[::70, 0, 0] += 1
+        assert set(self.faults(values)) == {()}
+
+    def test_a_sensor_that_settles_is_not_stuck(self):
+        values = np.full((300, 2, 3), 500.0)
+        values[:10] += np.arange(10)[:, None, None]
+        assert set(self.faults(values, tare="first")) == {()}
+
+    @pytest.mark.parametrize("limit", [0.0, 1000.0])
+    def test_saturated_while_it_lasts(self, limit):
+        values = lively(100)
+        values[50:53, 1, 1] = limit
+        found = self.faults(values)
+        assert runs(found, lambda f: f) == [((), 50), ((Fault.SATURATED,), 3), ((), 47)]
+
+    @pytest.mark.parametrize("value", [-1.0, 1001.0, -1e300, 1e300])
+    def test_out_of_range_is_no_reading(self, value):
+        values = lively(100)
+        values[50:53, 1, 1] = value
+        told = feed(Detector(model(("thumb",))), values)
+        assert runs(told, lambda e: (e.reason, e.faults))[2:] == [
+            (("", ()), 25), (("fault", (Fault.OUT_OF_RANGE,)), 3), (("warm_up", ()), 5),
+            (("", ()), 42),
+        ]  # fmt: skip
+        assert {e.faulty_taxels for e in told[50:53]} == {(1,)}
+        assert np.isnan([e.force for e in told[50:53]]).all()
+
+    def test_out_of_range_does_not_spoil_the_tare(self):
+        values = lively(100)
+        values[10, 0, 2] = 1e6
+        found = Detector(model(("thumb",)))
+        feed(found, values)
+        assert np.allclose(
+            found.baselines()["thumb"], np.delete(values[:20], 10, axis=0).mean(axis=0)
+        )
+
+    def test_just_within_the_limits(self):
+        values = lively(100)
+        values[50, 0, 0], values[51, 0, 0] = 1.0, 999.0
+        assert set(self.faults(values)) == {()}
+
+    def test_no_limits_no_saturation(self):
+        judge = model(("thumb",), which=sensor(limits=None))
+        values = lively(60)
+        values[40:] = 1e9 * np.sign(values[40:] - 500)
+        assert Fault.SATURATED not in {f for e in feed(Detector(judge), values) for f in e.faults}
+
+    def loaded(self):
+        rng = np.random.default_rng(3)
+        values = 500 + np.rint(rng.normal(scale=2, size=(400, 2, 3)))
+        values[:100, :, 2] += 200  # pressed while the tare is taken
+        values[300:, :, 2] += 200
+        return values
+
+    def test_a_tare_under_load_shows_when_the_load_goes(self):
+        found = self.faults(self.loaded())
+        assert runs(found, lambda f: f) == [((), 124), ((Fault.TARE_LOADED,), 176), ((), 100)]
+
+    @pytest.mark.parametrize("tare", ["first", "none"])
+    def test_a_recording_may_begin_in_contact(self, tare):
+        assert set(self.faults(self.loaded(), tare=tare)) == {()}
+
+    def test_a_short_pull_is_no_loaded_tare(self):
+        values = self.loaded()[100:]
+        values[100:120, :, 2] -= 200
+        assert set(self.faults(values)) == {()}
+
+    def test_several_at_once(self):
+        values = lively(300)
+        values[150:] = values[150]
+        values[150:, 0, 0] = 1000.0
+        assert self.faults(values)[-1] == (Fault.STUCK, Fault.SATURATED)
+
+
+def white(n=900, which=TIP, seed=0, level=3.0, middle=30_000.0):
+    """Noise of the sensor, in whole counts."""
+    rng = np.random.default_rng(seed)
+    return np.rint(middle + rng.normal(scale=level, size=(n, which.n_taxels, 3)))
+
+
+def told_of(values, which=TIP, **options):
+    return feed(Detector(model(("thumb",), which=which, **options)), values)
+
+
+def told_faults(values, which=TIP, **options):
+    return runs(told_of(values, which, **options), lambda e: (e.faults, e.faulty_taxels))
+
+
+class TestDead:
+    def test_after_two_seconds_of_lively_company(self):
+        values = white()
+        values[:, 4] = 30_000.0
+        assert told_faults(values) == [(((), ()), 200), (((Fault.DEAD,), (4,)), 700)]
+
+    def test_until_it_comes_alive(self):
+        values = white()
+        values[:500, 4] = 30_000.0
+        found = told_faults(values)
+        assert found == [(((), ()), 200), (((Fault.DEAD,), (4,)), 300), (((), ()), 400)]
+
+    def test_sent_twice_is_no_sign_of_death(self):
+        values = np.repeat(white(450), 2, axis=0)
+        assert told_faults(values) == [(((), ()), 900)]
+        values[:, 4] = 30_000.0
+        assert told_faults(values)[0] == (((), ()), 400)  # two hundred that differ
+
+    def test_a_dead_band_is_not_death(self):
+        values = white()
+        values[:, 2:] = 0.0  # two of six feel something
+        assert told_faults(values, sensor(6, "tip", limits=None)) == [(((), ()), 900)]
+
+    def test_two_dead_among_six_are_not_told_from_a_dead_band(self):
+        values = white()
+        values[:, 4:] = 30_000.0
+        assert told_faults(values) == [(((), ()), 900)]
+
+    @pytest.mark.parametrize("parts", [2, 3, 6])
+    def test_taxels_that_are_read_in_turns(self, parts):
+        values = white()
+        for k in range(1, len(values)):
+            old = np.arange(6) % parts != k % parts
+            values[k, old] = values[k - 1, old]
+        assert told_faults(values) == [(((), ()), 900)]
+
+
+class TestStuckTaxel:
+    def test_after_half_a_second_and_until_it_moves(self):
+        values = white()
+        values[300:500, 2] = values[300, 2]
+        found = told_faults(values)
+        assert found == [(((), ()), 350), (((Fault.STUCK,), (2,)), 150), (((), ()), 400)]
+
+    def test_windows_begin_anew_after_it(self):
+        values = white()
+        values[300:500, 2] = values[300, 2] + 4000.0
+        told = told_of(values)
+        assert [(str(reason), n) for reason, n in runs(told, lambda e: e.reason)[-3:]] == [
+            ("fault", 150),
+            ("warm_up", 5),
+            ("", 395),
+        ]
+        assert np.isfinite([e.force for e in told[350:500]]).all()
+        assert np.isnan([e.instability for e in told[350:505]]).all()
+        assert max(e.instability for e in told[505:]) < 20.0
+
+    def test_the_whole_finger_at_once_names_no_taxel(self):
+        values = white()
+        values[300:] = values[300]
+        assert told_faults(values)[-1][0] == ((Fault.STUCK,), ())
+
+    def test_sent_again_and_again_for_a_while(self):
+        values = white()
+        values[300:340] = values[300]
+        assert told_faults(values) == [(((), ()), 900)]
+
+    def test_at_a_limit_it_is_saturated_instead(self):
+        values = white()
+        values[300:500, 2] = 65_535.0
+        found = told_faults(values)
+        assert found == [(((), ()), 300), (((Fault.SATURATED,), (2,)), 200), (((), ()), 400)]
+
+    def test_a_quiet_sensor_may_stand_still(self):
+        values = white(level=0.25)
+        values[:, 2] = 30_000.0
+        values[:200:2, 2, 0] += 1.0  # flickered between two counts
+        assert told_faults(values) == [(((), ()), 900)]
+
+
+class TestNoisy:
+    def noisy(self, level, which=TIP, taxels=(3,)):
+        values = white(which=which)
+        rng = np.random.default_rng(9)
+        for taxel in taxels:
+            values[300:500, taxel] += np.rint(rng.normal(scale=level, size=(200, 3)))
+        return values
+
+    def test_a_loose_wire(self):
+        found = told_of(self.noisy(2000.0))
+        bad = np.array([e.faults == (Fault.NOISY,) for e in found])
+        assert not bad[:301].any()
+        assert bad[310:500].all()
+        assert not bad[800:].any()  # three seconds are twelve times what it is smoothed over
+        assert {e.faulty_taxels for e in found} == {(), (3,)}
+        assert max(e.instability for e in found[810:]) < 20.0
+
+    def test_that_was_loose_all_the_time(self):
+        values = white()
+        values[:, 3] += np.rint(np.random.default_rng(9).normal(scale=2000.0, size=(900, 3)))
+        assert told_faults(values)[1:] == [(((Fault.NOISY,), (3,)), 880)]
+
+    def test_noise_that_is_not_loud(self):
+        assert told_faults(self.noisy(12.0)) == [(((), ()), 900)]
+
+    def test_noise_in_two_taxels_comes_from_outside(self):
+        assert told_faults(self.noisy(2000.0, taxels=(2, 3))) == [(((), ()), 900)]
+
+    @pytest.mark.parametrize("hertz", [1.0, 5.0, 12.0])
+    def test_what_moves_is_no_noise(self, hertz):
+        values = white()
+        wave = 3000.0 * np.sin(2 * np.pi * hertz * np.arange(900) / RATE)
+        values[:, 3, 0] += np.rint(wave)
+        assert told_faults(values) == [(((), ()), 900)]
+
+    def test_a_step_is_no_noise(self):
+        values = white()
+        values[300:, 3, 2] += 8000.0
+        assert told_faults(values) == [(((), ()), 900)]
+
+    def test_jumps_over_a_dead_band_are_no_noise(self):
+        values = white(which=IN_NEWTONS)
+        gate = np.random.default_rng(3).random(900) < 0.3
+        values[gate, 3] = 0.0
+        assert told_faults(values, sensor(6, "tip", limits=None)) == [(((), ()), 900)]
+
+    def test_three_taxels_are_too_few(self):
+        which = sensor(3, limits=(0.0, 65_535.0))
+        assert told_faults(self.noisy(2000.0, which, (1,)), which) == [(((), ()), 900)]
+
+    def test_in_newtons_beside_what_was_measured(self):
+        loud = self.noisy(2000.0, IN_NEWTONS) * 1e-3
+        assert (Fault.NOISY,) in {e.faults for e in told_of(loud, IN_NEWTONS)}
+        quiet = self.noisy(100.0, IN_NEWTONS) * 1e-3
+        assert {e.faults for e in told_of(quiet, IN_NEWTONS)} == {()}
+
+
+class TestTaxelsBeyondAMask:
+    def test_are_a_fault_all_the_same(self):
+        which = sensor(70, limits=(0.0, 65_535.0))
+        values = white(400, which)
+        values[:, [3, 66]] = 30_000.0
+        assert told_faults(values, which)[-1] == (((Fault.DEAD,), (3,)), 200)
+        values[300, 66, 0] = np.nan
+        assert told_of(values, which)[300].faulty_taxels == ()
+
+
+class TestTareDrift:
+    def crept(self, seconds, height=400.0, n=2000, start=500):
+        """F_a that rises to `height` in so many seconds, and stays."""
+        ramp = np.clip((np.arange(n) - start) / (seconds * RATE), 0, 1) * height
+        values = white(n, sensor(1), level=5.0)
+        values[:, 0] += np.rint(ramp)[:, None] * sensor(1).rotations[0].T[:, 0]
+        return values
+
+    def told(self, values):
+        which = sensor(1, limits=None)
+        judge = model(("thumb",), which=which, threshold=100.0, window=14)
+        return feed(Detector(judge), values)
+
+    @pytest.mark.parametrize("seconds", [10.0, 14.0])
+    def test_what_creeps_over_the_threshold_is_drift(self, seconds):
+        told = self.told(self.crept(seconds))
+        above = [e for e in told[30:] if np.hypot.reduce(e.force) >= 100.0]
+        drifted = [e for e in above if e.faults]
+        assert len(drifted) > 0.98 * len(above) > 100  # but for noise, far under the threshold
+        assert {(e.state, e.reason, e.faults, e.faulty_taxels) for e in drifted} == {
+            (UNKNOWN, Reason.FAULT, (Fault.TARE_DRIFT,), ())
+        }
+        assert all(np.isnan(e.stable_probability) and np.isfinite(e.instability) for e in drifted)
+
+    @pytest.mark.parametrize("seconds", [0.01, 0.3, 2.0])
+    def test_a_touch_is_no_drift(self, seconds):
+        told = self.told(self.crept(seconds))
+        assert {e.faults for e in told} == {()}
+        assert UNKNOWN not in {e.state for e in told[40:]}
+
+    def test_a_touch_ends_it(self):
+        values = self.crept(10.0)
+        values[1700:, 0, 2] += 900.0
+        told = self.told(values)
+        assert {e.faults for e in told[1600:1700]} == {(Fault.TARE_DRIFT,)}
+        assert {e.faults for e in told[1710:]} == {()}
+        assert UNKNOWN not in {e.state for e in told[1710:]}
+
+    def test_it_ends_under_the_threshold(self):
+        values = self.crept(10.0)
+        values = np.concatenate([values, values[::-1]])
+        told = self.told(values)
+        assert {e.faults for e in told[1600:2400]} == {(Fault.TARE_DRIFT,)}
+        assert {e.state for e in told[-400:]} == {ContactState.NO_CONTACT}
+
+    def test_a_model_without_a_threshold_has_none(self):
+        judge = model(("thumb",), which=sensor(1, limits=None))
+        assert {e.faults for e in feed(Detector(judge), self.crept(10.0))} == {()}
+
+
+class TestIgnore:
+    def test_contributes_nothing(self):
+        values = white()
+        spoiled = values.copy()
+        spoiled[300:, 1] = np.nan
+        spoiled[:, 4] = 1e9
+        one = Detector(model(("thumb",), which=TIP), ignore={"thumb": (1, 4)})
+        two = Detector(model(("thumb",), which=TIP), ignore={"thumb": [4, 1]})
+        assert list(map(repr, feed(one, values))) == list(map(repr, feed(two, spoiled)))
+        force = np.array([e.force for e in feed(Detector(model(("thumb",), which=TIP)), values)])
+        kept = [0, 2, 3, 5]
+        part = type(TIP)("part", TIP.positions[kept], TIP.rotations[kept], TIP.normal, RATE)
+        alone = feed(Detector(model(("thumb",), which=part)), values[:, kept])
+        two.reset()
+        again = np.array([e.force for e in feed(two, spoiled)])
+        assert again == pytest.approx(np.array([e.force for e in alone]), nan_ok=True)
+        assert not np.allclose(again, force, equal_nan=True)
+
+    def test_causes_no_fault(self):
+        values = white()
+        values[:, 2] = 30_000.0
+        detector = Detector(model(("thumb",), which=TIP), ignore={"thumb": (2,)})
+        assert {e.faults for e in feed(detector, values)} == {()}
+
+    @pytest.mark.parametrize("tare", ["0.2", "first", "none", "0.1:0.4"])
+    def test_offline_too(self, tare):
+        values = white(300).astype(float)
+        values[:, 5] = np.nan
+        made = recording(thumb=Tactile(TIP, np.arange(300) / RATE, values))
+        judge = model(("thumb",), which=TIP, tare=tare)
+        detector = Detector.for_recording(judge, made, ignore={"thumb": (5,)})
+        found = detector.run(made).fingers["thumb"]
+        assert set(found.faults.tolist()) == {0}
+        if ":" not in tare:
+            live = feed(Detector(judge, ignore={"thumb": (5,)}), values)
+            assert list(map(repr, live)) == [repr(found.estimate(k)) for k in range(300)]
+
+    @pytest.mark.parametrize(
+        ("ignore", "message"),
+        [
+            ({"ring": [0]}, "taxels of 'ring' to be ignored; the model judges thumb"),
+            ({"thumb": [0, 6]}, "thumb: taxel 6 to be ignored; it has the taxels 0 to 5"),
+            ({"thumb": [-1]}, "thumb: taxel -1 to be ignored; it has the taxels 0 to 5"),
+        ],
+    )
+    def test_refuses_what_is_not_there(self, ignore, message):
+        judge = model(("thumb",), which=TIP)
+        made = recording(thumb=tactile(which=TIP))
+        for make in (
+            lambda: Detector(judge, ignore=ignore),
+            lambda: Detector.for_recording(judge, made, ignore=ignore),
+        ):
+            with pytest.raises(ValueError) as raised:
+                make()
+            assert str(raised.value) == message
+
+
+@st.composite
+def ailing(draw, n=700):
+    """Readings of six taxels of which some fail in some way for some time."""
+    unit = draw(st.sampled_from(["count", "N"]))
+    which = sensor(6, "tip", limits=(0.0, 65_535.0) if unit == "count" else None, unit=unit)
+    seed = draw(st.integers(0, 999))
+    level = draw(st.sampled_from([0.2, 0.6, 3.0]))
+    values = white(n, which, seed, level)
+    rng = np.random.default_rng([seed, 1])
+    values += np.rint(rng.normal(scale=30, size=(n, 1, 3)).cumsum(axis=0) * draw(st.booleans()))
+    creep = draw(st.sampled_from([0.0, 0.05, 0.2, 1.0]))
+    values[:, :, 2] += np.rint(creep * np.arange(n))[:, None]
+    ways = st.sampled_from(["still", "noise", "step", "zero", "limit", "beyond", "nan"])
+    for way in draw(st.lists(ways, max_size=4)):
+        taxel, start = draw(st.integers(0, 5)), draw(st.sampled_from([0, 60, 250, 400]))
+        part = values[start : start + draw(st.sampled_from([1, 5, 100, 700])), taxel]
+        if way == "still":
+            part[:] = part[0]
+        elif way == "noise":
+            part += np.rint(rng.normal(scale=draw(st.sampled_from([5, 3000])), size=part.shape))
+        elif way == "step":
+            part += 4000.0
+        elif way == "zero":
+            part[rng.random(len(part)) < 0.5] = 0.0
+        else:
+            part[:, 1] = {"limit": 65_535.0, "beyond": 7e4, "nan": np.nan}[way]
+    kept = rng.random(n) > draw(st.sampled_from([0.0, 0.03]))
+    for start in draw(st.lists(st.integers(1, n - 1), max_size=2)):
+        kept[start : start + draw(st.sampled_from([3, 40]))] = False
+    if draw(st.booleans()):
+        repeated = np.flatnonzero(rng.random(n - 1) < 0.4) + 1
+        values[repeated] = values[repeated - 1]
+    ignore = draw(st.sets(st.integers(0, 5), max_size=2))
+    return which, values[kept], np.flatnonzero(kept) / RATE, {"finger1": sorted(ignore)}
+
+
+@given(
+    sick=ailing(),
+    tare=st.sampled_from(["0.2", "first", "none"]),
+    noise=st.sampled_from([None, 5.0, 60.0]),
+    cuts=st.lists(st.integers(1, 699), max_size=3),
+)
+@settings(max_examples=25, deadline=None)
+def test_equals_the_twin_live_and_in_any_chunks(sick, tare, noise, cuts):
+    which, values, times, ignore = sick
+    judge = Model(fingers={ANY_FINGER: finger_model(contact_noise=noise)}, window=6, tare=tare)
+    sensors = {"finger1": which}
+    live = Detector(judge, sensors, RATE, ignore=ignore)
+    twin = naive.Hand(judge, sensors, Tare.parse(tare), RATE, ignore)
+    offline = Detector(judge, sensors, RATE, ignore=ignore)
+    bounds = sorted({0, len(values), *(cut for cut in cuts if cut < len(values))})
+    pieces = [
+        offline.run(recording(finger1=Tactile(which, times[a:b], values[a:b])))
+        for a, b in pairwise(bounds)
+    ]
+    rows = [p.fingers["finger1"].estimate(k) for p in pieces for k in range(len(p.times))]
+    for value, time, row in zip(values, times, rows, strict=True):
+        estimate = live.update({"finger1": value}, time)
+        same(estimate, twin.update({"finger1": value}, time))
+        assert repr(estimate.fingers["finger1"]) == repr(row)
+
+
+def test_a_recording_says_which_taxels():
+    values = white(400)
+    values[:, 4] = 30_000.0
+    made = recording(thumb=Tactile(TIP, np.arange(400) / RATE, values))
+    found = detect(model(("thumb",), which=TIP), made).fingers["thumb"]
+    assert found.faulty_taxels[[199, 200]].tolist() == [0, 1 << 4]
+    assert found.estimate(200).faulty_taxels == (4,)
