@@ -44,23 +44,16 @@ def verb(*words):
         late.cancel()
 
 
-def address(told):
-    return f"xela://{told['uri'].removeprefix('ws://').removeprefix('xela://')}"
-
-
 FINGERS = ("thumb", "index", "middle", "ring")
-NAMES = "?fingers=1:thumb,2:index,3:middle,4:ring"
 
 
-@pytest.mark.parametrize(
-    ("words", "names"), [((), NAMES), (("--whole-hand", "--version", "1.7"), "")]
-)
-def test_decisions_over_the_wire_are_those_of_the_recording(tmp_path, words, names):
+@pytest.mark.parametrize("words", [(), ("--whole-hand", "--version", "1.7")])
+def test_decisions_over_the_wire_are_those_of_the_recording(tmp_path, words):
     path, recording = build.grasp_file(tmp_path, fingers=FINGERS)
     model = build.model()
     with (
         verb("play", path, "--once", "--speed", 3, "--port", 0, *words) as told,
-        open_source(address(told) + names) as source,
+        open_source(told["uri"]) as source,
     ):
         judge = Judge(model, source.sensors)
         decisions = []
@@ -88,7 +81,7 @@ def test_the_page_shows_what_a_server_sends(tmp_path):
     path, _ = build.grasp_file(tmp_path, fingers=FINGERS)
     with (
         verb("play", path, "--port", 0, "--whole-hand") as player,
-        verb("serve", build.TWIN, address(player), "--port", 0, "--record-to", tmp_path) as server,
+        verb("serve", build.TWIN, player["uri"], "--port", 0, "--record-to", tmp_path) as server,
         sync_api.sync_playwright() as playwright,
     ):
         browser = playwright.chromium.launch(

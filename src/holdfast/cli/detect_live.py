@@ -19,9 +19,11 @@ def detections_live(
     model: "Model", uri: str, rate: RateRule, ignore: str, seconds: float | None
 ) -> Iterator["Detection"]:
     """What the model says of a live source, arrival by arrival, until Ctrl-C or `seconds`."""
+    from holdfast.live.judge import warm_up
     from holdfast.live.tracing import detection_of
     from holdfast.sources import open_source
 
+    warm_up()
     with suppress(KeyboardInterrupt), open_source(uri) as source:
         judge = judge_of(model, source, rate, ignore)
         for decisions in _decisions(source, judge, seconds):

@@ -57,9 +57,10 @@ def import_(
 ) -> None:
     """Brings in other people's data, whatever its format.
 
-    Formats: uskin-pick-move, xela-log, gtac, arq-crisp, csv (see docs/formats.md). Recordings of
-    holdfast itself come in too: an .mcap file that was cut is recovered as far as it goes. Writes
-    OUT/NAME.parquet for each recording: all of them, or none where anything goes wrong.
+    Formats: uskin-pick-move, xela-log, gtac, arq-crisp, rosbag, csv (see docs/formats.md).
+    Recordings of holdfast itself come in too: an .mcap file that was cut is recovered as far as
+    it goes. Writes OUT/NAME.parquet for each recording: all of them, or none where anything
+    goes wrong.
 
     Example:
       holdfast import data/uskin_pick_move real/

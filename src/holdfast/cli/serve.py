@@ -14,6 +14,7 @@ from holdfast.cli.page import HOST, PORT, show_page
 
 if TYPE_CHECKING:
     from holdfast.live.judge import Judge
+    from holdfast.live.ros_publisher import RosPublisher
 
 
 def serve(
@@ -66,11 +67,13 @@ def serve(
       holdfast serve model.json xela://auto --ros2
       holdfast serve model.json grasp.parquet --host 0.0.0.0 --token SECRET
     """
+    from holdfast.live.judge import warm_up
     from holdfast.sources import open_source
     from holdfast.web.guard import Guard
 
     guard = Guard(host, token)
     wanted = debounced(model, debounce, hysteresis)
+    warm_up()
 
     def tell(url: str) -> None:
         page = url if token is None else f"{url}?token={token}"

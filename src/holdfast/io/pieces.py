@@ -1,6 +1,6 @@
 """A recording in consecutive pieces, so that memory stays bounded."""
 
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
 from types import ModuleType
@@ -92,7 +92,7 @@ def _split(samples: _Buffer, n_samples: int) -> list[_Buffer]:
     ]
 
 
-def _joined(parts: list[Samples]) -> _Buffer:
+def _joined(parts: Sequence[Samples]) -> _Buffer:
     topics = list(dict.fromkeys(topic for part in parts for topic in part))
     return {
         topic: (

@@ -14,7 +14,7 @@ from holdfast.features import Tare
 from holdfast.model import Model
 from holdfast.recordings import GAP_PERIODS
 from holdfast.resampling import Resampler
-from holdfast.sensors import Sensor
+from holdfast.sensors import Sensor, sensor
 from holdfast.sources import Arrival
 
 RATE_SECONDS = 0.5
@@ -23,6 +23,11 @@ LEAST_SILENCE = 0.1
 """A source that says nothing for so long is silent, however fast it is [s]."""
 
 Samples = Mapping[str, npt.NDArray[Any]]
+
+
+def warm_up() -> None:
+    """Loads the compiled kernels, so that no live source waits for them."""
+    Detector(Model.load("builtin:noise-floor"), {"index": sensor("uskin-4x4")})
 
 
 class Decision(NamedTuple):
@@ -81,7 +86,7 @@ class Judge:
         self._ignore = ignore
         self._kept: list[Arrival] = []
         self._detector: Detector | None = None
-        Detector(model, self.fingers, 100.0, ignore=ignore)  # refuses what it must, and compiles
+        Detector(model, self.fingers, 100.0, ignore=ignore)  # refuses what it must
         self._resamplers: dict[str, Resampler] = {}
         self._faults: dict[str, tuple[Fault, ...]] = {}
         self._last: HandEstimate | None = None

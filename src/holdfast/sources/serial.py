@@ -51,7 +51,7 @@ class Board(Source):
         if not self._path:
             raise ValueError(f"{address.text}: a port expected, as in serial:///dev/ttyACM0")
         self._baud = _count(address, "baud", BAUD)
-        self._sensor = _sensor(address)
+        self._sensor = address.sensor() or sensor("anyskin")
         self._n_mags = _count(address, "mags", self._sensor.n_taxels)
         self._modules = _modules(address, self._n_mags, self._sensor)
         self._decoder = Decoder(self._n_mags)
@@ -221,14 +221,6 @@ def _count(address: Address, name: str, default: int) -> int:
     if not (text.isascii() and text.isdecimal() and int(text)):
         raise ValueError(f"{address.text}: {name}={default}, at least 1, expected, {text!r} given")
     return int(text)
-
-
-def _sensor(address: Address) -> Sensor:
-    name = address.parameters.get("sensor", "anyskin")
-    try:
-        return Sensor.from_json(name) if name.endswith(".json") else sensor(name)
-    except (ValueError, OSError) as cause:
-        raise ValueError(f"{address.text}: {cause}") from cause
 
 
 def _modules(address: Address, n_mags: int, kind: Sensor) -> tuple[str, ...]:

@@ -7,6 +7,7 @@ from importlib import import_module
 from pathlib import Path
 from urllib.parse import parse_qsl, urlsplit
 
+from holdfast.sensors import Sensor, built_in_sensors, sensor
 from holdfast.sources.source import Source
 
 SCHEMES = {
@@ -17,6 +18,9 @@ SCHEMES = {
     "serial": "a serial sensor: serial:///dev/ttyACM0?sensor=anyskin",
 }
 """Schemes of the URIs of sources, and what each is; a module of that name has its source."""
+
+VALUES = ("counts", "calibrated")
+"""What can be taken from a packet: uint16 counts, or newtons where the device has them."""
 
 _URI = re.compile(r"(?P<scheme>[a-z][a-z0-9+]+):")
 
@@ -64,6 +68,40 @@ class Address:
                 raise ValueError(f"{self.text}: a name for each finger expected, {given!r} given")
             names[int(number)] = name.strip()
         return names
+
+    def calibrated(self) -> bool:
+        """Whether `values=calibrated` asks for newtons, instead of `values=counts`.
+
+        Raises:
+            ValueError: it is neither.
+        """
+        values = self.parameters.get("values", VALUES[0])
+        if values not in VALUES:
+            raise ValueError(
+                f"{self.text}: values={' or '.join(VALUES)} expected, {values!r} given"
+            )
+        return values == "calibrated"
+
+    def sensor(self) -> Sensor | None:
+        """What `sensor=FILE.json`, or the name of one that is built in, gives; None if neither.
+
+        Raises:
+            ValueError: there is no such sensor.
+        """
+        given = self.parameters.get("sensor")
+        if given is None:
+            return None
+        if not given.endswith(".json") and given not in built_in_sensors():
+            raise ValueError(
+                f"{self.text}: sensor=FILE.json or one of {', '.join(built_in_sensors())} "
+                f"expected, {given!r} given"
+            )
+        try:
+            return Sensor.from_json(given) if given.endswith(".json") else sensor(given)
+        except OSError as cause:
+            raise ValueError(f"{self.text}: cannot read {given}: {cause.strerror}") from cause
+        except ValueError as cause:
+            raise ValueError(f"{self.text}: {cause}") from cause
 
 
 def parse(text: str) -> tuple[str, Address]:

@@ -36,5 +36,5 @@ def test_what_is_refused(query, text):
 
 
 def test_a_sensor_that_is_no_file(tmp_path):
-    with pytest.raises(OSError, match=r"nothing\.json"):
+    with pytest.raises(ValueError, match=r"nothing\.json"):
         open_source(f"xela://auto?sensor={tmp_path}/nothing.json")

@@ -8,14 +8,11 @@ from typing import NamedTuple
 
 from holdfast.errors import SourceError
 from holdfast.io.ros_messages import Message
-from holdfast.sensors import Sensor, built_in_sensors, sensor
 from holdfast.sensors.values import Unit
 from holdfast.sources.ros.translator import Translator
 from holdfast.sources.source import Arrival, Source, word
 from holdfast.sources.uri import Address
 
-VALUES = ("counts", "calibrated")
-"""What can be taken from a message: uint16 counts, or newtons where it has them."""
 PATIENCE = 5.0
 """How long entering waits for a message with samples [s]."""
 GATHERING = 1.0
@@ -90,7 +87,8 @@ class TopicSource(Source):
     def __init__(self, address: Address, link: Link) -> None:
         self.name = address.text
         self._link = link
-        self._options = (address.names(), _unit(address), _sensor(address))
+        unit: Unit = "N" if address.calibrated() else "count"
+        self._options = (address.names(), unit, address.sensor())
         self._translator = Translator(*self._options)
         self._forget()
 
@@ -240,24 +238,3 @@ def topic_of(address: Address) -> str:
 
 def _has_taxels(message: Message) -> bool:
     return len(message.forces if message.counts is None else message.counts) > 0
-
-
-def _unit(address: Address) -> Unit:
-    values = address.parameters.get("values", VALUES[0])
-    if values not in VALUES:
-        raise ValueError(f"{address.text}: values={' or '.join(VALUES)} expected, {values!r} given")
-    return "count" if values == VALUES[0] else "N"
-
-
-def _sensor(address: Address) -> Sensor | None:
-    given = address.parameters.get("sensor")
-    if given is None:
-        return None
-    if given in built_in_sensors():
-        return sensor(given)
-    if not given.endswith(".json"):
-        raise ValueError(
-            f"{address.text}: sensor=FILE.json or one of {', '.join(built_in_sensors())} "
-            f"expected, {given!r} given"
-        )
-    return Sensor.from_json(given)
