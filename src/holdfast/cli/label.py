@@ -26,7 +26,7 @@ def label(
     ] = False,
     export: Annotated[
         tuple[str, Path] | None,
-        typer.Option(help="Write labels for others: label-studio FOLDER or csv FOLDER."),
+        typer.Option(metavar="FORMAT FOLDER", help="Write labels: label-studio or csv."),
     ] = None,
     take: Annotated[
         Path | None, typer.Option("--import", help="Take labels: Label Studio's JSON, CSV.")
@@ -36,7 +36,7 @@ def label(
     ] = False,
     poses: Annotated[Path | None, typer.Option(help="CSV of poses for the rule tracking.")] = None,
     parameters: Annotated[
-        list[str] | None, typer.Option("--set", help="A rule's parameter: NAME=VALUE.")
+        list[str] | None, typer.Option("--set", metavar="NAME=VALUE", help="A rule's parameter.")
     ] = None,
     tare: Annotated[
         str, typer.Option(help="Seconds from the start, first, none, or START:END.")

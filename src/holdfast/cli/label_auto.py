@@ -64,7 +64,7 @@ def label_by_rule(
         print_json({"rule": rule, "written": not dry_run, "recordings": documents})
     else:
         tell(documents)
-    finish(documents)
+    finish(documents, written=not dry_run)
 
 
 def refuse_persons(files: Sequence[Path]) -> None:
@@ -179,18 +179,23 @@ def _tell_doubts(doubts: Sequence[tuple[str, dict[str, Any]]]) -> None:
         show(f"and {len(doubts) - MOST_DOUBTFUL} more: --json tells all of them")
 
 
-def finish(documents: Sequence[dict[str, Any]]) -> None:
+def finish(documents: Sequence[dict[str, Any]], *, written: bool) -> None:
     """Tells which labels are hidden now, and which recordings failed.
+
+    Args:
+        documents: from `label_all`.
+        written: whether label files were.
 
     Raises:
         RecordingError: one failed.
     """
     from holdfast.errors import RecordingError
 
-    if hidden := [each["name"] for each in documents if each.get("n_inside")]:
+    n_hidden = sum(bool(each.get("n_inside")) for each in documents)
+    if written and n_hidden:
         say(
-            f"{len(hidden)} of these recordings have labels inside as well; those of the label "
-            "files count while the files are there"
+            f"{n_hidden} of {len(documents)} recordings have labels inside as well: the label "
+            "files count while they are there"
         )
     errors = [each["error"] for each in documents if "error" in each]
     for error in errors[:-1]:

@@ -114,4 +114,4 @@ def import_labels(
         print_json({"source": str(source), "written": not dry_run, "recordings": documents})
     else:
         tell(documents)
-    finish(documents)
+    finish(documents, written=not dry_run)

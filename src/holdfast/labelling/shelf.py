@@ -142,7 +142,8 @@ class Shelf:
         """
         work = self.work(place)
         with self._computing:
-            return dict(work.changes)
+            _ = work.signals
+        return dict(work.changes)
 
     def stored(self, place: int) -> Stored:
         """The labels of a recording that are on the disk.
