@@ -425,3 +425,19 @@ class TestNoiseFloor:
         detector = Detector(model(("thumb",)))
         feed(detector, np.full((40, 2, 3), 500.0))
         assert detector._memory.levels[0, 4] == pytest.approx(np.sqrt(2 / 12))
+
+
+class TestBaselines:
+    def test_of_fingers_whose_tare_is_complete_and_a_copy(self):
+        detector, values = Detector(model()), lively(40)
+        feed(detector, values[:N_TARE])
+        assert detector.baselines() == {}
+        feed(detector, values[N_TARE:], start=N_TARE / RATE)
+        found = detector.baselines()
+        assert list(found) == ["thumb"]
+        assert np.allclose(found["thumb"], values[:N_TARE].mean(axis=0))
+        found["thumb"][:] = 0.0
+        assert detector.baselines()["thumb"].any()
+
+    def test_fingers_of_the_model_count(self):
+        assert Detector(model()).n_fingers == 2
