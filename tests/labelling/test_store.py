@@ -1,4 +1,6 @@
 import json
+import time
+from concurrent.futures import ThreadPoolExecutor
 from dataclasses import replace
 
 import pytest
@@ -6,6 +8,7 @@ import pytest
 from holdfast.contact import Cause, ContactState
 from holdfast.errors import OutputError, RecordingError
 from holdfast.io import labels_path, load_labels, load_recording, save_labels, save_recording
+from holdfast.labelling import store
 from holdfast.labelling.store import (
     ConflictError,
     GivenLabel,
@@ -244,3 +247,26 @@ def test_a_disk_that_refuses_leaves_what_was_there(bare, monkeypatch):
         save(bare, {"thumb": [LOST]}, first.revision)
     assert read_stored(path, recording) == first
     assert sorted(p.name for p in path.parent.iterdir()) == ["bare.labels.json", "bare.parquet"]
+
+
+def test_of_many_that_save_at_once_one_wins(bare, monkeypatch):
+    recording, path = bare
+    write = store.write_whole
+
+    def slowly(*given, **words):
+        time.sleep(0.05)  # all others have read the revision by now, unless they have to wait
+        write(*given, **words)
+
+    monkeypatch.setattr(store, "write_whole", slowly)
+
+    def attempt(number):
+        try:
+            return save(bare, {"thumb": [HELD]}, note=str(number))
+        except ConflictError as conflict:
+            return conflict.revision
+
+    with ThreadPoolExecutor(6) as pool:
+        found = list(pool.map(attempt, range(6)))
+    (won,) = (each for each in found if not isinstance(each, str))
+    assert read_stored(path, recording) == won
+    assert [each for each in found if each is not won] == [won.revision] * 5

@@ -52,7 +52,7 @@ def change_points(times: Array, force: Array, period: float) -> Array:
     if len(own) <= 2 * n:
         return np.empty(0)
     values = uniform_filter1d(values, 2 * round(SMOOTHING / period / 2) + 1, axis=0)
-    ahead, back = _movement(values, n), _movement(values[::-1], n)[::-1]
+    ahead, back = _movements(values, n)
     largest = float(np.quantile(np.linalg.norm(values, axis=1), 0.99))
     calm = max(NOISE_TIMES * float(np.median(ahead)), LEAST * largest, float(np.finfo(float).tiny))
     contrast = np.abs(np.log((ahead + calm) / (back + calm)))
@@ -61,11 +61,17 @@ def change_points(times: Array, force: Array, period: float) -> Array:
     return np.asarray(own[peaks])
 
 
-def _movement(force: Array, n: int) -> Array:
-    """(n_samples,) mean distance of the force from its next n samples, of the last to the end."""
+def _movements(force: Array, n: int) -> tuple[Array, Array]:
+    """(n_samples,) mean distance of the force from its next n samples, and from its last n.
+
+    Beyond both ends the force stays what it is there.
+    """
     steps = np.unique(np.linspace(1, n, min(n, STEPS)).round().astype(int))
-    moved = np.zeros(len(force))
+    ahead, back = np.zeros(len(force)), np.zeros(len(force))
     for step in steps.tolist():
-        moved[:-step] += np.linalg.norm(force[step:] - force[:-step], axis=1)
-        moved[-step:] += np.linalg.norm(force[-1] - force[-step:], axis=1)
-    return moved / len(steps)
+        moved = np.linalg.norm(force[step:] - force[:-step], axis=1)
+        ahead[:-step] += moved
+        back[step:] += moved
+        ahead[-step:] += np.linalg.norm(force[-1] - force[-step:], axis=1)
+        back[:step] += np.linalg.norm(force[0] - force[:step], axis=1)
+    return ahead / len(steps), back / len(steps)

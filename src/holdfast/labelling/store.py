@@ -6,7 +6,8 @@ is a hash of the file's bytes, and whoever saves says which revision he changed.
 
 import hashlib
 import os
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
+from contextlib import contextmanager, suppress
 from dataclasses import dataclass, replace
 from itertools import pairwise
 from pathlib import Path
@@ -20,6 +21,11 @@ from holdfast.files import write_whole
 from holdfast.io.header import label_data
 from holdfast.io.labels import LabelFile, labels_for, labels_path, load_labels
 from holdfast.recordings import Label, Recording
+
+try:
+    import fcntl
+except ImportError:  # Windows has no such locks
+    fcntl = None  # type: ignore[assignment]
 
 NONE = "none"
 """The revision of a label file that is not there."""
@@ -138,13 +144,6 @@ def save_stored(
         name: tuple(each if each.author else replace(each, author=author) for each in own)
         for name, own in mine.items()
     }
-    target = labels_path(path)
-    if is_read_only(path):
-        raise ReadOnlyError(f"{target} cannot be written: it or its folder is read-only")
-    now = revision_of(path)
-    if now != revision:
-        raise ConflictError(f"{target.name} was changed by somebody else since it was read", now)
-    labels_for(path, recording.digest)  # refuses to replace what is no label file of its own
     modules = {name: [label_data(each) for each in own] for name, own in signed.items()}
     file = LabelFile(
         recording=recording.digest,
@@ -154,9 +153,20 @@ def save_stored(
         time=time,
         notes=note,
     )
-    write_whole(target, msgspec.json.format(msgspec.json.encode(file)) + b"\n", force=True)
-    _settle(target)
-    return Stored(signed, "file", revision_of(path), author, time, note)
+    data = msgspec.json.format(msgspec.json.encode(file)) + b"\n"
+    target = labels_path(path)
+    if is_read_only(path):
+        raise ReadOnlyError(f"{target} cannot be written: it or its folder is read-only")
+    with _alone(target.parent):
+        now = revision_of(path)
+        if now != revision:
+            raise ConflictError(
+                f"{target.name} was changed by somebody else since it was read", now
+            )
+        labels_for(path, recording.digest)  # refuses to replace what is no label file of its own
+        write_whole(target, data, force=True)
+        _settle(target)
+        return Stored(signed, "file", revision_of(path), author, time, note)
 
 
 def revision_of(path: Path) -> str:
@@ -250,6 +260,21 @@ def _span(label: Label) -> str:
 
 def _writable(place: Path) -> bool:
     return os.access(place, os.W_OK) and bool(place.stat().st_mode & 0o222)
+
+
+@contextmanager
+def _alone(folder: Path) -> Iterator[None]:
+    """Lets nobody else save in a folder, be it another process; where the system can."""
+    if fcntl is None:
+        yield
+        return
+    handle = os.open(folder, os.O_RDONLY)
+    try:
+        with suppress(OSError):  # a network's disk that knows no locks
+            fcntl.flock(handle, fcntl.LOCK_EX)
+        yield
+    finally:
+        os.close(handle)
 
 
 def _settle(target: Path) -> None:
