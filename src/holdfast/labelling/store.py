@@ -22,11 +22,6 @@ from holdfast.io.header import label_data
 from holdfast.io.labels import LabelFile, labels_for, labels_path, load_labels
 from holdfast.recordings import Label, Recording
 
-try:
-    import fcntl
-except ImportError:  # Windows has no such locks
-    fcntl = None  # type: ignore[assignment]
-
 NONE = "none"
 """The revision of a label file that is not there."""
 
@@ -265,9 +260,11 @@ def _writable(place: Path) -> bool:
 @contextmanager
 def _alone(folder: Path) -> Iterator[None]:
     """Lets nobody else save in a folder, be it another process; where the system can."""
-    if fcntl is None:
+    if os.name != "posix":
         yield
         return
+    import fcntl
+
     handle = os.open(folder, os.O_RDONLY)
     try:
         with suppress(OSError):  # a network's disk that knows no locks
