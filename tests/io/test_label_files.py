@@ -1,6 +1,7 @@
 import re
 
 import msgspec
+import numpy as np
 import pytest
 
 from holdfast.contact import Cause, ContactState
@@ -108,6 +109,14 @@ def test_labels_are_not_overwritten_unless_forced(saved):
     with pytest.raises(OutputError, match="exists already"):
         save_labels(recording, path)
     save_labels(recording, path, force=True)
+
+
+def test_times_of_any_kind_of_number_come_back_from_csv(tmp_path):
+    path = tmp_path / "labels.csv"
+    label = Label(np.float64(0.1), np.float32(0.5), ContactState.STABLE)
+    path.write_text(labels_to_csv({"thumb": [label]}))
+    (got,) = labels_from_csv(path)["thumb"]
+    assert (got.start, got.end) == (0.1, 0.5)
 
 
 def test_csv_goes_out_and_comes_in(tmp_path):

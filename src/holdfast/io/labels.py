@@ -141,9 +141,8 @@ def labels_to_csv(labels: Mapping[str, Sequence[Label]]) -> str:
     writer.writerow(CSV_COLUMNS)
     for finger, intervals in labels.items():
         for label in intervals:
-            cause = label.cause or ""
-            state = label.state.value.lower()
-            writer.writerow([finger, repr(label.start), repr(label.end), state, cause])
+            span = (repr(float(label.start)), repr(float(label.end)))  # NumPy's own repr is none
+            writer.writerow([finger, *span, label.state.value.lower(), label.cause or ""])
     return text.getvalue()
 
 

@@ -1,0 +1,135 @@
+"""A server that sends nonsense, hangs up and comes back: the session goes on and tells of it."""
+
+import random
+
+import numpy as np
+
+from holdfast.contact import ContactState, Fault
+from holdfast.detector import detect
+from holdfast.live.judge import Judge
+from holdfast.live.session import Session
+from holdfast.sensors import sensor
+from holdfast.sources import open_source
+from holdfast.sources.xela.encoder import Encoder
+from sources.xela.servers import HANG_UP, free_port, server
+
+from . import build
+from .test_session import wait_for
+
+EPOCH = 1.7e9
+NAMES = "fingers=1:thumb,2:index,3:middle"
+
+
+def packets_of(recording, epoch=EPOCH):
+    """Every instant of a recording as a packet of XELA's server."""
+    sensors = {name: module.sensor for name, module in recording.modules.items()}
+    encoder = Encoder(sensors)
+    return [
+        encoder.packet(one.samples, epoch + one.time, epoch + one.time)
+        for one in build.arrivals_of(recording)
+    ]
+
+
+def garbage(packet, generator):
+    """A packet that went wrong: cut, torn, of another number of taxels, or no packet at all."""
+    text = bytearray(packet)
+    kind = generator.randrange(6)
+    if kind == 0:
+        return bytes(text[: generator.randrange(len(text))])
+    if kind == 1:
+        for _ in range(1 + generator.randrange(8)):
+            text[generator.randrange(len(text))] = generator.randrange(256)
+        return bytes(text)
+    if kind == 2:
+        return packet.replace(b'"data":"', b'"data":"ZZZZ,', 1)
+    if kind == 3:
+        return b'{"message": 5, "time": 1e308, "1": {"data": "8000", "taxels": 1}}'
+    if kind == 4:
+        return b"[" * generator.randrange(2000)
+    return generator.randbytes(generator.randrange(300))
+
+
+def test_ten_thousand_packets_of_nonsense_do_no_harm():
+    recording = build.grasp()
+    packets = packets_of(recording)
+    generator = random.Random(0)
+    with (
+        server(packets[:1]) as (port, said),
+        open_source(f"xela://127.0.0.1:{port}?{NAMES}") as source,
+    ):
+        session = Session(source, Judge(build.model(), source.sensors))
+        session.start()
+        try:
+            for packet in packets[1:]:
+                said.put(packet)
+                for _ in range(6):
+                    said.put(garbage(packet, generator))
+            wait_for(lambda: said.empty() and session.n_packets >= 0.9 * len(packets))
+        finally:
+            session.stop()
+    assert session.failure is None
+    assert session.n_refused > 5000
+
+
+def test_a_server_that_is_started_anew_keeps_the_tare_and_the_clock():
+    recording = build.grasp()
+    packets = packets_of(recording)
+    port = free_port()
+    heard = []
+    with server(packets[:300], port=port) as (_, said):
+        source = open_source(f"xela://127.0.0.1:{port}?{NAMES}")
+        source.open()
+        session = Session(source, Judge(build.model(), source.sensors))
+        session.listen(heard.append)
+        session.start()
+        wait_for(lambda: session.n_packets == 300)
+        said.put(HANG_UP)
+    try:
+        wait_for(lambda: session.silent)
+        later = packets_of(recording, EPOCH + 2.0)  # its counter begins anew
+        with server(later[300:900], port=port):
+            wait_for(lambda: session.n_packets == 900)
+    finally:
+        session.stop()
+    assert session.failure is None
+    estimates = [d.estimate for said in heard for d in said.decisions if said.arrival is not None]
+    times = [one.time for one in estimates]
+    assert (np.diff(times) > 0).all()
+    notices = [n for said in heard if said.arrival is not None for n in said.arrival.notices]
+    assert any("connection lost" in notice for notice in notices)
+    # The tare was kept: the force is that of the recording, and no finger waits for a new one.
+    expected = detect(build.model(), recording).fingers["thumb"].force[899]
+    np.testing.assert_allclose(estimates[-1].fingers["thumb"].force, expected)
+    assert any(one.fingers["thumb"].state is not ContactState.UNKNOWN for one in estimates[-100:])
+
+
+def test_a_module_of_another_size_is_unknown_until_it_is_well_again():
+    recording = build.grasp()
+    packets = packets_of(recording)
+    one = build.arrivals_of(recording)[500]
+    sensors = {name: module.sensor for name, module in recording.modules.items()}
+    smaller = Encoder({**sensors, "thumb": sensor("uskin-4x6")})
+    samples = {**one.samples, "thumb": one.samples["thumb"][:24]}
+    odd = smaller.packet(samples, EPOCH + one.time, EPOCH + one.time)
+    heard = []
+    with (
+        server([*packets[:500], odd, *packets[501:600]]) as (port, _),
+        open_source(f"xela://127.0.0.1:{port}?{NAMES}") as source,
+    ):
+        session = Session(source, Judge(build.model(), source.sensors))
+        session.listen(heard.append)
+        session.start()
+        wait_for(lambda: session.n_packets == 600)
+        session.stop()
+    decisions = [d for said in heard if said.arrival for d in said.decisions]
+    odd_ones = [  # a busy machine may add LATE, of any finger
+        k for k, d in enumerate(decisions)
+        if Fault.TAXEL_COUNT in d.estimate.fingers["thumb"].faults
+    ]  # fmt: skip
+    assert odd_ones
+    for k in odd_ones:
+        fingers = decisions[k].estimate.fingers
+        assert fingers["thumb"].state is ContactState.UNKNOWN
+        assert Fault.TAXEL_COUNT not in fingers["index"].faults
+    later = [d.estimate.fingers["thumb"] for d in decisions[odd_ones[-1] + 1 :]]
+    assert any(thumb.state is not ContactState.UNKNOWN for thumb in later)
