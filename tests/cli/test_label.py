@@ -282,6 +282,16 @@ def test_an_audit_needs_labels_to_learn_from(capsys, folder):
         (("--auto", "signal", "F", "--set", "share"), "--set NAME=VALUE expected, 'share' given"),
         (("--auto", "signal", "F", "--set", "magic=1"), "rule 'signal' knows no magic"),
         (("--auto", "signal", "F", "--poses", "p.csv"), "--poses are for the rule tracking; rule"),
+        (("--auto", "tracking", "F", "--poses", "gone.csv"), "cannot read gone.csv: No such file"),
+        (("--auto", "tracking", "F", "--poses", "a.bag"), "a.bag is no .csv, so taken for a bag: "),
+        (
+            ("--auto", "tracking", "F", "--poses", "a.bag", "--track", "object=/pose"),
+            "cannot read a.bag",
+        ),
+        (
+            ("--auto", "tracking", "F", "--track", "object=/pose"),
+            "--track names topics or frames of a bag: give --poses BAG",
+        ),
         (("--auto", "signal", "gone"), "gone does not exist; a recording or a folder expected"),
         (("--auto", "signal", "F", "--compare"), "--auto and --compare given; one of them"),
         (("--page", "F"), "--page shows what --audit found: give --audit as well"),
@@ -299,6 +309,7 @@ def test_an_audit_needs_labels_to_learn_from(capsys, folder):
 )
 def test_bad_input_is_one_line(capsys, folder, words, text, monkeypatch):
     monkeypatch.chdir(folder.parent)
+    (folder.parent / "p.csv").write_text("time,x,y,z,qw,qx,qy,qz\n0,0,0,0,1,0,0,0\n")
     code, out, err = run(capsys, *("recordings" if word == "F" else word for word in words))
     assert (code, out) == (2, "")
     assert err.count("\n") == 1

@@ -34,7 +34,15 @@ def label(
     page: Annotated[
         bool, typer.Option("--page", help="After --audit: show what it found on the page.")
     ] = False,
-    poses: Annotated[Path | None, typer.Option(help="CSV of poses for the rule tracking.")] = None,
+    poses: Annotated[
+        Path | None, typer.Option(help="Poses for the rule tracking: a CSV file, or a bag.")
+    ] = None,
+    tracks: Annotated[
+        list[str] | None,
+        typer.Option(
+            "--track", metavar="BODY=NAME", help="Topic or frame of a bag; BODY: object, thumb, ..."
+        ),
+    ] = None,
     parameters: Annotated[
         list[str] | None, typer.Option("--set", metavar="NAME=VALUE", help="A rule's parameter.")
     ] = None,
@@ -77,6 +85,7 @@ def label(
       holdfast label recordings/
       holdfast label --auto signal recordings/ --dry-run
       holdfast label --auto tracking grasp.parquet --poses markers.csv
+      holdfast label --auto tracking grasp.mcap --poses run.bag --track object=/aruco/pose
       holdfast label --compare recordings/ eve/ --json
       holdfast label --compare recordings/ signal
       holdfast label --audit recordings/ --page
@@ -85,7 +94,7 @@ def label(
     """
     from holdfast.cli.label_common import Asking, Serving
 
-    asking = Asking(tare, poses, tuple(parameters or ()))
+    asking = Asking(tare, poses, tuple(tracks or ()), tuple(parameters or ()))
     serving = Serving(host, port, token, not no_browser, as_json)
     mode = _mode(auto, compare, audit, export, take)
     if page and mode != "audit":

@@ -4,10 +4,12 @@ import getpass
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from datetime import datetime
+from functools import cached_property
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
+    from holdfast.labelling.poses import Poses
     from holdfast.labelling.store import Labels
     from holdfast.recordings import Label, Recording
 
@@ -22,13 +24,38 @@ class Asking:
 
     Attributes:
         tare: how the baseline is found.
-        poses: path of a CSV file of poses, for `tracking`.
+        poses: path of a CSV file of poses, or of a bag, for `tracking`.
+        tracks: topics or frames of a bag, as BODY=NAME.
         parameters: others, as NAME=VALUE.
     """
 
     tare: str = "0.5"
     poses: Path | None = None
+    tracks: tuple[str, ...] = ()
     parameters: tuple[str, ...] = ()
+
+    @cached_property
+    def tracking(self) -> "Poses | None":
+        """The poses that are given; None where none are.
+
+        Raises:
+            ValueError: tracks without a bag, or a bag without the object's.
+            RecordingError: the file cannot be read.
+            MissingExtra: it is a bag, and rosbags is not installed.
+        """
+        from holdfast.labelling.poses import OBJECT, poses_from_bag, poses_from_csv
+
+        if self.poses is None or self.poses.suffix == ".csv":
+            if self.tracks:
+                raise ValueError("--track names topics or frames of a bag: give --poses BAG")
+            return None if self.poses is None else poses_from_csv(self.poses)
+        names = dict(_pair(text, "--track BODY=NAME") for text in self.tracks)
+        if OBJECT not in names:
+            raise ValueError(
+                f"{self.poses} is no .csv, so taken for a bag: --track {OBJECT}=NAME expected, "
+                "a topic or frame"
+            )
+        return poses_from_bag(self.poses, names.pop(OBJECT), names)
 
     def arguments(self, rule: str) -> dict[str, Any]:
         """The arguments of a rule.
@@ -37,10 +64,10 @@ class Asking:
             ValueError: a parameter is not NAME=VALUE, or poses are given to a rule without.
         """
         given: dict[str, Any] = {"tare": self.tare, **dict(map(_parameter, self.parameters))}
-        if self.poses is not None:
+        if self.tracking is not None:
             if rule != "tracking":
                 raise ValueError(f"--poses are for the rule tracking; rule {rule!r} given")
-            given["tracking"] = self.poses
+            given["tracking"] = self.tracking
         return given
 
     def propose(self, rule: str, recording: "Recording") -> dict[str, tuple["Label", ...]]:
@@ -154,10 +181,15 @@ def labels_json(labels: "Labels") -> Mapping[str, Any]:
 
 
 def _parameter(text: str) -> tuple[str, Any]:
-    name, sign, value = text.partition("=")
-    if not (sign and name.strip() and value.strip()):
-        raise ValueError(f"--set NAME=VALUE expected, {text!r} given")
+    name, value = _pair(text, "--set NAME=VALUE")
     try:
-        return name.strip(), float(value)
+        return name, float(value)
     except ValueError:
-        return name.strip(), value.strip()
+        return name, value
+
+
+def _pair(text: str, expected: str) -> tuple[str, str]:
+    name, sign, value = (part.strip() for part in text.partition("="))
+    if not (sign and name and value):
+        raise ValueError(f"{expected} expected, {text!r} given")
+    return name, value

@@ -38,7 +38,6 @@ def show_label_page(
         OutputError: the address cannot be listened at.
     """
     from holdfast.features import Tare
-    from holdfast.labelling.poses import poses_from_csv
     from holdfast.labelling.service import Service
     from holdfast.labelling.shelf import Shelf
     from holdfast.web.guard import Guard
@@ -51,7 +50,7 @@ def show_label_page(
         author=login_name() if author is None else author,
         clock=now,
         tare=Tare.parse(asking.tare),
-        poses=None if asking.poses is None else poses_from_csv(asking.poses),
+        poses=asking.tracking,
         suspects=suspects,
     )
 
