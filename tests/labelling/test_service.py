@@ -4,17 +4,16 @@ from contextlib import asynccontextmanager
 from dataclasses import replace
 
 import msgspec
-import numpy as np
 import pytest
 from aiohttp import ClientSession, web
 
 from holdfast.contact import ContactState
 from holdfast.io import labels_path, load_labels, load_recording, save_labels, save_recording
-from holdfast.labelling import page_schema, shelf
+from holdfast.labelling import page_schema
 from holdfast.labelling.audit import Suspect
 from holdfast.labelling.service import Service
 from holdfast.labelling.shelf import Shelf
-from holdfast.recordings import Label, Truth
+from holdfast.recordings import Label
 from holdfast.synthetic import synthetic_recording
 from holdfast.web.guard import Guard
 
@@ -369,16 +368,6 @@ def test_rules_that_cannot_be_asked(tmp_path, body, text):
     assert opened["proposals"] == {}
 
 
-def test_the_rule_is_the_one_with_the_best_evidence():
-    recording = synthetic_recording("grasp", 0, FINGERS)
-    assert shelf.default_rule(recording) == "signal"
-    assert shelf.default_rule(recording, "poses.csv") == "tracking"
-    times = recording.modules["thumb"].times
-    rest = np.tile([0.0, 0, 0, 1, 0, 0, 0], (len(times), 1))
-    seen = Truth(times, {"object_pose": rest}, {"thumb": {"tip_pose": rest}})
-    assert shelf.default_rule(replace(recording, truth=seen)) == "tracking"
-
-
 def test_suspects_of_an_audit_are_told(tmp_path):
     found = [
         Suspect("grasp", "thumb", "interval", 1.0, 2.0, "stable", "unstable", 0.9),
@@ -434,23 +423,6 @@ def test_videos_beside_the_recording_and_nothing_else(tmp_path):
     assert all(b"secret" not in body for _, body in found)
     assert json.loads(found[1][1]) == {"error": "there is no such video beside the recording"}
     assert part == (206, bytes(range(10, 20)))
-
-
-def test_a_few_recordings_are_kept_in_memory(tmp_path, monkeypatch):
-    paths = [made(tmp_path, f"r{k}", k) for k in range(4)]
-    loaded = []
-    load = shelf.load_recording
-    monkeypatch.setattr(
-        shelf, "load_recording", lambda path, **words: (loaded.append(path.stem), load(path))[1]
-    )
-    kept = Shelf(paths, author="ada", clock=lambda: NOW)
-    assert [kept.summary(k).name for k in range(4)] == ["r0", "r1", "r2", "r3"]
-    assert loaded == []  # their headers tell
-    for place in (0, 1, 2, 0, 3, 0, 2, 1):
-        assert kept.work(place).recording.name == f"r{place}"
-    assert loaded == ["r0", "r1", "r2", "r3", "r1"]
-    save_recording(synthetic_recording("r1", 9, FINGERS), paths[1], force=True)
-    assert kept.work(1).recording.digest == synthetic_recording("r1", 9, FINGERS).digest
 
 
 def test_there_are_no_other_recordings(tmp_path):

@@ -1,0 +1,119 @@
+from dataclasses import replace
+from threading import Thread
+
+import numpy as np
+import pytest
+
+from holdfast.errors import RecordingError
+from holdfast.io import save_recording
+from holdfast.labelling import shelf
+from holdfast.labelling.shelf import Shelf, beside, default_rule
+from holdfast.recordings import Truth
+from holdfast.synthetic import synthetic_recording
+
+NOW = "2026-01-02T03:04:05+00:00"
+FINGERS = ("thumb", "index")
+
+
+def made(folder, name, seed=0):
+    path = folder / f"{name}.parquet"
+    save_recording(synthetic_recording(name, seed, FINGERS).with_labels({}), path)
+    return path
+
+
+def shelf_of(*paths, **words):
+    return Shelf(paths, author="ada", clock=lambda: NOW, **words)
+
+
+def test_a_few_recordings_are_kept_in_memory(tmp_path, monkeypatch):
+    paths = [made(tmp_path, f"r{k}", k) for k in range(4)]
+    loaded = []
+    load = shelf.load_recording
+    monkeypatch.setattr(
+        shelf, "load_recording", lambda path, **words: (loaded.append(path.stem), load(path))[1]
+    )
+    kept = Shelf(paths, author="ada", clock=lambda: NOW)
+    assert [kept.summary(k).name for k in range(4)] == ["r0", "r1", "r2", "r3"]
+    assert loaded == []  # their headers tell
+    for place in (0, 1, 2, 0, 3, 0, 2, 1):
+        assert kept.work(place).recording.name == f"r{place}"
+    assert loaded == ["r0", "r1", "r2", "r3", "r1"]
+    save_recording(synthetic_recording("r1", 9, FINGERS), paths[1], force=True)
+    assert kept.work(1).recording.digest == synthetic_recording("r1", 9, FINGERS).digest
+
+
+def test_the_rule_is_the_one_with_the_best_evidence():
+    recording = synthetic_recording("grasp", 0, FINGERS)
+    assert default_rule(recording) == "signal"
+    assert default_rule(recording, "poses.csv") == "tracking"
+    times = recording.modules["thumb"].times
+    rest = np.tile([0.0, 0, 0, 1, 0, 0, 0], (len(times), 1))
+    seen = Truth(times, {"object_pose": rest}, {"thumb": {"tip_pose": rest}})
+    assert default_rule(replace(recording, truth=seen)) == "tracking"
+
+
+def test_threads_share_what_is_computed_once(tmp_path, monkeypatch):
+    kept = shelf_of(made(tmp_path, "one"))
+    made_of = []
+    signals = shelf.Signals
+    monkeypatch.setattr(
+        shelf,
+        "Signals",
+        lambda recording, tare: (made_of.append(tare), signals(recording, tare))[1],
+    )
+    found = []
+    asked = [kept.signals, kept.changes, lambda k: kept.propose(k, "signal", {})] * 2
+    threads = [Thread(target=lambda ask=ask: found.append(ask(0))) for ask in asked]
+    for thread in threads:
+        thread.start()
+    for thread in threads:
+        thread.join()
+    assert len(found) == 6
+    assert len(made_of) == 1
+
+
+def test_the_tare_is_that_of_the_shelf_unless_a_page_asks_for_another(tmp_path):
+    path = made(tmp_path, "one")
+    held = shelf_of(path, tare="first")
+    _, first = held.propose(0, "", {})
+    _, usual = held.propose(0, "", {"tare": 0.5})
+    assert first != usual
+    assert shelf_of(path).propose(0, "signal", {})[1] == usual == held.proposals(0)
+
+
+def test_poses_that_the_shelf_has(tmp_path):
+    poses = tmp_path / "poses.csv"
+    rows = "".join(f"{k / 100},0,0,0,1,0,0,{1e-9 * (k % 2)}\n" for k in range(1200))
+    poses.write_text("time,x,y,z,qw,qx,qy,qz\n" + rows)
+    rule, found = shelf_of(made(tmp_path, "one"), poses=poses).propose(0, "", {})
+    assert rule == "tracking"
+    assert {label.author for label in found["thumb"]} == {"rule:tracking"}
+
+
+def test_recordings_that_are_gone(tmp_path):
+    kept = shelf_of(made(tmp_path, "one"))
+    assert kept.work(0).recording.name == "one"
+    kept.paths[0].unlink()
+    for ask in (kept.summary, kept.work, kept.stored, kept.signals):
+        with pytest.raises(RecordingError, match=r"^cannot read .*one\.parquet: No such file"):
+            ask(0)
+
+
+@pytest.mark.parametrize("name", ["a.mp4", "sub/b.mp4", "./a.mp4", "sub/../a.mp4"])
+def test_files_beside_a_recording(tmp_path, name):
+    (tmp_path / "sub").mkdir()
+    for file in ("a.mp4", "sub/b.mp4"):
+        (tmp_path / file).write_bytes(b"video")
+    found = beside(tmp_path / "one.parquet", name)
+    assert found is not None
+    assert found.read_bytes() == b"video"
+
+
+@pytest.mark.parametrize(
+    "name", ["", ".", "sub", "gone.mp4", "../other.mp4", "/etc/passwd", "a\0b", "x" * 5000, "~/a"]
+)
+def test_files_that_are_not_beside_it(tmp_path, name):
+    folder = tmp_path / "folder"
+    (folder / "sub").mkdir(parents=True)
+    (tmp_path / "other.mp4").write_bytes(b"other")
+    assert beside(folder / "one.parquet", name) is None
