@@ -5,11 +5,13 @@ import subprocess
 import sys
 import time
 from dataclasses import replace
-from urllib.request import urlopen
+from pathlib import Path
+from urllib.request import Request, urlopen
 
 import pytest
 
 from holdfast.cli import app, label_page, main
+from holdfast.cli.label_common import Asking
 from holdfast.contact import ContactState
 from holdfast.io import labels_path, load_labels, load_recording, save_labels, save_recording
 from holdfast.labelling.audit import Audit, Suspect
@@ -366,10 +368,19 @@ def test_the_page_is_served_and_keeps_what_was_saved_when_killed(folder):
 
 
 def save(url, labels):
-    from urllib.request import Request
 
     body = {"labels": {"thumb": labels}, "note": "", "author": "", "revision": "none"}
     request = Request(f"{url}api/v1/recordings/0/labels", json.dumps(body).encode(), method="PUT")
     deadline = time.monotonic() + PATIENCE
     with urlopen(request, timeout=deadline - time.monotonic()) as answer:
         assert answer.status == 200
+
+
+def test_poses_of_a_bag(monkeypatch):
+    given = []
+    monkeypatch.setattr(
+        "holdfast.labelling.poses.poses_from_bag", lambda *words: given.append(words) or "poses"
+    )
+    asking = Asking("0.5", Path("run.bag"), ("object = /aruco/pose", "thumb=tip"), ("speed=0.01",))
+    assert asking.arguments("tracking") == {"tare": "0.5", "speed": 0.01, "tracking": "poses"}
+    assert given == [(Path("run.bag"), "/aruco/pose", {"thumb": "tip"})]
