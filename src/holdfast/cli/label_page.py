@@ -60,10 +60,15 @@ def show_label_page(
             print_json({"url": page, "recordings": len(files)})
             sys.stdout.flush()
         opened = serving.browser and open_page(page)
-        say(f"{page} {'is open' if opened else 'labels'}: {len(files)} recordings; Ctrl-C ends it")
+        where = "is open in the browser" if opened else "is the page"
+        say(f"{page} {where} for {_what(files)}; Ctrl-C ends it")
 
     Thread(target=_prepare, args=(shelf,), daemon=True).start()
     run_server(Service(shelf, guard).app, serving.host, serving.port, tell)
+
+
+def _what(files: Sequence[Path]) -> str:
+    return f"{len(files)} recordings" if len(files) > 1 else str(files[0])
 
 
 def _prepare(shelf: "Shelf") -> None:
