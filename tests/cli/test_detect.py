@@ -15,13 +15,16 @@ from holdfast.contact import UNSTABLE, Fault
 from holdfast.detector import detect
 from holdfast.features import FeatureSpec
 from holdfast.io import load_recording, save_recording
+from holdfast.live.play import XelaServer
 from holdfast.model import Debounce, FingerModel, Model
 from holdfast.recordings import Recording, Tactile
 from holdfast.sensors import sensor
+from holdfast.sources import open_source
 from holdfast.synthetic import synthetic_recording
 
 FIELDS = [
-    "time", "finger", "state", "reason", "stable_probability", "instability", "force", "faults"
+    "time", "finger", "state", "reason", "stable_probability", "instability", "force", "faults",
+    "faulty_taxels",
 ]  # fmt: skip
 NOISE_FLOOR = "builtin:noise-floor"
 
@@ -100,6 +103,7 @@ def plain(estimate):
         "instability": sigma,
         "force": force,
         "faults": [fault.value for fault in estimate.faults],
+        "faulty_taxels": list(estimate.faulty_taxels),
     }
 
 
@@ -270,10 +274,18 @@ def test_refusals(capsys, model, grasp, save, tmp_path):
     assert refusal(capsys, "builtin:best", grasp) == (
         "unknown model 'builtin:best'; built in are builtin:twin, builtin:noise-floor"
     )
-    for uri in ("xela://auto", "twin:?object=can&seed=1"):
-        assert refusal(capsys, model, uri) == (
-            f"only the path of a recording can be a source yet; {uri!r} given"
-        )
+    assert refusal(capsys, model, "twin:?object=anvil").startswith(
+        "twin:?object=anvil: unknown object 'anvil'; "
+    )
+    assert refusal(capsys, model, "usb:3").startswith(
+        "'usb:3' is neither the path of a recording nor the URI of a source; there are xela:, "
+    )
+    assert refusal(capsys, model, grasp, "--ignore", "7") == (
+        "--ignore: FINGER:TAXEL,... expected, '7' given"
+    )
+    assert refusal(capsys, model, grasp, "--ignore", "index:99") == (
+        "index: taxel 99 to be ignored; it has the taxels 0 to 29"
+    )
     assert refusal(capsys, model, grasp, "--debounce=-1") == (
         "a duration of at least 0 s expected, -1.0 given"
     )
@@ -301,3 +313,22 @@ def test_real_uskin(capsys, data_folder, tmp_path):
     capsys.readouterr()
     got, _ = lines(capsys, NOISE_FLOOR, tmp_path / f"{source.name}.parquet")
     assert len(got) == 2 * 285
+
+
+def test_a_live_source_is_judged_as_it_comes(capsys, save):
+    grasp = save(synthetic_recording("a", 1, ("thumb", "index")))
+    with (
+        open_source(str(grasp), speed=1.5) as source,
+        XelaServer(source, port=0, wait=True) as server,
+    ):
+        got, _ = lines(capsys, NOISE_FLOOR, f"{server.uri}", "--seconds", "3")
+        found = summary(capsys, NOISE_FLOOR, f"{server.uri}", "--seconds", "1")
+    assert list(got[0]) == FIELDS
+    want = detect(Model.load(NOISE_FLOOR), load_recording(grasp))
+    for finger, trace in want.fingers.items():
+        mine = [line for line in got if line["finger"] == finger]
+        assert len(mine) > 75
+        for k, line in enumerate(mine[: len(trace)]):
+            if not line["faults"]:  # on a busy machine some are late
+                assert line["state"] == plain(trace.estimate(k))["state"]
+    assert set(found["fingers"]) == set(want.fingers)

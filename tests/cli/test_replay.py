@@ -1,10 +1,9 @@
-import time
-
-import numpy as np
 import pytest
 
 from holdfast.cli import replay as module
 from holdfast.cli.replay import replay
+from holdfast.io import save_recording
+from holdfast.model import Debounce
 from holdfast.synthetic import synthetic_recording
 from holdfast.training import Setting, train
 
@@ -23,20 +22,13 @@ def model(recording):
 
 
 @pytest.fixture
-def clock(monkeypatch):
-    """A clock that only sleep moves."""
-    now = [100.0]
-
-    def sleep(seconds):
-        now[0] += seconds
-
-    monkeypatch.setattr(time, "monotonic", lambda: now[0])
-    monkeypatch.setattr(time, "sleep", sleep)
-    return now
+def path(recording, tmp_path):
+    save_recording(recording, tmp_path / "grasp.parquet")
+    return tmp_path / "grasp.parquet"
 
 
-def test_every_sample_is_an_update_and_changes_of_the_hand_are_told(capsys, model, recording):
-    assert replay(model, recording, 0) == recording.modules["thumb"].n_samples
+def test_every_sample_is_an_update_and_changes_of_the_hand_are_told(capsys, model, recording, path):
+    assert replay(model, path, 0) == recording.modules["thumb"].n_samples
     out, err = capsys.readouterr()
     assert out == ""
     lines = err.splitlines()
@@ -48,28 +40,15 @@ def test_every_sample_is_an_update_and_changes_of_the_hand_are_told(capsys, mode
     assert len({line.split(" -> ")[1] for line in lines}) > 1
 
 
-@pytest.mark.parametrize("speed", [1.0, 4.0])
-def test_goes_at_its_pace(model, recording, clock, speed):
-    replay(model, recording, speed)
-    last = recording.modules["thumb"].times[-1]
-    assert clock[0] - 100.0 == pytest.approx(last / speed, abs=0.01)
-
-
-def test_as_fast_as_it_goes_never_waits(model, recording, clock):
-    replay(model, recording, 0)
-    assert clock[0] == 100.0
-
-
-def test_on_a_terminal_a_table_follows(capsys, model, recording, clock, monkeypatch):
+def test_on_a_terminal_a_table_follows(capsys, model, recording, path, monkeypatch):
     monkeypatch.setattr(module.sys.stderr, "isatty", lambda: True, raising=False)
-    assert replay(model, recording, 8.0) == recording.modules["thumb"].n_samples
+    assert replay(model, path, 40.0) == recording.modules["thumb"].n_samples
     err = capsys.readouterr().err
     assert "thumb" in err
     assert "sigma" in err
 
 
-def test_the_replay_does_not_touch_the_model(model, recording):
+def test_for_the_eye_states_are_held_back(model):
     before = model.debounce
-    replay(model, recording, 0)
+    assert module.calmer(model).debounce == Debounce(*module.DEBOUNCE)
     assert model.debounce == before
-    assert np.isfinite(recording.modules["thumb"].readings).all()

@@ -31,6 +31,8 @@ LARGEST = 2**20
 QUEUED = 4096
 """Packets that wait here for a reader that is busy (of a whole hand 80 MB, for 27 s); more
 wait at the server, which may drop a client that does not answer."""
+ELSEWHERE = "; xela_server binds the address of the network card: try xela://auto"
+"""What helps where one address was tried."""
 
 _QUIET = logging.getLogger("holdfast.sources.xela")
 _QUIET.addHandler(logging.NullHandler())
@@ -222,8 +224,8 @@ class XelaSource(Source):
         where = " or ".join(map(str, self._places))
         if all(isinstance(failure, ConnectionRefusedError) for failure in failures):
             return (
-                f"nothing listens at {where}; xela_server binds the address of the network card: "
-                "try xela://auto; without a hand, `holdfast play` stands in for it"
+                f"nothing listens at {where}{ELSEWHERE if len(self._places) == 1 else ''}; "
+                "without a hand, `holdfast play` stands in for it"
             )
         if any(isinstance(failure, WebSocketException) for failure in failures):
             return f"what listens at {where} is no XELA server: {failures[-1]}"
