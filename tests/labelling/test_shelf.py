@@ -90,6 +90,13 @@ def test_poses_that_the_shelf_has(tmp_path):
     assert {label.author for label in found["thumb"]} == {"rule:tracking"}
 
 
+def test_the_warm_up_reads_nothing(tmp_path):
+    kept = shelf_of(tmp_path / "gone.parquet")
+    kept.warm_up()
+    with pytest.raises(RecordingError):
+        kept.signals(0)
+
+
 def test_recordings_that_are_gone(tmp_path):
     kept = shelf_of(made(tmp_path, "one"))
     assert kept.work(0).recording.name == "one"

@@ -63,7 +63,8 @@ def show_label_page(
         where = "is open in the browser" if opened else "is the page"
         say(f"{page} {where} for {_what(files)}; Ctrl-C ends it")
 
-    Thread(target=_prepare, args=(shelf,), daemon=True).start()
+    for work in (_prepare, Shelf.warm_up):
+        Thread(target=work, args=(shelf,), daemon=True).start()
     run_server(Service(shelf, guard).app, serving.host, serving.port, tell)
 
 

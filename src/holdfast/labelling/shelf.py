@@ -8,6 +8,8 @@ from pathlib import Path
 from threading import RLock
 from typing import TYPE_CHECKING, Any
 
+import numpy as np
+
 from holdfast.errors import RecordingError
 from holdfast.features import Tare
 from holdfast.features.tare import TareArgument
@@ -18,7 +20,8 @@ from holdfast.labelling.rules import propose
 from holdfast.labelling.signals import Signals
 from holdfast.labelling.store import Labels, Stored, read_stored, save_stored
 from holdfast.labelling.summary import Summary, summary_of
-from holdfast.recordings import Label, Recording
+from holdfast.recordings import Label, Recording, Tactile
+from holdfast.sensors import sensor
 
 if TYPE_CHECKING:
     from holdfast.labelling.audit import Suspect
@@ -133,6 +136,13 @@ class Shelf:
         work = self.work(place)
         with self._computing:
             return work.signals
+
+    def warm_up(self) -> None:
+        """Loads what is compiled, which takes as long as reading a recording."""
+        tip = sensor("uskin-4x4")
+        still = Tactile(tip, np.arange(32) / tip.rate, np.zeros((32, tip.n_taxels, 3)))
+        with self._computing:
+            Signals(Recording("warm-up", {"finger": still}))
 
     def changes(self, place: int) -> dict[str, list[float]]:
         """Change points of a recording by finger [s].
