@@ -1,0 +1,32 @@
+// Colours for the canvases, read from the style sheet, so that they are written down once.
+
+const NAMES = [
+  "ground", "panel", "raised", "edge", "text", "muted", "grid", "base", "outline", "ink", "focus",
+  "stable", "unstable", "no-contact", "unknown",
+  "stable-line", "unstable-line", "no-contact-line", "unknown-line",
+  "finger-0", "finger-1", "finger-2", "finger-3", "finger-4", "finger-5",
+  "axis-x", "axis-y", "axis-z", "marker",
+];
+const light = window.matchMedia("(prefers-color-scheme: light)");
+
+export const colours = {};
+
+/** The page's own font at a size [px], for canvases. */
+export const font = (size, weight = 400) =>
+  `${weight} ${size}px ${getComputedStyle(document.documentElement).fontFamily}`;
+
+function read() {
+  const style = getComputedStyle(document.documentElement);
+  for (const name of NAMES) colours[name] = style.getPropertyValue(`--${name}`).trim();
+}
+
+/** Calls `changed` whenever the system turns from dark to light or back. */
+export function onTheme(changed) {
+  light.addEventListener("change", () => { read(); changed(); });
+}
+
+export const fingerColour = (place) => colours[`finger-${place % 6}`];
+export const stateColour = (key) => colours[key];
+export const stateLine = (key) => colours[`${key}-line`];
+
+read();
