@@ -275,7 +275,7 @@ def test_refusals(capsys, model, grasp, save, tmp_path):
         "unknown model 'builtin:best'; built in are builtin:twin, builtin:noise-floor"
     )
     assert refusal(capsys, model, "twin:?object=anvil").startswith(
-        "twin:?object=anvil: unknown object 'anvil'; "
+        "twin:?object=anvil: no object 'anvil'; there are "
     )
     assert refusal(capsys, model, "usb:3").startswith(
         "'usb:3' is neither the path of a recording nor the URI of a source; there are xela:, "

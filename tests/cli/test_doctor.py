@@ -1,11 +1,13 @@
 import json
+import socket
 from importlib import metadata
 
 import numpy as np
 import pytest
 
-from holdfast.cli import main
+from holdfast.cli import main, reach
 from holdfast.cli.doctor import PURPOSES
+from holdfast.sources.xela import places
 
 
 def report(capsys):
@@ -65,3 +67,25 @@ def test_no_data(capsys, monkeypatch):
     assert report(capsys)["data"] == {"path": None, "found": False}
     assert main(["doctor"]) == 0
     assert "not set" in capsys.readouterr().out
+
+
+def test_what_can_be_reached(capsys, monkeypatch):
+    monkeypatch.setattr("holdfast.sources.xela.places.own_address", lambda: None)
+    told = report(capsys)["sources"]
+    assert set(told) == {"xela", "ros1", "ros2", "serial"}
+    assert "127.0.0.1:5000" in told["xela"]
+    assert main(["doctor"]) == 0
+    assert told["ros2"] in capsys.readouterr().out
+
+
+def test_a_server_that_listens_is_told(monkeypatch):
+    with socket.create_server(("127.0.0.1", 0)) as server:
+        monkeypatch.setattr(places, "PORT", server.getsockname()[1])
+        assert reach.reachable()["xela"].startswith("something listens at 127.0.0.1:")
+
+
+def test_missing_extras_are_told(monkeypatch):
+    monkeypatch.setattr(reach, "find_spec", lambda name: None)
+    told = reach.reachable()
+    assert told["ros2"] == 'not installed: pip install "holdfast[ros2]"'
+    assert told["serial"] == 'not installed: pip install "holdfast[serial]"'

@@ -11,6 +11,7 @@ from typing import Annotated, Any
 import typer
 
 from holdfast.cli.console import print_json, print_table, show
+from holdfast.cli.reach import reachable
 
 PURPOSES = {
     "bags": "importing bags of ROS 1 and ROS 2",
@@ -31,8 +32,8 @@ def doctor(
 ) -> None:
     """Shows what is installed and what works.
 
-    Python, packages, extras and how to get them, the compiled kernels, and where HOLDFAST_DATA
-    points. It reports, and always exits with 0.
+    Python, packages, extras and how to get them, the compiled kernels, which live sources can be
+    reached, and where HOLDFAST_DATA points. It reports, and always exits with 0.
 
     Example:
       holdfast doctor
@@ -58,6 +59,7 @@ def _report() -> dict[str, Any]:
         "extras": {extra: _extra(extra, found) for extra, found in sorted(packages.items())},
         "kernels": _kernels(),
         "data": _data(),
+        "sources": reachable(),
     }
 
 
@@ -123,6 +125,8 @@ def _print(report: dict[str, Any]) -> None:
         ("HOLDFAST_DATA", _where(data)),
     ]
     print_table(("holdfast", report["holdfast"]), rows)
+    show()
+    print_table(("source", "state"), list(report["sources"].items()))
     show()
     print_table(
         ("package", "version"),

@@ -1,0 +1,124 @@
+import json
+import os
+import signal
+import threading
+import urllib.error
+import urllib.request
+
+import pytest
+
+from holdfast.cli import main
+from holdfast.cli import serve as verb
+from holdfast.cli.page import open_page
+from holdfast.io import load_recording, save_recording
+from holdfast.synthetic import synthetic_recording
+
+MODEL = "builtin:twin"
+
+
+@pytest.fixture
+def grasp(tmp_path):
+    save_recording(synthetic_recording("grasp", 1), tmp_path / "grasp.parquet")
+    return tmp_path / "grasp.parquet"
+
+
+@pytest.fixture
+def when_served(monkeypatch):
+    """Has work done, in a thread, once the page can be opened; then ends the service."""
+
+    def arrange(work):
+        found = []
+
+        def run(document):
+            try:
+                found.append(work(document["url"]))
+            except Exception as failure:
+                found.append(failure)
+            finally:
+                os.kill(os.getpid(), signal.SIGINT)
+
+        real = verb.print_json
+
+        def tell(document):
+            real(document)
+            threading.Thread(target=run, args=(document,)).start()
+
+        monkeypatch.setattr(verb, "print_json", tell)
+        return found
+
+    return arrange
+
+
+def run(capsys, *words):
+    code = main(["serve", *map(str, words)])
+    out, err = capsys.readouterr()
+    return code, out, err
+
+
+def refusal(capsys, *words):
+    code, out, err = run(capsys, *words)
+    assert (code, out, err.count("\n")) == (2, "", 1)
+    return err.removeprefix("holdfast: ").rstrip("\n")
+
+
+def ask(url, method="GET", **headers):
+    request = urllib.request.Request(url, method=method, headers=headers)
+    with urllib.request.urlopen(request) as answer:
+        return json.load(answer)
+
+
+def test_the_service_is_there_until_ctrl_c(capsys, grasp, when_served):
+    found = when_served(lambda url: ask(f"{url}api/v1/info"))
+    code, out, err = run(capsys, MODEL, grasp, "--port", 0, "--json")
+    assert code == 0
+    told = json.loads(out)
+    assert told["source"] == str(grasp)
+    assert told["url"] in err
+    assert found[0]["model"] == MODEL
+    assert set(found[0]["fingers"]) == {"thumb", "index", "middle"}
+
+
+def test_a_recording_is_ended_with_the_service(capsys, grasp, when_served, tmp_path):
+    found = when_served(lambda url: ask(f"{url}api/v1/recording", "POST"))
+    words = ("--port", 0, "--json", "--record-to", tmp_path / "made", "--speed", 4)
+    assert run(capsys, MODEL, grasp, *words)[0] == 0
+    assert load_recording(found[0]["path"]).complete
+
+
+def test_the_token_is_needed(capsys, grasp, when_served):
+    def work(url):
+        with pytest.raises(urllib.error.HTTPError, match="401"):
+            ask(f"{url.partition('?')[0]}api/v1/info")
+        return ask(f"{url.partition('?')[0]}api/v1/info", Authorization="Bearer secret")
+
+    found = when_served(work)
+    code, out, _ = run(capsys, MODEL, grasp, "--port", 0, "--json", "--token", "secret")
+    assert code == 0
+    assert json.loads(out)["url"].endswith("?token=secret")
+    assert found[0]["type"] == "hello"
+
+
+def test_once_ends_with_the_recording(capsys, grasp):
+    code, out, err = run(capsys, MODEL, grasp, "--once", "--speed", 20, "--port", 0)
+    assert (code, out) == (0, "")
+    assert "Ctrl-C ends it" in err
+
+
+def test_refusals(capsys, grasp, tmp_path):
+    assert refusal(capsys, MODEL, grasp, "--host", "0.0.0.0") == (
+        "--host 0.0.0.0 opens the service to the network: give --token SECRET as well"
+    )
+    assert refusal(capsys, MODEL, tmp_path / "none.parquet") == (
+        f"{tmp_path / 'none.parquet'} does not exist; a recording's file expected"
+    )
+    assert refusal(capsys, "builtin:best", grasp).startswith("unknown model 'builtin:best'")
+    assert refusal(capsys, MODEL, grasp, "--speed=-1").endswith("-1.0 given")
+    assert "port" in refusal(capsys, MODEL, grasp, "--port", 99999)
+    assert refusal(capsys, MODEL, grasp, "--ignore", "index").startswith("--ignore: FINGER:TAXEL")
+
+
+def test_no_text_browser_is_opened(monkeypatch):
+    for name in ("DISPLAY", "WAYLAND_DISPLAY"):
+        monkeypatch.delenv(name, raising=False)
+    monkeypatch.setattr("holdfast.cli.page.sys.platform", "linux")
+    assert open_page("http://127.0.0.1:1/") is False
