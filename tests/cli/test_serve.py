@@ -2,6 +2,7 @@ import json
 import os
 import signal
 import threading
+import time
 import urllib.error
 import urllib.request
 
@@ -79,7 +80,13 @@ def test_the_service_is_there_until_ctrl_c(capsys, grasp, when_served):
 
 
 def test_a_recording_is_ended_with_the_service(capsys, grasp, when_served, tmp_path):
-    found = when_served(lambda url: ask(f"{url}api/v1/recording", "POST"))
+    def work(url):
+        begun = ask(f"{url}api/v1/recording", "POST")
+        while not ask(f"{url}api/v1/state")["recording"]["seconds"]:
+            time.sleep(0.05)
+        return begun
+
+    found = when_served(work)
     words = ("--port", 0, "--json", "--record-to", tmp_path / "made", "--speed", 4)
     assert run(capsys, MODEL, grasp, *words)[0] == 0
     assert load_recording(found[0]["path"]).complete

@@ -216,6 +216,19 @@ def test_a_recording_is_made_marked_and_ended(tmp_path):
         np.testing.assert_array_equal(found.modules[name].times, module.times[100:300])
 
 
+def test_a_recording_without_samples_is_not_kept(tmp_path):
+    async def work():
+        async with served(patient(0), folder=tmp_path) as (client, _):
+            async with client.post("/api/v1/recording", json={"name": "mine"}) as answer:
+                assert answer.status == 200
+            async with client.delete("/api/v1/recording") as answer:
+                return answer.status, (await answer.json())["error"]
+
+    path = tmp_path / "mine.mcap"
+    assert run(work()) == (409, f"no sample came: {path} is not kept")
+    assert not path.exists()
+
+
 @pytest.mark.parametrize("name", ["../up", "a/b", "", ".hidden", "x" * 200])
 def test_names_that_no_recording_has(tmp_path, name):
     async def work():

@@ -59,13 +59,17 @@ class Recordings:
         """Ends the recording, and gives what made it.
 
         Raises:
-            OutputError: nothing is being recorded, or the disk refuses.
+            OutputError: nothing is being recorded, the disk refuses, or no sample came (then
+                there is no file).
         """
         with self._lock:
             recorder = self._running("there is nothing to stop")
             self.current = None
             self._session.leave(self._put)
             recorder.close()
+            if not recorder.status.n_samples:
+                recorder.path.unlink(missing_ok=True)
+                raise OutputError(f"no sample came: {recorder.path} is not kept")
             return recorder
 
     def _running(self, hint: str) -> Recorder:

@@ -119,7 +119,8 @@ class Service:
             await telling
         self._session.leave(put)
         if self._recordings.current is not None:
-            await asyncio.to_thread(self._recordings.end)
+            with suppress(HoldfastError):  # its readers have gone; the file tells what it has
+                await asyncio.to_thread(self._recordings.end)
 
     async def _tell_live(self) -> None:
         """Every reader gets the same text, encoded once."""
