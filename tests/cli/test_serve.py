@@ -82,7 +82,7 @@ def test_the_service_is_there_until_ctrl_c(capsys, grasp, when_served):
 def test_a_recording_is_ended_with_the_service(capsys, grasp, when_served, tmp_path):
     def work(url):
         begun = ask(f"{url}api/v1/recording", "POST")
-        while not ask(f"{url}api/v1/state")["recording"]["seconds"]:
+        while not (ask(f"{url}api/v1/state").get("recording") or {}).get("seconds"):
             time.sleep(0.05)
         return begun
 
