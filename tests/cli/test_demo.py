@@ -1,4 +1,6 @@
 import json
+import threading
+import urllib.request
 
 import msgspec
 import pytest
@@ -72,3 +74,25 @@ def test_a_speed_that_is_none(capsys, tmp_path, speed):
 def test_a_negative_seed(capsys, tmp_path):
     code, out, err = run(capsys, tmp_path / "demo", "--seed", "-1")
     assert (code, out, err.count("\n")) == (2, "", 1)
+
+
+def test_the_replay_is_shown_on_a_page_that_ends_with_it(capsys, tmp_path, monkeypatch):
+    pages = []
+
+    def look(url):
+        with urllib.request.urlopen(f"{url}api/v1/info") as answer:
+            pages.append(json.load(answer))
+        return False
+
+    monkeypatch.setattr("holdfast.cli.page.open_page", lambda url: _in_a_thread(look, url))
+    code, out, err = run(capsys, tmp_path / "demo", "--speed", 8)
+    assert code == 0
+    assert "shows it: open it in a browser" in err
+    assert "it ends with the recording" in err
+    assert "what to try next" in out
+    assert [set(page["fingers"]) for page in pages] == [{"thumb", "index", "middle", "ring"}]
+
+
+def _in_a_thread(work, url):
+    threading.Thread(target=work, args=(url,)).start()
+    return False
