@@ -21,6 +21,9 @@ MOST_POINTS = 10_000
 DIGITS = 6
 """Digits of a value that are told: far more than a screen has."""
 
+BLOCK = 16_384
+"""Samples whose readings are turned into force at a time: memory stays small."""
+
 Series = dict[str, list[float | None]]
 
 
@@ -152,7 +155,11 @@ def _force(module: Tactile, tare: Tare) -> Array:
     The force is linear in the readings: that of the baseline is the mean of the forces in its
     time, and no reading need be touched twice.
     """
-    force = fingertip_force(module.readings, module.sensor, "none", module.times)
+    force = np.empty((module.n_samples, 3))
+    for row in range(0, module.n_samples, BLOCK):
+        part = slice(row, row + BLOCK)
+        readings, times = module.readings[part], module.times[part]
+        force[part] = fingertip_force(readings, module.sensor, "none", times)
     taken = np.isfinite(force).all(axis=1)
     if tare.kind == "none" or not taken.any():
         return force
