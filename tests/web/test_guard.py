@@ -1,4 +1,8 @@
+import asyncio
+
 import pytest
+from aiohttp import web
+from aiohttp.test_utils import TestClient, TestServer
 
 from holdfast.web.guard import Guard, is_local
 
@@ -20,3 +24,23 @@ def test_other_names_need_a_token(host):
 def test_an_empty_token_is_none():
     with pytest.raises(ValueError, match=r"^--token: some text expected, none given$"):
         Guard("127.0.0.1", " ")
+
+
+@pytest.mark.parametrize(
+    ("path", "status"), [("/", 200), ("/page/a.js", 200), ("/api/x", 401), ("/media/0/0", 401)]
+)
+def test_where_the_token_is_needed(path, status):
+    async def work():
+        async def answer(_):
+            return web.Response(text="here")
+
+        app = web.Application(middlewares=[Guard("127.0.0.1", "secret").middleware])
+        app.router.add_get("/{any:.*}", answer)
+        async with TestClient(TestServer(app)) as client:
+            found = []
+            for query in ("", "?token=secret"):
+                async with client.get(path + query) as one:
+                    found.append(one.status)
+            return found
+
+    assert asyncio.run(work()) == [status, 200]

@@ -24,6 +24,7 @@ VERBS = {
     "record": "Records a source, and loses at most half a second whatever happens.",
     "import": "Brings in other people's data, whatever its format.",
     "info": "Shows what is in a recording, or in a folder of them.",
+    "label": "Labels recordings on a page, by a rule, or checks labels that are there.",
     "train": "Trains a model from labelled recordings.",
     "evaluate": "Measures a model on labelled recordings.",
     "detect": "Tells the contact state of every finger at every sample.",

@@ -15,6 +15,9 @@ POLICY = {
 }
 """What every answer says: nothing from elsewhere, nothing inside another page."""
 
+GUARDED = ("/api/", "/media/")
+"""Where the token is needed; a page itself holds no secret."""
+
 Handler = Callable[[web.Request], Awaitable[web.StreamResponse]]
 
 
@@ -55,7 +58,7 @@ class Guard:
         origin = request.headers.get("Origin")
         if origin is not None and origin.partition("://")[2] != request.host:
             raise web.HTTPForbidden(text=f"origin {origin!r} refused: {request.host} expected")
-        if request.path.startswith("/api/") and not self._knows_token(request):
+        if request.path.startswith(GUARDED) and not self._knows_token(request):
             raise web.HTTPUnauthorized(
                 text="token expected: Authorization: Bearer TOKEN, or ?token=TOKEN",
                 headers={"WWW-Authenticate": "Bearer"},
