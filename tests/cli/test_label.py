@@ -10,7 +10,7 @@ from urllib.request import Request, urlopen
 
 import pytest
 
-from holdfast.cli import app, label_page, main
+from holdfast.cli import label_page, main
 from holdfast.cli.label_common import Asking
 from holdfast.contact import ContactState
 from holdfast.io import labels_path, load_labels, load_recording, save_labels, save_recording
@@ -20,11 +20,6 @@ from holdfast.synthetic import synthetic_recording
 
 PATIENCE = 60.0
 FINGERS = ("thumb", "index")
-
-
-@pytest.fixture(autouse=True)
-def verb(monkeypatch):
-    monkeypatch.setitem(app.VERBS, "label", app.load_verb("label").__doc__.splitlines()[0])
 
 
 @pytest.fixture
@@ -344,9 +339,7 @@ def test_a_read_only_label_file(capsys, folder):
 
 
 def test_the_page_is_served_and_keeps_what_was_saved_when_killed(folder):
-    words = ["-c", "from holdfast.cli import app, main; import sys;"
-             "app.VERBS['label'] = app.load_verb('label').__doc__.splitlines()[0];"
-             "sys.exit(main())"]  # fmt: skip
+    words = ["-c", "import sys; from holdfast.cli import main; sys.exit(main())"]
     process = subprocess.Popen(
         [sys.executable, *words, "label", str(folder), "--port", "0", "--no-browser", "--json",
          "--author", "ada"],
