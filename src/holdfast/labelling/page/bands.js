@@ -58,19 +58,29 @@ export function strip(pen, view, row, labels) {
 }
 
 /** Proposals, hatched; the surer, the stronger; what is done with already is dim. */
-export function proposed(pen, view, row, items, open, focus) {
+export function proposed(pen, view, row, items, open) {
   const [top, bottom] = row.proposals;
   for (const [item, [left, right]] of seen(view, items)) {
     const key = stateKey(item.state), todo = open.has(item);
     pen.globalAlpha = (0.25 + 0.75 * item.confidence) * (todo ? 1 : 0.3);
     pen.fillStyle = stateLine(key);
     if (key !== "no-contact") hatch(pen, left, top, right - left, bottom - top, stateLine(key), key === "stable" ? 7 : 4, key === "stable" ? 3 : 2);
+    else {
+      pen.globalAlpha *= 0.5;
+      pen.fillRect(left, top, right - left, bottom - top);
+      pen.globalAlpha *= 2;
+    }
     pen.fillRect(left, top, right - left, 2);
     pen.fillRect(left, bottom - 2, right - left, 2);
     pen.globalAlpha = 1;
     line(pen, left + 0.5, top, left + 0.5, bottom, colours.panel);
-    if (item === focus) frame(pen, left, top - 1, right - left, bottom - top + 2, colours.text, 2);
   }
+}
+
+/** The proposal that Enter accepts. */
+export function meant(pen, view, row, item) {
+  const at = sides(view, item), [top, bottom] = row.proposals;
+  if (at) frame(pen, at[0] - 1, top - 2, at[1] - at[0] + 2, bottom - top + 4, colours.text, 2);
 }
 
 export function frame(pen, left, top, width, height, colour, thick = 2, dash = []) {

@@ -12,6 +12,7 @@ const FORCES = ["F_a", "F_x", "F_y", "F_z", "xyz"];
 export class Deeds {
   constructor(page) {
     this.page = page;
+    page.plot.target = () => this.target();
     for (const part of ["editor", "view", "plot", "player", "saver", "recordings"]) this[part] = page[part];
   }
 
@@ -38,10 +39,10 @@ export class Deeds {
     if (!this.editor.copy()) toast(this.editor.readOnly ? "Read-only" : "Draw or click a label first: A copies it to all fingers", "bad");
   }
 
-  /** What Enter and X mean: what is under the cursor, else what was gone to, else the next proposal. */
+  /** What Enter and X mean: what the pointer went to, else what was gone to, else the next proposal. */
   target() {
-    const { editor } = this, hovered = this.plot.hover?.proposal;
-    if (hovered && editor.proposals.some(({ item }) => item === hovered.item)) return { kind: "proposal", ...hovered };
+    const { editor } = this, { aimed } = this.plot;
+    if (aimed && editor.proposals.some(({ item }) => item === aimed.item)) return { kind: "proposal", ...aimed };
     const { chosen, focus } = editor;
     if (chosen && chosen.label.confidence < 1 && editor.doubts.some(({ item }) => item === chosen.label)) return { kind: "label", finger: chosen.finger, item: chosen.label };
     const open = (each) => each.item === focus?.item;
@@ -57,15 +58,17 @@ export class Deeds {
     const target = this.target();
     if (!target) { toast("No proposals are open", "good"); return; }
     if (this.editor.readOnly) { toast("Read-only", "bad"); return; }
-    if (!this.view.sees(target.item) && !(this.plot.hover?.proposal?.item === target.item)) {
+    const aimed = this.plot.aimed?.item === target.item;
+    if (!this.view.sees(target.item) && !aimed) {
       this.view.show(target.item);
       this.editor.point(target);
       return;
     }
     const after = this.after(target);
     act(target);
+    this.plot.aimed = null;
     this.editor.point(after);
-    if (after && this.plot.hover?.proposal?.item !== target.item && !this.view.sees(after.item)) this.view.show(after.item);
+    if (after && !aimed && !this.view.sees(after.item)) this.view.show(after.item);
   }
 
   // What comes next: a doubtful stretch after a doubtful one, else the next proposal in time.
@@ -94,6 +97,7 @@ export class Deeds {
   lookAt(doubt) {
     const { editor } = this;
     editor.lastDoubt = doubt;
+    this.plot.aimed = null;
     this.view.show(doubt.item);
     const label = doubt.kind === "label" ? doubt.item
       : doubt.kind === "suspect" ? editor.state.labels[doubt.finger].find((each) => each.start <= doubt.item.start && doubt.item.end <= each.end) : null;

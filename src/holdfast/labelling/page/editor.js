@@ -91,7 +91,7 @@ export class Editor {
     if (this.readOnly) return;
     const [labels, moved] = moveEdge(this.state.labels[finger], label, side, tidy(time), this.bounds);
     if (!commit) { this.show({ [finger]: labels }); return; }
-    if (moved[side] === label[side]) { this.show(null); return; }
+    if (!differ(labels, this.state.labels[finger])) { this.show(null); return; }
     const signed = { ...moved, ...this.mine() };
     this.selected = { finger, label: signed, fresh: false };
     this.put({ [finger]: labels.map((each) => (each === moved ? signed : each)) });
@@ -194,6 +194,9 @@ export class Editor {
     return (this.lastDoubt = after ?? all[0] ?? null);
   }
 }
+
+const differ = (one, two) => one.length !== two.length
+  || one.some((label, k) => label.start !== two[k].start || label.end !== two[k].end);
 
 function compare(a, b) {
   const k = a.findIndex((value, place) => value !== b[place]);

@@ -22,15 +22,17 @@ function* values(pieces, keys) {
   }
 }
 
-/** The least and the most of some series over a window; null where nothing is known. */
-export function extent(pieces, keys, positive = false) {
-  let [low, high] = [Infinity, -Infinity];
-  for (const value of values(pieces, keys)) {
-    if (Number.isNaN(value) || (positive && value <= 0)) continue;
-    if (value < low) low = value;
-    if (value > high) high = value;
-  }
-  return low <= high ? [low, high] : null;
+/**
+ * The least and the most of some series over a window; null where nothing is known.
+ *
+ * @param share of values that may lie below the least: a logarithm makes much of next to nothing.
+ */
+export function extent(pieces, keys, positive = false, share = 0) {
+  const known = [];
+  for (const value of values(pieces, keys)) if (!Number.isNaN(value) && !(positive && value <= 0)) known.push(value);
+  if (!known.length) return null;
+  const sorted = Float64Array.from(known).sort();
+  return [sorted[Math.floor(share * (sorted.length - 1))], sorted.at(-1)];
 }
 
 /** An axis from nought, or about it, with room above. */
@@ -59,7 +61,7 @@ function marks({ low, high, log }, tall) {
     const step = Math.max(1, Math.ceil(((high - low) * 13) / tall));
     return Array.from({ length: Math.floor((high - low) / step) + 1 }, (_, k) => 10 ** (low + k * step));
   }
-  const step = niceStep((high - low) / Math.max(2, tall / 20));
+  const step = niceStep((high - low) / Math.max(2, tall / 17));
   const first = Math.ceil(low / step - 1e-9);
   return Array.from({ length: Math.floor(high / step + 1e-9) - first + 1 }, (_, k) => (first + k) * step);
 }

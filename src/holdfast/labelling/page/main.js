@@ -188,6 +188,7 @@ class Page {
 
   /** Another part is looked at: what is there is drawn at once, finer data are asked for. */
   looked() {
+    this.pointer?.again();
     this.plot?.redraw(...ALL);
     if (this.editor?.fingers.length) this.signals.want(this.view.start, this.view.end, this.view.inner);
     if (this.signals) tellWindow(this.view, this.signals);

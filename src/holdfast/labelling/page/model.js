@@ -71,7 +71,8 @@ export function change(labels, label, fields) {
 }
 
 /**
- * Moves an edge. A label that shares the edge follows, and others in the way are overwritten.
+ * Moves an edge. A label that shares the edge follows, and others in the way are overwritten;
+ * of two that share it, the one that grows is the one that is moved, and may eat the other.
  *
  * @param side "start" or "end".
  * @param bounds of time: `low` and `high`; `least` is how short a label may become [s].
@@ -79,11 +80,15 @@ export function change(labels, label, fields) {
  */
 export function moveEdge(labels, label, side, time, { low, high, least }) {
   const other = side === "start" ? "end" : "start";
+  const sharing = labels.find((each) => each !== label && Math.abs(each[other] - label[side]) < TOUCH);
+  const shrinks = side === "start" ? time > label.start : time < label.end;
+  if (sharing && shrinks && (other === "start" ? time < sharing.start : time > sharing.end)) {
+    return moveEdge(labels, sharing, other, time, { low, high, least });
+  }
   const short = Math.min(least, label.end - label.start);
   const to = side === "start"
     ? clamp(time, low, label.end - short) : clamp(time, label.start + short, high);
   const moved = { ...label, [side]: to };
-  const sharing = labels.find((each) => each !== label && Math.abs(each[other] - label[side]) < TOUCH);
   const rest = labels.filter((each) => each !== label && each !== sharing);
   if (sharing) {
     const follower = { ...sharing, [other]: to };

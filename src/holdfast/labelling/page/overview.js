@@ -86,11 +86,11 @@ export function timeAxis(pen, view, markers) {
   return markers.filter(([time]) => time >= view.start && time <= view.end);
 }
 
-/** Grid lines of the same times through a row. */
-export function timeGrid(pen, view, height) {
+/** Grid lines of the same times through boxes [top, bottom]. */
+export function timeGrid(pen, view, boxes) {
   const step = niceStep((view.span * 80) / view.inner);
   for (let k = Math.ceil(view.start / step - 1e-9); k * step <= view.end + 1e-9 * step; k += 1) {
     const x = Math.round(view.x(k * step)) + 0.5;
-    line(pen, x, 0, x, height, colours.grid);
+    for (const [top, bottom] of boxes) line(pen, x, top, x, bottom, colours.grid);
   }
 }

@@ -7,14 +7,17 @@ export class Palette {
   /** @param act is called with the name of an action and its argument. */
   constructor(editor, act) {
     this.editor = editor;
-    this.states = STATES.map((state, k) => this.button(byId("states"), state, act, { state }, shape(stateKey(state)), stateWord(state), String(k + 1)));
-    this.causes = CAUSES.map((cause) => this.button(byId("causes"), cause, act, { cause }, null, cause, cause[0].toUpperCase()));
+    this.states = STATES.map((state, k) => this.button(byId("states"), state, act, { state }, String(k + 1),
+      [shape(stateKey(state)), make("span", "", stateWord(state)), make("kbd", "", String(k + 1))]));
+    // The letter that is underlined is the key.
+    this.causes = CAUSES.map((cause) => this.button(byId("causes"), cause, act, { cause }, cause[0].toUpperCase(),
+      [make("span", "", make("u", "", cause[0]), cause.slice(1))]));
     for (const name of ["undo", "redo", "copy", "remove"]) byId(name).addEventListener("click", () => act(name));
   }
 
-  button(row, value, act, fields, mark, word, key) {
-    const button = make("button", "", ...(mark ? [mark] : []), make("span", "", word), make("kbd", "", key));
-    Object.assign(button, { type: "button", title: `${word} (${key})` });
+  button(row, value, act, fields, key, content) {
+    const button = make("button", "", ...content);
+    Object.assign(button, { type: "button", title: `${stateWord(value)} (${key})` });
     if (fields.state) button.dataset.state = stateKey(value);
     button.dataset.value = value;
     button.addEventListener("click", () => act("name", fields));

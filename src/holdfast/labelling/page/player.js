@@ -32,6 +32,7 @@ export class Player {
     byId("film").hidden = !this.media.length;
     byId("medium").replaceChildren(...this.media.map(({ name }, k) => Object.assign(make("option", "", name), { value: String(k) })));
     byId("medium").hidden = this.media.length < 2;
+    byId("film-name").hidden = !byId("medium").hidden;
     this.load(this.media[0] ?? null);
   }
 
@@ -39,6 +40,7 @@ export class Player {
     this.stop();
     this.medium = medium;
     byId("film-problem").hidden = true;
+    byId("film-offset").hidden = false;
     if (!medium) { this.drop(); return; }
     byId("film-name").textContent = byId("film-name").title = medium.name;
     this.offset = kept(this.offsetKey) ?? medium.offset;
@@ -76,6 +78,7 @@ export class Player {
   }
 
   tell(text) {
+    byId("film-offset").hidden = this.media.length < 2;
     write(byId("film-problem"), text);
     byId("film-problem").hidden = false;
   }

@@ -1,7 +1,7 @@
 // The fingers one under the other. Three canvases lie on each other, so that what moves with the
 // pointer does not draw the signals anew: labels below, lines, and the cursor on top.
 
-import { grounds, outlines, proposed, selection, strip, tints } from "./bands.js";
+import { grounds, meant, outlines, proposed, selection, strip, tints } from "./bands.js";
 import { byId } from "./dom.js";
 import { Gutters } from "./gutters.js";
 import { axis, extent, forceLines, forceScale, series, sigmaScale } from "./lines.js";
@@ -23,7 +23,8 @@ export class Plot {
     this.kind = "F_a";
     this.close = false; // heights by what is in view, not by the whole recording
     this.changes = {};
-    this.hover = this.playhead = this.snapped = null;
+    this.hover = this.playhead = this.snapped = this.aimed = null; // aimed: the proposal that the pointer went to
+    this.target = () => null; // what Enter means
     this.rows = [];
     this.arrived = false;
     new ResizeObserver(() => this.fit()).observe(byId("rows"));
@@ -31,7 +32,7 @@ export class Plot {
 
   open() {
     this.changes = {};
-    this.hover = this.snapped = this.scales = null;
+    this.hover = this.snapped = this.aimed = this.scales = null;
     this.gutters.open(this.editor.recording, this.kind);
     this.fit();
   }
@@ -94,7 +95,7 @@ export class Plot {
       this.ticks(pen, row, finger);
       strip(pen, view, row, labels);
       const own = (editor.recording.proposals[finger] ?? []).filter((item) => !editor.isRejected(finger, item));
-      proposed(pen, view, row, own, todo, editor.focus?.item);
+      proposed(pen, view, row, own, todo);
     });
   }
 
@@ -110,7 +111,7 @@ export class Plot {
 
   lines(pen) {
     const { view } = this;
-    timeGrid(pen, view, this.height);
+    timeGrid(pen, view, this.rows.flatMap((row) => [row.force, row.sigma]));
     this.rows.forEach((row, k) => {
       const finger = this.editor.fingers[k], pieces = this.signals.pieces(finger, view.start, view.end);
       const [force, sigma] = this.scale(finger, pieces);
@@ -125,7 +126,7 @@ export class Plot {
 
   scale(finger, pieces) {
     const keys = forceLines(this.kind, 0).map(({ key }) => key), from0 = this.kind === "F_a";
-    const of = (some) => [forceScale(extent(some, keys), from0), sigmaScale(extent(some, ["sigma"], true))];
+    const of = (some) => [forceScale(extent(some, keys), from0), sigmaScale(extent(some, ["sigma"], true, 0.01))];
     if (this.close) return of(pieces);
     this.scales ??= {};
     const { whole } = this.signals;
@@ -142,8 +143,9 @@ export class Plot {
   }
 
   over(pen) {
-    const { editor, view } = this;
+    const { editor, view } = this, target = this.target();
     this.rows.forEach((row, k) => {
+      if (target?.kind === "proposal" && target.finger === editor.fingers[k]) meant(pen, view, row, target.item);
       const own = editor.doubts.filter(({ finger }) => finger === editor.fingers[k]);
       outlines(pen, view, row, own, editor.focus);
       const { selected } = editor;

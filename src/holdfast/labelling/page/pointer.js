@@ -19,7 +19,7 @@ export class Pointer {
     on("pointermove", this.move);
     on("pointerup", this.release);
     on("pointercancel", this.cancel);
-    on("pointerleave", () => { if (!this.drag) this.hover(null); });
+    on("pointerleave", this.leave);
     on("wheel", this.wheel, { passive: false });
     on("dblclick", () => this.view.fit());
     on("contextmenu", (event) => event.preventDefault());
@@ -81,9 +81,16 @@ export class Pointer {
     this.drag = { mode: "pinch", began: true, held };
   }
 
+  /** The window has moved under the pointer, which itself did not. */
+  again() {
+    if (this.last && this.plot.hover && !this.drag) this.plot.hover = this.find(this.last);
+  }
+
   move(event) {
     const found = this.find(event), { drag } = this;
+    this.last = event;
     if (!found) return;
+    this.plot.aimed = drag ? null : found.proposal ?? null;
     const before = this.down.get(event.pointerId);
     if (this.down.has(event.pointerId)) this.down.set(event.pointerId, event.clientX);
     if (!drag) { this.hover(found); return; }
@@ -140,6 +147,12 @@ export class Pointer {
     this.hover(event.pointerType === "touch" ? null : this.find(event));
   }
 
+  leave() {
+    if (this.drag) return;
+    this.last = this.plot.aimed = null;
+    this.hover(null);
+  }
+
   cancel(event) {
     this.down.delete(event.pointerId);
     this.stop();
@@ -160,6 +173,7 @@ export class Pointer {
       this.editor.point({ kind: "proposal", ...proposal });
     } else {
       this.editor.select(finger, label);
+      this.editor.point(null);
     }
     this.seek(time);
   }

@@ -33,7 +33,7 @@ const hints = {
 /** What is selected, or else what is meant by Enter and X. */
 export function tellAbout(editor, target) {
   const box = byId("about"), { selected } = editor;
-  const shown = selected && !(selected.fresh && target) ? { kind: "own", finger: selected.finger, item: selected.label } : target;
+  const shown = selected && !(target && (selected.fresh || target.kind !== "proposal")) ? { kind: "own", finger: selected.finger, item: selected.label } : target;
   if (!shown) {
     box.replaceChildren(make("span", "hint", editor.readOnly ? "" : "Drag over a finger to label it · ? for all keys"));
     return;
