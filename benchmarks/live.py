@@ -22,13 +22,13 @@ from tempfile import TemporaryDirectory
 import numpy as np
 
 from holdfast.io import save_recording
-from holdfast.live.guard import Guard
 from holdfast.live.judge import Judge
 from holdfast.live.service import Service
 from holdfast.live.session import Session
 from holdfast.model import Model
 from holdfast.sources import open_source
 from holdfast.synthetic import synthetic_recording
+from holdfast.web.guard import Guard
 
 FINGERS = ("thumb", "index", "middle", "ring")
 
