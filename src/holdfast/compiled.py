@@ -8,3 +8,5 @@ import numba
 
 compiled = numba.njit(cache=True, error_model="numpy")
 compiled_parallel = numba.njit(cache=True, error_model="numpy", parallel=True)
+inlined = numba.njit(error_model="numpy", inline="always")
+"""For steps that take all arrays: handing them over costs as much as the step."""

@@ -7,10 +7,12 @@ one the probability, one rule turns it into a state.
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from itertools import pairwise
+from math import inf
 from typing import Self
 
 import numpy as np
 import numpy.typing as npt
+from numpy import ndarray
 
 from holdfast.contact import (
     ContactEstimate,
@@ -22,7 +24,7 @@ from holdfast.contact import (
 from holdfast.detector.rule import N_REPORT, Live, Traces, new_decision, rule_of, run, step_live
 from holdfast.detector.traces import STATES, VERDICTS, Detection, detection_of
 from holdfast.errors import ModelError, StreamError
-from holdfast.features.kernel import TARED, TAXELS, Array
+from holdfast.features.layout import TARED, TAXELS, Array
 from holdfast.features.stream import StreamPlan, give_baseline, new_memory, new_output, samples_of
 from holdfast.model import Model
 from holdfast.recordings import Recording
@@ -108,7 +110,8 @@ class Detector:
         self._rule = rule_of(model, plan)
         n_fingers, n_taxels = len(plan.fingers), int(self._layout.offsets[-1])
         self._readings = np.zeros((n_taxels, 3))
-        self._present = np.zeros(n_fingers, dtype=np.bool_)
+        self._flags = bytearray(n_fingers)  # which are present: an array is slower to write to
+        self._present = np.frombuffer(self._flags, dtype=np.bool_)
         self._report = np.zeros((n_fingers, N_REPORT))
         bounds = pairwise(self._layout.offsets.tolist())
         self._slots = {
@@ -117,7 +120,7 @@ class Detector:
         }
         self.reset()
         # Compiles, and changes nothing: no finger is present.
-        self._step(0.0)
+        step_live(self._table, 0.0)
 
     def __getstate__(self) -> object:
         # A copy would share memory with this one, by address.
@@ -151,7 +154,7 @@ class Detector:
         )  # fmt: skip
         self._table, self._arrays = live.table()
         self._told = [ContactState.UNKNOWN] * (n_fingers + 1)
-        self._last = -np.inf
+        self._last = -inf
         self._events: list[ContactEvent] = []
 
     def update(self, samples: Mapping[str, npt.ArrayLike], time: float) -> HandEstimate:
@@ -170,10 +173,11 @@ class Detector:
                 does not go forward. The detector is as it was before.
         """
         time = float(time)
-        self._check_time(time)
+        if not self._last < time < inf:
+            self._refuse_time(time)
         self._place(samples)
         self._last = time
-        return self._tell(time, self._step(time))
+        return self._tell(time, step_live(self._table, time))
 
     def events(self) -> list[ContactEvent]:
         """The changes of state since the last call, at most `MAX_EVENTS`, oldest first."""
@@ -201,12 +205,9 @@ class Detector:
             pieces.append((times, present, traces))
         return detection_of(recording.name, self._plan.fingers, pieces)
 
-    def _check_time(self, time: float) -> None:
-        if not self._last < time < np.inf:
-            after = "" if self._last == -np.inf else f" after {self._last:.15g} s"
-            raise StreamError(
-                f"time {time:.15g} s given{after}; finite times that go forward expected"
-            )
+    def _refuse_time(self, time: float) -> None:
+        after = "" if self._last == -inf else f" after {self._last:.15g} s"
+        raise StreamError(f"time {time:.15g} s given{after}; finite times that go forward expected")
 
     def _check_recording(self, recording: Recording) -> None:
         modules = {f: recording.modules[f] for f in self._slots if f in recording.modules}
@@ -217,7 +218,9 @@ class Detector:
             )
         for finger, module in modules.items():
             self._check_shape(finger, module.readings.shape[1:])
-        self._check_time(min(float(m.times[0]) for m in modules.values() if m.n_samples))
+        start = min(float(m.times[0]) for m in modules.values() if m.n_samples)
+        if not self._last < start < inf:
+            self._refuse_time(start)
 
     def _check_shape(self, finger: str, shape: tuple[int, ...]) -> None:
         expected = self._slots[finger][2]
@@ -238,22 +241,19 @@ class Detector:
         self._told = [STATES[code] for code in codes[-1]]
         self._last = float(times[-1])
 
-    def _step(self, time: float) -> int:
-        return int(step_live(self._table, time))
-
     def _place(self, samples: Mapping[str, npt.ArrayLike]) -> None:
-        self._present[:] = False
+        slots, flags = self._slots, self._flags
+        if len(samples) != len(slots):
+            flags[:] = bytes(len(flags))
         for finger, sample in samples.items():
-            if finger not in self._slots:
-                raise StreamError(
-                    f"finger {finger!r} given; the model judges {', '.join(self._slots)}"
-                )
-            place, slot, shape = self._slots[finger]
-            values = sample if isinstance(sample, np.ndarray) else np.asarray(sample)
+            if finger not in slots:
+                raise StreamError(f"finger {finger!r} given; the model judges {', '.join(slots)}")
+            place, slot, shape = slots[finger]
+            values = sample if isinstance(sample, ndarray) else np.asarray(sample)
             if values.shape != shape:
                 self._check_shape(finger, values.shape)
             slot[...] = values
-            self._present[place] = True
+            flags[place] = 1
 
     def _tell(self, time: float, hand_code: int) -> HandEstimate:
         fingers = {}

@@ -21,9 +21,18 @@ from holdfast.detector.table import (
 )
 from holdfast.features import kernel
 from holdfast.features.faults import TARE_DRIFT
-from holdfast.features.kernel import (
+from holdfast.features.layout import (
+    AMPLITUDE,
+    FAULT,
     FAULTS,
+    LAST,
+    MEAN,
+    N_VALUES,
+    NOISE,
+    READY,
     REASON,
+    SIGMA,
+    SIGMA_WINDOW,
     TAXELS,
     Array,
     Flags,
@@ -31,9 +40,9 @@ from holdfast.features.kernel import (
     Layout,
     Memory,
     Output,
-    noise_sigma,
 )
 from holdfast.features.stream import StreamPlan
+from holdfast.features.values import noise_sigma
 from holdfast.model import ANY_FINGER, Model
 
 UNKNOWN, NO_CONTACT, UNSTABLE, STABLE = (
@@ -121,7 +130,7 @@ class Traces(NamedTuple):
             faults=np.zeros(shape, dtype=np.int16),
             taxels=np.zeros(shape, dtype=np.int64),
             probability=np.zeros(shape),
-            values=np.zeros((*shape, kernel.N_VALUES)),
+            values=np.zeros((*shape, N_VALUES)),
             hand=np.zeros(n, dtype=np.int8),
         )
 
@@ -162,20 +171,20 @@ def step(
     kernel.advance(layout, memory, output, readings, present, time)
     for finger in range(len(present)):
         codes, decided = decision.codes[finger], decision.values[finger]
-        noise, values = memory.levels[finger, kernel.NOISE], output.values[finger]
+        noise, values = memory.levels[finger, NOISE], output.values[finger]
         threshold = _contact(noise, rule.limits[finger])
-        ready = output.status[finger, REASON] == kernel.READY
+        ready = output.status[finger, REASON] == READY
         if ready and present[finger]:
-            quiet = noise_sigma(noise, layout.windows[finger, kernel.SIGMA_WINDOW])
+            quiet = noise_sigma(noise, layout.windows[finger, SIGMA_WINDOW])
             if _drifted(values, codes, decided, threshold, quiet, time, layout.period):
-                output.status[finger, REASON] = kernel.FAULT
+                output.status[finger, REASON] = FAULT
                 output.status[finger, FAULTS] = TARE_DRIFT
                 ready = False
         if not ready:
             codes[TOLD] = codes[CANDIDATE] = UNKNOWN
             decided[PROBABILITY] = decided[LAST_UNSTABLE] = math.nan
         elif present[finger]:
-            if values[kernel.AMPLITUDE] < threshold:
+            if values[AMPLITUDE] < threshold:
                 decided[PROBABILITY] = 0.0
                 state = NO_CONTACT
             else:
@@ -248,10 +257,10 @@ def step_live(table: Integers, time: float) -> int:
     hand = step(layout, memory, output, rule, decision, readings, present, time)
     for f in range(len(present)):
         state, status = decision.codes[f, TOLD], output.status[f]
-        report[f, 0] = memory.levels[f, kernel.LAST]
+        report[f, 0] = memory.levels[f, LAST]
         report[f, 1] = _verdict_code(state, status[REASON], status[FAULTS])
         report[f, 2] = decision.values[f, PROBABILITY]
-        report[f, 3] = output.values[f, kernel.SIGMA]
+        report[f, 3] = output.values[f, SIGMA]
         for axis in range(3):
             report[f, 4 + axis] = output.values[f, axis]
     return hand
@@ -304,12 +313,12 @@ def _drifted(
 
     `quiet` is the sigma that noise alone gives; a window of two samples has none.
     """
-    amplitude, mean = values[kernel.AMPLITUDE], math.sqrt(2.0) * values[kernel.MEAN]
+    amplitude, mean = values[AMPLITUDE], math.sqrt(2.0) * values[MEAN]
     if math.isnan(decided[SLOW]):
         decided[SLOW], decided[ROUSED] = amplitude, time
     away, jumped = abs(mean - decided[SLOW]), abs(amplitude - decided[SLOW]) > 0.5 * threshold
     decided[SLOW] += min(1.0, period / DRIFT_SECONDS) * (amplitude - decided[SLOW])
-    calm = quiet > 0.0 and values[kernel.SIGMA] <= CALM * quiet and away <= 0.5 * threshold
+    calm = quiet > 0.0 and values[SIGMA] <= CALM * quiet and away <= 0.5 * threshold
     if not calm:
         decided[ROUSED] = time
     if amplitude < threshold:

@@ -7,7 +7,7 @@ import numpy.typing as npt
 
 from holdfast.compiled import compiled
 from holdfast.features import kernel
-from holdfast.features.kernel import Array, Layout, Memory, Output
+from holdfast.features.layout import AMPLITUDE, TARE_GIVEN, Array, Layout, Memory, Output
 from holdfast.features.stream import (
     StreamPlan,
     give_baseline,
@@ -45,7 +45,7 @@ def extract(plan: StreamPlan, recording: Recording) -> dict[str, FingerFeatures]
     """
     layout = plan.layout()
     memory, output = new_memory(layout), new_output(layout)
-    if layout.tare_kind == kernel.TARE_GIVEN:
+    if layout.tare_kind == TARE_GIVEN:
         give_baseline(plan, memory, recording)
     pieces: list[list[FingerFeatures]] = [[] for _ in plan.fingers]
     for times, present, readings in samples_of(plan, recording):
@@ -78,4 +78,4 @@ def _extract(
     for k in range(len(times)):
         kernel.advance(layout, memory, output, readings[k], present[k], times[k])
         features[k] = output.features
-        amplitude[k] = output.values[:, kernel.AMPLITUDE]
+        amplitude[k] = output.values[:, AMPLITUDE]

@@ -8,7 +8,8 @@ import numpy.typing as npt
 
 from holdfast.compiled import compiled_parallel
 from holdfast.errors import RecordingError
-from holdfast.features.kernel import Array, force_of
+from holdfast.features.baseline import force_of
+from holdfast.features.layout import Array
 from holdfast.features.tare import HALF, Tare, TareArgument
 from holdfast.recordings import Tactile
 from holdfast.sensors import Sensor

@@ -8,20 +8,39 @@ from typing import NamedTuple
 import numpy as np
 import numpy.typing as npt
 
-from holdfast.features import kernel
 from holdfast.features.faults import CHANGED_AT, N_TAXEL
 from holdfast.features.force import baseline_of
-from holdfast.features.kernel import Array, Layout, Memory, Output
+from holdfast.features.layout import (
+    FIRST,
+    LAST,
+    LONGEST,
+    N_COUNTS,
+    N_LEVELS,
+    N_STATUS,
+    N_VALUES,
+    NOISE,
+    REASON,
+    TARE,
+    TARE_FIRST,
+    TARE_GIVEN,
+    TARE_NONE,
+    TARE_SECONDS,
+    WARM_UP,
+    Array,
+    Layout,
+    Memory,
+    Output,
+)
 from holdfast.features.specs import FeatureSpec, spec_codes
 from holdfast.features.tare import Tare
 from holdfast.recordings import Recording
 from holdfast.sensors import Sensor
 
 TARE_KINDS = {
-    "seconds": kernel.TARE_SECONDS,
-    "first": kernel.TARE_FIRST,
-    "none": kernel.TARE_NONE,
-    "interval": kernel.TARE_GIVEN,
+    "seconds": TARE_SECONDS,
+    "first": TARE_FIRST,
+    "none": TARE_NONE,
+    "interval": TARE_GIVEN,
 }
 COUNT_STEP_NOISE = float(1 / np.sqrt(12))
 """Standard deviation of rounding to whole counts: no sensor in counts is more quiet."""
@@ -96,17 +115,17 @@ def new_memory(layout: Layout) -> Memory:
     """The memory of a stream that has seen nothing."""
     n_fingers = len(layout.windows)
     n_taxels = len(layout.rotations)
-    longest = int(layout.windows[:, kernel.LONGEST].max())
-    levels = np.zeros((n_fingers, kernel.N_LEVELS))
+    longest = int(layout.windows[:, LONGEST].max())
+    levels = np.zeros((n_fingers, N_LEVELS))
     taxels = np.zeros((n_taxels, N_TAXEL))
     taxels[layout.ignored, CHANGED_AT] = np.inf  # never long ago
-    levels[:, [kernel.FIRST, kernel.LAST, kernel.NOISE]] = np.nan
+    levels[:, [FIRST, LAST, NOISE]] = np.nan
     return Memory(
         baseline=np.zeros((n_taxels, 3)),
         previous=np.zeros((n_taxels, 3)),
         taxels=taxels,
         history=np.zeros((n_fingers, 4, 2 * longest)),
-        counts=np.zeros((n_fingers, kernel.N_COUNTS), dtype=np.int64),
+        counts=np.zeros((n_fingers, N_COUNTS), dtype=np.int64),
         levels=levels,
         own=np.full((n_fingers, layout.specs.shape[1]), np.nan),
     )
@@ -115,12 +134,12 @@ def new_memory(layout: Layout) -> Memory:
 def new_output(layout: Layout) -> Output:
     """An output to be filled, as before the first sample."""
     n_fingers = len(layout.windows)
-    status = np.zeros((n_fingers, kernel.N_STATUS), dtype=np.int64)
-    taring = layout.tare_kind == kernel.TARE_SECONDS
-    status[:, kernel.REASON] = kernel.TARE if taring else kernel.WARM_UP
+    status = np.zeros((n_fingers, N_STATUS), dtype=np.int64)
+    taring = layout.tare_kind == TARE_SECONDS
+    status[:, REASON] = TARE if taring else WARM_UP
     return Output(
         features=np.full((n_fingers, layout.specs.shape[1]), np.nan),
-        values=np.full((n_fingers, kernel.N_VALUES), np.nan),
+        values=np.full((n_fingers, N_VALUES), np.nan),
         status=status,
     )
 
