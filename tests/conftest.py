@@ -1,3 +1,6 @@
+import ast
+import functools
+import math
 import os
 from pathlib import Path
 
@@ -21,15 +24,43 @@ def data_folder():
 
 
 def pytest_sessionstart(session):
-    """Deletes compiled kernels that are older than a kernel's source.
+    """Deletes compiled kernels that are older than a source that they may be made of.
 
-    Numba looks at the file of a kernel only, not at those that it imports.
+    Numba looks at the file of a kernel only, not at those that it imports, whose functions and
+    constants are compiled into it.
     """
     if hasattr(session.config, "workerinput"):
         return
     package = Path(__file__).parents[1] / "src" / "holdfast"
-    kernels = [path for path in package.rglob("*.py") if "compiled" in path.read_text()]
-    newest = max(path.stat().st_mtime for path in kernels)
-    for cache in package.rglob("*.nb[ci]"):
-        if cache.stat().st_mtime < newest:
-            cache.unlink(missing_ok=True)
+    for folder in package.rglob("__pycache__"):
+        for cache in folder.glob("*.nb[ci]"):
+            source = folder.parent / f"{cache.name.split('.')[0]}.py"
+            if cache.stat().st_mtime < newest(source):
+                cache.unlink(missing_ok=True)
+
+
+@functools.cache
+def newest(source):
+    """When a file, or one that it imports of the package, or so on, last changed."""
+    waiting, seen = [source], set()
+    while waiting:
+        path = waiting.pop()
+        if path not in seen and path.is_file():
+            seen.add(path)
+            waiting += imported(path)
+    return max((path.stat().st_mtime for path in seen), default=math.inf)
+
+
+@functools.cache
+def imported(path):
+    """Where the modules are that a file may import of the package, some of which are not."""
+    names = []
+    for node in ast.walk(ast.parse(path.read_text())):
+        if isinstance(node, ast.Import):
+            names += [alias.name for alias in node.names]
+        elif isinstance(node, ast.ImportFrom):
+            module = node.module or ""
+            names += [module, *(f"{module}.{alias.name}" for alias in node.names)]
+    source = Path(__file__).parents[1] / "src"
+    places = [source.joinpath(*name.split(".")) for name in names if name.startswith("holdfast")]
+    return [file for place in places for file in (place.with_suffix(".py"), place / "__init__.py")]
