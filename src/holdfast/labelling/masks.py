@@ -1,13 +1,12 @@
 """Masks over time: what is joined, left out or grown before it becomes an interval."""
 
-from itertools import pairwise
-
 import numpy as np
 import numpy.typing as npt
-from scipy.ndimage import maximum_filter1d, uniform_filter1d
+from scipy.ndimage import uniform_filter1d
 
+from holdfast.metrics.masks import joined, runs, runs_with, widened
 from holdfast.sensors.values import Array
-from holdfast.twin.labels import LabelRule, runs
+from holdfast.twin.labels import LabelRule
 
 Mask = npt.NDArray[np.bool_]
 
@@ -26,11 +25,7 @@ def n_samples(duration: float, period: float) -> int:
 
 def closed(mask: Mask, gap: int) -> Mask:
     """The mask with rests of fewer than `gap` samples filled in between its runs."""
-    filled = mask.copy()
-    for (_, end), (start, _) in pairwise(runs(mask)):
-        if start - end < gap:
-            filled[end:start] = True
-    return filled
+    return joined(mask, np.arange(len(mask)), gap + 1)
 
 
 def lasting(mask: Mask, least: int) -> Mask:
@@ -48,16 +43,12 @@ def steady(mask: Mask, blip: int) -> Mask:
 
 def grown(mask: Mask, margin: int) -> Mask:
     """The mask with every run longer by `margin` samples at both ends."""
-    return np.asarray(maximum_filter1d(mask.astype(np.uint8), 2 * margin + 1) > 0)
+    return widened(mask, np.arange(len(mask)), margin)
 
 
 def with_hysteresis(values: Array, low: float, high: float) -> Mask:
     """Runs above `low` that reach `high` somewhere; NaN is below both."""
-    wide = values > low
-    kept = np.zeros_like(wide)
-    for start, end in runs(wide):
-        kept[start:end] = (values[start:end] > high).any()
-    return kept
+    return runs_with(values > low, values > high)
 
 
 def smoothed(values: Array, n: int) -> Array:

@@ -5,16 +5,16 @@ leaves the object three to eight times a second. A person labels the shake as a 
 """
 
 from dataclasses import dataclass
-from itertools import pairwise
 
 import numpy as np
 import numpy.typing as npt
 
 from holdfast.contact import Cause, ContactState, Phase
+from holdfast.metrics.masks import Mask, joined, runs, runs_with, widened
 from holdfast.recordings import Label, Truth, labels_from_samples
 from holdfast.sensors.values import Array
 
-Mask = npt.NDArray[np.bool_]
+__all__ = ["HELD", "LabelRule", "labels_from_truth", "phases_as_felt", "runs"]
 
 HELD = (Phase.LOCKED, Phase.DISTURBED, Phase.SLIPPING)
 """Phases in which the hand holds the object."""
@@ -67,10 +67,10 @@ def labels_from_truth(
     sliding = held & (arrays["slip_speed"] > rule.sliding)
     acted = held & (np.linalg.norm(truth.hand["outside_force"], axis=1) > rule.contact)
     troubled = np.isin(phase, (Phase.DISTURBED, Phase.SLIPPING)) | sliding | acted
-    troubled = held & _grown(_closed(troubled, times, rule.merge), times, rule.margin)
+    troubled = held & widened(joined(troubled, times, rule.merge), times, rule.margin)
     troubled = held & _bridged(phase == Phase.CLOSING, troubled, times, rule.merge)
     lost = _since(held) & ~_since(phase == Phase.RELEASED) & (phase == Phase.FREE)
-    slipped = _spans_with(troubled, sliding)
+    slipped = runs_with(troubled, sliding)
     states = [
         _state(*row)
         for row in zip(
@@ -121,21 +121,6 @@ def _state(
     return ContactState.UNSTABLE, Cause.LOST if lost else Cause.RELEASED
 
 
-def runs(mask: Mask) -> npt.NDArray[np.int64]:
-    """(n_runs, 2) first sample of each run of True, and the first after it."""
-    edges = np.flatnonzero(np.diff(np.concatenate([[False], mask, [False]]).astype(np.int8)))
-    return edges.reshape(-1, 2)
-
-
-def _closed(mask: Mask, times: Array, gap: float) -> Mask:
-    """The mask with rests shorter than `gap` filled in between its runs."""
-    filled = mask.copy()
-    for (_, end), (start, _) in pairwise(runs(mask)):
-        if times[start] - times[end - 1] < gap:
-            filled[end:start] = True
-    return filled
-
-
 def _bridged(before: Mask, mask: Mask, times: Array, gap: float) -> Mask:
     """The mask, from the end of `before` on where it begins less than `gap` later."""
     bridged = mask.copy()
@@ -148,25 +133,7 @@ def _bridged(before: Mask, mask: Mask, times: Array, gap: float) -> Mask:
 
 def _steady(mask: Mask, times: Array, blip: float) -> Mask:
     """The mask without rests and then without runs that are shorter than `blip`."""
-    return ~_closed(~_closed(mask, times, blip), times, blip)
-
-
-def _grown(mask: Mask, times: Array, margin: float) -> Mask:
-    """The mask with every run longer by `margin` at both ends."""
-    grown = mask.copy()
-    for start, end in runs(mask):
-        first = np.searchsorted(times, times[start] - margin)
-        last = np.searchsorted(times, times[end - 1] + margin, side="right")
-        grown[first:last] = True
-    return grown
-
-
-def _spans_with(mask: Mask, wanted: Mask) -> Mask:
-    """The runs of the mask in which something wanted happens."""
-    found = np.zeros_like(mask)
-    for start, end in runs(mask):
-        found[start:end] = wanted[start:end].any()
-    return found
+    return ~joined(~joined(mask, times, blip), times, blip)
 
 
 def _since(mask: Mask) -> Mask:
