@@ -72,9 +72,9 @@ def test_what_a_crash_left_is_offered_again(visit, desk):
     page.keyboard.type("half done")
     shows(page, "#alert", "Not saved: the disk is full")
     page.close()
-    desk.refusal = None
     again = visit(desk.url, context=page.context)
     shows(again, "#ask", "1 label of grasp")
+    desk.refusal = None
     assert labels(again) == []
     again.click("#ask button[data-value=restore]")
     assert rough(labels(again)) == [MINE]
@@ -149,3 +149,20 @@ def test_changes_in_a_row_are_saved_in_one(visit, desk):
     shows(page, "#save-text", "^saved")
     page.wait_for_timeout(600)
     assert len(desk.puts) == 1
+
+
+def test_what_was_not_saved_is_offered_when_its_recording_is_opened_again(visit):
+    with Desk(Recording("one"), Recording("two")) as desk:
+        page = visit(desk.url)
+        ready(page)
+        desk.refusal = (500, "the disk is full")
+        drag(page, "thumb", 8, 12)
+        page.keyboard.press("n")
+        shows(page, "#name", "two")
+        shows(page, ".toast.bad", "one is not saved")
+        desk.refusal = None
+        page.keyboard.press("p")
+        shows(page, "#ask", "1 label of one")
+        page.click("#ask button[data-value=restore]")
+        saved(page)
+        assert rough(labels(page)) == [MINE]

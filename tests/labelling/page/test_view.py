@@ -86,7 +86,7 @@ def test_while_data_are_on_their_way_the_old_are_drawn(long):
         page.evaluate(f"holdfast.view.look({start}, {start + 10})")
     until(page, "holdfast.signals.part?.start > 60")
     settled(page)
-    assert [round(start) for start, _, _ in desk.asked] == [0, 35, 75]  # only the newest
+    assert [round(start) for start, _, _ in desk.asked] == [0, 36, 76]  # only the newest
 
 
 def test_an_answer_for_another_recording_is_dropped(visit):

@@ -5,7 +5,7 @@ import { colours, font, stateColour, stateLine } from "./theme.js";
 import { LEFT, RIGHT } from "./view.js";
 import { labelWord, percent, stateKey, stateWord } from "./words.js";
 
-const TINT = { stable: 0.15, unstable: 0.3, "no-contact": 0.09 };
+const TINT = { stable: 0.15, unstable: 0.25, "no-contact": 0.09 };
 
 /** Left and right of an interval within the plot; null where it is out of sight. */
 export function sides(view, { start, end }) {

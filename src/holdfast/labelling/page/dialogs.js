@@ -32,12 +32,14 @@ function show(title, texts, buttons) {
     }));
     const heading = make("h2", "", title);
     heading.id = "ask-title";
+    heading.tabIndex = -1;
     dialog.replaceChildren(heading, ...texts.map((text) => make("p", "", text)), row);
     // Escape would leave it open which labels count.
     dialog.oncancel = (event) => event.preventDefault();
     dialog.onkeydown = (event) => { if (event.key === "Escape") event.preventDefault(); };
     dialog.showModal();
-    row.firstElementChild?.focus();
+    // Not a button: whoever presses Enter for proposals must not answer unseen.
+    heading.focus();
   });
 }
 

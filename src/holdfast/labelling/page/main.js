@@ -2,7 +2,8 @@
 
 import { call } from "./api.js";
 import { Deeds } from "./deeds.js";
-import { alert, ask, toast } from "./dialogs.js";
+import { alert, toast } from "./dialogs.js";
+import { rescue, settle } from "./disputes.js";
 import { byId, write } from "./dom.js";
 import { Editor } from "./editor.js";
 import { Palette } from "./palette.js";
@@ -16,7 +17,7 @@ import { SaveState, tellAbout, tellWindow } from "./status.js";
 import { Strip } from "./strip.js";
 import { onTheme } from "./theme.js";
 import { View } from "./view.js";
-import { many, whenWord } from "./words.js";
+import { timeWord } from "./words.js";
 
 const ALL = ["head", "under", "lines", "over"];
 const SCHEMA = "holdfast.label/1";
@@ -31,7 +32,7 @@ class Page {
     this.editor = new Editor((real) => this.changed(real));
     this.plot = new Plot(this.editor, this.view, this.signals);
     this.state = new SaveState();
-    this.saver = new Saver((...told) => this.told(...told), () => this.conflict());
+    this.saver = new Saver((...told) => this.told(...told), () => settle(this));
     this.recordings = new Recordings((id) => this.open(id));
     this.checks = new Checks(this.editor, (doubt) => this.deeds.lookAt(doubt));
     this.player = new Player((time) => this.played(time));
@@ -40,7 +41,7 @@ class Page {
     this.pointer = new Pointer(byId("over"), this.plot, (time) => this.player.seek(time), () => this.about());
     this.strip = new Strip(byId("head"), this.view);
     this.deeds.listen();
-    byId("save").addEventListener("click", () => (this.saver.stopped ? this.conflict() : this.saver.flush()));
+    byId("save").addEventListener("click", () => (this.saver.stopped ? settle(this) : this.saver.flush()));
     onTheme(() => { this.plot.open(); this.plot.redraw(...ALL); });
     window.addEventListener("hashchange", () => this.open(this.asked()));
     this.start();
@@ -72,6 +73,7 @@ class Page {
     this.pointer.stop();
     await this.saver.flush();
     if (turn !== this.turn) return;
+    if (this.saver.dirty) toast(`${this.saver.recording.name} is not saved: this browser keeps its labels, and offers them when you open it again`, "bad");
     this.id = id;
     window.history.replaceState(null, "", `#${id}`);
     this.recordings.mark(id);
@@ -96,14 +98,18 @@ class Page {
     this.show(recording);
     const { id, start, end } = recording;
     alert(recording.read_only ? "Read-only: the labels of this recording cannot be saved, so nothing can be changed" : "");
-    this.signals.open(id, start, end, this.view.inner).catch((error) => turn === this.turn && alert(error.message));
-    call("GET", `recordings/${id}/changes`).then(({ fingers }) => {
-      if (turn !== this.turn) return;
-      this.plot.changes = fingers;
-      this.plot.redraw("under");
-    }, () => {}); // without them nothing snaps, that is all
+    // One after the other: what is drawn does not wait for what edges snap to.
+    this.signals.open(id, start, end, this.view.inner)
+      .then(() => this.change(id, turn), (error) => turn === this.turn && alert(error.message));
     const found = recording.read_only ? null : this.saver.rescue(recording);
-    if (found) this.rescue(recording, found);
+    if (found) rescue(this, recording, found);
+  }
+
+  async change(id, turn) {
+    const { fingers } = await call("GET", `recordings/${id}/changes`).catch(() => ({ fingers: {} })); // nothing snaps, that is all
+    if (turn !== this.turn) return;
+    this.plot.changes = fingers;
+    this.plot.redraw("under");
   }
 
   show(recording) {
@@ -114,6 +120,7 @@ class Page {
     this.state.open(recording);
     this.player.open(recording);
     this.plot.playhead = null;
+    write(byId("played"), "");
     this.plot.open();
     this.view.limit(recording.start, recording.end, LEAST_SAMPLES / (recording.rate || 100));
     write(byId("name"), recording.name);
@@ -125,42 +132,11 @@ class Page {
     this.changed(false);
   }
 
-  async rescue(recording, found) {
-    const n = Object.values(found.labels).flat().length;
-    const texts = [`This browser has ${many(n, "label")} of ${recording.name} from ${whenWord(found.time)} that were never saved.`];
-    if (found.revision !== recording.revision) texts.push("The label file has been changed since by somebody else; what is restored is written over it, and Undo brings it back.");
-    const answer = await ask("Unsaved labels", texts, [{ value: "restore", label: "Restore them" }, { value: "discard", label: "Discard them" }]);
-    if (answer === "restore") this.editor.replace(found.labels, found.note ?? "");
-    else this.saver.forget(recording);
-  }
-
-  async conflict() {
-    const { id, turn } = this;
-    let theirs;
-    try {
-      theirs = await call("GET", `recordings/${id}`);
-    } catch (error) {
-      toast(error.message, "bad");
-      return;
-    }
-    if (turn !== this.turn) return;
-    const count = (labels) => many(Object.values(labels).flat().length, "label");
-    const answer = await ask("Somebody else has saved labels for this recording", [
-      `On the disk: ${count(theirs.labels)}${theirs.author ? ` by ${theirs.author}` : ""}${theirs.time ? `, ${whenWord(theirs.time)}` : ""}.`,
-      `On this page: ${count(this.editor.state.labels)}. Whatever you take, Undo brings the other back.`,
-    ], [{ value: "theirs", label: "Take theirs" }, { value: "mine", label: "Keep mine" }]);
-    const mine = this.editor.state;
-    this.editor.replace(theirs.labels, theirs.note);
-    this.saver.decide(theirs.revision, this.editor.state);
-    this.state.by = { author: theirs.author, time: theirs.time };
-    // Theirs lies under mine, one step of undo away.
-    if (answer === "mine") this.editor.replace(mine.labels, mine.note);
-    else this.saver.touch(this.editor.state);
-  }
-
   told(state, why, by) {
     this.state.tell(state, why, by);
-    alert(state === "failed" ? `Not saved: ${why}. The labels are kept in this browser.` : "");
+    // It stays while it is tried again.
+    if (state === "failed") alert(`Not saved: ${why}. The labels are kept in this browser.`);
+    if (state === "saved" || state === "conflict") alert("");
     if (state === "saved" && by) this.recordings.update(this.id, { labelled: true });
     this.count();
   }
@@ -202,6 +178,7 @@ class Page {
 
   played(time) {
     this.plot.playhead = time;
+    write(byId("played"), `${timeWord(time, 0.01)} s`);
     if (this.player.playing) this.view.follow(time);
     this.plot.redraw("over");
   }

@@ -32,7 +32,6 @@ export class Player {
     byId("film").hidden = !this.media.length;
     byId("medium").replaceChildren(...this.media.map(({ name }, k) => Object.assign(make("option", "", name), { value: String(k) })));
     byId("medium").hidden = this.media.length < 2;
-    byId("film-name").hidden = !byId("medium").hidden;
     this.load(this.media[0] ?? null);
   }
 
@@ -40,9 +39,9 @@ export class Player {
     this.stop();
     this.medium = medium;
     byId("film-problem").hidden = true;
-    byId("film-offset").hidden = false;
+    byId("film-offset").hidden = !medium;
     if (!medium) { this.drop(); return; }
-    byId("film-name").textContent = byId("film-name").title = medium.name;
+    this.video.title = medium.name;
     this.offset = kept(this.offsetKey) ?? medium.offset;
     byId("offset").value = String(this.offset);
     if (medium.missing) {
@@ -78,7 +77,7 @@ export class Player {
   }
 
   tell(text) {
-    byId("film-offset").hidden = this.media.length < 2;
+    byId("film-offset").hidden = true;
     write(byId("film-problem"), text);
     byId("film-problem").hidden = false;
   }

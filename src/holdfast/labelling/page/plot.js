@@ -129,8 +129,8 @@ export class Plot {
     const of = (some) => [forceScale(extent(some, keys), from0), sigmaScale(extent(some, ["sigma"], true, 0.01))];
     if (this.close) return of(pieces);
     this.scales ??= {};
-    const { whole } = this.signals;
-    return (this.scales[finger] ??= of(whole ? [[whole.fingers.get(finger), -Infinity, Infinity]] : []));
+    const data = this.signals.whole?.fingers.get(finger);
+    return (this.scales[finger] ??= of(data ? [[data, -Infinity, Infinity]] : []));
   }
 
   caption(pen, row) {

@@ -3,7 +3,9 @@
 import { call } from "./api.js";
 
 export const SERIES = ["F_a", "F_x", "F_y", "F_z", "sigma"];
-const MARGIN = 0.5; // of the window, on either side
+const MARGIN = 0.4; // of the window, on either side
+const PAIRS = 0.75; // of extremes for each pixel: more are not seen, and take time to come
+const ENOUGH = 0.6; // pairs for each pixel, with which no finer data are asked for
 const PAUSE = 20; // [ms], so that a turn of the wheel is one question
 
 const numbers = (values) => Float64Array.from(values, (v) => (v === null ? NaN : v));
@@ -72,8 +74,7 @@ export class Signals {
     if (this.enough(start, end, width)) return;
     const margin = MARGIN * (end - start);
     const from = Math.max(this.start, start - margin), to = Math.min(this.end, end + margin);
-    // About one pair of extremes for each pixel.
-    const points = Math.min(5000, Math.round((width * (to - from)) / (end - start)));
+    const points = Math.min(5000, Math.round((PAIRS * width * (to - from)) / (end - start)));
     this.asking = true;
     let problem = null;
     try {
@@ -92,7 +93,7 @@ export class Signals {
   // Whether what is there is fine enough for a window of so many pixels.
   enough(start, end, width) {
     return [this.part, this.whole].some((data) => data && data.start <= start && data.end >= end
-      && (data.exact || data.points / (data.end - data.start) >= (0.6 * width) / (end - start)));
+      && (data.exact || data.points / (data.end - data.start) >= (ENOUGH * width) / (end - start)));
   }
 
   /** What there is of a finger over a window, the finest: pieces of (data, from, to). */
