@@ -273,6 +273,33 @@ def test_doubtful_stretches_one_after_the_other(visit, desk):
     ]  # fmt: skip
 
 
+@pytest.mark.parametrize(
+    ("suspect", "expected"),
+    [
+        (
+            (11.0, 12.0, "interval"),
+            [(8, 11, None), (11, 12, None), (12, 14, None), (14, 16, "slip")],
+        ),
+        ((13.5, 14.0, "edge"), [(8, 13.5, None), (13.5, 16, "slip")]),
+    ],
+)
+def test_what_an_audit_expects_is_put_where_it_expects_it(visit, desk, suspect, expected):
+    recording, (start, end, kind) = desk.recordings[0], suspect
+    held, slips = label(8, 14, "stable"), label(14, 16, "unstable", "slip")
+    recording.save({"thumb": [held, slips]})
+    recording.words["suspects"] = [
+        {"finger": "thumb", "start": start, "end": end, "given": "stable",
+         "expected": "unstable", "confidence": 0.95, "kind": kind},
+    ]  # fmt: skip
+    page = visit(desk.url)
+    ready(page)
+    page.keyboard.press("g")
+    shows(page, "#about", "Enter corrects it")
+    page.keyboard.press("Enter")
+    assert [(start, end, cause) for start, end, _, cause in labels(page)] == expected
+    shows(page, "#doubts", "^$")
+
+
 def test_the_next_recording(visit):
     with Desk(Recording("one"), Recording("two", fingers=("left", "right"))) as desk:
         page = visit(desk.url)

@@ -99,9 +99,7 @@ export class Deeds {
     editor.lastDoubt = doubt;
     this.plot.aimed = null;
     this.view.show(doubt.item);
-    const label = doubt.kind === "label" ? doubt.item
-      : doubt.kind === "suspect" ? editor.state.labels[doubt.finger].find((each) => each.start <= doubt.item.start && doubt.item.end <= each.end) : null;
-    editor.select(doubt.finger, label);
+    editor.select(doubt.finger, doubt.kind === "label" ? doubt.item : null);
     editor.point(doubt);
     this.player.seek(doubt.item.start);
   }

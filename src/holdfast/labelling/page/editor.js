@@ -136,12 +136,18 @@ export class Editor {
 
   signed(label) { return { ...label, ...this.mine() }; }
 
-  /** Takes a proposal, or confirms a doubtful label; what a person looked at is certain. */
+  /** Takes a proposal or what an audit expects, or confirms a label; what a person saw is certain. */
   accept({ kind, finger, item }) {
     const own = this.state.labels[finger], evidence = [item.author, "accepted", item.evidence].filter(Boolean).join(", ");
-    if (kind === "suspect") { this.reject({ finger, item }); return; }
     const sure = this.mine({ evidence });
-    if (kind === "label") {
+    if (kind === "suspect") {
+      const { start, end, expected: state } = item;
+      // At an edge the neighbour is what should have gone on.
+      const beside = own.find((each) => each.state === state && each.start <= end && each.end >= start);
+      const label = this.mine({ start, end, state, cause: beside?.cause ?? null, evidence: "audit, accepted" });
+      this.selected = null;
+      this.put({ [finger]: overwrite(own, label, this.bounds.least)[0] });
+    } else if (kind === "label") {
       const [labels, label] = change(own, item, sure);
       this.selected = { finger, label, fresh: true };
       this.put({ [finger]: labels });

@@ -5,6 +5,12 @@ import { labelWord, lengthWord, many, percent, stateKey, stateWord, timeWord } f
 
 const MOST = 60; // rows of doubtful stretches
 
+// Not scrollIntoView: that would scroll the page as well where it is longer than the screen.
+function reveal(row, list) {
+  const [one, all] = [row, list].map((each) => each.getBoundingClientRect());
+  list.scrollTop += Math.min(0, one.top - all.top) + Math.max(0, one.bottom - all.bottom);
+}
+
 /** The list of recordings with what is done of each. */
 export class Recordings {
   constructor(choose) {
@@ -51,7 +57,7 @@ export class Recordings {
     for (const row of byId("recordings").querySelectorAll("button")) {
       const here = row.dataset.id === String(id);
       row.setAttribute("aria-current", String(here));
-      if (here) row.scrollIntoView({ block: "nearest" });
+      if (here) reveal(row, byId("recordings"));
     }
   }
 

@@ -12,7 +12,7 @@ import { colours, font } from "./theme.js";
 import { LEFT, RIGHT } from "./view.js";
 import { timeWord, niceStep } from "./words.js";
 
-const LEAST = 112; // [px], a row; where there is less room the rows scroll
+const LEAST = 120; // [px], a row; where there is less room the rows scroll
 const PARTS = ["head", "under", "lines", "over"];
 
 export class Plot {

@@ -26,7 +26,7 @@ export class SaveState {
 }
 
 const hints = {
-  proposal: "Enter accepts, X rejects", suspect: "press a state to correct it, X if it is right",
+  proposal: "Enter accepts, X rejects", suspect: "Enter corrects it, X if the label is right",
   label: "Enter confirms it", fresh: "A copies it to all fingers",
 };
 
