@@ -277,6 +277,8 @@ def test_reset_forgets_everything():
 REFUSED = {
     "unknown finger": ({"ring": np.zeros((2, 3))}, 1.0,
                        "finger 'ring' given; the model judges thumb, index"),
+    "after a known one": ({"thumb": np.zeros((2, 3)), "ring": np.zeros((2, 3))}, 1.0,
+                          "finger 'ring' given; the model judges thumb, index"),
     "taxels": ({"thumb": np.zeros((2, 3)), "index": np.zeros((3, 3))}, 1.0,
                "index: a sample of shape (3, 3) given, (2, 3) expected (tiny)"),
     "axes": ({"thumb": np.zeros((2, 2))}, 1.0,
