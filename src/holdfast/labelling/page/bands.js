@@ -94,8 +94,13 @@ export function frame(pen, left, top, width, height, colour, thick = 2, dash = [
 /** Outlines of what a person should look at. */
 export function outlines(pen, view, row, doubts, focus) {
   for (const each of doubts) {
-    const at = each.kind === "proposal" ? null : sides(view, each.item);
+    const at = sides(view, each.item);
     if (!at) continue;
+    if (each.kind === "proposal") {
+      const [high, low] = row.proposals;
+      frame(pen, at[0], high - 1, at[1] - at[0], low - high + 2, colours["unknown-line"], 2, [2, 3]);
+      continue;
+    }
     const [left, right] = at, audit = each.kind === "suspect", top = row.force[0] - 2;
     const strong = focus && focus.item === each.item;
     frame(pen, left, top, right - left, row.labels[1] + 1 - top, colours["unknown-line"], strong ? 3 : 2, audit ? [7, 4] : [2, 3]);

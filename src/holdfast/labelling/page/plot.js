@@ -145,9 +145,9 @@ export class Plot {
   over(pen) {
     const { editor, view } = this, target = this.target();
     this.rows.forEach((row, k) => {
-      if (target?.kind === "proposal" && target.finger === editor.fingers[k]) meant(pen, view, row, target.item);
       const own = editor.doubts.filter(({ finger }) => finger === editor.fingers[k]);
       outlines(pen, view, row, own, editor.focus);
+      if (target?.kind === "proposal" && target.finger === editor.fingers[k]) meant(pen, view, row, target.item);
       const { selected } = editor;
       if (selected?.finger === editor.fingers[k] && !editor.preview) selection(pen, view, row, selected.label, selected.fresh);
     });
