@@ -11,9 +11,9 @@ import numpy.typing as npt
 from holdfast.errors import RecordingError
 from holdfast.io.importers.table import read_table
 from holdfast.labelling.masks import Mask
+from holdfast.metrics.masks import runs
 from holdfast.recordings import Recording, Truth
 from holdfast.sensors.values import Array
-from holdfast.twin.labels import runs
 
 OBJECT = "object"
 """Name of the object among the bodies of a file."""

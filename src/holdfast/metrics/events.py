@@ -15,6 +15,7 @@ import numpy.typing as npt
 
 from holdfast.contact import NO_CONTACT, STABLE, UNSTABLE, ContactState
 from holdfast.metrics.decisions import Codes, check_lengths, check_times
+from holdfast.metrics.masks import runs
 from holdfast.metrics.statistics import finite_or_none, percent, quantile
 from holdfast.sensors.values import Array
 
@@ -231,15 +232,14 @@ def _spans(mask: npt.NDArray[np.bool_], times: Array) -> Array:
     """(m, 2) start and end [s] of each unbroken run of True."""
     period = float(np.median(np.diff(times))) if len(times) > 1 else 0.0
     instants = np.append(times, times[-1:] + period)
-    edges = np.diff(np.concatenate([[False], mask, [False]]).astype(np.int8))
-    return instants[np.flatnonzero(edges)].reshape(-1, 2)
+    return instants[runs(mask)]
 
 
-def _events(runs: Array, stable: Array) -> tuple[Array, Array]:
+def _events(unstable: Array, stable: Array) -> tuple[Array, Array]:
     """Onsets and ends [s] of the not-stable runs that are events."""
-    wide = runs[1:, 0] - runs[:-1, 1] >= CLOSED_GAP - ROUNDING
-    first, last = np.append(True, wide)[: len(runs)], np.append(wide, True)[: len(runs)]
-    onsets, ends = runs[first, 0], runs[last, 1]
+    wide = unstable[1:, 0] - unstable[:-1, 1] >= CLOSED_GAP - ROUNDING
+    first, last = np.append(True, wide)[: len(unstable)], np.append(wide, True)[: len(unstable)]
+    onsets, ends = unstable[first, 0], unstable[last, 1]
     long_stable = stable[stable[:, 1] - stable[:, 0] >= STABLE_BEFORE - ROUNDING]
     chosen = (ends - onsets >= SHORTEST_EVENT - ROUNDING) & np.isin(onsets, long_stable[:, 1])
     return onsets[chosen], ends[chosen]

@@ -14,8 +14,6 @@ from holdfast.metrics.masks import Mask, joined, runs, runs_with, widened
 from holdfast.recordings import Label, Truth, labels_from_samples
 from holdfast.sensors.values import Array
 
-__all__ = ["HELD", "LabelRule", "labels_from_truth", "phases_as_felt", "runs"]
-
 HELD = (Phase.LOCKED, Phase.DISTURBED, Phase.SLIPPING)
 """Phases in which the hand holds the object."""
 

@@ -30,9 +30,9 @@ from holdfast.labelling.rules.hand import (
     lost_at,
 )
 from holdfast.labelling.rules.limits import check_positive
+from holdfast.metrics.masks import runs
 from holdfast.recordings import Label, Recording
 from holdfast.sensors.values import Array
-from holdfast.twin.labels import runs
 
 AUTHOR = "rule:signal"
 LET_GO = 0.9

@@ -31,9 +31,10 @@ from holdfast.labelling.rules.drawing import Drawing, Pen
 from holdfast.labelling.rules.hand import FingerForce, HandForce, hand_force, lost_at, pressed_at
 from holdfast.labelling.rules.limits import check_positive
 from holdfast.labelling.rules.motion import SMOOTHING, Motion, motion_of, relative
+from holdfast.metrics.masks import runs
 from holdfast.recordings import Label, Recording
 from holdfast.sensors.values import Array
-from holdfast.twin.labels import LabelRule, runs
+from holdfast.twin.labels import LabelRule
 
 AUTHOR = "rule:tracking"
 NOISE_TIMES = 5.0

@@ -10,10 +10,11 @@ from holdfast.contact import STABLE, UNKNOWN, Phase
 from holdfast.methods import HAND
 from holdfast.metrics import Decisions, FingerDecisions, calibration_sums
 from holdfast.metrics.events import ROUNDING
+from holdfast.metrics.masks import runs
 from holdfast.recordings import Truth
 from holdfast.sensors.values import Array
 from holdfast.study.judging.seen import Seen
-from holdfast.twin.labels import HELD, runs
+from holdfast.twin.labels import HELD
 
 Mask = npt.NDArray[np.bool_]
 

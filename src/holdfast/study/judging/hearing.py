@@ -11,9 +11,10 @@ import numpy.typing as npt
 from holdfast.contact import STABLE, UNKNOWN
 from holdfast.metrics import FingerDecisions, match_alarms
 from holdfast.metrics.events import POSTS, ROUNDING, STABLE_BEFORE
+from holdfast.metrics.masks import runs
 from holdfast.recordings import Truth
 from holdfast.sensors.values import Array
-from holdfast.twin.labels import HELD, LabelRule, runs
+from holdfast.twin.labels import HELD, LabelRule
 
 Mask = npt.NDArray[np.bool_]
 
