@@ -89,7 +89,6 @@ export function axis(pen, view, scale, box) {
 export function series(pen, view, pieces, key, scale, box, colour) {
   within(pen, LEFT, box[0] - 2, view.inner, box[1] - box[0] + 4, () => {
     pen.strokeStyle = pen.fillStyle = colour;
-    pen.lineWidth = 1.4;
     pen.lineJoin = "bevel";
     for (const [data, from, to] of pieces) trace(pen, view, data, data[key], from, to, (v) => heightOf(scale, box, v), scale.log);
   });
@@ -98,6 +97,8 @@ export function series(pen, view, pieces, key, scale, box, colour) {
 function trace(pen, view, { t }, column, from, to, height, log) {
   const first = Math.max(0, find(t, from) - 1), last = Math.min(t.length, find(t, to) + 1);
   const dots = last - first > 1 && (t[last - 1] - t[first]) / (last - 1 - first) / view.perPixel > DOTS;
+  // Dense lines are as good as hairlines, which are drawn many times faster.
+  pen.lineWidth = (last - first) * view.perPixel > to - from ? 1 : 1.4;
   let on = false;
   pen.beginPath();
   for (let k = first; k < last; k += 1) {

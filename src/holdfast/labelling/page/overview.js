@@ -1,6 +1,6 @@
 // The whole recording in a strip, with the window in it; below it the time axis of the window.
 
-import { line } from "./pen.js";
+import { line, penOf } from "./pen.js";
 import { colours, fingerColour, font, stateColour } from "./theme.js";
 import { LEFT, RIGHT } from "./view.js";
 import { niceStep, stateKey, timeWord } from "./words.js";
@@ -12,7 +12,20 @@ const RIBBON = 5;
 export const wholeX = (view, time) => LEFT + ((time - view.low) / (view.high - view.low)) * view.inner;
 export const wholeTime = (view, x) => view.low + ((x - LEFT) / view.inner) * (view.high - view.low);
 
+// What does not change with the window is drawn once.
+const still = { canvas: document.createElement("canvas"), of: [] };
+
 export function overview(pen, view, editor, signals) {
+  const of = [view.width, view.low, view.high, signals.whole, editor.doubts, editor.state, editor.preview, colours.base, window.devicePixelRatio];
+  if (of.some((value, k) => value !== still.of[k])) {
+    whole(penOf(still.canvas, view.width, STRIP[1]), view, editor, signals);
+    still.of = of;
+  }
+  pen.drawImage(still.canvas, 0, 0, view.width, STRIP[1]);
+  frame(pen, view);
+}
+
+function whole(pen, view, editor, signals) {
   const [top, bottom] = STRIP, n = editor.fingers.length;
   const ribbon = Math.max(2, Math.min(RIBBON, 20 / n)), ribbons = bottom - n * ribbon - 1;
   pen.fillStyle = colours.base;
@@ -30,7 +43,6 @@ export function overview(pen, view, editor, signals) {
     pen.fillStyle = colours["unknown-line"];
     pen.fillRect(left, top - 4, width, 3);
   }
-  window_(pen, view);
 }
 
 // The force, of each finger to its own height.
@@ -55,7 +67,7 @@ function profile(pen, view, data, [top, bottom], colour) {
   pen.globalAlpha = 1;
 }
 
-function window_(pen, view) {
+function frame(pen, view) {
   const [top, bottom] = STRIP, [left, right] = [view.start, view.end].map((time) => wholeX(view, time));
   pen.fillStyle = colours.ground;
   pen.globalAlpha = 0.6;
