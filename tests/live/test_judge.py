@@ -7,7 +7,7 @@ import pytest
 from holdfast.contact import ContactState, Fault, Reason
 from holdfast.detector import detect
 from holdfast.errors import ModelError, StreamError
-from holdfast.live.judge import Judge
+from holdfast.live.judge import MOST_KEPT, Judge
 from holdfast.recordings import Recording
 from holdfast.resampling import resample
 
@@ -113,6 +113,49 @@ def test_while_nothing_comes_no_finger_is_stable():
     for finger in said.estimate.fingers.values():
         assert (finger.state, finger.reason) == (ContactState.UNKNOWN, Reason.GAP)
         assert finger.faults == (Fault.PACKET_GAP,)
+
+
+def test_word_after_silence_brings_no_finger_back():
+    recording = build.grasp()
+    arrivals = build.arrivals_of(recording)
+    judge = Judge(build.model(), build.Script.of(recording).sensors)
+    for arrival in arrivals[:500]:
+        judge.take(arrival)
+    judge.silent()
+    (said,) = judge.take(build.told("odd", thumb=[Fault.TAXEL_COUNT]))
+    assert {finger.state for finger in said.estimate.fingers.values()} == {ContactState.UNKNOWN}
+    assert said.estimate.state is ContactState.UNKNOWN
+    (back,) = judge.take(arrivals[500])
+    assert all(finger.faults == () for finger in back.estimate.fingers.values())
+
+
+def test_a_finger_that_stays_away_is_told_of_while_the_others_go_on():
+    recording = build.grasp()
+    judge = Judge(build.model(), build.Script.of(recording).sensors)
+    decisions = []
+    for k, arrival in enumerate(build.arrivals_of(recording)[:600]):
+        there = {n: s for n, s in arrival.samples.items() if k < 500 or n != "thumb"}
+        decisions += judge.take(arrival._replace(samples=there))
+    told = [d for d in decisions[500:] if "thumb" in d.fingers]
+    assert len(told) == 1
+    thumb = told[0].estimate.fingers["thumb"]
+    assert (thumb.state, thumb.reason) == (ContactState.UNKNOWN, Reason.GAP)
+
+
+def test_what_is_kept_before_the_rate_is_known_is_bounded():
+    recording = build.grasp()
+    judge = Judge(build.model(), build.Script.of(recording).sensors)
+    first, *_ = build.arrivals_of(recording)
+    for k in range(3):
+        for _ in range(MOST_KEPT):
+            assert judge.take(build.told("odd", thumb=[Fault.TAXEL_COUNT])) == []
+        judge.take(first._replace(time=0.01 * k))
+    assert len(judge._kept) == 6
+    stuck = build.arrivals_of(recording)[: MOST_KEPT // 8]
+    for one in stuck:  # the clock of the device hardly moves
+        judge.take(one._replace(time=0.03 + one.time * 1e-6))
+    assert len(judge._kept) == 6 + len(stuck)
+    assert judge._kept.maxlen == MOST_KEPT
 
 
 def test_silence_is_longer_for_slow_sources():

@@ -81,6 +81,32 @@ def test_a_silent_source_is_told_once_and_its_return_ends_it(start):
     assert after.fingers["thumb"].state is not ContactState.UNKNOWN
 
 
+def test_packets_are_those_of_the_module_that_has_most(start):
+    recording = build.grasp()
+    steps = [
+        one._replace(time=one.time + 1e-4 * k, samples={name: sample})
+        for one in build.arrivals_of(recording)[:60]
+        for k, (name, sample) in enumerate(one.samples.items())
+    ]
+    session = start(build.Script.of(recording, steps))
+    wait_for(lambda: session.ended)
+    assert session.n_packets == 60
+
+
+def test_a_tare_that_was_given_up_is_not_taken_later(monkeypatch):
+    monkeypatch.setattr("holdfast.live.session.ANSWER_TIME", 0.01)
+    recording = build.grasp()
+    session = session_of(build.Script.of(recording))
+    taken = []
+    monkeypatch.setattr(session.judge, "tare", lambda: taken.append(1))
+    with pytest.raises(SourceError, match=r"^the source does not answer: no tare can be taken$"):
+        session.tare()
+    session.start()
+    wait_for(lambda: session.ended)
+    session.stop()
+    assert (taken, session.failure) == ([], None)
+
+
 def test_the_tare_is_taken_in_the_session_and_refused_in_contact(start):
     recording = build.grasp()
     arrivals = build.arrivals_of(recording)

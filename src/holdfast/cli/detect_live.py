@@ -1,5 +1,6 @@
 """`holdfast detect` on a live source: lines as they come, until Ctrl-C."""
 
+import math
 import time
 from collections.abc import Iterator
 from contextlib import suppress
@@ -33,18 +34,15 @@ def detections_live(
 def _decisions(
     source: "Source", judge: "Judge", seconds: float | None
 ) -> Iterator[list["Decision"]]:
-    end = None if seconds is None else time.monotonic() + seconds
-    silent = False
-    while not source.ended and (end is None or time.monotonic() < end):
-        arrival = source.read(judge.silence)
+    from holdfast.live.watch import Watch
+
+    end = math.inf if seconds is None else time.monotonic() + seconds
+    watch = Watch(source, judge)
+    while not source.ended and time.monotonic() < end:
+        arrival, decisions = watch.turn()
         if arrival is not None:
             tell(arrival)
-            silent = silent and not arrival.samples
-            yield judge.take(arrival)
-        elif not silent and not source.ended:
-            silent = True
-            said = judge.silent()
-            yield [said] if said else []
+        yield decisions
     yield judge.finish()
 
 

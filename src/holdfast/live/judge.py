@@ -1,6 +1,7 @@
 """A detector for what arrives from a source: rate, faults on the way, tare. No clock, no thread."""
 
 import math
+from collections import deque
 from collections.abc import Iterator, Mapping
 from typing import Any, NamedTuple
 
@@ -19,6 +20,8 @@ from holdfast.sources import Arrival
 
 RATE_SECONDS = 0.5
 """How much of a stream is looked at to find its rate; it is judged afterwards [s]."""
+MOST_KEPT = 4096
+"""So many samples are kept for that at the most: the clock of a device may stand still."""
 LEAST_SILENCE = 0.1
 """A source that says nothing for so long is silent, however fast it is [s]."""
 
@@ -35,7 +38,7 @@ class Decision(NamedTuple):
 
     Attributes:
         estimate: of the hand.
-        fingers: whose estimates are new.
+        fingers: whose estimates are new: they have a sample, or have had none for too long.
     """
 
     estimate: HandEstimate
@@ -84,11 +87,12 @@ class Judge:
         self.resampled = False
         self._strict = strict
         self._ignore = ignore
-        self._kept: list[Arrival] = []
+        self._kept: deque[Arrival] = deque(maxlen=MOST_KEPT)
         self._detector: Detector | None = None
         Detector(model, self.fingers, 100.0, ignore=ignore)  # refuses what it must
         self._resamplers: dict[str, Resampler] = {}
         self._faults: dict[str, tuple[Fault, ...]] = {}
+        self._gone: set[str] = set()
         self._last: HandEstimate | None = None
 
     @property
@@ -109,13 +113,14 @@ class Judge:
         """
         if self._detector is not None:
             return list(self._judge(self._detector, arrival))
-        self._kept.append(arrival)
+        self._keep(arrival)
         kept = [one for one in self._kept if one.samples]
-        if not kept or kept[-1].time - kept[0].time < RATE_SECONDS:
+        if not arrival.samples or arrival.time - kept[0].time < RATE_SECONDS:
             return []
         rate = _rate(kept, self.fingers)
         if rate is None:  # nothing of the model's fingers yet
-            self._kept = [arrival]
+            self._kept.clear()
+            self._kept.append(arrival)
             return []
         return self._begin(rate)
 
@@ -131,8 +136,8 @@ class Judge:
         """What is to be said while nothing arrives: every finger is UNKNOWN for a gap."""
         if self._last is None:
             return None
-        gap = dict.fromkeys(self.fingers, (Fault.PACKET_GAP,))
-        return Decision(self._told(gap, Reason.GAP), tuple(self.fingers))
+        self._gone = set(self.fingers)
+        return Decision(self._told(), tuple(self.fingers))
 
     def tare(self) -> None:
         """Takes the tare anew, from the next sample on.
@@ -162,6 +167,13 @@ class Judge:
             if name in samples
         }
 
+    def _keep(self, arrival: Arrival) -> None:
+        """Keeps what arrives before the rate is known; of words in a row, one."""
+        if self._kept and not (arrival.samples or self._kept[-1].samples):
+            before = self._kept.pop()
+            arrival = arrival._replace(faults={**before.faults, **arrival.faults})
+        self._kept.append(arrival)
+
     def _begin(self, rate: float) -> list[Decision]:
         """Makes the detector, and judges what was kept."""
         model, self.rate = self.model, rate
@@ -174,31 +186,36 @@ class Judge:
             self.resampled = True
             self._resamplers = {name: Resampler(rate, model.rate) for name in self.fingers}
         self._detector = Detector(model, self.fingers, rate, ignore=self._ignore)
-        kept, self._kept = self._kept, []
+        kept = list(self._kept)
+        self._kept.clear()
         return [said for one in kept for said in self._judge(self._detector, one)]
 
     def _judge(self, detector: Detector, arrival: Arrival) -> Iterator[Decision]:
         for name in arrival.samples:
             self._faults.pop(name, None)
+            self._gone.discard(name)
         self._faults.update(arrival.faults)
         found = {name: arrival.samples[name] for name in self.fingers if name in arrival.samples}
         for time, samples in self._instants(arrival.time, found):
-            self._last = detector.update(samples, time)
-            yield Decision(self._told(self._faults), tuple(samples))
+            before, self._last = self._last, detector.update(samples, time)
+            lost = _lost(before, self._last) - samples.keys() if before else ()
+            yield Decision(self._told(), (*samples, *lost))
         if not found and self._last is not None:
             named = tuple(name for name in self.fingers if name in arrival.faults)
             if named:
-                yield Decision(self._told(self._faults), named)
+                yield Decision(self._told(), named)
 
-    def _told(
-        self, faults: Mapping[str, tuple[Fault, ...]], reason: Reason = Reason.FAULT
-    ) -> HandEstimate:
+    def _told(self) -> HandEstimate:
         """The last estimate, with what is wrong on the way."""
         if self._last is None or self._detector is None:
             raise StreamError("nothing has been judged yet")
-        if not faults:
-            return self._last
-        return with_faults(self._last, faults, self._detector.n_fingers, reason)
+        told, n_fingers = self._last, self._detector.n_fingers
+        if self._faults:
+            told = with_faults(told, self._faults, n_fingers)
+        if self._gone:
+            gap = dict.fromkeys(self._gone, (Fault.PACKET_GAP,))
+            told = with_faults(told, gap, n_fingers, Reason.GAP)
+        return told
 
     def _instants(self, time: float, samples: Samples) -> Iterator[tuple[float, Samples]]:
         """The samples as the detector takes them: as they are, or at the model's rate."""
@@ -214,6 +231,16 @@ class Judge:
         for when in sorted(at):
             last = max(when, math.nextafter(last, math.inf))
             yield last, at[when]
+
+
+def _lost(before: HandEstimate, now: HandEstimate) -> set[str]:
+    """Fingers of which something was known, and is not any more."""
+    unknown = ContactState.UNKNOWN
+    return {
+        name
+        for name, finger in now.fingers.items()
+        if finger.state is unknown and before.fingers[name].state is not unknown
+    }
 
 
 def _rate(arrivals: list[Arrival], fingers: Mapping[str, Sensor]) -> float | None:

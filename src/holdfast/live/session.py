@@ -15,6 +15,7 @@ from holdfast.contact import ContactEvent, ContactState
 from holdfast.detector import HAND
 from holdfast.errors import SourceError
 from holdfast.live.judge import Decision, Judge
+from holdfast.live.watch import Watch
 from holdfast.sources import Arrival, Source
 
 N_LATENCIES = 8192
@@ -61,10 +62,10 @@ class Session:
         judge: of its samples.
 
     Attributes:
-        n_packets: that came with samples.
+        n_packets: that came with samples: how many the module has that has most, as one packet
+            may hold the samples of several instants, each of another module.
         n_lost: that are missing by the device's count.
         n_refused: that made no sense.
-        silent: whether nothing arrives.
         ended: whether the source is over, or judging failed.
         failure: why it failed.
     """
@@ -73,8 +74,10 @@ class Session:
         self.source = source
         self.judge = judge
         self.n_packets = self.n_lost = self.n_refused = 0
-        self.silent = self.ended = False
+        self.ended = False
         self.failure: Exception | None = None
+        self._watch = Watch(source, judge)
+        self._n_samples = dict.fromkeys(source.sensors, 0)
         self._listeners: list[Listener] = []
         self._requests: deque[Future[None]] = deque()
         self._stopping = Event()
@@ -82,6 +85,11 @@ class Session:
         self._states: dict[str, ContactState] = {}
         self._latencies = np.full(N_LATENCIES, np.nan)
         self._n_judged = 0
+
+    @property
+    def silent(self) -> bool:
+        """Whether no samples come of what is judged."""
+        return self._watch.silent
 
     def listen(self, listener: Listener) -> None:
         """Has `listener` called with all that is said from now on."""
@@ -118,6 +126,7 @@ class Session:
         try:
             answer.result(ANSWER_TIME)
         except TimeoutError as cause:
+            answer.cancel()
             raise SourceError("the source does not answer: no tare can be taken") from cause
 
     def latency(self) -> Latency:
@@ -139,26 +148,25 @@ class Session:
     def _turn(self) -> None:
         while self._requests:
             self._answer(self._requests.popleft())
-        arrival = self.source.read(self.judge.silence)
+        arrival, decisions = self._watch.turn()
         if arrival is not None:
-            self._take(arrival)
-        elif not self.silent and not self.source.ended:
-            self.silent = True
-            said = self.judge.silent()
-            self._say(None, [said] if said else [])
+            self._count(arrival, judged=bool(decisions))
+        if arrival is not None or decisions:
+            self._say(arrival, decisions)
 
-    def _take(self, arrival: Arrival) -> None:
-        decisions = self.judge.take(arrival)
-        if arrival.samples and decisions:
+    def _count(self, arrival: Arrival, *, judged: bool) -> None:
+        if arrival.samples and judged:
             self._latencies[self._n_judged % N_LATENCIES] = time.monotonic() - arrival.received
             self._n_judged += 1
-        self.silent = self.silent and not arrival.samples
-        self.n_packets += bool(arrival.samples)
+        for module in arrival.samples:
+            self._n_samples[module] += 1
+            self.n_packets = max(self.n_packets, self._n_samples[module])
         self.n_lost += arrival.n_lost
         self.n_refused += arrival.n_refused
-        self._say(arrival, decisions)
 
     def _answer(self, request: "Future[None]") -> None:
+        if not request.set_running_or_notify_cancel():
+            return  # whoever asked has given up
         try:
             self.judge.tare()
             request.set_result(None)

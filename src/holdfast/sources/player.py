@@ -35,7 +35,7 @@ class Player(Source):
             raise ValueError(f"a speed of at least 0 expected, {speed} given")
         self.name = name
         self.paced = speed > 0
-        self._speed = speed
+        self.speed = speed
         self._loops = loop
         self._moments: Iterator[Moment] = iter(())
         self._notices: list[str] = []
@@ -135,12 +135,12 @@ class Player(Source):
 
     def _due(self, moment: float, now: float) -> float:
         """When something is due, on the host's clock; minus infinity for at once."""
-        if not self._speed:
+        if not self.speed:
             return -math.inf
         if self._began is None:
             self._began = now, moment
         began, start = self._began
-        return began + (moment + self._shift - start) / self._speed
+        return began + (moment + self._shift - start) / self.speed
 
     def _given(self, moment: Moment) -> Arrival:
         received = time.monotonic()

@@ -54,6 +54,7 @@ class Source(ABC):
         metadata: of a recording made from it (`source`, `hand`, ...); plain JSON values.
         paced: whether samples come as time goes by; False where they come as fast as they are
             taken.
+        speed: how fast its time goes by; 1 is real time, 0 as fast as samples are taken.
 
     Example:
         >>> from holdfast.sources import open_source
@@ -66,6 +67,7 @@ class Source(ABC):
     sensors: Mapping[str, Sensor] = {}
     metadata: Mapping[str, Any] = {}
     paced: bool = True
+    speed: float = 1.0
 
     @abstractmethod
     def open(self) -> None:
