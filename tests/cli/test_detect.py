@@ -15,6 +15,7 @@ from holdfast.contact import UNSTABLE, Fault
 from holdfast.detector import detect
 from holdfast.features import FeatureSpec
 from holdfast.io import load_recording, save_recording
+from holdfast.io.mcap_writer import RecordingWriter
 from holdfast.live.play import XelaServer
 from holdfast.model import Debounce, FingerModel, Model
 from holdfast.recordings import Recording, Tactile
@@ -292,9 +293,21 @@ def test_refusals(capsys, model, grasp, save, tmp_path):
     assert refusal(capsys, model, grasp, "--hysteresis", "nan") == (
         "a hysteresis from 0 to 1 expected, nan given"
     )
+    assert refusal(capsys, model, "twin:", "--seconds", "0") == (
+        "--seconds: more than 0 s expected, 0 given"
+    )
+    assert refusal(capsys, model, grasp, "--seconds", "2") == (
+        f"--seconds is for live sources; {grasp} is judged to its end"
+    )
     assert "'slow' is not one of 'resample', 'strict'" in refusal(
         capsys, model, grasp, "--rate", "slow"
     )
+
+
+def test_a_recording_without_samples(capsys, tmp_path):
+    path = tmp_path / "empty.mcap"
+    RecordingWriter(path, {"thumb": sensor("uskin-curved")}).close()
+    assert refusal(capsys, NOISE_FLOOR, path) == f"{path} has no samples; at least one expected"
 
 
 def test_a_damaged_file(capsys, save):

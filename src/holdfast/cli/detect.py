@@ -66,7 +66,9 @@ def detect(
     """
     from holdfast.sources.uri import is_uri
 
-    wanted, live = debounced(model, debounce, hysteresis), is_uri(source)
+    live = is_uri(source)
+    _check_seconds(seconds, source, live=live)
+    wanted = debounced(model, debounce, hysteresis)
     if live:
         from holdfast.cli.detect_live import detections_live
 
@@ -83,6 +85,15 @@ def detect(
             sys.stdout.write(block)
         if live:
             sys.stdout.flush()
+
+
+def _check_seconds(seconds: float | None, source: str, *, live: bool) -> None:
+    if seconds is None:
+        return
+    if not live:
+        raise ValueError(f"--seconds is for live sources; {source} is judged to its end")
+    if not seconds > 0:
+        raise ValueError(f"--seconds: more than 0 s expected, {seconds:g} given")
 
 
 def _summarise(detections: Iterator["Detection"], model: str, *, as_json: bool) -> None:
@@ -113,13 +124,15 @@ def _detections(model: "Model", path: Path, rate: RateRule, ignore: str) -> Iter
 
 def _pieces(model: "Model", path: Path, rate: RateRule) -> Iterator["Recording"]:
     """The recording at the model's rate: in pieces, unless it must be known as a whole."""
-    from holdfast.errors import ModelError
+    from holdfast.errors import ModelError, RecordingError
     from holdfast.features import Tare
     from holdfast.io import load_recording, read_chunks
     from holdfast.resampling import resample
 
     pieces = read_chunks(path, PIECE, labels=False)
-    first = next(pieces)
+    first = next(pieces, None)
+    if first is None:
+        raise RecordingError(f"{path} has no samples; at least one expected")
     model.fingers_of({name: module.sensor for name, module in first.modules.items()})
     if not first.complete:
         say(f"{path} was cut: what could be recovered is judged")

@@ -32,7 +32,7 @@ def _ros1() -> str:
     try:
         rospy_module()
         check_master(master := master_of(None))
-    except HoldfastError as missing:
+    except (HoldfastError, ValueError) as missing:  # a ValueError: ROS_MASTER_URI is none
         return str(missing)
     return f"rospy, and a master at {master}"
 
