@@ -1,4 +1,6 @@
 import json
+import os
+import signal
 import re
 import tracemalloc
 from dataclasses import replace
@@ -17,6 +19,7 @@ from holdfast.features import FeatureSpec
 from holdfast.io import load_recording, save_recording
 from holdfast.io.mcap_writer import RecordingWriter
 from holdfast.live.play import XelaServer
+from holdfast.live.watch import Watch
 from holdfast.model import Debounce, FingerModel, Model
 from holdfast.recordings import Recording, Tactile
 from holdfast.sensors import sensor
@@ -345,3 +348,23 @@ def test_a_live_source_is_judged_as_it_comes(capsys, save):
             if not line["faults"]:  # on a busy machine some are late
                 assert line["state"] == plain(trace.estimate(k))["state"]
     assert set(found["fingers"]) == set(want.fingers)
+
+
+@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
+def test_a_signal_ends_a_live_source_in_order(capsys, monkeypatch, save, number):
+    grasp = save(synthetic_recording("a", 1, ("thumb", "index")))
+    real, turns = Watch.turn, []
+
+    def turn(watch):
+        turns.append(watch)
+        if len(turns) == 100:
+            os.kill(os.getpid(), number)
+        return real(watch)
+
+    monkeypatch.setattr(Watch, "turn", turn)
+    with (
+        open_source(str(grasp), speed=1.5, loop=True) as source,
+        XelaServer(source, port=0) as server,
+    ):
+        found = summary(capsys, NOISE_FLOOR, server.uri)
+    assert set(found["fingers"]) == {"thumb", "index"}

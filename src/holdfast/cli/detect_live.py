@@ -3,11 +3,11 @@
 import math
 import time
 from collections.abc import Iterator
-from contextlib import suppress
 from typing import TYPE_CHECKING
 
 from holdfast.cli.console import say
 from holdfast.cli.judging import RateRule, judge_of
+from holdfast.cli.stopping import Stop, stopping
 
 if TYPE_CHECKING:
     from holdfast.detector import Detection
@@ -19,26 +19,27 @@ if TYPE_CHECKING:
 def detections_live(
     model: "Model", uri: str, rate: RateRule, ignore: str, seconds: float | None
 ) -> Iterator["Detection"]:
-    """What the model says of a live source, arrival by arrival, until Ctrl-C or `seconds`."""
+    """What the model says of a live source, arrival by arrival, until a signal or `seconds`."""
     from holdfast.live.judge import warm_up
     from holdfast.live.tracing import detection_of
     from holdfast.sources import open_source
 
     warm_up()
-    with suppress(KeyboardInterrupt), open_source(uri) as source:
+    with stopping() as stop, open_source(uri) as source:
         judge = judge_of(model, source, rate, ignore)
-        for decisions in _decisions(source, judge, seconds):
+        stop.gently = True
+        for decisions in _decisions(source, judge, seconds, stop):
             yield detection_of(source.name, decisions)
 
 
 def _decisions(
-    source: "Source", judge: "Judge", seconds: float | None
+    source: "Source", judge: "Judge", seconds: float | None, stop: Stop
 ) -> Iterator[list["Decision"]]:
     from holdfast.live.watch import Watch
 
     end = math.inf if seconds is None else time.monotonic() + seconds
     watch = Watch(source, judge)
-    while not source.ended and time.monotonic() < end:
+    while not (source.ended or stop.asked) and time.monotonic() < end:
         arrival, decisions = watch.turn()
         if arrival is not None:
             tell(arrival)

@@ -2,19 +2,15 @@
 
 import math
 import re
-import signal
-import threading
 import time
 from collections.abc import Iterator
-from contextlib import contextmanager
-from dataclasses import dataclass
 from pathlib import Path
-from types import FrameType
 from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
 from holdfast.cli.console import print_json, say, show
+from holdfast.cli.stopping import Stop, stopping
 
 if TYPE_CHECKING:
     from holdfast.live.recorder import Recorder, RecorderStatus
@@ -26,19 +22,6 @@ GRACE = 1.0
 """A source that falls silent is given up so long after the time asked for [s]."""
 
 _SUFFIX = ".mcap"
-
-
-@dataclass
-class _Stop:
-    """Whether a signal asked for the end: gently while it records, else at once."""
-
-    asked: bool = False
-    gently: bool = False
-
-    def __call__(self, number: int, frame: FrameType | None) -> None:
-        if self.asked or not self.gently:
-            raise KeyboardInterrupt
-        self.asked = True
 
 
 def record(
@@ -86,7 +69,7 @@ def record(
     path = _target(source, out, thing, force=force)
     from holdfast.sources import open_source
 
-    with _signals() as stop, open_source(source, speed=speed) as opened:
+    with stopping() as stop, open_source(source, speed=speed) as opened:
         stop.gently = True
         recorder = _recorder(opened, path, own, fingers_only=fingers_only, force=force)
         _record(opened, recorder, stop, _arrivals(opened, seconds, speed))
@@ -100,24 +83,6 @@ def _check_speed(source: str, speed: float) -> None:
         raise ValueError(f"--speed: at least 0 expected, {speed:g} given")
     if speed != 1 and is_uri(source) and not source.startswith("twin:"):
         raise ValueError(f"--speed is for recordings and the twin; {source} has its own")
-
-
-@contextmanager
-def _signals() -> Iterator[_Stop]:
-    """Asks for the end on Ctrl-C, SIGTERM, and where the terminal goes away."""
-    stop = _Stop()
-    numbers = [signal.SIGINT, signal.SIGTERM]
-    hang_up = getattr(signal, "SIGHUP", None)
-    if hang_up is not None and signal.getsignal(hang_up) is not signal.SIG_IGN:  # as nohup does
-        numbers.append(hang_up)
-    if threading.current_thread() is not threading.main_thread():
-        numbers = []
-    before = [(number, signal.signal(number, stop)) for number in numbers]
-    try:
-        yield stop
-    finally:
-        for number, handler in before:
-            signal.signal(number, handler)
 
 
 def _arrivals(source: "Source", seconds: float | None, speed: float) -> "Iterator[Arrival | None]":
@@ -135,7 +100,7 @@ def _arrivals(source: "Source", seconds: float | None, speed: float) -> "Iterato
 
 
 def _record(
-    source: "Source", recorder: "Recorder", stop: _Stop, arrivals: "Iterator[Arrival | None]"
+    source: "Source", recorder: "Recorder", stop: Stop, arrivals: "Iterator[Arrival | None]"
 ) -> None:
     """Records until the source or somebody ends it; the file is whole then.
 
