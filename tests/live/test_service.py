@@ -247,6 +247,41 @@ def test_names_that_no_recording_has(tmp_path, name):
         assert status == 200  # the date and time
 
 
+def test_a_folder_that_cannot_be_made(tmp_path):
+    (tmp_path / "file").touch()
+
+    async def work():
+        async with (
+            served(patient(10), folder=tmp_path / "file" / "folder") as (client, _),
+            client.post("/api/v1/recording") as answer,
+        ):
+            return answer.status, (await answer.json())["error"]
+
+    text = f"cannot write to {tmp_path / 'file' / 'folder'}: Not a directory"
+    assert run(work()) == (409, text)
+
+
+def test_a_recording_that_the_disk_refuses_is_ended_and_told(tmp_path):
+    async def work():
+        async with served(patient(100), folder=tmp_path) as (client, session):
+            await wait_for(lambda: session.n_packets == 100)
+            async with client.ws_connect("/api/v1/live") as socket:
+                await socket.receive_json()
+                async with client.post("/api/v1/recording", json={"name": "mine"}):
+                    (tmp_path / "mine.mcap").unlink()
+                notices = []
+                while not notices:
+                    told = await socket.receive_json()
+                    notices = [one["text"] for one in told["notices"]]
+                while told["recording"] is not None:
+                    told = await socket.receive_json()
+            return notices
+
+    (notice,) = run(work())
+    assert notice.startswith("the recording has ended: cannot write ")
+    assert notice.endswith("it was removed while it was recorded")
+
+
 def test_no_folder_no_recordings():
     async def work():
         async with (

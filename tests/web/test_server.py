@@ -34,7 +34,7 @@ def test_serves_until_all_is_over():
     assert found == [b"hello"]
 
 
-@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
+@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM, signal.SIGHUP])
 def test_ends_in_order_when_told_to(number):
     told = []
 
@@ -51,9 +51,7 @@ def test_a_port_in_use():
         taken.bind(("127.0.0.1", 0))
         taken.listen()
         port = taken.getsockname()[1]
-        text = (
-            rf"^cannot listen at 127\.0\.0\.1:{port} \(it is in use\); --port 0 finds"
-        )
+        text = rf"^cannot listen at 127\.0\.0\.1:{port} \(it is in use\); --port 0 finds"
         with pytest.raises(OutputError, match=text):
             run_server(app(), "127.0.0.1", port, print)
 

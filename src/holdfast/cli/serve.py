@@ -5,6 +5,7 @@ from collections.abc import Iterator
 from contextlib import ExitStack
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
+from urllib.parse import quote
 
 import typer
 
@@ -76,7 +77,7 @@ def serve(
     warm_up()
 
     def tell(url: str) -> None:
-        page = url if token is None else f"{url}?token={token}"
+        page = url if token is None else f"{url}?token={quote(token, safe='')}"
         if as_json:
             print_json({"url": page, "model": wanted.name, "source": source})
             sys.stdout.flush()

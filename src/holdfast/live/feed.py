@@ -33,6 +33,7 @@ class Feed:
     def __init__(self, session: Session) -> None:
         self._session = session
         self._said: deque[tuple[float, Said]] = deque(maxlen=MOST)
+        self._notes: deque[schema.Notice] = deque(maxlen=MOST)
         self._newest: HandEstimate | None = None
         self._taxels: dict[str, list[schema.Vector]] = {}
         self._counts: deque[tuple[float, int]] = deque([(time.monotonic(), 0)])
@@ -41,9 +42,14 @@ class Feed:
         """Takes what the session says."""
         self._said.append((time.time(), said))
 
+    def note(self, text: str) -> None:
+        """Tells readers something that no source says; for the thread of `live`."""
+        self._notes.append(schema.Notice(time.time(), text))
+
     def live(self, recorder: Recorder | None) -> schema.Live:
         """All that was said since the last call."""
         said = [self._said.popleft() for _ in range(len(self._said))]
+        notes = [self._notes.popleft() for _ in range(len(self._notes))]
         estimates = [(d.estimate, d.fingers) for _, one in said for d in one.decisions]
         if estimates:
             self._newest = estimates[-1][0]
@@ -58,12 +64,7 @@ class Feed:
             },
             series=_series(estimates, list(self._session.judge.fingers)),
             events=[schema.Change(*event) for _, one in said for event in one.events],
-            notices=[
-                schema.Notice(when, text)
-                for when, one in said
-                if one.arrival is not None
-                for text in one.arrival.notices
-            ],
+            notices=notes + _notices(said),
             health=self._health(recorder),
             recording=None if recorder is None else recording_info(recorder),
             ended=self._session.ended,
@@ -95,6 +96,16 @@ class Feed:
             self._counts.popleft()
         (begin, before), (end, after) = self._counts[0], self._counts[-1]
         return (after - before) / (end - begin) if end > begin else np.nan
+
+
+def _notices(said: list[tuple[float, Said]]) -> list[schema.Notice]:
+    """What the source says to people."""
+    return [
+        schema.Notice(when, text)
+        for when, one in said
+        if one.arrival is not None
+        for text in one.arrival.notices
+    ]
 
 
 def hello(model: Model, session: Session, started: float, can_record: bool) -> schema.Hello:

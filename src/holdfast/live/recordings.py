@@ -89,7 +89,10 @@ class Recordings:
             raise OutputError(f"{self.current.path} is being recorded already")
         if not _NAME.fullmatch(name):
             raise OutputError(f"a name of letters, digits, _, - and . expected, {name!r} given")
-        self._folder.mkdir(parents=True, exist_ok=True)
+        try:
+            self._folder.mkdir(parents=True, exist_ok=True)
+        except OSError as cause:
+            raise OutputError(f"cannot write to {self._folder}: {cause.strerror}") from cause
         source = self._session.source
         path = self._folder / f"{name}.mcap"
         return Recorder(path, source.sensors, metadata=dict(source.metadata))

@@ -109,7 +109,8 @@ class Service:
         def put(said: Said) -> None:
             self._feed.put(said)
             if self._readers["estimates"]:
-                loop.call_soon_threadsafe(self._tell_estimates, said)
+                with suppress(RuntimeError):  # the service has ended; the session has not
+                    loop.call_soon_threadsafe(self._tell_estimates, said)
 
         self._session.listen(put)
         telling = asyncio.ensure_future(self._tell_live())
@@ -126,9 +127,19 @@ class Service:
         """Every reader gets the same text, encoded once."""
         while True:
             await asyncio.sleep(1 / DOCUMENTS_PER_SECOND)
+            await self._end_failed_recording()
             self._state = _encode(self._feed.live(self._recordings.current))
             for reader in self._readers["live"]:
                 reader.put(self._state.decode())
+
+    async def _end_failed_recording(self) -> None:
+        """Ends a recording that the disk refuses, and tells of it."""
+        recorder = self._recordings.current
+        if recorder is not None and recorder.failed:
+            try:
+                await asyncio.to_thread(self._recordings.end)
+            except HoldfastError as failure:
+                self._feed.note(f"the recording has ended: {failure}")
 
     def _tell_estimates(self, said: Said) -> None:
         for estimate, fresh in said.decisions:

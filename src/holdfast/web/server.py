@@ -22,7 +22,7 @@ def run_server(
     tell: Callable[[str], None],
     over: Callable[[], bool] = lambda: False,
 ) -> None:
-    """Serves until Ctrl-C or SIGTERM, and then ends in order.
+    """Serves until Ctrl-C, SIGTERM or SIGHUP, and then ends in order.
 
     Args:
         app: what is served.
@@ -51,12 +51,22 @@ async def _serve(
         await _listen(runner, host, port)
         tell(_address(runner, host))
         stopped = asyncio.Event()
-        asyncio.get_running_loop().add_signal_handler(signal.SIGTERM, stopped.set)
+        _end_by_signal(stopped)
         while not stopped.is_set() and not over():
             with suppress(TimeoutError):
                 await asyncio.wait_for(stopped.wait(), LOOK_EVERY)
     finally:
         await runner.cleanup()
+
+
+def _end_by_signal(stopped: asyncio.Event) -> None:
+    """SIGTERM, and a terminal that goes away unless that is ignored, end it; so does Ctrl-C."""
+    loop = asyncio.get_running_loop()
+    for name in ("SIGTERM", "SIGHUP"):
+        number = getattr(signal, name, None)
+        if number is not None and signal.getsignal(number) is not signal.SIG_IGN:
+            with suppress(NotImplementedError):  # Windows knows no handlers here
+                loop.add_signal_handler(number, stopped.set)
 
 
 async def _listen(runner: web.AppRunner, host: str, port: int) -> None:
