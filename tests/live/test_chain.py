@@ -10,7 +10,7 @@ import urllib.request
 from contextlib import contextmanager
 from pathlib import Path
 
-import numpy as np
+import msgspec
 import pytest
 
 from holdfast.detector import detect
@@ -70,11 +70,14 @@ def test_decisions_over_the_wire_are_those_of_the_recording(tmp_path, monkeypatc
     assert tuple(judge.fingers) == FINGERS
     for name, trace in expected.fingers.items():
         mine = [decision.estimate.fingers[name] for decision in decisions]
-        assert [one.state.code for one in mine] == trace.state.tolist()
-        probabilities = [one.stable_probability for one in mine]
-        np.testing.assert_array_equal(probabilities, trace.stable_probability)
-        np.testing.assert_array_equal([one.instability for one in mine], trace.instability)
-        np.testing.assert_array_equal([one.force for one in mine], trace.force)
+        assert [one.time - mine[0].time for one in mine] == pytest.approx(
+            (trace.times - trace.times[0]).tolist(), abs=1e-6
+        )
+        on_time = [k for k, one in enumerate(mine) if not one.faults]  # a busy machine is late
+        assert len(on_time) > 0.3 * len(mine)
+        for k in on_time:
+            told, offline = mine[k], trace.estimate(k)
+            assert build.same(told, msgspec.structs.replace(offline, time=told.time))
 
 
 def test_the_page_shows_what_a_server_sends(tmp_path):
