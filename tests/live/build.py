@@ -82,6 +82,21 @@ class Script(Source):
         self.n_closed += 1
 
 
+class Lasting(Script):
+    """Goes on with its last samples, a moment later each time, where it is told no more."""
+
+    last = None
+
+    def read(self, timeout):
+        if self.steps or self.last is None:
+            self.last = super().read(timeout)
+            return self.last
+        time.sleep(0.002)
+        when = np.nextafter(self.last.time, np.inf)
+        self.last = self.last._replace(time=when, received=time.monotonic())
+        return self.last
+
+
 def told(text, **faults):
     """Word of faults by module, without samples."""
     return word(time.monotonic(), text, faults={k: tuple(v) for k, v in faults.items()})

@@ -161,13 +161,14 @@ def test_a_reader_that_does_not_read_holds_nobody_up():
 def test_the_tare(tmp_path):
     async def work():
         recording = build.grasp()
-        source = patient(200, recording)
+        arrivals = build.arrivals_of(recording)
+        source = build.Lasting.of(recording, arrivals[:200], patient=True)
         async with served(source) as (client, session):
-            await wait_for(lambda: session.n_packets == 200)
+            await wait_for(lambda: session.n_packets >= 200)
             async with client.post("/api/v1/tare") as answer:
                 first = answer.status, await answer.json()
-            source.steps.extend(build.arrivals_of(recording)[200:600])
-            await wait_for(lambda: session.n_packets == 600)
+            source.steps.extend(arrivals[200:600])
+            await wait_for(lambda: source.last.time >= arrivals[599].time)
             async with client.post("/api/v1/tare") as answer:
                 return first, (answer.status, await answer.json())
 
@@ -319,7 +320,9 @@ def test_bodies_that_make_no_sense(tmp_path, body):
 )
 def test_other_origins_and_names_are_refused(headers, status):
     async def work():
-        async with served(patient(10)) as (client, _):
+        recording = build.grasp()
+        source = build.Lasting.of(recording, build.arrivals_of(recording)[:10], patient=True)
+        async with served(source) as (client, _):
             async with client.post("/api/v1/tare", headers=headers) as answer:
                 first = answer.status
             try:

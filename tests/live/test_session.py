@@ -110,13 +110,22 @@ def test_a_tare_that_was_given_up_is_not_taken_later(monkeypatch):
 def test_the_tare_is_taken_in_the_session_and_refused_in_contact(start):
     recording = build.grasp()
     arrivals = build.arrivals_of(recording)
-    source = build.Script.of(recording, arrivals[:200], patient=True)
+    source = build.Lasting.of(recording, arrivals[:200], patient=True)
     session = start(source)
-    wait_for(lambda: session.n_packets == 200)
+    wait_for(lambda: session.n_packets >= 200)
     session.tare()
     source.steps.extend(arrivals[200:600])
-    wait_for(lambda: session.n_packets == 600)
+    wait_for(lambda: source.last.time >= arrivals[599].time)
     with pytest.raises(StreamError, match="in contact"):
+        session.tare()
+
+
+def test_no_tare_while_nothing_arrives(start):
+    recording = build.grasp()
+    steps = [*build.arrivals_of(recording)[:200], None]
+    session = start(build.Script.of(recording, steps, patient=True))
+    wait_for(lambda: session.silent)
+    with pytest.raises(SourceError, match=r"^nothing arrives: no tare can be taken$"):
         session.tare()
 
 

@@ -168,6 +168,8 @@ class Session:
         if not request.set_running_or_notify_cancel():
             return  # whoever asked has given up
         try:
+            if self.silent:
+                raise SourceError("nothing arrives: no tare can be taken")
             self.judge.tare()
             request.set_result(None)
         except Exception as failure:
