@@ -1,7 +1,7 @@
 import json
 import os
-import signal
 import re
+import signal
 import tracemalloc
 from dataclasses import replace
 

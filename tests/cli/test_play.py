@@ -199,10 +199,13 @@ class TestRefusals:
     def test_a_uri_that_there_is_not(self, capsys):
         assert refusal(capsys, "can:3").startswith("'can:3' is neither the path of a recording")
 
-    @pytest.mark.parametrize("speed", ["0", "-1"])
-    def test_a_speed_that_is_none(self, capsys, path, speed):
-        told = refusal(capsys, path, "--speed", speed)
-        assert told == f"--speed: a speed above 0 expected, {speed} given"
+    def test_a_speed_that_is_none(self, capsys, path):
+        told = refusal(capsys, path, "--speed", "0")
+        assert told == "--speed: a speed above 0 expected, 0 given"
+        assert refusal(capsys, path, "--speed=-1") == "--speed: at least 0 expected, -1 given"
+        assert refusal(capsys, "xela://127.0.0.1:1", "--speed", "2") == (
+            "--speed is for recordings and the twin; xela://127.0.0.1:1 has its own"
+        )
 
     def test_a_version_that_there_is_not(self, capsys, path):
         told = refusal(capsys, path, "--version", "2.0", "--port", 0)

@@ -119,7 +119,10 @@ def test_refusals(capsys, grasp, tmp_path):
         f"{tmp_path / 'none.parquet'} does not exist; a recording's file expected"
     )
     assert refusal(capsys, "builtin:best", grasp).startswith("unknown model 'builtin:best'")
-    assert refusal(capsys, MODEL, grasp, "--speed=-1").endswith("-1.0 given")
+    assert refusal(capsys, MODEL, grasp, "--speed=-1") == "--speed: at least 0 expected, -1 given"
+    assert refusal(capsys, MODEL, "xela://127.0.0.1:1", "--speed", 2) == (
+        "--speed is for recordings and the twin; xela://127.0.0.1:1 has its own"
+    )
     assert "port" in refusal(capsys, MODEL, grasp, "--port", 99999)
     assert refusal(capsys, MODEL, grasp, "--ignore", "index").startswith("--ignore: FINGER:TAXEL")
 

@@ -1,5 +1,6 @@
 """`holdfast demo`: the main job in one go, on data of its own."""
 
+import math
 import sys
 import time
 from pathlib import Path
@@ -47,8 +48,8 @@ def demo(
     from holdfast.io import load_dataset
     from holdfast.training import Setting, train
 
-    if not speed >= 0:
-        raise ValueError(f"a speed of at least 0 expected, {speed} given")
+    if not (math.isfinite(speed) and speed >= 0):
+        raise ValueError(f"--speed: at least 0 expected, {speed:g} given")
     start = time.monotonic()
     folder, model = out / "recordings", out / "model.json"
     folder.mkdir(parents=True, exist_ok=True)

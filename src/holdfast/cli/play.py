@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from holdfast.cli.console import print_json, say
+from holdfast.cli.speed import check_speed
 
 if TYPE_CHECKING:
     from holdfast.live.play import XelaServer
@@ -58,7 +59,8 @@ def play(
     from holdfast.live.play import XelaServer
     from holdfast.sources import open_source
 
-    if speed <= 0:
+    check_speed(source, speed)
+    if not speed:
         raise ValueError(f"--speed: a speed above 0 expected, {speed:g} given")
     with open_source(source, speed=speed, loop=not once) as opened:
         server = XelaServer(

@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from holdfast.cli.console import print_json, say, show
+from holdfast.cli.speed import check_speed
 from holdfast.cli.stopping import Stop, stopping
 
 if TYPE_CHECKING:
@@ -64,7 +65,7 @@ def record(
     """
     if seconds is not None and not seconds > 0:
         raise ValueError(f"--seconds: more than 0 s expected, {seconds:g} given")
-    _check_speed(source, speed)
+    check_speed(source, speed)
     own = _metadata(thing, case, note, given or [])
     path = _target(source, out, thing, force=force)
     from holdfast.sources import open_source
@@ -74,15 +75,6 @@ def record(
         recorder = _recorder(opened, path, own, fingers_only=fingers_only, force=force)
         _record(opened, recorder, stop, _arrivals(opened, seconds, speed))
     _tell(recorder.path, recorder.status, as_json)
-
-
-def _check_speed(source: str, speed: float) -> None:
-    from holdfast.sources.uri import is_uri
-
-    if not (math.isfinite(speed) and speed >= 0):
-        raise ValueError(f"--speed: at least 0 expected, {speed:g} given")
-    if speed != 1 and is_uri(source) and not source.startswith("twin:"):
-        raise ValueError(f"--speed is for recordings and the twin; {source} has its own")
 
 
 def _arrivals(source: "Source", seconds: float | None, speed: float) -> "Iterator[Arrival | None]":

@@ -12,6 +12,7 @@ import typer
 from holdfast.cli.console import print_json, say
 from holdfast.cli.judging import RateRule, debounced, judge_of
 from holdfast.cli.page import HOST, PORT, show_page
+from holdfast.cli.speed import check_speed
 
 if TYPE_CHECKING:
     from holdfast.live.judge import Judge
@@ -73,6 +74,7 @@ def serve(
     from holdfast.web.guard import Guard
 
     guard = Guard(host, token)
+    check_speed(source, speed)
     wanted = debounced(model, debounce, hysteresis)
     warm_up()
 
