@@ -96,12 +96,12 @@ def test_the_token_is_needed(capsys, grasp, when_served):
     def work(url):
         with pytest.raises(urllib.error.HTTPError, match="401"):
             ask(f"{url.partition('?')[0]}api/v1/info")
-        return ask(f"{url.partition('?')[0]}api/v1/info", Authorization="Bearer secret")
+        return ask(f"{url.partition('?')[0]}api/v1/info", Authorization="Bearer s&cret")
 
     found = when_served(work)
-    code, out, _ = run(capsys, MODEL, grasp, "--port", 0, "--json", "--token", "secret")
+    code, out, _ = run(capsys, MODEL, grasp, "--port", 0, "--json", "--token", "s&cret")
     assert code == 0
-    assert json.loads(out)["url"].endswith("?token=secret")
+    assert json.loads(out)["url"].endswith("?token=s%26cret")
     assert found[0]["type"] == "hello"
 
 
@@ -132,3 +132,22 @@ def test_no_text_browser_is_opened(monkeypatch):
         monkeypatch.delenv(name, raising=False)
     monkeypatch.setattr("holdfast.cli.page.sys.platform", "linux")
     assert open_page("http://127.0.0.1:1/") is False
+
+
+def test_what_ros_does_not_take_is_told(capsys, monkeypatch, grasp):
+    class Refuser:
+        n_failed, n_dropped = 7, 2
+
+        def __enter__(self):
+            return self
+
+        def __exit__(self, *_):
+            pass
+
+        def put(self, said):
+            pass
+
+    monkeypatch.setattr(verb, "_publishers", lambda judge, **_: [Refuser()])
+    code, _, err = run(capsys, MODEL, grasp, "--once", "--speed", 50, "--port", 0, "--ros2")
+    assert code == 0
+    assert err.endswith("Refuser: ROS refused 7 estimates, and was too slow for 2\n")

@@ -1,7 +1,7 @@
 """`holdfast serve`: what a model says of a source, on a page and for other programs."""
 
 import sys
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from contextlib import ExitStack
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
@@ -94,6 +94,17 @@ def serve(
             judge=judge, host=host, port=port, guard=guard, folder=record_to,
             listeners=[publisher.put for publisher in publishers], stay=not once,
         )  # fmt: skip
+        _tell_unpublished(publishers)
+
+
+def _tell_unpublished(publishers: "Sequence[RosPublisher]") -> None:
+    """Tells what ROS did not take: nobody sees it on the topics."""
+    for publisher in publishers:
+        if publisher.n_failed or publisher.n_dropped:
+            say(
+                f"{type(publisher).__name__}: ROS refused {publisher.n_failed} estimates, and was "
+                f"too slow for {publisher.n_dropped}"
+            )
 
 
 def _publishers(judge: "Judge", *, ros2: bool, ros1: bool) -> "Iterator[RosPublisher]":
