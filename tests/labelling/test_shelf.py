@@ -1,5 +1,6 @@
+from concurrent.futures import ThreadPoolExecutor
 from dataclasses import replace
-from threading import Thread
+from threading import Event, Thread
 
 import numpy as np
 import pytest
@@ -70,6 +71,29 @@ def test_threads_share_what_is_computed_once(tmp_path, monkeypatch):
         thread.join()
     assert len(found) == 6
     assert len(made_of) == 1
+
+
+def test_nobody_who_draws_waits_for_change_points(tmp_path, monkeypatch):
+    kept, begun, go_on = shelf_of(made(tmp_path, "one")), Event(), Event()
+    n_asked = []
+
+    def slow(times, *_):
+        n_asked.append(len(times))
+        begun.set()
+        assert go_on.wait(60)
+        return times[:1]
+
+    monkeypatch.setattr(shelf, "change_points", slow)
+    with ThreadPoolExecutor(3) as pool:
+        try:
+            asked = [pool.submit(kept.changes, 0) for _ in range(2)]
+            assert begun.wait(60)
+            assert pool.submit(kept.signals, 0).result(60).draw().fingers
+            assert not any(each.done() for each in asked)
+        finally:
+            go_on.set()
+        assert [each.result(60) for each in asked] == [{name: [0.0] for name in FINGERS}] * 2
+    assert len(n_asked) == len(FINGERS)  # computed once
 
 
 def test_the_tare_is_that_of_the_shelf_unless_a_page_asks_for_another(tmp_path):

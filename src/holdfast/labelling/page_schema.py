@@ -130,7 +130,11 @@ class Opened(msgspec.Struct, frozen=True, kw_only=True):
 
 
 class Given(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
-    """Labels to be saved, and the revision that they were changed from."""
+    """Labels to be saved, and the revision that they were changed from.
+
+    They may end a sample period after the recording, so that its last sample is labelled; each is
+    cut to the samples of its own finger.
+    """
 
     labels: dict[str, list[GivenLabel]]
     revision: str

@@ -15,6 +15,7 @@ from holdfast.features import Tare
 from holdfast.features.tare import TareArgument
 from holdfast.io import load_recording
 from holdfast.labelling.changes import change_points
+from holdfast.labelling.fitting import fitted
 from holdfast.labelling.poses import Poses, poses_of
 from holdfast.labelling.rules import propose
 from holdfast.labelling.signals import Signals
@@ -98,6 +99,7 @@ class Shelf:
         self._reading = RLock()
         self._saving = RLock()
         self._computing = RLock()  # compiled kernels that run in parallel must not meet
+        self._changing = RLock()  # of its own: nobody waits for change points who zooms
 
     def summary(self, place: int) -> Summary:
         """What is known of a recording without reading its samples, if its header tells.
@@ -153,7 +155,8 @@ class Shelf:
         work = self.work(place)
         with self._computing:
             _ = work.signals
-        return dict(work.changes)
+        with self._changing:
+            return dict(work.changes)
 
     def stored(self, place: int) -> Stored:
         """The labels of a recording that are on the disk.
@@ -166,7 +169,7 @@ class Shelf:
             return read_stored(work.path, work.recording)
 
     def save(self, place: int, labels: Labels, *, revision: str, author: str, note: str) -> Stored:
-        """Saves the labels of a recording, at this time.
+        """Saves the labels of a recording, each cut to its finger's time, at this time.
 
         Raises:
             HoldfastError: as `save_stored`.
@@ -175,7 +178,7 @@ class Shelf:
         work = self.work(place)
         with self._saving:
             return save_stored(
-                work.path, work.recording, labels,
+                work.path, work.recording, fitted(work.recording, labels),
                 revision=revision, author=author or self.author, time=self._clock(), note=note,
             )  # fmt: skip
 

@@ -22,6 +22,9 @@ from holdfast.io.header import label_data
 from holdfast.io.labels import LabelFile, labels_for, labels_path, load_labels
 from holdfast.recordings import Label, Recording
 
+EDGE = 1e-6
+"""Nearer times are one time [s]."""
+
 NONE = "none"
 """The revision of a label file that is not there."""
 
@@ -241,7 +244,7 @@ def _label(finger: str, given: GivenLabel) -> Label:
 
 def _check(finger: str, recording: Recording, labels: Sequence[Label]) -> None:
     for one, two in pairwise(sorted(labels, key=lambda label: label.start)):
-        if two.start < one.end - 1e-6:
+        if two.start < one.end - EDGE:
             raise ValueError(f"{finger}: {_span(one)} and {_span(two)} overlap")
     try:
         replace(recording.modules[finger], labels=tuple(labels))
