@@ -2,6 +2,8 @@ import ast
 import functools
 import math
 import os
+import re
+import shutil
 from pathlib import Path
 
 import hypothesis
@@ -13,6 +15,12 @@ if os.environ.get("CI"):
     hypothesis.settings.load_profile("checks")
 
 
+BROWSER = (
+    "--headless", "--no-sandbox", "--disable-gpu", "--disable-background-networking",
+    "--disable-component-update", "--disable-sync", "--no-first-run",
+)  # fmt: skip
+
+
 @pytest.fixture(scope="session")
 def data_folder():
     """Where the real recordings are: HOLDFAST_DATA, or the folder shared beside the project."""
@@ -21,6 +29,50 @@ def data_folder():
     if not folder.is_dir():
         pytest.skip("no real recordings here: set HOLDFAST_DATA to their folder")
     return folder
+
+
+# Of a module and no wider: while Playwright runs, its thread has an event loop, and asyncio.run
+# of other tests in the same process would be refused.
+@pytest.fixture(scope="module")
+def browser():
+    path = shutil.which("chromium") or shutil.which("chromium-browser")
+    if path is None:
+        pytest.skip("no Chromium is installed")
+    api = pytest.importorskip("playwright.sync_api", reason="Playwright is not installed")
+    with api.sync_playwright() as playwright:
+        browser = playwright.chromium.launch(executable_path=path, args=BROWSER)
+        yield browser
+        browser.close()
+
+
+@pytest.fixture
+def visit(browser, noted):
+    """A function that opens an address; all complaints of its pages are errors."""
+    complaints, contexts = [], []
+
+    def visit(url, size=(1280, 720), scheme="dark", context=None, **words):
+        width, height = size
+        if context is None:
+            context = browser.new_context(
+                viewport={"width": width, "height": height}, color_scheme=scheme, **words
+            )
+            contexts.append(context)
+        page = context.new_page()
+        page.set_default_timeout(10_000)
+        page.on("console", lambda message: message.type == "error" and note(message.text))
+        page.on("pageerror", lambda error: complaints.append(str(error)))
+        page.on("dialog", lambda dialog: (complaints.append(dialog.message), dialog.dismiss()))
+        page.goto(url)
+        return page
+
+    def note(text):
+        if not re.match(noted, text):
+            complaints.append(text)
+
+    yield visit
+    for context in contexts:
+        context.close()
+    assert complaints == []
 
 
 def pytest_sessionstart(session):

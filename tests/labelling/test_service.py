@@ -163,6 +163,25 @@ def test_labels_are_saved_and_told(tmp_path):
     ]  # fmt: skip
 
 
+def test_the_last_sample_of_every_finger_can_be_labelled(tmp_path):
+    whole = synthetic_recording("grasp", 0, FINGERS)
+    shorter = whole.modules["index"].slice(10, -10)  # begins later and ends earlier
+    path = made(tmp_path, modules={**whole.modules, "index": shorter})
+    recording = load_recording(path)
+    all_of_it = {"start": 0.0, "end": recording.end + 1 / recording.rate, "state": "stable"}
+    given = {"thumb": [all_of_it], "index": [all_of_it]}
+    (status, _), (_, told) = ask([path], labels(labels=given), OPEN)
+    assert status == 200
+    for finger, module in recording.modules.items():
+        ((start, end),) = [(each["start"], each["end"]) for each in told["labels"][finger]]
+        assert start == module.times[0]
+        assert end == pytest.approx(module.times[-1] + module.period)
+    stable = load_recording(path).modules
+    assert all(
+        (module.label_states == ContactState.STABLE.code).all() for module in stable.values()
+    )
+
+
 def test_who_is_not_named_is_the_one_who_labels(tmp_path):
     path = made(tmp_path)
     ask([path], labels(HELD))
@@ -434,6 +453,17 @@ def test_there_are_no_other_recordings(tmp_path):
         ("GET", "/media/1/0"),
     )
     assert found == [(404, {"error": "recording 1 asked for; there are 1, from 0"})] * 3
+
+
+@pytest.mark.parametrize("path", ["/", "/page/main.js", "/page/style.css", "/web/base.css"])
+def test_the_files_of_the_page(tmp_path, path):
+    async def work():
+        async with served([made(tmp_path)]) as client, client.get(path) as answer:
+            return answer.status, len(await answer.read())
+
+    status, size = run(work())
+    assert status == 200
+    assert size > 100
 
 
 @pytest.mark.parametrize(

@@ -370,6 +370,17 @@ def test_the_page_may_load_nothing_from_elsewhere():
     assert "https://" not in text
 
 
+@pytest.mark.parametrize("path", ["/page/main.js", "/page/uplot/uPlot.esm.js", "/web/base.css"])
+def test_the_files_of_the_page(path):
+    async def work():
+        async with served(patient(10)) as (client, _), client.get(path) as answer:
+            return answer.status, len(await answer.read())
+
+    status, size = run(work())
+    assert status == 200
+    assert size > 100
+
+
 def test_the_schema_is_that_of_the_documents():
     async def work():
         async with (

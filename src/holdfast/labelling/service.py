@@ -20,12 +20,10 @@ from holdfast.web.guard import Guard, Handler
 MOST_BYTES = 64 << 20
 """Of labels that a page sends at a time."""
 
-_HOME = Path(str(resources.files("holdfast")))
-PAGE = _HOME / "labelling" / "page"
+PAGE = Path(str(resources.files("holdfast.labelling") / "page"))
 """The page's files."""
-SHARED = _HOME / "web" / "static"
+SHARED = Path(str(resources.files("holdfast.web") / "static"))
 """Files that all pages share."""
-_UPLOT = _HOME / "live" / "page" / "uplot"
 
 T = TypeVar("T")
 
@@ -51,7 +49,8 @@ class Service:
         one = r"/api/v1/recordings/{id:\d+}"
         return [
             web.get("/", _page),
-            *_files(),
+            web.static("/page", PAGE),
+            web.static("/web", SHARED),
             web.get("/api/v1/recordings", self._list),
             web.get(one, self._open),
             web.get(one + "/signals", self._draw),
@@ -114,12 +113,6 @@ class Service:
             n = len(self._shelf.paths)
             raise _refusal(web.HTTPNotFound, f"recording {place} asked for; there are {n}, from 0")
         return place
-
-
-def _files() -> list[web.AbstractRouteDef]:
-    """The page's files, and under /web those that all pages share."""
-    shared = ("/web", SHARED) if SHARED.is_dir() else ("/web/uplot", _UPLOT)
-    return [web.static(url, folder) for url, folder in (("/page", PAGE), shared) if folder.is_dir()]
 
 
 @web.middleware

@@ -28,6 +28,8 @@ HEARTBEAT = 10.0
 
 PAGE = Path(str(resources.files("holdfast.live") / "page"))
 """The page's files."""
+SHARED = Path(str(resources.files("holdfast.web") / "static"))
+"""Files that all pages share."""
 
 T = TypeVar("T")
 
@@ -92,6 +94,7 @@ class Service:
         return [
             web.get("/", _page),
             web.static("/page", PAGE),
+            web.static("/web", SHARED),
             web.get("/api/v1/live", self._read_live),
             web.get("/api/v1/estimates", self._read_estimates),
             web.get("/api/v1/info", self._info),

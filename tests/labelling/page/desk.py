@@ -16,6 +16,7 @@ from aiohttp import web
 from holdfast.web.guard import POLICY
 
 PAGE = Path(str(resources.files("holdfast.labelling"))) / "page"
+SHARED = Path(str(resources.files("holdfast.web"))) / "static"
 SERIES = ("F_a", "F_x", "F_y", "F_z", "sigma")
 FINGERS = ("thumb", "index", "middle", "ring")
 RATE = 150.0
@@ -156,6 +157,7 @@ class Desk:
         app = web.Application(middlewares=[self.guard])
         one = r"/api/v1/recordings/{id:\d+}"
         app.router.add_static("/page", PAGE)
+        app.router.add_static("/web", SHARED)
         app.router.add_get("/", self.index)
         app.router.add_get("/api/v1/recordings", self.list)
         app.router.add_get(one, self.open)

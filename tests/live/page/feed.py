@@ -24,6 +24,7 @@ from holdfast.sensors import sensor
 from holdfast.web.guard import POLICY
 
 PAGE = Path(str(resources.files("holdfast.live"))) / "page"
+SHARED = Path(str(resources.files("holdfast.web"))) / "static"
 STATES = [state.value for state in ContactState]
 FAULTS = list(Fault)
 
@@ -238,6 +239,7 @@ class Service:
         app = web.Application(middlewares=[self.guard])
         app.router.add_get("/", self.index)
         app.router.add_static("/page", PAGE)
+        app.router.add_static("/web", SHARED)
         app.router.add_get("/api/v1/live", self.live)
         app.router.add_get("/api/v1/info", self.info)
         app.router.add_post("/api/v1/tare", self.tare)

@@ -1,7 +1,7 @@
 // Draws labels, proposals, and what is doubtful about them.
 
+import { colours, font, stateColour, stateLine } from "../web/theme.js";
 import { cutText, hatch, line, shape } from "./pen.js";
-import { colours, font, stateColour, stateLine } from "./theme.js";
 import { LEFT, RIGHT } from "./view.js";
 import { labelWord, percent, stateKey, stateWord } from "./words.js";
 

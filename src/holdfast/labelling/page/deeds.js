@@ -1,8 +1,8 @@
 // What keys and buttons do.
 
-import { call } from "./api.js";
+import { call } from "../web/api.js";
+import { byId } from "../web/dom.js";
 import { toast } from "./dialogs.js";
-import { byId } from "./dom.js";
 import { keys } from "./bindings.js";
 import { listen } from "./keys.js";
 import { many } from "./words.js";

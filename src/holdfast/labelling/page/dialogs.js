@@ -1,6 +1,6 @@
 // Questions that need an answer, and short messages that do not.
 
-import { byId, make } from "./dom.js";
+import { byId, make } from "../web/dom.js";
 
 const STAYS = 6000; // [ms]
 

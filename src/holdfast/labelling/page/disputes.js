@@ -1,7 +1,7 @@
 // Whose labels count: those of an earlier page that died, or of somebody else. Nothing is lost:
 // what is not taken is one step of undo away.
 
-import { call } from "./api.js";
+import { call } from "../web/api.js";
 import { ask, toast } from "./dialogs.js";
 import { many, whenWord } from "./words.js";
 

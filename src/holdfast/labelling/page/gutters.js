@@ -1,8 +1,8 @@
 // Beside the plots of each finger: its name, what the lines are, and their values at the cursor.
 
-import { make, write } from "./dom.js";
+import { make, write } from "../web/dom.js";
+import { colours, fingerColour } from "../web/theme.js";
 import { forceLines } from "./lines.js";
-import { colours, fingerColour } from "./theme.js";
 import { number, unitWord } from "./words.js";
 
 function swatch(colour) {

@@ -1,8 +1,8 @@
 // Draws the signals: force and sigma of each finger, with their axes.
 
+import { colours, fingerColour, font } from "../web/theme.js";
 import { line, within } from "./pen.js";
 import { find } from "./signals.js";
-import { colours, fingerColour, font } from "./theme.js";
 import { LEFT, RIGHT } from "./view.js";
 import { niceStep } from "./words.js";
 

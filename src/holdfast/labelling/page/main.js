@@ -1,10 +1,11 @@
 // Puts the parts together.
 
-import { call } from "./api.js";
+import { call } from "../web/api.js";
+import { byId, write } from "../web/dom.js";
+import { onTheme } from "../web/theme.js";
 import { Deeds } from "./deeds.js";
 import { alert, toast } from "./dialogs.js";
 import { rescue, settle } from "./disputes.js";
-import { byId, write } from "./dom.js";
 import { Editor } from "./editor.js";
 import { Palette } from "./palette.js";
 import { Checks, Recordings } from "./panels.js";
@@ -15,7 +16,6 @@ import { Saver, kept } from "./saver.js";
 import { Signals } from "./signals.js";
 import { SaveState, tellAbout, tellWindow } from "./status.js";
 import { Strip } from "./strip.js";
-import { onTheme } from "./theme.js";
 import { View } from "./view.js";
 import { timeWord } from "./words.js";
 

@@ -1,7 +1,7 @@
 // The whole recording in a strip, with the window in it; below it the time axis of the window.
 
+import { colours, fingerColour, font, stateColour } from "../web/theme.js";
 import { line, penOf } from "./pen.js";
-import { colours, fingerColour, font, stateColour } from "./theme.js";
 import { LEFT, RIGHT } from "./view.js";
 import { niceStep, stateKey, timeWord } from "./words.js";
 

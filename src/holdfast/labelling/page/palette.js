@@ -1,6 +1,6 @@
 // The buttons of states, causes and edits, and which of them are pressed or can be.
 
-import { byId, make, shape } from "./dom.js";
+import { byId, make, shape } from "../web/dom.js";
 import { CAUSES, STATES, stateKey, stateWord } from "./words.js";
 
 export class Palette {

@@ -1,6 +1,6 @@
 // Beside the plots: the recordings, and what is left to be looked at.
 
-import { byId, make, shape, write } from "./dom.js";
+import { byId, make, shape, write } from "../web/dom.js";
 import { labelWord, lengthWord, many, percent, stateKey, stateWord, timeWord } from "./words.js";
 
 const MOST = 60; // rows of doubtful stretches

@@ -1,7 +1,7 @@
 // Time that runs: the video's, where there is one, else the page's own.
 
-import { mediaAddress } from "./api.js";
-import { byId, make, write } from "./dom.js";
+import { openAddress } from "../web/api.js";
+import { byId, make, write } from "../web/dom.js";
 import { keep, kept } from "./saver.js";
 
 const SMALL = 0.02; // [s], less the video need not be moved
@@ -50,7 +50,7 @@ export class Player {
       return;
     }
     this.video.hidden = false;
-    this.video.src = mediaAddress(this.id, medium.index);
+    this.video.src = openAddress(`media/${this.id}/${medium.index}`).href;
     this.video.playbackRate = this.rate;
   }
 

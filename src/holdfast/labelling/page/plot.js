@@ -1,14 +1,14 @@
 // The fingers one under the other. Three canvases lie on each other, so that what moves with the
 // pointer does not draw the signals anew: labels below, lines, and the cursor on top.
 
+import { byId } from "../web/dom.js";
+import { colours, font } from "../web/theme.js";
 import { grounds, meant, outlines, proposed, selection, strip, tints } from "./bands.js";
-import { byId } from "./dom.js";
 import { Gutters } from "./gutters.js";
 import { axis, extent, forceLines, forceScale, series, sigmaScale } from "./lines.js";
 import { overview, timeAxis, timeGrid, STRIP, AXIS } from "./overview.js";
 import { line, penOf } from "./pen.js";
 import { rowsOf } from "./rows.js";
-import { colours, font } from "./theme.js";
 import { LEFT, RIGHT } from "./view.js";
 import { timeWord, niceStep } from "./words.js";
 

@@ -1,6 +1,6 @@
 // Keeps the labels: in the browser at once, on the disk a moment later, and says how it stands.
 
-import { call } from "./api.js";
+import { call } from "../web/api.js";
 
 const PAUSE = 300; // [ms] after the last change
 const RETRIES = [1000, 2000, 5000, 10000]; // [ms]

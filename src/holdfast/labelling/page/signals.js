@@ -1,6 +1,6 @@
 // Signals of the recording: the whole of it coarsely, and what is looked at, finely, with a margin.
 
-import { call } from "./api.js";
+import { call } from "../web/api.js";
 
 export const SERIES = ["F_a", "F_x", "F_y", "F_z", "sigma"];
 const MARGIN = 0.4; // of the window, on either side

@@ -1,6 +1,6 @@
 // The line below: how the saving stands, what is pointed at, and when.
 
-import { byId, make, shape, write } from "./dom.js";
+import { byId, make, shape, write } from "../web/dom.js";
 import { labelWord, percent, spanWord, stateKey, stateWord, timeWord, whenWord } from "./words.js";
 
 const SAVING = { saving: "saving …", waiting: "not saved yet …", conflict: "NOT SAVED: the file was changed by somebody else", none: "no labels yet" };

@@ -1,10 +1,11 @@
 // Words and numbers as people read them. Pure functions.
 
+import { MINUS, NOTHING, plain } from "../web/text.js";
+
+export * from "../web/text.js";
+
 export const STATES = ["stable", "unstable", "no_contact"]; // by their keys 1, 2, 3
 export const CAUSES = ["closing", "disturbance", "slip", "lost", "released"]; // by their first letters
-
-// What nobody has named yet is shown as it came, underscores apart.
-const plain = (word) => String(word).replaceAll("_", " ");
 
 /** The key of a state in class names, shapes and colours: "no-contact". */
 export const stateKey = (state) => (STATES.includes(state) ? state.replace("_", "-") : "unknown");
@@ -13,24 +14,6 @@ export const stateWord = (state) => plain(state ?? "unknown");
 
 /** "unstable, slip" */
 export const labelWord = ({ state, cause }) => stateWord(state) + (cause ? `, ${plain(cause)}` : "");
-
-const MINUS = "\u2212";
-export const NOTHING = "\u2013";
-
-/** A number to three or four digits, with a real minus; a dash for none. */
-export function number(value) {
-  if (value === null || value === undefined || !Number.isFinite(value)) return NOTHING;
-  const size = Math.abs(value);
-  let text;
-  if (size >= 99999.5) text = `${(size / 1000).toFixed(0)}k`;
-  else if (size >= 99.95) text = size.toFixed(0);
-  else if (size >= 9.995) text = size.toFixed(1);
-  else text = size.toFixed(2);
-  return (value < 0 && Number(text) !== 0 ? MINUS : "") + text;
-}
-
-export const unitWord = (unit) => (unit === "count" ? "counts" : unit ?? "");
-export const percent = (share) => (Number.isFinite(share) ? `${Math.round(100 * share)}\u202f%` : NOTHING);
 
 /** A time with the digits that a step of the axis needs. */
 export const timeWord = (time, step) =>

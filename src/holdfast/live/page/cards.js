@@ -1,8 +1,8 @@
 // One card for each finger: its state, three figures, its faults and its map.
 
-import { make, shape, write } from "./dom.js";
+import { make, shape, write } from "../web/dom.js";
+import { fingerColour } from "../web/theme.js";
 import { Scale, TaxelMap } from "./taxelmap.js";
-import { fingerColour } from "./theme.js";
 import { faultWord, number, percent, reasonWord, stateKey, stateWord, unitWord } from "./words.js";
 
 // Decades that the bar of sigma spans, by unit: from noise to a violent slip.

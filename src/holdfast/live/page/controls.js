@@ -1,7 +1,7 @@
 // Tare, recording, markers, full screen; and the toasts that tell how it went.
 
-import { call } from "./api.js";
-import { byId, make, write } from "./dom.js";
+import { call } from "../web/api.js";
+import { byId, make, write } from "../web/dom.js";
 import { bytes, clock } from "./words.js";
 
 const STAYS = 6000; // [ms]

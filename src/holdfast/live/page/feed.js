@@ -1,10 +1,17 @@
 // The connection to the service: it comes back by itself, and says how it is.
 
-import { call, liveAddress } from "./api.js";
+import { call, openAddress } from "../web/api.js";
 
 const SHORTEST = 500, LONGEST = 4000; // [ms] between attempts
 const PATIENCE = 4000; // [ms] without a message: a cable that was pulled closes nothing
 const SCHEMA = "holdfast.live/1";
+
+// A browser cannot give a WebSocket headers, so the token is in its address.
+function liveAddress() {
+  const url = openAddress("api/v1/live");
+  url.protocol = url.protocol === "https:" ? "wss:" : "ws:";
+  return url.href;
+}
 
 export class Feed {
   /**

@@ -1,6 +1,6 @@
 // The banner with the state of the hand, the alert below it, and the line of health.
 
-import { byId, make, write } from "./dom.js";
+import { byId, make, write } from "../web/dom.js";
 import { NOTHING, delay, stateKey, stateWord } from "./words.js";
 
 const SPEAK = 1500; // [ms] between two announcements: a screen reader cannot follow 20 a second

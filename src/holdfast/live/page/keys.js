@@ -1,6 +1,6 @@
 // The keyboard: one letter for what an experimenter does with the other hand on the robot.
 
-import { byId } from "./dom.js";
+import { byId } from "../web/dom.js";
 
 const typing = (element) => element.closest?.("input, textarea, select, [contenteditable]");
 

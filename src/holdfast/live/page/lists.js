@@ -1,6 +1,6 @@
 // The latest events and notices, newest first, fifty of each.
 
-import { make, shape, write } from "./dom.js";
+import { make, shape, write } from "../web/dom.js";
 import { span, stateKey, stateWord, wall } from "./words.js";
 
 const MOST = 50;

@@ -1,8 +1,9 @@
 // Puts the parts together: messages in, pictures out, at the browser's own pace.
 
+import { byId, choice, make, press, write } from "../web/dom.js";
+import { fingerColour, onTheme } from "../web/theme.js";
 import { Cards } from "./cards.js";
 import { Controls } from "./controls.js";
-import { byId, choice, make, press, write } from "./dom.js";
 import { Feed } from "./feed.js";
 import { Hand, Health, alert } from "./hand.js";
 import { listen } from "./keys.js";
@@ -10,7 +11,6 @@ import { Events, Notices } from "./lists.js";
 import { Pace } from "./pace.js";
 import { Plots } from "./plots.js";
 import { Store, capacityFor } from "./store.js";
-import { fingerColour, onTheme } from "./theme.js";
 import { STATES, span } from "./words.js";
 
 const WINDOWS = [5, 10, 30, 60]; // [s]

@@ -1,12 +1,13 @@
 // Force, instability and probability over a common time, drawn by uPlot.
 
+import { make, write } from "../web/dom.js";
+import { colours, fingerColour, font } from "../web/theme.js";
 import uPlot from "./uplot/uPlot.esm.js";
-import { make, write } from "./dom.js";
 import { RIBBON, level, markers, ribbons, shade } from "./shading.js";
 import { reduce } from "./store.js";
-import { FONT, colours, fingerColour } from "./theme.js";
 import { number, unitWord } from "./words.js";
 
+const FONT = font(11);
 const AXES = [["fx", "x"], ["fy", "y"], ["fz", "z"]];
 
 // Steps that leave the ends of an axis where they are while the data change a little.

@@ -1,9 +1,11 @@
 // The map of one sensor on a canvas: a disc for the normal reading, an arrow for the shear.
 
+import { colours, font } from "../web/theme.js";
+import { heat } from "./heat.js";
 import { hull, layout, turned } from "./layout.js";
-import { FONT, colours, heat } from "./theme.js";
 import { number, unitWord } from "./words.js";
 
+const FONT = font(11);
 // Readings under this are noise: the scale never gets finer.
 const FLOORS = { count: 50, N: 0.1 };
 const DECAY = 6; // [s] to fall to 1/e: discs keep their meaning while a grasp changes

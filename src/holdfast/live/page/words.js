@@ -1,5 +1,9 @@
 // Words, numbers and names as people read them. Pure functions.
 
+import { NOTHING, plain } from "../web/text.js";
+
+export * from "../web/text.js";
+
 // By the code of a state in the series: its place in holdfast's list of states.
 export const STATES = ["UNKNOWN", "NO_CONTACT", "UNSTABLE", "STABLE"];
 export const UNKNOWN = 0, NO_CONTACT = 1, UNSTABLE = 2, STABLE = 3;
@@ -26,9 +30,6 @@ const FAULTS = {
   clock_jump: "clock jumped",
 };
 
-// What nobody has named yet is shown as it came, underscores apart.
-const plain = (word) => String(word).replaceAll("_", " ");
-
 /** The key of a state in class names, shapes and colours: "no-contact". */
 export const stateKey = (state) =>
   STATES.includes(state) ? state.toLowerCase().replace("_", "-") : "unknown";
@@ -36,26 +37,6 @@ export const stateKey = (state) =>
 export const stateWord = (state) => plain(state ?? "UNKNOWN");
 export const reasonWord = (reason) => (reason ? REASONS[reason] ?? plain(reason) : "");
 export const faultWord = (fault) => FAULTS[fault] ?? plain(fault);
-
-const MINUS = "\u2212";
-export const NOTHING = "\u2013";
-
-/** A number to three or four digits, with a real minus; a dash for none. */
-export function number(value) {
-  if (value === null || value === undefined || !Number.isFinite(value)) return NOTHING;
-  const size = Math.abs(value);
-  let text;
-  if (size >= 99999.5) text = `${(size / 1000).toFixed(0)}k`;
-  else if (size >= 99.95) text = size.toFixed(0);
-  else if (size >= 9.995) text = size.toFixed(1);
-  else text = size.toFixed(2);
-  return (value < 0 && Number(text) !== 0 ? MINUS : "") + text;
-}
-
-export const unitWord = (unit) => (unit === "count" ? "counts" : unit ?? "");
-
-export const percent = (value) =>
-  value === null || value === undefined ? NOTHING : `${Math.round(100 * value)}\u202f%`;
 
 /** A length of time in few characters: "0.8 s", "12 s", "3 min", "2 h". */
 export function span(seconds) {

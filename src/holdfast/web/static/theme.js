@@ -7,7 +7,7 @@ const NAMES = [
   "finger-0", "finger-1", "finger-2", "finger-3", "finger-4", "finger-5",
   "axis-x", "axis-y", "axis-z", "marker",
 ];
-const light = window.matchMedia("(prefers-color-scheme: light)");
+export const light = window.matchMedia("(prefers-color-scheme: light)");
 
 export const colours = {};
 

@@ -1,15 +1,15 @@
 // The service's REST calls, and the token that the page's own address may carry.
 
-export const token = new URLSearchParams(window.location.search).get("token");
+const token = new URLSearchParams(window.location.search).get("token");
 
 // Relative to the page, so that it works behind a proxy under another path too.
 const address = (path) => new URL(path, document.baseURI);
 
-/** The address of a video, which an element asks for by itself. */
-export function mediaAddress(id, index) {
-  const url = address(`media/${id}/${index}`);
+/** An address with the token inside, for what the browser asks for without our headers. */
+export function openAddress(path) {
+  const url = address(path);
   if (token !== null) url.searchParams.set("token", token);
-  return url.href;
+  return url;
 }
 
 /** Calls the service; throws an Error with the service's own words where it refuses. */

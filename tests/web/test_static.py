@@ -1,0 +1,43 @@
+"""The files of the pages: each is there that another one names, and once only."""
+
+import re
+from importlib import resources
+from os.path import normpath
+from pathlib import Path
+
+import pytest
+
+PACKAGE = Path(str(resources.files("holdfast")))
+SHARED = PACKAGE / "web" / "static"
+PAGES = [PACKAGE / "live" / "page", PACKAGE / "labelling" / "page"]
+NAMED = re.compile(r'(?:src|href)="([^"#]+)"|^(?:import|export)\b.* from "([^"]+)";$', re.MULTILINE)
+
+
+def place(page, file, name):
+    """Where a file is that another one names: /page and /web are neighbours under the root."""
+    folder = "." if file.suffix == ".html" else "web" if file.parent == SHARED else "page"
+    top, *rest = Path(normpath(f"{folder}/{name}")).parts
+    return {"page": page, "web": SHARED}[top].joinpath(*rest)
+
+
+@pytest.mark.parametrize("page", PAGES, ids=["live", "labelling"])
+def test_what_a_page_names_is_there(page):
+    waiting, seen = [page / "index.html"], set()
+    while waiting:
+        file = waiting.pop()
+        if file in seen:
+            continue
+        seen.add(file)
+        if file.suffix in (".html", ".js"):
+            names = [one or two for one, two in NAMED.findall(file.read_text())]
+            waiting += [place(page, file, name) for name in names]
+    assert [str(file) for file in seen if not file.is_file()] == []
+    shared = set(SHARED.iterdir())
+    assert shared <= seen  # what only one page uses is that page's own
+    own = {file for file in page.iterdir() if file.suffix in (".js", ".css", ".svg")}
+    assert own <= seen
+
+
+def test_no_page_has_a_copy_of_its_own():
+    texts = [file.read_text() for folder in (*PAGES, SHARED) for file in folder.glob("*.*")]
+    assert len(set(texts)) == len(texts)
