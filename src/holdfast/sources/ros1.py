@@ -10,10 +10,10 @@ from typing import Any
 from holdfast.errors import SourceError
 from holdfast.io.ros_messages import KNOWN, Message, Unpacker
 from holdfast.io.ros_wire import parse_definition
+from holdfast.sources.address import Address
 from holdfast.sources.ros import rospy_node
 from holdfast.sources.ros.topic import PATIENCE, Link, Packet, Stranger, TopicSource, topic_of
 from holdfast.sources.source import Source
-from holdfast.sources.uri import Address
 
 N_QUEUED = 256
 """Messages that wait for a reader that is busy; then it misses the oldest."""

@@ -8,10 +8,10 @@ from importlib.metadata import version
 from holdfast.contact import Fault
 from holdfast.errors import MissingExtra, SourceError
 from holdfast.sensors import Sensor, sensor
+from holdfast.sources.address import Address
 from holdfast.sources.anyskin import Decoded, Decoder
 from holdfast.sources.source import Arrival, Source, word
 from holdfast.sources.timeline import Timeline
-from holdfast.sources.uri import Address
 
 try:
     from serial import Serial

@@ -9,9 +9,9 @@ from typing import NamedTuple
 from holdfast.errors import SourceError
 from holdfast.io.ros_messages import Message
 from holdfast.sensors.values import Unit
+from holdfast.sources.address import Address
 from holdfast.sources.ros.translator import Translator
 from holdfast.sources.source import Arrival, Source, word
-from holdfast.sources.uri import Address
 
 PATIENCE = 5.0
 """How long entering waits for a message with samples [s]."""
