@@ -9,7 +9,18 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from holdfast.cli.console import Bar, print_json, say
-from holdfast.cli.judging import RateRule, debounced, taxels_of, tell_missing
+from holdfast.cli.judging import (
+    DebounceOption,
+    HysteresisOption,
+    IgnoreOption,
+    ModelArgument,
+    RateOption,
+    RateRule,
+    SourceArgument,
+    debounced,
+    taxels_of,
+    tell_missing,
+)
 
 if TYPE_CHECKING:
     from holdfast.detector import Detection
@@ -21,28 +32,18 @@ PIECE = 4096
 
 
 def detect(
-    model: Annotated[
-        str, typer.Argument(help="A model's file, builtin:twin or builtin:noise-floor.")
-    ],
-    source: Annotated[str, typer.Argument(help="A recording's path, or a URI: see above.")],
+    model: ModelArgument,
+    source: SourceArgument,
     summary: Annotated[
         bool, typer.Option("--summary", help="Print shares of states and the events instead.")
     ] = False,
-    rate: Annotated[
-        RateRule, typer.Option(help="Of a source not within 20 % of the model's rate.")
-    ] = RateRule.RESAMPLE,
-    debounce: Annotated[
-        float | None, typer.Option(help="Tell a state once it has lasted so long [s].")
-    ] = None,
-    hysteresis: Annotated[
-        float | None, typer.Option(help="How far past its threshold a probability must go.")
-    ] = None,
+    rate: RateOption = RateRule.RESAMPLE,
+    debounce: DebounceOption = None,
+    hysteresis: HysteresisOption = None,
     seconds: Annotated[
         float | None, typer.Option(help="Of a live source: stop after so long [s].")
     ] = None,
-    ignore: Annotated[
-        str, typer.Option(help="Taxels that count for nothing: index:7,index:12.")
-    ] = "",
+    ignore: IgnoreOption = "",
     as_json: Annotated[
         bool, typer.Option("--json", help="Print JSON: as always, and for --summary too.")
     ] = False,

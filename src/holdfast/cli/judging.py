@@ -2,7 +2,9 @@
 
 from collections.abc import Mapping
 from enum import StrEnum
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Annotated
+
+import typer
 
 from holdfast.cli.console import say
 
@@ -17,6 +19,25 @@ class RateRule(StrEnum):
 
     RESAMPLE = "resample"
     STRICT = "strict"
+
+
+ModelArgument = Annotated[
+    str, typer.Argument(help="A model's file, builtin:twin or builtin:noise-floor.")
+]
+SourceArgument = Annotated[str, typer.Argument(help="A recording's path, or a URI: see above.")]
+RateOption = Annotated[
+    RateRule, typer.Option("--rate", help="Of a source not within 20 % of the model's rate.")
+]
+DebounceOption = Annotated[
+    float | None, typer.Option("--debounce", help="Tell a state once it has lasted so long [s].")
+]
+HysteresisOption = Annotated[
+    float | None,
+    typer.Option("--hysteresis", help="How far past its threshold a probability must go."),
+]
+IgnoreOption = Annotated[
+    str, typer.Option("--ignore", help="Taxels that count for nothing: index:7,index:12.")
+]
 
 
 def debounced(name: str, debounce: float | None, hysteresis: float | None) -> "Model":

@@ -10,7 +10,17 @@ from urllib.parse import quote
 import typer
 
 from holdfast.cli.console import print_json, say
-from holdfast.cli.judging import RateRule, debounced, judge_of
+from holdfast.cli.judging import (
+    DebounceOption,
+    HysteresisOption,
+    IgnoreOption,
+    ModelArgument,
+    RateOption,
+    RateRule,
+    SourceArgument,
+    debounced,
+    judge_of,
+)
 from holdfast.cli.page import HOST, PORT, show_page
 from holdfast.cli.speed import check_speed
 
@@ -20,10 +30,8 @@ if TYPE_CHECKING:
 
 
 def serve(
-    model: Annotated[
-        str, typer.Argument(help="A model's file, builtin:twin or builtin:noise-floor.")
-    ],
-    source: Annotated[str, typer.Argument(help="A recording's path, or a URI: see above.")],
+    model: ModelArgument,
+    source: SourceArgument,
     host: Annotated[str, typer.Option(help="Address to listen at.")] = HOST,
     port: Annotated[int, typer.Option(help="Port; 0 finds a free one.")] = PORT,
     token: Annotated[
@@ -36,18 +44,10 @@ def serve(
     once: Annotated[
         bool, typer.Option("--once", help="Play a recording once, and end with it.")
     ] = False,
-    rate: Annotated[
-        RateRule, typer.Option(help="Of a source not within 20 % of the model's rate.")
-    ] = RateRule.RESAMPLE,
-    debounce: Annotated[
-        float | None, typer.Option(help="Tell a state once it has lasted so long [s].")
-    ] = None,
-    hysteresis: Annotated[
-        float | None, typer.Option(help="How far past its threshold a probability must go.")
-    ] = None,
-    ignore: Annotated[
-        str, typer.Option(help="Taxels that count for nothing: index:7,index:12.")
-    ] = "",
+    rate: RateOption = RateRule.RESAMPLE,
+    debounce: DebounceOption = None,
+    hysteresis: HysteresisOption = None,
+    ignore: IgnoreOption = "",
     ros2: Annotated[bool, typer.Option("--ros2", help="Publish on ROS 2 topics too.")] = False,
     ros1: Annotated[bool, typer.Option("--ros1", help="Publish on ROS 1 topics too.")] = False,
     as_json: Annotated[
