@@ -84,13 +84,13 @@ def refusal(capsys, *words):
 
 @pytest.mark.parametrize(
     "options",
-    [("--version", "1.7"), (), ("--whole-hand",), ("--whole-hand", "--version", "1.7")],
+    [("--version", "1.7", "--separate"), (), ("--separate",), ("--whole-hand", "--version", "1.7")],
     ids=" ".join,
 )
 def test_a_client_decides_as_on_the_recording(capsys, path, recording, options):
     """Sample by sample, over a socket, at eight times the pace."""
     port = free_port()
-    names = "" if "--whole-hand" in options else "?fingers=1:thumb,2:index,3:middle,4:ring"
+    names = "?fingers=1:thumb,2:index,3:middle,4:ring" if "--separate" in options else ""
     n = recording.modules["thumb"].n_samples
     listener = Listener(f"xela://127.0.0.1:{port}{names}", n)
     code, out, err = play(capsys, path, "--port", port, "--once", "--speed", FAST, *options)
@@ -129,7 +129,8 @@ def test_a_client_decides_as_on_the_recording(capsys, path, recording, options):
 def test_json_tells_where_and_how_much(capsys, path):
     port = free_port()
     listener = Listener(f"xela://127.0.0.1:{port}", 900)
-    code, out, _ = play(capsys, path, "--port", port, "--once", "--speed", FAST, "--json")
+    words = ("--port", port, "--once", "--separate", "--speed", FAST, "--json")
+    code, out, _ = play(capsys, path, *words)
     listener.join()
     assert code == 0
     begin, end = map(json.loads, out.splitlines())

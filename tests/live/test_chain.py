@@ -48,7 +48,7 @@ def verb(*words):
 FINGERS = ("thumb", "index", "middle", "ring")
 
 
-@pytest.mark.parametrize("words", [(), ("--whole-hand", "--version", "1.7")])
+@pytest.mark.parametrize("words", [("--separate",), ("--whole-hand", "--version", "1.7")])
 def test_decisions_over_the_wire_are_those_of_the_recording(tmp_path, monkeypatch, words):
     for module in ("timeline", "xela.decoder"):  # a machine that has much to do is late
         monkeypatch.setattr(f"holdfast.sources.{module}.LATE", math.inf)

@@ -33,8 +33,13 @@ def play(
         bool, typer.Option("--once", help="Wait for a client, play once, and end.")
     ] = False,
     whole_hand: Annotated[
-        bool, typer.Option("--whole-hand", help="Send fingertips inside the packet of a hand.")
-    ] = False,
+        bool | None,
+        typer.Option(
+            "--whole-hand/--separate",
+            help="Fingertips inside the packet of a hand, or as sensors 1, 2, ...; by default "
+            "the former where they are called as an Allegro hand's.",
+        ),
+    ] = None,
     as_json: Annotated[
         bool,
         typer.Option("--json", help="Print where it listens, and at the end how much it sent."),
@@ -43,28 +48,30 @@ def play(
     """Acts as a XELA server for a recording or the twin.
 
     Programs that read xela_server read this instead: the same packets over a WebSocket, at the
-    pace of the recording, whose times they carry, shifted to now. Fingertips become the
-    server's sensors 1, 2, ...; all 18 modules of an Allegro hand, or fingertips with
-    --whole-hand, one sensor of 368 taxels. Readings in newtons are sent as calibrated values,
-    with counts made up from a data sheet. Ctrl-C ends it.
+    pace of the recording, whose times they carry, shifted to now. Modules of an Allegro hand
+    become one sensor of 368 taxels, with those that are missing at rest; others, or all with
+    --separate, the server's sensors 1, 2, ... Readings in newtons are sent as calibrated
+    values, with counts made up from a data sheet. Ctrl-C ends it.
 
     SOURCE is the path of a recording, or twin:?object=can&seed=1; it begins anew when it is
     over, unless --once is given.
 
     Example:
       holdfast play twin:?object=can
-      holdfast play grasp.parquet --once --whole-hand --version 1.7
+      holdfast play grasp.parquet --once --separate --version 1.7
       holdfast detect builtin:twin xela://127.0.0.1:5000
     """
     from holdfast.live.play import XelaServer
     from holdfast.sources import open_source
+    from holdfast.sources.xela.encoder import is_part_of_hand
 
     check_speed(source, speed)
     if not speed:
         raise ValueError(f"--speed: a speed above 0 expected, {speed:g} given")
     with open_source(source, speed=speed, loop=not once) as opened:
+        whole = is_part_of_hand(opened.sensors) if whole_hand is None else whole_hand
         server = XelaServer(
-            opened, version=version, host=host, port=port, whole_hand=whole_hand, wait=once
+            opened, version=version, host=host, port=port, whole_hand=whole, wait=once
         )
         with _interruptible(), server:
             _tell_begin(server, source, version, as_json=as_json)

@@ -9,7 +9,7 @@ from hypothesis.extra.numpy import arrays
 
 from holdfast.sensors import Sensor, hand, sensor
 from holdfast.sources.xela.decoder import Decoder
-from holdfast.sources.xela.encoder import RESOLUTION, REST, Encoder
+from holdfast.sources.xela.encoder import RESOLUTION, REST, Encoder, is_part_of_hand
 from holdfast.sources.xela.models import unknown
 
 from .build import START, counts
@@ -243,3 +243,10 @@ def test_a_sensor_that_xela_does_not_make_goes_by_its_name():
 def test_a_version_that_there_is_not():
     with pytest.raises(ValueError, match=r"version 1\.7 or 1\.8 expected, '2\.0' given"):
         Encoder(TIPS, version="2.0")
+
+
+def test_what_is_part_of_an_allegro_hand():
+    tip, patch = sensor("uskin-curved"), sensor("uskin-4x4")
+    assert is_part_of_hand({"thumb": tip, "index": tip})
+    assert not is_part_of_hand({"finger1": tip})
+    assert not is_part_of_hand({"thumb": patch})

@@ -250,6 +250,15 @@ def _rests(n_taxels: int) -> npt.NDArray[np.uint16]:
     return (base + noise).astype(np.uint16)
 
 
+def is_part_of_hand(sensors: Mapping[str, Sensor]) -> bool:
+    """Whether all modules are called, and sized, as an Allegro hand's."""
+    try:
+        _check_modules(sensors, hand("allegro-uskin"))
+    except ValueError:
+        return False
+    return True
+
+
 def _is_whole(sensors: Mapping[str, Sensor], whole: Hand) -> bool:
     return set(sensors) == set(whole.modules) and all(
         sensors[name].n_taxels == module.sensor.n_taxels for name, module in whole.modules.items()
