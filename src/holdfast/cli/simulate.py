@@ -8,12 +8,10 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from holdfast.cli.console import Bar, print_json, say, show
+from holdfast.twin.profile import ATTEMPTS
 
 if TYPE_CHECKING:
     from holdfast.twin.simulation import Grasp
-
-ATTEMPTS = 4
-"""A grasp that fails is tried again, so often at the most; what failed is kept."""
 
 
 def simulate(

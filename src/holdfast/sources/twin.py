@@ -14,11 +14,9 @@ from holdfast.io import read_chunks, save_recording
 from holdfast.recordings import Recording
 from holdfast.sources.address import Address
 from holdfast.sources.player import Player
-from holdfast.twin.profile import profile
+from holdfast.twin.profile import ATTEMPTS, profile
 from holdfast.twin.simulation import CASES, Grasp, simulate
 
-ATTEMPTS = 4
-"""A grasp that fails is tried again, a little calmer, so often at the most."""
 WORK = "import sys; from holdfast.sources.twin import write; write(*sys.argv[1:])"
 """What the process does that simulates the next grasp."""
 

@@ -6,6 +6,9 @@ from typing import Any
 
 import msgspec
 
+ATTEMPTS = 4
+"""A grasp that fails is tried again, a little calmer, so often at the most."""
+
 Span = tuple[float, float]
 """Smallest and largest of what is drawn for each grasp."""
 

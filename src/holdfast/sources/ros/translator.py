@@ -16,11 +16,8 @@ from holdfast.sensors.values import Unit
 from holdfast.sources.source import Arrival, word
 from holdfast.sources.timeline import LATE, Delay, Timeline
 from holdfast.sources.xela.models import Skin, skins
+from holdfast.sources.xela.packet import n_missing
 
-COUNTER = 2**32
-"""Where the counter of packets begins again."""
-RESTART = 2**16
-"""A counter that goes on by more, or goes back, has begun anew: nothing was lost."""
 _CLOCKS: tuple[Callable[[Message], float | None], ...] = (
     lambda message: message.time,
     lambda message: message.stamp,
@@ -238,8 +235,7 @@ class _Device:
         last, self.sequence = self.sequence, sequence
         if last is None or sequence is None:
             return 0
-        step = (sequence - last) % COUNTER
-        return step - 1 if 0 < step < RESTART else 0
+        return n_missing(last, sequence)
 
     def is_late(self, time: float, received: float, *, jumped: bool) -> bool:
         if jumped:

@@ -15,12 +15,10 @@ from holdfast.sensors import Sensor
 from holdfast.sources.source import Arrival, word
 from holdfast.sources.timeline import LATE, Delay, Stamp, Timeline
 from holdfast.sources.xela.models import Skin, skins
-from holdfast.sources.xela.packet import COUNTER, Packet, Refusal, read_packet, read_sensor
+from holdfast.sources.xela.packet import Packet, Refusal, n_missing, read_packet, read_sensor
 
 QUIET = 1.0
 """A complaint about the same sensor is not told again sooner [s]."""
-RESTART = 2**16
-"""A counter that goes on by more, or goes back, has begun anew: nothing was lost."""
 FUTURE = 0.05
 """A sensor's own stamp so far ahead of its packet's is from before the clock jumped [s]."""
 
@@ -185,8 +183,7 @@ class Decoder:
 
     def _count(self, counter: int) -> None:
         if self._counter is not None:
-            step = (counter - self._counter) % COUNTER
-            self._n_lost += step - 1 if 0 < step < RESTART else 0
+            self._n_lost += n_missing(self._counter, counter)
         self._counter = counter
 
     def _complain(self, heard: "_Heard", about: int, what: str, received: float) -> None:

@@ -11,6 +11,8 @@ import numpy.typing as npt
 
 COUNTER = 2**32
 """Where the counter of packets begins again."""
+RESTART = 2**16
+"""A counter that goes on by more, or goes back, has begun anew: nothing was lost."""
 EARLIEST, LATEST = -1e11, 1e11
 """Stamps beyond, 3,000 years from 1970 [s], make no sense; doubles still hold 0.1 ms there."""
 ROUTINE = "routine"
@@ -193,3 +195,14 @@ def _points(values: npt.NDArray[Any]) -> npt.NDArray[Any]:
     if len(values) % 3:
         raise Refusal(f"{len(values)} values given, three a taxel expected")
     return values.reshape(-1, 3)
+
+
+def n_missing(last: int, counter: int) -> int:
+    """How many packets are missing between two counts.
+
+    Example:
+        >>> n_missing(2**32 - 2, 1), n_missing(5000, 0)
+        (2, 0)
+    """
+    step = (counter - last) % COUNTER
+    return step - 1 if 0 < step < RESTART else 0
