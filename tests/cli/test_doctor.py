@@ -92,7 +92,7 @@ def test_missing_extras_are_told(monkeypatch):
 
 
 def test_a_bad_master_is_told_and_harms_nothing(capsys, monkeypatch):
-    monkeypatch.setattr("holdfast.sources.ros.rospy_node.rospy_module", lambda: None)
+    monkeypatch.setattr("holdfast.ros.rospy_node.rospy_module", lambda: None)
     monkeypatch.setenv("ROS_MASTER_URI", "nonsense")
     assert report(capsys)["sources"]["ros1"] == (
         "a master as http://localhost:11311 expected, 'nonsense' given"

@@ -12,8 +12,8 @@ pytest.importorskip("rosbags", reason="rosbags is not installed")
 
 from rosbags.typesys import Stores, get_typestore
 
-from holdfast.io.ros_wire import parse_definition
 from holdfast.live.ros2_publisher import DEFINITIONS, Ros2Publisher
+from holdfast.ros.definitions import parse_definition
 
 from .estimates import UNITS, check_what_is_told, estimate
 

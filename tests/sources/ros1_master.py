@@ -13,7 +13,7 @@ from pathlib import Path
 import pytest
 
 from holdfast.errors import SourceError
-from holdfast.sources.ros import rospy_node
+from holdfast.ros import rospy_node
 
 PEER = Path(__file__).parent / "ros1_peer.py"
 

@@ -11,8 +11,8 @@ import json
 import sys
 import time
 
-from holdfast.io.ros_messages import SENS_STREAM
-from holdfast.sources.ros.rospy_node import rospy_module
+from holdfast.ros.messages import SENS_STREAM
+from holdfast.ros.rospy_node import rospy_module
 
 N_TAXELS = 30
 

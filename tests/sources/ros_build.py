@@ -4,7 +4,7 @@ import numpy as np
 from hypothesis import strategies as st
 from rosbags.typesys import Stores, get_types_from_msg, get_typestore
 
-from holdfast.io.ros_wire import NUMBERS
+from holdfast.ros.definitions import NUMBERS
 
 SENSOR_FULL = """uint32 message
 float64 time

@@ -15,10 +15,10 @@ import pytest
 import holdfast.sources.serial
 import holdfast.sources.twin
 from holdfast.io import save_recording
-from holdfast.io.ros_messages import known_definition
-from holdfast.io.ros_write import Encoder
 from holdfast.live.play import XelaServer
 from holdfast.recordings import Recording, Tactile
+from holdfast.ros.encoder import Encoder
+from holdfast.ros.messages import known_definition
 from holdfast.sensors import sensor
 from holdfast.sources import Source, open_source
 from holdfast.twin.simulation import simulate
@@ -174,7 +174,7 @@ def ros2(folder, monkeypatch):
     if find_spec("cyclonedds") is None:
         pytest.skip("cyclonedds is not installed")
     monkeypatch.setenv("ROS_LOCALHOST_ONLY", "1")
-    from holdfast.sources.ros import dds
+    from holdfast.ros import dds
 
     domain = 201 + os.getpid() % 30  # tests of ROS 2 itself take those below
     definition = known_definition("xela_server_ros2/SensStream", ros2=True)

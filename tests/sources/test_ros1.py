@@ -3,8 +3,8 @@ import time
 import numpy as np
 import pytest
 
+from holdfast.ros.rospy_node import published
 from holdfast.sources import open_source
-from holdfast.sources.ros.rospy_node import published
 from sources.ros1_master import lines, running_master
 
 N = 300

@@ -14,8 +14,8 @@ pytest.importorskip("cyclonedds", reason="cyclonedds is not installed")
 pytest.importorskip("rosbags", reason="rosbags is not installed")
 
 from holdfast.errors import MissingExtra, SourceError
-from holdfast.io.ros_messages import known_definition
-from holdfast.io.ros_wire import parse_definition
+from holdfast.ros.definitions import parse_definition
+from holdfast.ros.messages import known_definition
 from holdfast.sensors import sensor
 from holdfast.sources import open_source
 from holdfast.sources.ros import dds, topic
@@ -182,8 +182,8 @@ def test_unknown_parameters():
 
 def test_without_cyclonedds(monkeypatch):
     monkeypatch.delitem(sys.modules, "holdfast.sources.ros2", raising=False)
-    monkeypatch.delitem(sys.modules, "holdfast.sources.ros.dds")
-    monkeypatch.delattr("holdfast.sources.ros.dds", raising=False)
+    monkeypatch.delitem(sys.modules, "holdfast.ros.dds")
+    monkeypatch.delattr("holdfast.ros.dds", raising=False)
     for name in [name for name in sys.modules if name.split(".")[0] == "cyclonedds"]:
         monkeypatch.setitem(sys.modules, name, None)
     with pytest.raises(MissingExtra) as caught:

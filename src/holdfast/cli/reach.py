@@ -27,7 +27,7 @@ def _xela() -> str:
 
 def _ros1() -> str:
     from holdfast.errors import HoldfastError
-    from holdfast.sources.ros.rospy_node import check_master, master_of, rospy_module
+    from holdfast.ros.rospy_node import check_master, master_of, rospy_module
 
     try:
         rospy_module()

@@ -70,7 +70,7 @@ def _rich(scope: Literal["finger", "hand"]) -> tuple[FeatureSpec, ...]:
 
 
 HOLDFAST = (FeatureSpec("F_a", 0, "log", floor=FORCE_FLOOR), *_rich("finger"), *_rich("hand"))
-"""Our own features, `holdfast` by name: see `holdfast.methods.holdfast`."""
+"""Our own features, `holdfast` by name: see `holdfast.study.methods.holdfast`."""
 
 
 def parse_features(names: str | Sequence[str], window: int = 14) -> tuple[FeatureSpec, ...]:

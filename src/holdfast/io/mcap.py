@@ -20,7 +20,6 @@ from zstandard import ZstdError
 
 from holdfast.errors import RecordingError
 from holdfast.files import whole_file
-from holdfast.io import cdr
 from holdfast.io.header import Header, decode, header_of
 from holdfast.io.mcap_writer import MESSAGE_SECONDS
 from holdfast.io.message_log import HEADER_TOPIC, LIBRARY, MARKERS_TOPIC, MessageLog
@@ -34,6 +33,7 @@ from holdfast.io.series import (
 )
 from holdfast.io.spans import spans
 from holdfast.recordings import Recording
+from holdfast.ros import cdr
 from holdfast.sensors.values import Array
 
 _RECORD = struct.Struct("<BQ")

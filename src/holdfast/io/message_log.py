@@ -11,8 +11,8 @@ from mcap.writer import CompressionType, Writer
 
 from holdfast.errors import OutputError
 from holdfast.files import refuse_overwrite
-from holdfast.io import cdr
 from holdfast.io.header import Header, encode, number_of
+from holdfast.ros import cdr
 from holdfast.sensors.values import Array
 
 CHUNK_SECONDS = 0.3

@@ -6,8 +6,8 @@ from typing import Any
 
 from holdfast.errors import SourceError
 from holdfast.live.ros_publisher import DIAGNOSTICS, VECTOR, WRENCH, RosPublisher, Status
+from holdfast.ros import rospy_node
 from holdfast.sensors.values import Unit
-from holdfast.sources.ros import rospy_node
 
 N_SENDING = 10
 """Messages that rospy keeps for a subscriber that is slow; then the oldest goes."""

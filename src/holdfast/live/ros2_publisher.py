@@ -3,8 +3,6 @@
 from collections.abc import Callable, Iterable, Mapping
 from typing import Any
 
-from holdfast.io.ros_wire import parse_definition
-from holdfast.io.ros_write import Encoder
 from holdfast.live.ros_publisher import (
     DIAGNOSTICS,
     FLOAT,
@@ -14,8 +12,10 @@ from holdfast.live.ros_publisher import (
     RosPublisher,
     Status,
 )
+from holdfast.ros import dds
+from holdfast.ros.definitions import parse_definition
+from holdfast.ros.encoder import Encoder
 from holdfast.sensors.values import Unit
-from holdfast.sources.ros import dds
 
 _LINE = "\n=====\nMSG: "
 _HEADER = (

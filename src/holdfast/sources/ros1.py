@@ -8,10 +8,10 @@ from types import ModuleType
 from typing import Any
 
 from holdfast.errors import SourceError
-from holdfast.io.ros_messages import KNOWN, Message, Unpacker
-from holdfast.io.ros_wire import parse_definition
+from holdfast.ros import rospy_node
+from holdfast.ros.definitions import parse_definition
+from holdfast.ros.messages import KNOWN, Message, Unpacker
 from holdfast.sources.address import Address
-from holdfast.sources.ros import rospy_node
 from holdfast.sources.ros.topic import PATIENCE, Link, Packet, Stranger, TopicSource, topic_of
 from holdfast.sources.source import Source
 

@@ -4,9 +4,9 @@ import time
 from collections import deque
 
 from holdfast.errors import SourceError
-from holdfast.io.ros_messages import Unpacker, known_definition
+from holdfast.ros import dds
+from holdfast.ros.messages import Unpacker, known_definition
 from holdfast.sources.address import Address
-from holdfast.sources.ros import dds
 from holdfast.sources.ros.topic import PATIENCE, Link, Packet, TopicSource, topic_of
 from holdfast.sources.source import Source
 

@@ -5,7 +5,7 @@ import numpy as np
 import pytest
 
 from holdfast.errors import SourceError
-from holdfast.io.ros_messages import Message
+from holdfast.ros.messages import Message
 from holdfast.sensors import sensor
 from holdfast.sources.ros import topic
 from holdfast.sources.ros.topic import Link, Packet, Stranger, TopicSource, topic_of

@@ -3,7 +3,7 @@ import pytest
 
 from holdfast.contact import Fault
 from holdfast.errors import SourceError
-from holdfast.io.ros_messages import Message
+from holdfast.ros.messages import Message
 from holdfast.sensors import hand, sensor
 from holdfast.sources.ros.translator import Translator
 

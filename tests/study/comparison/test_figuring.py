@@ -13,7 +13,7 @@ from holdfast.study.comparison.figuring import (
     right_and_all,
     sample_rows,
 )
-from holdfast.study.judging.judge import Judged
+from holdfast.study.evaluation.judge import Judged
 
 
 def metrics_of(*recordings):

@@ -4,14 +4,14 @@ import msgspec
 import numpy as np
 import pytest
 
-from holdfast.methods import METHODS
 from holdfast.study.comparison import costs, jobs, methods, pictures, real, sensitivity
 from holdfast.study.comparison import part as comparison
 from holdfast.study.comparison.errors import quarters
 from holdfast.study.comparison.figuring import right_and_all
 from holdfast.study.corpus import corpus_of
-from holdfast.study.judging.counting import Breakdown, Grip
-from holdfast.study.judging.judge import Effort
+from holdfast.study.evaluation.counting import Breakdown, Grip
+from holdfast.study.evaluation.judge import Effort
+from holdfast.study.methods import METHODS
 from holdfast.study.plan import Plan
 from holdfast.study.report.layouts import to_html, to_latex
 from holdfast.study.report.tables import to_json

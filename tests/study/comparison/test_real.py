@@ -5,10 +5,10 @@ import numpy as np
 import pytest
 
 from holdfast.contact import ContactState
-from holdfast.methods import METHODS
 from holdfast.recordings import Label
 from holdfast.study.comparison import real
 from holdfast.study.corpus import corpus_of
+from holdfast.study.methods import METHODS
 from holdfast.study.plan import Plan
 from holdfast.study.report.layouts import to_html
 from holdfast.synthetic import synthetic_recording

@@ -14,9 +14,10 @@ import numpy as np
 import numpy.typing as npt
 
 from holdfast.errors import MissingExtra, RecordingError
-from holdfast.io import xela_models
 from holdfast.io.importers.table import natural
-from holdfast.io.ros_messages import (
+from holdfast.recordings import Recording, Tactile
+from holdfast.ros.definitions import Definition, parse_definition, short_name
+from holdfast.ros.messages import (
     Message,
     Unpacker,
     known_definition,
@@ -24,8 +25,7 @@ from holdfast.io.ros_messages import (
     readings_of,
     sensors_of,
 )
-from holdfast.io.ros_wire import Definition, parse_definition, short_name
-from holdfast.recordings import Recording, Tactile
+from holdfast.sensors import xela_models
 from holdfast.sensors.values import Array
 
 METADATA = "metadata.yaml"

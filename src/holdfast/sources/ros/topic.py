@@ -7,7 +7,7 @@ from collections.abc import Callable
 from typing import NamedTuple
 
 from holdfast.errors import SourceError
-from holdfast.io.ros_messages import Message
+from holdfast.ros.messages import Message
 from holdfast.sensors.values import Unit
 from holdfast.sources.address import Address
 from holdfast.sources.ros.translator import Translator

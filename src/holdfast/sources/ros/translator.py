@@ -9,10 +9,10 @@ import numpy.typing as npt
 
 from holdfast.contact import Fault
 from holdfast.errors import SourceError
-from holdfast.io.ros_messages import PAPILLARRAY, Message, readings_of
-from holdfast.io.xela_models import whole_hand
+from holdfast.ros.messages import PAPILLARRAY, Message, readings_of
 from holdfast.sensors import Sensor, sensor
 from holdfast.sensors.values import Unit
+from holdfast.sensors.xela_models import whole_hand
 from holdfast.sources.source import Arrival, word
 from holdfast.sources.timeline import LATE, Delay, Timeline
 from holdfast.sources.xela.models import Skin, skins

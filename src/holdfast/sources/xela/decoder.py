@@ -10,8 +10,8 @@ import numpy.typing as npt
 
 from holdfast.contact import Fault
 from holdfast.errors import SourceError
-from holdfast.io.xela_models import whole_hand
 from holdfast.sensors import Sensor
+from holdfast.sensors.xela_models import whole_hand
 from holdfast.sources.source import Arrival, word
 from holdfast.sources.timeline import LATE, Delay, Stamp, Timeline
 from holdfast.sources.xela.models import Skin, skins

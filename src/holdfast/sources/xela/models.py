@@ -8,9 +8,9 @@ import numpy as np
 import numpy.typing as npt
 
 from holdfast.errors import SourceError
-from holdfast.io.xela_models import module_sensors, whole_hand
 from holdfast.sensors import Hand, Sensor
 from holdfast.sensors.layouts import UINT16
+from holdfast.sensors.xela_models import module_sensors, whole_hand
 
 PITCH = 4.7e-3
 """Between the taxels of a sensor that is not known; it stands for none in particular [m]."""

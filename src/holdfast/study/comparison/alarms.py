@@ -5,8 +5,8 @@ from collections.abc import Callable, Iterator, Sequence
 from holdfast.metrics.events import POSTS
 from holdfast.study.comparison.figuring import count_row, quantile_row, ratio_row
 from holdfast.study.comparison.jobs import SPLITS, Results, found, titles
-from holdfast.study.judging.hearing import AFTER_GLITCH, Heard
-from holdfast.study.judging.judge import COMPARED_AT, HOLD, Judged
+from holdfast.study.evaluation.hearing import AFTER_GLITCH, Heard
+from holdfast.study.evaluation.judge import COMPARED_AT, HOLD, Judged
 from holdfast.study.plan import Plan
 from holdfast.study.report.tables import Key, Row, Table
 

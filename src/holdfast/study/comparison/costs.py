@@ -10,15 +10,15 @@ from holdfast.classifiers import LinearClassifier
 from holdfast.detector import Detector
 from holdfast.features import DEPLOYED, Tare, parse_features
 from holdfast.features.specs import HOLDFAST, FeatureSpec
-from holdfast.methods import METHODS, signal_of
-from holdfast.methods.paper import WINDOW
 from holdfast.model import FingerModel, Model
 from holdfast.recordings import Recording
 from holdfast.study.comparison.jobs import Results, titles
 from holdfast.study.corpus import Corpus
-from holdfast.study.judging.changes import Change
-from holdfast.study.judging.expert import Expert, material_of
-from holdfast.study.judging.seen import look
+from holdfast.study.evaluation.changes import Change
+from holdfast.study.evaluation.expert import Expert, material_of
+from holdfast.study.evaluation.seen import look
+from holdfast.study.methods import METHODS, signal_of
+from holdfast.study.methods.paper import WINDOW
 from holdfast.study.plan import Plan
 from holdfast.study.report.tables import Key, Row, Table
 from holdfast.study.work import Task

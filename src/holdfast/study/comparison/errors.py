@@ -9,7 +9,7 @@ from holdfast.contact import Phase
 from holdfast.sensors.values import Array
 from holdfast.study.comparison.figuring import ratio_row
 from holdfast.study.comparison.jobs import SPLITS, Results, found, titles
-from holdfast.study.judging.counting import AXES, Breakdown, Grip
+from holdfast.study.evaluation.counting import AXES, Breakdown, Grip
 from holdfast.study.plan import Plan
 from holdfast.study.report.tables import Key, Row, Table
 from holdfast.twin.labels import LabelRule

@@ -9,7 +9,7 @@ from holdfast.metrics import Interval, Metrics, SampleMetrics, bootstrap_interva
 from holdfast.metrics.intervals import Statistic, quantile_of
 from holdfast.metrics.statistics import quantile
 from holdfast.sensors.values import Array
-from holdfast.study.judging.judge import Judged
+from holdfast.study.evaluation.judge import Judged
 from holdfast.study.report.tables import Key, Row
 
 Keys = Mapping[str, Key]

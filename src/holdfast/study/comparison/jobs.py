@@ -4,9 +4,9 @@ from collections.abc import Iterator, Mapping
 from importlib.util import find_spec
 from typing import Any
 
-from holdfast.methods import METHODS
-from holdfast.study.judging.changes import Change
-from holdfast.study.judging.judge import Effort, Job, Judged, Split, judge
+from holdfast.study.evaluation.changes import Change
+from holdfast.study.evaluation.judge import Effort, Job, Judged, Split, judge
+from holdfast.study.methods import METHODS
 from holdfast.study.plan import Plan
 from holdfast.study.work import Task
 

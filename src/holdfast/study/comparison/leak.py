@@ -8,10 +8,10 @@ import numpy.typing as npt
 
 from holdfast.contact import STABLE, UNKNOWN
 from holdfast.metrics import Decisions
-from holdfast.study.judging.counting import judged_of
-from holdfast.study.judging.expert import Expert, material_of
-from holdfast.study.judging.judge import Job, method_called
-from holdfast.study.judging.seen import Seen, look
+from holdfast.study.evaluation.counting import judged_of
+from holdfast.study.evaluation.expert import Expert, material_of
+from holdfast.study.evaluation.judge import Job, method_called
+from holdfast.study.evaluation.seen import Seen, look
 from holdfast.study.paper.counts import Counts
 
 FOLDS = 5

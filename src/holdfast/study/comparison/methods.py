@@ -2,7 +2,6 @@
 
 from collections.abc import Iterator
 
-from holdfast.methods import METHODS
 from holdfast.study.comparison.figuring import (
     DIGITS,
     calibration_row,
@@ -10,7 +9,8 @@ from holdfast.study.comparison.figuring import (
     sample_rows,
 )
 from holdfast.study.comparison.jobs import PAPER, SPLITS, Results, found, network_note, titles
-from holdfast.study.judging.judge import Judged
+from holdfast.study.evaluation.judge import Judged
+from holdfast.study.methods import METHODS
 from holdfast.study.paper import printed
 from holdfast.study.paper.counts import Counts, figures
 from holdfast.study.plan import Plan

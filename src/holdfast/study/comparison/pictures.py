@@ -4,13 +4,13 @@ from collections.abc import Mapping, Sequence
 
 import numpy as np
 
-from holdfast.methods import METHODS
 from holdfast.metrics.events import POSTS
 from holdfast.sensors.values import Array
 from holdfast.study.comparison import errors, methods
 from holdfast.study.comparison.jobs import PAPER, SPLITS, Results, found, titles
-from holdfast.study.judging.hearing import Heard
-from holdfast.study.judging.judge import ALARM_RATES, COMPARED_AT, Judged
+from holdfast.study.evaluation.hearing import Heard
+from holdfast.study.evaluation.judge import ALARM_RATES, COMPARED_AT, Judged
+from holdfast.study.methods import METHODS
 from holdfast.study.plan import Plan
 from holdfast.study.report.curves import Curve, draw_alarms, draw_reliability
 from holdfast.study.report.dots import Estimate, draw_dots, draw_groups

@@ -2,12 +2,12 @@
 
 from typing import Any
 
-from holdfast.methods import METHODS
 from holdfast.metrics import RecordingMetrics
 from holdfast.study.comparison.jobs import NETWORK, SLOW, Results, has_network, judging
 from holdfast.study.corpus import Corpus
-from holdfast.study.judging.changes import Change
-from holdfast.study.judging.judge import Effort, Job, Judged
+from holdfast.study.evaluation.changes import Change
+from holdfast.study.evaluation.judge import Effort, Job, Judged
+from holdfast.study.methods import METHODS
 from holdfast.study.plan import Plan
 from holdfast.study.report.page import Picture
 from holdfast.study.report.tables import Row, Table

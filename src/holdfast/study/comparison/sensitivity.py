@@ -9,13 +9,13 @@ from typing import NamedTuple
 
 import numpy as np
 
-from holdfast.methods import METHODS
-from holdfast.methods.cuts import CUTS
 from holdfast.metrics.events import POSTS
 from holdfast.study.comparison.figuring import DIGITS, difference_row, ratio_row, sample_rows
 from holdfast.study.comparison.jobs import CORE, SPLITS, Results, effort_of, job_of, judging
-from holdfast.study.judging.changes import Change
-from holdfast.study.judging.judge import COMPARED_AT, Job, Judged
+from holdfast.study.evaluation.changes import Change
+from holdfast.study.evaluation.judge import COMPARED_AT, Job, Judged
+from holdfast.study.methods import METHODS
+from holdfast.study.methods.cuts import CUTS
 from holdfast.study.plan import Plan
 from holdfast.study.report.curves import Curve, draw_lines
 from holdfast.study.report.page import Picture

@@ -12,11 +12,11 @@ import numpy as np
 
 from holdfast.errors import TrainingError
 from holdfast.features import Tare
-from holdfast.methods import METHODS, Method
 from holdfast.study.corpus import Corpus
-from holdfast.study.judging.changes import Change
-from holdfast.study.judging.expert import Expert, Material, material_of
-from holdfast.study.judging.seen import look
+from holdfast.study.evaluation.changes import Change
+from holdfast.study.evaluation.expert import Expert, Material, material_of
+from holdfast.study.evaluation.seen import look
+from holdfast.study.methods import METHODS, Method
 from holdfast.study.paper.part import first_finger
 from holdfast.study.plan import Plan
 from holdfast.study.report.figures import (

@@ -15,10 +15,10 @@ import numpy.typing as npt
 from holdfast.classifiers import Samples
 from holdfast.contact import STABLE, UNKNOWN
 from holdfast.features import FEATURE_NAMES, Tare, haar_features
-from holdfast.methods import FingerSignal, signal_of
-from holdfast.methods.zhang import detail_energy
 from holdfast.sensors.values import Array
 from holdfast.study.corpus import Corpus
+from holdfast.study.methods import FingerSignal, signal_of
+from holdfast.study.methods.zhang import detail_energy
 from holdfast.training.design import at_rate
 
 N_PARTS = 25

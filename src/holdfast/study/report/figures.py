@@ -15,11 +15,11 @@ from matplotlib.ticker import MaxNLocator, NullLocator
 
 from holdfast.contact import NO_CONTACT, STABLE, UNKNOWN, UNSTABLE, Phase
 from holdfast.features import FEATURE_NAMES, Tare, haar_features
-from holdfast.methods import signal_of
 from holdfast.plots.envelope import envelope
 from holdfast.plots.recording import COMPONENT_COLOURS
 from holdfast.recordings import Recording
 from holdfast.sensors.values import Array
+from holdfast.study.methods import signal_of
 from holdfast.study.report.style import INK, SMALL, add_labels, add_legend, sheet, tidy
 
 Codes = npt.NDArray[np.integer[Any]]

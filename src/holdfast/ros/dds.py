@@ -1,0 +1,217 @@
+"""ROS 2 without ROS: its topics on the wire of DDS, by Cyclone DDS."""
+
+import os
+from collections.abc import Callable, Mapping
+from functools import cache
+from typing import Any, Self
+
+from holdfast.errors import MissingExtra, SourceError
+from holdfast.ros.definitions import NUMBERS, Definition, Field
+
+try:
+    from cyclonedds.builtin import BuiltinDataReader, BuiltinTopicDcpsPublication
+    from cyclonedds.core import (
+        DDSException,
+        InstanceState,
+        Policy,
+        Qos,
+        ReadCondition,
+        SampleState,
+        ViewState,
+        WaitSet,
+    )
+    from cyclonedds.domain import Domain, DomainParticipant
+    from cyclonedds.idl import make_idl_struct
+    from cyclonedds.idl import types as idl
+    from cyclonedds.internal import InvalidSample
+    from cyclonedds.pub import DataWriter
+    from cyclonedds.sub import DataReader
+    from cyclonedds.topic import Topic
+    from cyclonedds.util import duration
+except ImportError as cause:
+    raise MissingExtra("cyclonedds", "ros2") from cause
+
+N_QUEUED = 256
+"""Messages that wait for a reader that is busy."""
+N_TAKEN = 32
+"""Messages that are taken at a time."""
+LARGEST_DOMAIN = 232
+"""Domains above it have no ports."""
+PREFIX, SEPARATOR = "rt/", "::msg::dds_::"
+"""What ROS 2 puts before the names of topics, and into those of types."""
+
+LOOPBACK = (
+    "<CycloneDDS><Domain><General><AllowMulticast>false</AllowMulticast><Interfaces>"
+    '<NetworkInterface address="127.0.0.1"/></Interfaces></General><Discovery>'
+    "<ParticipantIndex>auto</ParticipantIndex><MaxAutoParticipantIndex>60</MaxAutoParticipantIndex>"
+    '<Peers><Peer address="127.0.0.1"/></Peers></Discovery></Domain></CycloneDDS>'
+)
+"""As `ROS_LOCALHOST_ONLY=1` wants it."""
+
+_PRIMITIVES = {
+    "bool": bool,
+    "string": str,
+    "byte": idl.uint8,
+    "char": idl.uint8,
+    **{name: getattr(idl, name) for name in NUMBERS if hasattr(idl, name) and name[-1].isdigit()},
+}
+_domains: dict[int, Domain] = {}
+
+
+class Node:
+    """Takes part in a domain of ROS; on this machine only, where `ROS_LOCALHOST_ONLY` is 1.
+
+    Args:
+        domain: of ROS.
+
+    Raises:
+        SourceError: DDS refuses, as where `CYCLONEDDS_URI` names no good configuration.
+    """
+
+    def __init__(self, domain: int) -> None:
+        try:
+            if _is_local() and domain not in _domains:
+                _domains[domain] = Domain(domain, LOOPBACK)
+            self._participant = DomainParticipant(domain)
+            self._publications = BuiltinDataReader(self._participant, BuiltinTopicDcpsPublication)
+        except DDSException as cause:
+            raise SourceError(f"ROS domain {domain} cannot be joined: {cause.msg}") from cause
+
+    def published(self) -> dict[str, str]:
+        """Types of the topics that somebody publishes, by name, both as in ROS."""
+        alive = InstanceState.Alive | ViewState.Any | SampleState.Any
+        found = self._publications.read(1000, ReadCondition(self._publications, alive))
+        return {
+            one.topic_name.removeprefix(PREFIX[:-1]): ros_type(one.type_name)
+            for one in found
+            if not isinstance(one, InvalidSample) and one.topic_name.startswith(PREFIX)
+        }
+
+    def reader(self, topic: str, definition: Definition) -> "Reader":
+        """Subscribes to a topic."""
+        qos = _qos(Policy.Reliability.BestEffort, N_QUEUED)  # takes reliable ones as well
+        reader = DataReader(self._participant, self._topic(topic, definition, qos), qos=qos)
+        return Reader(reader, WaitSet(self._participant))
+
+    def writer(self, topic: str, definition: Definition) -> Callable[[bytes], None]:
+        """Publishes on a topic, as ROS 2 does by default; what it returns takes messages."""
+        qos = _qos(Policy.Reliability.Reliable(duration(milliseconds=0)), 10)  # it never waits
+        writer = DataWriter(self._participant, self._topic(topic, definition, qos), qos=qos)
+        raw = _raw(definition)
+        return lambda data: writer.write(raw(data))
+
+    def _topic(self, name: str, definition: Definition, qos: Qos) -> Topic[Any]:
+        full = PREFIX + name.removeprefix("/")
+        return Topic(self._participant, full, _raw(definition), qos=qos)
+
+
+class Reader:
+    """A subscription to one topic."""
+
+    def __init__(self, reader: DataReader[Any], wait: WaitSet) -> None:
+        self._reader = reader
+        new = ViewState.Any | SampleState.NotRead | InstanceState.Any
+        self._new = ReadCondition(reader, new)
+        self._wait = wait
+        self._wait.attach(self._new)
+
+    def take(self, timeout: float) -> list[bytes]:
+        """The messages that are there; where there are none, those that come within `timeout`."""
+        found = self._reader.take(N_TAKEN)
+        if not found and self._wait.wait(duration(seconds=timeout)) > 0:
+            found = self._reader.take(N_TAKEN)
+        return [one.data for one in found if not isinstance(one, InvalidSample)]
+
+    def n_writers(self) -> int:
+        """How many publish on the topic now."""
+        return len(self._reader.get_matched_publications())
+
+
+def _qos(reliability: object, depth: int) -> Qos:
+    return Qos(
+        Policy.DataRepresentation(use_cdrv0_representation=True),
+        reliability,
+        Policy.Durability.Volatile,
+        Policy.History.KeepLast(depth),
+    )
+
+
+def _is_local() -> bool:
+    """Whether ROS is to stay on this machine, and Cyclone DDS has no configuration of its own."""
+    return os.environ.get("ROS_LOCALHOST_ONLY") == "1" and not os.environ.get("CYCLONEDDS_URI")
+
+
+def domain_of(given: str | None) -> int:
+    """The domain that is asked for; else that of `ROS_DOMAIN_ID`, else 0.
+
+    Raises:
+        ValueError: it is no number from 0 to 232.
+    """
+    text = given if given is not None else os.environ.get("ROS_DOMAIN_ID", "").strip() or "0"
+    if not (text.isdecimal() and int(text) <= LARGEST_DOMAIN):
+        raise ValueError(f"a ROS domain from 0 to {LARGEST_DOMAIN} expected, {text!r} given")
+    return int(text)
+
+
+def dds_type(name: str) -> str:
+    """The name of a type in DDS.
+
+    Example:
+        >>> dds_type("std_msgs/String")
+        'std_msgs::msg::dds_::String_'
+    """
+    package, kind = name.split("/")
+    return f"{package}{SEPARATOR}{kind}_"
+
+
+def ros_type(name: str) -> str:
+    """The name of a type in ROS; that in DDS, where it is not of ROS.
+
+    Example:
+        >>> ros_type("std_msgs::msg::dds_::String_")
+        'std_msgs/String'
+    """
+    package, separator, kind = name.partition(SEPARATOR)
+    return f"{package}/{kind.removesuffix('_')}" if separator else name
+
+
+def _raw(definition: Definition) -> type[Any]:
+    """The type of a message for DDS, whose samples stay bytes in `data`."""
+    return _raw_type(definition.name, tuple(definition.types.items()))
+
+
+class _Raw:
+    """How a type keeps its messages as bytes."""
+
+    def __init__(self, data: bytes) -> None:
+        self.data = data
+
+    def serialize(self, *_: object, **__: object) -> bytes:
+        return self.data
+
+    @classmethod
+    def deserialize(cls, data: bytes, *_: object, **__: object) -> Self:
+        return cls(bytes(data))
+
+    deserialize_key = deserialize
+
+
+@cache
+def _raw_type(name: str, types: tuple[tuple[str, tuple[Field, ...]], ...]) -> type[Any]:
+    made = _struct(name, dict(types))
+    for method in ("__init__", "serialize", "deserialize", "deserialize_key"):
+        setattr(made, method, vars(_Raw)[method])
+    return made
+
+
+def _struct(name: str, types: Mapping[str, tuple[Field, ...]]) -> type[Any]:
+    fields = {field.name: _member(field, types) for field in types[name]}
+    _, kind = name.split("/")
+    return make_idl_struct(kind, dds_type(name), fields, dataclassify=False)
+
+
+def _member(field: Field, types: Mapping[str, tuple[Field, ...]]) -> Any:  # noqa: ANN401
+    one = _PRIMITIVES.get(field.kind) or _struct(field.kind, types)
+    if field.size is None:
+        return one
+    return idl.sequence[one] if field.size == 0 else idl.array[one, field.size]  # type: ignore[misc]

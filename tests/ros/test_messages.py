@@ -1,0 +1,118 @@
+import numpy as np
+import pytest
+
+from holdfast.ros.definitions import parse_definition
+from holdfast.ros.messages import SENS_STREAM, Unpacker, known_definition
+
+pytest.importorskip("rosbags", reason="rosbags is not installed")
+
+from sources.ros_build import (
+    OLD,
+    PILLARS,
+    XELA,
+    counts,
+    sens_stream,
+    sensor_state,
+    store,
+    x_server,
+    x_stream,
+)
+
+ROS = pytest.mark.parametrize("ros2", [False, True], ids=["ros1", "ros2"])
+
+
+def packed(types, message, *, ros2):
+    name = message.__msgtype__
+    data = types.serialize_cdr(message, name) if ros2 else types.serialize_ros1(message, name)
+    return bytes(data)
+
+
+def told(types, message, *, ros2):
+    """The definition as ROS keeps it with a topic."""
+    name = message.__msgtype__
+    return parse_definition(name, types.generate_msgdef(name, ros_version=2 if ros2 else 1)[0])
+
+
+@ROS
+def test_a_stream_of_xela(ros2):
+    package = "xela_server_ros2" if ros2 else "xela_server_ros"
+    types = store(package, XELA, ros2=ros2)
+    thumb, tip = counts(30), counts(16, seed=1)
+    forces = np.random.default_rng(2).normal(size=(30, 3)).astype(np.float32)
+    message = sens_stream(
+        types,
+        package,
+        (1, "uSCuAH", 7, 1619157045.25, thumb, forces),
+        (4, "uSPa44", 2**32 - 1, 0.0, tip, []),
+    )
+    definitions = (
+        told(types, message, ros2=ros2),
+        known_definition(message.__msgtype__, ros2=ros2),
+    )
+    for definition in definitions:
+        one, two = Unpacker(definition, ros2=ros2)(packed(types, message, ros2=ros2))
+        assert one[:5] == (1, "uSCuAH", 1619157045.25, None, 7)
+        assert two[:5] == (4, "uSPa44", None, None, 2**32 - 1)
+        assert one.counts.dtype == np.uint16
+        np.testing.assert_array_equal(one.counts, thumb)
+        np.testing.assert_array_equal(one.forces, forces)
+        np.testing.assert_array_equal(two.counts, tip)
+        assert two.forces.shape == (0, 3)
+
+
+@ROS
+def test_older_streams_of_xela(ros2):
+    types = store("xela_server", OLD, ros2=ros2)
+    message = x_stream(types, "xela_server", counts(16), counts(4, seed=1))
+    found = Unpacker(told(types, message, ros2=ros2), ros2=ros2)(packed(types, message, ros2=ros2))
+    assert [one.number for one in found] == [1, 2]
+    np.testing.assert_array_equal(found[1].counts, counts(4, seed=1))
+    message = x_server(types, "xela_server", 3, "XR1944", 12.5, counts(16), ros2=ros2)
+    (one,) = Unpacker(told(types, message, ros2=ros2), ros2=ros2)(packed(types, message, ros2=ros2))
+    assert one[:5] == (3, "XR1944", None, 12.5, None)
+    assert one.counts.dtype == np.uint16
+    np.testing.assert_array_equal(one.counts, counts(16))
+
+
+@ROS
+def test_pillars(ros2):
+    package = "sensor_interfaces" if ros2 else "papillarray_ros_v2"
+    types = store(package, PILLARS, ros2=ros2)
+    forces = np.random.default_rng(2).normal(size=(9, 3)).astype(np.float32)
+    message = sensor_state(types, package, 1_500_000, 12.25, forces, ros2=ros2)
+    for definition in (
+        told(types, message, ros2=ros2),
+        known_definition(f"{package}/SensorState", ros2=ros2),
+    ):
+        (one,) = Unpacker(definition, ros2=ros2)(packed(types, message, ros2=ros2))
+        assert one[:5] == (None, "papillarray", 1.5, 12.25, None)
+        assert one.counts is None
+        np.testing.assert_array_equal(one.forces, forces)
+
+
+def test_counts_of_more_than_16_bits_are_refused():
+    types = store("xela_server", OLD, ros2=False)
+    message = x_stream(types, "xela_server", np.array([[1, 2, 65536]]))
+    unpack = Unpacker(told(types, message, ros2=False), ros2=False)
+    with pytest.raises(ValueError, match="a reading is no whole number from 0 to 65535"):
+        unpack(packed(types, message, ros2=False))
+
+
+def test_points_whose_axes_come_in_another_order():
+    text = SENS_STREAM.replace("uint16 x\nuint16 y\nuint16 z", "uint16 z\nuint16 y\nuint16 x")
+    types = store("p", XELA | {"Taxel": "uint16 z\nuint16 y\nuint16 x"}, ros2=False)
+    message = sens_stream(types, "p", (1, "", 7, 1.0, [[3, 2, 1], [6, 5, 4]], []))
+    unpack = Unpacker(parse_definition("xela_server_ros/SensStream", text), ros2=False)
+    assert unpack(packed(types, message, ros2=False))[0].counts.tolist() == [[1, 2, 3], [4, 5, 6]]
+
+
+def test_unknown_messages():
+    assert known_definition("std_msgs/msg/String", ros2=True) is None
+    assert known_definition("other/SensStream", ros2=True) is None
+    with pytest.raises(
+        ValueError, match="pkg/Text is of no kind that holdfast knows; there are xela"
+    ):
+        Unpacker(parse_definition("pkg/Text", "string text"), ros2=False)
+    signed = SENS_STREAM.replace("uint16", "int16")
+    with pytest.raises(ValueError, match="of no kind that holdfast knows"):
+        Unpacker(parse_definition("xela_server_ros/SensStream", signed), ros2=False)

@@ -1,0 +1,128 @@
+import sys
+from http.server import BaseHTTPRequestHandler, HTTPServer
+from socket import create_server
+from threading import Thread
+from xmlrpc.server import SimpleXMLRPCRequestHandler, SimpleXMLRPCServer
+
+import pytest
+
+from holdfast.errors import SourceError
+from holdfast.ros import rospy_node
+from holdfast.ros.rospy_node import check_master, master_of, node, published, rospy_module
+
+
+class _Silent(SimpleXMLRPCRequestHandler):
+    protocol_version = "HTTP/1.0"
+
+    def log_message(self, *_):
+        pass
+
+
+@pytest.fixture
+def master():
+    """What answers as a master does; its answers are in a dictionary."""
+    answers = {}
+    with SimpleXMLRPCServer(("127.0.0.1", 0), _Silent) as server:
+        for name in ("getPid", "getSystemState", "getTopicTypes"):
+            server.register_function(lambda _, name=name: answers[name], name)
+        thread = Thread(target=server.serve_forever, kwargs={"poll_interval": 0.01})
+        thread.start()
+        yield f"http://127.0.0.1:{server.server_address[1]}", answers
+        server.shutdown()
+        thread.join()
+
+
+def test_what_is_published(master):
+    uri, answers = master
+    answers["getPid"] = (1, "", 7)
+    check_master(uri)
+    answers["getSystemState"] = (1, "", [[["/a", ["node"]], ["/b", []]], [["/c", ["n"]]], []])
+    answers["getTopicTypes"] = (1, "", [["/a", "p/A"], ["/b", "p/B"], ["/c", "p/C"]])
+    assert published(uri) == {"/a": "p/A"}
+
+
+def test_a_master_that_refuses(master):
+    uri, answers = master
+    answers["getPid"] = (-1, "not now", 0)
+    with pytest.raises(SourceError, match=f"^the ROS master at {uri} refuses getPid: not now$"):
+        check_master(uri)
+
+
+def test_a_master_that_says_something_else(master):
+    uri, answers = master
+    answers["getPid"] = 7
+    with pytest.raises(SourceError, match="is no ROS master"):
+        check_master(uri)
+    del answers["getPid"]
+    with pytest.raises(SourceError, match="is no ROS master"):
+        check_master(uri)
+
+
+def test_nobody_listens():
+    with create_server(("127.0.0.1", 0)) as free:
+        uri = f"http://127.0.0.1:{free.getsockname()[1]}"
+    with pytest.raises(SourceError) as caught:
+        node(uri)
+    assert str(caught.value) == (
+        f"no ROS master answers at {uri} (Connection refused): is roscore running? "
+        "ROS_MASTER_URI or ?master= tell where"
+    )
+
+
+def test_somebody_listens_but_says_nothing(monkeypatch):
+    monkeypatch.setattr(rospy_node, "ANSWER_TIME", 0.1)
+    with create_server(("127.0.0.1", 0)) as mute:
+        uri = f"http://127.0.0.1:{mute.getsockname()[1]}"
+        with pytest.raises(SourceError, match=r"no ROS master answers at .* \(timed out\)"):
+            check_master(uri)
+
+
+def test_another_web_server():
+    class Handler(BaseHTTPRequestHandler):
+        def do_POST(self):
+            self.send_error(404)
+
+        def log_message(self, *_):
+            pass
+
+    with HTTPServer(("127.0.0.1", 0), Handler) as server:
+        thread = Thread(target=server.handle_request)
+        thread.start()
+        with pytest.raises(SourceError, match=r"is no ROS master: .*404"):
+            check_master(f"http://127.0.0.1:{server.server_address[1]}")
+        thread.join()
+
+
+def test_which_master(monkeypatch):
+    monkeypatch.delenv("ROS_MASTER_URI", raising=False)
+    assert master_of(None) == "http://localhost:11311"
+    monkeypatch.setenv("ROS_MASTER_URI", "http://robot:11311/")
+    assert master_of(None) == "http://robot:11311"
+    assert master_of("http://10.0.0.1:1") == "http://10.0.0.1:1"
+    for bad in ("robot:11311", "http://robot", "https://robot:1", "http://robot:port"):
+        with pytest.raises(ValueError, match="a master as http://localhost:11311 expected, "):
+            master_of(bad)
+
+
+def test_no_rospy_at_all(monkeypatch):
+    path = list(sys.path)
+    monkeypatch.setitem(sys.modules, "rospy", None)
+    monkeypatch.setattr(rospy_node, "PLACES", ())
+    with pytest.raises(SourceError) as caught:
+        rospy_module()
+    assert str(caught.value) == (
+        "this needs rospy of ROS 1, which pip cannot install: apt install python3-rospy, and "
+        f"a Python of the same version (this is 3.{sys.version_info[1]})"
+    )
+    assert sys.path == path
+
+
+def test_a_rospy_for_another_python_is_left_alone(tmp_path, monkeypatch):
+    (tmp_path / "rospy").mkdir()
+    monkeypatch.setitem(sys.modules, "rospy", None)
+    monkeypatch.setattr(rospy_node, "PLACES", (str(tmp_path),))
+    monkeypatch.setattr(rospy_node, "_pythons", lambda: ["python3.5", "python3.5-config"])
+    path = list(sys.path)
+    with pytest.raises(SourceError, match="apt install python3-rospy"):
+        rospy_module()
+    assert sys.path == path

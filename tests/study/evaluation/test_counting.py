@@ -1,0 +1,83 @@
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from holdfast.contact import STABLE, UNKNOWN, UNSTABLE
+from holdfast.metrics import Decisions, FingerDecisions
+from holdfast.recordings import Truth
+from holdfast.study.evaluation.counting import calibration_counts, count
+from holdfast.study.evaluation.seen import Seen
+from study.told import PUSH, truth_of
+
+TIMES = np.arange(1725) / 150
+LABELS = np.where((TIMES >= 2.3) & (TIMES < 9.5), STABLE, UNSTABLE)
+LABELS = np.where((TIMES >= 5.3 - 1e-9) & (TIMES < 6.5), UNSTABLE, LABELS).astype(np.int8)
+
+
+def seen_with(truth):
+    return Seen("one", None, truth, {}, {}, {}, {}, {}, {})
+
+
+def decided(states, names=("thumb", "index")):
+    finger = FingerDecisions(TIMES, LABELS, states, np.full(len(TIMES), 0.5))
+    return Decisions("one", dict.fromkeys(names, finger), finger)
+
+
+def told(states, truth=None, names=("thumb", "index")):
+    truth = truth or truth_of(TIMES, ("thumb", "index"))
+    return count(seen_with(truth), decided(states, names))
+
+
+def test_everything_called_stable():
+    found = told(np.full(1725, STABLE, dtype=np.int8))
+    assert found.phases["disturbed"] == (360, 360)
+    assert found.phases["locked"] == (1800, 0)
+    assert found.phases["free"][0] == found.phases["free"][1] == 2 * (225 + 225)
+    (push,) = found.pushes
+    assert (push.direction, push.n, push.wrong) == ("down", 358, 358)
+    assert [grip.counts for grip in found.grips] == [(900, 0, 180, 180)] * 2
+    assert [grip.force for grip in found.grips] == pytest.approx([2.0, 2.0])
+
+
+def test_samples_without_a_decision_do_not_count():
+    states = np.where(TIMES < 6.0 - 1e-9, UNKNOWN, UNSTABLE).astype(np.int8)
+    found = told(states)
+    assert found.phases["disturbed"] == (2 * 75, 0)
+    assert found.phases["locked"] == (2 * 450, 2 * 450)
+    assert found.grips[0].counts == (450, 450, 75, 0)
+
+
+@pytest.mark.parametrize(
+    ("force", "direction"),
+    [((0, 0, 1), "up"), ((0.2, -1, 0), "left"), ((1, 1, 0), "oblique"), ((3, 0, 1), "towards")],
+)
+def test_directions(force, direction):
+    truth = truth_of(TIMES, ("thumb", "index"))
+    outside = np.outer(np.linalg.norm(truth.hand["outside_force"], axis=1), force)
+    turned = Truth(TIMES, {**truth.hand, "outside_force": outside}, truth.fingers)
+    assert force != PUSH
+    assert [p.direction for p in told(np.full(1725, STABLE), turned).pushes] == [direction]
+
+
+def test_a_judge_of_hands_has_phases_and_pushes_but_no_grips():
+    found = told(np.full(1725, STABLE, dtype=np.int8), names=())
+    assert found.phases["disturbed"] == (180, 180)
+    assert found.pushes[0].n == 179
+    assert found.grips == []
+
+
+def test_nothing_is_counted_where_the_truth_is_not_known():
+    found = count(seen_with(None), decided(np.full(1725, STABLE)))
+    assert (found.phases, found.grips, found.pushes) == ({}, [], [])
+
+
+def test_calibration_counts_by_hand():
+    labels, states = [STABLE, UNSTABLE, STABLE, STABLE], [STABLE, STABLE, UNSTABLE, UNKNOWN]
+    finger = FingerDecisions(np.arange(4.0), labels, states, [0.95, 0.91, 0.05, np.nan])
+    table = np.array(calibration_counts(Decisions("one", {"thumb": finger})))
+    assert table[9] == pytest.approx([1.86, 1, 2])
+    assert table[0] == pytest.approx([0.05, 1, 1])
+    assert table[1:9].sum() == 0
+    as_hand = replace(Decisions("one", {}), hand=finger)
+    assert (np.array(calibration_counts(as_hand)) == table).all()

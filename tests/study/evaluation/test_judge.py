@@ -1,0 +1,208 @@
+from dataclasses import replace
+
+import msgspec
+import numpy as np
+import pytest
+
+from holdfast.contact import STABLE, ContactState
+from holdfast.metrics import event_metrics
+from holdfast.recordings import Label
+from holdfast.study.comparison.leak import judge_pooled
+from holdfast.study.corpus import corpus_of
+from holdfast.study.evaluation.changes import Change
+from holdfast.study.evaluation.judge import (
+    ALARM_RATES,
+    Effort,
+    Job,
+    Judged,
+    cases_of,
+    groups_of,
+    held_out,
+    judge,
+    method_called,
+)
+from study.build import synthetic, written
+from study.told import told_recording
+
+EFFORT = Effort(folds=3, inner=2, max_rows=1000)
+
+
+@pytest.fixture(scope="module")
+def recordings():
+    return [told_recording(f"grasp-{seed}", seed) for seed in range(6)]
+
+
+@pytest.fixture(scope="module")
+def corpus(tmp_path_factory, recordings):
+    return corpus_of("main", written(tmp_path_factory.mktemp("judging") / "main", recordings))
+
+
+@pytest.mark.parametrize("n", [2, 5, 12, 13])
+@pytest.mark.parametrize("split", ["recording", "object"])
+def test_every_recording_is_held_out_once(n, split):
+    objects = [f"object {k % 3}" for k in range(n)]
+    folds = list(held_out(objects, split, 5, seed=1))
+    assert sorted(place for fold in folds for place in fold) == list(range(n))
+    if split == "object":
+        assert all(len({objects[place] for place in fold}) == 1 for fold in folds)
+        assert len(folds) == min(3, n)
+
+
+def test_recordings_of_an_object_are_spread_over_the_folds():
+    objects = ["ball"] * 10 + ["box"] * 10
+    groups = groups_of(objects, 5, seed=3)
+    for half in (groups[:10], groups[10:]):
+        assert np.bincount(half, minlength=5).tolist() == [2] * 5
+
+
+@pytest.mark.parametrize("objects", [["ball", "ball"], ["ball", None], [None, None]])
+def test_no_split_by_object_where_objects_are_not_known(objects):
+    assert list(held_out(objects, "object", 5, 0)) == []
+
+
+@pytest.mark.parametrize("method", ["logreg", "jl_global_logreg"])
+def test_what_is_judged_has_no_say_in_its_judge(tmp_path, recordings, corpus, method):
+    """Labels and truth of the recordings of a fold turned round: the same decisions on them."""
+    held = next(held_out([r.metadata["object"] for r in recordings], "recording", 3, 0))
+    other = [turned(r) if k in held else r for k, r in enumerate(recordings)]
+    turned_corpus = corpus_of("main", written(tmp_path / "main", other))
+    job = Job(method, corpus, effort=EFFORT)
+    (_, cases), (_, turned_cases) = (
+        next(cases_of(each)) for each in (job, msgspec.structs.replace(job, train=turned_corpus))
+    )
+    for place, (case, twin) in enumerate(zip(cases, turned_cases, strict=True)):
+        assert same(case, twin) == (place in held)
+
+
+def turned(recording):
+    """Stable where it was not, everywhere."""
+    labels = {
+        name: [Label(each.start, each.end, _other(each.state)) for each in module.labels]
+        for name, module in recording.modules.items()
+    }
+    return replace(recording.with_labels(labels), truth=None)
+
+
+def _other(state):
+    return ContactState.UNSTABLE if state is ContactState.STABLE else ContactState.STABLE
+
+
+def same(case, twin):
+    margins = [
+        np.array_equal(margin, twin.opinion.margins[unit], equal_nan=True)
+        for unit, margin in case.opinion.margins.items()
+    ]
+    touching = [
+        np.array_equal(touch, twin.opinion.touching[finger])
+        for finger, touch in case.opinion.touching.items()
+    ]
+    return all(margins) and all(touching) and case.shifts == twin.shifts
+
+
+@pytest.fixture(scope="module")
+def judged(corpus, tmp_path_factory):
+    other = synthetic(tmp_path_factory.mktemp("judging-other") / "others", range(20, 23))
+    job = Job(
+        "logreg", corpus, ("recording", "object"), (corpus_of("others", other),), effort=EFFORT
+    )
+    data = msgspec.msgpack.encode(judge(job))
+    return msgspec.msgpack.decode(data, type=dict[str, Judged])
+
+
+def test_a_job_has_a_result_for_each_split_and_each_corpus(judged, corpus):
+    assert set(judged) == {"recording", "object", "others"}
+    assert judged["object"].names == judged["recording"].names == list(corpus.recordings)
+    assert len(judged["others"].names) == 3
+    assert judged["recording"].fingers.pooled.accuracy > 75
+
+
+def test_without_a_truth_there_are_no_slips_and_no_phases(judged):
+    others = judged["others"]
+    assert all(heard.slips == [] for heard in others.own)
+    assert all(not each.phases for each in others.breakdown)
+    assert all(len(heard.slips) == 1 for heard in judged["recording"].own)
+
+
+def test_events_are_counted_by_exact_labels(judged, corpus):
+    """As `event_metrics` has them, of the hand by labels without margin."""
+    _, cases = next(cases_of(Job("logreg", corpus, effort=EFFORT)))
+    for case, heard in zip(cases, judged["recording"].own, strict=True):
+        labels = case.seen.hand(case.seen.exact).labels
+        score = case.opinion.score(case.seen)
+        known = event_metrics(score.times, labels, score.states())
+        assert len(heard.delays) == known.n_events
+        assert heard.under_stable == known.false_alarms["STABLE"]
+        assert heard.false_alarms == sum(known.false_alarms.values())
+        assert (
+            heard.n_stable
+            == (labels == STABLE).sum() - (score.states()[labels == STABLE] == 0).sum()
+        )
+
+
+def test_every_rate_has_its_threshold_and_more_alarms_find_more_slips(judged):
+    curve = judged["recording"].curve
+    assert len(curve) == len(ALARM_RATES)
+    found = [sum(heard.n_found(0.2) for heard in point) for point in curve]
+    assert found == sorted(found)
+
+
+def test_a_hand_that_is_held_gives_fewer_alarms(judged):
+    bare, held = judged["recording"].own, judged["recording"].held
+    assert sum(h.false_alarms for h in held) <= sum(h.false_alarms for h in bare)
+    assert sum(h.n_doubted for h in held) >= sum(h.n_doubted for h in bare)
+
+
+def test_a_judge_of_hands_has_no_fingers(corpus):
+    found = judge(Job("jl_global_svm", corpus, effort=EFFORT))["recording"]
+    assert found.fingers is None
+    assert found.metrics is found.hand
+    assert found.hand.pooled.brier is not None
+
+
+def test_recordings_of_one_class_are_judged_too(tmp_path, recordings):
+    one = recordings[0].with_labels(
+        {f: [Label(2.0, 9.0, ContactState.STABLE)] for f in recordings[0].modules}
+    )
+    folder = written(tmp_path / "main", [one, *recordings[1:4]])
+    found = judge(Job("zhang", corpus_of("main", folder), effort=EFFORT))["recording"]
+    assert len(found.names) == 4
+
+
+def test_two_recordings_of_which_one_has_one_class(tmp_path, recordings):
+    """Half of the folds have nothing to learn from: nothing is decided there, nothing fails."""
+    one = replace(recordings[0], truth=None).with_labels(
+        {f: [Label(2.0, 9.0, ContactState.STABLE)] for f in recordings[0].modules}
+    )
+    corpus = corpus_of("main", written(tmp_path / "main", [one, recordings[1]]))
+    found = judge(Job("logreg", corpus, effort=EFFORT))["recording"]
+    first, second = found.fingers.recordings
+    assert first.fingers["thumb"].n > 0
+    assert second.fingers["thumb"].n == 0
+
+
+def test_a_stride_looks_at_fewer_decisions(corpus):
+    every, some = (
+        judge(Job("logreg", corpus, effort=msgspec.structs.replace(EFFORT, stride=stride)))
+        for stride in (1, 3)
+    )
+    n = [each["recording"].fingers.pooled.n for each in (every, some)]
+    assert n[1] == pytest.approx(n[0] / 3, rel=0.01)
+
+
+def test_a_change_is_made_to_all_recordings(corpus):
+    slow = judge(Job("zhang", corpus, change=Change(every=5), effort=EFFORT))["recording"]
+    assert slow.fingers.pooled.n < 6 * 2 * 1725 / 5
+
+
+def test_methods_of_one_question_are_found_too():
+    assert method_called("sigma_cut").title == "sigma of F_a"
+    assert method_called("svm").name == "svm"
+
+
+def test_a_random_split_judges_every_sample_once(corpus):
+    job = Job("logreg", corpus, effort=EFFORT)
+    counts = np.array(judge_pooled(job))
+    honest = judge(job)["recording"].fingers
+    assert counts.shape == (6, 4)
+    assert counts.sum() == honest.pooled.n
+    assert judge_pooled(job) == counts.tolist()

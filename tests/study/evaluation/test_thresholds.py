@@ -1,0 +1,90 @@
+import numpy as np
+import pytest
+
+from holdfast.contact import NO_CONTACT, STABLE, UNKNOWN, UNSTABLE
+from holdfast.metrics import match_alarms
+from holdfast.study.evaluation.opinion import Score
+from holdfast.study.evaluation.thresholds import Calm, shift_for
+
+
+def random_score(generator, n=3000):
+    """Scores that wander over a few levels, with gaps and losses of contact."""
+    steps = generator.normal(size=n) * (generator.random(n) < 0.3)
+    least = np.round(3 * np.sin(np.cumsum(steps)), 1)
+    known = generator.random(n) > 0.02
+    alone = np.repeat(generator.random(n // 50 + 1) < 0.1, 50)[:n]
+    least[generator.random(n) < 0.01] = np.inf
+    return Score(np.arange(n) / 150, least, known, alone, np.full(n, 0.5))
+
+
+def random_labels(generator, n=3000):
+    lengths = generator.integers(5, 300, size=n)
+    codes = generator.choice([STABLE, STABLE, UNSTABLE, NO_CONTACT, UNKNOWN], size=n)
+    return np.repeat(codes, lengths)[:n].astype(np.int8)
+
+
+def cases(seed):
+    generator = np.random.default_rng(seed)
+    return [(random_score(generator), random_labels(generator)) for _ in range(3)]
+
+
+def n_false(score, labels, shift):
+    """False alarms under a stable label, by deciding at that threshold."""
+    found = match_alarms(score.times, labels, score.states(shift))
+    return sum(alarm.label.code == STABLE for alarm in found.false_alarms)
+
+
+def brute_shift(pairs, per_minute, tried):
+    minutes = sum(match_alarms(s.times, y, y).stable_seconds for s, y in pairs) / 60
+    counts = [sum(n_false(s, y, shift) for s, y in pairs) for shift in tried]
+    allowed = []
+    for shift, count in zip(tried, counts, strict=True):
+        if count > per_minute * minutes:
+            break
+        allowed.append(shift)
+    return max(allowed, default=-np.inf), tried[int(np.argmax(counts))]
+
+
+@pytest.mark.parametrize("seed", range(5))
+def test_false_alarms_at_every_threshold_as_if_it_had_decided(seed):
+    for score, labels in cases(seed):
+        calm = Calm.of(score, labels)
+        for shift in (-np.inf, *np.arange(-3.2, 3.3, 0.1)):
+            counted = int(((calm.after < shift) & (shift <= calm.before)).sum())
+            if np.isneginf(shift):
+                counted = int(np.isneginf(calm.after).sum())
+            assert counted == n_false(score, labels, shift)
+
+
+@pytest.mark.parametrize("seed", range(5))
+@pytest.mark.parametrize("per_minute", [0.0, 5.0, 40.0, 200.0])
+def test_the_most_watchful_threshold_that_is_quiet_enough(seed, per_minute):
+    pairs = cases(seed)
+    tried = np.unique(np.concatenate([s.least[np.isfinite(s.least)] for s, _ in pairs]))
+    quiet, loudest = brute_shift(pairs, per_minute, tried)
+    chosen = shift_for([Calm.of(*pair) for pair in pairs], per_minute)
+    assert max(chosen, tried[0]) == max(min(quiet, loudest), tried[0])
+
+
+def test_it_never_goes_beyond_the_loudest_threshold():
+    """At 2 there are two alarms; at 3 the hand is never stable and there would be none."""
+    least = np.array([3.0, 1.0, 2.0, 1.0, 2.5, 2.5])
+    known, alone = np.ones(6, dtype=bool), np.zeros(6, dtype=bool)
+    calm = Calm.of(Score(np.arange(6.0), least, known, alone, least), np.full(6, STABLE))
+    assert shift_for([calm], 1e9) == 2.0
+
+
+def test_without_any_alarm_the_own_threshold_stays():
+    nothing = Calm(np.empty(0), np.empty(0), 1.0)
+    assert shift_for([nothing], 1.0) == 0.0
+
+
+def test_alarms_that_are_spared_do_not_count():
+    least = np.array([1.0, 1.0, -1.0, 1.0, -2.0, 1.0])
+    score = Score(
+        np.arange(6.0), least, np.ones(6, dtype=bool), np.zeros(6, dtype=bool), np.zeros(6)
+    )
+    labels = np.full(6, STABLE, dtype=np.int8)
+    spared = np.arange(6) == 4
+    assert shift_for([Calm.of(score, labels)], 0.0) == -2.0
+    assert shift_for([Calm.of(score, labels, spared)], 0.0) == -1.0

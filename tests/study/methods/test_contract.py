@@ -1,0 +1,140 @@
+"""What every method has to fulfil, whatever it looks at."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from holdfast.classifiers import Samples
+from holdfast.contact import ContactState
+from holdfast.errors import MissingExtra
+from holdfast.features import Tare
+from holdfast.recordings import Recording
+from holdfast.study.methods import HAND, METHODS, signal_of
+from holdfast.synthetic import synthetic_recording
+
+TARE = Tare.parse(0.5)
+TARED = 75
+"""Samples that the tare takes."""
+LONGEST = 160
+"""Samples of which every window is full."""
+FINGERS = ("thumb", "index")
+
+
+@pytest.fixture(scope="module")
+def recordings():
+    return [synthetic_recording(f"grasp {seed}", seed, FINGERS) for seed in range(3)]
+
+
+@pytest.fixture(params=sorted(METHODS))
+def method(request):
+    return METHODS[request.param]
+
+
+def features_of(method, recording):
+    return method.features(signal_of(recording, TARE, FINGERS))
+
+
+def changed(recording, change):
+    """The recording with every module changed."""
+    modules = {name: change(module) for name, module in recording.modules.items()}
+    return Recording(recording.name, modules, recording.metadata)
+
+
+def with_other_readings(recording, rows):
+    """The same with the readings of some samples shuffled and shifted."""
+
+    def change(module):
+        readings = module.readings.astype(float)
+        readings[rows] = readings[rows][::-1] * 0.9 + 40
+        return replace(module, readings=readings)
+
+    return changed(recording, change)
+
+
+def without_samples(recording, rows):
+    def change(module):
+        kept = np.delete(np.arange(module.n_samples), rows)
+        return replace(module, times=module.times[kept], readings=module.readings[kept], labels=())
+
+    return changed(recording, change)
+
+
+def same(one, two, rows):
+    return all(np.allclose(one[k][rows], two[k][rows], equal_nan=True) for k in one)
+
+
+def test_its_name_is_its_key(method):
+    assert METHODS[method.name] is method
+    assert method.title
+    assert method.source
+
+
+def test_one_row_for_each_sample(method, recordings):
+    found = features_of(method, recordings[0])
+    assert set(found) == ({HAND} if method.whole_hand else set(FINGERS))
+    n_samples = recordings[0].modules["thumb"].n_samples
+    shapes = {rows.shape for rows in found.values()}
+    assert len(shapes) == 1
+    assert shapes.pop()[0] == n_samples
+
+
+def test_nothing_before_the_tare_and_everything_once_windows_are_full(method, recordings):
+    for rows in features_of(method, recordings[0]).values():
+        assert np.isnan(rows[:TARED]).any(axis=1).all()
+        known = np.isfinite(rows).all(axis=1)
+        assert known[TARED + LONGEST :].all()
+        assert (np.diff(known.astype(int)) >= 0).all()
+
+
+def test_what_comes_later_changes_nothing(method, recordings):
+    k = 700
+    other = with_other_readings(recordings[0], slice(k, None))
+    one, two = features_of(method, recordings[0]), features_of(method, other)
+    assert same(one, two, slice(0, k))
+    assert not same(one, two, slice(k, None))
+
+
+def test_a_gap_starts_anew(method, recordings):
+    """After it, nothing depends on what was before it (but after the tare)."""
+    gap = slice(600, 610)
+    broken = without_samples(recordings[0], gap)
+    one = features_of(method, broken)
+    two = features_of(method, with_other_readings(broken, slice(TARED, gap.start)))
+    assert not same(one, two, slice(TARED, gap.start))
+    assert same(one, two, slice(gap.start, None))
+    for rows in one.values():
+        assert np.isfinite(rows[gap.start + LONGEST :]).all()
+
+
+def test_no_stretch_has_the_width_of_any_other(method, recordings):
+    short = changed(recordings[0], lambda module: module.slice(0, TARED - 5))
+    found = features_of(method, recordings[0])
+    for key, rows in features_of(method, short).items():
+        assert rows.shape == (TARED - 5, found[key].shape[1])
+        assert np.isnan(rows).any(axis=1).all()
+
+
+def test_it_is_fitted_and_gives_probabilities(method, recordings):
+    key = HAND if method.whole_hand else "index"
+    rows, stable, groups = [], [], []
+    for group, recording in enumerate(recordings):
+        found = features_of(method, recording)[key]
+        states = recording.modules["thumb"].label_states
+        known = np.flatnonzero(np.isfinite(found).all(axis=1) & (states > 0))[::5]
+        rows.append(found[known])
+        stable.append(states[known] == ContactState.STABLE.code)
+        groups.append(np.full(len(known), group))
+    samples = Samples(np.concatenate(rows), np.concatenate(stable), np.concatenate(groups))
+    try:
+        fitted = method.recipe.fit(samples, method.reference, 0)
+    except MissingExtra as missing:
+        pytest.skip(str(missing))
+    probability = fitted.probability(samples.features)
+    assert fitted.n_features == samples.features.shape[1]
+    assert ((probability >= 0) & (probability <= 1)).all()
+    assert 0 <= fitted.threshold <= 1
+    assert np.isnan(fitted.probability(np.full((1, fitted.n_features), np.nan))).all()
+    called = probability >= fitted.threshold
+    right = (called[samples.stable].mean() + (~called[~samples.stable]).mean()) / 2
+    assert right > 0.5
