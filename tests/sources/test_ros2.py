@@ -14,11 +14,12 @@ pytest.importorskip("cyclonedds", reason="cyclonedds is not installed")
 pytest.importorskip("rosbags", reason="rosbags is not installed")
 
 from holdfast.errors import MissingExtra, SourceError
+from holdfast.ros import dds
 from holdfast.ros.definitions import parse_definition
 from holdfast.ros.messages import known_definition
 from holdfast.sensors import sensor
 from holdfast.sources import open_source
-from holdfast.sources.ros import dds, topic
+from holdfast.sources.ros import topic
 from sources.ros_build import PILLARS, sensor_state, store
 
 PEER = Path(__file__).parent / "ros2_peer.py"
