@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from holdfast.sensors import hand, sensor
-from holdfast.sensors.xela_models import module_sensors, split, whole_hand
+from holdfast.sensors.xela_models import flat_grid, is_known, module_sensors, split, whole_hand
 
 
 @pytest.mark.parametrize("model", ["XR23AHRCPP", "xr23ahlcpp"])
@@ -25,7 +25,8 @@ def test_a_whole_hand_has_all_its_modules(model):
         ("uSCuAH", 30, "uskin-curved"),
         ("USPA44", 16, "uskin-4x4"),
         ("XR1946", 24, "uskin-4x6"),
-        ("never heard of", 24, "uskin-4x6"),
+        ("", 16, "uskin-4x4"),
+        ("", 24, "uskin-4x6"),
         ("", 30, "uskin-curved"),
     ],
 )
@@ -36,11 +37,30 @@ def test_separate_sensors(model, n_taxels, name):
     assert whole_hand(model) is None
 
 
-def test_a_patch_without_a_drawing_is_flat():
-    (patch,) = module_sensors("uSPa35", 15).values()
-    assert (patch.name, patch.n_taxels) == ("uspa35", 15)
-    assert (patch.rotations == np.eye(3)).all()
-    assert len(np.unique(patch.positions, axis=0)) == 15
+@pytest.mark.parametrize(
+    ("model", "n_taxels", "name"),
+    [("uSPa35", 15, "uspa35"), ("uSPr-DSF", 30, "uspr-dsf"), ("", 15, "unknown")],
+)
+def test_an_unknown_model_is_a_flat_grid_of_its_name(model, n_taxels, name):
+    assert module_sensors(model, n_taxels) == {"": flat_grid(name, n_taxels)}
+    assert not is_known(model)
+
+
+@pytest.mark.parametrize(
+    ("n", "n_rows", "n_columns"), [(1, 1, 1), (15, 3, 5), (16, 4, 4), (7, 1, 7)]
+)
+def test_flat_grids_are_complete(n, n_rows, n_columns):
+    flat = flat_grid("x", n)
+    assert (flat.name, flat.n_taxels, flat.limits) == ("x", n, (0.0, 65535.0))
+    assert len(np.unique(flat.positions, axis=0)) == n
+    places = flat.positions
+    assert (len(set(places[:, 1])), len(set(places[:, 0]))) == (n_rows, n_columns)
+    assert (flat.rotations == np.eye(3)).all()
+
+
+@pytest.mark.parametrize("model", ["uSPa44", "XR1946", "xr23ahlcpp"])
+def test_known_models(model):
+    assert is_known(model)
 
 
 @pytest.mark.parametrize(

@@ -1,6 +1,5 @@
-"""What XELA's servers call their sensors, and which of ours that is."""
+"""Layouts of XELA's sensors, by the model names that its servers send."""
 
-from functools import cache
 from typing import Any
 
 import numpy as np
@@ -9,8 +8,9 @@ import numpy.typing as npt
 from holdfast.sensors import Hand, Sensor, hand, sensor
 from holdfast.sensors.layouts import UINT16
 
-_HANDS = {"xr23ahlcpp": "allegro-uskin", "xr23ahrcpp": "allegro-uskin"}
-_SENSORS = {
+HANDS = {"xr23ahlcpp": "allegro-uskin", "xr23ahrcpp": "allegro-uskin"}
+"""Built-in hand of each model that is a whole hand; names in lower case."""
+SENSORS = {
     "uscuah": "uskin-curved",
     "uscualha": "uskin-curved",
     "usftah": "uskin-4x4",
@@ -20,20 +20,26 @@ _SENSORS = {
     "uspa46": "uskin-4x6",
     "xr1946": "uskin-4x6",
 }
-_BY_TAXELS = {16: "uskin-4x4", 24: "uskin-4x6", 30: "uskin-curved"}
-_PITCH = 7.25e-3
-"""Of the 4 x 6 patch [m]; nominal for patches of which no drawing is at hand."""
+"""Built-in sensor of each other model; names in lower case."""
+SENSOR_BY_N_TAXELS = {16: "uskin-4x4", 24: "uskin-4x6", 30: "uskin-curved"}
+"""Built-in sensor of a device that sends no model, as old servers do."""
+DEFAULT_PITCH = 4.7e-3
+"""Distance between the taxels of an unknown model [m]; nominal."""
+DEFAULT_RATE = 100.0
+"""Rate of an unknown model [Hz]; nominal."""
 
 
 def module_sensors(model: str, n_taxels: int) -> dict[str, Sensor]:
-    """Sensors of a device by module; of a device that is no hand, one that is called ''.
+    """Return the sensors of a device by module; a single sensor has the name ''.
 
-    A model that nobody knows is taken for the built-in sensor with as many taxels, or for a
-    flat line of taxels: its fingertip force is right where its taxels point the same way.
+    Importers and live sources both use this function, so that a device is the same sensor in
+    both. A device without a model is the built-in XELA sensor with that number of taxels. Any
+    other unknown device is a flat grid (see `flat_grid`) with the name of its model: its
+    fingertip force is right if all of its taxels have the same orientation.
 
     Args:
-        model: as the server calls it, in any case.
-        n_taxels: as it sends.
+        model: name that the server sends, in upper or lower case; may be empty.
+        n_taxels: number of taxels that the device sends.
 
     Raises:
         ValueError: there are no taxels, or the model has another number of them.
@@ -41,6 +47,8 @@ def module_sensors(model: str, n_taxels: int) -> dict[str, Sensor]:
     Example:
         >>> [len(module_sensors("XR23AHRCPP", 368)), module_sensors("uSPa46", 24)[""].name]
         [18, 'uskin-4x6']
+        >>> [module_sensors("", 16)[""].name, module_sensors("uSPa35", 15)[""].name]
+        ['uskin-4x4', 'uspa35']
     """
     if n_taxels < 1:
         raise ValueError(f"{model or 'a sensor'} with {n_taxels} taxels given; at least 1 expected")
@@ -48,35 +56,49 @@ def module_sensors(model: str, n_taxels: int) -> dict[str, Sensor]:
     if known is not None:
         _check(model, n_taxels, known.n_taxels, known.name)
         return {name: module.sensor for name, module in known.modules.items()}
-    if (name := _SENSORS.get(model.lower())) is not None:
+    if (name := SENSORS.get(model.lower())) is not None:
         built_in = sensor(name)
         _check(model, n_taxels, built_in.n_taxels, name)
         return {"": built_in}
-    if n_taxels in _BY_TAXELS:
-        return {"": sensor(_BY_TAXELS[n_taxels])}
-    return {"": _flat(model.lower() or "unknown", n_taxels)}
+    if not model and n_taxels in SENSOR_BY_N_TAXELS:
+        return {"": sensor(SENSOR_BY_N_TAXELS[n_taxels])}
+    return {"": flat_grid(model.lower() or "unknown", n_taxels)}
+
+
+def is_known(model: str) -> bool:
+    """Return whether the model is in the table of hands and sensors."""
+    return model.lower() in HANDS or model.lower() in SENSORS
 
 
 def whole_hand(model: str) -> Hand | None:
-    """The hand that reports in one packet under that model's name, if it is one."""
-    name = _HANDS.get(model.lower())
+    """Return the hand that reports in one packet under this model name, or None."""
+    name = HANDS.get(model.lower())
     return None if name is None else hand(name)
 
 
 def split(model: str, flat: npt.NDArray[Any]) -> dict[str, npt.NDArray[Any]]:
-    """Readings by module of (..., n_taxels, 3) of a device; see `module_sensors`."""
+    """Split (..., n_taxels, 3) readings of a device into modules, as in `module_sensors`."""
     known = whole_hand(model)
     return {"": flat} if known is None else known.split(flat)
+
+
+def flat_grid(name: str, n_taxels: int) -> Sensor:
+    """Return a flat sensor with a complete grid of taxels, as near to a square as possible.
+
+    Example:
+        >>> float(flat_grid("uspa35", 15).positions[:, 1].max())
+        0.0047
+    """
+    n_rows = max(k for k in range(1, int(n_taxels**0.5) + 1) if n_taxels % k == 0)
+    n_columns = n_taxels // n_rows
+    row, column = np.divmod(np.arange(n_taxels), n_columns)
+    x, y = column - (n_columns - 1) / 2, (n_rows - 1) / 2 - row
+    positions = DEFAULT_PITCH * np.column_stack([x, y, np.zeros(n_taxels)])
+    rotations = np.tile(np.eye(3), (n_taxels, 1, 1))
+    normal = np.array([0.0, 0.0, 1.0])
+    return Sensor(name, positions, rotations, normal, DEFAULT_RATE, limits=UINT16)
 
 
 def _check(model: str, n_given: int, n_expected: int, name: str) -> None:
     if n_given != n_expected:
         raise ValueError(f"{n_given} taxels given, {n_expected} expected ({model}: {name})")
-
-
-@cache
-def _flat(name: str, n_taxels: int) -> Sensor:
-    places = np.zeros((n_taxels, 3))
-    places[:, 0] = (np.arange(n_taxels) - (n_taxels - 1) / 2) * _PITCH
-    turns = np.tile(np.eye(3), (n_taxels, 1, 1))
-    return Sensor(name, places, turns, np.array([0.0, 0.0, 1.0]), rate=100.0, limits=UINT16)

@@ -8,7 +8,10 @@ from holdfast.cli import main
 from holdfast.errors import MissingExtra, RecordingError
 from holdfast.io import import_recordings, load_recording, save_recording
 from holdfast.io.files import is_recording
+from holdfast.ros.messages import Message
 from holdfast.sensors import hand
+from holdfast.sources.ros.translator import Translator
+from holdfast.sources.xela.decoder import Decoder
 from holdfast.synthetic import synthetic_recording
 
 pytest.importorskip("rosbags", reason="rosbags is not installed")
@@ -28,6 +31,7 @@ from sources.ros_build import (
     x_server,
     x_stream,
 )
+from sources.xela import build as xela_packets
 
 EPOCH = 1_619_157_045.0
 N = 30
@@ -110,6 +114,23 @@ def test_separate_sensors_with_their_own_times(bag):
     np.testing.assert_array_equal(two.readings, [tip for _, tip in samples])
     np.testing.assert_allclose(one.times - EPOCH, np.arange(N) * 0.01, atol=1e-6)
     np.testing.assert_allclose(two.times - EPOCH, np.arange(N) * 0.01 - 0.002, atol=1e-6)
+
+
+@pytest.mark.parametrize(
+    ("model", "n_taxels"),
+    [("", 16), ("", 15), ("uSPa35", 15), ("uSPr-DSF", 30), ("uSPa44", 16), ("XR23AHLCPP", 368)],
+)
+def test_a_device_is_the_same_sensor_in_a_bag_and_live(tmp_path, model, n_taxels):
+    with Bag(tmp_path / "grasp", "mcap", "xela_server_ros2", XELA) as given:
+        for k in range(4):
+            given.xela(EPOCH + k, (1, model, k, EPOCH + k, counts(n_taxels, k), []))
+    translator = Translator()
+    translator.learn([Message(1, model, EPOCH, None, 0, counts(n_taxels), np.empty((0, 3)))])
+    decoder = Decoder()
+    decoder.learn(xela_packets.text(0, [xela_packets.sensor(counts(n_taxels), model)]))
+    imported = {name: module.sensor for name, module in read(given.path).modules.items()}
+    assert imported == translator.sensors
+    assert imported == decoder.sensors
 
 
 def test_a_whole_hand(bag):

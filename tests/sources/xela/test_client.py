@@ -77,7 +77,10 @@ class TestOpening:
         with server([NEW]) as (port, _), open_source(f"xela://127.0.0.1:{port}") as source:
             first = source.read(PATIENCE)
         assert list(first.samples) == ["finger1"]
-        assert first.notices[0].startswith("finger1: where the 1 taxels of a uSPa11 sit")
+        text = "finger1: the layout of a uSPa11 with 1 taxels is not known"
+        assert first.notices[0].startswith(text)
+            "finger1: the layout of a uSPa11 with 1 taxels is not known"
+        )
         assert source.metadata["server_version"] == "1.8.0b_200801"
 
     def test_it_can_be_opened_again(self):

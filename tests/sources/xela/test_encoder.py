@@ -8,9 +8,9 @@ from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 
 from holdfast.sensors import Sensor, hand, sensor
+from holdfast.sensors.xela_models import flat_grid
 from holdfast.sources.xela.decoder import Decoder
 from holdfast.sources.xela.encoder import RESOLUTION, REST, Encoder, is_part_of_hand
-from holdfast.sources.xela.models import unknown
 
 from .build import START, counts
 
@@ -75,7 +75,7 @@ def test_fields_of_1_7():
 
 @pytest.mark.parametrize(
     ("model", "sensors"),
-    [("XR23AHRCPP", WHOLE), ("uSPa35", {"finger1": unknown("uSPa35", 15)})],
+    [("XR23AHRCPP", WHOLE), ("uSPa35", {"finger1": flat_grid("uSPa35", 15)})],
 )
 def test_fields_of_1_8_are_those_of_a_real_server(model, sensors, real_packets):
     real = json.loads(real_packets[model])

@@ -3,7 +3,8 @@ import pytest
 
 from holdfast.errors import SourceError
 from holdfast.sensors import hand, sensor
-from holdfast.sources.xela.models import skins, unknown
+from holdfast.sensors.xela_models import flat_grid
+from holdfast.sources.xela.models import skins
 
 TIP = ("uSCuAH", 30)
 
@@ -56,8 +57,8 @@ def test_a_model_without_a_layout_is_flat_and_told(model):
     (flat,) = skin.modules.values()
     assert (flat.name, flat.n_taxels, flat.limits) == (model.lower(), 15, (0.0, 65535.0))
     assert skin.notices == (
-        f"finger1: where the 15 taxels of a {model} sit is not known; taken as flat "
-        "(sensor=FILE.json in the URI tells it)",
+        f"finger1: the layout of a {model} with 15 taxels is not known; a flat grid is assumed "
+        "(sensor=FILE.json in the URI gives another)",
     )
 
 
@@ -72,22 +73,24 @@ def test_without_a_model():
     assert "a sensor without a model" in skin.notices[0]
 
 
-@pytest.mark.parametrize(("n", "rows", "columns"), [(1, 1, 1), (15, 3, 5), (16, 4, 4), (7, 1, 7)])
-def test_flat_sensors_are_grids(n, rows, columns):
-    places = unknown("x", n).positions
-    assert len(np.unique(places, axis=0)) == n
-    assert (len(set(places[:, 1])), len(set(places[:, 0]))) == (rows, columns)
-    assert (unknown("x", n).rotations == np.eye(3)).all()
+@pytest.mark.parametrize("name", ["uskin-4x4", "uskin-4x6", "uskin-curved"])
+def test_without_a_model_but_with_the_taxels_of_a_built_in_sensor(name):
+    skin = skins({1: ("", sensor(name).n_taxels)}, {})[1]
+    assert skin.modules == {"finger1": sensor(name)}
+    assert skin.notices == (
+        f"finger1: the layout of a sensor without a model with {sensor(name).n_taxels} taxels is "
+        f"not known; {name} is assumed (sensor=FILE.json in the URI gives another)",
+    )
 
 
 def test_a_given_sensor_is_taken_where_it_fits():
-    given = unknown("mine", 15)
+    given = flat_grid("mine", 15)
     found = {1: TIP, 2: ("uSPa35", 15)}
     made = skins(found, {}, given)
     assert made[1].modules == {"finger1": sensor("uskin-curved")}
     assert made[2].modules == {"finger2": given}
     assert made[2].notices == ()
-    other = unknown("mine", 24)  # another layout of a known model
+    other = flat_grid("mine", 24)  # another layout of a known model
     assert skins({1: ("uSCuAH", 24)}, {}, other)[1].modules == {"finger1": other}
 
 
@@ -135,7 +138,7 @@ def test_two_hands_have_names_of_their_own():
         (
             {1: TIP},
             {},
-            unknown("mine", 15),
+            flat_grid("mine", 15),
             "sensor= has 15 taxels and fits none that the server has: 1 (30 taxels)",
         ),
         (

@@ -9,13 +9,7 @@ import numpy.typing as npt
 
 from holdfast.errors import SourceError
 from holdfast.sensors import Hand, Sensor
-from holdfast.sensors.layouts import UINT16
-from holdfast.sensors.xela_models import module_sensors, whole_hand
-
-PITCH = 4.7e-3
-"""Between the taxels of a sensor that is not known; it stands for none in particular [m]."""
-RATE = 100.0
-"""Of a sensor that is not known [Hz]; times tell the true one."""
+from holdfast.sensors.xela_models import is_known, module_sensors, whole_hand
 
 
 @dataclass(frozen=True, eq=False)
@@ -86,22 +80,6 @@ def skins(
     return made
 
 
-def unknown(name: str, n_taxels: int) -> Sensor:
-    """A flat sensor of so many taxels, as near to a square as rows of one length allow.
-
-    Example:
-        >>> float(unknown("uspa35", 15).positions[:, 1].max())
-        0.0047
-    """
-    n_rows = max(k for k in range(1, int(n_taxels**0.5) + 1) if n_taxels % k == 0)
-    n_columns = n_taxels // n_rows
-    row, column = np.divmod(np.arange(n_taxels), n_columns)
-    x, y = column - (n_columns - 1) / 2, (n_rows - 1) / 2 - row
-    positions = PITCH * np.column_stack([x, y, np.zeros(n_taxels)])
-    turns = np.tile(np.eye(3), (n_taxels, 1, 1))
-    return Sensor(name, positions, turns, np.array([0.0, 0.0, 1.0]), RATE, limits=UINT16)
-
-
 def _hand(number: int, model: str, n_taxels: int, whole: Hand, prefix: str) -> Skin:
     modules = _built_in(number, model, n_taxels)
     order = np.concatenate([whole.modules[name].flat_indices for name in modules])
@@ -111,24 +89,15 @@ def _hand(number: int, model: str, n_taxels: int, whole: Hand, prefix: str) -> S
 def _separate(number: int, name: str, model: str, n_taxels: int, given: Sensor | None) -> Skin:
     if given is not None and given.n_taxels == n_taxels:
         return Skin(number, model, {name: given})
-    if _is_known(model):
-        (known,) = _built_in(number, model, n_taxels).values()
-        return Skin(number, model, {name: known})
+    (found,) = _built_in(number, model, n_taxels).values()
+    if is_known(model):
+        return Skin(number, model, {name: found})
+    layout = "a flat grid" if found.name == (model.lower() or "unknown") else found.name
     notice = (
-        f"{name}: where the {n_taxels} taxels of a {model or 'sensor without a model'} sit is not "
-        "known; taken as flat (sensor=FILE.json in the URI tells it)"
+        f"{name}: the layout of a {model or 'sensor without a model'} with {n_taxels} taxels is "
+        f"not known; {layout} is assumed (sensor=FILE.json in the URI gives another)"
     )
-    flat = unknown(model.lower() or "unknown", n_taxels)
-    return Skin(number, model, {name: flat}, notices=(notice,))
-
-
-def _is_known(model: str) -> bool:
-    """Whether the model has a layout: then it refuses a number of taxels that no layout has."""
-    try:
-        module_sensors(model, 1)
-    except ValueError:
-        return True
-    return False
+    return Skin(number, model, {name: found}, notices=(notice,))
 
 
 def _built_in(number: int, model: str, n_taxels: int) -> dict[str, Sensor]:
