@@ -79,8 +79,6 @@ class TestOpening:
         assert list(first.samples) == ["finger1"]
         text = "finger1: the layout of a uSPa11 with 1 taxels is not known"
         assert first.notices[0].startswith(text)
-            "finger1: the layout of a uSPa11 with 1 taxels is not known"
-        )
         assert source.metadata["server_version"] == "1.8.0b_200801"
 
     def test_it_can_be_opened_again(self):
