@@ -16,6 +16,7 @@ from holdfast.contact import (
     Fault,
     HandEstimate,
     Reason,
+    StateChanges,
     faults_of,
     hand_state,
     taxels_of,
@@ -154,3 +155,27 @@ class TestWithFaults:
         one = hand({"thumb": ContactState.STABLE}, tuple(before))
         found = with_faults(one, {"thumb": tuple(more)}, 1).fingers["thumb"].faults
         assert list(found) == [fault for fault in Fault if fault in before or fault in more]
+
+
+@given(
+    st.lists(st.lists(st.sampled_from(list(ContactState)), min_size=2, max_size=2), max_size=20),
+    st.integers(0, 20),
+)
+def test_changes_of_state_are_the_same_by_sample_and_in_chunks(states, cut):
+    times = 0.1 * np.arange(len(states))
+    codes = np.array([[one.code for one in row] for row in states], dtype=np.int8).reshape(-1, 2)
+    by_sample = StateChanges(("a", "hand"))
+    expected = [
+        event
+        for time, row in zip(times.tolist(), states, strict=True)
+        for event in by_sample.update(row, time)
+    ]
+    in_chunks = StateChanges(("a", "hand"))
+    found = in_chunks.update_chunk(times[:cut], codes[:cut])
+    found += in_chunks.update_chunk(times[cut:], codes[cut:])
+    assert found == expected
+    previous = {"a": ContactState.UNKNOWN, "hand": ContactState.UNKNOWN}
+    for event in expected:
+        assert event.previous is previous[event.finger]
+        assert event.state is not event.previous
+        previous[event.finger] = event.state

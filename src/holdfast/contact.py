@@ -5,7 +5,7 @@ codes, and an instant without a label is UNKNOWN, so that labels and decisions c
 """
 
 import math
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from enum import StrEnum
 from functools import cache, lru_cache
 from typing import Any, NamedTuple
@@ -137,13 +137,79 @@ class ContactEvent(NamedTuple):
         finger: whose contact it is; "hand" for the hand as a whole.
         state: the state that begins.
         previous: the state that ends.
-        time: of the sample at which it was told [s].
+        time: of the sample at which the new state was reported [s].
     """
 
     finger: str
     state: ContactState
     previous: ContactState
     time: float
+
+
+class StateChanges:
+    """Find the changes of several contact states, sample by sample or in chunks.
+
+    All states begin as UNKNOWN.
+
+    Args:
+        names: of the fingers, in the order of the states.
+
+    Example:
+        >>> changes = StateChanges(["thumb"])
+        >>> changes.update([ContactState.UNKNOWN], time=0.0)
+        []
+        >>> (event,) = changes.update([ContactState.STABLE], time=0.1)
+        >>> event.finger, event.state.value, event.previous.value, event.time
+        ('thumb', 'STABLE', 'UNKNOWN', 0.1)
+        >>> len(changes.update_chunk(np.array([0.2, 0.3]), np.array([[STABLE], [UNSTABLE]])))
+        1
+    """
+
+    def __init__(self, names: Sequence[str]) -> None:
+        self._names = tuple(names)
+        self._states = [ContactState.UNKNOWN] * len(self._names)
+
+    def update(self, states: list[ContactState], time: float) -> list[ContactEvent]:
+        """Return the changes from the previous states to `states` at one sample.
+
+        Args:
+            states: one for each name.
+            time: of the sample [s].
+        """
+        previous = self._states
+        if states == previous:
+            return []
+        self._states = states
+        return [
+            ContactEvent(name, new, old, time)
+            for name, new, old in zip(self._names, states, previous, strict=True)
+            if new is not old
+        ]
+
+    def update_chunk(
+        self, times: npt.NDArray[np.float64], codes: npt.NDArray[np.integer[Any]]
+    ) -> list[ContactEvent]:
+        """Return all changes within consecutive samples, oldest first.
+
+        Args:
+            times: (n,) of the samples [s].
+            codes: (n, n_names) codes of the states.
+        """
+        if not len(times):
+            return []
+        codes = np.vstack([[state.code for state in self._states], codes])
+        rows, columns = np.nonzero(codes[1:] != codes[:-1])
+        self._states = [_STATES[code] for code in codes[-1]]
+        return [
+            ContactEvent(self._names[column], _STATES[new], _STATES[old], time)
+            for column, new, old, time in zip(
+                columns.tolist(),
+                codes[rows + 1, columns].tolist(),
+                codes[rows, columns].tolist(),
+                times[rows].tolist(),
+                strict=True,
+            )
+        ]
 
 
 def hand_state(codes: npt.NDArray[np.integer[Any]], n_model_fingers: int) -> int:

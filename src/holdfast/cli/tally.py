@@ -1,6 +1,5 @@
 """Shares of states, reasons and faults, and the events, over a stream of detections."""
 
-from collections.abc import Iterator
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
@@ -8,7 +7,7 @@ import numpy as np
 import numpy.typing as npt
 
 from holdfast.cli.console import print_table, show
-from holdfast.contact import UNKNOWN, ContactEvent, ContactState, Fault, Reason
+from holdfast.contact import ContactEvent, ContactState, Fault, Reason, StateChanges
 from holdfast.detector import HAND
 
 if TYPE_CHECKING:
@@ -29,7 +28,8 @@ class Tally:
     def __init__(self) -> None:
         self._name = ""
         self._counts: dict[str, _Counts] = {}
-        self._changes: dict[str, _Changes] = {}
+        self._changes: dict[str, StateChanges] = {}
+        self._found: dict[str, list[ContactEvent]] = {}
 
     def add(self, detection: "Detection") -> None:
         """Takes the next piece."""
@@ -76,14 +76,11 @@ class Tally:
             counts.faults += (faults[:, None] >> np.arange(len(FAULTS)) & 1).sum(axis=0)
 
     def _change(self, name: str, times: "Array", states: _Codes) -> None:
-        self._changes.setdefault(name, _Changes()).add(times, states)
+        changes = self._changes.setdefault(name, StateChanges((name,)))
+        self._found.setdefault(name, []).extend(changes.update_chunk(times, states[:, None]))
 
     def _events(self) -> list[ContactEvent]:
-        events = [
-            ContactEvent(name, STATES[state], STATES[previous], time)
-            for name, changes in self._changes.items()
-            for time, state, previous in changes
-        ]
+        events = [event for found in self._found.values() for event in found]
         return sorted(events, key=lambda event: event.time)
 
 
@@ -112,27 +109,6 @@ class _Counts:
         n = int(self.states.sum())
         shares = (f"{100 * k / n:.1f}" for k in self.states.tolist())
         return n, *shares, _text(REASONS[1:], self.reasons[1:]), _text(FAULTS, self.faults)
-
-
-class _Changes:
-    """The changes of one state over a stream."""
-
-    def __init__(self) -> None:
-        self._told = UNKNOWN
-        self._pieces: list[tuple[Array, _Codes, _Codes]] = []
-
-    def add(self, times: "Array", states: _Codes) -> None:
-        if not len(states):
-            return
-        before = np.concatenate([np.array([self._told], dtype=np.int8), states[:-1]])
-        changed = states != before
-        if changed.any():
-            self._pieces.append((times[changed], states[changed], before[changed]))
-        self._told = int(states[-1])
-
-    def __iter__(self) -> Iterator[tuple[float, int, int]]:
-        for times, states, before in self._pieces:
-            yield from zip(times.tolist(), states.tolist(), before.tolist(), strict=True)
 
 
 def _some(names: "tuple[Reason, ...] | tuple[Fault, ...]", counts: _Numbers) -> dict[str, int]:

@@ -17,8 +17,8 @@ from numpy import ndarray
 from holdfast.contact import (
     ContactEstimate,
     ContactEvent,
-    ContactState,
     HandEstimate,
+    StateChanges,
     taxels_of,
 )
 from holdfast.detector.rule import N_REPORT, Live, Traces, new_decision, rule_of, run, step_live
@@ -153,7 +153,7 @@ class Detector:
             self._readings, self._present, self._report,
         )  # fmt: skip
         self._table, self._arrays = live.table()
-        self._told = [ContactState.UNKNOWN] * (n_fingers + 1)
+        self._changes = StateChanges(self._names)
         self._last = -inf
         self._events: list[ContactEvent] = []
 
@@ -201,7 +201,9 @@ class Detector:
                 self._layout, self._memory, self._output, self._rule, self._decision,
                 readings, present, times, traces,
             )  # fmt: skip
-            self._follow(times, traces)
+            codes = np.column_stack([traces.state, traces.hand])
+            self._keep_events(self._changes.update_chunk(times, codes))
+            self._last = float(times[-1])
             pieces.append((times, present, traces))
         return detection_of(recording.name, self._plan.fingers, pieces)
 
@@ -230,17 +232,6 @@ class Detector:
                 f"({self._plan.sensors[finger].name})"
             )
 
-    def _follow(self, times: Array, traces: Traces) -> None:
-        """Notes what `update` would have noted at those samples."""
-        before = [state.code for state in self._told]
-        codes = np.vstack([before, np.column_stack([traces.state, traces.hand])])
-        rows, places = np.nonzero(codes[1:] != codes[:-1])
-        for k, place in zip(rows[-MAX_EVENTS:], places[-MAX_EVENTS:], strict=True):
-            self._told[place] = STATES[codes[k, place]]
-            self._note(int(place), STATES[codes[k + 1, place]], float(times[k]))
-        self._told = [STATES[code] for code in codes[-1]]
-        self._last = float(times[-1])
-
     def _place(self, samples: Mapping[str, npt.ArrayLike]) -> None:
         slots, flags = self._slots, self._flags
         if len(samples) != len(slots):
@@ -256,25 +247,23 @@ class Detector:
             flags[place] = 1
 
     def _tell(self, time: float, hand_code: int) -> HandEstimate:
-        fingers = {}
-        told = self._told
+        fingers, states = {}, []
         for place, row in enumerate(self._report.tolist()):
             seen, code, probability, sigma, x, y, z = row
             state, reason, faults = VERDICTS[code]
             taxels = taxels_of(int(self._output.status[place, TAXELS])) if faults else ()
-            if state is not told[place]:
-                self._note(place, state, time)
+            states.append(state)
             fingers[self._names[place]] = ContactEstimate(
                 seen, state, reason, probability, sigma, (x, y, z), faults, taxels
             )
         hand = STATES[hand_code]
-        if hand is not told[-1]:
-            self._note(len(told) - 1, hand, time)
+        states.append(hand)
+        if events := self._changes.update(states, time):
+            self._keep_events(events)
         return HandEstimate(time, hand, fingers)
 
-    def _note(self, place: int, state: ContactState, time: float) -> None:
-        self._events.append(ContactEvent(self._names[place], state, self._told[place], time))
-        self._told[place] = state
+    def _keep_events(self, events: list[ContactEvent]) -> None:
+        self._events += events
         del self._events[:-MAX_EVENTS]
 
 

@@ -11,7 +11,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from holdfast.contact import ContactEvent, ContactState
+from holdfast.contact import ContactEvent, StateChanges
 from holdfast.detector import HAND
 from holdfast.errors import SourceError
 from holdfast.live.judge import Decision, Judge
@@ -82,7 +82,7 @@ class Session:
         self._requests: deque[Future[None]] = deque()
         self._stopping = Event()
         self._thread = Thread(target=self._run, name="holdfast-detector", daemon=True)
-        self._states: dict[str, ContactState] = {}
+        self._changes = StateChanges((*judge.fingers, HAND))
         self._latencies = np.full(N_LATENCIES, np.nan)
         self._n_judged = 0
 
@@ -176,20 +176,12 @@ class Session:
             request.set_exception(failure)
 
     def _say(self, arrival: Arrival | None, decisions: list[Decision]) -> None:
-        events = [event for decision in decisions for event in self._changes(decision)]
+        events = [event for decision in decisions for event in self._events(decision)]
         said = Said(arrival, decisions, events)
         for listener in self._listeners:
             listener(said)
 
-    def _changes(self, decision: Decision) -> list[ContactEvent]:
-        """Which states are others than before."""
+    def _events(self, decision: Decision) -> list[ContactEvent]:
         estimate = decision.estimate
-        states = {name: finger.state for name, finger in estimate.fingers.items()}
-        states[HAND] = estimate.state
-        changes = [
-            ContactEvent(name, state, self._states.get(name, ContactState.UNKNOWN), estimate.time)
-            for name, state in states.items()
-            if state is not self._states.get(name, ContactState.UNKNOWN)
-        ]
-        self._states = states
-        return changes
+        states = [finger.state for finger in estimate.fingers.values()]
+        return self._changes.update([*states, estimate.state], estimate.time)
