@@ -22,12 +22,12 @@ from typing import NamedTuple
 
 import numpy as np
 
-from holdfast.contact import Cause, ContactState, Phase
+from holdfast.contact import HELD_PHASES, Cause, ContactState, Phase
 from holdfast.io import load_dataset
 from holdfast.metrics import Metrics
 from holdfast.recordings import Label, Recording, Truth, labels_from_samples
 from holdfast.training import Setting, train
-from holdfast.twin.labels import HELD, LabelRule, labels_from_truth
+from holdfast.twin.labels import LabelRule, labels_from_truth
 from holdfast.twin.objects import OTHER_OBJECTS, load_things, thing
 from holdfast.twin.simulation import Grasp, simulate
 
@@ -208,7 +208,7 @@ def by_rule(rule: LabelRule) -> Callable[[Truth, str], tuple[Label, ...]]:
 
 def only_slip(known: Truth, finger: str) -> tuple[Label, ...]:
     phase = known.hand["phase"]
-    held = np.isin(phase, HELD)
+    held = np.isin(phase, HELD_PHASES)
     nobody = np.zeros_like(known.hand["outside_force"])
     hand = {"phase": np.where(held, Phase.LOCKED.value, phase), "outside_force": nobody}
     return labels_from_truth(Truth(known.times, hand, known.fingers), finger)
@@ -217,7 +217,7 @@ def only_slip(known: Truth, finger: str) -> tuple[Label, ...]:
 def sample_wise(known: Truth, finger: str) -> tuple[Label, ...]:
     arrays = known.fingers[finger]
     phase = known.hand["phase"]
-    held = np.isin(phase, HELD)
+    held = np.isin(phase, HELD_PHASES)
     touching = np.linalg.norm(arrays["contact_force"], axis=1) > LabelRule().contact
     troubled = np.linalg.norm(known.hand["outside_force"], axis=1) > LabelRule().contact
     troubled |= arrays["slip_speed"] > LabelRule().sliding

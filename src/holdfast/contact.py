@@ -90,6 +90,24 @@ class Phase(StrEnum):
     RELEASED = "released"
 
 
+HELD_PHASES = (Phase.LOCKED, Phase.DISTURBED, Phase.SLIPPING)
+"""Phases in which the hand holds the object."""
+
+LABEL_STATES = (ContactState.STABLE, ContactState.UNSTABLE, ContactState.NO_CONTACT)
+"""States that a label can have."""
+
+CONTACT_FORCE = 0.05
+"""Force on the object from which a finger counts as touching it [N]."""
+SLIP_SPEED = 0.001
+"""Sliding speed from which a held contact counts as slipping [m/s]."""
+MERGE_GAP = 0.35
+"""Two unstable intervals with a shorter gap between them are labelled as one [s]."""
+UNSTABLE_MARGIN = 0.1
+"""Time by which an unstable interval is extended at both ends [s]."""
+MIN_CONTACT_DURATION = 0.1
+"""A contact, or a loss of contact, that is shorter is not labelled [s]."""
+
+
 class ContactEstimate(msgspec.Struct, frozen=True, gc=False):
     """What a detector says of one finger at one sample.
 

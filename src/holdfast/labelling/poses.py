@@ -10,8 +10,7 @@ import numpy.typing as npt
 
 from holdfast.errors import RecordingError
 from holdfast.io.importers.table import read_table
-from holdfast.labelling.masks import Mask
-from holdfast.metrics.masks import runs
+from holdfast.metrics.masks import Mask, runs
 from holdfast.recordings import Recording, Truth
 from holdfast.sensors.values import Array
 

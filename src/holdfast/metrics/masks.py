@@ -1,6 +1,6 @@
-"""Masks over time: their runs, and what is joined, widened or kept of them.
+"""Masks over time: their runs, and operations that join, widen, drop or select runs.
 
-A place is a time [s] or the number of a sample: whatever a gap and a margin are measured in.
+A position is the time [s] or the number of a sample. Gaps and margins have the same unit.
 """
 
 from itertools import pairwise
@@ -9,50 +9,103 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
+from holdfast.sensors.values import Array
+
 Mask = npt.NDArray[np.bool_]
-Places = npt.NDArray[np.integer[Any] | np.floating[Any]]
+Positions = npt.NDArray[np.integer[Any] | np.floating[Any]]
 
 
 def runs(mask: Mask) -> npt.NDArray[np.int64]:
-    """(n_runs, 2) first sample of each run of True, and the first after it."""
+    """Return the runs of True in a mask.
+
+    Returns:
+        (n_runs, 2) number of the first sample of each run, and of the first sample after it.
+
+    Example:
+        >>> runs(np.array([True, True, False, True])).tolist()
+        [[0, 2], [3, 4]]
+    """
     edges = np.flatnonzero(np.diff(np.concatenate([[False], mask, [False]]).astype(np.int8)))
     return edges.reshape(-1, 2)
 
 
-def joined(mask: Mask, places: Places, gap: float) -> Mask:
-    """The mask with its runs joined that are less than `gap` apart.
+def join_runs(mask: Mask, positions: Positions, gap: float) -> Mask:
+    """Fill the gaps between runs that are less than `gap` apart.
 
     Args:
         mask: (n,) of samples.
-        places: (n,) of the samples, in order.
-        gap: from the last sample of a run to the first of the next, in the unit of the places.
+        positions: (n,) of the samples, increasing.
+        gap: from the last sample of a run to the first of the next, in the unit of `positions`.
     """
     filled = mask.copy()
     for (_, end), (start, _) in pairwise(runs(mask)):
-        if places[start] - places[end - 1] < gap:
+        if positions[start] - positions[end - 1] < gap:
             filled[end:start] = True
     return filled
 
 
-def widened(mask: Mask, places: Places, margin: float) -> Mask:
-    """The mask with every run longer by `margin` at both ends.
+def fill_short_gaps(mask: Mask, n_samples: int) -> Mask:
+    """Fill the gaps between runs that have fewer than `n_samples` samples."""
+    return join_runs(mask, np.arange(len(mask)), n_samples + 1)
+
+
+def drop_short_runs(mask: Mask, n_samples: int) -> Mask:
+    """Remove the runs that have fewer than `n_samples` samples."""
+    kept = mask.copy()
+    for start, end in runs(mask):
+        kept[start:end] = end - start >= n_samples
+    return kept
+
+
+def widen_runs(mask: Mask, positions: Positions, margin: float) -> Mask:
+    """Extend every run by `margin` at both ends.
 
     Args:
         mask: (n,) of samples.
-        places: (n,) of the samples, in order.
-        margin: in the unit of the places.
+        positions: (n,) of the samples, increasing.
+        margin: in the unit of `positions`.
     """
     wide = mask.copy()
     for start, end in runs(mask):
-        first = np.searchsorted(places, places[start] - margin)
-        last = np.searchsorted(places, places[end - 1] + margin, side="right")
+        first = np.searchsorted(positions, positions[start] - margin)
+        last = np.searchsorted(positions, positions[end - 1] + margin, side="right")
         wide[first:last] = True
     return wide
 
 
-def runs_with(mask: Mask, wanted: Mask) -> Mask:
-    """The runs of the mask in which something wanted happens."""
+def runs_with(mask: Mask, selected: Mask) -> Mask:
+    """Keep the runs of a mask that contain at least one selected sample."""
     found = np.zeros_like(mask)
     for start, end in runs(mask):
-        found[start:end] = wanted[start:end].any()
+        found[start:end] = selected[start:end].any()
     return found
+
+
+def hysteresis(values: Array, low: float, high: float) -> Mask:
+    """Return the runs of values above `low` that somewhere exceed `high`; NaN exceeds neither."""
+    return runs_with(values > low, values > high)
+
+
+def covered(grid: Array, times: Array, max_gap: float) -> Mask:
+    """Return where neighbouring times around a grid point are at most `max_gap` apart.
+
+    Args:
+        grid: (n,) [s].
+        times: (m,) of known values, increasing [s].
+        max_gap: longest gap that is bridged; half of it before the first and after the last [s].
+
+    Returns:
+        (n,) True where the grid point is covered.
+    """
+    if not len(times):
+        return np.zeros(len(grid), dtype=bool)
+    after = np.searchsorted(times, grid)
+    later = times[np.minimum(after, len(times) - 1)]
+    earlier = times[np.maximum(after - 1, 0)]
+    inside = (grid >= times[0] - max_gap / 2) & (grid <= times[-1] + max_gap / 2)
+    return np.asarray(inside & (later - earlier <= max_gap * (1 + 1e-9)))
+
+
+def n_samples_of(duration: float, period: float) -> int:
+    """Return how many samples of a period [s] a duration [s] lasts, at least one."""
+    return max(round(duration / period), 1)

@@ -9,13 +9,20 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 
-from holdfast.contact import Cause, ContactState, Phase
-from holdfast.metrics.masks import Mask, joined, runs, runs_with, widened
+from holdfast.contact import (
+    CONTACT_FORCE,
+    HELD_PHASES,
+    MERGE_GAP,
+    MIN_CONTACT_DURATION,
+    SLIP_SPEED,
+    UNSTABLE_MARGIN,
+    Cause,
+    ContactState,
+    Phase,
+)
+from holdfast.metrics.masks import Mask, join_runs, runs, runs_with, widen_runs
 from holdfast.recordings import Label, Truth, labels_from_samples
 from holdfast.sensors.values import Array
-
-HELD = (Phase.LOCKED, Phase.DISTURBED, Phase.SLIPPING)
-"""Phases in which the hand holds the object."""
 
 
 @dataclass(frozen=True)
@@ -31,11 +38,11 @@ class LabelRule:
         blip: contact or its loss for a shorter time is not told [s].
     """
 
-    contact: float = 0.05
-    sliding: float = 0.001
-    merge: float = 0.35
-    margin: float = 0.1
-    blip: float = 0.1
+    contact: float = CONTACT_FORCE
+    sliding: float = SLIP_SPEED
+    merge: float = MERGE_GAP
+    margin: float = UNSTABLE_MARGIN
+    blip: float = MIN_CONTACT_DURATION
 
 
 def labels_from_truth(
@@ -61,11 +68,11 @@ def labels_from_truth(
     touching = _steady(
         np.linalg.norm(arrays["contact_force"], axis=1) > rule.contact, times, rule.blip
     )
-    held = np.isin(phase, HELD)
+    held = np.isin(phase, HELD_PHASES)
     sliding = held & (arrays["slip_speed"] > rule.sliding)
     acted = held & (np.linalg.norm(truth.hand["outside_force"], axis=1) > rule.contact)
     troubled = np.isin(phase, (Phase.DISTURBED, Phase.SLIPPING)) | sliding | acted
-    troubled = held & widened(joined(troubled, times, rule.merge), times, rule.margin)
+    troubled = held & widen_runs(join_runs(troubled, times, rule.merge), times, rule.margin)
     troubled = held & _bridged(phase == Phase.CLOSING, troubled, times, rule.merge)
     lost = _since(held) & ~_since(phase == Phase.RELEASED) & (phase == Phase.FREE)
     slipped = runs_with(troubled, sliding)
@@ -131,7 +138,7 @@ def _bridged(before: Mask, mask: Mask, times: Array, gap: float) -> Mask:
 
 def _steady(mask: Mask, times: Array, blip: float) -> Mask:
     """The mask without rests and then without runs that are shorter than `blip`."""
-    return ~joined(~joined(mask, times, blip), times, blip)
+    return ~join_runs(~join_runs(mask, times, blip), times, blip)
 
 
 def _since(mask: Mask) -> Mask:

@@ -4,7 +4,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from holdfast.labelling.masks import Mask
+from holdfast.metrics.masks import Mask
 from holdfast.sensors.values import Array
 
 FARTHEST = 0.5

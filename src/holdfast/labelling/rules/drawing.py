@@ -8,7 +8,7 @@ import numpy as np
 import numpy.typing as npt
 
 from holdfast.contact import UNKNOWN, Cause, ContactState
-from holdfast.labelling.masks import Mask
+from holdfast.metrics.masks import Mask
 from holdfast.recordings import Label
 from holdfast.sensors.values import Array
 

@@ -5,21 +5,14 @@ from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
-from scipy.ndimage import maximum_filter1d, minimum_filter1d
+from scipy.ndimage import maximum_filter1d, minimum_filter1d, uniform_filter1d
 
+from holdfast.contact import MERGE_GAP, MIN_CONTACT_DURATION
 from holdfast.errors import RecordingError
 from holdfast.features import Tare, fingertip_force
 from holdfast.features.force import baseline_of
 from holdfast.features.tare import TareArgument
-from holdfast.labelling.masks import (
-    BLIP,
-    MERGE,
-    Mask,
-    known_between,
-    n_samples,
-    smoothed,
-    steady,
-)
+from holdfast.metrics.masks import Mask, covered, drop_short_runs, fill_short_gaps, n_samples_of
 from holdfast.recordings import GAP_PERIODS, Recording, Tactile
 from holdfast.sensors.values import Array
 from holdfast.training.design import contact_threshold, rest_moments
@@ -70,22 +63,23 @@ class FingerForce:
         if self.threshold is None:
             return self.known
         touching = self.known & (self.amplitude > max(self.threshold, SEEN * self._grip))
-        return steady(touching & ~self._creep(), self._n(BLIP))
+        n = self._n(MIN_CONTACT_DURATION)
+        return drop_short_runs(fill_short_gaps(touching & ~self._creep(), n), n)
 
     @cached_property
     def _grip(self) -> float:
         """The largest F_a that lasts, in the whole recording: a knock does not."""
-        lasting = minimum_filter1d(np.where(self.known, self.amplitude, 0.0), self._n(MERGE))
+        lasting = minimum_filter1d(np.where(self.known, self.amplitude, 0.0), self._n(MERGE_GAP))
         return float(lasting.max())
 
     def _n(self, duration: float) -> int:
-        return n_samples(duration, self.period)
+        return n_samples_of(duration, self.period)
 
     def _creep(self) -> Mask:
         """Where a finger that was loaded only gives back what its skin kept."""
         loaded = np.logical_or.accumulate(self.known & (self.amplitude > self._grip / 2))
         rate = np.abs(np.gradient(self.amplitude, self.period))
-        slow = smoothed(rate, self._n(BLIP)) < CREEP_RATE * self._grip
+        slow = _moving_mean(rate, self._n(MIN_CONTACT_DURATION)) < CREEP_RATE * self._grip
         return np.asarray(loaded & slow & (self.amplitude < CREEP_LEVEL * self._grip))
 
     def change(self, window: float) -> Array:
@@ -157,11 +151,11 @@ def _finger(module: Tactile, tare: Tare, grid: Array, period: float) -> FingerFo
     finite = np.isfinite(force).all(axis=1)
     times = module.times[finite]
     columns = [np.interp(grid, times, column) for column in force[finite].T]
-    smooth = smoothed(np.stack(columns, axis=1), n_samples(SMOOTHING, period))
+    smooth = _moving_mean(np.stack(columns, axis=1), n_samples_of(SMOOTHING, period))
     resting = (grid >= times[0]) & (grid < times[0] + tare.seconds)
     return FingerForce(
         force=smooth,
-        known=known_between(grid, times, GAP_PERIODS * module.period),
+        known=covered(grid, times, GAP_PERIODS * module.period),
         threshold=_threshold(module, tare),
         noise=float(np.sqrt(smooth[resting].var(axis=0).mean())) if resting.any() else 0.0,
         normal=module.sensor.normal,
@@ -202,7 +196,7 @@ def pressed_at(module: Tactile, tare: TareArgument | Tare, hand: HandForce) -> A
     )  # fmt: skip
     pressing = np.nan_to_num(np.maximum(module.readings[:, :, 2] - baseline[:, 2], 0.0))
     load = np.column_stack([pressing @ module.sensor.positions, pressing.sum(axis=1)])
-    smooth = smoothed(load, n_samples(SMOOTHING, module.period))
+    smooth = _moving_mean(load, n_samples_of(SMOOTHING, module.period))
     mean = load[:, :3].sum(axis=0) / max(load[:, 3].sum(), np.finfo(float).tiny)
     light = smooth[:, 3] < SEEN * smooth[:, 3].max()
     place = np.where(light[:, None], mean, smooth[:, :3] / np.maximum(smooth[:, 3:], 1e-300))
@@ -227,7 +221,7 @@ def lost_at(hand: HandForce, jump: float = 0.2, times_over: float = 5.0) -> int 
         times_over: how often the spread of the force before.
     """
     pressing = np.sum([each.force @ each.normal for each in hand.fingers.values()], axis=0)
-    n = n_samples(jump, hand.period)
+    n = n_samples_of(jump, hand.period)
     if len(pressing) <= 2 * n:
         return None
     fall = pressing[:-n] - pressing[n:]
@@ -237,3 +231,8 @@ def lost_at(hand: HandForce, jump: float = 0.2, times_over: float = 5.0) -> int 
     stays = pressing[start + n :].max() < pressing[start] - fall[start] / 2
     middle = start + int(np.argmax(pressing[start:] < pressing[start] - fall[start] / 2))
     return middle if stays else None
+
+
+def _moving_mean(values: Array, n: int) -> Array:
+    """Return the mean over n samples around each one, along the first axis."""
+    return np.asarray(uniform_filter1d(values, n, axis=0, mode="nearest"))

@@ -6,8 +6,8 @@ import numpy as np
 from scipy.ndimage import convolve1d
 from scipy.spatial.transform import Rotation
 
-from holdfast.labelling.masks import Mask, known_between, n_samples
 from holdfast.labelling.poses import Track
+from holdfast.metrics.masks import Mask, covered, n_samples_of
 from holdfast.sensors.values import Array
 
 BRIDGED = 0.1
@@ -93,7 +93,7 @@ def motion_of(track: Track, grid: Array, point: Array | None = None, offset: flo
     if point is not None:
         inside = np.einsum("nji,nj->ni", turn, point - place)
     velocity = rate[:, :3] + np.einsum("nij,nj->ni", rate[:, 3:].reshape(-1, 3, 3), inside)
-    known = known_between(grid, times, BRIDGED)
+    known = covered(grid, times, BRIDGED)
     jitter = _slope_noise(numbers, float(np.median(np.diff(times))))
     lever = float(np.median(np.linalg.norm(inside, axis=1)))
     spin_noise = float(np.linalg.norm(jitter[3:]) / np.sqrt(2))
@@ -110,7 +110,7 @@ def motion_of(track: Track, grid: Array, point: Array | None = None, offset: flo
 
 def slope(values: Array, period: float) -> Array:
     """(n, k) rate of change: that of the straight line through SMOOTHING about each sample."""
-    half = max(n_samples(SMOOTHING, period) // 2, 1)
+    half = max(n_samples_of(SMOOTHING, period) // 2, 1)
     places = np.arange(-half, half + 1)
     weights = places / ((places**2).sum() * period)
     return np.asarray(convolve1d(values, weights[::-1], axis=0, mode="nearest"))
@@ -126,14 +126,14 @@ def _slope_noise(values: Array, step: float) -> Array:
         return np.zeros(values.shape[1])
     second = values[2:] - 2 * values[1:-1] + values[:-2]
     jitter = np.median(np.abs(second), axis=0) / (0.6745 * np.sqrt(6))
-    half = max(n_samples(SMOOTHING, step) // 2, 1)
+    half = max(n_samples_of(SMOOTHING, step) // 2, 1)
     return np.asarray(jitter / (step * np.sqrt((np.arange(-half, half + 1) ** 2).sum())))
 
 
 def _at(track: Track, times: Array) -> Track:
     """The track at other times; NaN where its poses are further apart than BRIDGED."""
     seen = track.seen
-    known = known_between(times, track.times[seen], BRIDGED)
+    known = covered(times, track.times[seen], BRIDGED)
     positions, quaternions = np.full((len(times), 3), np.nan), np.full((len(times), 4), np.nan)
     if known.any():
         own = track.times[seen]

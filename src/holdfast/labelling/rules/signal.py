@@ -9,17 +9,17 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from holdfast.contact import NO_CONTACT, STABLE, UNSTABLE, Cause, ContactState
+from holdfast.contact import (
+    MERGE_GAP,
+    NO_CONTACT,
+    STABLE,
+    UNSTABLE,
+    UNSTABLE_MARGIN,
+    Cause,
+    ContactState,
+)
 from holdfast.features import Tare
 from holdfast.features.tare import TareArgument
-from holdfast.labelling.masks import (
-    MARGIN,
-    MERGE,
-    Mask,
-    closed,
-    lasting,
-    n_samples,
-)
 from holdfast.labelling.rules.drawing import Drawing, Pen
 from holdfast.labelling.rules.hand import (
     SEEN,
@@ -30,7 +30,7 @@ from holdfast.labelling.rules.hand import (
     lost_at,
 )
 from holdfast.labelling.rules.limits import check_positive
-from holdfast.metrics.masks import runs
+from holdfast.metrics.masks import Mask, drop_short_runs, fill_short_gaps, n_samples_of, runs
 from holdfast.recordings import Label, Recording
 from holdfast.sensors.values import Array
 
@@ -63,9 +63,9 @@ class SignalRule:
     """
 
     share: float = SEEN
-    window: float = 2 * MARGIN
-    settle: float = MERGE
-    merge: float = MERGE
+    window: float = 2 * UNSTABLE_MARGIN
+    settle: float = MERGE_GAP
+    merge: float = MERGE_GAP
 
     def __post_init__(self) -> None:
         check_positive(self)
@@ -118,16 +118,16 @@ def _change(finger: FingerForce, rule: SignalRule) -> Array:
 
 def _troubled(hand: HandForce, change: Mapping[str, Array], rule: SignalRule) -> dict[str, Mask]:
     shown = np.sum([ratio > 1 for ratio in change.values()], axis=0) >= 2
-    gap = n_samples(rule.merge - rule.window, hand.period)  # the window fills the rest of it
+    gap = n_samples_of(rule.merge - rule.window, hand.period)  # the window fills the rest of it
     return {
-        name: closed(((change[name] > 1) | shown) & each.contact, gap) & each.contact
+        name: fill_short_gaps(((change[name] > 1) | shown) & each.contact, gap) & each.contact
         for name, each in hand.fingers.items()
     }
 
 
 def _grasps(hand: HandForce, rule: SignalRule) -> list[tuple[int, int]]:
     """From the first finger's touch to the last one's end."""
-    touched = closed(hand.n_touching > 0, n_samples(rule.settle, hand.period))
+    touched = fill_short_gaps(hand.n_touching > 0, n_samples_of(rule.settle, hand.period))
     return [(int(start), int(end)) for start, end in runs(touched)]
 
 
@@ -166,7 +166,7 @@ class _Grasp:
         calm = self._inside & (hand.n_touching >= min(2, ever))
         for mask in self._troubled.values():
             calm &= ~mask
-        rests = runs(lasting(calm, self._n(self._rule.settle)))
+        rests = runs(drop_short_runs(calm, self._n(self._rule.settle)))
         return int(rests[0][0]) if len(rests) else self._end
 
     def paint(self, name: str, drawing: Drawing) -> None:
@@ -205,7 +205,7 @@ class _Grasp:
         return start if onset - start < self._n(self._rule.merge) else onset + 1
 
     def _n(self, duration: float) -> int:
-        return n_samples(duration, self._hand.period)
+        return n_samples_of(duration, self._hand.period)
 
 
 def _paint_loss(hand: HandForce, drawings: Mapping[str, Drawing]) -> None:

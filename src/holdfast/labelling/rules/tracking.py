@@ -11,30 +11,36 @@ from typing import Literal
 
 import numpy as np
 
-from holdfast.contact import NO_CONTACT, STABLE, UNSTABLE, Cause, ContactState
+from holdfast.contact import (
+    MERGE_GAP,
+    NO_CONTACT,
+    SLIP_SPEED,
+    STABLE,
+    UNSTABLE,
+    UNSTABLE_MARGIN,
+    Cause,
+    ContactState,
+)
 from holdfast.errors import RecordingError
 from holdfast.features import Tare
 from holdfast.features.tare import TareArgument
-from holdfast.labelling.masks import (
-    MARGIN,
-    MERGE,
-    Mask,
-    closed,
-    grown,
-    lasting,
-    n_samples,
-    with_hysteresis,
-)
 from holdfast.labelling.poses import Poses, Track, names_of, poses_of
 from holdfast.labelling.rules.clocks import Offset, offset_of
 from holdfast.labelling.rules.drawing import Drawing, Pen
 from holdfast.labelling.rules.hand import FingerForce, HandForce, hand_force, lost_at, pressed_at
 from holdfast.labelling.rules.limits import check_positive
 from holdfast.labelling.rules.motion import SMOOTHING, Motion, motion_of, relative
-from holdfast.metrics.masks import runs
+from holdfast.metrics.masks import (
+    Mask,
+    drop_short_runs,
+    fill_short_gaps,
+    hysteresis,
+    n_samples_of,
+    runs,
+    widen_runs,
+)
 from holdfast.recordings import Label, Recording
 from holdfast.sensors.values import Array
-from holdfast.twin.labels import LabelRule
 
 AUTHOR = "rule:tracking"
 NOISE_TIMES = 5.0
@@ -70,14 +76,14 @@ class TrackingRule:
     """
 
     measure: Literal["speed", "displacement"] = "speed"
-    speed: float = LabelRule.sliding
-    spin: float = LabelRule.sliding / 0.01
+    speed: float = SLIP_SPEED
+    spin: float = SLIP_SPEED / 0.01
     distance: float = 0.003
     angle: float = 0.1
     release: float = 0.5
     least: float = 0.03
-    merge: float = MERGE
-    margin: float = MARGIN
+    merge: float = MERGE_GAP
+    margin: float = UNSTABLE_MARGIN
 
     def __post_init__(self) -> None:
         if self.measure not in ("speed", "displacement"):
@@ -135,7 +141,7 @@ def _clock(poses: Poses, relatives: Mapping[str, Track], hand: HandForce) -> Off
     motions = [motion_of(track, hand.times) for track in relatives.values()]
     seen = np.nanmax([np.where(each.known, each.speed, 0.0) for each in motions], axis=0)
     known = np.any([each.known for each in motions], axis=0)
-    felt = np.sum([hand.fingers[name].change(MARGIN) for name in relatives], axis=0)
+    felt = np.sum([hand.fingers[name].change(UNSTABLE_MARGIN) for name in relatives], axis=0)
     return offset_of(seen, felt, known, hand.period)
 
 
@@ -191,10 +197,10 @@ class _Judge:
         """(n,) the way from the pose of the grasp, in times of what counts: the first rest."""
         calm = self._contact & motion.known
         calm &= motion.speed < max(self._rule.speed, NOISE_TIMES * motion.speed_noise)
-        rests = runs(lasting(calm, n_samples(REST, self._finger.period)))
+        rests = runs(drop_short_runs(calm, n_samples_of(REST, self._finger.period)))
         if not len(rests):
             return np.zeros(len(self._times))
-        first = slice(rests[0][0], rests[0][0] + n_samples(REST, self._finger.period))
+        first = slice(rests[0][0], rests[0][0] + n_samples_of(REST, self._finger.period))
         place, turn = motion.position[first].mean(axis=0), motion.matrix[first].mean(axis=0)
         far, turned = motion.away_from(
             place, turn, None if point is None else point[first].mean(axis=0)
@@ -203,12 +209,15 @@ class _Judge:
 
     def _moving(self, ratio: Array, known: Mask) -> Mask:
         rule, period = self._rule, self._finger.period
-        moving = lasting(with_hysteresis(ratio, rule.release, 1.0), n_samples(rule.least, period))
+        moving = drop_short_runs(
+            hysteresis(ratio, rule.release, 1.0), n_samples_of(rule.least, period)
+        )
         if rule.measure == "displacement":
             return moving
         # The smoothing has drawn motion longer by half of itself at both ends already.
-        moving = closed(moving, n_samples(rule.merge - SMOOTHING, period))
-        return grown(moving, n_samples(rule.margin - SMOOTHING / 2, period))
+        moving = fill_short_gaps(moving, n_samples_of(rule.merge - SMOOTHING, period))
+        margin = n_samples_of(rule.margin - SMOOTHING / 2, period)
+        return widen_runs(moving, np.arange(len(moving)), margin)
 
     def _paint_ends(self, drawing: Drawing, start: int, end: int) -> None:
         """Motion at the beginning of a contact is closing, at its end release."""
@@ -226,7 +235,7 @@ class _Judge:
 
     def _paint_loss(self, drawing: Drawing, known: Mask, start: int, end: int) -> None:
         """The object is lost where it is out of sight when the force ends, and stays so."""
-        n = n_samples(GONE, self._finger.period)
+        n = n_samples_of(GONE, self._finger.period)
         seen = np.flatnonzero(known[start:end])
         if not len(seen) or end == len(known) or known[max(end - 1, start) : end + n].any():
             return

@@ -6,7 +6,7 @@ import msgspec
 import numpy as np
 import numpy.typing as npt
 
-from holdfast.contact import STABLE, UNKNOWN, Phase
+from holdfast.contact import HELD_PHASES, STABLE, UNKNOWN, Phase
 from holdfast.metrics import Decisions, FingerDecisions, calibration_sums
 from holdfast.metrics.events import ROUNDING
 from holdfast.metrics.masks import runs
@@ -14,7 +14,6 @@ from holdfast.recordings import Truth
 from holdfast.sensors.values import Array
 from holdfast.study.evaluation.seen import Seen
 from holdfast.study.methods import HAND
-from holdfast.twin.labels import HELD
 
 Mask = npt.NDArray[np.bool_]
 
@@ -108,7 +107,7 @@ def _grips(truth: Truth, fingers: Mapping[str, FingerDecisions]) -> list[Grip]:
         if "contact_force" not in truth.fingers.get(name, {}) or not locked.any():
             continue
         force = np.linalg.norm(truth.fingers[name]["contact_force"], axis=1)
-        held = np.isin(phase, HELD)[_at(truth, finger.times)]
+        held = np.isin(phase, HELD_PHASES)[_at(truth, finger.times)]
         known, wrong = _errors(finger)
         stable = finger.labels == STABLE
         parts = (known & held & stable, known & held & ~stable)

@@ -8,13 +8,13 @@ import msgspec
 import numpy as np
 import numpy.typing as npt
 
-from holdfast.contact import STABLE, UNKNOWN
+from holdfast.contact import HELD_PHASES, STABLE, UNKNOWN
 from holdfast.metrics import FingerDecisions, match_alarms
 from holdfast.metrics.events import POSTS, ROUNDING, STABLE_BEFORE
 from holdfast.metrics.masks import runs
 from holdfast.recordings import Truth
 from holdfast.sensors.values import Array
-from holdfast.twin.labels import HELD, LabelRule
+from holdfast.twin.labels import LabelRule
 
 Mask = npt.NDArray[np.bool_]
 
@@ -113,11 +113,11 @@ def _sliding(truth: Truth) -> Mask:
         if {"contact_force", "slip_speed"} <= set(finger):
             touching = np.linalg.norm(finger["contact_force"], axis=1) > rule.contact
             found |= touching & (finger["slip_speed"] > rule.sliding)
-    return np.asarray(np.isin(truth.hand["phase"], HELD) & found)
+    return np.asarray(np.isin(truth.hand["phase"], HELD_PHASES) & found)
 
 
 def _held_since(truth: Truth, place: int) -> float:
-    free = np.flatnonzero(~np.isin(truth.hand["phase"][: place + 1], HELD))
+    free = np.flatnonzero(~np.isin(truth.hand["phase"][: place + 1], HELD_PHASES))
     return float(truth.times[free[-1]]) if len(free) else float(truth.times[0])
 
 
