@@ -9,8 +9,8 @@ from holdfast.errors import TrainingError
 from holdfast.parallel import Engine
 from holdfast.study import circumstances
 from holdfast.study.chapters import Made, sections
-from holdfast.study.comparison import part as comparison
-from holdfast.study.comparison import real, sensitivity
+from holdfast.study.comparison import all_methods as comparison
+from holdfast.study.comparison import real_recordings, sensitivity
 from holdfast.study.paper import experiments
 from holdfast.study.paper import part as paper
 from holdfast.study.plan import Plan
@@ -43,7 +43,7 @@ PARTS: Mapping[str, Part] = {
     "experiments": experiments,
     "comparison": comparison,
     "sensitivity": sensitivity,
-    "real": real,
+    "real": real_recordings,
 }
 """The parts by name."""
 

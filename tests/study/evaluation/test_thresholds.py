@@ -3,8 +3,8 @@ import pytest
 
 from holdfast.contact import NO_CONTACT, STABLE, UNKNOWN, UNSTABLE
 from holdfast.metrics import match_alarms
-from holdfast.study.evaluation.opinion import Score
-from holdfast.study.evaluation.thresholds import Calm, shift_for
+from holdfast.study.evaluation.scores import HandScores
+from holdfast.study.evaluation.thresholds import FalseAlarmRanges, threshold_shift
 
 
 def random_score(generator, n=3000):
@@ -14,7 +14,7 @@ def random_score(generator, n=3000):
     known = generator.random(n) > 0.02
     alone = np.repeat(generator.random(n // 50 + 1) < 0.1, 50)[:n]
     least[generator.random(n) < 0.01] = np.inf
-    return Score(np.arange(n) / 150, least, known, alone, np.full(n, 0.5))
+    return HandScores(np.arange(n) / 150, least, known, alone, np.full(n, 0.5))
 
 
 def random_labels(generator, n=3000):
@@ -48,7 +48,7 @@ def brute_shift(pairs, per_minute, tried):
 @pytest.mark.parametrize("seed", range(5))
 def test_false_alarms_at_every_threshold_as_if_it_had_decided(seed):
     for score, labels in cases(seed):
-        calm = Calm.of(score, labels)
+        calm = FalseAlarmRanges.of(score, labels)
         for shift in (-np.inf, *np.arange(-3.2, 3.3, 0.1)):
             counted = int(((calm.after < shift) & (shift <= calm.before)).sum())
             if np.isneginf(shift):
@@ -62,7 +62,7 @@ def test_the_most_watchful_threshold_that_is_quiet_enough(seed, per_minute):
     pairs = cases(seed)
     tried = np.unique(np.concatenate([s.least[np.isfinite(s.least)] for s, _ in pairs]))
     quiet, loudest = brute_shift(pairs, per_minute, tried)
-    chosen = shift_for([Calm.of(*pair) for pair in pairs], per_minute)
+    chosen = threshold_shift([FalseAlarmRanges.of(*pair) for pair in pairs], per_minute)
     assert max(chosen, tried[0]) == max(min(quiet, loudest), tried[0])
 
 
@@ -70,21 +70,23 @@ def test_it_never_goes_beyond_the_loudest_threshold():
     """At 2 there are two alarms; at 3 the hand is never stable and there would be none."""
     least = np.array([3.0, 1.0, 2.0, 1.0, 2.5, 2.5])
     known, alone = np.ones(6, dtype=bool), np.zeros(6, dtype=bool)
-    calm = Calm.of(Score(np.arange(6.0), least, known, alone, least), np.full(6, STABLE))
-    assert shift_for([calm], 1e9) == 2.0
+    calm = FalseAlarmRanges.of(
+        HandScores(np.arange(6.0), least, known, alone, least), np.full(6, STABLE)
+    )
+    assert threshold_shift([calm], 1e9) == 2.0
 
 
 def test_without_any_alarm_the_own_threshold_stays():
-    nothing = Calm(np.empty(0), np.empty(0), 1.0)
-    assert shift_for([nothing], 1.0) == 0.0
+    nothing = FalseAlarmRanges(np.empty(0), np.empty(0), 1.0)
+    assert threshold_shift([nothing], 1.0) == 0.0
 
 
 def test_alarms_that_are_spared_do_not_count():
     least = np.array([1.0, 1.0, -1.0, 1.0, -2.0, 1.0])
-    score = Score(
+    score = HandScores(
         np.arange(6.0), least, np.ones(6, dtype=bool), np.zeros(6, dtype=bool), np.zeros(6)
     )
     labels = np.full(6, STABLE, dtype=np.int8)
     spared = np.arange(6) == 4
-    assert shift_for([Calm.of(score, labels)], 0.0) == -2.0
-    assert shift_for([Calm.of(score, labels, spared)], 0.0) == -1.0
+    assert threshold_shift([FalseAlarmRanges.of(score, labels)], 0.0) == -2.0
+    assert threshold_shift([FalseAlarmRanges.of(score, labels, spared)], 0.0) == -1.0

@@ -5,7 +5,7 @@ import numpy as np
 from holdfast.features import Tare
 from holdfast.recordings import Recording, Tactile
 from holdfast.sensors import Sensor
-from holdfast.study.methods import HandSignal, signal_of
+from holdfast.study.methods import HandSignal, hand_signal
 
 UP = np.array([0.0, 0.0, 1.0])
 
@@ -22,7 +22,7 @@ def pressed(readings, rate=100.0, unit="count", times=None) -> HandSignal:
     readings = readings[:, None] if readings.ndim == 2 else readings
     times = np.arange(len(readings)) / rate if times is None else times
     finger = Tactile(patch(readings.shape[1], rate, unit), times, readings)
-    return signal_of(Recording("by hand", {"index": finger}), Tare.parse("none"), ("index",))
+    return hand_signal(Recording("by hand", {"index": finger}), Tare.parse("none"), ("index",))
 
 
 def along_normal(values):

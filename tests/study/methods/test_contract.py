@@ -10,7 +10,7 @@ from holdfast.contact import ContactState
 from holdfast.errors import MissingExtra
 from holdfast.features import Tare
 from holdfast.recordings import Recording
-from holdfast.study.methods import HAND, METHODS, signal_of
+from holdfast.study.methods import HAND, METHODS, hand_signal
 from holdfast.synthetic import synthetic_recording
 
 TARE = Tare.parse(0.5)
@@ -32,7 +32,7 @@ def method(request):
 
 
 def features_of(method, recording):
-    return method.features(signal_of(recording, TARE, FINGERS))
+    return method.features(hand_signal(recording, TARE, FINGERS))
 
 
 def changed(recording, change):

@@ -2,9 +2,9 @@ import numpy as np
 import pytest
 
 from holdfast.features import FEATURE_NAMES, Tare, haar_features
-from holdfast.study.methods import signal_of
+from holdfast.study.methods import hand_signal
 from holdfast.study.methods.cuts import CUTS, detail_sigma
-from holdfast.study.methods.zhang import detail_energy
+from holdfast.study.methods.wavelets import detail_energy
 from holdfast.synthetic import synthetic_recording
 
 
@@ -26,7 +26,7 @@ def test_sigma_and_energy_differ_by_the_mean_of_the_details():
 
 
 def test_each_has_one_feature_of_every_finger():
-    hand = signal_of(synthetic_recording("one", 0, ("thumb", "index")), Tare.parse("0.5"))
+    hand = hand_signal(synthetic_recording("one", 0, ("thumb", "index")), Tare.parse("0.5"))
     thumb = hand.fingers["thumb"]
     for name, signal, measure in (
         ("sigma_cut", thumb.amplitude, detail_sigma),

@@ -5,13 +5,13 @@ import pytest
 
 from holdfast.features import Tare
 from holdfast.recordings import Recording
-from holdfast.study.methods import METHODS, signal_of
+from holdfast.study.methods import METHODS, hand_signal
 from holdfast.study.methods.grover import N_STEPS, last_second
 from training.build import tiny_module, tiny_recording
 
 
 def windows(recording):
-    hand = signal_of(recording, Tare.parse("none"))
+    hand = hand_signal(recording, Tare.parse("none"))
     name = next(iter(hand.fingers))
     rows = last_second(hand)[name]
     return rows.reshape(len(rows), N_STEPS, 3), hand.fingers[name].force

@@ -8,7 +8,7 @@ from holdfast.errors import TrainingError
 from holdfast.features import Tare
 from holdfast.recordings import Label, Recording, Tactile
 from holdfast.sensors import Sensor
-from holdfast.study.methods import HAND, METHODS, signal_of
+from holdfast.study.methods import HAND, METHODS, hand_signal
 from holdfast.study.methods.james_lepora import local, whole
 
 PAIR = Sensor(
@@ -27,7 +27,7 @@ def finger(times, readings):
 
 
 def hand(tare="none", **fingers):
-    return signal_of(Recording("tiny", fingers), Tare.parse(tare))
+    return hand_signal(Recording("tiny", fingers), Tare.parse(tare))
 
 
 THUMB = finger(

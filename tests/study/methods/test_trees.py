@@ -3,12 +3,12 @@
 import numpy as np
 
 from holdfast.features import FEATURE_NAMES, Tare, haar_features
-from holdfast.study.methods import METHODS, signal_of
+from holdfast.study.methods import METHODS, hand_signal
 from training.build import tiny_recording
 
 
 def test_the_papers_six_features():
-    hand = signal_of(tiny_recording(0), Tare.parse("0.5"))
+    hand = hand_signal(tiny_recording(0), Tare.parse("0.5"))
     found = METHODS["trees"].features(hand)
     assert list(found) == ["thumb", "index"]
     for name, rows in found.items():

@@ -14,10 +14,10 @@ from holdfast.model import FingerModel, Model
 from holdfast.recordings import Recording
 from holdfast.study.comparison.jobs import Results, titles
 from holdfast.study.corpus import Corpus
-from holdfast.study.evaluation.changes import Change
-from holdfast.study.evaluation.expert import Expert, material_of
-from holdfast.study.evaluation.seen import look
-from holdfast.study.methods import METHODS, signal_of
+from holdfast.study.evaluation.fitted_method import FittedMethod, gather_training_samples
+from holdfast.study.evaluation.recording_features import corpus_features
+from holdfast.study.evaluation.variation import Variation
+from holdfast.study.methods import METHODS, hand_signal
 from holdfast.study.methods.paper import WINDOW
 from holdfast.study.plan import Plan
 from holdfast.study.report.tables import Key, Row, Table
@@ -108,16 +108,18 @@ def table(plan: Plan, results: Results) -> Table:
 
 def _cost(name: str, corpus: Corpus, seed: int) -> Cost:
     method = METHODS[name]
-    recordings = look(method, corpus, Change())
-    expert = Expert.fit(method, material_of(recordings, 2_000), range(len(recordings)), seed)
+    recordings = corpus_features(method, corpus, Variation())
+    fitted = FittedMethod.fit(
+        method, gather_training_samples(recordings, 2_000), range(len(recordings)), seed
+    )
     recording = corpus.load()[0]
-    hand = signal_of(recording, Tare.parse(corpus.tare), tuple(recordings[0].times))
+    hand = hand_signal(recording, Tare.parse(corpus.tare), tuple(recordings[0].times))
     n = sum(len(rows) for rows in recordings[0].features.values())
     first = recordings[0].features
     return Cost(
         features=_least(lambda: method.features(hand)) / n,
         probability=_least(
-            lambda: [c.probability(first[unit]) for unit, c in expert.classifiers.items()]
+            lambda: [c.probability(first[unit]) for unit, c in fitted.classifiers.items()]
         )
         / n,
     )

@@ -4,8 +4,14 @@ from collections.abc import Iterator, Mapping
 from importlib.util import find_spec
 from typing import Any
 
-from holdfast.study.evaluation.changes import Change
-from holdfast.study.evaluation.judge import Effort, Job, Judged, Split, judge
+from holdfast.study.evaluation.evaluate_method import (
+    EvaluationEffort,
+    EvaluationJob,
+    MethodEvaluation,
+    Split,
+    evaluate_method,
+)
+from holdfast.study.evaluation.variation import Variation
 from holdfast.study.methods import METHODS
 from holdfast.study.plan import Plan
 from holdfast.study.work import Task
@@ -13,7 +19,7 @@ from holdfast.study.work import Task
 PAPER = "logreg"
 """What all others are compared to."""
 MAIN = ("logreg", "svm", "zhang", "trees", "holdfast")
-"""Judged on every corpus."""
+"""Evaluated on every corpus."""
 CORE = ("logreg", "holdfast")
 """Those of them that a quick study judges there."""
 NETWORK = "tcn"
@@ -23,8 +29,8 @@ SECONDS = {"trees": 300.0, "jl_local_svm": 150.0, "jl_global_svm": 230.0, NETWOR
 """About how long they take; others `USUAL`."""
 USUAL = 30.0
 
-QUICK = Effort(folds=3, inner=2, max_rows=10_000)
-OF_NETWORK = Effort(folds=2, inner=2, stride=3, max_rows=6_000)
+QUICK = EvaluationEffort(folds=3, inner=2, max_rows=10_000)
+OF_NETWORK = EvaluationEffort(folds=2, inner=2, stride=3, max_rows=6_000)
 """A fit takes a minute for 20,000 windows of a finger."""
 
 SPLITS = {
@@ -69,7 +75,7 @@ def task_of(plan: Plan, method: str) -> Task:
     return judging(f"methods/{method}", job_of(plan, method), quick=plan.quick)
 
 
-def judging(name: str, job: Job, *, quick: bool = False) -> Task:
+def judging(name: str, job: EvaluationJob, *, quick: bool = False) -> Task:
     """A task of that name that does a job; its cost is about right for the twin's recordings [s].
 
     Args:
@@ -79,28 +85,30 @@ def judging(name: str, job: Job, *, quick: bool = False) -> Task:
     """
     parts = len(job.splits) + 0.5 * len(job.tests)
     seconds = SECONDS.get(job.method, USUAL) * parts / 2.5 * (0.5 if quick else 1.0)
-    return Task(name, judge, (job,), dict[str, Judged], cost=seconds)
+    return Task(name, evaluate_method, (job,), dict[str, MethodEvaluation], cost=seconds)
 
 
-def job_of(plan: Plan, method: str) -> Job:
+def job_of(plan: Plan, method: str) -> EvaluationJob:
     """All that is asked of a method."""
     tests = tuple(plan.corpora[role] for role in _roles(plan, method))
     splits: tuple[Split, ...] = ("recording", "object")
     if method == NETWORK or (plan.quick and method not in CORE):
         splits = ("recording",)
-    return Job(method, plan.main, splits, tests, Change(), effort_of(plan, method), plan.seed)
+    return EvaluationJob(
+        method, plan.main, splits, tests, Variation(), effort_of(plan, method), plan.seed
+    )
 
 
-def effort_of(plan: Plan, method: str) -> Effort:
+def effort_of(plan: Plan, method: str) -> EvaluationEffort:
     """How thoroughly a method is judged."""
     if method == NETWORK:
         return OF_NETWORK
-    return QUICK if plan.quick else Effort()
+    return QUICK if plan.quick else EvaluationEffort()
 
 
-def found(plan: Plan, results: Results, method: str) -> Iterator[tuple[str, Judged]]:
+def found(plan: Plan, results: Results, method: str) -> Iterator[tuple[str, MethodEvaluation]]:
     """By key of `SPLITS`, what a method is worth there."""
-    judged: Mapping[str, Judged] = results[f"methods/{method}"]
+    judged: Mapping[str, MethodEvaluation] = results[f"methods/{method}"]
     for key in SPLITS:
         name = plan.corpora[key].name if key in plan.corpora else key
         if name in judged:

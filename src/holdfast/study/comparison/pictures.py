@@ -6,10 +6,14 @@ import numpy as np
 
 from holdfast.metrics.events import POSTS
 from holdfast.sensors.values import Array
-from holdfast.study.comparison import errors, methods
+from holdfast.study.comparison import error_tables, sample_tables
 from holdfast.study.comparison.jobs import PAPER, SPLITS, Results, found, titles
-from holdfast.study.evaluation.hearing import Heard
-from holdfast.study.evaluation.judge import ALARM_RATES, COMPARED_AT, Judged
+from holdfast.study.evaluation.alarm_statistics import AlarmStatistics
+from holdfast.study.evaluation.evaluate_method import (
+    COMPARED_RATE,
+    FALSE_ALARM_RATES,
+    MethodEvaluation,
+)
 from holdfast.study.methods import METHODS
 from holdfast.study.plan import Plan
 from holdfast.study.report.curves import Curve, draw_alarms, draw_reliability
@@ -37,7 +41,7 @@ def pictures(plan: Plan, results: Results) -> list[Picture]:
 
 
 def _methods(plan: Plan, results: Results) -> Picture:
-    table = methods.hands(plan, results)
+    table = sample_tables.hands(plan, results)
     shown = ("recording", "object", "others")
     groups = {
         f"accuracy of hands,\n{SPLITS[key]} [%]": _estimates(
@@ -73,27 +77,27 @@ def _alarms(plan: Plan, results: Results) -> Picture:
     caption = (
         "What is missed against what is alarmed in vain, by recording. Thresholds are chosen on "
         "training recordings for false alarms under a stable label of "
-        f"{', '.join(f'{rate:g}' for rate in ALARM_RATES)} per minute; drawn is what they come to "
-        f"on the others. Large marks: chosen for {COMPARED_AT:g} per minute."
+        f"{', '.join(f'{rate:g}' for rate in FALSE_ALARM_RATES)} per minute; drawn is what they "
+        f"come to on the others. Large marks: chosen for {COMPARED_RATE:g} per minute."
     )
-    return Picture("alarms", caption, draw_alarms(groups, bar=COMPARED_AT))
+    return Picture("alarms", caption, draw_alarms(groups, bar=COMPARED_RATE))
 
 
-def _curves(judged: Judged) -> tuple[Curve, Curve]:
+def _curves(judged: MethodEvaluation) -> tuple[Curve, Curve]:
     """Missed events, and slips not found, over false alarms under a stable label."""
     rates = np.array([_per_minute(heard) for heard in judged.curve])
     missed = [_share(sum(h.n_missed(POSTS[0]) for h in heard), sum(len(h.delays) for h in heard))
               for heard in judged.curve]  # fmt: skip
     found_ = [_share(sum(h.n_found(POSTS[0]) for h in heard), sum(len(h.slips) for h in heard))
               for heard in judged.curve]  # fmt: skip
-    chosen = ALARM_RATES.index(COMPARED_AT)
+    chosen = FALSE_ALARM_RATES.index(COMPARED_RATE)
     return (
         Curve(rates, np.array(missed), chosen=chosen),
         Curve(rates, 100 - np.array(found_), chosen=chosen),
     )
 
 
-def _per_minute(heard: Sequence[Heard]) -> float:
+def _per_minute(heard: Sequence[AlarmStatistics]) -> float:
     seconds = sum(each.stable_seconds for each in heard)
     return 60 * sum(each.under_stable for each in heard) / seconds if seconds else np.nan
 
@@ -116,7 +120,7 @@ def _reliability(plan: Plan, results: Results) -> Picture:
     return Picture("reliability", caption, draw_reliability(curves, notes))
 
 
-def _bins(judged: Judged) -> Array:
+def _bins(judged: MethodEvaluation) -> Array:
     """(m, 3) mean probability, share labelled stable and samples of each bin that has any."""
     total = np.array(judged.calibration, dtype=np.float64).sum(axis=0)
     p, stable, n = total[total[:, 2] > 0].T
@@ -124,10 +128,10 @@ def _bins(judged: Judged) -> Array:
 
 
 def _by_force(plan: Plan, results: Results) -> Picture | None:
-    table = errors.force(plan, results)
+    table = error_tables.force(plan, results)
     groups = {
         error: _groups(plan, [row for row in table.rows if row.keys["error"] == error], "grip")
-        for error in (errors.DOUBTED, errors.TRUSTED)
+        for error in (error_tables.DOUBTED, error_tables.TRUSTED)
     }
     if not any(groups.values()):
         return None
@@ -138,7 +142,7 @@ def _by_force(plan: Plan, results: Results) -> Picture | None:
 
 
 def _by_direction(plan: Plan, results: Results) -> Picture | None:
-    table = errors.directions(plan, results)
+    table = error_tables.directions(plan, results)
     groups = {"direction of the push": _groups(plan, table.rows, "direction")}
     if not any(groups.values()):
         return None

@@ -10,10 +10,10 @@ from typing import NamedTuple
 import numpy as np
 
 from holdfast.metrics.events import POSTS
-from holdfast.study.comparison.figuring import DIGITS, difference_row, ratio_row, sample_rows
 from holdfast.study.comparison.jobs import CORE, SPLITS, Results, effort_of, job_of, judging
-from holdfast.study.evaluation.changes import Change
-from holdfast.study.evaluation.judge import COMPARED_AT, Job, Judged
+from holdfast.study.comparison.rows import DIGITS, difference_row, ratio_row, sample_rows
+from holdfast.study.evaluation.evaluate_method import COMPARED_RATE, EvaluationJob, MethodEvaluation
+from holdfast.study.evaluation.variation import Variation
 from holdfast.study.methods import METHODS
 from holdfast.study.methods.cuts import CUTS
 from holdfast.study.plan import Plan
@@ -54,7 +54,7 @@ class Sweep(NamedTuple):
     name: str
     title: str
     key: str
-    changes: Mapping[float, Change]
+    changes: Mapping[float, Variation]
     note: str
 
 
@@ -116,7 +116,7 @@ def sweeps(plan: Plan) -> list[Sweep]:
             "rates",
             "Sensitivity to the sampling rate",
             RATE,
-            {round(plan.main.rate / every, 1): Change(every=every) for every in _every(plan)},
+            {round(plan.main.rate / every, 1): Variation(every=every) for every in _every(plan)},
             "Every 1st, 2nd, ... sample, in training and in test. Windows keep their number of "
             "samples, so that they last longer.",
         ),
@@ -136,59 +136,59 @@ def sweeps(plan: Plan) -> list[Sweep]:
     return found
 
 
-def _noise(plan: Plan) -> dict[float, Change]:
-    return {level: Change(noise=level) for level in (_ends(LEVELS) if plan.quick else LEVELS)}
+def _noise(plan: Plan) -> dict[float, Variation]:
+    return {level: Variation(noise=level) for level in (_ends(LEVELS) if plan.quick else LEVELS)}
 
 
 def _every(plan: Plan) -> tuple[int, ...]:
     return (1, 3) if plan.quick else EVERY
 
 
-def _margins(plan: Plan) -> dict[float, Change]:
+def _margins(plan: Plan) -> dict[float, Variation]:
     """By margin; the labels as they are have that of the rule. None without a truth."""
     truth = plan.main.load()[0].truth
     if truth is None or "phase" not in truth.hand:
         return {}
     usual = LabelRule().margin
     margins = (0.0, usual) if plan.quick else MARGINS
-    return {each: Change() if each == usual else Change(margin=each) for each in margins}
+    return {each: Variation() if each == usual else Variation(margin=each) for each in margins}
 
 
 def _ends(values: Sequence[float]) -> tuple[float, float]:
     return values[0], values[-1]
 
 
-def _changes(sweep: Sweep, method: str) -> dict[float, Change]:
+def _changes(sweep: Sweep, method: str) -> dict[float, Variation]:
     """The changes that a method is judged under: a slow one under every other."""
     every = list(sweep.changes.items())
     kept = every if method not in SLOW else every[:: 2 if len(every) > 2 else 1]
-    plain = [(value, change) for value, change in every if change == Change()]
+    plain = [(value, change) for value, change in every if change == Variation()]
     return dict(sorted({**dict(kept), **dict(plain)}.items()))
 
 
-def _task(plan: Plan, method: str, change: Change) -> Task:
+def _task(plan: Plan, method: str, change: Variation) -> Task:
     job = _job(plan, method, change)
     return judging(_name(method, change), job, quick=plan.quick)
 
 
-def _name(method: str, change: Change) -> str:
+def _name(method: str, change: Variation) -> str:
     margin = "" if change.margin is None else f"/margin-{change.margin:g}"
     return f"sensitivity/{method}/noise-{change.noise:g}/every-{change.every}{margin}"
 
 
-def _job(plan: Plan, method: str, change: Change) -> Job:
+def _job(plan: Plan, method: str, change: Variation) -> EvaluationJob:
     """Unchanged it is the job of the comparison, which is so done once."""
-    if method in METHODS and change == Change():
+    if method in METHODS and change == Variation():
         return job_of(plan, method)
     effort = effort_of(plan, method)
-    return Job(method, plan.main, ("recording",), (), change, effort, plan.seed)
+    return EvaluationJob(method, plan.main, ("recording",), (), change, effort, plan.seed)
 
 
 def _table(plan: Plan, results: Results, sweep: Sweep) -> Table:
     rows: list[Row] = []
     for method in methods(plan):
         for value, change in _changes(sweep, method).items():
-            judged: Judged = results[_name(method, change)]["recording"]
+            judged: MethodEvaluation = results[_name(method, change)]["recording"]
             keys: Keys = {"method": METHODS[method].title, sweep.key: value}
             rows += _figures(keys, judged, plan.seed)
     lines = ("method", sweep.key)
@@ -196,15 +196,15 @@ def _table(plan: Plan, results: Results, sweep: Sweep) -> Table:
 
 
 _NOTE = (
-    f"By recording. Slips and alarms in vain: at the threshold for {COMPARED_AT:g} false alarm per "
-    "minute under a stable label in training, chosen anew each time."
+    f"By recording. Slips and alarms in vain: at the threshold for {COMPARED_RATE:g} false alarm "
+    "per minute under a stable label in training, chosen anew each time."
 )
 
 
 def _profiles(plan: Plan, results: Results) -> Table:
     rows: list[Row] = []
     for method in methods(plan):
-        judged = results[_name(method, Change())]
+        judged = results[_name(method, Variation())]
         for key in PROFILES:
             name = plan.corpora[key].name if key in plan.corpora else key
             if name in judged:
@@ -242,7 +242,7 @@ def _sigma_energy(plan: Plan, results: Results) -> Table:
     return Table("sigma_energy", title, note, rows, lines, digits_of=DIGITS)
 
 
-def _figures(keys: Keys, judged: Judged, seed: int) -> Iterator[Row]:
+def _figures(keys: Keys, judged: MethodEvaluation, seed: int) -> Iterator[Row]:
     yield from sample_rows(keys, judged.metrics, SAMPLE)
     heard = judged.calm
     slips = [len(each.slips) for each in heard]

@@ -15,10 +15,10 @@ from holdfast.metrics import match_alarms
 from holdfast.metrics.decisions import Codes
 from holdfast.metrics.events import EARLY, LATE, ROUNDING
 from holdfast.sensors.values import Array
-from holdfast.study.evaluation.opinion import Mask, Score
+from holdfast.study.evaluation.scores import HandScores, Mask
 
 
-class Calm(NamedTuple):
+class FalseAlarmRanges(NamedTuple):
     """What tells the false alarms of one recording at any threshold.
 
     Attributes:
@@ -33,7 +33,7 @@ class Calm(NamedTuple):
     minutes: float
 
     @classmethod
-    def of(cls, score: Score, labels: Codes, spared: Mask | None = None) -> Self:
+    def of(cls, score: HandScores, labels: Codes, spared: Mask | None = None) -> Self:
         """The false alarms under a stable label, of a hand.
 
         Args:
@@ -56,7 +56,7 @@ class Calm(NamedTuple):
         return cls(before[rows], after[rows + 1], found.stable_seconds / 60)
 
 
-def shift_for(calms: Sequence[Calm], per_minute: float) -> float:
+def threshold_shift(calms: Sequence[FalseAlarmRanges], per_minute: float) -> float:
     """The most watchful threshold up to which there are never more false alarms than that.
 
     It goes no further than to the threshold with the most of them: beyond, a hand is hardly

@@ -8,12 +8,12 @@ from holdfast.study.methods.holdfast import HOLDFAST
 from holdfast.study.methods.james_lepora import JAMES_LEPORA
 from holdfast.study.methods.method import HAND, Method
 from holdfast.study.methods.paper import LOGREG, SVM
-from holdfast.study.methods.signals import FingerSignal, HandSignal, signal_of, stretchwise
+from holdfast.study.methods.signals import FingerSignal, HandSignal, hand_signal, stretchwise
 from holdfast.study.methods.slip_servo import SLIP_SERVO
 from holdfast.study.methods.spectrum import SPECTRUM
 from holdfast.study.methods.tangential import TANGENTIAL
 from holdfast.study.methods.trees import TREES
-from holdfast.study.methods.zhang import ZHANG
+from holdfast.study.methods.wavelets import ZHANG
 
 METHODS: dict[str, Method] = {
     each.name: each
@@ -40,6 +40,6 @@ __all__ = [
     "FingerSignal",
     "HandSignal",
     "Method",
-    "signal_of",
+    "hand_signal",
     "stretchwise",
 ]

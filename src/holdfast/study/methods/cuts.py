@@ -16,7 +16,7 @@ from holdfast.sensors.values import Array
 from holdfast.study.methods.method import Method
 from holdfast.study.methods.paper import WINDOW
 from holdfast.study.methods.signals import FingerSignal, HandSignal, stretchwise, windowed
-from holdfast.study.methods.zhang import detail_energy
+from holdfast.study.methods.wavelets import detail_energy
 
 LEAST = 1e-9
 """Under it there is nothing [count or N, and their squares]."""

@@ -111,7 +111,7 @@ class HandSignal:
             yield rows, finger.cut(rows)
 
 
-def signal_of(
+def hand_signal(
     recording: Recording, tare: Tare, fingers: tuple[str, ...] | None = None
 ) -> HandSignal:
     """The signal of a recording's labelled fingers, or of those named.

@@ -13,9 +13,13 @@ import numpy as np
 from holdfast.errors import TrainingError
 from holdfast.features import Tare
 from holdfast.study.corpus import Corpus
-from holdfast.study.evaluation.changes import Change
-from holdfast.study.evaluation.expert import Expert, Material, material_of
-from holdfast.study.evaluation.seen import look
+from holdfast.study.evaluation.fitted_method import (
+    FittedMethod,
+    TrainingSamples,
+    gather_training_samples,
+)
+from holdfast.study.evaluation.recording_features import corpus_features
+from holdfast.study.evaluation.variation import Variation
 from holdfast.study.methods import METHODS, Method
 from holdfast.study.paper.part import first_finger
 from holdfast.study.plan import Plan
@@ -98,7 +102,9 @@ def predict(corpora: Mapping[str, Corpus], finger: str, seed: int) -> list[Shown
     main = corpora["main"]
     judged = list(_chosen(corpora, finger))
     for name in SHOWN:
-        material = material_of(look(METHODS[name], _of(main, finger), Change()))
+        material = gather_training_samples(
+            corpus_features(METHODS[name], _of(main, finger), Variation())
+        )
         for shown in judged:
             states = _states(METHODS[name], material, corpora, shown, seed)
             shown.states[name] = states.tolist()
@@ -130,16 +136,22 @@ def _first(corpus: Corpus, finger: str, case: str) -> str | None:
 
 
 def _states(
-    method: Method, material: Material, corpora: Mapping[str, Corpus], shown: Shown, seed: int
+    method: Method,
+    material: TrainingSamples,
+    corpora: Mapping[str, Corpus],
+    shown: Shown,
+    seed: int,
 ) -> Codes:
     """What a fit to all main recordings, but for the one that is judged, says of it."""
     names = corpora["main"].recordings
     places = {k for k, name in enumerate(names) if (shown.role, shown.recording) != ("main", name)}
-    expert = Expert.fit(method, material, places, seed)
-    if not expert.classifiers:
+    fitted = FittedMethod.fit(method, material, places, seed)
+    if not fitted.classifiers:
         raise TrainingError(f"without {shown.recording} the {shown.finger} has labels of one class")
-    (seen,) = look(method, _of(corpora[shown.role], shown.finger, shown.recording), Change())
-    return expert.opinion(seen).decisions(seen, seen.labels).fingers[shown.finger].states
+    (seen,) = corpus_features(
+        method, _of(corpora[shown.role], shown.finger, shown.recording), Variation()
+    )
+    return fitted.scores(seen).decide(seen, seen.labels).fingers[shown.finger].states
 
 
 def _of(corpus: Corpus, finger: str, recording: str | None = None) -> Corpus:

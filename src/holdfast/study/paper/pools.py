@@ -17,8 +17,8 @@ from holdfast.contact import STABLE, UNKNOWN
 from holdfast.features import FEATURE_NAMES, Tare, haar_features
 from holdfast.sensors.values import Array
 from holdfast.study.corpus import Corpus
-from holdfast.study.methods import FingerSignal, signal_of
-from holdfast.study.methods.zhang import detail_energy
+from holdfast.study.methods import FingerSignal, hand_signal
+from holdfast.study.methods.wavelets import detail_energy
 from holdfast.training.design import at_rate
 
 N_PARTS = 25
@@ -98,7 +98,7 @@ def _hands(corpus: Corpus, rate: float) -> tuple[_Hand, ...]:
 def _hand_of(corpus: Corpus, rate: float) -> Iterator[_Hand]:
     for given in corpus.load():
         recording = at_rate(given, rate)
-        hand = signal_of(recording, Tare.parse(corpus.tare))
+        hand = hand_signal(recording, Tare.parse(corpus.tare))
         fingers = {
             name: (_without_readings(signal), recording.modules[name].label_states)
             for name, signal in hand.fingers.items()

@@ -19,7 +19,7 @@ from holdfast.plots.envelope import envelope
 from holdfast.plots.recording import COMPONENT_COLOURS
 from holdfast.recordings import Recording
 from holdfast.sensors.values import Array
-from holdfast.study.methods import signal_of
+from holdfast.study.methods import hand_signal
 from holdfast.study.report.style import INK, SMALL, add_labels, add_legend, sheet, tidy
 
 Codes = npt.NDArray[np.integer[Any]]
@@ -88,7 +88,7 @@ def trace_of(recording: Recording, finger: str, tare: Tare, window: int = 14) ->
         tare: how the baseline is found.
         window: N_w [samples].
     """
-    signal = signal_of(recording, tare, (finger,)).fingers[finger]
+    signal = hand_signal(recording, tare, (finger,)).fingers[finger]
     features = haar_features(signal.force, window)
     truth = recording.truth
     phases = np.full(len(signal.times), "")

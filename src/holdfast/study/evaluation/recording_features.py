@@ -13,13 +13,13 @@ from holdfast.metrics.decisions import Codes
 from holdfast.recordings import Recording, Truth, label_states
 from holdfast.sensors.values import Array
 from holdfast.study.corpus import Corpus
-from holdfast.study.evaluation.changes import Change, relabelled
-from holdfast.study.methods import HAND, Method, signal_of
+from holdfast.study.evaluation.variation import Variation, relabelled
+from holdfast.study.methods import HAND, Method, hand_signal
 from holdfast.training.design import rest_moments
 
 
 @dataclass(frozen=True, eq=False)
-class Seen:
+class RecordingFeatures:
     """One recording as a method sees it.
 
     Attributes:
@@ -68,7 +68,9 @@ class Seen:
         return hand.labels[np.searchsorted(hand.times, next(iter(self.times.values())))]
 
 
-def look(method: Method, corpus: Corpus, change: Change, stride: int = 1) -> list[Seen]:
+def corpus_features(
+    method: Method, corpus: Corpus, change: Variation, stride: int = 1
+) -> list[RecordingFeatures]:
     """The recordings of a corpus that have its fingers, as a method sees them.
 
     Args:
@@ -79,7 +81,7 @@ def look(method: Method, corpus: Corpus, change: Change, stride: int = 1) -> lis
     """
     seen = []
     for recording in corpus.load():
-        changed = change.of(recording)
+        changed = change.apply(recording)
         fingers = _fingers(corpus, changed)
         if fingers:
             seen.append(_look(method, corpus, changed, fingers, stride))
@@ -93,8 +95,8 @@ def _fingers(corpus: Corpus, recording: Recording) -> tuple[str, ...]:
 
 def _look(
     method: Method, corpus: Corpus, recording: Recording, fingers: Sequence[str], stride: int
-) -> Seen:
-    hand = signal_of(recording, Tare.parse(corpus.tare), tuple(fingers))
+) -> RecordingFeatures:
+    hand = hand_signal(recording, Tare.parse(corpus.tare), tuple(fingers))
     modules = {name: recording.modules[name] for name in fingers}
     rested = modules if hand.tare.without_contact else {}
     held = recording.metadata.get("object")
@@ -102,7 +104,7 @@ def _look(
         unit: np.asarray(rows[::stride], dtype=np.float32)
         for unit, rows in method.features(hand).items()
     }
-    return Seen(
+    return RecordingFeatures(
         name=recording.name,
         object=None if held is None else str(held),
         truth=recording.truth,

@@ -5,7 +5,12 @@ import pytest
 
 from holdfast.contact import STABLE, UNSTABLE
 from holdfast.metrics import FingerDecisions
-from holdfast.study.evaluation.hearing import Spell, after_glitch, hear, spells_of
+from holdfast.study.evaluation.alarm_statistics import (
+    SlipInterval,
+    alarm_statistics,
+    find_slips,
+    follows_jump,
+)
 from study.told import GLITCH, truth_of
 
 TIMES = np.arange(1725) / 150
@@ -23,25 +28,27 @@ def where(*spans):
 
 
 def test_a_slip_begins_after_half_a_second_of_rest():
-    (slip,) = spells_of(TRUTH)
+    (slip,) = find_slips(TRUTH)
     assert slip.onset == pytest.approx(5.6)
     assert slip.end == pytest.approx(5.9 - 1 / 150)
-    assert spells_of(None) == []
+    assert find_slips(None) == []
 
 
 def test_latency_of_a_slip_counts_from_its_onset():
-    spell = Spell(5.6, 5.9)
+    slip = SlipInterval(5.6, 5.9)
     labels = where((5.3, 6.5))
     cases = {(5.65, 5.7): 0.05, (5.0, 5.61): 0.0, (5.95, 6.5): math.inf, (5.88, 6.0): 0.28}
     for span, latency in cases.items():
-        heard = hear(hand(labels, where(span)), TRUTH, [spell])
+        heard = alarm_statistics(hand(labels, where(span)), TRUTH, [slip])
         assert heard.slips == [pytest.approx(latency, abs=0.007)]
-    assert hear(hand(labels, where((5.64, 5.7))), TRUTH, [spell]).n_found(0.05) == 1
-    assert hear(hand(labels, where((5.66, 5.7))), TRUTH, [spell]).n_found(0.05) == 0
+    assert alarm_statistics(hand(labels, where((5.64, 5.7))), TRUTH, [slip]).n_found(0.05) == 1
+    assert alarm_statistics(hand(labels, where((5.66, 5.7))), TRUTH, [slip]).n_found(0.05) == 0
 
 
 def test_a_short_slip_may_be_told_until_a_fifth_of_a_second():
-    heard = hear(hand(where((5.3, 6.5)), where((5.78, 6.0))), TRUTH, [Spell(5.6, 5.62)])
+    heard = alarm_statistics(
+        hand(where((5.3, 6.5)), where((5.78, 6.0))), TRUTH, [SlipInterval(5.6, 5.62)]
+    )
     assert heard.n_found(0.2) == 1
     assert heard.n_found(0.1) == 0
 
@@ -50,9 +57,9 @@ def test_alarms_in_vain_are_told_apart():
     """One in a calm hold, one just after the glitch, one while nothing is known of stability."""
     labels = where((0.0, 2.0), (5.3, 6.5))
     states = where((0.5, 0.6), (3.0, 3.1), (5.32, 6.5), (GLITCH + 0.05, GLITCH + 0.1))
-    heard = hear(hand(labels, states), TRUTH, [])
+    heard = alarm_statistics(hand(labels, states), TRUTH, [])
     assert heard.delays == [pytest.approx(0.02)]
-    assert (heard.false_alarms, heard.under_stable, heard.after_glitch) == (3, 2, 1)
+    assert (heard.false_alarms, heard.under_stable, heard.follows_jump) == (3, 2, 1)
     assert heard.stable_seconds == pytest.approx(1725 / 150 - 3.2)
     assert heard.n_missed(0.05) == 0
     assert heard.n_doubted == 15 + 7
@@ -61,5 +68,5 @@ def test_alarms_in_vain_are_told_apart():
 
 def test_a_glitch_is_felt_for_a_tenth_of_a_second():
     times = np.array([GLITCH - 0.01, GLITCH, GLITCH + 0.1, GLITCH + 0.11])
-    assert after_glitch(times, TRUTH).tolist() == [False, True, True, False]
-    assert not after_glitch(times, None).any()
+    assert follows_jump(times, TRUTH).tolist() == [False, True, True, False]
+    assert not follows_jump(times, None).any()

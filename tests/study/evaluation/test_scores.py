@@ -2,13 +2,13 @@ import numpy as np
 import pytest
 
 from holdfast.contact import NO_CONTACT, STABLE, UNKNOWN, UNSTABLE
-from holdfast.study.evaluation.opinion import Score
+from holdfast.study.evaluation.scores import HandScores
 
 
 def score(least, known=None, alone=None, rate=100.0):
     least = np.array(least, dtype=float)
     n = len(least)
-    return Score(
+    return HandScores(
         times=np.arange(n) / rate,
         least=least,
         known=np.ones(n, dtype=bool) if known is None else np.array(known, dtype=bool),

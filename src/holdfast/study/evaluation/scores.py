@@ -1,4 +1,4 @@
-"""What an expert thinks of one recording, and what is decided from it at any threshold.
+"""What an fitted thinks of one recording, and what is decided from it at any threshold.
 
 A finger in contact is stable where its margin, the log odds of stability over the threshold of
 its classifier, is at least the shift. A hand is not stable where a finger is not: so of a hand
@@ -15,14 +15,14 @@ from holdfast.contact import NO_CONTACT, STABLE, UNKNOWN, UNSTABLE
 from holdfast.metrics import Decisions, FingerDecisions
 from holdfast.metrics.decisions import Codes
 from holdfast.sensors.values import Array
-from holdfast.study.evaluation.seen import Seen
+from holdfast.study.evaluation.recording_features import RecordingFeatures
 from holdfast.study.methods import HAND
 
 Mask = npt.NDArray[np.bool_]
 
 
 @dataclass(frozen=True, eq=False)
-class Score:
+class HandScores:
     """A hand over a recording, before a threshold decides.
 
     Attributes:
@@ -51,7 +51,7 @@ class Score:
         states = np.select([c for c, _ in choices], [s for _, s in choices], default=STABLE)
         return states.astype(np.int8)
 
-    def held(self, seconds: float) -> "Score":
+    def held(self, seconds: float) -> "HandScores":
         """The score of a hand that goes on not to be stable for a while, as `Debounce.hold` does.
 
         Not where too few fingers are in contact, nor where a finger is not known.
@@ -66,14 +66,14 @@ class Score:
         least = np.lib.stride_tricks.sliding_window_view(padded, n).min(axis=1)
         return replace(self, least=np.where(self.alone | ~self.known, self.least, least))
 
-    def hand(self, labels: Codes, shift: float = 0.0) -> FingerDecisions:
+    def decide(self, labels: Codes, shift: float = 0.0) -> FingerDecisions:
         """The hand's decisions beside those labels."""
         return FingerDecisions(self.times, labels, self.states(shift), self.probability)
 
 
 @dataclass(frozen=True, eq=False)
-class Opinion:
-    """What an expert thinks of one recording.
+class RecordingScores:
+    """What an fitted thinks of one recording.
 
     Attributes:
         margins: of each unit, (n,) log odds of stability over its own threshold; NaN where
@@ -86,12 +86,12 @@ class Opinion:
     thresholds: Mapping[str, float]
     touching: Mapping[str, Mask]
 
-    def decisions(self, seen: Seen, labels: Mapping[str, Codes]) -> Decisions:
+    def decide(self, seen: RecordingFeatures, labels: Mapping[str, Codes]) -> Decisions:
         """The decisions of the fingers at their own thresholds beside those labels, and the hand's.
 
         A method that judges the hand as a whole has no fingers there.
         """
-        hand = self.score(seen).hand(seen.hand(labels).labels)
+        hand = self.hand(seen).decide(seen.hand(labels).labels)
         if HAND in self.margins:
             return Decisions(seen.name, {}, hand)
         fingers = {
@@ -100,7 +100,7 @@ class Opinion:
         }
         return Decisions(seen.name, fingers, hand)
 
-    def score(self, seen: Seen) -> Score:
+    def hand(self, seen: RecordingFeatures) -> HandScores:
         """The hand, at every time of any finger; each holds its last sample."""
         times = np.unique(np.concatenate(list(seen.times.values())))
         held = {f: np.searchsorted(own, times, side="right") - 1 for f, own in seen.times.items()}
@@ -120,7 +120,7 @@ class Opinion:
             started = np.array([at >= 0 for at in held.values()])
         told = touching & ~np.isnan(margins)
         none = np.where(told.any(axis=0), 0.0, np.nan)
-        return Score(
+        return HandScores(
             times=times,
             least=np.where(told, margins, np.inf).min(axis=0),
             known=np.all(started & ~np.isnan(margins), axis=0),
@@ -128,7 +128,7 @@ class Opinion:
             probability=np.where(alone, 0.0, np.where(told, probability, 1.0).min(axis=0) + none),
         )
 
-    def _finger(self, seen: Seen, finger: str) -> tuple[Array, Array]:
+    def _finger(self, seen: RecordingFeatures, finger: str) -> tuple[Array, Array]:
         """Margins and probabilities of a finger; NaN where its classifier is missing."""
         nothing = np.full(len(seen.times[finger]), np.nan)
         margins = self.margins.get(finger, nothing)

@@ -3,18 +3,18 @@
 from collections.abc import Callable, Iterator, Sequence
 
 from holdfast.metrics.events import POSTS
-from holdfast.study.comparison.figuring import count_row, quantile_row, ratio_row
 from holdfast.study.comparison.jobs import SPLITS, Results, found, titles
-from holdfast.study.evaluation.hearing import AFTER_GLITCH, Heard
-from holdfast.study.evaluation.judge import COMPARED_AT, HOLD, Judged
+from holdfast.study.comparison.rows import count_row, quantile_row, ratio_row
+from holdfast.study.evaluation.alarm_statistics import AFTER_GLITCH, AlarmStatistics
+from holdfast.study.evaluation.evaluate_method import COMPARED_RATE, HOLD_TIME, MethodEvaluation
 from holdfast.study.plan import Plan
 from holdfast.study.report.tables import Key, Row, Table
 
-THRESHOLDS: dict[str, Callable[[Judged], list[Heard]]] = {
+THRESHOLDS: dict[str, Callable[[MethodEvaluation], list[AlarmStatistics]]] = {
     "own": lambda judged: judged.own,
-    f"own, held {HOLD:g} s": lambda judged: judged.held,
-    f"for {COMPARED_AT:g}/min": lambda judged: judged.calm,
-    f"for {COMPARED_AT:g}/min, jumps apart": lambda judged: judged.spared,
+    f"own, held {HOLD_TIME:g} s": lambda judged: judged.held,
+    f"for {COMPARED_RATE:g}/min": lambda judged: judged.calm,
+    f"for {COMPARED_RATE:g}/min, jumps apart": lambda judged: judged.spared,
 }
 OF_SLIPS = tuple(THRESHOLDS)[1:]
 SHOWN = ("recording", "object", "others")
@@ -35,9 +35,9 @@ def events(plan: Plan, results: Results) -> Table:
         "Of the hand, by labels without margin. An event: a hold of half a second that ends; an "
         "alarm: the hand is stable no more. Missed: no alarm until that long after the onset; a "
         "missed event counts as infinitely late. Thresholds: the method's own, sample by sample; "
-        f"the same where not stable is told for {HOLD:g} s more, so that one disturbance is one "
-        "alarm; and, held as long, the most "
-        f"watchful one that gives {COMPARED_AT:g} false alarm per minute under a stable label in "
+        f"the same where not stable is told for {HOLD_TIME:g} s more, so that one disturbance is "
+        "one alarm; and, held as long, the most "
+        f"watchful one that gives {COMPARED_RATE:g} false alarm per minute under a stable label in "
         "training, each training recording judged without itself; 'jumps apart': those right "
         "after a jump of the controller's set point not counted in choosing it. In vain, per "
         "minute of stable "
@@ -68,7 +68,7 @@ def slips(plan: Plan, results: Results) -> Table:
         "half a second, in a hand that holds it. Found: the hand is not called stable at some "
         "sample from the onset on, until that late; being so already, from what led to the slip, "
         "counts. So the share of stable samples that are not called stable stands beside it. "
-        f"Thresholds: for {COMPARED_AT:g} false alarm per minute under a stable label in "
+        f"Thresholds: for {COMPARED_RATE:g} false alarm per minute under a stable label in "
         "training; 'jumps apart': those right after a jump of the controller's set point not "
         "counted in choosing it."
     )
@@ -78,7 +78,7 @@ def slips(plan: Plan, results: Results) -> Table:
 
 def _lines(
     plan: Plan, results: Results, thresholds: Sequence[str], shown: Sequence[str]
-) -> Iterator[tuple[Keys, list[Heard]]]:
+) -> Iterator[tuple[Keys, list[AlarmStatistics]]]:
     for name, title in titles(plan).items():
         for key, judged in found(plan, results, name):
             if key not in shown:
@@ -93,26 +93,26 @@ def _of_events(plan: Plan) -> tuple[str, ...]:
     return "recording", "others" if "others" in plan.corpora else "object"
 
 
-def _missed(keys: Keys, heard: Sequence[Heard], seed: int) -> Iterator[Row]:
+def _missed(keys: Keys, heard: Sequence[AlarmStatistics], seed: int) -> Iterator[Row]:
     n = [len(each.delays) for each in heard]
     for post in POSTS:
         about = keys | {"figure": f"missed at {1000 * post:.0f} ms [%]"}
         yield ratio_row(about, [each.n_missed(post) for each in heard], n, seed)
 
 
-def _delays(keys: Keys, heard: Sequence[Heard], seed: int) -> Iterator[Row]:
+def _delays(keys: Keys, heard: Sequence[AlarmStatistics], seed: int) -> Iterator[Row]:
     delays = [each.delays for each in heard]
     yield quantile_row(keys | {"figure": "delay median [s]"}, delays, 0.5, seed)
     yield quantile_row(keys | {"figure": "delay 95 % [s]"}, delays, 0.95, seed)
 
 
-def _in_vain(keys: Keys, heard: Sequence[Heard], seed: int) -> Iterator[Row]:
+def _in_vain(keys: Keys, heard: Sequence[AlarmStatistics], seed: int) -> Iterator[Row]:
     minutes = [each.stable_seconds / 60 for each in heard]
     counts = {
         "in vain per minute": [each.false_alarms for each in heard],
         UNDER_STABLE: [each.under_stable for each in heard],
-        "after a jump": [each.after_glitch for each in heard],
-        "the rest": [each.under_stable - each.after_glitch for each in heard],
+        "after a jump": [each.follows_jump for each in heard],
+        "the rest": [each.under_stable - each.follows_jump for each in heard],
     }
     for figure, count in counts.items():
         yield ratio_row(keys | {"figure": figure}, count, minutes, seed, scale=1.0)

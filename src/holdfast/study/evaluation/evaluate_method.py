@@ -15,28 +15,41 @@ import numpy.typing as npt
 
 from holdfast.metrics import Decisions, Metrics, summarise
 from holdfast.study.corpus import Corpus
-from holdfast.study.evaluation.changes import Change
-from holdfast.study.evaluation.counting import Breakdown, calibration_counts, count
-from holdfast.study.evaluation.expert import Expert, Material, material_of
-from holdfast.study.evaluation.hearing import Heard, after_glitch, hear, spells_of
-from holdfast.study.evaluation.opinion import Opinion
-from holdfast.study.evaluation.seen import Seen, look
-from holdfast.study.evaluation.thresholds import Calm, shift_for
+from holdfast.study.evaluation.alarm_statistics import (
+    AlarmStatistics,
+    alarm_statistics,
+    find_slips,
+    follows_jump,
+)
+from holdfast.study.evaluation.error_breakdown import (
+    ErrorBreakdown,
+    break_down_errors,
+    calibration_counts,
+)
+from holdfast.study.evaluation.fitted_method import (
+    FittedMethod,
+    TrainingSamples,
+    gather_training_samples,
+)
+from holdfast.study.evaluation.recording_features import RecordingFeatures, corpus_features
+from holdfast.study.evaluation.scores import RecordingScores
+from holdfast.study.evaluation.thresholds import FalseAlarmRanges, threshold_shift
+from holdfast.study.evaluation.variation import Variation
 from holdfast.study.methods import HAND, METHODS, Method
 from holdfast.study.methods.cuts import CUTS
 
-ALARM_RATES = (0.5, 1.0, 2.0, 5.0, 10.0, 20.0, 50.0)
+FALSE_ALARM_RATES = (0.5, 1.0, 2.0, 5.0, 10.0, 20.0, 50.0)
 """False alarms per minute of stable label that thresholds are chosen for, in training."""
-COMPARED_AT = 1.0
+COMPARED_RATE = 1.0
 """The rate that methods are compared at."""
-HOLD = 0.1
+HOLD_TIME = 0.1
 """For how long a hand goes on not to be stable at those thresholds, so that one disturbance is
 one alarm, whatever the method [s]."""
 
 Split = Literal["recording", "object"]
 
 
-class Effort(msgspec.Struct, frozen=True):
+class EvaluationEffort(msgspec.Struct, frozen=True):
     """How thoroughly a method is judged.
 
     Attributes:
@@ -52,7 +65,7 @@ class Effort(msgspec.Struct, frozen=True):
     max_rows: int = 20_000
 
 
-class Job(msgspec.Struct, frozen=True):
+class EvaluationJob(msgspec.Struct, frozen=True):
     """What is judged.
 
     Attributes:
@@ -69,12 +82,12 @@ class Job(msgspec.Struct, frozen=True):
     train: Corpus
     splits: tuple[Split, ...] = ("recording",)
     tests: tuple[Corpus, ...] = ()
-    change: Change = Change()
-    effort: Effort = Effort()
+    change: Variation = Variation()
+    effort: EvaluationEffort = EvaluationEffort()
     seed: int = 0
 
 
-class Judged(msgspec.Struct, frozen=True):
+class MethodEvaluation(msgspec.Struct, frozen=True):
     """What was counted.
 
     Attributes:
@@ -82,8 +95,8 @@ class Judged(msgspec.Struct, frozen=True):
         fingers: by sample, at the method's own threshold; None of a method for whole hands.
         hand: the same of the hand.
         own: its alarms, by exact labels, at the same threshold, of each recording.
-        held: the same, held for `HOLD`.
-        curve: the same, held, at thresholds for each of `ALARM_RATES`.
+        held: the same, held for `HOLD_TIME`.
+        curve: the same, held, at thresholds for each of `FALSE_ALARM_RATES`.
         spared: the same, held, at thresholds for one false alarm per minute, where those right
             after a jump of the controller's set point are not counted.
         breakdown: of errors at the method's own threshold, of each recording.
@@ -94,11 +107,11 @@ class Judged(msgspec.Struct, frozen=True):
     names: list[str]
     fingers: Metrics | None
     hand: Metrics
-    own: list[Heard]
-    held: list[Heard]
-    curve: list[list[Heard]]
-    spared: list[Heard]
-    breakdown: list[Breakdown]
+    own: list[AlarmStatistics]
+    held: list[AlarmStatistics]
+    curve: list[list[AlarmStatistics]]
+    spared: list[AlarmStatistics]
+    breakdown: list[ErrorBreakdown]
     calibration: list[list[list[float]]]
 
     @property
@@ -107,33 +120,33 @@ class Judged(msgspec.Struct, frozen=True):
         return self.fingers or self.hand
 
     @property
-    def calm(self) -> list[Heard]:
+    def calm(self) -> list[AlarmStatistics]:
         """At the threshold that methods are compared at."""
-        return self.curve[ALARM_RATES.index(COMPARED_AT)]
+        return self.curve[FALSE_ALARM_RATES.index(COMPARED_RATE)]
 
 
-class Fold(NamedTuple):
+class FittedFold(NamedTuple):
     """A fit and its thresholds.
 
     Attributes:
-        expert: fitted to all training recordings.
-        shifts: of its threshold, for each of `ALARM_RATES`, and for the one that is compared
+        fitted: fitted to all training recordings.
+        shifts: of its threshold, for each of `FALSE_ALARM_RATES`, and for the one that is compared
             with alarms spared.
     """
 
-    expert: Expert
+    fitted: FittedMethod
     shifts: Sequence[float]
 
 
-class Case(NamedTuple):
+class ScoredRecording(NamedTuple):
     """A recording that was judged: what was seen, what was thought of it, and the thresholds."""
 
-    seen: Seen
-    opinion: Opinion
+    seen: RecordingFeatures
+    scores: RecordingScores
     shifts: Sequence[float]
 
 
-def judge(job: Job) -> dict[str, Judged]:
+def evaluate_method(job: EvaluationJob) -> dict[str, MethodEvaluation]:
     """What the method is worth by each split, and on each other corpus.
 
     A split by object is left out where there are fewer than two, or not all are known.
@@ -144,17 +157,17 @@ def judge(job: Job) -> dict[str, Judged]:
     Raises:
         TrainingError: a whole-hand method gets too few fingers.
     """
-    return {key: judged_of(cases) for key, cases in cases_of(job) if cases}
+    return {key: summarise_recordings(cases) for key, cases in scored_recordings(job) if cases}
 
 
-def cases_of(job: Job) -> Iterator[tuple[str, list[Case]]]:
+def scored_recordings(job: EvaluationJob) -> Iterator[tuple[str, list[ScoredRecording]]]:
     """By split, or corpus, the recordings and what was thought of them, in order."""
-    method = method_called(job.method)
-    recordings = look(method, job.train, job.change, job.effort.stride)
-    material = material_of(recordings, job.effort.max_rows)
+    method = find_method(job.method)
+    recordings = corpus_features(method, job.train, job.change, job.effort.stride)
+    material = gather_training_samples(recordings, job.effort.max_rows)
     everyone = frozenset(range(len(recordings)))
     for split in job.splits:
-        cases: dict[int, Case] = {}
+        cases: dict[int, ScoredRecording] = {}
         for held in held_out(material.objects, split, job.effort.folds, job.seed):
             fold = _fold(job, method, material, recordings, everyone - held)
             cases |= {place: _case(fold, recordings[place]) for place in held}
@@ -162,11 +175,11 @@ def cases_of(job: Job) -> Iterator[tuple[str, list[Case]]]:
     if job.tests:
         fold = _fold(job, method, material, recordings, everyone)
         for corpus in job.tests:
-            tested = look(method, corpus, job.change, job.effort.stride)
+            tested = corpus_features(method, corpus, job.change, job.effort.stride)
             yield corpus.name, [_case(fold, seen) for seen in tested]
 
 
-def method_called(name: str) -> Method:
+def find_method(name: str) -> Method:
     """The method of that name, also of those that the study has for one question alone."""
     return METHODS[name] if name in METHODS else CUTS[name]
 
@@ -203,68 +216,75 @@ def groups_of(objects: Sequence[str | None], n_groups: int, seed: int) -> npt.ND
 
 
 def _fold(
-    job: Job,
+    job: EvaluationJob,
     method: Method,
-    material: Material,
-    recordings: Sequence[Seen],
+    material: TrainingSamples,
+    recordings: Sequence[RecordingFeatures],
     training: frozenset[int],
-) -> Fold:
+) -> FittedFold:
     """The fit to the training recordings; nothing else is looked at."""
     places = sorted(training)
     objects = [material.objects[place] for place in places]
     n_inner = min(job.effort.inner, len(places))
-    calms: list[tuple[Calm, Calm]] = []
+    calms: list[tuple[FalseAlarmRanges, FalseAlarmRanges]] = []
     for held in held_out(objects, "recording", n_inner, job.seed + 1) if n_inner > 1 else ():
         left_out = {places[k] for k in held}
-        inner = Expert.fit(method, material, training - left_out, job.seed)
+        inner = FittedMethod.fit(method, material, training - left_out, job.seed)
         calms += [_calm(inner, recordings[place]) for place in sorted(left_out)]
-    return Fold(Expert.fit(method, material, training, job.seed), _shifts(calms))
+    return FittedFold(FittedMethod.fit(method, material, training, job.seed), _shifts(calms))
 
 
-def _calm(expert: Expert, seen: Seen) -> tuple[Calm, Calm]:
+def _calm(
+    fitted: FittedMethod, seen: RecordingFeatures
+) -> tuple[FalseAlarmRanges, FalseAlarmRanges]:
     """What tells its false alarms: of all, and of those that no jump of the set point caused."""
-    score, labels = expert.opinion(seen).score(seen).held(HOLD), seen.hand(seen.exact).labels
-    spared = after_glitch(score.times, seen.truth)
-    return Calm.of(score, labels), Calm.of(score, labels, spared)
+    score, labels = fitted.scores(seen).hand(seen).held(HOLD_TIME), seen.hand(seen.exact).labels
+    spared = follows_jump(score.times, seen.truth)
+    return FalseAlarmRanges.of(score, labels), FalseAlarmRanges.of(score, labels, spared)
 
 
-def _shifts(calms: Sequence[tuple[Calm, Calm]]) -> list[float]:
+def _shifts(calms: Sequence[tuple[FalseAlarmRanges, FalseAlarmRanges]]) -> list[float]:
     if not calms:
-        return [0.0] * (1 + len(ALARM_RATES))
+        return [0.0] * (1 + len(FALSE_ALARM_RATES))
     every, spared = zip(*calms, strict=True)
-    return [*(shift_for(every, rate) for rate in ALARM_RATES), shift_for(spared, COMPARED_AT)]
+    return [
+        *(threshold_shift(every, rate) for rate in FALSE_ALARM_RATES),
+        threshold_shift(spared, COMPARED_RATE),
+    ]
 
 
-def _case(fold: Fold, seen: Seen) -> Case:
-    return Case(replace(seen, features={}), fold.expert.opinion(seen), fold.shifts)
+def _case(fold: FittedFold, seen: RecordingFeatures) -> ScoredRecording:
+    return ScoredRecording(replace(seen, features={}), fold.fitted.scores(seen), fold.shifts)
 
 
-def judged_of(cases: Sequence[Case]) -> Judged:
+def summarise_recordings(cases: Sequence[ScoredRecording]) -> MethodEvaluation:
     """What is counted of the recordings that were judged."""
-    own = [case.opinion.decisions(case.seen, case.seen.labels) for case in cases]
+    own = [case.scores.decide(case.seen, case.seen.labels) for case in cases]
     heard = [list(_heard(case)) for case in cases]
-    return Judged(
+    return MethodEvaluation(
         names=[case.seen.name for case in cases],
         fingers=summarise(own) if any(each.fingers for each in own) else None,
         hand=summarise(_hands(own)),
         own=[each[0] for each in heard],
         held=[each[1] for each in heard],
-        curve=[[each[2 + k] for each in heard] for k in range(len(ALARM_RATES))],
+        curve=[[each[2 + k] for each in heard] for k in range(len(FALSE_ALARM_RATES))],
         spared=[each[-1] for each in heard],
-        breakdown=[count(case.seen, each) for case, each in zip(cases, own, strict=True)],
+        breakdown=[
+            break_down_errors(case.seen, each) for case, each in zip(cases, own, strict=True)
+        ],
         calibration=[calibration_counts(each) for each in own],
     )
 
 
-def _heard(case: Case) -> Iterator[Heard]:
+def _heard(case: ScoredRecording) -> Iterator[AlarmStatistics]:
     """Its alarms at its own threshold, then held: at its own, and at each that was chosen."""
-    seen, opinion, shifts = case
-    score, labels = opinion.score(seen), seen.hand(seen.exact).labels
-    spells = spells_of(seen.truth)
-    yield hear(score.hand(labels), seen.truth, spells)
-    held = score.held(HOLD)
+    seen, scores, shifts = case
+    score, labels = scores.hand(seen), seen.hand(seen.exact).labels
+    slips = find_slips(seen.truth)
+    yield alarm_statistics(score.decide(labels), seen.truth, slips)
+    held = score.held(HOLD_TIME)
     for shift in (0.0, *shifts):
-        yield hear(held.hand(labels, shift), seen.truth, spells)
+        yield alarm_statistics(held.decide(labels, shift), seen.truth, slips)
 
 
 def _hands(decided: Iterable[Decisions]) -> Iterator[Decisions]:

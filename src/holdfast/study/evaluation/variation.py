@@ -10,7 +10,7 @@ from holdfast.recordings import Recording, Tactile
 from holdfast.twin.labels import LabelRule, labels_from_truth
 
 
-class Change(msgspec.Struct, frozen=True):
+class Variation(msgspec.Struct, frozen=True):
     """How recordings are changed; nothing is, by default.
 
     Attributes:
@@ -25,11 +25,11 @@ class Change(msgspec.Struct, frozen=True):
     every: int = 1
     margin: float | None = None
 
-    def of(self, recording: Recording) -> Recording:
+    def apply(self, recording: Recording) -> Recording:
         """The recording, changed; the same whenever it is asked for."""
         if self.margin is not None:
             recording = relabelled(recording, self.margin)
-        if self == Change(margin=self.margin):
+        if self == Variation(margin=self.margin):
             return recording
         seed = zlib.crc32(recording.name.encode())
         modules = {

@@ -6,8 +6,8 @@ import pytest
 from holdfast.contact import STABLE, UNKNOWN, UNSTABLE
 from holdfast.metrics import Decisions, FingerDecisions
 from holdfast.recordings import Truth
-from holdfast.study.evaluation.counting import calibration_counts, count
-from holdfast.study.evaluation.seen import Seen
+from holdfast.study.evaluation.error_breakdown import break_down_errors, calibration_counts
+from holdfast.study.evaluation.recording_features import RecordingFeatures
 from study.told import PUSH, truth_of
 
 TIMES = np.arange(1725) / 150
@@ -16,7 +16,7 @@ LABELS = np.where((TIMES >= 5.3 - 1e-9) & (TIMES < 6.5), UNSTABLE, LABELS).astyp
 
 
 def seen_with(truth):
-    return Seen("one", None, truth, {}, {}, {}, {}, {}, {})
+    return RecordingFeatures("one", None, truth, {}, {}, {}, {}, {}, {})
 
 
 def decided(states, names=("thumb", "index")):
@@ -26,7 +26,7 @@ def decided(states, names=("thumb", "index")):
 
 def told(states, truth=None, names=("thumb", "index")):
     truth = truth or truth_of(TIMES, ("thumb", "index"))
-    return count(seen_with(truth), decided(states, names))
+    return break_down_errors(seen_with(truth), decided(states, names))
 
 
 def test_everything_called_stable():
@@ -68,7 +68,7 @@ def test_a_judge_of_hands_has_phases_and_pushes_but_no_grips():
 
 
 def test_nothing_is_counted_where_the_truth_is_not_known():
-    found = count(seen_with(None), decided(np.full(1725, STABLE)))
+    found = break_down_errors(seen_with(None), decided(np.full(1725, STABLE)))
     assert (found.phases, found.grips, found.pushes) == ({}, [], [])
 
 

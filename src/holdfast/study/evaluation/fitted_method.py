@@ -1,4 +1,4 @@
-"""A method fitted to some recordings of a corpus, asked for its opinion of others."""
+"""A method fitted to some recordings of a corpus, asked for its scores of others."""
 
 from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass
@@ -10,8 +10,8 @@ import numpy.typing as npt
 from holdfast.classifiers import Classifier, Samples
 from holdfast.contact import STABLE, UNKNOWN
 from holdfast.sensors.values import Array
-from holdfast.study.evaluation.opinion import Opinion
-from holdfast.study.evaluation.seen import Seen
+from holdfast.study.evaluation.recording_features import RecordingFeatures
+from holdfast.study.evaluation.scores import RecordingScores
 from holdfast.study.methods import Method
 from holdfast.training.design import contact_threshold
 
@@ -23,7 +23,7 @@ SURE = 1e-12
 
 
 @dataclass(frozen=True, eq=False)
-class Material:
+class TrainingSamples:
     """What a method can be fitted to.
 
     Attributes:
@@ -37,7 +37,9 @@ class Material:
     objects: tuple[str | None, ...]
 
 
-def material_of(recordings: Sequence[Seen], max_rows: int = MAX_ROWS) -> Material:
+def gather_training_samples(
+    recordings: Sequence[RecordingFeatures], max_rows: int = MAX_ROWS
+) -> TrainingSamples:
     """What can be learned from those recordings: a bounded number of their samples.
 
     A hand that lacks a finger gives a method for whole hands nothing to learn.
@@ -58,10 +60,10 @@ def material_of(recordings: Sequence[Seen], max_rows: int = MAX_ROWS) -> Materia
         for finger, moments in seen.at_rest.items():
             at_rest[finger][place] = moments
     samples = {unit: _stack(pile) for unit, pile in piles.items()}
-    return Material(samples, at_rest, tuple(seen.object for seen in recordings))
+    return TrainingSamples(samples, at_rest, tuple(seen.object for seen in recordings))
 
 
-def _widths(recordings: Sequence[Seen]) -> dict[str, int]:
+def _widths(recordings: Sequence[RecordingFeatures]) -> dict[str, int]:
     """How many features each unit has: the most that a recording gives."""
     widths: dict[str, int] = {}
     for seen in recordings:
@@ -85,7 +87,7 @@ def _stack(pile: Sequence[Samples]) -> Samples:
 
 
 @dataclass(frozen=True, eq=False)
-class Expert:
+class FittedMethod:
     """A method fitted to some recordings.
 
     Attributes:
@@ -98,9 +100,9 @@ class Expert:
 
     @classmethod
     def fit(
-        cls, method: Method, material: Material, recordings: Collection[int], seed: int
-    ) -> "Expert":
-        """The expert that those recordings make."""
+        cls, method: Method, material: TrainingSamples, recordings: Collection[int], seed: int
+    ) -> "FittedMethod":
+        """The fitted that those recordings make."""
         places = sorted(recordings)
         classifiers = {}
         for unit, samples in material.samples.items():
@@ -110,7 +112,7 @@ class Expert:
         contact = {f: contact_threshold(rows[places]) for f, rows in material.at_rest.items()}
         return cls(classifiers, contact)
 
-    def opinion(self, seen: Seen) -> Opinion:
+    def scores(self, seen: RecordingFeatures) -> RecordingScores:
         """What it thinks of a recording; nothing of a unit that it has no classifier for."""
         known = {unit: rows for unit, rows in seen.features.items() if self._fits(unit, rows)}
         own = {unit: float(_log_odds(self.classifiers[unit].threshold)) for unit in known}
@@ -126,7 +128,7 @@ class Expert:
                 name: ~(amplitude < (self.contact.get(name) or 0.0))
                 for name, amplitude in seen.amplitude.items()
             }
-        return Opinion(margins, own, touching)
+        return RecordingScores(margins, own, touching)
 
     def _fits(self, unit: str, rows: Array) -> bool:
         classifier = self.classifiers.get(unit)

@@ -2,14 +2,14 @@
 
 from collections.abc import Iterator
 
-from holdfast.study.comparison.figuring import (
+from holdfast.study.comparison.jobs import PAPER, SPLITS, Results, found, network_note, titles
+from holdfast.study.comparison.rows import (
     DIGITS,
     calibration_row,
     difference_row,
     sample_rows,
 )
-from holdfast.study.comparison.jobs import PAPER, SPLITS, Results, found, network_note, titles
-from holdfast.study.evaluation.judge import Judged
+from holdfast.study.evaluation.evaluate_method import MethodEvaluation
 from holdfast.study.methods import METHODS
 from holdfast.study.paper import printed
 from holdfast.study.paper.counts import Counts, figures
@@ -118,7 +118,7 @@ def _pooled(keys: dict[str, Key], counts: Counts, paper: float | None, seed: int
     return Row(keys | {"split": "random"}, row.ours, paper, row.n, row.interval)
 
 
-def _paper(plan: Plan, results: Results, key: str) -> Judged | None:
+def _paper(plan: Plan, results: Results, key: str) -> MethodEvaluation | None:
     """The paper's method on the same recordings."""
     return dict(found(plan, results, PAPER)).get(key)
 

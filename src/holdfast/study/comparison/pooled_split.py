@@ -8,10 +8,10 @@ import numpy.typing as npt
 
 from holdfast.contact import STABLE, UNKNOWN
 from holdfast.metrics import Decisions
-from holdfast.study.evaluation.counting import judged_of
-from holdfast.study.evaluation.expert import Expert, material_of
-from holdfast.study.evaluation.judge import Job, method_called
-from holdfast.study.evaluation.seen import Seen, look
+from holdfast.study.evaluation.error_breakdown import evaluated_units
+from holdfast.study.evaluation.evaluate_method import EvaluationJob, find_method
+from holdfast.study.evaluation.fitted_method import FittedMethod, gather_training_samples
+from holdfast.study.evaluation.recording_features import RecordingFeatures, corpus_features
 from holdfast.study.paper.counts import Counts
 
 FOLDS = 5
@@ -20,7 +20,7 @@ FOLDS = 5
 Mask = npt.NDArray[np.bool_]
 
 
-def judge_pooled(job: Job) -> Counts:
+def judge_pooled(job: EvaluationJob) -> Counts:
     """[TN, FP, FN, TP] of each recording, out of fold in random folds of all samples.
 
     All else is as in the honest splits, so that the difference is the split's: the contact
@@ -29,8 +29,8 @@ def judge_pooled(job: Job) -> Counts:
     Args:
         job: whose method, training corpus, change, effort and seed count.
     """
-    method = method_called(job.method)
-    recordings = look(method, job.train, job.change, job.effort.stride)
+    method = find_method(job.method)
+    recordings = corpus_features(method, job.train, job.change, job.effort.stride)
     generator = np.random.default_rng(job.seed)
     dealt = [
         {unit: generator.integers(FOLDS, size=len(rows)) for unit, rows in seen.features.items()}
@@ -41,15 +41,15 @@ def judge_pooled(job: Job) -> Counts:
         held = [{unit: each == fold for unit, each in own.items()} for own in dealt]
         kept = [{unit: each != fold for unit, each in own.items()} for own in dealt]
         training = [_only(*each) for each in zip(recordings, kept, strict=True)]
-        material = material_of(training, job.effort.max_rows)
-        expert = Expert.fit(method, material, range(len(recordings)), job.seed)
+        material = gather_training_samples(training, job.effort.max_rows)
+        fitted = FittedMethod.fit(method, material, range(len(recordings)), job.seed)
         for place, each in enumerate(zip(recordings, held, strict=True)):
             tested = _only(*each)
-            total[place] += _counts(expert.opinion(tested).decisions(tested, tested.labels))
+            total[place] += _counts(fitted.scores(tested).decide(tested, tested.labels))
     return [[int(n) for n in row] for row in total]
 
 
-def _only(seen: Seen, chosen: Mapping[str, Mask]) -> Seen:
+def _only(seen: RecordingFeatures, chosen: Mapping[str, Mask]) -> RecordingFeatures:
     """The recording with features of the chosen samples alone."""
     features = {
         unit: np.where(chosen[unit][:, None], rows, np.nan) for unit, rows in seen.features.items()
@@ -60,7 +60,7 @@ def _only(seen: Seen, chosen: Mapping[str, Mask]) -> Seen:
 def _counts(decided: Decisions) -> npt.NDArray[np.int64]:
     """(4,) TN, FP, FN, TP of the samples that are decided."""
     counts = np.zeros(4, dtype=np.int64)
-    for finger in judged_of(decided).values():
+    for finger in evaluated_units(decided).values():
         known = (finger.labels != UNKNOWN) & (finger.states != UNKNOWN)
         place = 2 * (finger.labels == STABLE) + (finger.states == STABLE)
         counts += np.bincount(place[known], minlength=4)

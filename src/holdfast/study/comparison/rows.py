@@ -9,7 +9,7 @@ from holdfast.metrics import Interval, Metrics, SampleMetrics, bootstrap_interva
 from holdfast.metrics.intervals import Statistic, quantile_of
 from holdfast.metrics.statistics import quantile
 from holdfast.sensors.values import Array
-from holdfast.study.evaluation.judge import Judged
+from holdfast.study.evaluation.evaluate_method import MethodEvaluation
 from holdfast.study.report.tables import Key, Row
 
 Keys = Mapping[str, Key]
@@ -140,7 +140,7 @@ def _difference(counts: Array) -> Statistic:
     return statistic
 
 
-def calibration_row(keys: Keys, judged: Judged, seed: int) -> Row:
+def calibration_row(keys: Keys, judged: MethodEvaluation, seed: int) -> Row:
     """How far given probabilities are from what was so, mean over samples, by ten bins."""
     table = np.array(judged.calibration, dtype=np.float64).reshape(len(judged.names), -1, 3)
     table = table[table[:, :, 2].sum(axis=1) > 0]

@@ -7,24 +7,24 @@ import pytest
 from holdfast.contact import STABLE, ContactState
 from holdfast.metrics import event_metrics
 from holdfast.recordings import Label
-from holdfast.study.comparison.leak import judge_pooled
+from holdfast.study.comparison.pooled_split import judge_pooled
 from holdfast.study.corpus import corpus_of
-from holdfast.study.evaluation.changes import Change
-from holdfast.study.evaluation.judge import (
-    ALARM_RATES,
-    Effort,
-    Job,
-    Judged,
-    cases_of,
+from holdfast.study.evaluation.evaluate_method import (
+    FALSE_ALARM_RATES,
+    EvaluationEffort,
+    EvaluationJob,
+    MethodEvaluation,
+    evaluate_method,
+    find_method,
     groups_of,
     held_out,
-    judge,
-    method_called,
+    scored_recordings,
 )
+from holdfast.study.evaluation.variation import Variation
 from study.build import synthetic, written
 from study.told import told_recording
 
-EFFORT = Effort(folds=3, inner=2, max_rows=1000)
+EFFORT = EvaluationEffort(folds=3, inner=2, max_rows=1000)
 
 
 @pytest.fixture(scope="module")
@@ -66,9 +66,10 @@ def test_what_is_judged_has_no_say_in_its_judge(tmp_path, recordings, corpus, me
     held = next(held_out([r.metadata["object"] for r in recordings], "recording", 3, 0))
     other = [turned(r) if k in held else r for k, r in enumerate(recordings)]
     turned_corpus = corpus_of("main", written(tmp_path / "main", other))
-    job = Job(method, corpus, effort=EFFORT)
+    job = EvaluationJob(method, corpus, effort=EFFORT)
     (_, cases), (_, turned_cases) = (
-        next(cases_of(each)) for each in (job, msgspec.structs.replace(job, train=turned_corpus))
+        next(scored_recordings(each))
+        for each in (job, msgspec.structs.replace(job, train=turned_corpus))
     )
     for place, (case, twin) in enumerate(zip(cases, turned_cases, strict=True)):
         assert same(case, twin) == (place in held)
@@ -89,12 +90,12 @@ def _other(state):
 
 def same(case, twin):
     margins = [
-        np.array_equal(margin, twin.opinion.margins[unit], equal_nan=True)
-        for unit, margin in case.opinion.margins.items()
+        np.array_equal(margin, twin.scores.margins[unit], equal_nan=True)
+        for unit, margin in case.scores.margins.items()
     ]
     touching = [
-        np.array_equal(touch, twin.opinion.touching[finger])
-        for finger, touch in case.opinion.touching.items()
+        np.array_equal(touch, twin.scores.touching[finger])
+        for finger, touch in case.scores.touching.items()
     ]
     return all(margins) and all(touching) and case.shifts == twin.shifts
 
@@ -102,11 +103,11 @@ def same(case, twin):
 @pytest.fixture(scope="module")
 def judged(corpus, tmp_path_factory):
     other = synthetic(tmp_path_factory.mktemp("judging-other") / "others", range(20, 23))
-    job = Job(
+    job = EvaluationJob(
         "logreg", corpus, ("recording", "object"), (corpus_of("others", other),), effort=EFFORT
     )
-    data = msgspec.msgpack.encode(judge(job))
-    return msgspec.msgpack.decode(data, type=dict[str, Judged])
+    data = msgspec.msgpack.encode(evaluate_method(job))
+    return msgspec.msgpack.decode(data, type=dict[str, MethodEvaluation])
 
 
 def test_a_job_has_a_result_for_each_split_and_each_corpus(judged, corpus):
@@ -125,10 +126,10 @@ def test_without_a_truth_there_are_no_slips_and_no_phases(judged):
 
 def test_events_are_counted_by_exact_labels(judged, corpus):
     """As `event_metrics` has them, of the hand by labels without margin."""
-    _, cases = next(cases_of(Job("logreg", corpus, effort=EFFORT)))
+    _, cases = next(scored_recordings(EvaluationJob("logreg", corpus, effort=EFFORT)))
     for case, heard in zip(cases, judged["recording"].own, strict=True):
         labels = case.seen.hand(case.seen.exact).labels
-        score = case.opinion.score(case.seen)
+        score = case.scores.hand(case.seen)
         known = event_metrics(score.times, labels, score.states())
         assert len(heard.delays) == known.n_events
         assert heard.under_stable == known.false_alarms["STABLE"]
@@ -141,7 +142,7 @@ def test_events_are_counted_by_exact_labels(judged, corpus):
 
 def test_every_rate_has_its_threshold_and_more_alarms_find_more_slips(judged):
     curve = judged["recording"].curve
-    assert len(curve) == len(ALARM_RATES)
+    assert len(curve) == len(FALSE_ALARM_RATES)
     found = [sum(heard.n_found(0.2) for heard in point) for point in curve]
     assert found == sorted(found)
 
@@ -153,7 +154,7 @@ def test_a_hand_that_is_held_gives_fewer_alarms(judged):
 
 
 def test_a_judge_of_hands_has_no_fingers(corpus):
-    found = judge(Job("jl_global_svm", corpus, effort=EFFORT))["recording"]
+    found = evaluate_method(EvaluationJob("jl_global_svm", corpus, effort=EFFORT))["recording"]
     assert found.fingers is None
     assert found.metrics is found.hand
     assert found.hand.pooled.brier is not None
@@ -164,7 +165,9 @@ def test_recordings_of_one_class_are_judged_too(tmp_path, recordings):
         {f: [Label(2.0, 9.0, ContactState.STABLE)] for f in recordings[0].modules}
     )
     folder = written(tmp_path / "main", [one, *recordings[1:4]])
-    found = judge(Job("zhang", corpus_of("main", folder), effort=EFFORT))["recording"]
+    found = evaluate_method(EvaluationJob("zhang", corpus_of("main", folder), effort=EFFORT))[
+        "recording"
+    ]
     assert len(found.names) == 4
 
 
@@ -174,7 +177,7 @@ def test_two_recordings_of_which_one_has_one_class(tmp_path, recordings):
         {f: [Label(2.0, 9.0, ContactState.STABLE)] for f in recordings[0].modules}
     )
     corpus = corpus_of("main", written(tmp_path / "main", [one, recordings[1]]))
-    found = judge(Job("logreg", corpus, effort=EFFORT))["recording"]
+    found = evaluate_method(EvaluationJob("logreg", corpus, effort=EFFORT))["recording"]
     first, second = found.fingers.recordings
     assert first.fingers["thumb"].n > 0
     assert second.fingers["thumb"].n == 0
@@ -182,7 +185,9 @@ def test_two_recordings_of_which_one_has_one_class(tmp_path, recordings):
 
 def test_a_stride_looks_at_fewer_decisions(corpus):
     every, some = (
-        judge(Job("logreg", corpus, effort=msgspec.structs.replace(EFFORT, stride=stride)))
+        evaluate_method(
+            EvaluationJob("logreg", corpus, effort=msgspec.structs.replace(EFFORT, stride=stride))
+        )
         for stride in (1, 3)
     )
     n = [each["recording"].fingers.pooled.n for each in (every, some)]
@@ -190,19 +195,21 @@ def test_a_stride_looks_at_fewer_decisions(corpus):
 
 
 def test_a_change_is_made_to_all_recordings(corpus):
-    slow = judge(Job("zhang", corpus, change=Change(every=5), effort=EFFORT))["recording"]
+    slow = evaluate_method(
+        EvaluationJob("zhang", corpus, change=Variation(every=5), effort=EFFORT)
+    )["recording"]
     assert slow.fingers.pooled.n < 6 * 2 * 1725 / 5
 
 
 def test_methods_of_one_question_are_found_too():
-    assert method_called("sigma_cut").title == "sigma of F_a"
-    assert method_called("svm").name == "svm"
+    assert find_method("sigma_cut").title == "sigma of F_a"
+    assert find_method("svm").name == "svm"
 
 
 def test_a_random_split_judges_every_sample_once(corpus):
-    job = Job("logreg", corpus, effort=EFFORT)
+    job = EvaluationJob("logreg", corpus, effort=EFFORT)
     counts = np.array(judge_pooled(job))
-    honest = judge(job)["recording"].fingers
+    honest = evaluate_method(job)["recording"].fingers
     assert counts.shape == (6, 4)
     assert counts.sum() == honest.pooled.n
     assert judge_pooled(job) == counts.tolist()

@@ -6,17 +6,17 @@ import pytest
 from holdfast.contact import NO_CONTACT, STABLE, UNKNOWN, UNSTABLE
 from holdfast.metrics import FingerDecisions, hand_decisions
 from holdfast.study.corpus import corpus_of
-from holdfast.study.evaluation.changes import Change
-from holdfast.study.evaluation.expert import Expert, material_of
-from holdfast.study.evaluation.opinion import Opinion
-from holdfast.study.evaluation.seen import Seen, look
+from holdfast.study.evaluation.fitted_method import FittedMethod, gather_training_samples
+from holdfast.study.evaluation.recording_features import RecordingFeatures, corpus_features
+from holdfast.study.evaluation.scores import RecordingScores
+from holdfast.study.evaluation.variation import Variation
 from holdfast.study.methods import HAND, METHODS
 from study.build import synthetic
 
 
 def seen_of(times):
     empty = {name: np.zeros(len(own), dtype=np.int8) for name, own in times.items()}
-    return Seen("one", None, None, times, {}, empty, empty, {}, {})
+    return RecordingFeatures("one", None, None, times, {}, empty, empty, {}, {})
 
 
 def slow_state(margin, touching, shift):
@@ -35,8 +35,8 @@ def test_a_hand_is_what_its_fingers_make_it_at_any_threshold(seed):
     for each in margins.values():
         each[generator.random(60) < 0.1] = np.nan
     touching = {f: generator.random(60) < 0.7 for f in times}
-    opinion = Opinion(margins, dict.fromkeys(times, 0.3), touching)
-    score = opinion.score(seen_of(times))
+    scores = RecordingScores(margins, dict.fromkeys(times, 0.3), touching)
+    score = scores.hand(seen_of(times))
     for shift in (-np.inf, -1.0, 0.0, 0.4, np.inf):
         fingers = {}
         for f, own in times.items():
@@ -54,8 +54,8 @@ def test_the_probability_of_a_hand_is_the_least_of_the_fingers_in_contact():
     margins = {"a": np.array([0.0, 0.0, 0.0]), "b": np.array([1.0, 1.0, np.nan]),
                "c": np.array([-5.0, 2.0, 2.0])}  # fmt: skip
     touching = {"a": np.ones(3, bool), "b": np.ones(3, bool), "c": np.array([False, True, True])}
-    opinion = Opinion(margins, {"a": 2.0, "b": 0.0, "c": 0.0}, touching)
-    found = opinion.score(seen_of(times)).probability
+    scores = RecordingScores(margins, {"a": 2.0, "b": 0.0, "c": 0.0}, touching)
+    found = scores.hand(seen_of(times)).probability
     odds = np.exp([1.0, 1.0, 2.0])
     assert found == pytest.approx(odds / (1 + odds))
 
@@ -63,20 +63,22 @@ def test_the_probability_of_a_hand_is_the_least_of_the_fingers_in_contact():
 def test_a_hand_judged_as_a_whole_has_no_fingers():
     times = {f: np.array([0.0, 1.0, 2.0]) for f in ("a", "b")}
     touching = {"a": np.ones(3, bool), "b": np.array([True, True, False])}
-    opinion = Opinion({HAND: np.array([np.nan, 1.0, 1.0])}, {HAND: 0.0}, touching)
+    scores = RecordingScores({HAND: np.array([np.nan, 1.0, 1.0])}, {HAND: 0.0}, touching)
     seen = seen_of(times)
-    decided = opinion.decisions(seen, seen.labels)
+    decided = scores.decide(seen, seen.labels)
     assert not decided.fingers
     assert decided.hand.states.tolist() == [UNKNOWN, STABLE, NO_CONTACT]
 
 
 @pytest.fixture(scope="module")
 def corpus(tmp_path_factory):
-    return corpus_of("main", synthetic(tmp_path_factory.mktemp("expert") / "main", range(4)))
+    return corpus_of("main", synthetic(tmp_path_factory.mktemp("fitted") / "main", range(4)))
 
 
 def test_what_is_learned_is_bounded_and_spread_over_all_recordings(corpus):
-    material = material_of(look(METHODS["logreg"], corpus, Change()), max_rows=100)
+    material = gather_training_samples(
+        corpus_features(METHODS["logreg"], corpus, Variation()), max_rows=100
+    )
     for samples in material.samples.values():
         assert len(samples.stable) <= 100
         assert np.bincount(samples.groups).min() >= 20
@@ -85,13 +87,16 @@ def test_what_is_learned_is_bounded_and_spread_over_all_recordings(corpus):
 
 def test_an_expert_knows_nothing_of_the_recordings_that_it_was_not_fitted_to(corpus):
     method = METHODS["logreg"]
-    recordings = look(method, corpus, Change())
+    recordings = corpus_features(method, corpus, Variation())
     other = [*recordings[:3], scrambled(recordings[3])]
-    experts = [Expert.fit(method, material_of(each), {0, 1, 2}, 0) for each in (recordings, other)]
-    assert experts[0].classifiers == experts[1].classifiers
-    assert experts[0].contact == experts[1].contact
-    assert Expert.fit(method, material_of(other), {1, 2, 3}, 0).classifiers != (
-        Expert.fit(method, material_of(recordings), {1, 2, 3}, 0).classifiers
+    fitted_methods = [
+        FittedMethod.fit(method, gather_training_samples(each), {0, 1, 2}, 0)
+        for each in (recordings, other)
+    ]
+    assert fitted_methods[0].classifiers == fitted_methods[1].classifiers
+    assert fitted_methods[0].contact == fitted_methods[1].contact
+    assert FittedMethod.fit(method, gather_training_samples(other), {1, 2, 3}, 0).classifiers != (
+        FittedMethod.fit(method, gather_training_samples(recordings), {1, 2, 3}, 0).classifiers
     )
 
 
@@ -105,23 +110,27 @@ def scrambled(seen):
 
 def test_a_finger_that_a_recording_lacks_is_not_judged_there(corpus):
     method = METHODS["logreg"]
-    recordings = look(method, corpus, Change())
+    recordings = corpus_features(method, corpus, Variation())
     lacking = without(recordings[3], "index")
-    expert = Expert.fit(method, material_of([*recordings[:3], lacking]), {0, 1, 2, 3}, 0)
-    decided = expert.opinion(lacking).decisions(lacking, lacking.labels)
+    fitted = FittedMethod.fit(
+        method, gather_training_samples([*recordings[:3], lacking]), {0, 1, 2, 3}, 0
+    )
+    decided = fitted.scores(lacking).decide(lacking, lacking.labels)
     assert set(decided.fingers) == {"thumb"}
     assert (decided.hand.states == STABLE).any()
 
 
 def test_a_hand_that_lacks_a_finger_is_unknown_to_a_judge_of_hands(corpus):
     method = METHODS["jl_global_logreg"]
-    recordings = look(method, corpus, Change())
+    recordings = corpus_features(method, corpus, Variation())
     lacking = without(recordings[3], "index")
     narrow = {HAND: lacking.features[HAND][:, :90]}
     lacking = replace(lacking, features=narrow)
-    expert = Expert.fit(method, material_of([*recordings[:3], lacking]), {0, 1, 2, 3}, 0)
-    assert (expert.opinion(lacking).decisions(lacking, lacking.labels).hand.states == UNKNOWN).all()
-    known = expert.opinion(recordings[0]).decisions(recordings[0], recordings[0].labels).hand
+    fitted = FittedMethod.fit(
+        method, gather_training_samples([*recordings[:3], lacking]), {0, 1, 2, 3}, 0
+    )
+    assert (fitted.scores(lacking).decide(lacking, lacking.labels).hand.states == UNKNOWN).all()
+    known = fitted.scores(recordings[0]).decide(recordings[0], recordings[0].labels).hand
     assert (known.states == STABLE).any()
 
 
@@ -137,11 +146,11 @@ def without(seen, finger):
 
 def test_one_class_makes_no_classifier_and_so_no_opinion(corpus):
     method = METHODS["logreg"]
-    recordings = look(method, corpus, Change())
+    recordings = corpus_features(method, corpus, Variation())
     stable = {f: np.full(len(t), STABLE, dtype=np.int8) for f, t in recordings[0].times.items()}
     one = replace(recordings[0], labels=stable)
-    expert = Expert.fit(method, material_of([one]), {0}, 0)
-    assert not expert.classifiers
-    decided = expert.opinion(one).decisions(one, one.labels)
+    fitted = FittedMethod.fit(method, gather_training_samples([one]), {0}, 0)
+    assert not fitted.classifiers
+    decided = fitted.scores(one).decide(one, one.labels)
     assert (decided.hand.states == UNKNOWN).all()
     assert all((finger.states == UNKNOWN).all() for finger in decided.fingers.values())

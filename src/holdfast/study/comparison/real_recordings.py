@@ -5,8 +5,12 @@ from typing import Any
 from holdfast.metrics import RecordingMetrics
 from holdfast.study.comparison.jobs import NETWORK, SLOW, Results, has_network, judging
 from holdfast.study.corpus import Corpus
-from holdfast.study.evaluation.changes import Change
-from holdfast.study.evaluation.judge import Effort, Job, Judged
+from holdfast.study.evaluation.evaluate_method import (
+    EvaluationEffort,
+    EvaluationJob,
+    MethodEvaluation,
+)
+from holdfast.study.evaluation.variation import Variation
 from holdfast.study.methods import METHODS
 from holdfast.study.plan import Plan
 from holdfast.study.report.page import Picture
@@ -43,7 +47,7 @@ def tables(plan: Plan, results: Results) -> list[Table]:
         return []
     rows: list[Row] = []
     for name, title in _methods(plan).items():
-        judged: Judged = results[f"real/{name}"]["recording"]
+        judged: MethodEvaluation = results[f"real/{name}"]["recording"]
         for recording in judged.metrics.recordings:
             rows += _rows(title, recording)
     rows.sort(key=lambda row: (str(row.keys["recording"]), str(row.keys["finger"])))
@@ -81,9 +85,9 @@ def _methods(plan: Plan) -> dict[str, str]:
     return {name: each.title for name, each in METHODS.items() if name not in left_out}
 
 
-def _job(plan: Plan, real: Corpus, name: str) -> Job:
-    effort = Effort(folds=min(len(real.recordings), MOST_FOLDS), inner=2)
-    return Job(name, real, ("recording",), (), Change(), effort, plan.seed)
+def _job(plan: Plan, real: Corpus, name: str) -> EvaluationJob:
+    effort = EvaluationEffort(folds=min(len(real.recordings), MOST_FOLDS), inner=2)
+    return EvaluationJob(name, real, ("recording",), (), Variation(), effort, plan.seed)
 
 
 def _cost(name: str) -> float:

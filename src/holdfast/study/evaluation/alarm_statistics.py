@@ -25,14 +25,14 @@ SET_POINT = "set_point_error"
 """Of the truth of a hand: how far the controller's set point is off [rad]."""
 
 
-class Spell(NamedTuple):
+class SlipInterval(NamedTuple):
     """An object slides on a fingertip of a hand that holds it: first and last sample [s]."""
 
     onset: float
     end: float
 
 
-class Heard(msgspec.Struct, frozen=True):
+class AlarmStatistics(msgspec.Struct, frozen=True):
     """What the alarms of a hand are worth in one recording, at one threshold.
 
     Attributes:
@@ -41,7 +41,7 @@ class Heard(msgspec.Struct, frozen=True):
             it was until the sliding ended.
         false_alarms: alarms that belong to no event.
         under_stable: of them, those under a stable label.
-        after_glitch: of those, those right after a jump of the controller's set point.
+        follows_jump: of those, those right after a jump of the controller's set point.
         stable_seconds: how long the label is stable [s].
         n_stable: samples labelled stable and decided.
         n_doubted: of them, those that were not called stable.
@@ -51,7 +51,7 @@ class Heard(msgspec.Struct, frozen=True):
     slips: list[float]
     false_alarms: int
     under_stable: int
-    after_glitch: int
+    follows_jump: int
     stable_seconds: float
     n_stable: int
     n_doubted: int
@@ -65,30 +65,32 @@ class Heard(msgspec.Struct, frozen=True):
         return sum(latency <= within + ROUNDING for latency in self.slips)
 
 
-def hear(hand: FingerDecisions, truth: Truth | None, spells: Sequence[Spell]) -> Heard:
+def alarm_statistics(
+    hand: FingerDecisions, truth: Truth | None, slips: Sequence[SlipInterval]
+) -> AlarmStatistics:
     """What the alarms of a hand are worth.
 
     Args:
         hand: labels and decisions.
         truth: of the recording.
-        spells: of sliding, that `spells_of` finds in it.
+        slips: of sliding, that `find_slips` finds in it.
     """
     match = match_alarms(hand.times, hand.labels, hand.states)
     false = [alarm for alarm in match.false_alarms if alarm.label.code == STABLE]
     stable = (hand.labels == STABLE) & (hand.states != UNKNOWN)
-    return Heard(
+    return AlarmStatistics(
         delays=[event.delay for event in match.events],
-        slips=[_latency(spell, hand) for spell in spells],
+        slips=[_latency(slip, hand) for slip in slips],
         false_alarms=len(match.false_alarms),
         under_stable=len(false),
-        after_glitch=int(after_glitch(np.array([alarm.time for alarm in false]), truth).sum()),
+        follows_jump=int(follows_jump(np.array([alarm.time for alarm in false]), truth).sum()),
         stable_seconds=match.stable_seconds,
         n_stable=int(stable.sum()),
         n_doubted=int((stable & (hand.states != STABLE)).sum()),
     )
 
 
-def spells_of(truth: Truth | None) -> list[Spell]:
+def find_slips(truth: Truth | None) -> list[SlipInterval]:
     """The slips of a recording; none where the truth is not known.
 
     A slip begins where the object starts to slide on a finger of a hand that has held it, and
@@ -96,13 +98,13 @@ def spells_of(truth: Truth | None) -> list[Spell]:
     """
     if truth is None or "phase" not in truth.hand:
         return []
-    times, spells, rested = truth.times, [], -np.inf
+    times, slips, rested = truth.times, [], -np.inf
     for start, end in runs(_sliding(truth)):
         since = max(rested, _held_since(truth, start))
         if times[start] - since >= STABLE_BEFORE - ROUNDING:
-            spells.append(Spell(float(times[start]), float(times[end - 1])))
+            slips.append(SlipInterval(float(times[start]), float(times[end - 1])))
         rested = float(times[end - 1])
-    return spells
+    return slips
 
 
 def _sliding(truth: Truth) -> Mask:
@@ -121,17 +123,17 @@ def _held_since(truth: Truth, place: int) -> float:
     return float(truth.times[free[-1]]) if len(free) else float(truth.times[0])
 
 
-def _latency(spell: Spell, hand: FingerDecisions) -> float:
+def _latency(slip: SlipInterval, hand: FingerDecisions) -> float:
     """How long until the hand is not called stable; at least until the last of `POSTS`."""
-    last = max(spell.end, spell.onset + POSTS[-1]) + ROUNDING
-    rows = slice(*np.searchsorted(hand.times, (spell.onset - ROUNDING, last)))
+    last = max(slip.end, slip.onset + POSTS[-1]) + ROUNDING
+    rows = slice(*np.searchsorted(hand.times, (slip.onset - ROUNDING, last)))
     told = (hand.states[rows] != STABLE) & (hand.states[rows] != UNKNOWN)
     if not told.any():
         return math.inf
-    return max(float(hand.times[rows][np.argmax(told)]) - spell.onset, 0.0)
+    return max(float(hand.times[rows][np.argmax(told)]) - slip.onset, 0.0)
 
 
-def after_glitch(times: Array, truth: Truth | None) -> Mask:
+def follows_jump(times: Array, truth: Truth | None) -> Mask:
     """(n,) whether the controller's set point has just jumped; never, where that is not known."""
     if truth is None or SET_POINT not in truth.hand:
         return np.zeros(len(times), dtype=np.bool_)

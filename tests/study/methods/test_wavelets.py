@@ -3,7 +3,7 @@ import pytest
 
 from holdfast.features import haar_features
 from holdfast.study.methods import METHODS
-from holdfast.study.methods.zhang import detail_energy, energy
+from holdfast.study.methods.wavelets import detail_energy, energy
 
 from .build import along_normal, pressed
 

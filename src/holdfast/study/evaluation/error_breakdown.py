@@ -12,7 +12,7 @@ from holdfast.metrics.events import ROUNDING
 from holdfast.metrics.masks import runs
 from holdfast.recordings import Truth
 from holdfast.sensors.values import Array
-from holdfast.study.evaluation.seen import Seen
+from holdfast.study.evaluation.recording_features import RecordingFeatures
 from holdfast.study.methods import HAND
 
 Mask = npt.NDArray[np.bool_]
@@ -29,7 +29,7 @@ AXES = {
 NEAR = np.cos(np.radians(30.0))
 
 
-class Grip(msgspec.Struct, frozen=True):
+class GripErrors(msgspec.Struct, frozen=True):
     """Errors of a finger in a recording while the object is held.
 
     Attributes:
@@ -41,7 +41,7 @@ class Grip(msgspec.Struct, frozen=True):
     counts: tuple[int, int, int, int]
 
 
-class Pushed(msgspec.Struct, frozen=True):
+class DisturbanceErrors(msgspec.Struct, frozen=True):
     """One disturbance.
 
     Attributes:
@@ -55,7 +55,7 @@ class Pushed(msgspec.Struct, frozen=True):
     wrong: int
 
 
-class Breakdown(msgspec.Struct, frozen=True):
+class ErrorBreakdown(msgspec.Struct, frozen=True):
     """Where the errors of one recording are.
 
     Attributes:
@@ -65,23 +65,23 @@ class Breakdown(msgspec.Struct, frozen=True):
     """
 
     phases: dict[str, tuple[int, int]]
-    grips: list[Grip]
-    pushes: list[Pushed]
+    grips: list[GripErrors]
+    pushes: list[DisturbanceErrors]
 
 
-def count(seen: Seen, decided: Decisions) -> Breakdown:
+def break_down_errors(seen: RecordingFeatures, decided: Decisions) -> ErrorBreakdown:
     """Where the errors are; nothing, where the truth is not known.
 
     Of a method that judges the hand as a whole, those of the hand.
     """
     truth = seen.truth
-    judged = judged_of(decided)
+    judged = evaluated_units(decided)
     if truth is None or not {"phase", "outside_force"} <= set(truth.hand) or not judged:
-        return Breakdown({}, [], [])
-    return Breakdown(_phases(truth, judged), _grips(truth, judged), _pushes(truth, judged))
+        return ErrorBreakdown({}, [], [])
+    return ErrorBreakdown(_phases(truth, judged), _grips(truth, judged), _pushes(truth, judged))
 
 
-def judged_of(decided: Decisions) -> Mapping[str, FingerDecisions]:
+def evaluated_units(decided: Decisions) -> Mapping[str, FingerDecisions]:
     """What a method decides itself: the fingers, or the hand under the name `HAND`."""
     if decided.fingers or decided.hand is None:
         return decided.fingers
@@ -99,7 +99,7 @@ def _phases(truth: Truth, fingers: Mapping[str, FingerDecisions]) -> dict[str, t
     return {name: (int(n), int(wrong)) for name, (n, wrong) in counts.items() if n}
 
 
-def _grips(truth: Truth, fingers: Mapping[str, FingerDecisions]) -> list[Grip]:
+def _grips(truth: Truth, fingers: Mapping[str, FingerDecisions]) -> list[GripErrors]:
     phase = truth.hand["phase"]
     grips = []
     locked = phase == Phase.LOCKED
@@ -112,11 +112,11 @@ def _grips(truth: Truth, fingers: Mapping[str, FingerDecisions]) -> list[Grip]:
         stable = finger.labels == STABLE
         parts = (known & held & stable, known & held & ~stable)
         counts = [int(x) for part in parts for x in (part.sum(), (part & wrong).sum())]
-        grips.append(Grip(float(force[locked].mean()), tuple(counts)))  # type: ignore[arg-type]
+        grips.append(GripErrors(float(force[locked].mean()), tuple(counts)))  # type: ignore[arg-type]
     return grips
 
 
-def _pushes(truth: Truth, fingers: Mapping[str, FingerDecisions]) -> list[Pushed]:
+def _pushes(truth: Truth, fingers: Mapping[str, FingerDecisions]) -> list[DisturbanceErrors]:
     pushing = np.isin(truth.hand["phase"], (Phase.DISTURBED, Phase.SLIPPING))
     found = []
     for start, end in runs(pushing):
@@ -128,7 +128,7 @@ def _pushes(truth: Truth, fingers: Mapping[str, FingerDecisions]) -> list[Pushed
             here &= known & (finger.labels != STABLE)
             n, n_wrong = n + int(here.sum()), n_wrong + int((here & wrong).sum())
         force = truth.hand["outside_force"][start:end].mean(axis=0)
-        found.append(Pushed(_direction(force), n, n_wrong))
+        found.append(DisturbanceErrors(_direction(force), n, n_wrong))
     return found
 
 
@@ -151,5 +151,5 @@ def _at(truth: Truth, times: Array) -> npt.NDArray[np.intp]:
 
 def calibration_counts(decided: Decisions) -> list[list[float]]:
     """(10, 3) sum of probabilities, stable samples and samples of each bin of probabilities."""
-    sums = calibration_sums(list(judged_of(decided).values()))
+    sums = calibration_sums(list(evaluated_units(decided).values()))
     return [[float(x) for x in row] for row in sums]

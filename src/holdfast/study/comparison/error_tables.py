@@ -7,9 +7,9 @@ import numpy as np
 
 from holdfast.contact import Phase
 from holdfast.sensors.values import Array
-from holdfast.study.comparison.figuring import ratio_row
 from holdfast.study.comparison.jobs import SPLITS, Results, found, titles
-from holdfast.study.evaluation.counting import AXES, Breakdown, Grip
+from holdfast.study.comparison.rows import ratio_row
+from holdfast.study.evaluation.error_breakdown import AXES, ErrorBreakdown, GripErrors
 from holdfast.study.plan import Plan
 from holdfast.study.report.tables import Key, Row, Table
 from holdfast.twin.labels import LabelRule
@@ -20,7 +20,7 @@ SHOWN = ("recording", "others")
 DOUBTED, TRUSTED = "stable called otherwise [%]", "not stable called stable [%]"
 
 Keys = dict[str, Key]
-Line = tuple[Keys, Sequence[Breakdown]]
+Line = tuple[Keys, Sequence[ErrorBreakdown]]
 
 
 def phases(plan: Plan, results: Results) -> Table:
@@ -83,19 +83,19 @@ def directions(plan: Plan, results: Results) -> Table:
     return Table("directions", title, note, rows, ("on", "method"), column="direction")
 
 
-def quarters(parts: Sequence[Breakdown]) -> Array:
+def quarters(parts: Sequence[ErrorBreakdown]) -> Array:
     """The three forces [N] that part the fingers which hold something into quarters."""
     forces = [grip.force for grip in _holding(parts)]
     return np.quantile(forces, (0.25, 0.5, 0.75)) if forces else np.empty(0)
 
 
-def _holding(parts: Sequence[Breakdown]) -> Iterator[Grip]:
+def _holding(parts: Sequence[ErrorBreakdown]) -> Iterator[GripErrors]:
     every = chain.from_iterable(each.grips for each in parts)
     return (grip for grip in every if grip.force > LabelRule().contact)
 
 
 def _of_quarter(
-    parts: Sequence[Breakdown], edges: Array, place: int, pair: tuple[int, int]
+    parts: Sequence[ErrorBreakdown], edges: Array, place: int, pair: tuple[int, int]
 ) -> Array:
     """(2, n_recordings) samples, and wrong ones, of the fingers in one quarter."""
     counts = np.zeros((2, len(parts)))

@@ -1,9 +1,9 @@
 """Part of the study: all methods on the same recordings, by sample, by event, by circumstance."""
 
-from holdfast.study.comparison import alarms, costs, errors, methods
+from holdfast.study.comparison import costs, error_tables, event_tables, sample_tables
 from holdfast.study.comparison import pictures as drawn
 from holdfast.study.comparison.jobs import SECONDS, USUAL, Results, job_of, task_of, titles
-from holdfast.study.comparison.leak import judge_pooled
+from holdfast.study.comparison.pooled_split import judge_pooled
 from holdfast.study.paper.counts import Counts
 from holdfast.study.plan import Plan
 from holdfast.study.report.page import Picture
@@ -11,15 +11,15 @@ from holdfast.study.report.tables import Table
 from holdfast.study.work import Task
 
 MAKERS = (
-    methods.methods,
-    methods.hands,
-    alarms.events,
-    alarms.slips,
-    methods.splits,
-    errors.phases,
-    errors.force,
-    errors.directions,
-    methods.reliability,
+    sample_tables.methods,
+    sample_tables.hands,
+    event_tables.events,
+    event_tables.slips,
+    sample_tables.splits,
+    error_tables.phases,
+    error_tables.force,
+    error_tables.directions,
+    sample_tables.reliability,
     costs.table,
 )
 
@@ -27,7 +27,7 @@ MAKERS = (
 def tasks(plan: Plan) -> list[Task]:
     """A task for each method, one for each that is also judged by a random split, and the costs."""
     judged = [task_of(plan, name) for name in titles(plan)]
-    pooled = [_pooled(plan, name) for name in methods.leaking(plan)]
+    pooled = [_pooled(plan, name) for name in sample_tables.leaking(plan)]
     return [*judged, *pooled, *costs.tasks(plan)]
 
 

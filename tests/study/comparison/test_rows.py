@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from holdfast.metrics import Decisions, FingerDecisions, summarise
-from holdfast.study.comparison.figuring import (
+from holdfast.study.comparison.rows import (
     calibration_row,
     count_row,
     difference_row,
@@ -13,7 +13,7 @@ from holdfast.study.comparison.figuring import (
     right_and_all,
     sample_rows,
 )
-from holdfast.study.evaluation.judge import Judged
+from holdfast.study.evaluation.evaluate_method import MethodEvaluation
 
 
 def metrics_of(*recordings):
@@ -88,7 +88,7 @@ def test_the_calibration_error_by_hand():
     """One bin is off by 0.1 on 30 samples, one by 0.2 on 10."""
     table = [[0.0, 0.0, 0.0]] * 8 + [[24.0, 21.0, 30.0], [9.0, 7.0, 10.0]]
     metrics = metrics_of(RIGHT)
-    judged = Judged(["a"], None, metrics, [], [], [], [], [], [table])
+    judged = MethodEvaluation(["a"], None, metrics, [], [], [], [], [], [table])
     assert calibration_row({}, judged, seed=0).ours == pytest.approx((3 + 2) / 40)
-    both = Judged(["a", "b"], None, metrics, [], [], [], [], [], [table, table])
+    both = MethodEvaluation(["a", "b"], None, metrics, [], [], [], [], [], [table, table])
     assert calibration_row({}, both, seed=0).interval == pytest.approx((0.125, 0.125))

@@ -6,7 +6,7 @@ import pytest
 
 from holdfast.contact import ContactState
 from holdfast.recordings import Label
-from holdfast.study.comparison import real
+from holdfast.study.comparison import real_recordings
 from holdfast.study.corpus import corpus_of
 from holdfast.study.methods import METHODS
 from holdfast.study.plan import Plan
@@ -24,10 +24,10 @@ CALM = [Label(3.0, 8.0, ContactState.STABLE)]
 
 def run(plan):
     results = {}
-    for task in real.tasks(plan):
+    for task in real_recordings.tasks(plan):
         data = msgspec.msgpack.encode(task.function(*task.arguments))
         results[task.name] = msgspec.msgpack.decode(data, type=task.result)
-    return real.tables(plan, results)
+    return real_recordings.tables(plan, results)
 
 
 @pytest.fixture(scope="module")
@@ -57,9 +57,11 @@ def held_part(recording):
 
 def test_each_recording_is_judged_by_the_others(corpus, monkeypatch):
     names = ("logreg", "zhang", "jl_global_logreg")
-    monkeypatch.setattr(real, "METHODS", {name: METHODS[name] for name in names})
+    monkeypatch.setattr(real_recordings, "METHODS", {name: METHODS[name] for name in names})
     plan = Plan({"main": corpus}, real=corpus)
-    (job,) = (task.arguments[0] for task in real.tasks(plan) if task.name == "real/logreg")
+    (job,) = (
+        task.arguments[0] for task in real_recordings.tasks(plan) if task.name == "real/logreg"
+    )
     assert job.effort.folds == 4
     (table,) = run(plan)
     assert table.name == "real"
@@ -75,4 +77,8 @@ def test_each_recording_is_judged_by_the_others(corpus, monkeypatch):
 
 def test_without_real_recordings_there_is_nothing_to_do(corpus):
     plan = Plan({"main": corpus})
-    assert (real.tasks(plan), real.tables(plan, {}), real.pictures(plan, {})) == ([], [], [])
+    assert (
+        real_recordings.tasks(plan),
+        real_recordings.tables(plan, {}),
+        real_recordings.pictures(plan, {}),
+    ) == ([], [], [])

@@ -3,7 +3,7 @@ import pytest
 
 from holdfast.contact import UNSTABLE
 from holdfast.recordings import label_states
-from holdfast.study.evaluation.changes import Change, relabelled
+from holdfast.study.evaluation.variation import Variation, relabelled
 from holdfast.synthetic import synthetic_recording
 from study.told import told_recording
 
@@ -15,25 +15,25 @@ def readings(recording, finger="thumb"):
 
 
 def test_no_change_is_no_change():
-    assert Change().of(RECORDING) is RECORDING
+    assert Variation().apply(RECORDING) is RECORDING
 
 
 def test_noise_has_its_size_stays_whole_and_is_the_same_every_time():
-    added = readings(Change(noise=4.0).of(RECORDING)) - readings(RECORDING)
+    added = readings(Variation(noise=4.0).apply(RECORDING)) - readings(RECORDING)
     assert added.std() == pytest.approx(np.sqrt(4.0**2 + 1 / 12), rel=0.01)
     assert abs(added.mean()) < 0.05
     assert (added == np.rint(added)).all()
-    assert (added == readings(Change(noise=4.0).of(RECORDING)) - readings(RECORDING)).all()
+    assert (added == readings(Variation(noise=4.0).apply(RECORDING)) - readings(RECORDING)).all()
 
 
 def test_noise_of_one_module_tells_nothing_of_another():
-    changed = Change(noise=4.0).of(RECORDING)
+    changed = Variation(noise=4.0).apply(RECORDING)
     first, second = (readings(changed, f) - readings(RECORDING, f) for f in ("thumb", "index"))
     assert abs(np.corrcoef(first.ravel(), second.ravel())[0, 1]) < 0.02
 
 
 def test_every_third_sample_is_a_slower_sensor():
-    changed = Change(every=3).of(RECORDING)
+    changed = Variation(every=3).apply(RECORDING)
     thumb = changed.modules["thumb"]
     assert (readings(changed) == readings(RECORDING)[::3]).all()
     assert (thumb.times == RECORDING.modules["thumb"].times[::3]).all()
@@ -45,7 +45,7 @@ def test_a_margin_draws_disturbances_longer_where_the_truth_is_known():
     told = told_recording("grasp", 3)
     n = {}
     for margin in (0.0, 0.1, 0.2):
-        module = Change(margin=margin).of(told).modules["index"]
+        module = Variation(margin=margin).apply(told).modules["index"]
         states = label_states(module.labels, module.times)
         shaken = (states == UNSTABLE) & (module.times > 4) & (module.times < 8)
         n[margin] = int(shaken.sum())

@@ -4,13 +4,20 @@ import msgspec
 import numpy as np
 import pytest
 
-from holdfast.study.comparison import costs, jobs, methods, pictures, real, sensitivity
-from holdfast.study.comparison import part as comparison
-from holdfast.study.comparison.errors import quarters
-from holdfast.study.comparison.figuring import right_and_all
+from holdfast.study.comparison import all_methods as comparison
+from holdfast.study.comparison import (
+    costs,
+    jobs,
+    pictures,
+    real_recordings,
+    sample_tables,
+    sensitivity,
+)
+from holdfast.study.comparison.error_tables import quarters
+from holdfast.study.comparison.rows import right_and_all
 from holdfast.study.corpus import corpus_of
-from holdfast.study.evaluation.counting import Breakdown, Grip
-from holdfast.study.evaluation.judge import Effort
+from holdfast.study.evaluation.error_breakdown import ErrorBreakdown, GripErrors
+from holdfast.study.evaluation.evaluate_method import EvaluationEffort
 from holdfast.study.methods import METHODS
 from holdfast.study.plan import Plan
 from holdfast.study.report.layouts import to_html, to_latex
@@ -43,9 +50,11 @@ def few():
     """Few methods, folds and samples."""
     chosen = {name: METHODS[name] for name in FEW}
     with pytest.MonkeyPatch.context() as patch:
-        for module in (jobs, methods, pictures, sensitivity, real):
+        for module in (jobs, sample_tables, pictures, sensitivity, real_recordings):
             patch.setattr(module, "METHODS", chosen)
-        patch.setattr(jobs, "Effort", lambda: Effort(folds=2, inner=2, max_rows=500))
+        patch.setattr(
+            jobs, "EvaluationEffort", lambda: EvaluationEffort(folds=2, inner=2, max_rows=500)
+        )
         patch.setattr(costs, "N_UPDATES", 50)
         patch.setattr(sensitivity, "SHOWN", ("logreg",))
         patch.setattr(sensitivity, "LEVELS", (0.0, 2.0))
@@ -82,7 +91,7 @@ def rows_of(table, **keys):
 
 def test_names_of_tasks_are_unique_over_all_parts(plan, few):
     both = Plan(plan.corpora, real=plan.main)
-    tasks = [*comparison.tasks(both), *sensitivity.tasks(both), *real.tasks(both)]
+    tasks = [*comparison.tasks(both), *sensitivity.tasks(both), *real_recordings.tasks(both)]
     names = [task.name for task in tasks]
     assert len(set(names)) == len(names)
     assert all(task.cost > 0 for task in tasks)
@@ -115,7 +124,7 @@ def test_differences_are_those_of_the_accuracies_beside_them(plan, results, tabl
                 tables["methods"],
                 method=METHODS[name].title,
                 on=jobs.SPLITS[key],
-                figure=methods.DIFFERENCE,
+                figure=sample_tables.DIFFERENCE,
             )
             own = results[f"methods/{name}"][key].metrics
             reference = getattr(logreg[key], base)
@@ -123,7 +132,7 @@ def test_differences_are_those_of_the_accuracies_beside_them(plan, results, tabl
             assert row.ours == pytest.approx(accuracy(own) - accuracy(reference))
             low, high = row.interval
             assert low <= row.ours <= high
-    differences = rows_of(tables["methods"], figure=methods.DIFFERENCE)
+    differences = rows_of(tables["methods"], figure=sample_tables.DIFFERENCE)
     assert all(row.keys["method"] != METHODS["logreg"].title for row in differences)
 
 
@@ -172,10 +181,9 @@ def test_every_part_of_the_errors_has_its_methods(tables):
 
 
 def test_quarters_of_the_fingers_that_hold():
-    grips = [Grip(force, (1, 0, 1, 0)) for force in (0.01, 1.0, 2.0, 3.0, 4.0, 5.0)]
-    assert quarters([Breakdown({}, grips[:3], []), Breakdown({}, grips[3:], [])]).tolist() == [
-        2.0, 3.0, 4.0,
-    ]  # fmt: skip
+    grips = [GripErrors(force, (1, 0, 1, 0)) for force in (0.01, 1.0, 2.0, 3.0, 4.0, 5.0)]
+    parts = [ErrorBreakdown({}, grips[:3], []), ErrorBreakdown({}, grips[3:], [])]
+    assert quarters(parts).tolist() == [2.0, 3.0, 4.0]
 
 
 def test_costs_are_more_than_nothing(tables):
