@@ -23,7 +23,7 @@ from holdfast.io import load_recording, save_recording
 from holdfast.live.recorder import Recorder
 from holdfast.sensors import sensor
 from holdfast.sources import Arrival
-from holdfast.sources.source import Source, word
+from holdfast.sources.base import Source, notice_arrival
 from holdfast.synthetic import synthetic_recording
 
 ANYSKIN = sensor("anyskin")
@@ -193,7 +193,7 @@ def test_it_stops_by_itself(capsys, device, tmp_path):
 
 def test_it_stops_by_itself_though_the_source_is_silent(capsys, device, tmp_path, monkeypatch):
     monkeypatch.setattr(verb, "GRACE", 0.1)
-    device(arrival(0), word(0.0, "connection\x1b lost"), ends=False)
+    device(arrival(0), notice_arrival(0.0, "connection\x1b lost"), ends=False)
     code, _, told = run(capsys, "xela://fake", tmp_path / "a.mcap", "--seconds", "0.3")
     assert code == 0
     assert "connection? lost" in told.splitlines()
@@ -203,7 +203,7 @@ def test_it_stops_by_itself_though_the_source_is_silent(capsys, device, tmp_path
 
 def test_where_nothing_came_nothing_is_left(capsys, device, tmp_path):
     out = tmp_path / "a.mcap"
-    device(word(0.0, "hello"))
+    device(notice_arrival(0.0, "hello"))
     assert refusal(capsys, "xela://fake", out) == (
         "xela://fake sent no samples: nothing was recorded"
     )

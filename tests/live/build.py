@@ -7,7 +7,7 @@ import numpy as np
 
 from holdfast.io import save_recording
 from holdfast.model import Model
-from holdfast.sources.source import Arrival, Source, word
+from holdfast.sources.base import Arrival, Source, notice_arrival
 from holdfast.synthetic import synthetic_recording
 
 FINGERS = ("thumb", "index", "middle")
@@ -99,7 +99,7 @@ class Lasting(Script):
 
 def told(text, **faults):
     """Word of faults by module, without samples."""
-    return word(time.monotonic(), text, faults={k: tuple(v) for k, v in faults.items()})
+    return notice_arrival(time.monotonic(), text, faults={k: tuple(v) for k, v in faults.items()})
 
 
 def same(one, two):

@@ -12,7 +12,7 @@ from holdfast.live.judge import Judge
 from holdfast.live.session import Session
 from holdfast.sensors import sensor
 from holdfast.sources import open_source
-from holdfast.sources.xela.encoder import Encoder
+from holdfast.sources.xela.encoder import XelaEncoder
 from sources.xela.servers import HANG_UP, free_port, server
 
 from . import build
@@ -33,7 +33,7 @@ def any_pace(monkeypatch):
 def packets_of(recording, epoch=EPOCH):
     """Every instant of a recording as a packet of XELA's server."""
     sensors = {name: module.sensor for name, module in recording.modules.items()}
-    encoder = Encoder(sensors)
+    encoder = XelaEncoder(sensors)
     return [
         encoder.packet(one.samples, epoch + one.time, epoch + one.time)
         for one in build.arrivals_of(recording)
@@ -118,7 +118,7 @@ def test_a_module_of_another_size_is_unknown_until_it_is_well_again():
     packets = packets_of(recording)
     one = build.arrivals_of(recording)[500]
     sensors = {name: module.sensor for name, module in recording.modules.items()}
-    smaller = Encoder({**sensors, "thumb": sensor("uskin-4x6")})
+    smaller = XelaEncoder({**sensors, "thumb": sensor("uskin-4x6")})
     samples = {**one.samples, "thumb": one.samples["thumb"][:24]}
     odd = smaller.packet(samples, EPOCH + one.time, EPOCH + one.time)
     heard = []

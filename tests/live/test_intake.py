@@ -11,7 +11,7 @@ from holdfast.live.intake import Intake, Track, plain
 from holdfast.recordings import Tactile
 from holdfast.sensors import sensor
 from holdfast.sources import Arrival
-from holdfast.sources.source import word
+from holdfast.sources.base import notice_arrival
 
 ANYSKIN = sensor("anyskin")
 TIMES = st.lists(st.floats(-1e9, 1e9) | st.sampled_from([math.nan, math.inf, -math.inf]))
@@ -96,7 +96,7 @@ def test_a_device_that_babbles_fills_no_memory(monkeypatch):
     monkeypatch.setattr(module, "MOST_MARKERS", 500)
     babbled = Intake({"thumb": ANYSKIN})
     for k in range(10_000):
-        babbled.take(word(0.01 * k, f"noise {k}", n_refused=1))
+        babbled.take(notice_arrival(0.01 * k, f"noise {k}", n_refused=1))
     assert babbled.n_refused == 10_000
     assert len(babbled._said) <= module.MOST_WORDS
     assert babbled.drain_markers() == []  # before the first sample

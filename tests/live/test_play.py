@@ -14,7 +14,7 @@ from holdfast.live import play as module
 from holdfast.live.play import XelaServer
 from holdfast.sensors import hand, sensor
 from holdfast.sources import Arrival, Source, open_source
-from holdfast.sources.source import word
+from holdfast.sources.base import notice_arrival
 from holdfast.sources.xela import client
 
 TIPS = dict.fromkeys(("thumb", "index", "middle", "ring"), sensor("uskin-curved"))
@@ -221,7 +221,7 @@ def test_word_without_samples_is_no_packet():
     class Talks(Made):
         def read(self, timeout):
             self.k += 1
-            return word(0.0, "a notice") if self.k % 2 else super().read(timeout)
+            return notice_arrival(0.0, "a notice") if self.k % 2 else super().read(timeout)
 
     with played(Talks(n=20)) as server:
         assert server.wait(PATIENCE)

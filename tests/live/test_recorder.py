@@ -19,7 +19,7 @@ from holdfast.live import recorder as module
 from holdfast.live.recorder import Recorder
 from holdfast.sensors import sensor
 from holdfast.sources import Arrival, open_source
-from holdfast.sources.source import word
+from holdfast.sources.base import notice_arrival
 
 ANYSKIN = sensor("anyskin")
 TWO = {"thumb": ANYSKIN, "index": ANYSKIN}
@@ -140,8 +140,8 @@ def test_faults_and_notices_become_markers(path):
         recorder.put(arrival(0, "thumb", "index"))
         recorder.put(arrival(1, "thumb", "index", faults=gap))
         recorder.put(arrival(2, "thumb", "index", faults=gap))
-        recorder.put(word(0.02, "connection lost"))
-        recorder.put(word(0.03, faults={"thumb": (Fault.LATE,), "index": (Fault.LATE,)}))
+        recorder.put(notice_arrival(0.02, "connection lost"))
+        recorder.put(notice_arrival(0.03, faults={"thumb": (Fault.LATE,), "index": (Fault.LATE,)}))
         recorder.put(arrival(200, "thumb", "index"))
         recorder.put(arrival(300, "thumb", "index", faults=gap))
     assert load_recording(path).markers == (
@@ -173,8 +173,8 @@ def test_the_faults_of_the_last_second_are_there_now(path):
     old = {"thumb": (Fault.LATE,), "elsewhere": (Fault.LATE,)}
     new = {"index": (Fault.PACKET_GAP, Fault.LATE)}
     with Recorder(path, TWO) as recorder:
-        recorder.put(word(now - 1.5, faults=old))
-        recorder.put(word(now + PATIENCE, faults=new))
+        recorder.put(notice_arrival(now - 1.5, faults=old))
+        recorder.put(notice_arrival(now + PATIENCE, faults=new))
     assert recorder.status.faulty == {"index": (Fault.PACKET_GAP, Fault.LATE)}
 
 
@@ -182,7 +182,7 @@ def test_the_same_words_are_a_marker_once_a_second(path):
     with Recorder(path, TWO) as recorder:
         for k in range(250):
             recorder.put(arrival(k, notices=("noise",)))
-            recorder.put(word(k / 100, f"babble {k}", f"babble {-k}"))
+            recorder.put(notice_arrival(k / 100, f"babble {k}", f"babble {-k}"))
     markers = load_recording(path).markers
     assert [time for time, text in markers if text == "note: noise"] == [0.0, 1.0, 2.0]
     assert len(markers) <= 303

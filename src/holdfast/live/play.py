@@ -13,8 +13,12 @@ from websockets.exceptions import ConnectionClosed
 
 from holdfast.errors import OutputError
 from holdfast.sources import Source
-from holdfast.sources.xela.encoder import NEW, Encoder
-from holdfast.sources.xela.gathering import Gathered, Gathering
+from holdfast.sources.xela.encoder import (
+    NEW_VERSION,
+    SampleBatch,
+    SampleBatcher,
+    XelaEncoder,
+)
 
 HOST, PORT = "127.0.0.1", 5000
 PATIENCE = 0.2
@@ -61,14 +65,14 @@ class XelaServer:
         self,
         source: Source,
         *,
-        version: str = NEW,
+        version: str = NEW_VERSION,
         host: str = HOST,
         port: int = PORT,
         whole_hand: bool = False,
         wait: bool = False,
     ) -> None:
-        self.encoder = Encoder(source.sensors, version=version, whole_hand=whole_hand)
-        self._gathering = Gathering(source.sensors, own_stamps=self.encoder.has_own_stamps)
+        self.encoder = XelaEncoder(source.sensors, version=version, whole_hand=whole_hand)
+        self._batcher = SampleBatcher(source.sensors, own_stamps=self.encoder.has_own_stamps)
         self._source = source
         self._address = host, port
         self.n_packets = 0
@@ -133,8 +137,8 @@ class XelaServer:
             while not self._stopping.is_set() and not self._source.ended:
                 arrival = self._source.read(PATIENCE)
                 if arrival is not None and arrival.samples:
-                    self._tell(self._gathering.add(arrival.samples, arrival.time))
-            self._tell(self._gathering.rest())
+                    self._tell(self._batcher.add(arrival.samples, arrival.time))
+            self._tell(self._batcher.flush())
         except Exception as failure:  # told by whoever started it
             self.failure = failure
         finally:
@@ -142,16 +146,16 @@ class XelaServer:
                 self._wait_for_readers()
             self._over.set()
 
-    def _tell(self, due: Iterator[Gathered]) -> None:
-        for gathered in due:
-            self._loop.call_soon_threadsafe(self._send, self._packet(gathered))
+    def _tell(self, due: Iterator[SampleBatch]) -> None:
+        for batch in due:
+            self._loop.call_soon_threadsafe(self._send, self._packet(batch))
 
-    def _packet(self, gathered: Gathered) -> str:
+    def _packet(self, batch: SampleBatch) -> str:
         now = time.time()
         if self._shift is None:
-            self._shift = now - gathered.time
-        times = {name: one + self._shift for name, one in gathered.times.items()}
-        packet = self.encoder.packet(gathered.samples, gathered.time + self._shift, now, times)
+            self._shift = now - batch.time
+        times = {name: one + self._shift for name, one in batch.times.items()}
+        packet = self.encoder.packet(batch.samples, batch.time + self._shift, now, times)
         return packet.decode()
 
     def _wait_for_readers(self) -> None:

@@ -1,6 +1,6 @@
 """Where samples come from: a recording, the twin, or a device, all with one contract."""
 
-from holdfast.sources.source import Arrival, Source
+from holdfast.sources.base import Arrival, Source
 from holdfast.sources.uri import SCHEMES, open_source
 
 __all__ = ["SCHEMES", "Arrival", "Source", "open_source"]

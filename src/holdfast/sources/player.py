@@ -8,8 +8,8 @@ from itertools import chain
 
 from holdfast.errors import HoldfastError, RecordingError
 from holdfast.recordings import Recording
+from holdfast.sources.base import Arrival, Source, notice_arrival
 from holdfast.sources.moments import Moment, moments
-from holdfast.sources.source import Arrival, Source, word
 
 PAUSE = 1.0
 """Between the last sample of a recording and the first of the next [s]; a gap to a detector."""
@@ -152,7 +152,7 @@ class Player(Source):
         self._notices.clear()
         self._next = None
         if not moment.samples:
-            return word(received, *notices, n_refused=moment.n_refused)
+            return notice_arrival(received, *notices, n_refused=moment.n_refused)
         self._last = moment.time + self._shift
         return Arrival(
             self._last, moment.samples, received, n_refused=moment.n_refused, notices=notices

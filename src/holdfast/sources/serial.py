@@ -8,10 +8,10 @@ from importlib.metadata import version
 from holdfast.contact import Fault
 from holdfast.errors import MissingExtra, SourceError
 from holdfast.sensors import Sensor, sensor
-from holdfast.sources.address import Address
 from holdfast.sources.anyskin import Decoded, Decoder
-from holdfast.sources.source import Arrival, Source, word
+from holdfast.sources.base import Arrival, Source, notice_arrival
 from holdfast.sources.timeline import Timeline
+from holdfast.sources.uri import Address
 
 try:
     from serial import Serial
@@ -144,7 +144,7 @@ class Board(Source):
             self._retry_at = time.monotonic() + self._retry
         else:
             self._retry = BACKOFF[0]
-            self._arrivals.append(word(time.monotonic(), f"{self.name}: connected again"))
+            self._arrivals.append(notice_arrival(time.monotonic(), f"{self.name}: connected again"))
 
     def _receive_or_lose(self, timeout: float) -> None:
         try:
@@ -154,7 +154,9 @@ class Board(Source):
             now = time.monotonic()
             self._retry_at = now + self._retry
             self._arrivals.append(
-                word(now, f"{self.name}: the connection is lost ({_reason(cause)}); trying again")
+                notice_arrival(
+                    now, f"{self.name}: the connection is lost ({_reason(cause)}); trying again"
+                )
             )
 
     def _receive(self, timeout: float) -> Decoded:
@@ -198,7 +200,9 @@ class Board(Source):
             self._told = {text: received}
             notices.append(f"{self.name}: {text}")
         faults = dict.fromkeys(self._modules, (Fault.TAXEL_COUNT,)) if wrong else {}
-        self._arrivals.append(word(received, *notices, faults=faults, n_refused=decoded.n_refused))
+        self._arrivals.append(
+            notice_arrival(received, *notices, faults=faults, n_refused=decoded.n_refused)
+        )
 
     def _miscount(self, decoded: Decoded) -> str:
         return (

@@ -12,8 +12,8 @@ from tempfile import TemporaryDirectory
 
 from holdfast.io import read_chunks, save_recording
 from holdfast.recordings import Recording
-from holdfast.sources.address import Address
 from holdfast.sources.player import Player
+from holdfast.sources.uri import Address
 from holdfast.twin.profile import ATTEMPTS, profile
 from holdfast.twin.simulation import CASES, Grasp, simulate
 

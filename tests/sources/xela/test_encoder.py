@@ -10,7 +10,14 @@ from hypothesis.extra.numpy import arrays
 from holdfast.sensors import Sensor, hand, sensor
 from holdfast.sensors.xela_models import flat_grid
 from holdfast.sources.xela.decoder import Decoder
-from holdfast.sources.xela.encoder import RESOLUTION, REST, Encoder, is_part_of_hand
+from holdfast.sources.xela.encoder import (
+    MAX_MODULE_WAIT,
+    NEWTONS_PER_COUNT,
+    REST_READING,
+    SampleBatcher,
+    XelaEncoder,
+    is_part_of_hand,
+)
 
 from .build import START, counts
 
@@ -44,7 +51,7 @@ def decoded(encoder, packets, **options):
 @pytest.mark.parametrize("version", ["1.7", "1.8"])
 @pytest.mark.parametrize("sensors", [TIPS, WHOLE], ids=["tips", "hand"])
 def test_what_is_decoded_is_what_was_encoded(version, sensors):
-    encoder = Encoder(sensors, version=version)
+    encoder = XelaEncoder(sensors, version=version)
     given = [samples_of(sensors, k) for k in range(20)]
     times = [START + k / 150 for k in range(20)]
     packets = [encoder.packet(s, t, t) for s, t in zip(given, times, strict=True)]
@@ -59,7 +66,7 @@ def test_what_is_decoded_is_what_was_encoded(version, sensors):
 
 
 def test_fields_of_1_7():
-    encoder = Encoder({"thumb": sensor("uskin-4x4")}, version="1.7")
+    encoder = XelaEncoder({"thumb": sensor("uskin-4x4")}, version="1.7")
     packet = told(encoder, {"thumb": np.full((16, 3), 0xFA0C)})
     assert list(packet) == ["message", "time", "sensors", "1"]
     assert packet["1"] == {
@@ -79,7 +86,7 @@ def test_fields_of_1_7():
 )
 def test_fields_of_1_8_are_those_of_a_real_server(model, sensors, real_packets):
     real = json.loads(real_packets[model])
-    packet = told(Encoder(sensors, version="1.8"), samples_of(sensors))
+    packet = told(XelaEncoder(sensors, version="1.8"), samples_of(sensors))
     assert list(packet) == [key for key in real if key != "2"]
     assert list(packet["1"]) == list(real["1"])
     for field, value in real["1"].items():
@@ -90,7 +97,7 @@ def test_fields_of_1_8_are_those_of_a_real_server(model, sensors, real_packets):
 
 
 def test_fields_of_1_8():
-    encoder = Encoder({"thumb": newtons()}, version="1.8")
+    encoder = XelaEncoder({"thumb": newtons()}, version="1.8")
     packet = told(encoder, {"thumb": np.zeros((16, 3))})
     assert list(packet) == ["message", "time", "sensors", "type", "version", "1", "sendtime"]
     assert list(packet["1"]) == [
@@ -105,12 +112,12 @@ def test_fields_of_1_8():
 
 
 def test_the_first_word_is_welcome():
-    assert json.loads(Encoder(TIPS, version="1.7").welcome()) == {"message": "Welcome"}
-    assert json.loads(Encoder(TIPS).welcome())["message"] == "Welcome"
+    assert json.loads(XelaEncoder(TIPS, version="1.7").welcome()) == {"message": "Welcome"}
+    assert json.loads(XelaEncoder(TIPS).welcome())["message"] == "Welcome"
 
 
 def test_the_counter_counts():
-    encoder = Encoder({"a": sensor("uskin-4x4")})
+    encoder = XelaEncoder({"a": sensor("uskin-4x4")})
     numbers = [told(encoder, {"a": np.zeros((16, 3))})["message"] for _ in range(3)]
     assert numbers == [0, 1, 2]
     encoder._counter = 2**32 - 1
@@ -119,7 +126,7 @@ def test_the_counter_counts():
 
 
 def test_a_sensor_without_a_sample_is_left_out():
-    encoder = Encoder(TIPS)
+    encoder = XelaEncoder(TIPS)
     packet = told(encoder, {"index": counts(30), "ring": counts(30, 1)})
     assert [key for key in packet if key.isdigit()] == ["2", "4"]
     assert packet["sensors"] == 2
@@ -129,7 +136,7 @@ def test_a_sensor_without_a_sample_is_left_out():
 
 class TestWholeHand:
     def test_fingertips_inside_a_hand(self):
-        encoder = Encoder(TIPS, whole_hand=True)
+        encoder = XelaEncoder(TIPS, whole_hand=True)
         assert encoder.is_hand
         given = [samples_of(TIPS, k) for k in range(5)]
         packets = [encoder.packet(s, START + k, 0.0) for k, s in enumerate(given)]
@@ -138,19 +145,19 @@ class TestWholeHand:
             for name, readings in expected.items():
                 np.testing.assert_array_equal(arrival.samples[name], readings)
             for name in set(WHOLE) - set(TIPS):
-                assert (np.abs(arrival.samples[name].astype(float) - REST) < 300).all()
+                assert (np.abs(arrival.samples[name].astype(float) - REST_READING) < 300).all()
 
     def test_what_is_at_rest_is_always_the_same(self):
         packets = [
             [encoder.packet(samples_of(TIPS, k), START + k, 0.0) for k in range(3)]
-            for encoder in (Encoder(TIPS, whole_hand=True), Encoder(TIPS, whole_hand=True))
+            for encoder in (XelaEncoder(TIPS, whole_hand=True), XelaEncoder(TIPS, whole_hand=True))
         ]
         assert packets[0] == packets[1]
-        first, second = (a.samples["palm/1"] for a in decoded(Encoder(WHOLE), packets[0])[:2])
+        first, second = (a.samples["palm/1"] for a in decoded(XelaEncoder(WHOLE), packets[0])[:2])
         assert 0 < np.abs(first.astype(int) - second).max() <= 4
 
     def test_a_module_without_a_sample_stays_as_it_was(self):
-        encoder = Encoder(WHOLE)
+        encoder = XelaEncoder(WHOLE)
         first = samples_of(WHOLE)
         thumb = {"thumb": counts(30, 77)}
         packets = [encoder.packet(first, START, 0.0), encoder.packet(thumb, START + 1, 0.0)]
@@ -160,7 +167,7 @@ class TestWholeHand:
 
     def test_newtons(self):
         tips = dict.fromkeys(TIPS, newtons("uskin-curved"))
-        encoder = Encoder(tips, whole_hand=True)
+        encoder = XelaEncoder(tips, whole_hand=True)
         force = np.random.default_rng(0).normal(size=(30, 3))
         (arrival,) = decoded(
             encoder, [encoder.packet({"thumb": force}, START, 0.0)], calibrated=True
@@ -177,24 +184,24 @@ class TestWholeHand:
     )
     def test_what_is_no_part_of_it(self, sensors, text):
         with pytest.raises(ValueError) as refusal:
-            Encoder(sensors, whole_hand=True)
+            XelaEncoder(sensors, whole_hand=True)
         assert str(refusal.value).startswith(f"--whole-hand: {text}")
 
     def test_a_hand_with_another_sensor_is_sent_in_parts(self):
-        assert not Encoder(WHOLE | {"thumb": sensor("uskin-4x4")}).is_hand
+        assert not XelaEncoder(WHOLE | {"thumb": sensor("uskin-4x4")}).is_hand
 
 
 class TestReadings:
     @given(arrays(np.float64, (16, 3), elements=st.floats(-0.49, 65535.49)))
     def test_floats_are_rounded(self, readings):
-        encoder = Encoder({"a": sensor("uskin-4x4")})
+        encoder = XelaEncoder({"a": sensor("uskin-4x4")})
         packet = told(encoder, {"a": readings})
         assert packet["1"]["integer"] == [int(value) for value in np.rint(readings).ravel()]
 
     @pytest.mark.parametrize("kind", [np.int16, np.int32, np.uint16, np.float32, ">u2"])
     def test_number_types(self, kind):
         readings = np.arange(48).reshape(16, 3).astype(kind)
-        packet = told(Encoder({"a": sensor("uskin-4x4")}), {"a": readings})
+        packet = told(XelaEncoder({"a": sensor("uskin-4x4")}), {"a": readings})
         assert packet["1"]["integer"] == list(range(48))
 
     @pytest.mark.parametrize(("wrong", "told_as"), [(-1, "-1 to 0"), (65536.0, "0 to 65536")])
@@ -202,7 +209,7 @@ class TestReadings:
         readings = np.zeros((16, 3), dtype=type(wrong))
         readings[3, 1] = wrong
         with pytest.raises(ValueError) as refusal:
-            Encoder({"a": sensor("uskin-4x4")}).packet({"a": readings}, 0.0, 0.0)
+            XelaEncoder({"a": sensor("uskin-4x4")}).packet({"a": readings}, 0.0, 0.0)
         assert str(refusal.value) == (
             f"a: readings from 0 to 65535 counts expected, {told_as} given; packets of a XELA "
             "server hold no others"
@@ -212,12 +219,12 @@ class TestReadings:
         two = dict.fromkeys("ab", sensor("uskin-4x4"))
         broken = np.zeros((16, 3))
         broken[0, 0] = np.nan
-        packet = told(Encoder(two), {"a": broken, "b": np.zeros((16, 3))})
+        packet = told(XelaEncoder(two), {"a": broken, "b": np.zeros((16, 3))})
         assert "1" not in packet
         assert packet["2"]["integer"] == [0] * 48
 
     def test_newtons(self):
-        encoder = Encoder({"a": newtons()})
+        encoder = XelaEncoder({"a": newtons()})
         force = np.random.default_rng(0).normal(size=(16, 3))
         force[2, 1] = np.nan
         packet = encoder.packet({"a": force}, START, 0.0)
@@ -225,24 +232,24 @@ class TestReadings:
         np.testing.assert_array_equal(arrival.samples["a"], force)
         (counted,) = decoded(encoder, [packet])
         known = np.isfinite(force)
-        errors = counted.samples["a"] - (REST + force / RESOLUTION)
+        errors = counted.samples["a"] - (REST_READING + force / NEWTONS_PER_COUNT)
         assert np.abs(errors[known]).max() <= 0.5
-        assert counted.samples["a"][2, 1] == REST[1]
+        assert counted.samples["a"][2, 1] == REST_READING[1]
 
     def test_another_shape(self):
         with pytest.raises(ValueError, match=r"a: \(16, 3\) readings expected, \(15, 3\) given"):
-            Encoder({"a": sensor("uskin-4x4")}).packet({"a": np.zeros((15, 3))}, 0.0, 0.0)
+            XelaEncoder({"a": sensor("uskin-4x4")}).packet({"a": np.zeros((15, 3))}, 0.0, 0.0)
 
 
 def test_a_sensor_that_xela_does_not_make_goes_by_its_name():
     own = Sensor("mine", np.zeros((2, 3)), np.tile(np.eye(3), (2, 1, 1)), np.array([0, 0, 1]), 50.0)
-    packet = told(Encoder({"a": own}), {"a": np.zeros((2, 3))})
+    packet = told(XelaEncoder({"a": own}), {"a": np.zeros((2, 3))})
     assert (packet["1"]["model"], packet["1"]["ups"]) == ("mine", [50.0, 50.0])
 
 
 def test_a_version_that_there_is_not():
     with pytest.raises(ValueError, match=r"version 1\.7 or 1\.8 expected, '2\.0' given"):
-        Encoder(TIPS, version="2.0")
+        XelaEncoder(TIPS, version="2.0")
 
 
 def test_what_is_part_of_an_allegro_hand():
@@ -250,3 +257,65 @@ def test_what_is_part_of_an_allegro_hand():
     assert is_part_of_hand({"thumb": tip, "index": tip})
     assert not is_part_of_hand({"finger1": tip})
     assert not is_part_of_hand({"thumb": patch})
+
+
+def batches(batcher, given):
+    """Time of each batch, and the samples of its modules with their times."""
+    due = [one for time, samples in given for one in batcher.add(samples, time)]
+    due += batcher.flush()
+    return [(one.time, {n: (s, one.times[n]) for n, s in one.samples.items()}) for one in due]
+
+
+def test_one_instant_is_one_batch():
+    given = [(t, {"a": 10 + t, "b": 20 + t}) for t in range(3)]
+    expected = [(t, {"a": (10 + t, t), "b": (20 + t, t)}) for t in range(3)]
+    for own_stamps in (False, True):
+        assert batches(SampleBatcher("ab", own_stamps=own_stamps), given) == expected
+
+
+def test_with_own_stamps_every_sample_is_passed_on_at_once():
+    given = [(0.0, {"a": 1}), (0.1, {"b": 2}), (0.2, {"a": 3}), (0.3, {"a": 4})]
+    assert batches(SampleBatcher("ab", own_stamps=True), given) == [
+        (0.1, {"a": (1, 0.0), "b": (2, 0.1)}),
+        (0.2, {"a": (3, 0.2), "b": (2, 0.1)}),
+        (0.3, {"a": (4, 0.3), "b": (2, 0.1)}),
+    ]
+
+
+def test_without_own_stamps_samples_wait_for_each_other():
+    given = [(0.0, {"a": 1}), (0.1, {"b": 2}), (0.2, {"b": 3}), (0.3, {"a": 4}), (0.4, {"a": 5})]
+    assert batches(SampleBatcher("ab", own_stamps=False), given) == [
+        (0.1, {"a": (1, 0.0), "b": (2, 0.1)}),
+        (0.3, {"a": (4, 0.3), "b": (3, 0.2)}),
+        (0.4, {"a": (5, 0.4), "b": (3, 0.2)}),
+    ]
+
+
+def test_a_module_with_its_next_sample_does_not_wait():
+    given = [(0.0, {"a": 1, "b": 2}), (0.1, {"a": 3}), (0.2, {"a": 4})]
+    assert batches(SampleBatcher("ab", own_stamps=False), given) == [
+        (0.0, {"a": (1, 0.0), "b": (2, 0.0)}),
+        (0.1, {"a": (3, 0.1), "b": (2, 0.0)}),
+        (0.2, {"a": (4, 0.2), "b": (2, 0.0)}),
+    ]
+
+
+def test_a_module_that_never_arrives_is_waited_for_once():
+    for own_stamps in (False, True):
+        given = [
+            (t, {"a": t})
+            for t in (0.0, 0.9 * MAX_MODULE_WAIT, MAX_MODULE_WAIT, MAX_MODULE_WAIT + 0.1)
+        ]
+        assert batches(SampleBatcher("ab", own_stamps=own_stamps), given) == [
+            (t, {"a": (t, t)}) for t in (MAX_MODULE_WAIT, MAX_MODULE_WAIT + 0.1)
+        ]
+
+
+def test_a_module_that_arrives_late_is_passed_on_from_then():
+    given = [(MAX_MODULE_WAIT, {"a": 2}), (MAX_MODULE_WAIT + 0.1, {"b": 3})]
+    batcher = SampleBatcher("ab", own_stamps=True)
+    assert batches(batcher, [(0.0, {"a": 1})]) == []
+    assert batches(batcher, given)[-1] == (
+        MAX_MODULE_WAIT + 0.1,
+        {"a": (2, MAX_MODULE_WAIT), "b": (3, MAX_MODULE_WAIT + 0.1)},
+    )

@@ -9,9 +9,9 @@ from typing import NamedTuple
 from holdfast.errors import SourceError
 from holdfast.ros.messages import Message
 from holdfast.sensors.values import Unit
-from holdfast.sources.address import Address
+from holdfast.sources.base import Arrival, Source, notice_arrival
 from holdfast.sources.ros.translator import Translator
-from holdfast.sources.source import Arrival, Source, word
+from holdfast.sources.uri import Address
 
 PATIENCE = 5.0
 """How long entering waits for a message with samples [s]."""
@@ -108,7 +108,7 @@ class TopicSource(Source):
         self.metadata = {"source": self.name, **self._translator.metadata}
         notices = [notice for skin in self._translator.skins.values() for notice in skin.notices]
         if notices:
-            self._pending.append(word(time.monotonic(), *notices))
+            self._pending.append(notice_arrival(time.monotonic(), *notices))
         self._heard_at = self._seen_at = time.monotonic()
         for packet in packets:
             self._take(packet)
@@ -218,7 +218,7 @@ class TopicSource(Source):
             self._tell("somebody publishes again")
 
     def _tell(self, notice: str) -> None:
-        self._pending.append(word(time.monotonic(), notice))
+        self._pending.append(notice_arrival(time.monotonic(), notice))
 
 
 def topic_of(address: Address) -> str:

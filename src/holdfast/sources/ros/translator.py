@@ -13,7 +13,7 @@ from holdfast.ros.messages import PAPILLARRAY, Message, readings_of
 from holdfast.sensors import Sensor, sensor
 from holdfast.sensors.values import Unit
 from holdfast.sensors.xela_models import whole_hand
-from holdfast.sources.source import Arrival, word
+from holdfast.sources.base import Arrival, notice_arrival
 from holdfast.sources.timeline import LATE, Delay, Timeline
 from holdfast.sources.xela.models import Skin, skins
 from holdfast.sources.xela.packet import n_missing
@@ -189,7 +189,7 @@ class Translator:
             told = {name: these for name, these in faults.items() if these}
             arrivals.append(Arrival(self._time, samples, received, told))
         if not arrivals and (heard.notices or heard.faults or heard.n_refused):
-            arrivals = [word(received)]
+            arrivals = [notice_arrival(received)]
         if arrivals:
             arrivals[0] = arrivals[0]._replace(
                 faults={**heard.faults, **arrivals[0].faults},

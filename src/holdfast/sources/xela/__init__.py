@@ -1,7 +1,7 @@
 """XELA's server as a source: `xela://HOST:PORT` or `xela://auto`."""
 
-from holdfast.sources.address import Address
-from holdfast.sources.source import Source
+from holdfast.sources.base import Source
+from holdfast.sources.uri import Address
 
 
 def source(address: Address) -> Source:

@@ -11,7 +11,7 @@ from websockets.sync.client import ClientConnection, connect
 
 from holdfast.errors import SourceError
 from holdfast.sensors import Sensor
-from holdfast.sources.source import Arrival, Source, word
+from holdfast.sources.base import Arrival, Source, notice_arrival
 from holdfast.sources.xela.decoder import Decoder
 from holdfast.sources.xela.packet import Refusal
 from holdfast.sources.xela.places import Place
@@ -171,7 +171,9 @@ class XelaSource(Source):
         if any(arrival.samples for arrival in arrivals):
             if self._silent:
                 silence = received - self._heard_at
-                self._pending.append(word(received, f"samples again after {silence:.1f} s"))
+                self._pending.append(
+                    notice_arrival(received, f"samples again after {silence:.1f} s")
+                )
             self._silent = False
             self._heard_at = received
         else:
@@ -182,7 +184,7 @@ class XelaSource(Source):
         now = time.monotonic()
         if not self._silent and now - self._heard_at >= SILENCE:
             self._silent = True
-            self._pending.append(word(now, f"no new sample for {SILENCE:g} s"))
+            self._pending.append(notice_arrival(now, f"no new sample for {SILENCE:g} s"))
 
     def _lose(self, why: Exception) -> None:
         self._disconnect()
@@ -190,7 +192,7 @@ class XelaSource(Source):
         self._backoff = BACKOFF
         self._again_at = now + self._backoff
         reason = "the server ended it" if isinstance(why, ConnectionClosedOK) else why
-        self._pending.append(word(now, f"connection lost ({reason})"))
+        self._pending.append(notice_arrival(now, f"connection lost ({reason})"))
 
     def _try_again(self, timeout: float) -> None:
         """Waits until it is time to connect again, and does; within `timeout` and `CONNECT`."""
@@ -208,7 +210,9 @@ class XelaSource(Source):
         now = self._heard_at = time.monotonic()
         self._silent = False
         self._decoder.reconnected()
-        self._pending.append(word(now, f"connected again after {now - self._lost_at:.1f} s"))
+        self._pending.append(
+            notice_arrival(now, f"connected again after {now - self._lost_at:.1f} s")
+        )
 
     def _disconnect(self) -> None:
         connection, self._connection = self._connection, None

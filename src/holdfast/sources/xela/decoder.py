@@ -12,7 +12,7 @@ from holdfast.contact import Fault
 from holdfast.errors import SourceError
 from holdfast.sensors import Sensor
 from holdfast.sensors.xela_models import whole_hand
-from holdfast.sources.source import Arrival, word
+from holdfast.sources.base import Arrival, notice_arrival
 from holdfast.sources.timeline import LATE, Delay, Stamp, Timeline
 from holdfast.sources.xela.models import Skin, skins
 from holdfast.sources.xela.packet import Packet, Refusal, n_missing, read_packet, read_sensor
@@ -200,7 +200,7 @@ class Decoder:
             faults = {name: heard.late[name] for name in samples if heard.late[name]}
             arrivals.append(Arrival(self._time, samples, received, faults))
         if not arrivals and heard.notices:
-            arrivals = [word(received)]
+            arrivals = [notice_arrival(received)]
         if arrivals:
             first = arrivals[0]
             arrivals[0] = first._replace(

@@ -4,7 +4,7 @@ import socket
 from typing import NamedTuple
 from urllib.parse import urlsplit
 
-from holdfast.sources.address import Address
+from holdfast.sources.uri import Address
 
 HOST, PORT = "127.0.0.1", 5000
 AUTO = "auto"

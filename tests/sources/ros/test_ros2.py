@@ -22,7 +22,7 @@ from holdfast.sources import open_source
 from holdfast.sources.ros import topic
 from sources.ros_build import PILLARS, sensor_state, store
 
-PEER = Path(__file__).parent / "ros2_peer.py"
+PEER = Path(__file__).parents[1] / "ros2_peer.py"
 N = 300
 _numbers = itertools.count()
 
@@ -182,7 +182,7 @@ def test_unknown_parameters():
 
 
 def test_without_cyclonedds(monkeypatch):
-    monkeypatch.delitem(sys.modules, "holdfast.sources.ros2", raising=False)
+    monkeypatch.delitem(sys.modules, "holdfast.sources.ros.ros2", raising=False)
     monkeypatch.delitem(sys.modules, "holdfast.ros.dds")
     monkeypatch.delattr("holdfast.ros.dds", raising=False)
     for name in [name for name in sys.modules if name.split(".")[0] == "cyclonedds"]:

@@ -6,9 +6,9 @@ from collections import deque
 from holdfast.errors import SourceError
 from holdfast.ros import dds
 from holdfast.ros.messages import Unpacker, known_definition
-from holdfast.sources.address import Address
+from holdfast.sources.base import Source
 from holdfast.sources.ros.topic import PATIENCE, Link, Packet, TopicSource, topic_of
-from holdfast.sources.source import Source
+from holdfast.sources.uri import Address
 
 LOOK = 0.05
 """How often who publishes is looked at, while a publisher is waited for [s]."""

@@ -114,7 +114,7 @@ class Source(ABC):
         self.close()
 
 
-def word(
+def notice_arrival(
     received: float,
     *notices: str,
     faults: Mapping[str, tuple[Fault, ...]] | None = None,

@@ -11,9 +11,9 @@ from holdfast.errors import SourceError
 from holdfast.ros import rospy_node
 from holdfast.ros.definitions import parse_definition
 from holdfast.ros.messages import KNOWN, Message, Unpacker
-from holdfast.sources.address import Address
+from holdfast.sources.base import Source
 from holdfast.sources.ros.topic import PATIENCE, Link, Packet, Stranger, TopicSource, topic_of
-from holdfast.sources.source import Source
+from holdfast.sources.uri import Address
 
 N_QUEUED = 256
 """Messages that wait for a reader that is busy; then it misses the oldest."""
