@@ -4,7 +4,9 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from holdfast.errors import RecordingError
-from holdfast.features import fingertip_force
+from holdfast.features import Tare, fingertip_force, force
+from holdfast.features.force import rest_amplitude, tared_force
+from holdfast.recordings import Tactile
 from holdfast.sensors import sensor
 
 from . import naive
@@ -157,3 +159,67 @@ def test_refuses_other_times(n):
     with pytest.raises(RecordingError) as raised:
         fingertip_force(readings(9), CURVED, times=np.arange(n))
     assert str(raised.value) == f"9 samples given with times of shape ({n},)"
+
+
+def module(values, which=CURVED, times=None):
+    times = np.arange(len(values)) / which.rate if times is None else times
+    return Tactile(which, times, values)
+
+
+@pytest.mark.parametrize("tare", [0.5, "first", "none", (0.1, 0.4)])
+@pytest.mark.parametrize("kind", [np.uint16, np.float32])
+def test_a_module_has_the_same_force_in_blocks(tare, kind, monkeypatch):
+    monkeypatch.setattr(force, "BLOCK_SAMPLES", 7)
+    made = module(readings(100).astype(kind))
+    found = tared_force(made, tare)
+    expected = fingertip_force(made.readings, CURVED, tare)
+    assert np.array_equal(found.force, expected, equal_nan=True)
+    assert found.first == np.flatnonzero(np.isfinite(expected[:, 0]))[0]
+    assert np.array_equal(found.amplitude, np.linalg.norm(expected, axis=1), equal_nan=True)
+
+
+def test_the_rate_says_how_many_samples_a_tare_takes():
+    made = module(readings(100), times=np.arange(100) / 100)
+    assert tared_force(made, 0.105).first == 11  # up to half a period of 150 Hz before 0.105 s
+    assert tared_force(made, 0.105, rate=50.0).first == 10
+    assert tared_force(made, 0.101, rate=1000.0).first == 11
+
+
+def test_the_offline_baseline_holds_for_the_samples_before_it_too():
+    values = readings(100).astype(float)
+    values[:2, 0, 0] = np.nan
+    found = tared_force(module(values), 0.5, offline=True)
+    live = tared_force(module(values), 0.5)
+    assert np.array_equal(found.baseline, live.baseline)
+    assert (found.first, live.first) == (0, 77)
+    assert np.isnan(found.force[:2]).all()
+    assert np.isfinite(found.force[2:]).all()
+    assert np.array_equal(found.force[77:], live.force[77:])
+
+
+def test_the_offline_baseline_takes_one_sample_at_least():
+    made = module(readings(4))
+    assert (tared_force(made, 1e-4, offline=True).force[0] == 0).all()
+
+
+@pytest.mark.parametrize("tare", ["first", "none", "0.1:0.2"])
+def test_other_tares_are_the_same_offline(tare):
+    made = module(readings(60))
+    found = tared_force(made, tare, offline=True)
+    assert np.array_equal(found.force, fingertip_force(made.readings, CURVED, tare))
+
+
+def test_amplitude_at_rest():
+    values = readings(100).astype(float)
+    values[3, 0, 0] = np.nan
+    found = rest_amplitude(module(values), Tare.parse(0.5), CURVED.rate)
+    baseline = np.delete(values[:75], 3, axis=0).mean(axis=0)
+    loop = [np.linalg.norm(naive.force(v, baseline, CURVED.rotations)) for v in values[:75]]
+    assert np.allclose(found, np.delete(loop, 3), rtol=1e-12, atol=1e-6)
+
+
+def test_amplitude_at_rest_of_a_sensor_that_begins_late():
+    values = readings(400).astype(float)
+    values[:300] = np.nan
+    found = rest_amplitude(module(values), Tare.parse(0.5), CURVED.rate)
+    assert np.array_equal(found, rest_amplitude(module(values[300:]), Tare.parse(0.5), CURVED.rate))

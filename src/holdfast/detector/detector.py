@@ -24,7 +24,7 @@ from holdfast.contact import (
 from holdfast.detector.rule import N_REPORT, Live, Traces, new_decision, rule_of, run, step_live
 from holdfast.detector.traces import STATES, VERDICTS, Detection, detection_of
 from holdfast.errors import ModelError, StreamError
-from holdfast.features.layout import TARED, TAXELS, Array
+from holdfast.features.arrays import TARED, TAXELS, Array
 from holdfast.features.stream import StreamPlan, give_baseline, new_memory, new_output, samples_of
 from holdfast.model import Model
 from holdfast.recordings import Recording

@@ -20,8 +20,7 @@ from holdfast.detector.table import (
     table_of,
 )
 from holdfast.features import kernel
-from holdfast.features.faults import TARE_DRIFT
-from holdfast.features.layout import (
+from holdfast.features.arrays import (
     AMPLITUDE,
     FAULT,
     FAULTS,
@@ -41,6 +40,7 @@ from holdfast.features.layout import (
     Memory,
     Output,
 )
+from holdfast.features.faults import TARE_DRIFT
 from holdfast.features.stream import StreamPlan
 from holdfast.features.values import noise_sigma
 from holdfast.model import ANY_FINGER, Model

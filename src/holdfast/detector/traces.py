@@ -17,7 +17,7 @@ from holdfast.contact import (
     taxels_of,
 )
 from holdfast.detector.rule import Traces, verdict_code
-from holdfast.features.layout import SIGMA, Array
+from holdfast.features.arrays import SIGMA, Array
 
 STATES = tuple(ContactState)
 REASONS = tuple(Reason)

@@ -7,7 +7,7 @@ import numpy.typing as npt
 
 from holdfast.compiled import compiled
 from holdfast.features import kernel
-from holdfast.features.layout import AMPLITUDE, TARE_GIVEN, Array, Layout, Memory, Output
+from holdfast.features.arrays import AMPLITUDE, TARE_GIVEN, Array, Layout, Memory, Output
 from holdfast.features.stream import (
     StreamPlan,
     give_baseline,

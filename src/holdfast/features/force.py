@@ -1,18 +1,21 @@
-"""Fingertip force from taxels."""
+"""Fingertip force of recordings: the taxel readings less the tare, rotated and summed."""
 
 import math
+from typing import NamedTuple
 
 import numba
 import numpy as np
 import numpy.typing as npt
 
-from holdfast.compiled import compiled_parallel
+from holdfast.compiled import compiled, compiled_parallel
 from holdfast.errors import RecordingError
-from holdfast.features.baseline import force_of
-from holdfast.features.layout import Array
-from holdfast.features.tare import HALF, Tare, TareArgument
+from holdfast.features.arrays import Array
+from holdfast.features.tare import Tare, TareArgument, baseline_of, offline_tare
 from holdfast.recordings import Tactile
 from holdfast.sensors import Sensor
+
+BLOCK_SAMPLES = 16_384
+"""Samples that are converted to float64 at a time: bounds the memory of offline work."""
 
 
 def fingertip_force(
@@ -21,21 +24,22 @@ def fingertip_force(
     tare: TareArgument | Tare = 0.5,
     times: npt.ArrayLike | None = None,
 ) -> Array:
-    """The force on a fingertip, by its taxels: F_tip(k) = sum_i R_i (f_i(k) - baseline_i).
+    """Return the force on a fingertip: F_tip(k) = sum_i R_i (f_i(k) - baseline_i).
 
     Args:
         readings: (n, n_taxels, 3) in taxel frames [count or N].
-        sensor: whose readings they are.
-        tare: the baseline: seconds from the start, "first", "none", or (start, end) [s].
-        times: (n,) [s]; by default 0, 1, 2, ... over the sensor's rate.
+        sensor: the sensor that gave the readings.
+        tare: how the baseline is found: seconds from the start, "first", "none", or
+            (start, end) [s].
+        times: (n,) [s]; by default 0, 1, 2, ... divided by the rate of the sensor.
 
     Returns:
-        (n, 3) in the fingertip frame, in the unit of the readings; NaN until the tare is
-        complete and where a reading is not finite.
+        (n, 3) in the fingertip frame, in the unit of the readings. NaN until the tare is
+        complete, and where a reading is not finite.
 
     Raises:
-        RecordingError: another number of taxels, axes or times.
-        ValueError: an unknown tare, or an interval without samples.
+        RecordingError: the number of taxels, axes or times does not fit.
+        ValueError: the tare is unknown, or no finite sample lies in its time.
 
     Example:
         >>> import numpy as np
@@ -57,59 +61,115 @@ def fingertip_force(
     if clock.shape != (len(values),):
         raise RecordingError(f"{len(values)} samples given with times of shape {clock.shape}")
     baseline, first = baseline_of(values, clock, Tare.parse(tare), 1 / sensor.rate)
-    force = np.full((len(values), 3), np.nan)
-    _forces(values[first:], baseline, sensor.rotations, force[first:])
-    return force
+    return _forces(values, baseline, sensor, first)
 
 
-def baseline_of(values: Array, times: Array, tare: Tare, period: float) -> tuple[Array, int]:
-    """The baseline (n_taxels, 3), and the first sample that it may be used for.
+class TaredForce(NamedTuple):
+    """The fingertip force of a module, with the tare that was subtracted.
 
-    Raises:
-        ValueError: no finite sample in the time that the tare takes.
+    Attributes:
+        force: (n, 3) F_tip in the fingertip frame [unit of the readings]; NaN before `first`
+            and where a reading is not finite.
+        baseline: (n_taxels, 3) mean readings without contact [unit of the readings].
+        first: the first sample that has a force, if its readings are finite.
     """
-    if tare.kind == "none" or not (len(values) or tare.kind == "interval"):
-        return np.zeros(values.shape[1:]), 0
-    finite = np.isfinite(values).all(axis=(1, 2))
-    start = int(finite.argmax()) if len(values) else 0
-    if tare.kind == "first":
-        return values[start], start
-    if tare.kind == "interval":
-        taken = finite & (times >= tare.interval[0]) & (times < tare.interval[1])
-        first = 0
-    else:
-        running = times - times[start] + HALF * period < tare.seconds
-        running[: start + 1] = True  # one sample at least
-        taken = finite & running
-        first = int(running.sum())
-    if not taken.any():
-        raise ValueError(f"tare {tare}: no finite sample in that time")
-    return np.add.accumulate(values[taken], axis=0)[-1] / taken.sum(), first
+
+    force: Array
+    baseline: Array
+    first: int
+
+    @property
+    def amplitude(self) -> Array:
+        """(n,) F_a = |F_tip| [unit of the readings]."""
+        return np.asarray(np.linalg.norm(self.force, axis=1))
 
 
-@compiled_parallel
-def _forces(values: Array, baseline: Array, rotations: Array, force: Array) -> None:
-    for k in numba.prange(len(values)):
-        x, y, z, _ = force_of(values[k], baseline, rotations, 0, len(baseline))
-        if math.isfinite(x + y + z):
-            force[k, 0], force[k, 1], force[k, 2] = x, y, z
+def tared_force(
+    module: Tactile,
+    tare: TareArgument | Tare = 0.5,
+    rate: float | None = None,
+    *,
+    offline: bool = False,
+) -> TaredForce:
+    """Return the fingertip force of a module of a recording, and its tare.
 
-
-def tare_amplitude(module: Tactile, tare: Tare, rate: float) -> Array:
-    """F_a of the samples that a tare by seconds is taken from, with that very tare.
+    Readings are converted in blocks: a long module needs little memory beside its own.
 
     Args:
-        module: readings of a finger.
-        tare: by seconds.
+        module: the readings of a finger.
+        tare: how the baseline is found.
+        rate: samples per second [Hz]; by default the nominal rate of the sensor.
+        offline: subtract the baseline from all samples, from those before the tare is complete
+            too. A detector cannot do so.
+
+    Raises:
+        ValueError: the tare is unknown, or no finite sample lies in its time.
+
+    Example:
+        >>> from holdfast.synthetic import synthetic_recording
+        >>> module = synthetic_recording("made", seed=0).modules["index"]
+        >>> found = tared_force(module, 0.5)
+        >>> found.first, found.force.shape, found.baseline.shape
+        (75, (1725, 3), (30, 3))
+    """
+    how = offline_tare(tare, module) if offline else Tare.parse(tare)
+    period = 1 / (module.sensor.rate if rate is None else rate)
+    baseline, first = baseline_of(module.readings, module.times, how, period)
+    return TaredForce(_forces(module.readings, baseline, module.sensor, first), baseline, first)
+
+
+def rest_amplitude(module: Tactile, tare: Tare, rate: float) -> Array:
+    """Return F_a of the samples that a tare by seconds is taken from.
+
+    Args:
+        module: the readings of a finger.
+        tare: a tare by seconds, which is subtracted.
         rate: samples per second [Hz].
 
     Returns:
-        (n,) what the sensor shows without contact [unit of the readings].
+        (n,) what the sensor reports without contact [unit of the readings]; finite samples only.
+
+    Raises:
+        ValueError: no finite sample lies in the time of the tare.
     """
-    n_enough = int(np.searchsorted(module.times, module.times[0] + tare.seconds + 1)) + 1
-    values = np.ascontiguousarray(module.readings[:n_enough], dtype=np.float64)
-    baseline, first = baseline_of(values, module.times[:n_enough], tare, 1 / rate)
-    force = np.full((first, 3), np.nan)
-    _forces(values[:first], baseline, module.sensor.rotations, force)
+    baseline, first = baseline_of(module.readings, module.times, tare, 1 / rate)
+    force = _forces(module.readings[:first], baseline, module.sensor)
     amplitude: Array = np.linalg.norm(force, axis=1)
     return amplitude[np.isfinite(amplitude)]
+
+
+@compiled
+def sum_taxels(
+    readings: Array, baseline: Array, rotations: Array, first: int, last: int
+) -> tuple[float, float, float, float]:
+    """Return F_tip = sum over taxels of R_i (f_i - baseline_i), and the sum of normal readings."""
+    fx = fy = fz = normal = 0.0
+    for i in range(np.uint64(first), np.uint64(last)):
+        x = readings[i, 0] - baseline[i, 0]
+        y = readings[i, 1] - baseline[i, 1]
+        z = readings[i, 2] - baseline[i, 2]
+        fx += rotations[i, 0, 0] * x + rotations[i, 0, 1] * y + rotations[i, 0, 2] * z
+        fy += rotations[i, 1, 0] * x + rotations[i, 1, 1] * y + rotations[i, 1, 2] * z
+        fz += rotations[i, 2, 0] * x + rotations[i, 2, 1] * y + rotations[i, 2, 2] * z
+        normal += z
+    return fx, fy, fz, normal
+
+
+def _forces(
+    readings: npt.NDArray[np.generic], baseline: Array, sensor: Sensor, first: int = 0
+) -> Array:
+    """Return (n, 3) F_tip from sample `first` on; NaN before and where it is not finite."""
+    force = np.full((len(readings), 3), np.nan)
+    for start in range(first, len(readings), BLOCK_SAMPLES):
+        block = slice(start, start + BLOCK_SAMPLES)
+        values = np.ascontiguousarray(readings[block], dtype=np.float64)
+        _fill_forces(values, baseline, sensor.rotations, force[block])
+    return force
+
+
+@compiled_parallel
+def _fill_forces(values: Array, baseline: Array, rotations: Array, force: Array) -> None:
+    for k in numba.prange(len(values)):
+        x, y, z, _ = sum_taxels(values[k], baseline, rotations, 0, len(baseline))
+        if math.isfinite(x + y + z):
+            force[k, 0], force[k, 1], force[k, 2] = x, y, z

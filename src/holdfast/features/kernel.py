@@ -10,28 +10,7 @@ import math
 import numpy as np
 
 from holdfast.compiled import compiled, inlined
-from holdfast.features.baseline import force_of, prepared
-from holdfast.features.faults import (
-    LEAST_TAXELS,
-    NOISE_SMOOTHING,
-    NOISY,
-    NOT_FINITE,
-    OUT_OF_RANGE,
-    SATURATED,
-    SPOILING,
-    STUCK,
-    STUCK_SECONDS,
-    TARE_LOADED,
-    bit_of,
-    differ,
-    forget_noise,
-    is_noisy,
-    outside,
-    still_taxels,
-    survey,
-    watch_taxels,
-)
-from holdfast.features.layout import (
+from holdfast.features.arrays import (
     AMPLITUDE,
     CHANGES,
     END,
@@ -71,6 +50,28 @@ from holdfast.features.layout import (
     Memory,
     Output,
 )
+from holdfast.features.baseline import prepared
+from holdfast.features.faults import (
+    LEAST_TAXELS,
+    NOISE_SMOOTHING,
+    NOISY,
+    NOT_FINITE,
+    OUT_OF_RANGE,
+    SATURATED,
+    SPOILING,
+    STUCK,
+    STUCK_SECONDS,
+    TARE_LOADED,
+    bit_of,
+    differ,
+    forget_noise,
+    is_noisy,
+    outside,
+    still_taxels,
+    survey,
+    watch_taxels,
+)
+from holdfast.features.force import sum_taxels
 from holdfast.features.values import blank, fill_features, moments, own_features
 
 LOADED_SECONDS = 0.25
@@ -161,7 +162,7 @@ def _feel(
     """The force of a sample, with its faults so far; what `_take` returns."""
     counts, levels, windows = memory.counts, memory.levels, layout.windows
     first, last = layout.offsets[f], layout.offsets[f + 1]
-    x, y, z, pressing = force_of(readings, memory.baseline, layout.rotations, first, last)
+    x, y, z, pressing = sum_taxels(readings, memory.baseline, layout.rotations, first, last)
     _remember(memory.history, counts, values, f, x, y, z)
     if _stuck(counts, f, layout.period):
         faults |= STUCK

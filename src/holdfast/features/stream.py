@@ -8,9 +8,7 @@ from typing import NamedTuple
 import numpy as np
 import numpy.typing as npt
 
-from holdfast.features.faults import CHANGED_AT, N_TAXEL
-from holdfast.features.force import baseline_of
-from holdfast.features.layout import (
+from holdfast.features.arrays import (
     FIRST,
     LAST,
     LONGEST,
@@ -31,8 +29,9 @@ from holdfast.features.layout import (
     Memory,
     Output,
 )
+from holdfast.features.faults import CHANGED_AT, N_TAXEL
 from holdfast.features.specs import FeatureSpec, spec_codes
-from holdfast.features.tare import Tare
+from holdfast.features.tare import Tare, baseline_of
 from holdfast.recordings import Recording
 from holdfast.sensors import Sensor
 

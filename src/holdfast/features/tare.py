@@ -1,14 +1,25 @@
-"""The tare: a per-taxel baseline taken without contact, then frozen."""
+"""The tare: a per-taxel baseline taken without contact, then frozen; offline and live.
+
+`baseline_of` computes it from a recording, `update_baseline` sample by sample in a stream. Both
+add the same samples in the same order, so that both give the same bits.
+"""
 
 import math
 from dataclasses import dataclass
-from typing import Literal, Self
+from typing import Any, Literal, Self
+
+import numpy as np
+import numpy.typing as npt
+
+from holdfast.compiled import compiled
+from holdfast.features.arrays import TARE_FIRST, TARE_SECONDS, TARED, Array, Integers
+from holdfast.recordings import Tactile
 
 TareArgument = float | str | tuple[float, float]
 """Seconds from the start, "first", "none", "START:END", or (start, end) in seconds."""
 
-HALF = 0.5
-"""Times are compared to half a sample period, so that rounding cannot move a sample."""
+SEARCH_BLOCK = 1024
+"""Samples in which the first finite one is searched at a time."""
 
 
 @dataclass(frozen=True)
@@ -18,8 +29,8 @@ class Tare:
     Attributes:
         kind: `seconds` (the mean of the first `seconds`), `first` (the first sample, for
             recordings that begin in contact), `none`, or `interval` (offline only).
-        seconds: for `seconds`: how long [s].
-        interval: for `interval`: start and end on the clock of the recording [s].
+        seconds: duration, for `seconds` [s].
+        interval: start and end on the clock of the recording, for `interval` [s].
     """
 
     kind: Literal["seconds", "first", "none", "interval"]
@@ -28,7 +39,7 @@ class Tare:
 
     @classmethod
     def parse(cls, given: "TareArgument | Tare") -> Self:
-        """The tare that a user asks for.
+        """Return the tare that a number, a text or a pair of times describes.
 
         Raises:
             ValueError: it is none of the known forms.
@@ -56,18 +67,18 @@ class Tare:
     @classmethod
     def _interval(cls, start: float, end: float) -> Self:
         if not (math.isfinite(start) and math.isfinite(end) and start < end):
-            raise ValueError("an interval ends after its start")
+            raise ValueError("an interval must end after its start")
         return cls("interval", interval=(start, end))
 
     @classmethod
     def _seconds(cls, seconds: float) -> Self:
         if not (math.isfinite(seconds) and seconds > 0):
-            raise ValueError("a tare takes time")
+            raise ValueError("a duration above 0 s is needed")
         return cls("seconds", seconds)
 
     @property
     def without_contact(self) -> bool:
-        """Whether it is taken over a stretch that tells the noise of a sensor without contact."""
+        """Whether its samples show the noise of the sensor without contact."""
         return self.kind == "seconds"
 
     def __str__(self) -> str:
@@ -78,6 +89,107 @@ class Tare:
         return self.kind
 
 
+def baseline_of(
+    readings: npt.NDArray[Any], times: Array, tare: Tare, period: float
+) -> tuple[Array, int]:
+    """Return the baseline of a recorded module.
+
+    Times are compared with half a sample period of tolerance, so that their rounding does not
+    move a sample into the tare or out of it.
+
+    Args:
+        readings: (n, n_taxels, 3) [count or N].
+        times: (n,) [s].
+        tare: how the baseline is found.
+        period: of the samples [s].
+
+    Returns:
+        (n_taxels, 3) float64 in the unit of the readings, and the first sample from which it may
+        be subtracted without looking ahead (0 for an interval).
+
+    Raises:
+        ValueError: no finite sample lies in the time of the tare.
+    """
+    if tare.kind == "none" or not (len(readings) or tare.kind == "interval"):
+        return np.zeros(readings.shape[1:]), 0
+    if tare.kind == "interval":
+        inside = (times >= tare.interval[0]) & (times < tare.interval[1])
+        return _mean(readings[inside], tare), 0
+    start = first_finite(readings)
+    if tare.kind == "first":
+        return readings[start].astype(np.float64), start
+    inside = times - times[start] + 0.5 * period < tare.seconds
+    inside[: start + 1] = True  # one sample at least
+    return _mean(readings[inside], tare), int(inside.sum())
+
+
+def offline_tare(tare: TareArgument | Tare, module: Tactile) -> Tare:
+    """Return the same tare for all samples of a module, those before it is complete included.
+
+    A tare by seconds becomes the interval of those seconds from the first finite sample on.
+
+    Raises:
+        ValueError: the tare is unknown.
+    """
+    how = Tare.parse(tare)
+    if how.kind != "seconds" or not module.n_samples:
+        return how
+    start = float(module.times[first_finite(module.readings)])
+    return Tare("interval", interval=(start, start + max(how.seconds, module.period / 2)))
+
+
+def first_finite(readings: npt.NDArray[Any]) -> int:
+    """Return the index of the first sample without a reading that is not finite; 0 if none."""
+    for row in range(0, len(readings), SEARCH_BLOCK):
+        finite = np.isfinite(readings[row : row + SEARCH_BLOCK]).all(axis=(1, 2))
+        if finite.any():
+            return row + int(finite.argmax())
+    return 0
+
+
+def _mean(readings: npt.NDArray[Any], tare: Tare) -> Array:
+    """Return the mean of the finite samples, added one after the other as in a stream."""
+    values = readings[np.isfinite(readings).all(axis=(1, 2))].astype(np.float64)
+    if not len(values):
+        raise ValueError(f"tare {tare}: no finite sample in that time")
+    return np.asarray(np.add.accumulate(values, axis=0)[-1] / len(values))
+
+
+@compiled
+def update_baseline(
+    readings: Array,
+    baseline: Array,
+    counts: Integers,
+    f: int,
+    first: int,
+    last: int,
+    kind: int,
+    running: bool,
+) -> bool:
+    """Add a sample to the baseline of a finger, or freeze it. Return whether it is frozen.
+
+    Args:
+        readings: (n_taxels, 3) of all fingers.
+        baseline: (n_taxels, 3) of all fingers; a sum until it is frozen. Is changed.
+        counts: of all fingers, see `holdfast.features.arrays`. Is changed.
+        f: the finger.
+        first: its first taxel.
+        last: one past its last taxel.
+        kind: code of the tare.
+        running: whether the sample lies in the time of the tare.
+    """
+    if kind == TARE_FIRST:
+        baseline[first:last] = readings[first:last]
+    elif kind == TARE_SECONDS:
+        if running:
+            baseline[first:last] += readings[first:last]
+            counts[f, TARED] += 1
+            return False
+        baseline[first:last] /= max(counts[f, TARED], 1)
+    counts[f, TARED] = -1
+    return True
+
+
 def _exact(number: float) -> str:
-    """The shortest text that is read as the same number."""
+    """Return the shortest text that is read back as the same number."""
     return repr(number).removesuffix(".0")

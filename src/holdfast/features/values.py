@@ -3,8 +3,7 @@
 import math
 
 from holdfast.compiled import compiled, inlined
-from holdfast.features.haar import haar_window
-from holdfast.features.layout import (
+from holdfast.features.arrays import (
     CHANGE,
     END,
     FIRST_WINDOWED,
@@ -24,6 +23,7 @@ from holdfast.features.layout import (
     Memory,
     Output,
 )
+from holdfast.features.haar import haar_window
 
 
 @compiled

@@ -11,7 +11,7 @@ from holdfast.contact import STABLE, UNKNOWN
 from holdfast.errors import TrainingError
 from holdfast.features import FeatureSpec, Tare
 from holdfast.features.extract import extract
-from holdfast.features.force import tare_amplitude
+from holdfast.features.force import rest_amplitude
 from holdfast.features.stream import StreamPlan
 from holdfast.model import ANY_FINGER, RATE_TOLERANCE
 from holdfast.recordings import Recording, Tactile, label_states
@@ -161,7 +161,7 @@ def contact_threshold(moments: npt.NDArray[np.float64]) -> float | None:
 def rest_moments(module: Tactile, tare: Tare, rate: float) -> tuple[int, float, float]:
     """Number, sum and sum of squares of F_a in the tare stretch; none of a dead finger."""
     try:
-        amplitude = tare_amplitude(module, tare, rate)
+        amplitude = rest_amplitude(module, tare, rate)
     except ValueError:  # no finite sample in that time
         return 0, 0.0, 0.0
     return len(amplitude), float(amplitude.sum()), float((amplitude**2).sum())

@@ -10,8 +10,7 @@ from scipy.ndimage import maximum_filter1d, minimum_filter1d, uniform_filter1d
 from holdfast.contact import MERGE_GAP, MIN_CONTACT_DURATION
 from holdfast.errors import RecordingError
 from holdfast.features import Tare, fingertip_force
-from holdfast.features.force import baseline_of
-from holdfast.features.tare import TareArgument
+from holdfast.features.tare import TareArgument, baseline_of
 from holdfast.metrics.masks import Mask, covered, drop_short_runs, fill_short_gaps, n_samples_of
 from holdfast.recordings import GAP_PERIODS, Recording, Tactile
 from holdfast.sensors.values import Array

@@ -9,8 +9,9 @@ import numpy as np
 from numpy.lib.stride_tricks import sliding_window_view
 
 from holdfast.features import Tare
-from holdfast.features.force import baseline_of, fingertip_force
+from holdfast.features.force import fingertip_force
 from holdfast.features.kernel import GAP_LIMIT
+from holdfast.features.tare import baseline_of
 from holdfast.recordings import Recording, Tactile
 from holdfast.sensors import Sensor
 from holdfast.sensors.values import Array
