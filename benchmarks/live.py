@@ -22,9 +22,9 @@ from tempfile import TemporaryDirectory
 import numpy as np
 
 from holdfast.io import save_recording
-from holdfast.live.judge import Judge
 from holdfast.live.service import Service
 from holdfast.live.session import Session
+from holdfast.live.stream_detector import StreamDetector
 from holdfast.model import Model
 from holdfast.sources import open_source
 from holdfast.synthetic import synthetic_recording
@@ -64,9 +64,9 @@ def _player(path: Path, port: int) -> "subprocess.Popen[bytes]":
 def _measure(options: argparse.Namespace) -> dict[str, object]:
     model = Model.load("builtin:twin")
     with _connected(options.port) as source:
-        session = Session(source, Judge(model, source.sensors))
+        session = Session(StreamDetector(model, source))
         notes = np.zeros((int(60 * options.minutes * 400) + 10_000, 2))  # so that it never grows
-        session.listen(lambda said: _note(said, notes, session.n_packets))
+        session.add_listener(lambda said: _note(said, notes, session.n_packets))
         if options.page:
             threading.Thread(target=_serve, args=(session, model), daemon=True).start()
         session.start()

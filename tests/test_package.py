@@ -1,5 +1,6 @@
 import subprocess
 import sys
+from dataclasses import fields
 from importlib import metadata
 from pathlib import Path
 
@@ -9,10 +10,12 @@ import holdfast
 
 PUBLIC = [
     *("FEATURE_NAMES", "fingertip_force", "haar_features"),
-    *("Hand", "Sensor", "Label", "Recording", "Tactile", "Truth"),
+    *("Hand", "Sensor", "sensor", "Label", "Recording", "Tactile", "Truth"),
     *("load_dataset", "load_recording", "save_recording"),
-    *("Model", "Detector", "detect", "ContactEstimate", "ContactState", "HandEstimate"),
-    *("StabilityClassifier", "event_metrics", "sample_metrics"),
+    *("Model", "Detector", "StreamDetector", "detect"),
+    *("ContactEstimate", "ContactEvent", "ContactState", "HandEstimate"),
+    *("Cause", "Fault", "Reason"),
+    *("StabilityClassifier", "train", "evaluate", "event_metrics", "sample_metrics"),
     *("HoldfastError", "MissingExtra", "ModelError", "OutputError"),
     *("RecordingError", "SourceError", "StreamError", "TrainingError"),
     *("Arrival", "Source", "open_source"),
@@ -28,6 +31,15 @@ def test_public_name(name):
 
 def test_there_is_no_other_public_name():
     assert sorted([*PUBLIC, "__version__"]) == holdfast.__all__
+
+
+def test_the_order_of_fields_is_fixed():
+    assert [field.name for field in fields(holdfast.Label)] == [
+        *("start", "end", "state", "cause", "evidence", "confidence", "author"),
+    ]
+    assert [field.name for field in fields(holdfast.Tactile)] == [
+        *("sensor", "times", "readings", "unit", "labels"),
+    ]
 
 
 def test_version_is_that_of_the_distribution():

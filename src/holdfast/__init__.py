@@ -13,9 +13,13 @@ from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
+    from holdfast.contact import Cause as Cause
     from holdfast.contact import ContactEstimate as ContactEstimate
+    from holdfast.contact import ContactEvent as ContactEvent
     from holdfast.contact import ContactState as ContactState
+    from holdfast.contact import Fault as Fault
     from holdfast.contact import HandEstimate as HandEstimate
+    from holdfast.contact import Reason as Reason
     from holdfast.detector import Detector as Detector
     from holdfast.detector import detect as detect
     from holdfast.errors import HoldfastError as HoldfastError
@@ -32,6 +36,7 @@ if TYPE_CHECKING:
     from holdfast.io import load_dataset as load_dataset
     from holdfast.io import load_recording as load_recording
     from holdfast.io import save_recording as save_recording
+    from holdfast.live.stream_detector import StreamDetector as StreamDetector
     from holdfast.metrics import event_metrics as event_metrics
     from holdfast.metrics import sample_metrics as sample_metrics
     from holdfast.model import Model as Model
@@ -41,10 +46,13 @@ if TYPE_CHECKING:
     from holdfast.recordings import Truth as Truth
     from holdfast.sensors import Hand as Hand
     from holdfast.sensors import Sensor as Sensor
+    from holdfast.sensors import sensor as sensor
     from holdfast.sources import Arrival as Arrival
     from holdfast.sources import Source as Source
     from holdfast.sources import open_source as open_source
     from holdfast.training import StabilityClassifier as StabilityClassifier
+    from holdfast.training import evaluate as evaluate
+    from holdfast.training import train as train
 
 _HOMES = {
     "FEATURE_NAMES": "features",
@@ -52,6 +60,7 @@ _HOMES = {
     "haar_features": "features",
     "Hand": "sensors",
     "Sensor": "sensors",
+    "sensor": "sensors",
     "Label": "recordings",
     "Recording": "recordings",
     "Tactile": "recordings",
@@ -62,13 +71,20 @@ _HOMES = {
     "Model": "model",
     "Detector": "detector",
     "detect": "detector",
+    "Cause": "contact",
     "ContactEstimate": "contact",
+    "ContactEvent": "contact",
     "ContactState": "contact",
+    "Fault": "contact",
     "HandEstimate": "contact",
+    "Reason": "contact",
+    "StreamDetector": "live.stream_detector",
     "Arrival": "sources",
     "Source": "sources",
     "open_source": "sources",
     "StabilityClassifier": "training",
+    "evaluate": "training",
+    "train": "training",
     "event_metrics": "metrics",
     "sample_metrics": "metrics",
     "HoldfastError": "errors",

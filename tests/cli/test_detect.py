@@ -19,7 +19,7 @@ from holdfast.features import FeatureSpec
 from holdfast.io import load_recording, save_recording
 from holdfast.io.mcap_writer import RecordingWriter
 from holdfast.live.play import XelaServer
-from holdfast.live.watch import Watch
+from holdfast.live.stream_detector import StreamDetector
 from holdfast.model import Debounce, FingerModel, Model
 from holdfast.recordings import Recording, Tactile
 from holdfast.sensors import sensor
@@ -353,15 +353,15 @@ def test_a_live_source_is_judged_as_it_comes(capsys, save):
 @pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
 def test_a_signal_ends_a_live_source_in_order(capsys, monkeypatch, save, number):
     grasp = save(synthetic_recording("a", 1, ("thumb", "index")))
-    real, turns = Watch.turn, []
+    read, calls = StreamDetector.read, []
 
-    def turn(watch):
-        turns.append(watch)
-        if len(turns) == 100:
+    def read_and_signal(stream):
+        calls.append(stream)
+        if len(calls) == 100:
             os.kill(os.getpid(), number)
-        return real(watch)
+        return read(stream)
 
-    monkeypatch.setattr(Watch, "turn", turn)
+    monkeypatch.setattr(StreamDetector, "read", read_and_signal)
     with (
         open_source(str(grasp), speed=1.5, loop=True) as source,
         XelaServer(source, port=0) as server,

@@ -14,7 +14,7 @@ import msgspec
 import pytest
 
 from holdfast.detector import detect
-from holdfast.live.judge import Judge
+from holdfast.live.stream_detector import StreamDetector
 from holdfast.sources import open_source
 
 from . import build
@@ -59,17 +59,17 @@ def test_decisions_over_the_wire_are_those_of_the_recording(tmp_path, monkeypatc
         verb("play", path, "--once", "--speed", 3, "--port", 0, *words) as told,
         open_source(told["uri"]) as source,
     ):
-        judge = Judge(model, source.sensors)
-        decisions = []
-        for arrival in source:
-            decisions += judge.take(arrival)
-            if len(decisions) == recording.modules["thumb"].n_samples:
-                break
-    assert arrival.n_lost == 0
+        detector = StreamDetector(model, source)
+        estimates, n_lost = [], 0
+        while len(estimates) < recording.modules["thumb"].n_samples:
+            arrival, new, _ = detector.read()
+            estimates += new
+            n_lost += 0 if arrival is None else arrival.n_lost
+    assert n_lost == 0
     expected = detect(model, recording)
-    assert tuple(judge.fingers) == FINGERS
+    assert tuple(detector.fingers) == FINGERS
     for name, trace in expected.fingers.items():
-        mine = [decision.estimate.fingers[name] for decision in decisions]
+        mine = [decision.estimate.fingers[name] for decision in estimates]
         assert [one.time - mine[0].time for one in mine] == pytest.approx(
             (trace.times - trace.times[0]).tolist(), abs=1e-6
         )

@@ -8,8 +8,8 @@ import pytest
 
 from holdfast.contact import ContactState, Fault
 from holdfast.detector import detect
-from holdfast.live.judge import Judge
 from holdfast.live.session import Session
+from holdfast.live.stream_detector import StreamDetector
 from holdfast.sensors import sensor
 from holdfast.sources import open_source
 from holdfast.sources.xela.encoder import XelaEncoder
@@ -67,7 +67,7 @@ def test_ten_thousand_packets_of_nonsense_do_no_harm():
         server(packets[:1]) as (port, said),
         open_source(f"xela://127.0.0.1:{port}?{NAMES}") as source,
     ):
-        session = Session(source, Judge(build.model(), source.sensors))
+        session = Session(StreamDetector(build.model(), source))
         session.start()
         try:
             for packet in packets[1:]:
@@ -89,20 +89,20 @@ def test_a_server_that_is_started_anew_keeps_the_tare_and_the_clock():
     with server(packets[:300], port=port) as (_, said):
         source = open_source(f"xela://127.0.0.1:{port}?{NAMES}")
         source.open()
-        session = Session(source, Judge(build.model(), source.sensors))
-        session.listen(heard.append)
+        session = Session(StreamDetector(build.model(), source))
+        session.add_listener(heard.append)
         session.start()
         wait_for(lambda: session.n_packets == 300)
         said.put(HANG_UP)
     try:
-        wait_for(lambda: session.silent)
+        wait_for(lambda: session.stream.silent)
         later = packets_of(recording, EPOCH + 2.0)  # its counter begins anew
         with server(later[300:900], port=port):
             wait_for(lambda: session.n_packets == 900)
     finally:
         session.stop()
     assert session.failure is None
-    estimates = [d.estimate for said in heard for d in said.decisions if said.arrival is not None]
+    estimates = [d.estimate for said in heard for d in said.estimates if said.arrival is not None]
     times = [one.time for one in estimates]
     assert (np.diff(times) > 0).all()
     notices = [n for said in heard if said.arrival is not None for n in said.arrival.notices]
@@ -126,12 +126,12 @@ def test_a_module_of_another_size_is_unknown_until_it_is_well_again():
         server([*packets[:500], odd, *packets[501:600]]) as (port, _),
         open_source(f"xela://127.0.0.1:{port}?{NAMES}") as source,
     ):
-        session = Session(source, Judge(build.model(), source.sensors))
-        session.listen(heard.append)
+        session = Session(StreamDetector(build.model(), source))
+        session.add_listener(heard.append)
         session.start()
         wait_for(lambda: session.n_packets == 600)
         session.stop()
-    decisions = [d for said in heard if said.arrival for d in said.decisions]
+    decisions = [d for said in heard if said.arrival for d in said.estimates]
     odd_ones = [  # a busy machine may add LATE, of any finger
         k for k, d in enumerate(decisions)
         if Fault.TAXEL_COUNT in d.estimate.fingers["thumb"].faults

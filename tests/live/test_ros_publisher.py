@@ -5,9 +5,8 @@ import pytest
 
 from holdfast.contact import ContactState, Fault, Reason
 from holdfast.live import ros_publisher
-from holdfast.live.judge import Decision
 from holdfast.live.ros_publisher import ERROR, OK, WARN, RosPublisher, statuses_of, topic_names
-from holdfast.live.session import Said
+from holdfast.live.stream_detector import StreamEstimate, StreamUpdate
 
 from .estimates import UNITS, estimate, finger
 
@@ -82,8 +81,11 @@ def test_what_is_published_and_where():
 
 def test_a_listener_of_a_session_publishes_what_is_new():
     with Noted() as publisher:
-        decisions = [Decision(estimate(7.0), ("thumb",)), Decision(estimate(8.0), ("index/1",))]
-        publisher.put(Said(None, decisions, []))
+        decisions = [
+            StreamEstimate(estimate(7.0), ("thumb",)),
+            StreamEstimate(estimate(8.0), ("index/1",)),
+        ]
+        publisher.put(StreamUpdate(None, decisions, []))
     assert len(publisher.of("/holdfast/thumb/state")) == 1
     assert len(publisher.of("/holdfast/index_1/state")) == 1
     assert len(publisher.of("/holdfast/hand/state")) == 2

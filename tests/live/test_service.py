@@ -11,9 +11,9 @@ from aiohttp import ClientSession, WSServerHandshakeError, web
 from holdfast.detector import detect
 from holdfast.io import load_recording
 from holdfast.live import schema
-from holdfast.live.judge import Judge
 from holdfast.live.service import Service
 from holdfast.live.session import Session
+from holdfast.live.stream_detector import StreamDetector
 from holdfast.web.guard import Guard
 
 from . import build
@@ -24,7 +24,7 @@ PATIENCE = 30.0
 @asynccontextmanager
 async def served(source, token=None, host="127.0.0.1", folder=None, start=True):
     """A client of the service of a source, its address, and the session."""
-    session = Session(source, Judge(build.model(), source.sensors))
+    session = Session(StreamDetector(build.model(), source))
     service = Service(session, build.model(), Guard(host, token), folder)
     runner = web.AppRunner(service.app, shutdown_timeout=0.5)
     await runner.setup()

@@ -7,8 +7,8 @@ import pytest
 from holdfast.contact import ContactState, Fault
 from holdfast.detector import detect
 from holdfast.errors import ModelError, SourceError, StreamError
-from holdfast.live.judge import Judge
 from holdfast.live.session import Session
+from holdfast.live.stream_detector import StreamDetector
 
 from . import build
 
@@ -16,7 +16,7 @@ PATIENCE = 30.0
 
 
 def session_of(source):
-    return Session(source, Judge(build.model(), source.sensors))
+    return Session(StreamDetector(build.model(), source))
 
 
 def wait_for(condition):
@@ -34,7 +34,7 @@ def start():
     def begin(source, *listeners):
         session = session_of(source)
         for listener in listeners:
-            session.listen(listener)
+            session.add_listener(listener)
         session.start()
         running.append(session)
         return session
@@ -49,7 +49,7 @@ def test_listeners_hear_everything_in_order(start):
     heard = []
     session = start(build.Script.of(recording), heard.append)
     wait_for(lambda: session.ended)
-    decisions = [decision for said in heard for decision in said.decisions]
+    decisions = [decision for said in heard for decision in said.estimates]
     expected = detect(build.model(), recording)
     assert [d.estimate.state.code for d in decisions] == expected.hand.tolist()
     assert session.n_packets == len(expected.hand)
@@ -72,12 +72,12 @@ def test_a_silent_source_is_told_once_and_its_return_ends_it(start):
     heard = []
     session = start(build.Script.of(recording, steps), heard.append)
     wait_for(lambda: session.ended)
-    gaps = [s for s in heard if s.arrival is None and s.decisions]
+    gaps = [s for s in heard if s.arrival is None and s.estimates]
     assert len(gaps) == 1
-    estimate = gaps[0].decisions[0].estimate
+    estimate = gaps[0].estimates[0].estimate
     assert all(f.faults == (Fault.PACKET_GAP,) for f in estimate.fingers.values())
-    assert not session.silent
-    after = heard[heard.index(gaps[0]) + 1].decisions[0].estimate
+    assert not session.stream.silent
+    after = heard[heard.index(gaps[0]) + 1].estimates[0].estimate
     assert after.fingers["thumb"].state is not ContactState.UNKNOWN
 
 
@@ -94,13 +94,13 @@ def test_packets_are_those_of_the_module_that_has_most(start):
 
 
 def test_a_tare_that_was_given_up_is_not_taken_later(monkeypatch):
-    monkeypatch.setattr("holdfast.live.session.ANSWER_TIME", 0.01)
+    monkeypatch.setattr("holdfast.live.session.TARE_TIMEOUT", 0.01)
     recording = build.grasp()
     session = session_of(build.Script.of(recording))
     taken = []
-    monkeypatch.setattr(session.judge, "tare", lambda: taken.append(1))
+    monkeypatch.setattr(session.stream, "restart_tare", lambda: taken.append(1))
     with pytest.raises(SourceError, match=r"^the source does not answer: no tare can be taken$"):
-        session.tare()
+        session.restart_tare()
     session.start()
     wait_for(lambda: session.ended)
     session.stop()
@@ -113,34 +113,34 @@ def test_the_tare_is_taken_in_the_session_and_refused_in_contact(start):
     source = build.Lasting.of(recording, arrivals[:200], patient=True)
     session = start(source)
     wait_for(lambda: session.n_packets >= 200)
-    session.tare()
+    session.restart_tare()
     source.steps.extend(arrivals[200:600])
     wait_for(lambda: source.last.time >= arrivals[599].time)
     with pytest.raises(StreamError, match="in contact"):
-        session.tare()
+        session.restart_tare()
 
 
 def test_no_tare_while_nothing_arrives(start):
     recording = build.grasp()
     steps = [*build.arrivals_of(recording)[:200], None]
     session = start(build.Script.of(recording, steps, patient=True))
-    wait_for(lambda: session.silent)
-    with pytest.raises(SourceError, match=r"^nothing arrives: no tare can be taken$"):
-        session.tare()
+    wait_for(lambda: session.stream.silent)
+    with pytest.raises(SourceError, match=r"^no samples arrive: no tare can be taken$"):
+        session.restart_tare()
 
 
 def test_no_tare_after_the_end(start):
     session = start(build.Script.of(build.grasp(), []))
     wait_for(lambda: session.ended)
     with pytest.raises(SourceError, match=r"^the source has ended: no tare can be taken$"):
-        session.tare()
+        session.restart_tare()
 
 
 def test_a_failure_is_kept_and_ends_the_session(start):
     recording = build.grasp()
     slow = [one._replace(time=one.time * 3) for one in build.arrivals_of(recording)]
     source = build.Script.of(recording, slow)
-    session = Session(source, Judge(build.model(), source.sensors, strict=True))
+    session = Session(StreamDetector(build.model(), source, strict=True))
     session.start()
     wait_for(lambda: session.ended)
     session.stop()
@@ -172,7 +172,7 @@ def test_who_leaves_hears_no_more(start):
     heard = []
     session = start(source, heard.append)
     wait_for(lambda: session.n_packets == 100)
-    session.leave(heard.append)
+    session.remove_listener(heard.append)
     n_heard = len(heard)
     source.steps.extend(build.arrivals_of(recording)[100:200])
     wait_for(lambda: session.n_packets == 200)

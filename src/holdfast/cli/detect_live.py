@@ -6,45 +6,42 @@ from collections.abc import Iterator
 from typing import TYPE_CHECKING
 
 from holdfast.cli.console import say
-from holdfast.cli.judging import RateRule, judge_of
+from holdfast.cli.judging import RateRule, stream_detector_of
 from holdfast.cli.stopping import Stop, stopping
 
 if TYPE_CHECKING:
     from holdfast.detector import Detection
-    from holdfast.live.judge import Decision, Judge
+    from holdfast.live.stream_detector import StreamDetector, StreamEstimate
     from holdfast.model import Model
-    from holdfast.sources import Arrival, Source
+    from holdfast.sources import Arrival
 
 
 def detections_live(
     model: "Model", uri: str, rate: RateRule, ignore: str, seconds: float | None
 ) -> Iterator["Detection"]:
     """What the model says of a live source, arrival by arrival, until a signal or `seconds`."""
-    from holdfast.live.judge import warm_up
+    from holdfast.live.stream_detector import compile_kernels
     from holdfast.live.tracing import detection_of
     from holdfast.sources import open_source
 
-    warm_up()
+    compile_kernels()
     with stopping() as stop, open_source(uri) as source:
-        judge = judge_of(model, source, rate, ignore)
+        stream = stream_detector_of(model, source, rate, ignore)
         stop.gently = True
-        for decisions in _decisions(source, judge, seconds, stop):
-            yield detection_of(source.name, decisions)
+        for estimates in _estimates(stream, seconds, stop):
+            yield detection_of(source.name, estimates)
 
 
-def _decisions(
-    source: "Source", judge: "Judge", seconds: float | None, stop: Stop
-) -> Iterator[list["Decision"]]:
-    from holdfast.live.watch import Watch
-
+def _estimates(
+    stream: "StreamDetector", seconds: float | None, stop: Stop
+) -> Iterator[list["StreamEstimate"]]:
     end = math.inf if seconds is None else time.monotonic() + seconds
-    watch = Watch(source, judge)
-    while not (source.ended or stop.asked) and time.monotonic() < end:
-        arrival, decisions = watch.turn()
+    while not (stream.source.ended or stop.asked) and time.monotonic() < end:
+        arrival, estimates, _ = stream.read()
         if arrival is not None:
             tell(arrival)
-        yield decisions
-    yield judge.finish()
+        yield estimates
+    yield stream.finish().estimates
 
 
 def tell(arrival: "Arrival") -> None:

@@ -9,7 +9,7 @@ import typer
 from holdfast.cli.console import say
 
 if TYPE_CHECKING:
-    from holdfast.live.judge import Judge
+    from holdfast.live.stream_detector import StreamDetector
     from holdfast.model import Model
     from holdfast.sources import Source
 
@@ -56,13 +56,15 @@ def debounced(name: str, debounce: float | None, hysteresis: float | None) -> "M
     return replace(model, name=model.name or name, debounce=held)
 
 
-def judge_of(model: "Model", source: "Source", rate: RateRule, ignore: str) -> "Judge":
-    """A judge of an open source; tells on stderr what the source lacks."""
-    from holdfast.live.judge import Judge
+def stream_detector_of(
+    model: "Model", source: "Source", rate: RateRule, ignore: str
+) -> "StreamDetector":
+    """Return the stream detector of an open source; report on stderr what the source lacks."""
+    from holdfast.live.stream_detector import StreamDetector
 
-    judge = Judge(model, source.sensors, strict=rate is RateRule.STRICT, ignore=taxels_of(ignore))
+    stream = StreamDetector(model, source, strict=rate is RateRule.STRICT, ignore=taxels_of(ignore))
     tell_missing(model, source.name, source.sensors)
-    return judge
+    return stream
 
 
 def tell_missing(model: "Model", name: str, modules: Mapping[str, object]) -> None:

@@ -8,8 +8,8 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
-    from holdfast.live.judge import Judge
     from holdfast.live.session import Listener
+    from holdfast.live.stream_detector import StreamDetector
     from holdfast.model import Model
     from holdfast.sources import Source
     from holdfast.web.guard import Guard
@@ -22,7 +22,7 @@ def show_page(
     source: "Source",
     tell: Callable[[str], None],
     *,
-    judge: "Judge | None" = None,
+    stream: "StreamDetector | None" = None,
     host: str = HOST,
     port: int = PORT,
     guard: "Guard | None" = None,
@@ -36,7 +36,7 @@ def show_page(
         model: that judges.
         source: that is open.
         tell: is given the address once the page can be opened.
-        judge: of the source; one without options by default.
+        stream: detector of the source; one without options by default.
         host: address to listen at.
         port: 0 for any that is free.
         guard: who may come in; this machine by default.
@@ -48,16 +48,16 @@ def show_page(
         OutputError: the address cannot be listened at.
         Exception: that which made the session fail.
     """
-    from holdfast.live.judge import Judge
     from holdfast.live.service import Service
     from holdfast.live.session import Session
+    from holdfast.live.stream_detector import StreamDetector
     from holdfast.web.guard import Guard
     from holdfast.web.server import run_server
 
-    session = Session(source, judge or Judge(model, source.sensors))
+    session = Session(stream or StreamDetector(model, source))
     service = Service(session, model, guard or Guard(host), folder)
     for listener in listeners:
-        session.listen(listener)
+        session.add_listener(listener)
     session.start()
     try:
         run_server(

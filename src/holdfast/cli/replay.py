@@ -13,7 +13,6 @@ if TYPE_CHECKING:
 
     from holdfast.contact import ContactEstimate, HandEstimate
     from holdfast.model import Model
-    from holdfast.sources import Source
 
 REFRESH = 0.1
 """How often the terminal is redrawn [s]."""
@@ -45,24 +44,14 @@ def replay(model: "Model", path: Path, speed: float) -> int:
     Returns:
         How many updates there were.
     """
+    from holdfast.live.stream_detector import StreamDetector
     from holdfast.sources import open_source
 
     with open_source(str(path), speed=speed) as source:
-        estimates = _estimates(model, source)
+        estimates = iter(StreamDetector(model, source))
         if speed and sys.stderr.isatty():
             return _follow(estimates)
         return _tell_changes(estimates)
-
-
-def _estimates(model: "Model", source: "Source") -> "Iterator[HandEstimate]":
-    from holdfast.live.judge import Judge
-
-    judge = Judge(model, source.sensors)
-    for arrival in source:
-        for decision in judge.take(arrival):
-            yield decision.estimate
-    for decision in judge.finish():
-        yield decision.estimate
 
 
 def _tell_changes(estimates: "Iterator[HandEstimate]") -> int:

@@ -19,14 +19,14 @@ from holdfast.cli.judging import (
     RateRule,
     SourceArgument,
     debounced,
-    judge_of,
+    stream_detector_of,
 )
 from holdfast.cli.page import HOST, PORT, show_page
 from holdfast.cli.speed import check_speed
 
 if TYPE_CHECKING:
-    from holdfast.live.judge import Judge
     from holdfast.live.ros_publisher import RosPublisher
+    from holdfast.live.stream_detector import StreamDetector
 
 
 def serve(
@@ -69,14 +69,14 @@ def serve(
       holdfast serve model.json xela://auto --ros2
       holdfast serve model.json grasp.parquet --host 0.0.0.0 --token SECRET
     """
-    from holdfast.live.judge import warm_up
+    from holdfast.live.stream_detector import compile_kernels
     from holdfast.sources import open_source
     from holdfast.web.guard import Guard
 
     guard = Guard(host, token)
     check_speed(source, speed)
     wanted = debounced(model, debounce, hysteresis)
-    warm_up()
+    compile_kernels()
 
     def tell(url: str) -> None:
         page = url if token is None else f"{url}?token={quote(token, safe='')}"
@@ -87,11 +87,11 @@ def serve(
 
     with ExitStack() as stack:
         opened = stack.enter_context(open_source(source, speed=speed, loop=not once))
-        judge = judge_of(wanted, opened, rate, ignore)
-        publishers = [stack.enter_context(one) for one in _publishers(judge, ros2=ros2, ros1=ros1)]
+        stream = stream_detector_of(wanted, opened, rate, ignore)
+        publishers = [stack.enter_context(one) for one in _publishers(stream, ros2=ros2, ros1=ros1)]
         show_page(
             wanted, opened, tell,
-            judge=judge, host=host, port=port, guard=guard, folder=record_to,
+            stream=stream, host=host, port=port, guard=guard, folder=record_to,
             listeners=[publisher.put for publisher in publishers], stay=not once,
         )  # fmt: skip
         _tell_unpublished(publishers)
@@ -107,9 +107,9 @@ def _tell_unpublished(publishers: "Sequence[RosPublisher]") -> None:
             )
 
 
-def _publishers(judge: "Judge", *, ros2: bool, ros1: bool) -> "Iterator[RosPublisher]":
+def _publishers(stream: "StreamDetector", *, ros2: bool, ros1: bool) -> "Iterator[RosPublisher]":
     """Those of the estimates on ROS topics that are asked for."""
-    units = {name: sensor.unit for name, sensor in judge.fingers.items()}
+    units = {name: sensor.unit for name, sensor in stream.fingers.items()}
     if ros2:
         from holdfast.live.ros2_publisher import Ros2Publisher
 

@@ -8,7 +8,8 @@ import numpy as np
 from holdfast.contact import ContactEstimate, ContactState, HandEstimate
 from holdfast.live import schema
 from holdfast.live.recorder import Recorder
-from holdfast.live.session import Said, Session
+from holdfast.live.session import Session
+from holdfast.live.stream_detector import StreamUpdate
 from holdfast.model import Model
 from holdfast.sensors import Sensor
 
@@ -32,13 +33,13 @@ class Feed:
 
     def __init__(self, session: Session) -> None:
         self._session = session
-        self._said: deque[tuple[float, Said]] = deque(maxlen=MOST)
+        self._said: deque[tuple[float, StreamUpdate]] = deque(maxlen=MOST)
         self._notes: deque[schema.Notice] = deque(maxlen=MOST)
         self._newest: HandEstimate | None = None
         self._taxels: dict[str, list[schema.Vector]] = {}
         self._counts: deque[tuple[float, int]] = deque([(time.monotonic(), 0)])
 
-    def put(self, said: Said) -> None:
+    def put(self, said: StreamUpdate) -> None:
         """Takes what the session says."""
         self._said.append((time.time(), said))
 
@@ -50,7 +51,7 @@ class Feed:
         """All that was said since the last call."""
         said = [self._said.popleft() for _ in range(len(self._said))]
         notes = [self._notes.popleft() for _ in range(len(self._notes))]
-        estimates = [(d.estimate, d.fingers) for _, one in said for d in one.decisions]
+        estimates = [(d.estimate, d.updated_fingers) for _, one in said for d in one.estimates]
         if estimates:
             self._newest = estimates[-1][0]
             self._look_at_taxels([one for _, one in said])
@@ -62,7 +63,7 @@ class Feed:
             fingers={
                 name: finger_of(finger, self._taxels.get(name)) for name, finger in fingers.items()
             },
-            series=_series(estimates, list(self._session.judge.fingers)),
+            series=_series(estimates, list(self._session.stream.fingers)),
             events=[schema.Change(*event) for _, one in said for event in one.events],
             notices=notes + _notices(said),
             health=self._health(recorder),
@@ -70,11 +71,13 @@ class Feed:
             ended=self._session.ended,
         )
 
-    def _look_at_taxels(self, said: list[Said]) -> None:
+    def _look_at_taxels(self, said: list[StreamUpdate]) -> None:
         """The newest readings of every finger, without the tare."""
-        for one in said[-len(self._session.judge.fingers) :]:
+        for one in said[-len(self._session.stream.fingers) :]:
             if one.arrival is not None:
-                for name, readings in self._session.judge.tared(one.arrival.samples).items():
+                for name, readings in self._session.stream.subtract_tare(
+                    one.arrival.samples
+                ).items():
                     self._taxels[name] = readings.round(4).tolist()
 
     def _health(self, recorder: Recorder | None) -> schema.Health:
@@ -85,7 +88,7 @@ class Feed:
             n_lost=session.n_lost,
             n_refused=session.n_refused,
             n_dropped=0 if recorder is None else recorder.status.n_dropped,
-            silent=session.silent,
+            silent=session.stream.silent,
             latency=schema.LatencyInfo(latency.p50, latency.p99, latency.largest),
         )
 
@@ -98,7 +101,7 @@ class Feed:
         return (after - before) / (end - begin) if end > begin else np.nan
 
 
-def _notices(said: list[tuple[float, Said]]) -> list[schema.Notice]:
+def _notices(said: list[tuple[float, StreamUpdate]]) -> list[schema.Notice]:
     """What the source says to people."""
     return [
         schema.Notice(when, text)
@@ -110,13 +113,13 @@ def _notices(said: list[tuple[float, Said]]) -> list[schema.Notice]:
 
 def hello(model: Model, session: Session, started: float, can_record: bool) -> schema.Hello:
     """What a reader must know first."""
-    source, judge = session.source, session.judge
+    source, stream = session.source, session.stream
     return schema.Hello(
         model=model.name or "a model without a name",
         source=source.name,
-        fingers={name: _info(model, name, sensor) for name, sensor in judge.fingers.items()},
+        fingers={name: _info(model, name, sensor) for name, sensor in stream.fingers.items()},
         modules={name: sensor.n_taxels for name, sensor in source.sensors.items()},
-        rate=None if np.isnan(judge.rate) else judge.rate,
+        rate=None if np.isnan(stream.rate) else stream.rate,
         started=started,
         can_record=can_record,
     )

@@ -7,7 +7,8 @@ from threading import Lock
 
 from holdfast.errors import OutputError
 from holdfast.live.recorder import Recorder
-from holdfast.live.session import Said, Session
+from holdfast.live.session import Session
+from holdfast.live.stream_detector import StreamUpdate
 
 _NAME = re.compile(r"\w[\w .-]{0,99}", re.ASCII)
 
@@ -44,7 +45,7 @@ class Recordings:
         with self._lock:
             recorder = self._recorder(name or time.strftime("%Y%m%d-%H%M%S"))
             self.current = recorder
-            self._session.listen(self._put)
+            self._session.add_listener(self._put)
             return recorder.path
 
     def mark(self, text: str) -> None:
@@ -65,7 +66,7 @@ class Recordings:
         with self._lock:
             recorder = self._running("there is nothing to stop")
             self.current = None
-            self._session.leave(self._put)
+            self._session.remove_listener(self._put)
             recorder.close()
             if not recorder.status.n_samples:
                 recorder.path.unlink(missing_ok=True)
@@ -77,7 +78,7 @@ class Recordings:
             raise OutputError(f"nothing is being recorded: {hint}")
         return self.current
 
-    def _put(self, said: Said) -> None:
+    def _put(self, said: StreamUpdate) -> None:
         recorder = self.current
         if recorder is not None and said.arrival is not None:
             recorder.put(said.arrival)

@@ -13,7 +13,7 @@ from holdfast.contact import ContactEstimate, ContactState, HandEstimate, Reason
 from holdfast.sensors.values import Unit
 
 if TYPE_CHECKING:
-    from holdfast.live.session import Said
+    from holdfast.live.stream_detector import StreamUpdate
 
 N_QUEUED = 64
 """Estimates that wait for ROS; then the oldest goes."""
@@ -110,10 +110,10 @@ class RosPublisher(ABC):
             thread.join()
             self._disconnect()
 
-    def put(self, said: "Said") -> None:
-        """Publishes what a session says; a listener of it."""
-        for decision in said.decisions:
-            self.publish(decision.estimate, decision.fingers)
+    def put(self, update: "StreamUpdate") -> None:
+        """Publish the estimates of an update; a listener of a session."""
+        for one in update.estimates:
+            self.publish(one.estimate, one.updated_fingers)
 
     def publish(self, estimate: HandEstimate, fingers: Iterable[str] | None = None) -> None:
         """Publishes an estimate, soon.

@@ -15,7 +15,8 @@ from holdfast.errors import HoldfastError
 from holdfast.live import schema
 from holdfast.live.feed import Feed, finger_of, hello, recording_info
 from holdfast.live.recordings import Recordings
-from holdfast.live.session import Said, Session
+from holdfast.live.session import Session
+from holdfast.live.stream_detector import StreamUpdate
 from holdfast.model import Model
 from holdfast.web.guard import Guard
 
@@ -109,19 +110,19 @@ class Service:
     async def _running(self, _: web.Application) -> AsyncIterator[None]:
         loop = asyncio.get_running_loop()
 
-        def put(said: Said) -> None:
+        def put(said: StreamUpdate) -> None:
             self._feed.put(said)
             if self._readers["estimates"]:
                 with suppress(RuntimeError):  # the service has ended; the session has not
                     loop.call_soon_threadsafe(self._tell_estimates, said)
 
-        self._session.listen(put)
+        self._session.add_listener(put)
         telling = asyncio.ensure_future(self._tell_live())
         yield
         telling.cancel()
         with suppress(asyncio.CancelledError):
             await telling
-        self._session.leave(put)
+        self._session.remove_listener(put)
         if self._recordings.current is not None:
             with suppress(HoldfastError):  # its readers have gone; the file tells what it has
                 await asyncio.to_thread(self._recordings.end)
@@ -144,8 +145,8 @@ class Service:
             except HoldfastError as failure:
                 self._feed.note(f"the recording has ended: {failure}")
 
-    def _tell_estimates(self, said: Said) -> None:
-        for estimate, fresh in said.decisions:
+    def _tell_estimates(self, said: StreamUpdate) -> None:
+        for estimate, fresh in said.estimates:
             fingers = {name: finger_of(estimate.fingers[name]) for name in fresh}
             told = schema.Estimate(time=estimate.time, hand=estimate.state, fingers=fingers)
             text = _encode(told).decode()
@@ -181,7 +182,7 @@ class Service:
         return web.Response(body=self._state, content_type="application/json")
 
     async def _tare(self, _: web.Request) -> web.Response:
-        return await _done(self._session.tare)
+        return await _done(self._session.restart_tare)
 
     async def _record(self, request: web.Request) -> web.Response:
         name = (await _body(request, _Recording)).name

@@ -1,4 +1,4 @@
-"""A source that is judged in a thread of its own, for as many listeners as like."""
+"""Run a stream detector in its own thread, for any number of listeners."""
 
 import gc
 import sys
@@ -11,127 +11,105 @@ from typing import NamedTuple
 
 import numpy as np
 
-from holdfast.contact import ContactEvent, StateChanges
-from holdfast.detector import HAND
 from holdfast.errors import SourceError
-from holdfast.live.judge import Decision, Judge
-from holdfast.live.watch import Watch
-from holdfast.sources import Arrival, Source
+from holdfast.live.stream_detector import StreamDetector, StreamUpdate
+from holdfast.sources import Arrival
 
-N_LATENCIES = 8192
-"""So many of the newest latencies are kept for their percentiles."""
+MAX_LATENCIES = 8192
+"""Number of newest latencies from which the percentiles are computed."""
 SWITCH_INTERVAL = 5e-4
-"""How soon a busy thread of Python lets the detector's go on [s]; Python's own is ten times it."""
-ANSWER_TIME = 2.0
-"""How long a tare is waited for [s]."""
-
-
-class Said(NamedTuple):
-    """What a session tells its listeners.
-
-    Attributes:
-        arrival: what came; None where nothing did, and the source is silent.
-        decisions: what the detector says to it.
-        events: which states changed.
-    """
-
-    arrival: Arrival | None
-    decisions: list[Decision]
-    events: list[ContactEvent]
+"""Python's thread switch interval while a session runs [s]; a tenth of the default, so that
+other busy threads delay the detector less."""
+TARE_TIMEOUT = 2.0
+"""Maximum time that `Session.restart_tare` waits for the detector's thread [s]."""
 
 
 class Latency(NamedTuple):
-    """From the last byte of a packet in hand to the decision [s]; NaN before the first."""
+    """Time from the last byte of a packet to its estimate [s]; NaN before the first estimate."""
 
     p50: float
     p99: float
     largest: float
 
 
-Listener = Callable[[Said], None]
+Listener = Callable[[StreamUpdate], None]
 
 
 class Session:
-    """Reads a source and judges it, in a thread of its own.
+    """Run a stream detector in its own thread.
 
-    Listeners are called in that thread, one after the other: they take what is said and return
-    at once, whatever they do with it.
+    Listeners are called in that thread, one after the other. They must return at once: they
+    put the update into a queue, and other threads process it.
 
     Args:
-        source: that is open.
-        judge: of its samples.
+        stream: detector of an open source.
 
     Attributes:
-        n_packets: that came with samples: how many the module has that has most, as one packet
-            may hold the samples of several instants, each of another module.
-        n_lost: that are missing by the device's count.
-        n_refused: that made no sense.
-        ended: whether the source is over, or judging failed.
-        failure: why it failed.
+        stream: the detector.
+        source: its source.
+        n_packets: packets with samples. This is the largest number of samples of any module,
+            because one packet may hold the samples of several instants, each of another module.
+        n_lost: packets that are missing by the device's own count.
+        n_refused: packets that could not be decoded.
+        ended: True if the source has ended, or the detector has failed.
+        failure: the exception that ended the session.
     """
 
-    def __init__(self, source: Source, judge: Judge) -> None:
-        self.source = source
-        self.judge = judge
+    def __init__(self, stream: StreamDetector) -> None:
+        self.stream = stream
+        self.source = stream.source
         self.n_packets = self.n_lost = self.n_refused = 0
         self.ended = False
         self.failure: Exception | None = None
-        self._watch = Watch(source, judge)
-        self._n_samples = dict.fromkeys(source.sensors, 0)
+        self._n_samples = dict.fromkeys(self.source.sensors, 0)
         self._listeners: list[Listener] = []
-        self._requests: deque[Future[None]] = deque()
+        self._tare_requests: deque[Future[None]] = deque()
         self._stopping = Event()
         self._thread = Thread(target=self._run, name="holdfast-detector", daemon=True)
-        self._changes = StateChanges((*judge.fingers, HAND))
-        self._latencies = np.full(N_LATENCIES, np.nan)
-        self._n_judged = 0
+        self._latencies = np.full(MAX_LATENCIES, np.nan)
+        self._n_latencies = 0
 
-    @property
-    def silent(self) -> bool:
-        """Whether no samples come of what is judged."""
-        return self._watch.silent
-
-    def listen(self, listener: Listener) -> None:
-        """Has `listener` called with all that is said from now on."""
+    def add_listener(self, listener: Listener) -> None:
+        """Call `listener` with every update from now on."""
         self._listeners = [*self._listeners, listener]
 
-    def leave(self, listener: Listener) -> None:
-        """Has it called no more."""
+    def remove_listener(self, listener: Listener) -> None:
+        """Stop calling `listener`."""
         self._listeners = [one for one in self._listeners if one != listener]
 
     def start(self) -> None:
-        """Begins to read."""
+        """Start to read the source."""
         sys.setswitchinterval(SWITCH_INTERVAL)
-        gc.freeze()  # what was loaded so far is not looked at by every collection
+        gc.freeze()  # collections do not scan the objects that exist now
         self._thread.start()
 
     def stop(self) -> None:
-        """Ends, and closes the source; again, it does nothing."""
+        """Stop the thread and close the source; a second call does nothing."""
         self._stopping.set()
         if self._thread.is_alive():
             self._thread.join()
         self.source.close()
 
-    def tare(self) -> None:
-        """Takes the tare anew.
+    def restart_tare(self) -> None:
+        """Forget the tare, and take a new one from the next samples.
 
         Raises:
             StreamError: a finger is in contact.
-            SourceError: the source is over, or nothing arrives.
+            SourceError: the source has ended or is silent.
         """
         if self.ended:
             raise SourceError("the source has ended: no tare can be taken")
-        answer: Future[None] = Future()
-        self._requests.append(answer)
+        request: Future[None] = Future()
+        self._tare_requests.append(request)
         try:
-            answer.result(ANSWER_TIME)
+            request.result(TARE_TIMEOUT)
         except TimeoutError as cause:
-            answer.cancel()
+            request.cancel()
             raise SourceError("the source does not answer: no tare can be taken") from cause
 
     def latency(self) -> Latency:
-        """Of the newest decisions."""
-        known = self._latencies[: min(self._n_judged, N_LATENCIES)]
+        """Compute the percentiles of the newest latencies."""
+        known = self._latencies[: min(self._n_latencies, MAX_LATENCIES)]
         if not len(known):
             return Latency(np.nan, np.nan, np.nan)
         return Latency(*np.percentile(known, (50, 99, 100)).tolist())
@@ -139,25 +117,26 @@ class Session:
     def _run(self) -> None:
         try:
             while not self._stopping.is_set() and not self.source.ended:
-                self._turn()
-            self._say(None, self.judge.finish())
-        except Exception as failure:  # told by whoever started the session
+                self._step()
+            self._notify(self.stream.finish())
+        except Exception as failure:  # the owner of the session raises it again
             self.failure = failure
         self.ended = True
 
-    def _turn(self) -> None:
-        while self._requests:
-            self._answer(self._requests.popleft())
-        arrival, decisions = self._watch.turn()
-        if arrival is not None:
-            self._count(arrival, judged=bool(decisions))
-        if arrival is not None or decisions:
-            self._say(arrival, decisions)
+    def _step(self) -> None:
+        while self._tare_requests:
+            self._answer(self._tare_requests.popleft())
+        update = self.stream.read()
+        if update.arrival is not None:
+            self._count(update.arrival, has_estimates=bool(update.estimates))
+        if update.arrival is not None or update.estimates:
+            self._notify(update)
 
-    def _count(self, arrival: Arrival, *, judged: bool) -> None:
-        if arrival.samples and judged:
-            self._latencies[self._n_judged % N_LATENCIES] = time.monotonic() - arrival.received
-            self._n_judged += 1
+    def _count(self, arrival: Arrival, *, has_estimates: bool) -> None:
+        if arrival.samples and has_estimates:
+            latency = time.monotonic() - arrival.received
+            self._latencies[self._n_latencies % MAX_LATENCIES] = latency
+            self._n_latencies += 1
         for module in arrival.samples:
             self._n_samples[module] += 1
             self.n_packets = max(self.n_packets, self._n_samples[module])
@@ -166,22 +145,15 @@ class Session:
 
     def _answer(self, request: "Future[None]") -> None:
         if not request.set_running_or_notify_cancel():
-            return  # whoever asked has given up
+            return  # the caller has timed out
         try:
-            if self.silent:
-                raise SourceError("nothing arrives: no tare can be taken")
-            self.judge.tare()
+            if self.stream.silent:
+                raise SourceError("no samples arrive: no tare can be taken")
+            self.stream.restart_tare()
             request.set_result(None)
         except Exception as failure:
             request.set_exception(failure)
 
-    def _say(self, arrival: Arrival | None, decisions: list[Decision]) -> None:
-        events = [event for decision in decisions for event in self._events(decision)]
-        said = Said(arrival, decisions, events)
+    def _notify(self, update: StreamUpdate) -> None:
         for listener in self._listeners:
-            listener(said)
-
-    def _events(self, decision: Decision) -> list[ContactEvent]:
-        estimate = decision.estimate
-        states = [finger.state for finger in estimate.fingers.values()]
-        return self._changes.update([*states, estimate.state], estimate.time)
+            listener(update)

@@ -6,13 +6,13 @@ import numpy as np
 
 from holdfast.contact import ContactEstimate, Fault, Reason
 from holdfast.detector import Detection, FingerTrace
-from holdfast.live.judge import Decision
+from holdfast.live.stream_detector import StreamEstimate
 
 REASONS = tuple(Reason)
 FAULTS = tuple(Fault)
 
 
-def detection_of(name: str, decisions: Sequence[Decision]) -> Detection:
+def detection_of(name: str, decisions: Sequence[StreamEstimate]) -> Detection:
     """What was decided, as a detection.
 
     Args:

@@ -60,7 +60,10 @@ class Source(ABC):
         >>> from holdfast.sources import open_source
         >>> with open_source("grasp.parquet", speed=0) as source:  # doctest: +SKIP
         ...     for arrival in source:
-        ...         estimate = detector.update(arrival.samples, arrival.time)
+        ...         print(arrival.time, list(arrival.samples))
+
+        To detect contact states, use `holdfast.StreamDetector`: it also resamples, and handles
+        faults and modules that the model does not use.
     """
 
     name: str = ""

@@ -1,0 +1,356 @@
+import time
+from dataclasses import replace
+
+import msgspec
+import numpy as np
+import pytest
+
+from holdfast.contact import ContactState, Fault, Reason
+from holdfast.detector import Detector, detect
+from holdfast.errors import ModelError, StreamError
+from holdfast.live.judge import Judge
+from holdfast.live.stream_detector import MAX_BUFFERED_ARRIVALS, ArrivalDetector, StreamDetector
+from holdfast.recordings import Recording
+from holdfast.resampling import resample
+
+from . import build
+
+
+def judged(recording, model=None, steps=None, **options):
+    source = build.Script.of(recording, steps)
+    detector = ArrivalDetector(model or build.model(), source.sensors, **options)
+    estimates = [said for arrival in source for said in detector.update(arrival)]
+    return detector, estimates + detector.finish()
+
+
+def check_equal(estimates, expected):
+    for name, trace in expected.fingers.items():
+        mine = [d.estimate.fingers[name] for d in estimates if name in d.updated_fingers]
+        assert len(mine) == len(trace)
+        assert all(build.same(one, trace.estimate(k)) for k, one in enumerate(mine))
+    assert [d.estimate.state.code for d in estimates] == expected.hand.tolist()
+
+
+def test_decisions_are_those_of_the_recording_sample_by_sample():
+    recording = build.grasp()
+    _, estimates = judged(recording)
+    check_equal(estimates, detect(build.model(), recording))
+    assert {d.estimate.state for d in estimates} == set(ContactState)
+
+
+def test_a_source_of_another_rate_is_resampled_as_the_recording_is():
+    recording = build.grasp()
+    slow = Recording(
+        "slow", {name: replace(m, times=m.times * 2.5) for name, m in recording.modules.items()}
+    )
+    detector, estimates = judged(slow)
+    assert detector.resampled
+    expected = detect(build.model(), resample(slow, 150.0))
+    for name, trace in expected.fingers.items():
+        mine = [d.estimate.fingers[name] for d in estimates if name in d.updated_fingers]
+        n = min(len(mine), len(trace))  # the last sample may wait for one that never comes
+        assert abs(len(mine) - len(trace)) <= 1
+        states = np.array([one.state.code for one in mine[:n]])
+        assert (states == trace.state[:n]).mean() > 0.999
+        forces = np.array([one.force for one in mine[:n]])
+        np.testing.assert_allclose(forces, trace.force[:n], rtol=1e-6, atol=1e-6)
+
+
+def test_a_source_of_another_rate_is_refused_where_that_is_asked_for():
+    recording = build.grasp()
+    slow = Recording(
+        "slow", {name: replace(m, times=m.times * 2) for name, m in recording.modules.items()}
+    )
+    text = r"^75 Hz given, the model expects 150 Hz within 20 % \(--rate resample accepts it\)$"
+    with pytest.raises(ModelError, match=text):
+        judged(slow, strict=True)
+
+
+def test_nothing_is_said_before_the_rate_is_known_and_then_everything():
+    arrivals = build.arrivals_of(build.grasp())
+    detector = ArrivalDetector(build.model(), build.Script.of(build.grasp()).sensors)
+    said = [detector.update(arrival) for arrival in arrivals[:80]]
+    first = next(k for k, estimates in enumerate(said) if estimates)
+    assert 70 <= first <= 76
+    assert len(said[first]) == first + 1
+    assert detector.rate == pytest.approx(150.0)
+
+
+def test_a_source_that_ends_early_is_judged_all_the_same():
+    recording = build.grasp()
+    _, estimates = judged(recording, steps=build.arrivals_of(recording)[:20])
+    assert len(estimates) == 20
+    assert estimates[-1].estimate.fingers["thumb"].reason is Reason.TARE
+
+
+def test_a_fault_on_the_way_makes_its_finger_unknown_until_the_next_good_sample():
+    recording = build.grasp()
+    steps = build.arrivals_of(recording)
+    k = 500
+    thumbless = {n: s for n, s in steps[k].samples.items() if n != "thumb"}
+    steps[k] = steps[k]._replace(samples=thumbless, faults={"thumb": (Fault.TAXEL_COUNT,)})
+    steps.insert(k + 1, build.told("odd", index=[Fault.LATE]))
+    _, estimates = judged(recording, steps=steps)
+    before, at, told, after = (estimates[i].estimate for i in (k - 1, k, k + 1, k + 2))
+    assert before.fingers["thumb"].state is not ContactState.UNKNOWN
+    assert at.fingers["thumb"].state is ContactState.UNKNOWN
+    assert at.fingers["thumb"].faults == (Fault.TAXEL_COUNT,)
+    assert at.fingers["index"].faults == ()
+    assert told.fingers["index"].state is ContactState.UNKNOWN
+    assert told.fingers["index"].reason is Reason.FAULT
+    assert np.isnan(told.fingers["index"].stable_probability)
+    assert estimates[k + 1].updated_fingers == ("index",)
+    assert all(finger.faults == () for finger in after.fingers.values())
+
+
+def test_while_nothing_comes_no_finger_is_stable():
+    recording = build.grasp()
+    detector = ArrivalDetector(build.model(), build.Script.of(recording).sensors)
+    assert detector.mark_silent() == []
+    for arrival in build.arrivals_of(recording)[:500]:
+        detector.update(arrival)
+    (said,) = detector.mark_silent()
+    assert said.updated_fingers == build.FINGERS
+    assert said.estimate.state is ContactState.UNKNOWN
+    for finger in said.estimate.fingers.values():
+        assert (finger.state, finger.reason) == (ContactState.UNKNOWN, Reason.GAP)
+        assert finger.faults == (Fault.PACKET_GAP,)
+
+
+def test_word_after_silence_brings_no_finger_back():
+    recording = build.grasp()
+    arrivals = build.arrivals_of(recording)
+    detector = ArrivalDetector(build.model(), build.Script.of(recording).sensors)
+    for arrival in arrivals[:500]:
+        detector.update(arrival)
+    detector.mark_silent()
+    (said,) = detector.update(build.told("odd", thumb=[Fault.TAXEL_COUNT]))
+    assert {finger.state for finger in said.estimate.fingers.values()} == {ContactState.UNKNOWN}
+    assert said.estimate.state is ContactState.UNKNOWN
+    (back,) = detector.update(arrivals[500])
+    assert all(finger.faults == () for finger in back.estimate.fingers.values())
+
+
+def test_a_finger_that_stays_away_is_told_of_while_the_others_go_on():
+    recording = build.grasp()
+    detector = ArrivalDetector(build.model(), build.Script.of(recording).sensors)
+    estimates = []
+    for k, arrival in enumerate(build.arrivals_of(recording)[:600]):
+        there = {n: s for n, s in arrival.samples.items() if k < 500 or n != "thumb"}
+        estimates += detector.update(arrival._replace(samples=there))
+    told = [d for d in estimates[500:] if "thumb" in d.updated_fingers]
+    assert len(told) == 1
+    thumb = told[0].estimate.fingers["thumb"]
+    assert (thumb.state, thumb.reason) == (ContactState.UNKNOWN, Reason.GAP)
+
+
+def test_what_is_kept_before_the_rate_is_known_is_bounded():
+    recording = build.grasp()
+    detector = ArrivalDetector(build.model(), build.Script.of(recording).sensors)
+    first, *_ = build.arrivals_of(recording)
+    for k in range(3):
+        for _ in range(MAX_BUFFERED_ARRIVALS):
+            assert detector.update(build.told("odd", thumb=[Fault.TAXEL_COUNT])) == []
+        detector.update(first._replace(time=0.01 * k))
+    assert len(detector._buffer) == 6
+    stuck = build.arrivals_of(recording)[: MAX_BUFFERED_ARRIVALS // 8]
+    for one in stuck:  # the clock of the device hardly moves
+        detector.update(one._replace(time=0.03 + one.time * 1e-6))
+    assert len(detector._buffer) == 6 + len(stuck)
+    assert detector._buffer.maxlen == MAX_BUFFERED_ARRIVALS
+
+
+def test_silence_is_longer_for_slow_sources():
+    recording = build.grasp()
+    detector = ArrivalDetector(build.model(), build.Script.of(recording).sensors)
+    assert detector.silence_timeout == 0.1
+    for arrival in build.arrivals_of(recording)[:200]:
+        detector.update(arrival._replace(time=20 * arrival.time))
+    assert detector.silence_timeout == pytest.approx(0.4, rel=0.01)
+
+
+def test_a_tare_in_contact_is_refused_and_one_without_is_taken_anew():
+    recording = build.grasp()
+    detector = ArrivalDetector(build.model(), build.Script.of(recording).sensors)
+    detector.restart_tare()
+    arrivals = build.arrivals_of(recording)
+    for arrival in arrivals[:200]:
+        detector.update(arrival)
+    detector.restart_tare()
+    said = detector.update(arrivals[200])[-1].estimate.fingers["thumb"]
+    assert (said.state, said.reason) == (ContactState.UNKNOWN, Reason.TARE)
+    for arrival in arrivals[201:600]:
+        detector.update(arrival)
+    with pytest.raises(StreamError, match=r"^thumb, index, middle in contact: open the hand, the"):
+        detector.restart_tare()
+
+
+def test_tared_readings_begin_at_zero():
+    recording = build.grasp()
+    detector = ArrivalDetector(build.model(), build.Script.of(recording).sensors)
+    arrivals = build.arrivals_of(recording)
+    assert detector.subtract_tare(arrivals[0].samples) == {}
+    for arrival in arrivals[:120]:
+        detector.update(arrival)
+    tared = detector.subtract_tare(arrivals[120].samples)
+    assert set(tared) == set(build.FINGERS)
+    assert all(np.abs(values).max() < 10 for values in tared.values())
+
+
+def test_modules_that_the_model_does_not_judge_are_passed_over():
+    recording = build.grasp()
+    steps = build.arrivals_of(recording)
+    palm = np.zeros((4, 3))
+    more = [one._replace(samples={**one.samples, "palm/1": palm}) for one in steps]
+    _, estimates = judged(recording, steps=more)
+    check_equal(estimates, detect(build.model(), recording))
+
+
+def test_a_tare_by_interval_is_refused():
+    model = msgspec.structs.replace(build.model(), tare="0:1")
+    with pytest.raises(ModelError, match=r"^the model's tare is the interval 0:1 s of a recordin"):
+        ArrivalDetector(model, build.Script.of(build.grasp()).sensors)
+
+
+def test_ignored_taxels_count_for_nothing():
+    recording = build.grasp()
+    steps = build.arrivals_of(recording)
+    for k, arrival in enumerate(steps):
+        spoilt = arrival.samples["thumb"].copy()
+        spoilt[3] = 65535 if k > 300 else spoilt[3]
+        steps[k] = arrival._replace(samples={**arrival.samples, "thumb": spoilt})
+    _, spoilt = judged(recording, steps=list(steps))
+    assert spoilt[-1].estimate.fingers["thumb"].faults == (Fault.SATURATED,)
+    assert spoilt[-1].estimate.fingers["thumb"].faulty_taxels == (3,)
+    _, healthy = judged(recording, steps=list(steps), ignore={"thumb": (3,)})
+    assert healthy[-1].estimate.fingers["thumb"].faults == ()
+
+
+class Babbler(build.Script):
+    """Sends arrivals without samples, without end and without a pause."""
+
+    paced = True
+
+    def read(self, timeout):
+        if self.steps:
+            return super().read(timeout)
+        time.sleep(0.001)
+        return build.told("nonsense")
+
+
+def read_times(source, n):
+    stream = StreamDetector(build.model(), source)
+    return stream, [stream.read() for _ in range(n)]
+
+
+def test_a_source_without_samples_is_silent():
+    recording = build.grasp()
+    source = Babbler.of(recording, build.arrivals_of(recording)[:500], patient=True)
+    stream, _ = read_times(source, 500)
+    assert not stream.silent
+    found = []
+    end = time.monotonic() + 30
+    while not stream.silent and time.monotonic() < end:
+        found += stream.read().estimates
+    (silence,) = found
+    assert {one.state for one in silence.estimate.fingers.values()} == {ContactState.UNKNOWN}
+    assert stream.read().estimates == []
+
+
+def test_samples_of_unused_modules_do_not_end_the_silence():
+    recording = build.grasp()
+    arrivals = build.arrivals_of(recording)
+    palm = [one._replace(samples={"palm/1": one.samples["thumb"]}) for one in arrivals[500:502]]
+    source = build.Script.of(recording, [*arrivals[:500], None, *palm, arrivals[502]], patient=True)
+    stream, updates = read_times(source, 503)
+    assert stream.silent
+    estimates = [(one, update.arrival) for update in updates for one in update.estimates]
+    assert [arrival is None for _, arrival in estimates[500:]] == [True]
+    stream.read()
+    assert not stream.silent
+
+
+def test_a_source_that_is_not_paced_is_not_silent_because_its_reader_is_slow():
+    recording = build.grasp()
+    arrivals = build.arrivals_of(recording)
+    steps = [*arrivals[:500], build.told("a marker"), arrivals[500]]
+    stream, _ = read_times(build.Script.of(recording, steps), 500)
+    time.sleep(0.15)
+    assert stream.read().estimates == []
+    assert not stream.silent
+
+
+def test_in_slow_motion_silence_is_longer():
+    recording = build.grasp()
+    asked = []
+
+    class Slow(build.Script):
+        speed = 0.1
+
+        def read(self, timeout):
+            asked.append(timeout)
+            return super().read(0.0)
+
+    read_times(Slow.of(recording), 1)
+    assert asked == [
+        10 * ArrivalDetector(build.model(), Slow.of(recording).sensors).silence_timeout
+    ]
+
+
+def with_palm(recording):
+    """The arrivals of a recording whose source has a module that no model uses."""
+    palm = replace(next(iter(recording.modules.values())))
+    more = Recording(recording.name, {**recording.modules, "palm/1": palm})
+    return build.Script.of(more)
+
+
+def test_iterating_gives_the_estimates_of_the_recording():
+    recording = build.grasp()
+    estimates = list(StreamDetector(build.model(), with_palm(recording)))
+    expected = detect(build.model(), recording)
+    assert [one.state.code for one in estimates] == expected.hand.tolist()
+    for name, trace in expected.fingers.items():
+        mine = [one.fingers[name] for one in estimates]
+        assert all(build.same(one, trace.estimate(k)) for k, one in enumerate(mine))
+    assert {name for one in estimates for name in one.fingers} == set(build.FINGERS)
+
+
+def test_a_detector_fed_without_it_refuses_unused_modules_and_does_not_resample():
+    recording = build.grasp()
+    slow = Recording(
+        "slow", {name: replace(m, times=m.times * 2.5) for name, m in recording.modules.items()}
+    )
+    source = with_palm(slow)
+    detector = Detector(build.model(), StreamDetector(build.model(), source).fingers)
+    with pytest.raises(StreamError, match=r"^finger 'palm/1' given"):
+        for arrival in source:
+            detector.update(arrival.samples, arrival.time)
+    n_instants = slow.modules["thumb"].n_samples
+    stream = StreamDetector(build.model(), with_palm(slow))
+    times = [estimate.time for estimate in stream]
+    assert stream.resampled
+    assert stream.rate == pytest.approx(60.0)
+    assert np.median(np.diff(times)) == pytest.approx(1 / 150)
+    assert len(times) > 2 * n_instants
+
+
+def test_events_are_the_changes_of_the_estimates():
+    stream = StreamDetector(build.model(), build.Script.of(build.grasp()))
+    updates = []
+    while not stream.source.ended:
+        updates.append(stream.read())
+    events = [event for update in updates for event in update.events if event.finger == "thumb"]
+    states = [one.estimate.fingers["thumb"].state for u in updates for one in u.estimates]
+    changed = [state for k, state in enumerate(states) if k and state is not states[k - 1]]
+    assert [event.state for event in events] == changed
+    assert events[0].previous is ContactState.UNKNOWN
+
+
+def test_the_old_name_works_and_warns():
+    recording = build.grasp()
+    sensors = build.Script.of(recording).sensors
+    with pytest.warns(DeprecationWarning, match=r"^holdfast\.live\.judge\.Judge is deprec"):
+        judge = Judge(build.model(), sensors, strict=True)
+    estimates = [one for each in build.arrivals_of(recording)[:80] for one in judge.take(each)]
+    assert len(estimates) == 80
+    assert estimates[0].estimate.state is ContactState.UNKNOWN
