@@ -16,7 +16,7 @@ from holdfast.features import DEPLOYED, haar_features, parse_features
 from holdfast.features.haar import fill_features
 from holdfast.model import FingerModel, Model
 from holdfast.sensors import sensor
-from holdfast.sensors.values import Array
+from holdfast.sensors.types import Array
 
 FINGERS = ("thumb", "index", "middle", "ring")
 WINDOW = 14

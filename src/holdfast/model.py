@@ -18,7 +18,7 @@ from holdfast.features.stream import StreamPlan
 from holdfast.files import write_whole
 from holdfast.recordings import Recording
 from holdfast.sensors import Sensor
-from holdfast.sensors.values import ROTATION_TOLERANCE
+from holdfast.sensors.types import ROTATION_TOLERANCE
 
 SCHEMA = "holdfast.model/1"
 ANY_FINGER = "*"

@@ -14,7 +14,7 @@ import numpy.typing as npt
 from holdfast.contact import Cause, ContactState
 from holdfast.errors import RecordingError
 from holdfast.sensors import Sensor
-from holdfast.sensors.values import Array, Unit, rebuilt
+from holdfast.sensors.types import Array, Unit, rebuilt
 
 GAP_PERIODS = 3.0
 """A step in time longer than this many sample periods is a gap."""

@@ -8,7 +8,7 @@ import numpy.typing as npt
 
 from holdfast.errors import StreamError
 from holdfast.recordings import GAP_PERIODS, Recording, Tactile
-from holdfast.sensors.values import Array
+from holdfast.sensors.types import Array
 
 Integers = npt.NDArray[np.int64]
 TOLERANCE = 1e-3

@@ -12,7 +12,7 @@ import numpy as np
 from holdfast.contact import Cause, ContactState
 from holdfast.recordings import Label, Recording, Tactile
 from holdfast.sensors import Sensor, sensor
-from holdfast.sensors.values import Array
+from holdfast.sensors.types import Array
 
 RATE = 150.0
 NOISE = 0.9

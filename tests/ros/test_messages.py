@@ -2,7 +2,7 @@ import numpy as np
 import pytest
 
 from holdfast.ros.definitions import parse_definition
-from holdfast.ros.messages import SENS_STREAM, Unpacker, known_definition
+from holdfast.ros.messages import SENS_STREAM, SampleDecoder, known_definition
 
 pytest.importorskip("rosbags", reason="rosbags is not installed")
 
@@ -50,7 +50,7 @@ def test_a_stream_of_xela(ros2):
         known_definition(message.__msgtype__, ros2=ros2),
     )
     for definition in definitions:
-        one, two = Unpacker(definition, ros2=ros2)(packed(types, message, ros2=ros2))
+        one, two = SampleDecoder(definition, ros2=ros2)(packed(types, message, ros2=ros2))
         assert one[:5] == (1, "uSCuAH", 1619157045.25, None, 7)
         assert two[:5] == (4, "uSPa44", None, None, 2**32 - 1)
         assert one.counts.dtype == np.uint16
@@ -64,11 +64,15 @@ def test_a_stream_of_xela(ros2):
 def test_older_streams_of_xela(ros2):
     types = store("xela_server", OLD, ros2=ros2)
     message = x_stream(types, "xela_server", counts(16), counts(4, seed=1))
-    found = Unpacker(told(types, message, ros2=ros2), ros2=ros2)(packed(types, message, ros2=ros2))
+    found = SampleDecoder(told(types, message, ros2=ros2), ros2=ros2)(
+        packed(types, message, ros2=ros2)
+    )
     assert [one.number for one in found] == [1, 2]
     np.testing.assert_array_equal(found[1].counts, counts(4, seed=1))
     message = x_server(types, "xela_server", 3, "XR1944", 12.5, counts(16), ros2=ros2)
-    (one,) = Unpacker(told(types, message, ros2=ros2), ros2=ros2)(packed(types, message, ros2=ros2))
+    (one,) = SampleDecoder(told(types, message, ros2=ros2), ros2=ros2)(
+        packed(types, message, ros2=ros2)
+    )
     assert one[:5] == (3, "XR1944", None, 12.5, None)
     assert one.counts.dtype == np.uint16
     np.testing.assert_array_equal(one.counts, counts(16))
@@ -84,7 +88,7 @@ def test_pillars(ros2):
         told(types, message, ros2=ros2),
         known_definition(f"{package}/SensorState", ros2=ros2),
     ):
-        (one,) = Unpacker(definition, ros2=ros2)(packed(types, message, ros2=ros2))
+        (one,) = SampleDecoder(definition, ros2=ros2)(packed(types, message, ros2=ros2))
         assert one[:5] == (None, "papillarray", 1.5, 12.25, None)
         assert one.counts is None
         np.testing.assert_array_equal(one.forces, forces)
@@ -93,7 +97,7 @@ def test_pillars(ros2):
 def test_counts_of_more_than_16_bits_are_refused():
     types = store("xela_server", OLD, ros2=False)
     message = x_stream(types, "xela_server", np.array([[1, 2, 65536]]))
-    unpack = Unpacker(told(types, message, ros2=False), ros2=False)
+    unpack = SampleDecoder(told(types, message, ros2=False), ros2=False)
     with pytest.raises(ValueError, match="a reading is no whole number from 0 to 65535"):
         unpack(packed(types, message, ros2=False))
 
@@ -102,7 +106,7 @@ def test_points_whose_axes_come_in_another_order():
     text = SENS_STREAM.replace("uint16 x\nuint16 y\nuint16 z", "uint16 z\nuint16 y\nuint16 x")
     types = store("p", XELA | {"Taxel": "uint16 z\nuint16 y\nuint16 x"}, ros2=False)
     message = sens_stream(types, "p", (1, "", 7, 1.0, [[3, 2, 1], [6, 5, 4]], []))
-    unpack = Unpacker(parse_definition("xela_server_ros/SensStream", text), ros2=False)
+    unpack = SampleDecoder(parse_definition("xela_server_ros/SensStream", text), ros2=False)
     assert unpack(packed(types, message, ros2=False))[0].counts.tolist() == [[1, 2, 3], [4, 5, 6]]
 
 
@@ -112,7 +116,7 @@ def test_unknown_messages():
     with pytest.raises(
         ValueError, match="pkg/Text is of no kind that holdfast knows; there are xela"
     ):
-        Unpacker(parse_definition("pkg/Text", "string text"), ros2=False)
+        SampleDecoder(parse_definition("pkg/Text", "string text"), ros2=False)
     signed = SENS_STREAM.replace("uint16", "int16")
     with pytest.raises(ValueError, match="of no kind that holdfast knows"):
-        Unpacker(parse_definition("xela_server_ros/SensStream", signed), ros2=False)
+        SampleDecoder(parse_definition("xela_server_ros/SensStream", signed), ros2=False)

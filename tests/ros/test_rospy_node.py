@@ -8,7 +8,13 @@ import pytest
 
 from holdfast.errors import SourceError
 from holdfast.ros import rospy_node
-from holdfast.ros.rospy_node import check_master, master_of, node, published, rospy_module
+from holdfast.ros.rospy_node import (
+    check_master,
+    master_uri,
+    published_topics,
+    rospy_module,
+    start_node,
+)
 
 
 class _Silent(SimpleXMLRPCRequestHandler):
@@ -38,7 +44,7 @@ def test_what_is_published(master):
     check_master(uri)
     answers["getSystemState"] = (1, "", [[["/a", ["node"]], ["/b", []]], [["/c", ["n"]]], []])
     answers["getTopicTypes"] = (1, "", [["/a", "p/A"], ["/b", "p/B"], ["/c", "p/C"]])
-    assert published(uri) == {"/a": "p/A"}
+    assert published_topics(uri) == {"/a": "p/A"}
 
 
 def test_a_master_that_refuses(master):
@@ -62,7 +68,7 @@ def test_nobody_listens():
     with create_server(("127.0.0.1", 0)) as free:
         uri = f"http://127.0.0.1:{free.getsockname()[1]}"
     with pytest.raises(SourceError) as caught:
-        node(uri)
+        start_node(uri)
     assert str(caught.value) == (
         f"no ROS master answers at {uri} (Connection refused): is roscore running? "
         "ROS_MASTER_URI or ?master= tell where"
@@ -95,13 +101,13 @@ def test_another_web_server():
 
 def test_which_master(monkeypatch):
     monkeypatch.delenv("ROS_MASTER_URI", raising=False)
-    assert master_of(None) == "http://localhost:11311"
+    assert master_uri(None) == "http://localhost:11311"
     monkeypatch.setenv("ROS_MASTER_URI", "http://robot:11311/")
-    assert master_of(None) == "http://robot:11311"
-    assert master_of("http://10.0.0.1:1") == "http://10.0.0.1:1"
+    assert master_uri(None) == "http://robot:11311"
+    assert master_uri("http://10.0.0.1:1") == "http://10.0.0.1:1"
     for bad in ("robot:11311", "http://robot", "https://robot:1", "http://robot:port"):
         with pytest.raises(ValueError, match="a master as http://localhost:11311 expected, "):
-            master_of(bad)
+            master_uri(bad)
 
 
 def test_no_rospy_at_all(monkeypatch):

@@ -17,7 +17,7 @@ import holdfast.sources.twin
 from holdfast.io import save_recording
 from holdfast.live.play import XelaServer
 from holdfast.recordings import Recording, Tactile
-from holdfast.ros.encoder import Encoder
+from holdfast.ros.cdr import MessageEncoder
 from holdfast.ros.messages import known_definition
 from holdfast.sensors import sensor
 from holdfast.sources import Source, open_source
@@ -179,7 +179,7 @@ def ros2(folder, monkeypatch):
     domain = 201 + os.getpid() % 30  # tests of ROS 2 itself take those below
     definition = known_definition("xela_server_ros2/SensStream", ros2=True)
     node = dds.Node(domain)
-    write, encode = node.writer("/xServTopic", definition), Encoder(definition)
+    write, encode = node.writer("/xServTopic", definition), MessageEncoder(definition)
     quiet = Event()
 
     def publish():

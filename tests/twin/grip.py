@@ -6,7 +6,7 @@ import numpy as np
 import numpy.typing as npt
 from scipy.spatial.transform import Rotation
 
-from holdfast.sensors.values import Array
+from holdfast.sensors.types import Array
 from holdfast.twin.contact import Constants, Contact, constants_of, new_contact, touch
 from holdfast.twin.objects import Thing, solid
 from holdfast.twin.shapes import probe

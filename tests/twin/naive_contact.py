@@ -4,7 +4,7 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from holdfast.sensors.values import Array
+from holdfast.sensors.types import Array
 from holdfast.twin.objects import Thing, distance_to
 from holdfast.twin.skin import Skin
 from holdfast.twin.surface import Surface

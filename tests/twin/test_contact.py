@@ -7,7 +7,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy.spatial.transform import Rotation
 
-from holdfast.sensors.values import Array
+from holdfast.sensors.types import Array
 from holdfast.twin.contact import Contact, constants_of, new_contact, touch
 from holdfast.twin.objects import Thing, load_things, solid, thing
 from holdfast.twin.shapes import probe, relief

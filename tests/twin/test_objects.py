@@ -8,7 +8,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from holdfast.sensors.values import Array
+from holdfast.sensors.types import Array
 from holdfast.twin.objects import (
     OTHER_OBJECTS,
     TABLE,

@@ -27,11 +27,11 @@ def _xela() -> str:
 
 def _ros1() -> str:
     from holdfast.errors import HoldfastError
-    from holdfast.ros.rospy_node import check_master, master_of, rospy_module
+    from holdfast.ros.rospy_node import check_master, master_uri, rospy_module
 
     try:
         rospy_module()
-        check_master(master := master_of(None))
+        check_master(master := master_uri(None))
     except (HoldfastError, ValueError) as missing:  # a ValueError: ROS_MASTER_URI is none
         return str(missing)
     return f"rospy, and a master at {master}"

@@ -12,7 +12,7 @@ from holdfast.detector import HAND
 
 if TYPE_CHECKING:
     from holdfast.detector import Detection
-    from holdfast.sensors.values import Array
+    from holdfast.sensors.types import Array
 
 STATES, REASONS, FAULTS = tuple(ContactState), tuple(Reason), tuple(Fault)
 MOST_EVENTS = 40

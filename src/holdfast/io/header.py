@@ -12,7 +12,7 @@ from holdfast.contact import Cause, ContactState
 from holdfast.errors import RecordingError
 from holdfast.recordings import Label, Recording, Truth
 from holdfast.sensors import Sensor
-from holdfast.sensors.values import Unit
+from holdfast.sensors.types import Unit
 
 NUMBERS = (
     *("int8", "int16", "int32", "int64", "uint8", "uint16", "uint32", "uint64"),

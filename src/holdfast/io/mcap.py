@@ -21,6 +21,7 @@ from zstandard import ZstdError
 from holdfast.errors import RecordingError
 from holdfast.files import whole_file
 from holdfast.io.header import Header, decode, header_of
+from holdfast.io.mcap_messages import decode_samples, decode_text, number_of_type
 from holdfast.io.mcap_writer import MESSAGE_SECONDS
 from holdfast.io.message_log import HEADER_TOPIC, LIBRARY, MARKERS_TOPIC, MessageLog
 from holdfast.io.series import (
@@ -33,8 +34,7 @@ from holdfast.io.series import (
 )
 from holdfast.io.spans import spans
 from holdfast.recordings import Recording
-from holdfast.ros import cdr
-from holdfast.sensors.values import Array
+from holdfast.sensors.types import Array
 
 _RECORD = struct.Struct("<BQ")
 _FOOTER = struct.Struct("<BQQQI")
@@ -121,7 +121,7 @@ def chunks(path: Path) -> tuple[Header, Iterator[Samples], bool]:
     complete = _is_whole(path)
     messages = _messages(path, complete)
     header = _header(path, messages, complete)
-    markers = [cdr.unpack_text(m.data) for m in messages if m.topic == MARKERS_TOPIC]
+    markers = [decode_text(m.data) for m in messages if m.topic == MARKERS_TOPIC]
     header = msgspec.structs.replace(header, markers=markers)
     again = _samples(path, header, _messages(path, complete), [])
     return header, ({topic: pair} for topic, pair in again), complete
@@ -152,7 +152,7 @@ def _header(path: Path, messages: Iterator[_Found], complete: bool) -> Header:
     """The header, which is the first message."""
     first = next(messages, None)
     if first is not None and first.topic == HEADER_TOPIC:
-        return decode(cdr.unpack_text(first.data)[1], path)
+        return decode(decode_text(first.data)[1], path)
     if complete:
         raise RecordingError(f"{path} is an MCAP file but no recording of holdfast")
     raise RecordingError(f"{path} is cut so early that nothing can be recovered: it has no header")
@@ -168,7 +168,7 @@ def _samples(
     every = {series.topic: series for series in series_of(header)}
     for message in messages:
         if message.topic == MARKERS_TOPIC:
-            markers.append(cdr.unpack_text(message.data))
+            markers.append(decode_text(message.data))
         elif message.topic != HEADER_TOPIC:
             yield message.topic, _unpacked_samples(path, message, every.get(message.topic))
 
@@ -176,9 +176,9 @@ def _samples(
 def _unpacked_samples(
     path: Path, message: _Found, series: Series | None
 ) -> tuple[Array, npt.NDArray[Any]]:
-    number = message.schema.removeprefix("holdfast_msgs/msg/").removesuffix("Samples").lower()
+    number = number_of_type(message.schema)
     try:
-        times, values = cdr.unpack_samples(message.data, number)
+        times, values = decode_samples(message.data, number)
     except (ValueError, TypeError) as cause:
         raise RecordingError(f"{path}: {message.topic}: {cause}") from cause
     if series is None or series.number not in (None, number) or values.shape[1:] != series.shape:

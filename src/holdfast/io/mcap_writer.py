@@ -13,7 +13,7 @@ from holdfast.io.header import Header, ModuleData, number_of
 from holdfast.io.message_log import MARKERS_TOPIC, MessageLog
 from holdfast.io.spans import spans
 from holdfast.sensors import Sensor
-from holdfast.sensors.values import Array, Unit
+from holdfast.sensors.types import Array, Unit
 
 MESSAGE_SECONDS = 0.1
 

@@ -12,8 +12,15 @@ from mcap.writer import CompressionType, Writer
 from holdfast.errors import OutputError
 from holdfast.files import refuse_overwrite
 from holdfast.io.header import Header, encode, number_of
-from holdfast.ros import cdr
-from holdfast.sensors.values import Array
+from holdfast.io.mcap_messages import (
+    TEXT_SCHEMA,
+    TEXT_TYPE,
+    encode_samples,
+    encode_text,
+    samples_schema,
+    samples_type,
+)
+from holdfast.sensors.types import Array
 
 CHUNK_SECONDS = 0.3
 
@@ -70,14 +77,14 @@ class MessageLog:
         start = float(times[0])
         self._make_room(start, float(times[-1]))
         number = number_of(values, topic)
-        channel = self._channel(topic, cdr.type_name(number), cdr.schema(number))
-        self._message(channel, start, cdr.pack_samples(times, values))
+        channel = self._channel(topic, samples_type(number), samples_schema(number))
+        self._message(channel, start, encode_samples(times, values))
 
     def text(self, topic: str, time: float, text: str) -> None:
         """Writes one message of text."""
         self._make_room(time, time)
-        channel = self._channel(topic, cdr.TEXT_TYPE, cdr.TEXT_SCHEMA)
-        self._message(channel, time, cdr.pack_text(time, text))
+        channel = self._channel(topic, TEXT_TYPE, TEXT_SCHEMA)
+        self._message(channel, time, encode_text(time, text))
 
     def flush(self) -> None:
         """Ends the chunk: what came so far is on its way to the disk."""

@@ -29,7 +29,7 @@ from holdfast.io.series import (
 )
 from holdfast.io.spans import spans
 from holdfast.recordings import Recording
-from holdfast.sensors.values import Array
+from holdfast.sensors.types import Array
 
 HEADER_KEY = "holdfast.header"
 MAGIC = b"PAR1"

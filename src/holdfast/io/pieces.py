@@ -15,7 +15,7 @@ from holdfast.io.labels import labels_for, labels_path
 from holdfast.io.series import Samples, cut_labels, recording_from
 from holdfast.io.spans import spans
 from holdfast.recordings import Label, Recording
-from holdfast.sensors.values import Array
+from holdfast.sensors.types import Array
 
 LAG = 1.0
 """An MCAP file has modules one after the other: what is newer may not be whole yet [s]."""

@@ -20,7 +20,7 @@ from holdfast.io.header import (
 )
 from holdfast.recordings import Label, Recording, Tactile, Truth
 from holdfast.sensors import Sensor
-from holdfast.sensors.values import Array
+from holdfast.sensors.types import Array
 
 Samples = Mapping[str, tuple[Array, npt.NDArray[Any]]]
 """Times (n,) and values (n, ...) by topic."""

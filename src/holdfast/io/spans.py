@@ -4,7 +4,7 @@ from collections.abc import Collection, Iterator, Mapping
 
 import numpy as np
 
-from holdfast.sensors.values import Array
+from holdfast.sensors.types import Array
 
 
 def spans(

@@ -17,7 +17,7 @@ from holdfast.labelling.edges import REACH, Edge, edges_of, shift_of, typical_sh
 from holdfast.labelling.out_of_fold import N_FOLDS, out_of_fold
 from holdfast.labelling.spans import ROUNDING, Span, State, spans_of, state_name
 from holdfast.recordings import Label, Recording, label_states
-from holdfast.sensors.values import Array
+from holdfast.sensors.types import Array
 from holdfast.training.setting import Setting
 
 SHORTEST = 0.05

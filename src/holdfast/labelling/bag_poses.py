@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 
 from holdfast.errors import MissingExtra, RecordingError
-from holdfast.sensors.values import Array
+from holdfast.sensors.types import Array
 
 POSE, FRAMES = "geometry_msgs/msg/PoseStamped", "tf2_msgs/msg/TFMessage"
 

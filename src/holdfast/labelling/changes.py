@@ -10,7 +10,7 @@ import math
 import numpy as np
 from scipy.ndimage import maximum_filter1d, uniform_filter1d
 
-from holdfast.sensors.values import Array
+from holdfast.sensors.types import Array
 
 SMOOTHING = 0.03
 """Over which the force is averaged first [s]: its noise goes, an edge stays where it is."""

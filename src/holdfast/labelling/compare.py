@@ -15,7 +15,7 @@ from holdfast.errors import RecordingError
 from holdfast.labelling.spans import ROUNDING, Span, spans_of
 from holdfast.metrics.statistics import quantile
 from holdfast.recordings import Label, label_states
-from holdfast.sensors.values import Array
+from holdfast.sensors.types import Array
 
 MATCHED = 0.5
 """Onsets of two labellings that lie closer than this [s] may be the same."""

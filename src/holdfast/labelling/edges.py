@@ -7,7 +7,7 @@ from typing import NamedTuple
 import numpy as np
 
 from holdfast.labelling.spans import ROUNDING, Span
-from holdfast.sensors.values import Array
+from holdfast.sensors.types import Array
 
 REACH = 0.5
 """The place of an edge is looked for within this [s] of where it is drawn."""

@@ -24,7 +24,7 @@ from holdfast.features import FEATURE_NAMES, fingertip_force, haar_features
 from holdfast.files import refuse_overwrite, write_whole
 from holdfast.labelling.label_studio import STATES, label_name, state_of
 from holdfast.recordings import Label, Recording, Tactile
-from holdfast.sensors.values import Array
+from holdfast.sensors.types import Array
 
 TASKS, CONFIG, SIGNALS = "label-studio.json", "label-studio.xml", ".signals.csv"
 SHOWN = ("F_a", "F_x", "F_y", "F_z", "sigma")

@@ -21,7 +21,7 @@ from holdfast.errors import TrainingError
 from holdfast.model import ANY_FINGER, Model
 from holdfast.parallel import each
 from holdfast.recordings import Label, Recording
-from holdfast.sensors.values import Array
+from holdfast.sensors.types import Array
 from holdfast.training.design import at_rate, gather
 from holdfast.training.fitting import Material, fit_model
 from holdfast.training.setting import Setting

@@ -12,7 +12,7 @@ from holdfast.errors import RecordingError
 from holdfast.io.importers.table import read_table
 from holdfast.metrics.masks import Mask, runs
 from holdfast.recordings import Recording, Truth
-from holdfast.sensors.values import Array
+from holdfast.sensors.types import Array
 
 OBJECT = "object"
 """Name of the object among the bodies of a file."""

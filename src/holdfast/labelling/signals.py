@@ -9,7 +9,7 @@ import numpy as np
 from holdfast.features import Tare, fingertip_force, haar_features
 from holdfast.features.tare import TareArgument
 from holdfast.recordings import GAP_PERIODS, Recording, Tactile
-from holdfast.sensors.values import Array
+from holdfast.sensors.types import Array
 
 SERIES = ("F_a", "F_x", "F_y", "F_z", "sigma")
 """What is drawn of a finger: the amplitude of its force, its components, the instability."""

@@ -12,7 +12,7 @@ from holdfast.contact import Fault
 from holdfast.io.header import NUMBERS
 from holdfast.recordings import GAP_PERIODS
 from holdfast.sensors import Sensor
-from holdfast.sensors.values import Array
+from holdfast.sensors.types import Array
 from holdfast.sources import Arrival
 
 AGAIN = 1.0

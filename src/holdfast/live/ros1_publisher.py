@@ -7,7 +7,7 @@ from typing import Any
 from holdfast.errors import SourceError
 from holdfast.live.ros_publisher import DIAGNOSTICS, VECTOR, WRENCH, RosPublisher, Status
 from holdfast.ros import rospy_node
-from holdfast.sensors.values import Unit
+from holdfast.sensors.types import Unit
 
 N_SENDING = 10
 """Messages that rospy keeps for a subscriber that is slow; then the oldest goes."""
@@ -32,13 +32,13 @@ class Ros1Publisher(RosPublisher):
         master: str | None = None,
     ) -> None:
         super().__init__(units, namespace)
-        self._master = rospy_node.master_of(master)
+        self._master = rospy_node.master_uri(master)
         self._publishers: dict[str, Any] = {}
         self._kinds: dict[str, type[Any]] = {}
         self._rospy: Any = None
 
     def _connect(self, topics: Mapping[str, str]) -> None:
-        self._rospy = rospy_node.node(self._master)
+        self._rospy = rospy_node.start_node(self._master)
         self._kinds = {kind: _message(kind) for kind in set(topics.values())}
         for name in ("DiagnosticStatus", "KeyValue"):
             self._kinds[name] = _message(f"diagnostic_msgs/{name}")

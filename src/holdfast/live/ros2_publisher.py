@@ -13,9 +13,9 @@ from holdfast.live.ros_publisher import (
     Status,
 )
 from holdfast.ros import dds
+from holdfast.ros.cdr import MessageEncoder
 from holdfast.ros.definitions import parse_definition
-from holdfast.ros.encoder import Encoder
-from holdfast.sensors.values import Unit
+from holdfast.sensors.types import Unit
 
 _LINE = "\n=====\nMSG: "
 _HEADER = (
@@ -71,7 +71,7 @@ class Ros2Publisher(RosPublisher):
         domain: int | None = None,
     ) -> None:
         super().__init__(units, namespace)
-        self._domain = dds.domain_of(None if domain is None else str(domain))
+        self._domain = dds.domain_number(None if domain is None else str(domain))
         self._node: dds.Node | None = None
         self._writers: dict[str, Callable[[Mapping[str, Any]], None]] = {}
 
@@ -120,7 +120,7 @@ class Ros2Publisher(RosPublisher):
 
 def _writer(node: dds.Node, topic: str, kind: str) -> Callable[[Mapping[str, Any]], None]:
     definition = parse_definition(kind, DEFINITIONS[kind])
-    write, encode = node.writer(topic, definition), Encoder(definition)
+    write, encode = node.writer(topic, definition), MessageEncoder(definition)
     return lambda message: write(encode(message))
 
 

@@ -10,7 +10,7 @@ from types import TracebackType
 from typing import TYPE_CHECKING, NamedTuple, Self
 
 from holdfast.contact import ContactEstimate, ContactState, HandEstimate, Reason
-from holdfast.sensors.values import Unit
+from holdfast.sensors.types import Unit
 
 if TYPE_CHECKING:
     from holdfast.live.stream_detector import StreamUpdate

@@ -6,7 +6,7 @@ import numpy as np
 
 from holdfast.contact import STABLE, UNKNOWN
 from holdfast.metrics.decisions import FingerDecisions
-from holdfast.sensors.values import Array
+from holdfast.sensors.types import Array
 
 N_BINS = 10
 """Of probabilities from 0 to 1."""

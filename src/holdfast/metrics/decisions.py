@@ -9,7 +9,7 @@ import numpy as np
 import numpy.typing as npt
 
 from holdfast.contact import NO_CONTACT, STABLE, UNKNOWN, UNSTABLE
-from holdfast.sensors.values import Array
+from holdfast.sensors.types import Array
 
 Codes = npt.NDArray[np.int8]
 

@@ -17,7 +17,7 @@ from holdfast.contact import NO_CONTACT, STABLE, UNSTABLE, ContactState
 from holdfast.metrics.decisions import Codes, check_lengths, check_times
 from holdfast.metrics.masks import runs
 from holdfast.metrics.statistics import finite_or_none, percent, quantile
-from holdfast.sensors.values import Array
+from holdfast.sensors.types import Array
 
 SHORTEST_EVENT = 0.05
 """A run of not-stable labels of at least this [s] is an event."""

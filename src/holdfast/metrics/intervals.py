@@ -11,7 +11,7 @@ import numpy as np
 import numpy.typing as npt
 
 from holdfast.metrics.statistics import finite_or_none, quantile
-from holdfast.sensors.values import Array
+from holdfast.sensors.types import Array
 
 Interval = tuple[float | None, float | None]
 """Lower and upper end; None where an end is infinite."""

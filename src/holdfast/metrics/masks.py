@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from holdfast.sensors.values import Array
+from holdfast.sensors.types import Array
 
 Mask = npt.NDArray[np.bool_]
 Positions = npt.NDArray[np.integer[Any] | np.floating[Any]]

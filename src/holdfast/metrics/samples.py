@@ -11,7 +11,7 @@ import numpy.typing as npt
 from holdfast.contact import NO_CONTACT, STABLE, UNKNOWN, UNSTABLE
 from holdfast.metrics.decisions import check_lengths
 from holdfast.metrics.statistics import finite_or_none, pairs_won, percent
-from holdfast.sensors.values import Array
+from holdfast.sensors.types import Array
 
 
 class SampleMetrics(msgspec.Struct, frozen=True):

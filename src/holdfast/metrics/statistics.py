@@ -4,7 +4,7 @@ import math
 
 import numpy as np
 
-from holdfast.sensors.values import Array
+from holdfast.sensors.types import Array
 
 
 def percent(part: float, whole: float) -> float | None:

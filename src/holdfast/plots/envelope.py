@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from holdfast.sensors.values import Array
+from holdfast.sensors.types import Array
 
 
 def envelope(times: Array, values: Array, n_bins: int = 2000) -> tuple[Array, Array]:

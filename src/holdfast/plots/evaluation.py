@@ -18,7 +18,7 @@ from holdfast.metrics import (
 )
 from holdfast.metrics.decisions import FingerDecisions
 from holdfast.metrics.events import EARLY, POSTS, event_delays
-from holdfast.sensors.values import Array
+from holdfast.sensors.types import Array
 
 COLOURS = ("#0072b2", "#d55e00", "#009e73", "#cc79a7", "#56b4e9", "#e69f00")
 """Told apart by colour-blind people too (Okabe and Ito); beyond six fingers they come again."""

@@ -15,7 +15,7 @@ from holdfast.contact import ContactState
 from holdfast.features import FEATURE_NAMES, Tare, fingertip_force, haar_features
 from holdfast.plots.envelope import envelope
 from holdfast.recordings import GAP_PERIODS, Recording, Tactile
-from holdfast.sensors.values import Array
+from holdfast.sensors.types import Array
 
 # Colours after Okabe and Ito, told apart by the colour-blind.
 COMPONENT_COLOURS = {"F_x": "#0072B2", "F_y": "#E69F00", "F_z": "#CC79A7", "F_a": "#000000"}

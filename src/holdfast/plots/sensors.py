@@ -10,7 +10,7 @@ from matplotlib.patches import FancyBboxPatch
 from mpl_toolkits.mplot3d import Axes3D  # type: ignore[import-untyped]
 
 from holdfast.sensors import Hand, HandModule, Sensor
-from holdfast.sensors.values import Array
+from holdfast.sensors.types import Array
 
 MM = 1e3
 FLAT = 1e-3

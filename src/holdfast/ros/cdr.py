@@ -1,151 +1,213 @@
-"""Messages of holdfast in CDR, the encoding of ROS 2, little endian.
+"""Codec for ROS messages: CDR, the encoding of ROS 2, and the encoding of ROS 1.
 
-A message of samples has three fields, whatever its number type: `float64[] times`,
-`uint32[] shape` of one value, and the values themselves. Foxglove and the `mcap` tools decode
-it by the schema that the file carries.
+MCAP recordings, ROS 2 sources and publishers, and the import of bags all use it. Messages are
+plain values, described by a `Definition`; nothing is generated from a definition or executed.
 """
 
-from math import prod
+import struct
+from collections.abc import Callable, Mapping, Sequence
 from typing import Any
 
 import numpy as np
 import numpy.typing as npt
 
-from holdfast.sensors.values import Array
+from holdfast.ros.definitions import NUMBERS, Definition, Field
 
 HEAD = b"\x00\x01\x00\x00"
-"""CDR, little endian, no options; alignment counts from its end."""
+"""First bytes of a CDR message: little endian, no options. Alignment counts from their end."""
 
-TEXT_TYPE = "holdfast_msgs/msg/Text"
-TEXT_SCHEMA = "# A text and when it was set [s].\nfloat64 time\nstring text\n"
-
-_ROS_TYPES = {"bool": "bool", "str": "string"}
-
-
-def type_name(number: str) -> str:
-    """The name of the message of samples of a number type.
-
-    Example:
-        >>> type_name("uint16")
-        'holdfast_msgs/msg/Uint16Samples'
-    """
-    return f"holdfast_msgs/msg/{number.capitalize()}Samples"
+_CODES = dict(zip(NUMBERS, "?BBbBhHiIqQfd", strict=True))
+"""Codes of `struct` for the number types of ROS."""
+_DTYPES = {kind: np.dtype("<" + code) for kind, code in NUMBERS.items()}
+_PADDING = tuple(bytes(n) for n in range(8))
 
 
-def schema(number: str) -> str:
-    """The definition of that message, as a `ros2msg` schema."""
-    return (
-        "# Samples of one module or quantity, oldest first.\n"
-        "float64[] times   # of each sample [s], on the clock of the recording\n"
-        "uint32[] shape    # of one sample, such as 30 3 for 30 taxels\n"
-        f"{_ROS_TYPES.get(number, number)}[] values   # all samples, last axis fastest\n"
-    )
+class MessageDecoder:
+    r"""Decoder of messages of one type into dictionaries by field.
 
-
-def pack_samples(times: Array, values: npt.NDArray[Any]) -> bytes:
-    """The message of these samples.
+    Numbers become numbers of Python and sequences of numbers become arrays. Sequences of points
+    (messages of x, y and z of one number type) become arrays of shape (n, 3). Other sequences
+    become lists.
 
     Args:
-        times: (n,) [s].
-        values: (n, ...).
+        definition: definition of the messages.
+        ros2: whether messages are CDR, as in ROS 2; otherwise they are encoded as in ROS 1.
+
+    Example:
+        >>> from holdfast.ros.definitions import parse_definition
+        >>> point = parse_definition("pkg/Point", "float32 x\nfloat32 y")
+        >>> decode = MessageDecoder(point, ros2=False)
+        >>> decode(np.array([1, 2], "<f4").tobytes())
+        {'x': 1.0, 'y': 2.0}
     """
-    data = bytearray(HEAD)
-    _put(data, np.asarray(times, "<f8"))
-    _put(data, np.array(values.shape[1:], "<u4"))
-    if values.dtype.kind == "U":
-        _put_texts(data, values)
+
+    def __init__(self, definition: Definition, *, ros2: bool) -> None:
+        self._definition = definition
+        self._open: Callable[[bytes], _Ros1Bytes] = _CdrBytes if ros2 else _Ros1Bytes
+        self._points = _point_types(definition)
+
+    def __call__(self, data: bytes) -> dict[str, Any]:
+        """Decode a message.
+
+        Raises:
+            ValueError: these bytes are not a message of this type.
+        """
+        try:
+            source = self._open(data)
+            message = self._message(source, self._definition.name)
+        except UnicodeError as cause:
+            raise ValueError(f"{self._definition.name}: a text is no UTF-8") from cause
+        if source.n_left > source.max_padding:
+            raise ValueError(f"{self._definition.name}: {source.n_left} bytes too many")
+        return message
+
+    def _message(self, source: "_Ros1Bytes", name: str) -> dict[str, Any]:
+        return {f.name: self._field(source, f) for f in self._definition.types[name]}
+
+    def _field(self, source: "_Ros1Bytes", field: Field) -> Any:  # noqa: ANN401 (any ROS type)
+        if field.size is None:
+            return self._value(source, field.kind)
+        n = field.size or source.length()
+        if field.kind in NUMBERS:
+            return source.array(field.kind, n)
+        if (number := self._points.get(field.kind)) is not None:
+            return source.array(number, 3 * n).reshape(n, 3)
+        if n > source.n_left:  # every value takes at least a byte
+            raise ValueError(f"{field.name}: {n} given, {source.n_left} bytes left")
+        return [self._value(source, field.kind) for _ in range(n)]
+
+    def _value(self, source: "_Ros1Bytes", kind: str) -> Any:  # noqa: ANN401 (any ROS type)
+        if kind in NUMBERS:
+            return source.array(kind, 1)[0].item()
+        return source.text() if kind == "string" else self._message(source, kind)
+
+
+class MessageEncoder:
+    r"""Encoder of dictionaries by field into messages of one type, in CDR.
+
+    Args:
+        definition: definition of the messages.
+
+    Example:
+        >>> from holdfast.ros.definitions import parse_definition
+        >>> encode = MessageEncoder(parse_definition("pkg/Named", "string name\nfloat64 value"))
+        >>> encode({"name": "a", "value": 0.5}).hex(" ", 4)
+        '00010000 02000000 61000000 00000000 0000e03f'
+    """
+
+    def __init__(self, definition: Definition) -> None:
+        self._definition = definition
+
+    def __call__(self, message: Mapping[str, Any]) -> bytes:
+        """Encode a message.
+
+        Raises:
+            KeyError: a field is missing.
+            ValueError: an array of fixed size has another number of values.
+            struct.error: a number does not fit its field.
+        """
+        data = bytearray()
+        self._message(data, self._definition.name, message)
+        return HEAD + bytes(data)
+
+    def _message(self, data: bytearray, name: str, message: Mapping[str, Any]) -> None:
+        for field in self._definition.types[name]:
+            self._field(data, field, message[field.name])
+
+    def _field(self, data: bytearray, field: Field, value: Any) -> None:  # noqa: ANN401
+        if field.size is None:
+            self._value(data, field.kind, value)
+            return
+        if field.size == 0:
+            _append_numbers(data, "uint32", (len(value),))
+        elif len(value) != field.size:
+            raise ValueError(f"{field.name}: {field.size} values expected, {len(value)} given")
+        if field.kind in NUMBERS:
+            _append_numbers(data, field.kind, value)
+            return
+        for one in value:
+            self._value(data, field.kind, one)
+
+    def _value(self, data: bytearray, kind: str, value: Any) -> None:  # noqa: ANN401
+        if kind in NUMBERS:
+            _append_numbers(data, kind, (value,))
+        elif kind == "string":
+            encoded = value.encode() + b"\x00"
+            _append_numbers(data, "uint32", (len(encoded),))
+            data += encoded
+        else:
+            self._message(data, kind, value)
+
+
+def _append_numbers(data: bytearray, kind: str, values: Sequence[float] | npt.NDArray[Any]) -> None:
+    """Append numbers, aligned to their size; an array of the same type is copied as a whole."""
+    if len(values):
+        data += _PADDING[-len(data) % _DTYPES[kind].itemsize]
+    if isinstance(values, np.ndarray) and values.dtype == _DTYPES[kind]:
+        data += values.tobytes()
     else:
-        _put(data, values.astype(values.dtype.newbyteorder("<"), copy=False))
-    return bytes(data)
+        data += struct.pack(f"<{len(values)}{_CODES[kind]}", *values)
 
 
-def unpack_samples(data: bytes, number: str) -> tuple[Array, npt.NDArray[Any]]:
-    """Times and values out of a message of samples.
-
-    Raises:
-        ValueError: it is none.
-    """
-    reader = _Reader(data)
-    times = reader.array("<f8")
-    shape = tuple(reader.array("<u4").tolist())
-    if number == "str":
-        values = np.array(reader.texts(), dtype=str)
-    else:
-        values = reader.array(np.dtype(number).newbyteorder("<"))
-    if len(values) != len(times) * prod(shape):
-        raise ValueError(f"{len(values)} values given for {len(times)} samples of shape {shape}")
-    return times, values.reshape(len(times), *shape)
+def _point_types(definition: Definition) -> dict[str, str]:
+    """Return the number type of each message that consists of x, y and z of one number type."""
+    return {
+        name: number
+        for name, fields in definition.types.items()
+        for number in NUMBERS
+        if fields == tuple(Field(axis, number) for axis in "xyz")
+    }
 
 
-def pack_text(time: float, text: str) -> bytes:
-    """The message of a text and its time [s]."""
-    data = bytearray(HEAD)
-    data += np.array([time], "<f8").tobytes()
-    _put_text(data, text)
-    return bytes(data)
+class _Ros1Bytes:
+    """Reader of one value after the other from a message in the encoding of ROS 1."""
 
-
-def unpack_text(data: bytes) -> tuple[float, str]:
-    """Time [s] and text out of the message.
-
-    Raises:
-        ValueError: it is none.
-    """
-    reader = _Reader(data)
-    return float(reader.take("<f8", 1)[0]), reader.text()
-
-
-def _align(data: bytearray, size: int) -> None:
-    data += bytes(-(len(data) - len(HEAD)) % size)
-
-
-def _put(data: bytearray, array: npt.NDArray[Any]) -> None:
-    _align(data, 4)
-    data += np.uint32(array.size).astype("<u4").tobytes()
-    if array.size:
-        _align(data, array.itemsize)
-        data += array.tobytes()
-
-
-def _put_texts(data: bytearray, texts: npt.NDArray[Any]) -> None:
-    _align(data, 4)
-    data += np.uint32(texts.size).astype("<u4").tobytes()
-    for text in texts.ravel().tolist():
-        _put_text(data, text)
-
-
-def _put_text(data: bytearray, text: str) -> None:
-    _align(data, 4)
-    raw = text.encode() + b"\x00"
-    data += np.uint32(len(raw)).astype("<u4").tobytes()
-    data += raw
-
-
-class _Reader:
-    """Takes one field after the other out of a message."""
+    max_padding = 0
+    """Number of bytes that may follow the last value."""
 
     def __init__(self, data: bytes) -> None:
-        if data[: len(HEAD)] != HEAD:
-            raise ValueError("no little-endian CDR message")
         self._data = data
-        self._place = len(HEAD)
+        self._place = 0
+        self._byte_order = "<"
 
-    def take(self, dtype: npt.DTypeLike, n: int) -> npt.NDArray[Any]:
-        kind = np.dtype(dtype)
-        self._place += -(self._place - len(HEAD)) % kind.itemsize
-        values = np.frombuffer(self._data, kind, n, self._place)
+    @property
+    def n_left(self) -> int:
+        return len(self._data) - self._place
+
+    def array(self, kind: str, n: int) -> npt.NDArray[Any]:
+        dtype = np.dtype(self._byte_order + NUMBERS[kind])
+        if n:
+            self._align(dtype.itemsize)
+        if n * dtype.itemsize > self.n_left:
+            raise ValueError(f"the message is cut: {n} {kind} expected, {self.n_left} bytes left")
+        values = np.frombuffer(self._data, dtype, n, self._place) if n else np.empty(0, dtype)
         self._place += values.nbytes
-        return values.astype(kind.newbyteorder("="), copy=False)
+        return values.astype(dtype.newbyteorder("="))
 
-    def array(self, dtype: npt.DTypeLike) -> npt.NDArray[Any]:
-        n = int(self.take("<u4", 1)[0])
-        return self.take(dtype, n) if n else np.empty(0, np.dtype(dtype).newbyteorder("="))
+    def length(self) -> int:
+        return int(self.array("uint32", 1)[0])
 
     def text(self) -> str:
-        n = int(self.take("<u4", 1)[0])
-        raw = self.take("u1", n).tobytes()
-        return raw[:-1].decode()
+        return self.array("uint8", self.length()).tobytes().decode()
 
-    def texts(self) -> list[str]:
-        n = int(self.take("<u4", 1)[0])
-        return [self.text() for _ in range(n)]
+    def _align(self, size: int) -> None:
+        """Do nothing: ROS 1 does not align values."""
+
+
+class _CdrBytes(_Ros1Bytes):
+    """Reader of a message in CDR: values are aligned, and texts end with a zero byte."""
+
+    max_padding = 3
+
+    def __init__(self, data: bytes) -> None:
+        super().__init__(data)
+        if len(data) < 4 or data[0] != 0 or data[1] > 1:
+            raise ValueError("no CDR message")
+        self._byte_order = "<" if data[1] else ">"
+        self._place = 4
+
+    def text(self) -> str:
+        return super().text().removesuffix("\x00")
+
+    def _align(self, size: int) -> None:
+        self._place = min(self._place + -(self._place - 4) % size, len(self._data))

@@ -77,7 +77,7 @@ class Node:
         except DDSException as cause:
             raise SourceError(f"ROS domain {domain} cannot be joined: {cause.msg}") from cause
 
-    def published(self) -> dict[str, str]:
+    def published_topics(self) -> dict[str, str]:
         """Types of the topics that somebody publishes, by name, both as in ROS."""
         alive = InstanceState.Alive | ViewState.Any | SampleState.Any
         found = self._publications.read(1000, ReadCondition(self._publications, alive))
@@ -87,11 +87,11 @@ class Node:
             if not isinstance(one, InvalidSample) and one.topic_name.startswith(PREFIX)
         }
 
-    def reader(self, topic: str, definition: Definition) -> "Reader":
+    def reader(self, topic: str, definition: Definition) -> "TopicReader":
         """Subscribes to a topic."""
         qos = _qos(Policy.Reliability.BestEffort, N_QUEUED)  # takes reliable ones as well
         reader = DataReader(self._participant, self._topic(topic, definition, qos), qos=qos)
-        return Reader(reader, WaitSet(self._participant))
+        return TopicReader(reader, WaitSet(self._participant))
 
     def writer(self, topic: str, definition: Definition) -> Callable[[bytes], None]:
         """Publishes on a topic, as ROS 2 does by default; what it returns takes messages."""
@@ -105,7 +105,7 @@ class Node:
         return Topic(self._participant, full, _raw(definition), qos=qos)
 
 
-class Reader:
+class TopicReader:
     """A subscription to one topic."""
 
     def __init__(self, reader: DataReader[Any], wait: WaitSet) -> None:
@@ -141,7 +141,7 @@ def _is_local() -> bool:
     return os.environ.get("ROS_LOCALHOST_ONLY") == "1" and not os.environ.get("CYCLONEDDS_URI")
 
 
-def domain_of(given: str | None) -> int:
+def domain_number(given: str | None) -> int:
     """The domain that is asked for; else that of `ROS_DOMAIN_ID`, else 0.
 
     Raises:

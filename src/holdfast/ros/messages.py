@@ -7,9 +7,10 @@ from typing import Any, NamedTuple
 import numpy as np
 import numpy.typing as npt
 
-from holdfast.ros.definitions import Decoder, Definition, parse_definition, short_name
+from holdfast.ros.cdr import MessageDecoder
+from holdfast.ros.definitions import Definition, parse_definition, short_name
 from holdfast.sensors import Sensor, sensor
-from holdfast.sensors.values import Array, Unit
+from holdfast.sensors.types import Array, Unit
 from holdfast.sensors.xela_models import module_sensors
 
 _LINE = "\n" + "=" * 80 + "\nMSG: "
@@ -49,7 +50,7 @@ _SENSOR_STATE = (
 _PILLARS = ("papillarray_ros_v2/SensorState", "sensor_interfaces/SensorState")
 
 
-class Message(NamedTuple):
+class DeviceSample(NamedTuple):
     """What one device says in a message.
 
     Attributes:
@@ -93,7 +94,7 @@ def known_definition(name: str, *, ros2: bool) -> Definition | None:
     return None
 
 
-class Unpacker:
+class SampleDecoder:
     """Takes what devices say out of messages of one type.
 
     Args:
@@ -106,10 +107,10 @@ class Unpacker:
 
     def __init__(self, definition: Definition, *, ros2: bool) -> None:
         self._take = _taker(definition)
-        self._decode = Decoder(definition, ros2=ros2)
+        self._decode = MessageDecoder(definition, ros2=ros2)
         self._name = definition.name
 
-    def __call__(self, data: bytes) -> list[Message]:
+    def __call__(self, data: bytes) -> list[DeviceSample]:
         """What each device says in a message.
 
         Raises:
@@ -118,20 +119,22 @@ class Unpacker:
         return self._take(self._decode(data))
 
 
-KNOWN = (
+SUPPORTED_MESSAGES = (
     "xela_server_ros/SensStream, xela_server_ros2/SensStream, XStream, xServerMsg, "
     "XelaServerMsg, SensorState"
 )
 """Messages that readings can be taken from, for people."""
 
 
-def _taker(definition: Definition) -> Callable[[Mapping[str, Any]], list[Message]]:
+def _taker(definition: Definition) -> Callable[[Mapping[str, Any]], list[DeviceSample]]:
     """By the fields of the messages: packages change their names, and older ones differ."""
     paths = _paths(definition)
     for needed, take in _TAKERS:
         if needed <= paths:
             return take
-    raise ValueError(f"{definition.name} is of no kind that holdfast knows; there are {KNOWN}")
+    raise ValueError(
+        f"{definition.name} is of no kind that holdfast knows; there are {SUPPORTED_MESSAGES}"
+    )
 
 
 def _paths(definition: Definition) -> set[str]:
@@ -154,9 +157,9 @@ def _each(before: str, kind: str, names: str = "xyz") -> set[str]:
     return {f"{before}{name} {kind}" for name in names}
 
 
-def _of_sens_stream(message: Mapping[str, Any]) -> list[Message]:
+def _of_sens_stream(message: Mapping[str, Any]) -> list[DeviceSample]:
     return [
-        Message(
+        DeviceSample(
             one["sensor_pos"],
             one["model"],
             one["time"] if np.isfinite(one["time"]) and one["time"] > 0 else None,
@@ -169,28 +172,28 @@ def _of_sens_stream(message: Mapping[str, Any]) -> list[Message]:
     ]
 
 
-def _of_x_stream(message: Mapping[str, Any]) -> list[Message]:
+def _of_x_stream(message: Mapping[str, Any]) -> list[DeviceSample]:
     return [
-        Message(one["sensor"], "", None, None, None, _counts(_points(one["xyz"])), _NO_FORCES)
+        DeviceSample(one["sensor"], "", None, None, None, _counts(_points(one["xyz"])), _NO_FORCES)
         for one in message["data"]
     ]
 
 
-def _of_x_server(message: Mapping[str, Any]) -> list[Message]:
+def _of_x_server(message: Mapping[str, Any]) -> list[DeviceSample]:
     counts = _counts(_points([one["point"] for one in message["points"]]))
     number, model = message["sensor"], message["model"]
     stamp = _seconds(message["header"]["stamp"])
-    return [Message(number, model, None, stamp, None, counts, _NO_FORCES)]
+    return [DeviceSample(number, model, None, stamp, None, counts, _NO_FORCES)]
 
 
-def _of_pillars(message: Mapping[str, Any]) -> list[Message]:
+def _of_pillars(message: Mapping[str, Any]) -> list[DeviceSample]:
     forces = _points(message["pillars"], ("fX", "fY", "fZ"))
     time = message["tus"] * 1e-6 if message["tus"] > 0 else None
     stamp = _seconds(message["header"]["stamp"])
-    return [Message(None, PAPILLARRAY, time, stamp, None, None, forces)]
+    return [DeviceSample(None, PAPILLARRAY, time, stamp, None, None, forces)]
 
 
-_TAKERS: tuple[tuple[set[str], Callable[[Mapping[str, Any]], list[Message]]], ...] = (
+_TAKERS: tuple[tuple[set[str], Callable[[Mapping[str, Any]], list[DeviceSample]]], ...] = (
     (
         {
             "sensors[].message uint32",
@@ -246,7 +249,7 @@ def _seconds(stamp: Mapping[str, int]) -> float | None:
     return whole + nanoseconds * 1e-9 if whole or nanoseconds else None
 
 
-def sensors_of(message: Message, unit: Unit) -> dict[str, Sensor]:
+def sensors_of(message: DeviceSample, unit: Unit) -> dict[str, Sensor]:
     """Sensors of a device by module, as `module_sensors`.
 
     Raises:
@@ -266,7 +269,7 @@ def sensors_of(message: Message, unit: Unit) -> dict[str, Sensor]:
     return {name: replace(one, unit=unit, limits=None) for name, one in sensors.items()}
 
 
-def readings_of(message: Message, unit: Unit) -> npt.NDArray[Any]:
+def readings_of(message: DeviceSample, unit: Unit) -> npt.NDArray[Any]:
     """(n_taxels, 3) of a message: counts, or newtons where they are wanted or all there is."""
     return message.forces if unit == "N" or message.counts is None else message.counts
 

@@ -55,7 +55,7 @@ def rospy_module() -> ModuleType:
     )
 
 
-def node(master: str) -> ModuleType:
+def start_node(master: str) -> ModuleType:
     """rospy, with this process as a node of that master.
 
     Raises:
@@ -78,7 +78,7 @@ def node(master: str) -> ModuleType:
         return rospy
 
 
-def master_of(given: str | None) -> str:
+def master_uri(given: str | None) -> str:
     """The master that is asked for; else that of `ROS_MASTER_URI`, else the one of this machine.
 
     Raises:
@@ -98,20 +98,20 @@ def check_master(master: str) -> None:
     Raises:
         SourceError: nothing does, within 2 s.
     """
-    ask(master, "getPid")
+    call_master(master, "getPid")
 
 
-def published(master: str) -> dict[str, str]:
+def published_topics(master: str) -> dict[str, str]:
     """Types of the topics that somebody publishes, by name.
 
     Raises:
         SourceError: the master does not answer.
     """
-    names = {name for name, nodes in ask(master, "getSystemState")[0] if nodes}
-    return {name: kind for name, kind in ask(master, "getTopicTypes") if name in names}
+    names = {name for name, nodes in call_master(master, "getSystemState")[0] if nodes}
+    return {name: kind for name, kind in call_master(master, "getTopicTypes") if name in names}
 
 
-def ask(master: str, what: str, *given: str) -> Any:  # noqa: ANN401 (whatever it answers)
+def call_master(master: str, what: str, *given: str) -> Any:  # noqa: ANN401 (whatever it answers)
     """What a master answers to a call of its interface.
 
     Raises:

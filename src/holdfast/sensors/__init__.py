@@ -1,7 +1,7 @@
 """Sensors and hands as values: where each taxel sits and how it is turned."""
 
 from holdfast.sensors.layouts import built_in_hands, built_in_sensors, hand, sensor
-from holdfast.sensors.values import Hand, HandModule, Sensor
+from holdfast.sensors.types import Hand, HandModule, Sensor
 
 __all__ = [
     "Hand",

@@ -6,7 +6,7 @@ from importlib import resources
 
 import numpy as np
 
-from holdfast.sensors.values import Array, Hand, HandModule, Sensor
+from holdfast.sensors.types import Array, Hand, HandModule, Sensor
 
 UINT16 = (0.0, 65535.0)
 

@@ -11,7 +11,7 @@ import numpy.typing as npt
 
 from holdfast.errors import RecordingError
 from holdfast.recordings import Recording
-from holdfast.sensors.values import Array
+from holdfast.sensors.types import Array
 
 HOLD = 1.0
 """Pieces of a file may overlap by less than this, as modules are written one by one [s]."""

@@ -9,7 +9,7 @@ from typing import NamedTuple
 import numpy as np
 
 from holdfast.compiled import compiled
-from holdfast.sensors.values import Array
+from holdfast.sensors.types import Array
 from holdfast.twin.hand import JOINTS, N_JOINTS
 
 EVERY = 3

@@ -14,7 +14,7 @@ import numpy as np
 from scipy.optimize import least_squares
 
 from holdfast.compiled import compiled
-from holdfast.sensors.values import Array
+from holdfast.sensors.types import Array
 from holdfast.twin.hand import FINGERS, JOINTS, MIRRORED, MOUNTS, N_JOINTS, HandModel
 from holdfast.twin.objects import Thing, distance_to
 

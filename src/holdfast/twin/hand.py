@@ -12,7 +12,7 @@ import mujoco
 import numpy as np
 
 from holdfast.compiled import compiled
-from holdfast.sensors.values import Array
+from holdfast.sensors.types import Array
 from holdfast.twin.objects import Thing
 from holdfast.twin.surface import AXIS
 

@@ -22,7 +22,7 @@ from holdfast.contact import (
 )
 from holdfast.metrics.masks import Mask, join_runs, runs, runs_with, widen_runs
 from holdfast.recordings import Label, Truth, labels_from_samples
-from holdfast.sensors.values import Array
+from holdfast.sensors.types import Array
 
 
 @dataclass(frozen=True)

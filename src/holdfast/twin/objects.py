@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from holdfast.sensors.values import Array, rebuilt
+from holdfast.sensors.types import Array, rebuilt
 from holdfast.twin.shapes import (
     AMPLITUDE,
     AROUND_2,

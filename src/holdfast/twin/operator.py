@@ -10,7 +10,7 @@ from typing import NamedTuple
 import numpy as np
 
 from holdfast.compiled import compiled
-from holdfast.sensors.values import Array
+from holdfast.sensors.types import Array
 from holdfast.twin.profile import Profile
 
 HOLD_STIFFNESS, HOLD_DAMPING = 250.0, 10.0

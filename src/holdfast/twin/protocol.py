@@ -10,7 +10,7 @@ from typing import NamedTuple
 import numpy as np
 
 from holdfast.contact import Phase
-from holdfast.sensors.values import Array
+from holdfast.sensors.types import Array
 from holdfast.twin.operator import Push
 from holdfast.twin.profile import Profile
 

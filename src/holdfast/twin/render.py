@@ -16,7 +16,7 @@ import numpy as np
 import numpy.typing as npt
 
 from holdfast.errors import OutputError
-from holdfast.sensors.values import Array
+from holdfast.sensors.types import Array
 
 Picture = npt.NDArray[np.uint8]
 """(height, width, 3) red, green, blue."""

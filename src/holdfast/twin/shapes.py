@@ -9,7 +9,7 @@ import math
 import numpy as np
 
 from holdfast.compiled import compiled
-from holdfast.sensors.values import Array
+from holdfast.sensors.types import Array
 
 REVOLVED, BOX, HEXAGON, CAPSULE = range(4)
 """The cores: a frustum (a cylinder too), a box, a hexagonal prism, a line (a point too)."""

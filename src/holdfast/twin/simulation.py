@@ -11,7 +11,7 @@ import numpy as np
 from holdfast.contact import Phase
 from holdfast.recordings import Recording, Tactile, Truth
 from holdfast.sensors import sensor
-from holdfast.sensors.values import Array
+from holdfast.sensors.types import Array
 from holdfast.twin.contact import SHARE, SLIP
 from holdfast.twin.control import EVERY, draw_controller
 from holdfast.twin.grasp import ClosingPath, closing_path

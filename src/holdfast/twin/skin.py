@@ -10,7 +10,7 @@ import math
 from typing import NamedTuple
 
 from holdfast.compiled import compiled
-from holdfast.sensors.values import Array
+from holdfast.sensors.types import Array
 from holdfast.twin.shapes import MU_KINETIC, MU_STATIC
 from holdfast.twin.vectors import Nine, Three, add, apply, apply_transposed, dot, scaled
 

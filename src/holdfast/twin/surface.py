@@ -12,7 +12,7 @@ import numpy as np
 from scipy.interpolate import RBFInterpolator
 
 from holdfast.sensors import sensor
-from holdfast.sensors.values import Array
+from holdfast.sensors.types import Array
 
 AXIS = 0.01254
 """Palmar coordinate of the capsule's axis [m]: the outer walls' taxels sit beside it."""

@@ -11,7 +11,7 @@ import numpy as np
 import numpy.typing as npt
 
 from holdfast.sensors import Sensor
-from holdfast.sensors.values import Array
+from holdfast.sensors.types import Array
 from holdfast.twin.uskin_parameters import UskinParameters
 from holdfast.twin.uskin_readout import Counts, Readout, Taxels
 

@@ -4,7 +4,7 @@ import mujoco
 import numpy as np
 
 from holdfast.compiled import compiled
-from holdfast.sensors.values import Array
+from holdfast.sensors.types import Array
 from holdfast.twin.contact import LOAD, SLIP, constants_of, new_contact, touch
 from holdfast.twin.control import EVERY, Controller, control
 from holdfast.twin.grasp import ClosingPath, object_pose

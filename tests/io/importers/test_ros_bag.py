@@ -8,7 +8,7 @@ from holdfast.cli import main
 from holdfast.errors import MissingExtra, RecordingError
 from holdfast.io import import_recordings, load_recording, save_recording
 from holdfast.io.files import is_recording
-from holdfast.ros.messages import Message
+from holdfast.ros.messages import DeviceSample
 from holdfast.sensors import hand
 from holdfast.sources.ros.translator import Translator
 from holdfast.sources.xela.decoder import Decoder
@@ -125,7 +125,7 @@ def test_a_device_is_the_same_sensor_in_a_bag_and_live(tmp_path, model, n_taxels
         for k in range(4):
             given.xela(EPOCH + k, (1, model, k, EPOCH + k, counts(n_taxels, k), []))
     translator = Translator()
-    translator.learn([Message(1, model, EPOCH, None, 0, counts(n_taxels), np.empty((0, 3)))])
+    translator.learn([DeviceSample(1, model, EPOCH, None, 0, counts(n_taxels), np.empty((0, 3)))])
     decoder = Decoder()
     decoder.learn(xela_packets.text(0, [xela_packets.sensor(counts(n_taxels), model)]))
     imported = {name: module.sensor for name, module in read(given.path).modules.items()}

@@ -3,7 +3,7 @@ import time
 import numpy as np
 import pytest
 
-from holdfast.ros.rospy_node import published
+from holdfast.ros.rospy_node import published_topics
 from holdfast.sources import open_source
 from sources.ros1_master import lines, running_master
 
@@ -61,7 +61,7 @@ def test_a_master_that_is_started_again(master):
 
 def test_topics_of_others(master):
     master.peer("chatter")
-    while "/chatter" not in published(master.uri):
+    while "/chatter" not in published_topics(master.uri):
         time.sleep(0.05)
     (told,) = lines(master.peer("source", "ros1:///xServTopic", ALONE, 1))
     assert told["error"].startswith(

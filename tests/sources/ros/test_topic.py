@@ -5,7 +5,7 @@ import numpy as np
 import pytest
 
 from holdfast.errors import SourceError
-from holdfast.ros.messages import Message
+from holdfast.ros.messages import DeviceSample
 from holdfast.sensors import sensor
 from holdfast.sources.ros import topic
 from holdfast.sources.ros.topic import Link, Packet, Stranger, TopicSource, topic_of
@@ -32,7 +32,9 @@ class Script(Link):
     def samples(self, k, *numbers, model="uSPa44"):
         counts = np.full((16, 3), k, np.uint16)
         forces = np.empty((0, 3))
-        self.put(*(Message(n, model, 0.01 * (k + 1), None, k, counts, forces) for n in numbers))
+        self.put(
+            *(DeviceSample(n, model, 0.01 * (k + 1), None, k, counts, forces) for n in numbers)
+        )
 
     def open(self, deadline):
         assert deadline > time.monotonic()

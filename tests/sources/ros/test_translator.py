@@ -3,7 +3,7 @@ import pytest
 
 from holdfast.contact import Fault
 from holdfast.errors import SourceError
-from holdfast.ros.messages import Message
+from holdfast.ros.messages import DeviceSample
 from holdfast.sensors import hand, sensor
 from holdfast.sources.ros.translator import Translator
 
@@ -21,12 +21,12 @@ def uskin(k, number=1, model="uSPa44", n_taxels=16, time=None, forces=0, **given
         "counts": np.full((n_taxels, 3), k, np.uint16),
         "forces": np.full((forces, 3), 0.5 * k),
     }
-    return Message(**(fields | given))
+    return DeviceSample(**(fields | given))
 
 
 def pillars(k, n_taxels=9):
     forces = np.full((n_taxels, 3), 0.5 * k)
-    return Message(None, "papillarray", 0.001 * k, EPOCH, None, None, forces)
+    return DeviceSample(None, "papillarray", 0.001 * k, EPOCH, None, None, forces)
 
 
 def learned(*first, **given):

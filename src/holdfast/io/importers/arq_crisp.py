@@ -17,7 +17,7 @@ from holdfast.errors import MissingExtra, RecordingError
 from holdfast.io.importers.table import counts_or, natural
 from holdfast.recordings import Label, Recording, Tactile, labels_from_samples
 from holdfast.sensors import Sensor, sensor
-from holdfast.sensors.values import Array
+from holdfast.sensors.types import Array
 
 SUFFIXES = (".h5", ".hdf5")
 MAGIC = b"\x89HDF\r\n\x1a\n"

@@ -10,7 +10,7 @@ from holdfast.errors import RecordingError
 from holdfast.io.importers.table import Table, counts_or, csv_files, header_line, read_table
 from holdfast.recordings import Label, Recording, Tactile, labels_from_samples
 from holdfast.sensors import Sensor, built_in_sensors, sensor
-from holdfast.sensors.values import Unit
+from holdfast.sensors.types import Unit
 
 TIME = "time"
 ONE_MODULE = "finger1"

@@ -13,7 +13,7 @@ from holdfast.errors import RecordingError
 from holdfast.io.importers.table import Table, counts_or, csv_files, header_line, read_table
 from holdfast.recordings import Recording, Tactile
 from holdfast.sensors import sensor
-from holdfast.sensors.values import Array
+from holdfast.sensors.types import Array
 
 N_NODES = 15
 NAMES = tuple(f"mag_{axis}{node + 1}" for node in range(N_NODES) for axis in "xyz")

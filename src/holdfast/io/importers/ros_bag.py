@@ -18,15 +18,15 @@ from holdfast.io.importers.table import natural
 from holdfast.recordings import Recording, Tactile
 from holdfast.ros.definitions import Definition, parse_definition, short_name
 from holdfast.ros.messages import (
-    Message,
-    Unpacker,
+    DeviceSample,
+    SampleDecoder,
     known_definition,
     module_name,
     readings_of,
     sensors_of,
 )
 from holdfast.sensors import xela_models
-from holdfast.sensors.values import Array
+from holdfast.sensors.types import Array
 
 METADATA = "metadata.yaml"
 MAGICS = {
@@ -99,7 +99,7 @@ class _Topic(NamedTuple):
 
     name: str
     kind: str
-    unpack: Unpacker
+    unpack: SampleDecoder
     connections: list[Any]
 
 
@@ -107,13 +107,13 @@ class _Topic(NamedTuple):
 class _Track:
     """What one device said in one topic, message by message."""
 
-    first: Message
+    first: DeviceSample
     readings: list[npt.NDArray[Any]] = field(default_factory=list)
     stamps: list[tuple[float | None, float | None, float]] = field(default_factory=list)
     n_refused: int = 0
-    last: Message | None = None
+    last: DeviceSample | None = None
 
-    def add(self, message: Message, time: float) -> None:
+    def add(self, message: DeviceSample, time: float) -> None:
         """Takes a message that came at a time of the bag [s]; one that came twice, once."""
         given = readings_of(message, "count")
         if given.shape != readings_of(self.first, "count").shape:
@@ -138,7 +138,7 @@ class _Track:
         return np.nan if times is None else float(np.median(bag - times))
 
 
-def _same(one: Message, two: Message) -> bool:
+def _same(one: DeviceSample, two: DeviceSample) -> bool:
     """Whether a packet was sent again."""
     return (
         two.time is not None
@@ -196,11 +196,11 @@ class _Bag:
             )
         return list(topics.values())
 
-    def _unpacker(self, connection: Any) -> Unpacker | None:  # noqa: ANN401 (a Connection)
+    def _unpacker(self, connection: Any) -> SampleDecoder | None:  # noqa: ANN401 (a Connection)
         """By the definition in the bag, or the one we know; None for any other topic."""
         try:
             definition = self._definition(connection)
-            return None if definition is None else Unpacker(definition, ros2=self._ros2)
+            return None if definition is None else SampleDecoder(definition, ros2=self._ros2)
         except ValueError:
             return None
 
@@ -223,7 +223,7 @@ class _Bag:
                 f"{n_expected} expected"
             )
 
-    def _add(self, topic: str, message: Message, time: float) -> None:
+    def _add(self, topic: str, message: DeviceSample, time: float) -> None:
         if not len(readings_of(message, "count")):  # the server's word for a sensor that is off
             return
         number = 0 if message.number is None else message.number

@@ -10,7 +10,7 @@ import numpy as np
 import numpy.typing as npt
 
 from holdfast.errors import RecordingError
-from holdfast.sensors.values import Array
+from holdfast.sensors.types import Array
 
 if TYPE_CHECKING:
     import pyarrow

@@ -19,7 +19,7 @@ from holdfast.errors import RecordingError
 from holdfast.io.importers.table import Table, counts_or, read_table
 from holdfast.recordings import Label, Recording, Tactile, Truth, labels_from_samples
 from holdfast.sensors import sensor
-from holdfast.sensors.values import Array
+from holdfast.sensors.types import Array
 
 FILES = {"finger1": "xela_sensor1.csv", "finger2": "xela_sensor2.csv"}
 N_JOINTS = 7

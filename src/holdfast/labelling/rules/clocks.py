@@ -5,7 +5,7 @@ from typing import NamedTuple
 import numpy as np
 
 from holdfast.metrics.masks import Mask
-from holdfast.sensors.values import Array
+from holdfast.sensors.types import Array
 
 FARTHEST = 0.5
 """Offsets that are tried, to both sides [s]."""

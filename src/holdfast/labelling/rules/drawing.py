@@ -10,7 +10,7 @@ import numpy.typing as npt
 from holdfast.contact import UNKNOWN, Cause, ContactState
 from holdfast.metrics.masks import Mask
 from holdfast.recordings import Label
-from holdfast.sensors.values import Array
+from holdfast.sensors.types import Array
 
 SHORT = 0.2
 """Duration at which a label keeps 63 % of its confidence [s]."""

@@ -13,7 +13,7 @@ from holdfast.features import Tare, fingertip_force
 from holdfast.features.tare import TareArgument, baseline_of
 from holdfast.metrics.masks import Mask, covered, drop_short_runs, fill_short_gaps, n_samples_of
 from holdfast.recordings import GAP_PERIODS, Recording, Tactile
-from holdfast.sensors.values import Array
+from holdfast.sensors.types import Array
 from holdfast.training.design import contact_threshold, rest_moments
 
 SMOOTHING = 0.05

@@ -8,7 +8,7 @@ from scipy.spatial.transform import Rotation
 
 from holdfast.labelling.poses import Track
 from holdfast.metrics.masks import Mask, covered, n_samples_of
-from holdfast.sensors.values import Array
+from holdfast.sensors.types import Array
 
 BRIDGED = 0.1
 """Gaps in the poses that are bridged [s]."""

@@ -32,7 +32,7 @@ from holdfast.labelling.rules.hand import (
 from holdfast.labelling.rules.limits import check_positive
 from holdfast.metrics.masks import Mask, drop_short_runs, fill_short_gaps, n_samples_of, runs
 from holdfast.recordings import Label, Recording
-from holdfast.sensors.values import Array
+from holdfast.sensors.types import Array
 
 AUTHOR = "rule:signal"
 LET_GO = 0.9

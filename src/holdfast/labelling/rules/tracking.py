@@ -40,7 +40,7 @@ from holdfast.metrics.masks import (
     widen_runs,
 )
 from holdfast.recordings import Label, Recording
-from holdfast.sensors.values import Array
+from holdfast.sensors.types import Array
 
 AUTHOR = "rule:tracking"
 NOISE_TIMES = 5.0

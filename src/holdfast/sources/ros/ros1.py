@@ -10,7 +10,7 @@ from typing import Any
 from holdfast.errors import SourceError
 from holdfast.ros import rospy_node
 from holdfast.ros.definitions import parse_definition
-from holdfast.ros.messages import KNOWN, Message, Unpacker
+from holdfast.ros.messages import SUPPORTED_MESSAGES, DeviceSample, SampleDecoder
 from holdfast.sources.base import Source
 from holdfast.sources.ros.topic import PATIENCE, Link, Packet, Stranger, TopicSource, topic_of
 from holdfast.sources.uri import Address
@@ -33,7 +33,7 @@ def source(address: Address) -> Source:
         OSError: the sensor's file cannot be read.
     """
     address.only("master", "values", "fingers", "sensor")
-    master = rospy_node.master_of(address.parameters.get("master"))
+    master = rospy_node.master_uri(address.parameters.get("master"))
     return TopicSource(address, Ros1Link(topic_of(address), master))
 
 
@@ -53,7 +53,7 @@ class Ros1Link(Link):
         self._waiting: deque[tuple[Any, float]] = deque()
         self._came = Condition()
         self._n_dropped = 0
-        self._unpackers: dict[tuple[str, str], Callable[[bytes], list[Message]]] = {}
+        self._unpackers: dict[tuple[str, str], Callable[[bytes], list[DeviceSample]]] = {}
 
     def open(self, deadline: float) -> None:
         """Subscribes.
@@ -61,7 +61,7 @@ class Ros1Link(Link):
         Raises:
             SourceError: there is no rospy, or no master.
         """
-        self._rospy = rospy_node.node(self._master)
+        self._rospy = rospy_node.start_node(self._master)
         self._subscribe()
 
     def take(self, timeout: float) -> Packet | None:
@@ -84,7 +84,7 @@ class Ros1Link(Link):
 
     def missing(self) -> str:
         """What to tell where no message comes: who publishes, which topics there are."""
-        there = rospy_node.published(self._master)
+        there = rospy_node.published_topics(self._master)
         if self._topic in there:
             return f"{self._topic} has a publisher, but no samples came in {PATIENCE:g} s"
         others = ", ".join(f"{topic} ({kind})" for topic, kind in sorted(there.items()))
@@ -129,20 +129,23 @@ class Ros1Link(Link):
             self._waiting.append((message, received))
             self._came.notify()
 
-    def _unpacker(self, header: dict[str, str]) -> Callable[[bytes], list[Message]]:
+    def _unpacker(self, header: dict[str, str]) -> Callable[[bytes], list[DeviceSample]]:
         """By the definition that the publisher sent ahead."""
         kind, text = header.get("type", ""), header.get("message_definition", "")
         if (kind, text) not in self._unpackers:
             self._unpackers[kind, text] = self._new_unpacker(kind, text)
         return self._unpackers[kind, text]
 
-    def _new_unpacker(self, kind: str, text: str) -> Callable[[bytes], list[Message]]:
+    def _new_unpacker(self, kind: str, text: str) -> Callable[[bytes], list[DeviceSample]]:
         try:
-            return Unpacker(parse_definition(kind, text), ros2=False)
+            return SampleDecoder(parse_definition(kind, text), ros2=False)
         except ValueError:
-            what = f"{self._topic} has {kind}, in which holdfast knows no samples; it takes {KNOWN}"
+            what = (
+                f"{self._topic} has {kind}, in which holdfast knows no samples; it takes "
+                f"{SUPPORTED_MESSAGES}"
+            )
 
-            def refuse(_: bytes) -> list[Message]:
+            def refuse(_: bytes) -> list[DeviceSample]:
                 raise Stranger(what)
 
             return refuse

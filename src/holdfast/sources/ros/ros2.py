@@ -5,7 +5,7 @@ from collections import deque
 
 from holdfast.errors import SourceError
 from holdfast.ros import dds
-from holdfast.ros.messages import Unpacker, known_definition
+from holdfast.ros.messages import SampleDecoder, known_definition
 from holdfast.sources.base import Source
 from holdfast.sources.ros.topic import PATIENCE, Link, Packet, TopicSource, topic_of
 from holdfast.sources.uri import Address
@@ -25,7 +25,7 @@ def source(address: Address) -> Source:
         OSError: the sensor's file cannot be read.
     """
     address.only("domain", "values", "fingers", "sensor")
-    domain = dds.domain_of(address.parameters.get("domain"))
+    domain = dds.domain_number(address.parameters.get("domain"))
     return TopicSource(address, Ros2Link(topic_of(address), domain))
 
 
@@ -41,7 +41,7 @@ class Ros2Link(Link):
         self._topic = topic
         self._domain = domain
         self._node: dds.Node | None = None
-        self._reader: dds.Reader | None = None
+        self._reader: dds.TopicReader | None = None
         self._waiting: deque[Packet] = deque()
 
     def open(self, deadline: float) -> None:
@@ -58,7 +58,7 @@ class Ros2Link(Link):
                 f"{self._topic} has {kind}, in which holdfast knows no samples; it takes "
                 "xela_server_ros2/SensStream and sensor_interfaces/SensorState"
             )
-        self._unpack = Unpacker(definition, ros2=True)
+        self._unpack = SampleDecoder(definition, ros2=True)
         self._reader = self._node.reader(self._topic, definition)
 
     def take(self, timeout: float) -> Packet | None:
@@ -75,7 +75,7 @@ class Ros2Link(Link):
 
     def missing(self) -> str:
         """What to tell where no message comes: who publishes, which topics there are."""
-        there = {} if self._node is None else self._node.published()
+        there = {} if self._node is None else self._node.published_topics()
         if self._topic in there:
             return f"{self._topic} has a publisher, but no samples came in {PATIENCE:g} s"
         others = ", ".join(f"{topic} ({kind})" for topic, kind in sorted(there.items()))
@@ -92,7 +92,7 @@ class Ros2Link(Link):
 
     def _kind(self, node: dds.Node, deadline: float) -> str:
         """The type of the messages, as the first publisher tells it."""
-        while (kind := node.published().get(self._topic)) is None:
+        while (kind := node.published_topics().get(self._topic)) is None:
             if time.monotonic() >= deadline:
                 raise SourceError(self.missing())
             time.sleep(LOOK)

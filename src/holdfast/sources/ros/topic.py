@@ -7,8 +7,8 @@ from collections.abc import Callable
 from typing import NamedTuple
 
 from holdfast.errors import SourceError
-from holdfast.ros.messages import Message
-from holdfast.sensors.values import Unit
+from holdfast.ros.messages import DeviceSample
+from holdfast.sensors.types import Unit
 from holdfast.sources.base import Arrival, Source, notice_arrival
 from holdfast.sources.ros.translator import Translator
 from holdfast.sources.uri import Address
@@ -38,7 +38,7 @@ class Packet(NamedTuple):
 
     data: bytes
     received: float
-    unpack: Callable[[bytes], list[Message]]
+    unpack: Callable[[bytes], list[DeviceSample]]
 
 
 class Link(ABC):
@@ -138,10 +138,10 @@ class TopicSource(Source):
         self._silent = self._alone = False
         self._backoff, self._mend_at = BACKOFF, 0.0
 
-    def _first(self, deadline: float) -> tuple[list[Packet], list[Message]]:
+    def _first(self, deadline: float) -> tuple[list[Packet], list[DeviceSample]]:
         """The first packets, until one tells of a device anew."""
         packets: list[Packet] = []
-        found: dict[int | None, Message] = {}
+        found: dict[int | None, DeviceSample] = {}
         refusal: ValueError | None = None
         while (left := deadline - time.monotonic()) > 0:
             packet = self._link.take(left)
@@ -236,5 +236,5 @@ def topic_of(address: Address) -> str:
     return topic
 
 
-def _has_taxels(message: Message) -> bool:
+def _has_taxels(message: DeviceSample) -> bool:
     return len(message.forces if message.counts is None else message.counts) > 0

@@ -9,16 +9,16 @@ import numpy.typing as npt
 
 from holdfast.contact import Fault
 from holdfast.errors import SourceError
-from holdfast.ros.messages import PAPILLARRAY, Message, readings_of
+from holdfast.ros.messages import PAPILLARRAY, DeviceSample, readings_of
 from holdfast.sensors import Sensor, sensor
-from holdfast.sensors.values import Unit
+from holdfast.sensors.types import Unit
 from holdfast.sensors.xela_models import whole_hand
 from holdfast.sources.base import Arrival, notice_arrival
 from holdfast.sources.timeline import LATE, Delay, Timeline
 from holdfast.sources.xela.models import Skin, skins
 from holdfast.sources.xela.packet import n_missing
 
-_CLOCKS: tuple[Callable[[Message], float | None], ...] = (
+_CLOCKS: tuple[Callable[[DeviceSample], float | None], ...] = (
     lambda message: message.time,
     lambda message: message.stamp,
 )
@@ -54,7 +54,7 @@ class Translator:
         self.skins: dict[int, Skin] = {}
         self._devices: dict[int, _Device] = {}
         self._timeline = Timeline()
-        self._clock: Callable[[Message], float | None] | None = None
+        self._clock: Callable[[DeviceSample], float | None] | None = None
         self._time = -math.inf
         self._told: dict[str, float] = {}
 
@@ -70,7 +70,7 @@ class Translator:
         hands = [whole.name for skin in self.skins.values() if (whole := whole_hand(skin.model))]
         return told | ({"hand": hands[0]} if len(hands) == 1 else {})
 
-    def learn(self, messages: Iterable[Message]) -> None:
+    def learn(self, messages: Iterable[DeviceSample]) -> None:
         """Learns from the first messages which devices there are.
 
         Raises:
@@ -85,7 +85,7 @@ class Translator:
         )
         self._devices = {number: _Device() for number in self.skins}
 
-    def take(self, messages: Iterable[Message], received: float) -> list[Arrival]:
+    def take(self, messages: Iterable[DeviceSample], received: float) -> list[Arrival]:
         """What the messages of one packet bring, in the order of time.
 
         Args:
@@ -119,14 +119,14 @@ class Translator:
         for device in self._devices.values():
             device.sequence = None
 
-    def _skins(self, found: Mapping[int, Message]) -> dict[int, Skin]:
+    def _skins(self, found: Mapping[int, DeviceSample]) -> dict[int, Skin]:
         pillars = [number for number, message in found.items() if message.counts is None]
         if pillars:
             return {number: self._pillars(number, found[number]) for number in pillars}
         given = {n: (m.model, len(readings_of(m, self._unit))) for n, m in found.items()}
         return skins(given, self._names, self._sensor, calibrated=self._unit == "N")
 
-    def _pillars(self, number: int, message: Message) -> Skin:
+    def _pillars(self, number: int, message: DeviceSample) -> Skin:
         if strangers := sorted(set(self._names) - {number}):
             raise SourceError(
                 f"fingers= names {', '.join(map(str, strangers))}; the topic has 1 ({PAPILLARRAY})"
@@ -139,14 +139,14 @@ class Translator:
             )
         return Skin(number, PAPILLARRAY, {self._names.get(number, f"finger{number}"): built_in})
 
-    def _check_readings(self, number: int, message: Message) -> None:
+    def _check_readings(self, number: int, message: DeviceSample) -> None:
         if message.counts is not None and self._unit == "N" and not len(message.forces):
             raise SourceError(
                 f"sensor {number} ({message.model}) has no calibrated values: set calibration=on "
                 "for it in xServ.ini and start xela_server anew, or take ?values=counts"
             )
 
-    def _is_expected(self, message: Message, heard: "_Heard", received: float) -> bool:
+    def _is_expected(self, message: DeviceSample, heard: "_Heard", received: float) -> bool:
         """Whether it holds a sample that is new, of a device as it was."""
         number = _number(message)
         skin, device = self.skins.get(number), self._devices.get(number)
@@ -164,7 +164,7 @@ class Translator:
         return device.is_new(message)
 
     def _hear(
-        self, message: Message, time: float, received: float, heard: "_Heard", jumped: bool
+        self, message: DeviceSample, time: float, received: float, heard: "_Heard", jumped: bool
     ) -> None:
         device, skin = self._devices[_number(message)], self.skins[_number(message)]
         heard.n_lost = max(heard.n_lost, device.count(message.sequence))
@@ -219,7 +219,7 @@ class _Device:
         self._newest: tuple[int | None, float] | None = None
         self._delay = Delay()
 
-    def is_new(self, message: Message) -> bool:
+    def is_new(self, message: DeviceSample) -> bool:
         """Whether it is no packet that came already; without stamps, every packet is new."""
         time = message.time if message.time is not None else message.stamp
         if time is None:
@@ -243,10 +243,10 @@ class _Device:
         return self._delay.of(time, received) > LATE
 
 
-def _number(message: Message) -> int:
+def _number(message: DeviceSample) -> int:
     return 1 if message.number is None else message.number
 
 
-def _is_there(message: Message) -> bool:
+def _is_there(message: DeviceSample) -> bool:
     """Whether it is a sensor at all, and not the server's word for one that is off."""
     return bool(len(message.forces)) if message.counts is None else bool(len(message.counts))

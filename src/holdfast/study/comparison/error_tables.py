@@ -6,7 +6,7 @@ from itertools import chain
 import numpy as np
 
 from holdfast.contact import Phase
-from holdfast.sensors.values import Array
+from holdfast.sensors.types import Array
 from holdfast.study.comparison.jobs import SPLITS, Results, found, titles
 from holdfast.study.comparison.rows import ratio_row
 from holdfast.study.evaluation.error_breakdown import AXES, ErrorBreakdown, GripErrors

@@ -5,7 +5,7 @@ from collections.abc import Mapping, Sequence
 import numpy as np
 
 from holdfast.metrics.events import POSTS
-from holdfast.sensors.values import Array
+from holdfast.sensors.types import Array
 from holdfast.study.comparison import error_tables, sample_tables
 from holdfast.study.comparison.jobs import PAPER, SPLITS, Results, found, titles
 from holdfast.study.evaluation.alarm_statistics import AlarmStatistics

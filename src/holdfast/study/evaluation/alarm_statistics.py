@@ -13,7 +13,7 @@ from holdfast.metrics import FingerDecisions, match_alarms
 from holdfast.metrics.events import POSTS, ROUNDING, STABLE_BEFORE
 from holdfast.metrics.masks import runs
 from holdfast.recordings import Truth
-from holdfast.sensors.values import Array
+from holdfast.sensors.types import Array
 from holdfast.twin.labels import LabelRule
 
 Mask = npt.NDArray[np.bool_]

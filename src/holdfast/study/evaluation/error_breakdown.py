@@ -11,7 +11,7 @@ from holdfast.metrics import Decisions, FingerDecisions, calibration_sums
 from holdfast.metrics.events import ROUNDING
 from holdfast.metrics.masks import runs
 from holdfast.recordings import Truth
-from holdfast.sensors.values import Array
+from holdfast.sensors.types import Array
 from holdfast.study.evaluation.recording_features import RecordingFeatures
 from holdfast.study.methods import HAND
 

@@ -9,7 +9,7 @@ import numpy.typing as npt
 
 from holdfast.classifiers import Classifier, Samples
 from holdfast.contact import STABLE, UNKNOWN
-from holdfast.sensors.values import Array
+from holdfast.sensors.types import Array
 from holdfast.study.evaluation.recording_features import RecordingFeatures
 from holdfast.study.evaluation.scores import RecordingScores
 from holdfast.study.methods import Method

@@ -11,7 +11,7 @@ from holdfast.features import Tare
 from holdfast.metrics import FingerDecisions, hand_decisions
 from holdfast.metrics.decisions import Codes
 from holdfast.recordings import Recording, Truth, label_states
-from holdfast.sensors.values import Array
+from holdfast.sensors.types import Array
 from holdfast.study.corpus import Corpus
 from holdfast.study.evaluation.variation import Variation, relabelled
 from holdfast.study.methods import HAND, Method, hand_signal

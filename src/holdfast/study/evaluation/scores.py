@@ -14,7 +14,7 @@ import numpy.typing as npt
 from holdfast.contact import NO_CONTACT, STABLE, UNKNOWN, UNSTABLE
 from holdfast.metrics import Decisions, FingerDecisions
 from holdfast.metrics.decisions import Codes
-from holdfast.sensors.values import Array
+from holdfast.sensors.types import Array
 from holdfast.study.evaluation.recording_features import RecordingFeatures
 from holdfast.study.methods import HAND
 

@@ -14,7 +14,7 @@ from holdfast.contact import STABLE
 from holdfast.metrics import match_alarms
 from holdfast.metrics.decisions import Codes
 from holdfast.metrics.events import EARLY, LATE, ROUNDING
-from holdfast.sensors.values import Array
+from holdfast.sensors.types import Array
 from holdfast.study.evaluation.scores import HandScores, Mask
 
 

@@ -5,7 +5,7 @@ from collections.abc import Mapping
 import numpy as np
 
 from holdfast.classifiers import recipe
-from holdfast.sensors.values import Array
+from holdfast.sensors.types import Array
 from holdfast.study.methods.method import Method
 from holdfast.study.methods.signals import FingerSignal, HandSignal, stretchwise, windowed
 

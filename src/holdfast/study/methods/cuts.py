@@ -12,7 +12,7 @@ from functools import partial
 import numpy as np
 
 from holdfast.classifiers import Threshold
-from holdfast.sensors.values import Array
+from holdfast.sensors.types import Array
 from holdfast.study.methods.method import Method
 from holdfast.study.methods.paper import WINDOW
 from holdfast.study.methods.signals import FingerSignal, HandSignal, stretchwise, windowed

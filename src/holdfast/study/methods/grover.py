@@ -3,7 +3,7 @@
 import numpy as np
 
 from holdfast.classifiers.tcn import TemporalConvolution
-from holdfast.sensors.values import Array
+from holdfast.sensors.types import Array
 from holdfast.study.methods.method import Method
 from holdfast.study.methods.signals import FingerSignal, HandSignal, stretchwise
 

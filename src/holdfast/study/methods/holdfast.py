@@ -15,7 +15,7 @@ from holdfast.classifiers import recipe
 from holdfast.features.extract import extract
 from holdfast.features.specs import HOLDFAST as FEATURES
 from holdfast.features.stream import StreamPlan
-from holdfast.sensors.values import Array
+from holdfast.sensors.types import Array
 from holdfast.study.methods.method import Method
 from holdfast.study.methods.paper import WINDOW
 from holdfast.study.methods.signals import HandSignal

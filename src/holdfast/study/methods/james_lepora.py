@@ -10,7 +10,7 @@ import numpy.typing as npt
 from holdfast.classifiers import recipe
 from holdfast.errors import TrainingError
 from holdfast.features.kernel import GAP_LIMIT
-from holdfast.sensors.values import Array
+from holdfast.sensors.types import Array
 from holdfast.study.methods.method import HAND, Method
 from holdfast.study.methods.signals import FingerSignal, HandSignal, stretchwise
 

@@ -6,7 +6,7 @@ import numpy as np
 
 from holdfast.classifiers import recipe
 from holdfast.features import DEPLOYED, FEATURE_NAMES, haar_features
-from holdfast.sensors.values import Array
+from holdfast.sensors.types import Array
 from holdfast.study.methods.method import Method
 from holdfast.study.methods.signals import FingerSignal, HandSignal, stretchwise
 

@@ -14,7 +14,7 @@ from holdfast.features.kernel import GAP_LIMIT
 from holdfast.features.tare import baseline_of
 from holdfast.recordings import Recording, Tactile
 from holdfast.sensors import Sensor
-from holdfast.sensors.values import Array
+from holdfast.sensors.types import Array
 
 NEWTONS_PER_COUNT = 0.000729
 """Of a uSkin taxel along its normal, by the data sheet of the uSPa46 [N/count]."""

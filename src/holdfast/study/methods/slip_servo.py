@@ -6,7 +6,7 @@ import numpy as np
 from scipy.signal import butter, lfilter
 
 from holdfast.classifiers import Threshold
-from holdfast.sensors.values import Array
+from holdfast.sensors.types import Array
 from holdfast.study.methods.method import Method
 from holdfast.study.methods.signals import FingerSignal, HandSignal, stretchwise
 

@@ -4,7 +4,7 @@ from collections.abc import Mapping
 
 from holdfast.classifiers.trees import GradientBoosting
 from holdfast.features import FEATURE_NAMES
-from holdfast.sensors.values import Array
+from holdfast.sensors.types import Array
 from holdfast.study.methods.method import Method
 from holdfast.study.methods.paper import WINDOW, haar
 from holdfast.study.methods.signals import HandSignal

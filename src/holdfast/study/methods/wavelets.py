@@ -6,7 +6,7 @@ import numpy as np
 
 from holdfast.classifiers import recipe
 from holdfast.features.haar import check_window
-from holdfast.sensors.values import Array
+from holdfast.sensors.types import Array
 from holdfast.study.methods.method import Method
 from holdfast.study.methods.signals import FingerSignal, HandSignal, stretchwise, windowed
 

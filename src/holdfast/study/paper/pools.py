@@ -15,7 +15,7 @@ import numpy.typing as npt
 from holdfast.classifiers import Samples
 from holdfast.contact import STABLE, UNKNOWN
 from holdfast.features import FEATURE_NAMES, Tare, haar_features
-from holdfast.sensors.values import Array
+from holdfast.sensors.types import Array
 from holdfast.study.corpus import Corpus
 from holdfast.study.methods import FingerSignal, hand_signal
 from holdfast.study.methods.wavelets import detail_energy

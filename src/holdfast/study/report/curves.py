@@ -9,7 +9,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.ticker import FuncFormatter, NullLocator
 
-from holdfast.sensors.values import Array
+from holdfast.sensors.types import Array
 from holdfast.study.report.style import (
     FAINT,
     GREY,

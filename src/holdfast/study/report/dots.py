@@ -10,7 +10,7 @@ from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 
 from holdfast.plots.evaluation import COLOURS
-from holdfast.sensors.values import Array
+from holdfast.sensors.types import Array
 from holdfast.study.report.style import (
     FAINT,
     INK,

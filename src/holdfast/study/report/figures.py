@@ -18,7 +18,7 @@ from holdfast.features import FEATURE_NAMES, Tare, haar_features
 from holdfast.plots.envelope import envelope
 from holdfast.plots.recording import COMPONENT_COLOURS
 from holdfast.recordings import Recording
-from holdfast.sensors.values import Array
+from holdfast.sensors.types import Array
 from holdfast.study.methods import hand_signal
 from holdfast.study.report.style import INK, SMALL, add_labels, add_legend, sheet, tidy
 
