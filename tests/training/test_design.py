@@ -7,13 +7,14 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from holdfast.classifiers import Samples
 from holdfast.contact import STABLE, ContactState
 from holdfast.errors import TrainingError
 from holdfast.features import Tare, fingertip_force, haar_features, parse_features
 from holdfast.model import ANY_FINGER
 from holdfast.recordings import Recording
 from holdfast.training import Setting
-from holdfast.training.design import gather
+from holdfast.training.design import gather, thin, thinning_step
 from holdfast.training.splits import divide
 from holdfast.training.survey import survey
 
@@ -146,3 +147,16 @@ def test_a_module_without_samples(grasps):
     found = designs([*grasps, hollow])
     assert np.bincount(found["thumb"].samples.groups, minlength=7)[6] == 345
     assert np.bincount(found["index"].samples.groups, minlength=7)[6] == 0
+
+
+def test_thinning_takes_even_steps():
+    samples = Samples(np.arange(10.0)[:, None], np.zeros(10, bool), np.arange(10))
+    assert thin(samples, 10).groups.tolist() == list(range(10))
+    assert thin(samples, 4).groups.tolist() == [0, 3, 6, 9]
+
+
+@given(st.integers(0, 200), st.integers(1, 50))
+def test_the_thinning_step_is_the_smallest_that_keeps_the_limit(n, n_max):
+    step = thinning_step(n, n_max)
+    assert len(range(0, n, step)) <= n_max
+    assert step == 1 or len(range(0, n, step - 1)) > n_max

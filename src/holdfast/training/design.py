@@ -2,6 +2,7 @@
 
 from collections.abc import Collection, Iterable, Mapping, Sequence
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 import numpy.typing as npt
@@ -86,7 +87,7 @@ def gather(
         RecordingError: a recording cannot be read.
         TrainingError: one classifier is asked for fingers with different sensors.
     """
-    step = max(1, -(-found.n_labelled // setting.max_samples))
+    step = thinning_step(found.n_labelled, setting.max_samples)
     piles: dict[str, list[Samples]] = {finger: [] for finger in found.sensors}
     units: dict[str, list[Integers]] = {finger: [] for finger in found.sensors}
     at_rest = {finger: np.zeros((len(found.entries), 3)) for finger in found.sensors}
@@ -100,22 +101,59 @@ def gather(
         for finger, rows in extract(plan, recording).items():
             module = recording.modules[finger]
             states = label_states(module.labels, module.times)
-            usable = (states != UNKNOWN) & np.isfinite(rows.features).all(axis=1)
-            rows_usable = np.flatnonzero(usable)
-            kept = rows_usable[-n_seen[finger] % step :: step]
-            n_seen[finger] += len(rows_usable)
-            groups = np.full(len(kept), division.group_of[place])
-            piles[finger].append(Samples(rows.features[kept], states[kept] == STABLE, groups))
+            usable = usable_rows(rows.features, states)
+            kept = usable[-n_seen[finger] % step :: step]
+            n_seen[finger] += len(usable)
+            group = int(division.group_of[place])
+            piles[finger].append(labelled_samples(rows.features, states, kept, group))
             units[finger].append(division.units_of(place, module.n_samples)[kept])
             if plan.tare.without_contact:
                 at_rest[finger][place] = rest_moments(module, plan.tare, found.rate)
     designs = {
         finger: FingerDesign(
-            found.sensors[finger], _stack(pile), np.concatenate(units[finger]), at_rest[finger]
+            found.sensors[finger], concatenate(pile), np.concatenate(units[finger]), at_rest[finger]
         )
         for finger, pile in piles.items()
     }
     return {ANY_FINGER: _pool(designs)} if setting.shared else designs
+
+
+def usable_rows(features: npt.NDArray[np.floating[Any]], states: npt.NDArray[np.int8]) -> Integers:
+    """Return the rows that have a label and finite features.
+
+    Args:
+        features: (n, n_features).
+        states: (n,) state codes of the labels.
+    """
+    return np.flatnonzero((states != UNKNOWN) & np.isfinite(features).all(axis=1))
+
+
+def labelled_samples(
+    features: npt.NDArray[Any], states: npt.NDArray[np.int8], rows: Integers, group: int
+) -> Samples:
+    """Return the samples in some rows of one recording, all of the same group."""
+    return Samples(features[rows], states[rows] == STABLE, np.full(len(rows), group))
+
+
+def concatenate(parts: Sequence[Samples]) -> Samples:
+    """Return all samples of at least one part, in order."""
+    return Samples(*(np.concatenate(arrays) for arrays in zip(*parts, strict=True)))
+
+
+def thinning_step(n: int, n_max: int) -> int:
+    """Return the smallest step at which every step-th of n samples makes at most `n_max`.
+
+    Example:
+        >>> thinning_step(10, 4), thinning_step(3, 4)
+        (3, 1)
+    """
+    return max(1, -(-n // n_max))
+
+
+def thin(samples: Samples, n_max: int) -> Samples:
+    """Return at most `n_max` of the samples, at even steps."""
+    step = thinning_step(len(samples.stable), n_max)
+    return Samples(samples.features[::step], samples.stable[::step], samples.groups[::step])
 
 
 def at_rate(recording: Recording, rate: float) -> Recording:
@@ -167,10 +205,6 @@ def rest_moments(module: Tactile, tare: Tare, rate: float) -> tuple[int, float, 
     return len(amplitude), float(amplitude.sum()), float((amplitude**2).sum())
 
 
-def _stack(pile: Sequence[Samples]) -> Samples:
-    return Samples(*(np.concatenate(parts) for parts in zip(*pile, strict=True)))
-
-
 def _pool(designs: Mapping[str, FingerDesign]) -> FingerDesign:
     if len({design.sensor for design in designs.values()}) > 1:
         raise TrainingError(
@@ -180,7 +214,7 @@ def _pool(designs: Mapping[str, FingerDesign]) -> FingerDesign:
     each = list(designs.values())
     return FingerDesign(
         each[0].sensor,
-        _stack([design.samples for design in each]),
+        concatenate([design.samples for design in each]),
         np.concatenate([design.units for design in each]),
         np.sum([design.at_rest for design in each], axis=0),
     )

@@ -13,7 +13,7 @@ from holdfast.metrics import Decisions, Metrics, summarise
 from holdfast.model import ANY_FINGER, Model, Training
 from holdfast.parallel import each
 from holdfast.recordings import Recording
-from holdfast.training.design import gather
+from holdfast.training.design import gather, thin
 from holdfast.training.fitting import Material, fit_model, fit_whole
 from holdfast.training.judging import decisions_of, pick
 from holdfast.training.origin import doubts, seen_by
@@ -140,7 +140,7 @@ class _Trainer:
             reference = {finger: setting.recipe_of(finger).reference for finger in self.designs}
             return [reference for _ in without]
         tasks = [
-            (_spread(design.without(held)), setting, finger, self.journal)
+            (thin(design.without(held), SEARCH_SAMPLES), setting, finger, self.journal)
             for held in without
             for finger, design in self.designs.items()
         ]
@@ -202,12 +202,6 @@ def _judged(model: Model, recording: Recording) -> Decisions:
     if ANY_FINGER not in model.fingers and not set(model.fingers) & set(recording.modules):
         return Decisions(recording.name, {})
     return decisions_of(model, recording)
-
-
-def _spread(samples: Samples) -> Samples:
-    """At most `SEARCH_SAMPLES`, evenly spread."""
-    step = max(1, -(-len(samples.stable) // SEARCH_SAMPLES))
-    return Samples(samples.features[::step], samples.stable[::step], samples.groups[::step])
 
 
 def _search(

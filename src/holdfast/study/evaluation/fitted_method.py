@@ -8,12 +8,17 @@ import numpy as np
 import numpy.typing as npt
 
 from holdfast.classifiers import Classifier, Samples
-from holdfast.contact import STABLE, UNKNOWN
 from holdfast.sensors.types import Array
 from holdfast.study.evaluation.recording_features import RecordingFeatures
 from holdfast.study.evaluation.scores import RecordingScores
 from holdfast.study.methods import Method
-from holdfast.training.design import contact_threshold
+from holdfast.training.design import (
+    concatenate,
+    contact_threshold,
+    labelled_samples,
+    thinning_step,
+    usable_rows,
+)
 
 MAX_ROWS = 20_000
 """Samples of a finger that a classifier is fitted to, evenly spread; judged is every sample."""
@@ -56,10 +61,13 @@ def gather_training_samples(
     for place, seen in enumerate(recordings):
         for unit, features in seen.features.items():
             if features.shape[1] == widths[unit]:
-                piles[unit].append(_samples(features, seen.unit_labels(unit), place, n_rows))
+                states = seen.unit_labels(unit)
+                rows = usable_rows(features, states)
+                rows = rows[:: thinning_step(len(rows), n_rows)]
+                piles[unit].append(labelled_samples(features, states, rows, place))
         for finger, moments in seen.at_rest.items():
             at_rest[finger][place] = moments
-    samples = {unit: _stack(pile) for unit, pile in piles.items()}
+    samples = {unit: concatenate(pile) for unit, pile in piles.items()}
     return TrainingSamples(samples, at_rest, tuple(seen.object for seen in recordings))
 
 
@@ -70,20 +78,6 @@ def _widths(recordings: Sequence[RecordingFeatures]) -> dict[str, int]:
         for unit, features in seen.features.items():
             widths[unit] = max(widths.get(unit, 0), features.shape[1])
     return widths
-
-
-def _samples(features: Array, labels: npt.NDArray[np.int8], place: int, n_rows: int) -> Samples:
-    usable = np.flatnonzero((labels != UNKNOWN) & np.isfinite(features).all(axis=1))
-    rows = usable[:: max(1, -(-len(usable) // n_rows))]
-    return Samples(features[rows], labels[rows] == STABLE, np.full(len(rows), place))
-
-
-def _stack(pile: Sequence[Samples]) -> Samples:
-    return Samples(
-        np.concatenate([each.features for each in pile]),
-        np.concatenate([each.stable for each in pile]),
-        np.concatenate([each.groups for each in pile]),
-    )
 
 
 @dataclass(frozen=True, eq=False)
