@@ -6,7 +6,8 @@ import sys
 import pytest
 
 from holdfast.cli import app, main
-from holdfast.cli.console import Bar, print_json, print_table, progress
+from holdfast.cli.terminal.console import print_json, print_table
+from holdfast.cli.terminal.progress import Bar, progress
 from holdfast.errors import RecordingError
 
 
@@ -196,7 +197,7 @@ class TestConsole:
 
     def test_progress_appears_on_a_terminal_after_a_while(self, capsys, monkeypatch):
         monkeypatch.setattr("sys.stderr.isatty", lambda: True, raising=False)
-        monkeypatch.setattr("holdfast.cli.console.PATIENCE", -1.0)
+        monkeypatch.setattr("holdfast.cli.terminal.progress.PATIENCE", -1.0)
         with Bar("counting", 3) as bar:
             bar.advance(3)
         assert "counting" in capsys.readouterr().err

@@ -1,8 +1,13 @@
 import json
 
+import numpy as np
 import pytest
 
+from holdfast.cli import bench as verb
 from holdfast.cli import main
+from holdfast.cli.bench import WINDOW, _pywt_loop, _scipy, _tsflex, benchmark
+from holdfast.cli.terminal.console import print_json
+from holdfast.features import haar_features
 
 
 def test_json(capsys):
@@ -16,9 +21,7 @@ def test_json(capsys):
 
 
 def test_a_table_for_people(capsys, monkeypatch):
-    from holdfast import benchmark
-
-    monkeypatch.setattr(benchmark, "find_spec", lambda name: None)
+    monkeypatch.setattr(verb, "find_spec", lambda name: None)
     assert main(["bench", "--samples", "1000", "--updates", "1000"]) == 0
     out = capsys.readouterr().out
     assert "batch features of 1,000 samples, window 14" in out
@@ -35,3 +38,70 @@ def test_too_little_to_measure(capsys, words):
     assert err == (
         f"holdfast: at least 1000 samples and updates expected, {samples}, {updates} given\n"
     )
+
+
+@pytest.fixture(scope="module")
+def force():
+    walk = np.random.default_rng(0).normal(size=(400, 3)).cumsum(axis=0)
+    return walk + np.array([300.0, 0.0, 0.0])
+
+
+def test_the_pywt_loop_computes_the_same(force):
+    pytest.importorskip("pywt")
+    expected = haar_features(force, WINDOW)
+    np.testing.assert_allclose(_pywt_loop(force), expected, rtol=0, atol=1e-9 * 300)
+    assert np.isnan(expected[: WINDOW - 1, 5]).all()
+
+
+def test_scipy_computes_the_same(force):
+    full = slice(WINDOW - 1, None)
+    expected = haar_features(force, WINDOW)[full]
+    np.testing.assert_allclose(_scipy(force)[full], expected, rtol=0, atol=1e-9 * 300)
+
+
+def test_tsflex_computes_the_same(force):
+    pytest.importorskip("tsflex")
+    (frame,) = _tsflex(force)()
+    table = {name.split("__")[1]: column for name, column in frame.items()}
+    expected = haar_features(force, WINDOW)[WINDOW - 1 :]
+    for name, column in (("m", 4), ("sigma", 5)):
+        values = table[name].to_numpy()
+        # Its windows end before the instant that they are stamped with: the last one is missing.
+        np.testing.assert_allclose(values, expected[: len(values), column], rtol=0, atol=1e-9 * 300)
+        assert len(expected) - len(values) <= 1
+
+
+@pytest.fixture(scope="module")
+def found():
+    return benchmark(n_samples=2000, n_updates=1000)
+
+
+def test_the_report_has_the_fields_of_the_contract(found, capsys):
+    print_json(found)
+    report = json.loads(capsys.readouterr().out)
+    assert set(report) >= {"machine", "batch", "hand_update"}
+    assert {"seconds_per_sample", "ratio_to_copy", "speedup_over_pywt"} <= set(report["batch"])
+    assert {"p50", "p99", "p999", "speedup_over_pywt_sklearn"} <= set(report["hand_update"])
+    assert report["machine"]["versions"]["holdfast"]
+    assert report["batch"]["n_samples"] == 2000
+    assert report["hand_update"]["n_updates"] == 1000
+
+
+def test_figures_are_finite_and_consistent(found):
+    batch, update = found["batch"], found["hand_update"]
+    assert batch["ratio_to_copy"] == pytest.approx(
+        batch["seconds_per_sample"] / batch["seconds_per_sample_copy"]
+    )
+    assert 0 < update["p50"] <= update["p99"] <= update["p999"] < np.inf
+    assert update["speedup_over_pywt_sklearn"] == pytest.approx(
+        update["seconds_pywt_sklearn"] / update["p50"]
+    )
+
+
+def test_peers_that_are_missing_are_left_out(monkeypatch):
+    monkeypatch.setattr(verb, "find_spec", lambda name: None)
+    found = benchmark(n_samples=2000, n_updates=1000)
+    assert found["batch"]["speedup_over_pywt"] is None
+    assert found["batch"]["speedup_over_tsflex"] is None
+    assert found["hand_update"]["speedup_over_pywt_sklearn"] is None
+    assert found["batch"]["speedup_over_scipy"] > 0

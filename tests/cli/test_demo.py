@@ -8,11 +8,15 @@ import pytest
 from holdfast.cli import demo as verb
 from holdfast.cli import main
 from holdfast.cli import simulate as simulate_verb
-from holdfast.io import load_dataset
-from holdfast.model import Model
+from holdfast.cli.demo import replay
+from holdfast.io import load_dataset, save_recording
+from holdfast.model import Debounce, Model
+from holdfast.synthetic import synthetic_recording
+from holdfast.training import Setting, train
 from holdfast.twin import simulation
 from holdfast.twin.profile import profile
 
+FINGERS = ("thumb", "index")
 SHORT = msgspec.structs.replace(profile("reference"), idle=(0.7, 0.8), hold=6.0)
 
 
@@ -84,7 +88,7 @@ def test_the_replay_is_shown_on_a_page_that_ends_with_it(capsys, tmp_path, monke
             pages.append(json.load(answer))
         return False
 
-    monkeypatch.setattr("holdfast.cli.page.open_page", lambda url: _in_a_thread(look, url))
+    monkeypatch.setattr("holdfast.cli.serve.open_page", lambda url: _in_a_thread(look, url))
     code, out, err = run(capsys, tmp_path / "demo", "--speed", 8)
     assert code == 0
     assert "shows it: open it in a browser" in err
@@ -96,3 +100,47 @@ def test_the_replay_is_shown_on_a_page_that_ends_with_it(capsys, tmp_path, monke
 def _in_a_thread(work, url):
     threading.Thread(target=work, args=(url,)).start()
     return False
+
+
+@pytest.fixture(scope="module")
+def recording():
+    return synthetic_recording("grasp", 0, FINGERS)
+
+
+@pytest.fixture(scope="module")
+def model(recording):
+    others = [synthetic_recording(f"grasp-{k}", k, FINGERS) for k in (1, 2)]
+    return train(others, Setting(trials=0)).model
+
+
+@pytest.fixture
+def path(recording, tmp_path):
+    save_recording(recording, tmp_path / "grasp.parquet")
+    return tmp_path / "grasp.parquet"
+
+
+def test_every_sample_is_an_update_and_changes_of_the_hand_are_told(capsys, model, recording, path):
+    assert replay(model, path, 0) == recording.modules["thumb"].n_samples
+    out, err = capsys.readouterr()
+    assert out == ""
+    lines = err.splitlines()
+    assert lines
+    assert all("hand" in line and " -> " in line for line in lines)
+    times = [float(line.split()[0]) for line in lines]
+    assert times == sorted(times)
+    assert 0 <= times[0] <= times[-1] <= recording.modules["thumb"].times[-1]
+    assert len({line.split(" -> ")[1] for line in lines}) > 1
+
+
+def test_on_a_terminal_a_table_follows(capsys, model, recording, path, monkeypatch):
+    monkeypatch.setattr(verb.sys.stderr, "isatty", lambda: True, raising=False)
+    assert replay(model, path, 40.0) == recording.modules["thumb"].n_samples
+    err = capsys.readouterr().err
+    assert "thumb" in err
+    assert "sigma" in err
+
+
+def test_for_the_eye_states_are_held_back(model):
+    before = model.debounce
+    assert verb.calmer(model).debounce == Debounce(*verb.DEBOUNCE)
+    assert model.debounce == before

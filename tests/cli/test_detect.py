@@ -12,7 +12,7 @@ import pytest
 from holdfast.classifiers import LinearClassifier
 from holdfast.cli import main
 from holdfast.cli.detect import PIECE
-from holdfast.cli.lines import json_lines
+from holdfast.cli.detect_output import json_lines
 from holdfast.contact import UNSTABLE, Fault
 from holdfast.detector import detect
 from holdfast.features import FeatureSpec

@@ -10,7 +10,7 @@ import pytest
 
 from holdfast.cli import main
 from holdfast.cli import serve as verb
-from holdfast.cli.page import open_page
+from holdfast.cli.serve import open_page
 from holdfast.io import load_recording, save_recording
 from holdfast.synthetic import synthetic_recording
 
@@ -130,7 +130,7 @@ def test_refusals(capsys, grasp, tmp_path):
 def test_no_text_browser_is_opened(monkeypatch):
     for name in ("DISPLAY", "WAYLAND_DISPLAY"):
         monkeypatch.delenv(name, raising=False)
-    monkeypatch.setattr("holdfast.cli.page.sys.platform", "linux")
+    monkeypatch.setattr("holdfast.cli.serve.sys.platform", "linux")
     assert open_page("http://127.0.0.1:1/") is False
 
 

@@ -12,7 +12,7 @@ import numpy as np
 import pytest
 from threadpoolctl import threadpool_info
 
-from holdfast.cli.console import progress
+from holdfast.cli.terminal.progress import progress
 from holdfast.errors import EngineError, OutputError
 from holdfast.parallel import Engine
 from holdfast.study import work

@@ -15,7 +15,7 @@ from importlib import import_module
 import typer
 from typer.main import get_command
 
-from holdfast.cli.console import complain
+from holdfast.cli.terminal.console import complain
 from holdfast.errors import HoldfastError
 
 VERBS = {

@@ -1,6 +1,8 @@
 """`holdfast detect`: what a model says of every finger at every sample."""
 
+import math
 import sys
+import time
 from collections.abc import Iterator
 from itertools import chain
 from pathlib import Path
@@ -8,8 +10,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from holdfast.cli.console import Bar, print_json, say
-from holdfast.cli.judging import (
+from holdfast.cli.options import (
     DebounceOption,
     HysteresisOption,
     IgnoreOption,
@@ -18,14 +19,20 @@ from holdfast.cli.judging import (
     RateRule,
     SourceArgument,
     debounced,
+    stream_detector_of,
     taxels_of,
     tell_missing,
 )
+from holdfast.cli.terminal.console import print_json, say
+from holdfast.cli.terminal.progress import Bar
+from holdfast.cli.terminal.stopping import Stop, stopping
 
 if TYPE_CHECKING:
     from holdfast.detector import Detection
+    from holdfast.live.stream_detector import StreamDetector, StreamEstimate
     from holdfast.model import Model
     from holdfast.recordings import Recording
+    from holdfast.sources import Arrival
 
 PIECE = 4096
 """Samples that are taken at a time: bounds the memory."""
@@ -71,15 +78,13 @@ def detect(
     _check_seconds(seconds, source, live=live)
     wanted = debounced(model, debounce, hysteresis)
     if live:
-        from holdfast.cli.detect_live import detections_live
-
         detections = detections_live(wanted, source, rate, ignore, seconds)
     else:
         detections = _detections(wanted, Path(source), rate, ignore)
     if summary:
         _summarise(detections, model, as_json=as_json)
         return
-    from holdfast.cli.lines import json_lines
+    from holdfast.cli.detect_output import json_lines
 
     for detection in detections:
         for block in json_lines(detection):
@@ -98,7 +103,7 @@ def _check_seconds(seconds: float | None, source: str, *, live: bool) -> None:
 
 
 def _summarise(detections: Iterator["Detection"], model: str, *, as_json: bool) -> None:
-    from holdfast.cli.tally import Tally
+    from holdfast.cli.detect_output import Tally
 
     tally = Tally()
     for detection in detections:
@@ -146,3 +151,37 @@ def _pieces(model: "Model", path: Path, rate: RateRule) -> Iterator["Recording"]
         raise ModelError(f"{given} within 20 % (--rate resample takes it all the same)")
     say(f"{given}: resampled")
     return iter([resample(load_recording(path, labels=False), model.rate)])
+
+
+def detections_live(
+    model: "Model", uri: str, rate: RateRule, ignore: str, seconds: float | None
+) -> Iterator["Detection"]:
+    """What the model says of a live source, arrival by arrival, until a signal or `seconds`."""
+    from holdfast.live.stream_detector import compile_kernels
+    from holdfast.live.tracing import detection_of
+    from holdfast.sources import open_source
+
+    compile_kernels()
+    with stopping() as stop, open_source(uri) as source:
+        stream = stream_detector_of(model, source, rate, ignore)
+        stop.gently = True
+        for estimates in _estimates(stream, seconds, stop):
+            yield detection_of(source.name, estimates)
+
+
+def _estimates(
+    stream: "StreamDetector", seconds: float | None, stop: Stop
+) -> Iterator[list["StreamEstimate"]]:
+    end = math.inf if seconds is None else time.monotonic() + seconds
+    while not (stream.source.ended or stop.asked) and time.monotonic() < end:
+        arrival, estimates, _ = stream.read()
+        if arrival is not None:
+            tell(arrival)
+        yield estimates
+    yield stream.finish().estimates
+
+
+def tell(arrival: "Arrival") -> None:
+    """Tells on stderr what a person should know."""
+    for notice in arrival.notices:
+        say(notice)

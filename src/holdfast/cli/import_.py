@@ -10,7 +10,8 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from holdfast.cli.console import print_json, print_table, progress, say, show
+from holdfast.cli.terminal.console import print_json, print_table, say, show
+from holdfast.cli.terminal.progress import progress
 
 if TYPE_CHECKING:
     from holdfast.recordings import Recording

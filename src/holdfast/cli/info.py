@@ -7,7 +7,8 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from holdfast.cli.console import complain, print_json, print_table, progress, show
+from holdfast.cli.terminal.console import complain, print_json, print_table, show
+from holdfast.cli.terminal.progress import progress
 
 if TYPE_CHECKING:
     from holdfast.features import Tare
@@ -52,7 +53,7 @@ def info(
 
 
 def _tell_one(path: Path, plot: Path | None, tare: "Tare", force: bool, as_json: bool) -> None:
-    from holdfast.cli.figures import refuse_plot, save_plot
+    from holdfast.cli.options import refuse_plot, save_plot
     from holdfast.io import load_recording
 
     if plot is not None:

@@ -9,8 +9,8 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from holdfast.cli.console import print_json, say
-from holdfast.cli.speed import check_speed
+from holdfast.cli.options import check_speed
+from holdfast.cli.terminal.console import print_json, say
 
 if TYPE_CHECKING:
     from holdfast.live.play import XelaServer

@@ -9,9 +9,9 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from holdfast.cli.console import print_json, say, show
-from holdfast.cli.speed import check_speed
-from holdfast.cli.stopping import Stop, stopping
+from holdfast.cli.options import check_speed
+from holdfast.cli.terminal.console import print_json, say, show
+from holdfast.cli.terminal.stopping import Stop, stopping
 
 if TYPE_CHECKING:
     from holdfast.live.recorder import Recorder, RecorderStatus
@@ -100,8 +100,8 @@ def _record(
         OutputError: the disk refused.
         SourceError: no sample came; no file is left.
     """
-    from holdfast.cli.keys import LEGEND, Keys
-    from holdfast.cli.record_line import RecordLine
+    from holdfast.cli.terminal.keys import LEGEND, Keys
+    from holdfast.cli.terminal.record_line import RecordLine
     from holdfast.errors import OutputError, SourceError
     from holdfast.live.intake import plain
 
@@ -218,7 +218,7 @@ def _tell(path: Path, status: "RecorderStatus", as_json: bool) -> None:
     if as_json:
         print_json(_document(path, status))
         return
-    from holdfast.cli.record_line import size
+    from holdfast.cli.terminal.record_line import size
 
     show(
         f"{status.seconds:.2f} s, {status.n_samples} samples of {len(status.modules)} modules "

@@ -5,7 +5,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from holdfast.cli.console import print_json, print_table, show
+from holdfast.cli.terminal.console import print_json, print_table, show
 
 if TYPE_CHECKING:
     from holdfast.sensors import Hand, Sensor
@@ -175,7 +175,7 @@ def _ranges(indices: list[int]) -> str:
 
 
 def _draw(found: "Sensor | Hand", plot: Path, force: bool) -> None:
-    from holdfast.cli.figures import refuse_plot, save_plot
+    from holdfast.cli.options import refuse_plot, save_plot
 
     refuse_plot(plot, force)
     from holdfast.plots.sensors import plot_hand, plot_sensor

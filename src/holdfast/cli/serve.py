@@ -1,7 +1,9 @@
 """`holdfast serve`: what a model says of a source, on a page and for other programs."""
 
+import os
 import sys
-from collections.abc import Iterator, Sequence
+import webbrowser
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import ExitStack
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
@@ -9,8 +11,7 @@ from urllib.parse import quote
 
 import typer
 
-from holdfast.cli.console import print_json, say
-from holdfast.cli.judging import (
+from holdfast.cli.options import (
     DebounceOption,
     HysteresisOption,
     IgnoreOption,
@@ -18,15 +19,21 @@ from holdfast.cli.judging import (
     RateOption,
     RateRule,
     SourceArgument,
+    check_speed,
     debounced,
     stream_detector_of,
 )
-from holdfast.cli.page import HOST, PORT, show_page
-from holdfast.cli.speed import check_speed
+from holdfast.cli.terminal.console import print_json, say
 
 if TYPE_CHECKING:
     from holdfast.live.ros_publisher import RosPublisher
+    from holdfast.live.session import Listener
     from holdfast.live.stream_detector import StreamDetector
+    from holdfast.model import Model
+    from holdfast.sources import Source
+    from holdfast.web.guard import Guard
+
+HOST, PORT = "127.0.0.1", 8080
 
 
 def serve(
@@ -118,3 +125,67 @@ def _publishers(stream: "StreamDetector", *, ros2: bool, ros1: bool) -> "Iterato
         from holdfast.live.ros1_publisher import Ros1Publisher
 
         yield Ros1Publisher(units)
+
+
+def show_page(
+    model: "Model",
+    source: "Source",
+    tell: Callable[[str], None],
+    *,
+    stream: "StreamDetector | None" = None,
+    host: str = HOST,
+    port: int = PORT,
+    guard: "Guard | None" = None,
+    folder: Path | None = None,
+    listeners: Sequence["Listener"] = (),
+    stay: bool = True,
+) -> None:
+    """Serves the page of a source until Ctrl-C, or until the source ends where not `stay`.
+
+    Args:
+        model: that judges.
+        source: that is open.
+        tell: is given the address once the page can be opened.
+        stream: detector of the source; one without options by default.
+        host: address to listen at.
+        port: 0 for any that is free.
+        guard: who may come in; this machine by default.
+        folder: where recordings go.
+        listeners: what else hears what is said.
+        stay: go on when the source has ended.
+
+    Raises:
+        OutputError: the address cannot be listened at.
+        Exception: that which made the session fail.
+    """
+    from holdfast.live.service import Service
+    from holdfast.live.session import Session
+    from holdfast.live.stream_detector import StreamDetector
+    from holdfast.web.guard import Guard
+    from holdfast.web.server import run_server
+
+    session = Session(stream or StreamDetector(model, source))
+    service = Service(session, model, guard or Guard(host), folder)
+    for listener in listeners:
+        session.add_listener(listener)
+    session.start()
+    try:
+        run_server(
+            service.app, host, port, tell,
+            lambda: session.ended and not (stay and session.failure is None),
+        )  # fmt: skip
+    finally:
+        session.stop()
+    if session.failure is not None:
+        raise session.failure
+
+
+def open_page(url: str) -> bool:
+    """Whether a browser with windows has been told to open a page; text browsers are not."""
+    windows = sys.platform in ("win32", "darwin")
+    if not (windows or os.environ.get("DISPLAY") or os.environ.get("WAYLAND_DISPLAY")):
+        return False
+    try:
+        return webbrowser.open(url)
+    except webbrowser.Error:
+        return False

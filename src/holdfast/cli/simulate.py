@@ -7,7 +7,8 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from holdfast.cli.console import Bar, print_json, say, show
+from holdfast.cli.terminal.console import print_json, say, show
+from holdfast.cli.terminal.progress import Bar
 from holdfast.twin.profile import ATTEMPTS
 
 if TYPE_CHECKING:

@@ -5,7 +5,8 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from holdfast.cli.console import print_json, progress, say, show
+from holdfast.cli.terminal.console import print_json, say, show
+from holdfast.cli.terminal.progress import progress
 
 if TYPE_CHECKING:
     from holdfast.model import Model
@@ -112,7 +113,7 @@ def train(
     if as_json:
         print_json({"model": model, "split": split, "cross_validation": trained.cross_validation})
         return
-    from holdfast.cli.report import show_metrics
+    from holdfast.cli.evaluate import show_metrics
 
     show_metrics(trained.cross_validation)
     show(

@@ -5,7 +5,7 @@ import time
 from types import TracebackType
 from typing import TYPE_CHECKING, Self
 
-from holdfast.cli.console import say
+from holdfast.cli.terminal.console import say
 
 if TYPE_CHECKING:
     from rich.live import Live

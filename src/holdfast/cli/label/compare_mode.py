@@ -4,8 +4,9 @@ from collections.abc import Callable, Iterator, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from holdfast.cli.console import print_json, print_table, progress, say, show
-from holdfast.cli.label_common import Asking
+from holdfast.cli.label.inputs import Asking
+from holdfast.cli.terminal.console import print_json, print_table, say, show
+from holdfast.cli.terminal.progress import progress
 
 if TYPE_CHECKING:
     from holdfast.labelling.compare import (

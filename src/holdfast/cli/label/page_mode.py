@@ -7,9 +7,9 @@ from pathlib import Path
 from threading import Thread
 from typing import TYPE_CHECKING
 
-from holdfast.cli.console import print_json, say
-from holdfast.cli.label_common import Asking, Serving, login_name, now, recordings_at
-from holdfast.cli.page import open_page
+from holdfast.cli.label.inputs import Asking, Serving, login_name, now, recordings_at
+from holdfast.cli.serve import open_page
+from holdfast.cli.terminal.console import print_json, say
 
 if TYPE_CHECKING:
     from holdfast.labelling.audit import Suspect

@@ -6,7 +6,7 @@ from typing import Annotated
 
 import typer
 
-from holdfast.cli.page import HOST
+from holdfast.cli.serve import HOST
 
 PORT = 8081
 
@@ -92,7 +92,7 @@ def label(
       holdfast label --export label-studio studio/ recordings/
       holdfast label --import export.json recordings/
     """
-    from holdfast.cli.label_common import Asking, Serving
+    from holdfast.cli.label.inputs import Asking, Serving
 
     asking = Asking(tare, poses, tuple(tracks or ()), tuple(parameters or ()))
     serving = Serving(host, port, token, not no_browser, as_json)
@@ -100,30 +100,30 @@ def label(
     if page and mode != "audit":
         raise ValueError("--page shows what --audit found: give --audit as well")
     if mode == "auto":
-        from holdfast.cli.label_auto import label_by_rule
+        from holdfast.cli.label.auto_mode import label_by_rule
 
         label_by_rule(
             paths, auto or "", asking,
             author=author, dry_run=dry_run, force=force, as_json=as_json,
         )  # fmt: skip
     elif mode == "compare":
-        from holdfast.cli.label_compare import compare_labels
+        from holdfast.cli.label.compare_mode import compare_labels
 
         compare_labels(paths, asking, annotator, as_json=as_json)
     elif mode == "export" and export is not None:
-        from holdfast.cli.label_exchange import export_labels
+        from holdfast.cli.label.exchange_mode import export_labels
 
         export_labels(paths, *export, force=force, as_json=as_json)
     elif mode == "import" and take is not None:
-        from holdfast.cli.label_exchange import import_labels
+        from holdfast.cli.label.exchange_mode import import_labels
 
         import_labels(
             paths, take,
             annotator=annotator, author=author, dry_run=dry_run, force=force, as_json=as_json,
         )  # fmt: skip
     else:
-        from holdfast.cli.label_audit import audit_labels
-        from holdfast.cli.label_page import show_label_page
+        from holdfast.cli.label.audit_mode import audit_labels
+        from holdfast.cli.label.page_mode import show_label_page
 
         suspects = audit_labels(paths, jobs, as_json=as_json and not page) if audit else ()
         if page or not audit:

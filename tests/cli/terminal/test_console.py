@@ -3,8 +3,8 @@ import time
 
 import pytest
 
-from holdfast.cli import console
-from holdfast.cli.console import Bar, progress
+from holdfast.cli.terminal import console
+from holdfast.cli.terminal.progress import Bar, progress
 
 
 @pytest.fixture

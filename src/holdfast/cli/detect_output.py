@@ -1,13 +1,24 @@
 """Shares of states, reasons and faults, and the events, over a stream of detections."""
 
+from collections.abc import Iterator
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import numpy.typing as npt
+from msgspec import Struct
+from msgspec.json import Encoder
 
-from holdfast.cli.console import print_table, show
-from holdfast.contact import ContactEvent, ContactState, Fault, Reason, StateChanges
+from holdfast.cli.terminal.console import print_table, show
+from holdfast.contact import (
+    ContactEvent,
+    ContactState,
+    Fault,
+    Reason,
+    StateChanges,
+    faults_of,
+    taxels_of,
+)
 from holdfast.detector import HAND
 
 if TYPE_CHECKING:
@@ -117,3 +128,53 @@ def _some(names: "tuple[Reason, ...] | tuple[Fault, ...]", counts: _Numbers) -> 
 
 def _text(names: "tuple[Reason, ...] | tuple[Fault, ...]", counts: _Numbers) -> str:
     return ", ".join(f"{name} {k}" for name, k in _some(names, counts).items()) or "-"
+
+
+BLOCK = 8192
+"""Lines that are made at a time."""
+
+_STATES = [state.value for state in ContactState]
+_REASONS = [reason.value for reason in Reason]
+
+
+class Line(Struct, gc=False):
+    """What is printed of one finger at one sample; what is NaN becomes null."""
+
+    time: float
+    finger: str
+    state: str
+    reason: str
+    stable_probability: float
+    instability: float
+    force: list[float]
+    faults: tuple[str, ...]
+    faulty_taxels: tuple[int, ...]
+
+
+def json_lines(detection: "Detection") -> Iterator[str]:
+    """Blocks of lines, one a finger and sample, in the order of time and then of fingers."""
+    names = list(detection.fingers)
+    traces = list(detection.fingers.values())
+    if not traces:
+        return
+    which = np.repeat(np.arange(len(names)), [len(trace) for trace in traces])
+    times, state, reason, probability, sigma, force, faults, taxels = (
+        np.concatenate(column) for column in zip(*traces, strict=True)
+    )
+    order = np.argsort(times, kind="stable")
+    encoder = Encoder()
+    for start in range(0, len(order), BLOCK):
+        rows = order[start : start + BLOCK]
+        lines = map(  # a list, since msgspec 0.22 leaks what an iterator gives it
+            Line,
+            times[rows].tolist(),
+            [names[k] for k in which[rows].tolist()],
+            [_STATES[k] for k in state[rows].tolist()],
+            [_REASONS[k] for k in reason[rows].tolist()],
+            probability[rows].tolist(),
+            sigma[rows].tolist(),
+            force[rows].tolist(),
+            [faults_of(mask) for mask in faults[rows].tolist()],
+            [taxels_of(mask) for mask in taxels[rows].tolist()],
+        )
+        yield encoder.encode_lines(list(lines)).decode()

@@ -4,8 +4,7 @@ from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from holdfast.cli.console import complain, print_json, print_table, progress, say, show
-from holdfast.cli.label_common import (
+from holdfast.cli.label.inputs import (
     MOST_DOUBTFUL,
     Asking,
     check_rule,
@@ -15,6 +14,8 @@ from holdfast.cli.label_common import (
     recordings_at,
     seconds_of,
 )
+from holdfast.cli.terminal.console import complain, print_json, print_table, say, show
+from holdfast.cli.terminal.progress import progress
 
 if TYPE_CHECKING:
     from holdfast.labelling.store import Labels

@@ -4,8 +4,8 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from holdfast.cli.console import print_json, print_table, say, show
-from holdfast.cli.label_common import recordings_at
+from holdfast.cli.label.inputs import recordings_at
+from holdfast.cli.terminal.console import print_json, print_table, say, show
 
 if TYPE_CHECKING:
     from holdfast.labelling.audit import Audit, Suspect

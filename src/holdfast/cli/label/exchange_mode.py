@@ -4,9 +4,10 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from holdfast.cli.console import print_json, progress, show
-from holdfast.cli.label_auto import finish, label_all, refuse_persons, tell, write
-from holdfast.cli.label_common import login_name, recordings_at
+from holdfast.cli.label.auto_mode import finish, label_all, refuse_persons, tell, write
+from holdfast.cli.label.inputs import login_name, recordings_at
+from holdfast.cli.terminal.console import print_json, show
+from holdfast.cli.terminal.progress import progress
 
 if TYPE_CHECKING:
     from holdfast.labelling.store import Labels

@@ -5,7 +5,7 @@ import sys
 
 import pytest
 
-from holdfast.cli.keys import LABELS, LEGEND, STOP, Keys
+from holdfast.cli.terminal.keys import LABELS, LEGEND, STOP, Keys
 
 
 class Stdin:

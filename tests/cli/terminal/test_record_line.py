@@ -2,8 +2,8 @@ import io
 
 import pytest
 
-from holdfast.cli import record_line
-from holdfast.cli.record_line import RecordLine, line
+from holdfast.cli.terminal import record_line
+from holdfast.cli.terminal.record_line import RecordLine, line
 from holdfast.contact import Fault
 from holdfast.live.recorder import RecorderStatus
 

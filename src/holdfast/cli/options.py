@@ -1,14 +1,18 @@
 """What verbs that judge samples have in common: the model as it is wanted, and what to tell."""
 
+import math
 from collections.abc import Mapping
 from enum import StrEnum
+from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from holdfast.cli.console import say
+from holdfast.cli.terminal.console import say
 
 if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
     from holdfast.live.stream_detector import StreamDetector
     from holdfast.model import Model
     from holdfast.sources import Source
@@ -91,3 +95,43 @@ def taxels_of(text: str) -> dict[str, tuple[int, ...]]:
             raise ValueError(f"--ignore: FINGER:TAXEL,... expected, {text!r} given")
         found[finger] = (*found.get(finger, ()), int(number))
     return found
+
+
+SUFFIXES = (".pdf", ".png", ".svg")
+
+
+def refuse_plot(plot: Path, force: bool) -> None:
+    """Does nothing where a figure may be written there.
+
+    Raises:
+        ValueError: another suffix.
+        OutputError: it exists and `force` is not given, or its folder does not exist.
+    """
+    from holdfast.files import refuse_overwrite
+
+    if plot.suffix.lower() not in SUFFIXES:
+        raise ValueError(f"a plot ends in {', '.join(SUFFIXES)}; {plot.name!r} given")
+    refuse_overwrite(plot, force=force)
+
+
+def save_plot(figure: "Figure", plot: Path, force: bool) -> None:
+    """Writes the figure, and says so."""
+    from holdfast.files import whole_file
+
+    with whole_file(plot, force=force) as part:
+        figure.savefig(part)
+    say(f"{plot} written")
+
+
+def check_speed(source: str, speed: float) -> None:
+    """Refuses a speed that no source has, or that is not that of this one.
+
+    Raises:
+        ValueError: it is negative or not finite, or a device is given another than its own.
+    """
+    from holdfast.sources.uri import is_uri
+
+    if not (math.isfinite(speed) and speed >= 0):
+        raise ValueError(f"--speed: at least 0 expected, {speed:g} given")
+    if speed != 1 and is_uri(source) and not source.startswith("twin:"):
+        raise ValueError(f"--speed is for recordings and the twin; {source} has its own")

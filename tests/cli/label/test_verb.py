@@ -11,7 +11,7 @@ from urllib.request import Request, urlopen
 import pytest
 
 from holdfast.cli import label_page, main
-from holdfast.cli.label_common import Asking
+from holdfast.cli.label.inputs import Asking
 from holdfast.contact import ContactState
 from holdfast.io import labels_path, load_labels, load_recording, save_labels, save_recording
 from holdfast.labelling.audit import Audit, Suspect
