@@ -5,7 +5,8 @@ from importlib import metadata
 import numpy as np
 import pytest
 
-from holdfast.cli import main, reach
+from holdfast.cli import doctor as verb
+from holdfast.cli import main
 from holdfast.cli.doctor import PURPOSES
 from holdfast.sources.xela import places
 
@@ -81,12 +82,12 @@ def test_what_can_be_reached(capsys, monkeypatch):
 def test_a_server_that_listens_is_told(monkeypatch):
     with socket.create_server(("127.0.0.1", 0)) as server:
         monkeypatch.setattr(places, "PORT", server.getsockname()[1])
-        assert reach.reachable()["xela"].startswith("something listens at 127.0.0.1:")
+        assert verb.reachable()["xela"].startswith("something listens at 127.0.0.1:")
 
 
 def test_missing_extras_are_told(monkeypatch):
-    monkeypatch.setattr(reach, "find_spec", lambda name: None)
-    told = reach.reachable()
+    monkeypatch.setattr(verb, "find_spec", lambda name: None)
+    told = verb.reachable()
     assert told["ros2"] == 'not installed: pip install "holdfast[ros2]"'
     assert told["serial"] == 'not installed: pip install "holdfast[serial]"'
 

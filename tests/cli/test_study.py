@@ -4,7 +4,7 @@ import msgspec
 import pytest
 
 from holdfast import parallel
-from holdfast.cli import main, study_data
+from holdfast.cli import main
 from holdfast.cli import study as verb
 from holdfast.contact import ContactState
 from holdfast.io import save_recording
@@ -73,10 +73,10 @@ def test_own_recordings(capsys, data, tmp_path):
 def test_the_twin_makes_the_recordings_first(capsys, monkeypatch, tmp_path):
     brief = msgspec.structs.replace(profile("reference"), idle=(0.7, 0.8), hold=1.5)
     monkeypatch.setattr(simulation, "profile", lambda name: brief)
-    monkeypatch.setattr(study_data, "QUICK", {"main": study_data.Kind()})
-    monkeypatch.setattr(study_data, "FEW", {"main": 1})
-    known = study_data.grasps
-    monkeypatch.setattr(study_data, "grasps", lambda _, *rest, **more: known("can", *rest, **more))
+    monkeypatch.setattr(verb, "QUICK", {"main": verb.Kind()})
+    monkeypatch.setattr(verb, "FEW", {"main": 1})
+    known = verb.grasps
+    monkeypatch.setattr(verb, "grasps", lambda _, *rest, **more: known("can", *rest, **more))
     out = tmp_path / "out"
     words = ("--twin", "--quick", "--jobs", 1, "--out", out, "--json")
     code, printed, told = run(capsys, *words)
@@ -100,9 +100,9 @@ def refusal_after(capsys, *words):
 
 
 def test_real_recordings_that_cannot_be_used_are_left_out(capsys, monkeypatch, tmp_path):
-    (tmp_path / "here" / study_data.REAL).mkdir(parents=True)
+    (tmp_path / "here" / verb.REAL).mkdir(parents=True)
     monkeypatch.setenv("HOLDFAST_DATA", str(tmp_path / "here"))
-    corpus, left_out = study_data.real_corpus(tmp_path / "real")
+    corpus, left_out = verb.real_corpus(tmp_path / "real")
     assert corpus is None
     assert left_out[0].startswith("real recordings, for those of HOLDFAST_DATA cannot be used (")
     assert "the real recordings are left out: " in capsys.readouterr().err
@@ -110,9 +110,9 @@ def test_real_recordings_that_cannot_be_used_are_left_out(capsys, monkeypatch, t
 
 def test_real_recordings_are_brought_in(data_folder, monkeypatch, tmp_path):
     monkeypatch.setenv("HOLDFAST_DATA", str(data_folder))
-    corpus, left_out = study_data.real_corpus(tmp_path / "real")
+    corpus, left_out = verb.real_corpus(tmp_path / "real")
     assert (len(corpus.recordings), corpus.tare, left_out) == (5, "first", [])
-    again, _ = study_data.real_corpus(tmp_path / "real")
+    again, _ = verb.real_corpus(tmp_path / "real")
     assert again == corpus
 
 

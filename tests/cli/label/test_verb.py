@@ -10,7 +10,8 @@ from urllib.request import Request, urlopen
 
 import pytest
 
-from holdfast.cli import label_page, main
+from holdfast.cli import main
+from holdfast.cli.label import page_mode
 from holdfast.cli.label.inputs import Asking
 from holdfast.contact import ContactState
 from holdfast.io import labels_path, load_labels, load_recording, save_labels, save_recording
@@ -256,7 +257,7 @@ def test_an_audit_is_told(capsys, folder, audited):
 def test_an_audit_is_shown_on_the_page(capsys, folder, audited, monkeypatch):
     shown = []
     monkeypatch.setattr(
-        label_page, "show_label_page", lambda *given: shown.append((given[0], given[-1]))
+        page_mode, "show_label_page", lambda *given: shown.append((given[0], given[-1]))
     )
     assert run(capsys, "--audit", folder, "--page", "--no-browser")[0] == 0
     assert shown == [([folder], [SUSPECT])]

@@ -3,7 +3,7 @@ import time
 
 import pytest
 
-from holdfast.cli.terminal import console
+from holdfast.cli.terminal import progress as module
 from holdfast.cli.terminal.progress import Bar, progress
 
 
@@ -11,7 +11,7 @@ from holdfast.cli.terminal.progress import Bar, progress
 def clock(monkeypatch):
     """A clock that the test moves on."""
     now = [1000.0]
-    monkeypatch.setattr(console.time, "monotonic", lambda: now[0])
+    monkeypatch.setattr(module.time, "monotonic", lambda: now[0])
 
     def wait(seconds):
         now[0] += seconds
@@ -52,7 +52,7 @@ def test_what_is_costly_weighs_more(capsys, clock):
 
 def test_a_bar_appears_before_the_first_step_is_done(capsys, monkeypatch):
     on_terminal(monkeypatch)
-    monkeypatch.setattr(console, "PATIENCE", 0.01)
+    monkeypatch.setattr(module, "PATIENCE", 0.01)
     with Bar("working", 3) as bar:
         ends = time.monotonic() + 20
         while bar._shown is None and time.monotonic() < ends:
