@@ -19,6 +19,8 @@ from holdfast.contact import (
     StateChanges,
     faults_of,
     hand_state,
+    hand_states,
+    is_held,
     taxels_of,
     with_faults,
 )
@@ -66,6 +68,18 @@ def test_no_label_is_unknown():
 def test_state_of_a_hand(fingers, n_model_fingers, expected):
     codes = np.array([NAMES[name] for name in fingers], dtype=np.int8)
     assert hand_state(codes, n_model_fingers) == expected
+
+
+@given(st.lists(st.sampled_from(list(NAMES.values())), max_size=5), st.integers(1, 4))
+def test_the_state_of_a_hand_at_many_instants_is_by_the_same_rule(codes, n_model_fingers):
+    fingers = np.array(codes, dtype=np.int8)
+    held = enough_contacts(np.array([(fingers == STABLE).sum()]), n_model_fingers)
+    (found,) = hand_states(np.array([UNSTABLE in codes]), np.array([UNKNOWN in codes]), held)
+    assert found == hand_state(fingers, n_model_fingers)
+
+
+def test_nothing_is_held_before_the_first_unstable_sample():
+    assert not is_held(0.0, np.nan, hold=1.0, period=0.01)
 
 
 @given(st.lists(st.sampled_from(list(NAMES.values())), min_size=2, max_size=5))

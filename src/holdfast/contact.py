@@ -1,7 +1,7 @@
-"""The words for a contact: states, reasons, causes, phases, estimates and events.
+"""Contact states, reasons, faults, causes, phases, estimates and events.
 
-Arrays of states hold codes: the place of the state in `ContactState`. Labels use the same
-codes, and an instant without a label is UNKNOWN, so that labels and decisions compare.
+Arrays of states hold codes: the position of the state in `ContactState`. Labels use the same
+codes. An instant without a label is UNKNOWN, so that labels and decisions can be compared.
 """
 
 import math
@@ -16,7 +16,7 @@ import numpy.typing as npt
 
 
 class ContactState(StrEnum):
-    """What is known of a contact; the code of a state is its place in this list."""
+    """State of a contact. The code of a state is its position in this list."""
 
     UNKNOWN = "UNKNOWN"
     NO_CONTACT = "NO_CONTACT"
@@ -25,7 +25,7 @@ class ContactState(StrEnum):
 
     @property
     def code(self) -> int:
-        """The state as a number: its place in the list of states."""
+        """Position of the state in the list of states."""
         return _STATES.index(self)
 
 
@@ -35,7 +35,7 @@ UNKNOWN, NO_CONTACT, UNSTABLE, STABLE = range(len(_STATES))
 
 
 class Reason(StrEnum):
-    """Why a contact's state is UNKNOWN; the code of a reason is its place in this list."""
+    """Reason why a state is UNKNOWN. The code of a reason is its position in this list."""
 
     NONE = ""
     TARE = "tare"
@@ -45,10 +45,10 @@ class Reason(StrEnum):
 
 
 class Fault(StrEnum):
-    """What is wrong with a finger; bit i of a fault mask is place i here.
+    """Fault of a finger. Bit i of a fault mask is position i in this list.
 
-    Those up to TARE_DRIFT show in the readings, and the detector finds them. The others show
-    in how samples arrive: a source tells them.
+    The detector finds the faults up to TARE_DRIFT in the readings. A source reports the others,
+    which concern the arrival of samples.
     """
 
     NOT_FINITE = "not_finite"
@@ -66,11 +66,11 @@ class Fault(StrEnum):
 
 
 SIGNAL_FAULTS = tuple(Fault)[:8]
-"""Those that show in the readings."""
+"""Faults that the detector finds in the readings."""
 
 
 class Cause(StrEnum):
-    """Why a contact is not stable."""
+    """Cause of a contact that is not stable."""
 
     CLOSING = "closing"
     DISTURBANCE = "disturbance"
@@ -80,7 +80,7 @@ class Cause(StrEnum):
 
 
 class Phase(StrEnum):
-    """What the experiment was doing."""
+    """Phase of an experiment."""
 
     FREE = "free"
     CLOSING = "closing"
@@ -109,19 +109,19 @@ MIN_CONTACT_DURATION = 0.1
 
 
 class ContactEstimate(msgspec.Struct, frozen=True, gc=False):
-    """What a detector says of one finger at one sample.
+    """Estimate of one finger at one sample.
 
     Attributes:
-        time: of the sample [s], on the clock of the source.
+        time: time of the sample, on the clock of the source [s].
         state: UNKNOWN, NO_CONTACT, UNSTABLE or STABLE.
         reason: why the state is UNKNOWN; empty otherwise.
-        stable_probability: that the contact is stable; NaN while UNKNOWN.
-        instability: sigma, the standard deviation of the Haar details, in the unit of the
-            readings; NaN without a full window.
-        force: F_tip = (F_x, F_y, F_z) in the fingertip frame, in the unit of the readings.
-        faults: what is wrong with the readings, or with how they arrive.
-        faulty_taxels: places in the module, from 0, of taxels that are at fault by themselves;
-            none where the finger as a whole is.
+        stable_probability: probability that the contact is stable; NaN while UNKNOWN.
+        instability: sigma, the standard deviation of the Haar details [unit of the readings];
+            NaN without a full window.
+        force: F_tip = (F_x, F_y, F_z) in the fingertip frame [unit of the readings].
+        faults: faults of the readings, or of their arrival.
+        faulty_taxels: indices in the module, from 0, of the taxels that are faulty by
+            themselves; empty where the finger as a whole is faulty.
     """
 
     time: float
@@ -135,11 +135,11 @@ class ContactEstimate(msgspec.Struct, frozen=True, gc=False):
 
 
 class HandEstimate(msgspec.Struct, frozen=True, gc=False):
-    """What a detector says of a hand at one instant: its own state, and each finger's.
+    """Estimate of a hand at one instant: its own state and the estimate of each finger.
 
     Attributes:
-        time: of the newest sample [s].
-        state: of the hand, see `hand_state`.
+        time: time of the newest sample [s].
+        state: state of the hand, see `hand_state`.
         fingers: the latest estimate of every finger of the model.
     """
 
@@ -149,13 +149,13 @@ class HandEstimate(msgspec.Struct, frozen=True, gc=False):
 
 
 class ContactEvent(NamedTuple):
-    """A change of a finger's contact state.
+    """Change of the contact state of a finger or of the hand.
 
     Attributes:
-        finger: whose contact it is; "hand" for the hand as a whole.
+        finger: name of the finger; "hand" for the hand as a whole.
         state: the state that begins.
         previous: the state that ends.
-        time: of the sample at which the new state was reported [s].
+        time: time of the sample at which the new state was reported [s].
     """
 
     finger: str
@@ -165,7 +165,7 @@ class ContactEvent(NamedTuple):
 
 
 class StateChanges:
-    """Find the changes of several contact states, sample by sample or in chunks.
+    """Memory of several contact states that finds their changes, by sample or in chunks.
 
     All states begin as UNKNOWN.
 
@@ -230,15 +230,20 @@ class StateChanges:
         ]
 
 
-def hand_state(codes: npt.NDArray[np.integer[Any]], n_model_fingers: int) -> int:
-    """The state of a hand, from the codes of its fingers' states.
+MIN_HOLDING_FINGERS = 2
+"""Fingers in stable contact from which the hand is STABLE; one, for a model of one finger."""
 
-    UNSTABLE if any finger is, else UNKNOWN if any is, else STABLE if at least two fingers are
-    in contact (one, where the model has one), else NO_CONTACT.
+
+def hand_state(codes: npt.NDArray[np.integer[Any]], n_model_fingers: int) -> int:
+    """Return the state of a hand, from the codes of its fingers' states.
+
+    The state is UNSTABLE if any finger is UNSTABLE, else UNKNOWN if any finger is UNKNOWN, else
+    STABLE if at least two fingers are in contact (one, for a model of one finger), else
+    NO_CONTACT.
 
     Args:
-        codes: (n_fingers,) state codes.
-        n_model_fingers: how many fingers the model has.
+        codes: (n_fingers,) codes of the states.
+        n_model_fingers: number of fingers of the model.
 
     Returns:
         The code of the hand's state.
@@ -256,18 +261,82 @@ def hand_state(codes: npt.NDArray[np.integer[Any]], n_model_fingers: int) -> int
         n_stable += code == STABLE
     if n_unknown > 0:
         return UNKNOWN
-    return STABLE if n_stable >= min(2, n_model_fingers) else NO_CONTACT
+    holds = n_stable >= min(MIN_HOLDING_FINGERS, n_model_fingers)
+    return STABLE if holds else NO_CONTACT
+
+
+_HAND_STATES = np.array(
+    [
+        hand_state(np.array([UNSTABLE] * unstable + [UNKNOWN] * unknown + [STABLE] * held), 1)
+        for unstable in (False, True)
+        for unknown in (False, True)
+        for held in (False, True)
+    ],
+    dtype=np.int8,
+)
+
+
+def hand_states(
+    unstable: npt.NDArray[np.bool_], unknown: npt.NDArray[np.bool_], held: npt.NDArray[np.bool_]
+) -> npt.NDArray[np.int8]:
+    """Return the states of a hand at many instants, by the rule of `hand_state`.
+
+    Args:
+        unstable: (n,) True where a finger is UNSTABLE.
+        unknown: (n,) True where a finger is UNKNOWN.
+        held: (n,) True where enough fingers are in contact, see `enough_contacts`.
+
+    Returns:
+        (n,) codes of the hand's state.
+
+    Example:
+        >>> calm = np.array([False, False])
+        >>> held = enough_contacts(np.array([1, 2]), n_model_fingers=3)
+        >>> hand_states(calm, calm, held).tolist() == [NO_CONTACT, STABLE]
+        True
+    """
+    return np.asarray(_HAND_STATES[4 * unstable + 2 * unknown + held])
+
+
+def enough_contacts(
+    n_contacts: npt.NDArray[np.integer[Any]], n_model_fingers: int
+) -> npt.NDArray[np.bool_]:
+    """Return where enough fingers are in contact to hold an object.
+
+    Args:
+        n_contacts: (n,) number of fingers in contact.
+        n_model_fingers: number of fingers of the model.
+    """
+    return np.asarray(n_contacts >= min(MIN_HOLDING_FINGERS, n_model_fingers))
+
+
+def is_held(time: float, last_unstable: float, hold: float, period: float) -> bool:
+    """Return whether UNSTABLE is still held at a time, for the hold time of a model.
+
+    Half a sample period of tolerance keeps the rounding of times from moving the end.
+
+    Args:
+        time: of a sample [s].
+        last_unstable: when the finger last was unstable [s]; NaN if it never was.
+        hold: hold time [s].
+        period: of the samples [s].
+
+    Example:
+        >>> [is_held(k / 100, 0.0, hold=0.03, period=0.01) for k in range(5)]
+        [True, True, True, False, False]
+    """
+    return time - last_unstable + 0.5 * period < hold
 
 
 @cache
 def faults_of(mask: int) -> tuple[Fault, ...]:
-    """The faults whose bits a mask has, in the order of `Fault`."""
+    """Return the faults whose bits are set in a mask, in the order of `Fault`."""
     return tuple(fault for bit, fault in enumerate(Fault) if mask >> bit & 1)
 
 
 @lru_cache(maxsize=4096)
 def taxels_of(mask: int) -> tuple[int, ...]:
-    """The taxels whose bits a mask has: bit i is taxel i."""
+    """Return the taxels whose bits are set in a mask; bit i is taxel i."""
     return tuple(taxel for taxel in range(mask.bit_length()) if mask >> taxel & 1)
 
 
@@ -277,17 +346,17 @@ def with_faults(
     n_model_fingers: int,
     reason: Reason = Reason.FAULT,
 ) -> HandEstimate:
-    """The estimate with what is wrong with how samples arrive.
+    """Return the estimate with faults in the arrival of samples added.
 
     Args:
-        estimate: by the readings alone.
-        faults: of the fingers that become UNKNOWN; of others nothing is known, and they are
-            passed over.
-        n_model_fingers: how many fingers the model has.
-        reason: that those fingers are given.
+        estimate: estimate from the readings alone.
+        faults: faults of the fingers that become UNKNOWN. Fingers that the estimate does not
+            have are ignored.
+        n_model_fingers: number of fingers of the model.
+        reason: reason that those fingers get.
 
     Returns:
-        The same object where no finger of it is named.
+        The same object if none of its fingers has such a fault.
 
     Example:
         >>> finger = ContactEstimate(1.0, ContactState.STABLE, Reason.NONE, 0.9, 2.0, (1, 0, 0))

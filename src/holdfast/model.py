@@ -12,7 +12,7 @@ import numpy.typing as npt
 
 from holdfast.classifiers import LinearClassifier
 from holdfast.errors import ModelError, OutputError
-from holdfast.features import FeatureSpec, Tare
+from holdfast.features import DEFAULT_WINDOW, FeatureSpec, Tare
 from holdfast.features.extract import extract
 from holdfast.features.stream import StreamPlan
 from holdfast.files import write_whole
@@ -119,7 +119,7 @@ class Model(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=Tru
     fingers: dict[str, FingerModel]
     rate: float | None = None
     sensors: dict[str, Sensor] = {}
-    window: int = 14
+    window: int = DEFAULT_WINDOW
     tare: str = "0.5"
     debounce: Debounce = Debounce()
     training: Training | None = None
@@ -305,7 +305,9 @@ def _noise_floor() -> Model:
         mean=(math.log(3.0),), scale=(1.0,), coefficients=(-slope,), intercept=0.0
     )
     finger = FingerModel(
-        features=(FeatureSpec("sigma", 14, "noise"),), classifier=rule, contact_noise=5.0
+        features=(FeatureSpec("sigma", DEFAULT_WINDOW, "noise"),),
+        classifier=rule,
+        contact_noise=5.0,
     )
     return Model(name="builtin:noise-floor", fingers={ANY_FINGER: finger})
 

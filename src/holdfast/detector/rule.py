@@ -52,6 +52,7 @@ UNKNOWN, NO_CONTACT, UNSTABLE, STABLE = (
     contact.STABLE,
 )
 _hand_state = compiled(contact.hand_state)
+_is_held = compiled(contact.is_held)
 
 
 # Columns of Rule.limits.
@@ -346,7 +347,7 @@ def _held(state: int, decided: Array, hold: float, time: float, period: float) -
     """UNSTABLE for a while after the rule last said so."""
     if state == UNSTABLE:
         decided[LAST_UNSTABLE] = time
-    elif time - decided[LAST_UNSTABLE] + 0.5 * period < hold:  # False while it never said so
+    elif _is_held(time, decided[LAST_UNSTABLE], hold, period):
         return UNSTABLE
     return state
 

@@ -1,11 +1,12 @@
 """From readings to features: tare, fingertip force, the Haar window."""
 
 from holdfast.features.force import fingertip_force
-from holdfast.features.haar import FEATURE_NAMES, haar_features
+from holdfast.features.haar import DEFAULT_WINDOW, FEATURE_NAMES, haar_features
 from holdfast.features.specs import DEPLOYED, FeatureSpec, parse_features
 from holdfast.features.tare import Tare
 
 __all__ = [
+    "DEFAULT_WINDOW",
     "DEPLOYED",
     "FEATURE_NAMES",
     "FeatureSpec",

@@ -10,6 +10,9 @@ from holdfast.compiled import compiled, compiled_parallel
 
 Array = npt.NDArray[np.float64]
 
+DEFAULT_WINDOW = 14
+"""N_w, samples in the window, as in most of the paper."""
+
 FEATURE_NAMES = ("F_a", "F_x", "F_y", "F_z", "m", "sigma")
 """The paper's features, in the order of the columns of `haar_features`."""
 
@@ -17,7 +20,7 @@ _BLOCK = 512
 """Samples that one thread takes at a time: small enough for the cache."""
 
 
-def haar_features(force: npt.ArrayLike, window: int = 14) -> npt.NDArray[np.float64]:
+def haar_features(force: npt.ArrayLike, window: int = DEFAULT_WINDOW) -> npt.NDArray[np.float64]:
     r"""The paper's six features of a fingertip force, at every sample.
 
     Amplitude F_a = |F_tip|, the three components, and from the Haar transform of F_a over the

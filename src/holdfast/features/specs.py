@@ -7,7 +7,7 @@ import msgspec
 import numpy as np
 import numpy.typing as npt
 
-from holdfast.features.haar import FEATURE_NAMES, check_window
+from holdfast.features.haar import DEFAULT_WINDOW, FEATURE_NAMES, check_window
 
 KINDS = (*FEATURE_NAMES, "sigma_xyz", "change")
 TRANSFORMS = ("none", "log", "noise")
@@ -73,7 +73,9 @@ HOLDFAST = (FeatureSpec("F_a", 0, "log", floor=FORCE_FLOOR), *_rich("finger"), *
 """Our own features, `holdfast` by name: see `holdfast.study.methods.holdfast`."""
 
 
-def parse_features(names: str | Sequence[str], window: int = 14) -> tuple[FeatureSpec, ...]:
+def parse_features(
+    names: str | Sequence[str], window: int = DEFAULT_WINDOW
+) -> tuple[FeatureSpec, ...]:
     """The features of that list of names, with that window.
 
     Args:

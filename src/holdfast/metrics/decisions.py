@@ -8,7 +8,7 @@ from typing import Any, Self
 import numpy as np
 import numpy.typing as npt
 
-from holdfast.contact import NO_CONTACT, STABLE, UNKNOWN, UNSTABLE
+from holdfast.contact import STABLE, UNKNOWN, UNSTABLE, enough_contacts, hand_states
 from holdfast.sensors.types import Array
 
 Codes = npt.NDArray[np.int8]
@@ -136,13 +136,8 @@ def _held(times: Array, codes: Codes, at: Array) -> Codes:
 
 
 def _hand_states(codes: list[Codes], n_times: int, n_model_fingers: int) -> Codes:
-    """`holdfast.contact.hand_state` at every instant."""
+    """Return the state of the hand at every instant, from (n_times,) codes of each finger."""
     table = np.array(codes, dtype=np.int8).reshape(len(codes), n_times)
-    held = (table == STABLE).sum(axis=0) >= min(2, n_model_fingers)
-    choices = [
-        ((table == UNSTABLE).any(axis=0), UNSTABLE),
-        ((table == UNKNOWN).any(axis=0), UNKNOWN),
-        (held, STABLE),
-    ]
-    states = np.select([c for c, _ in choices], [s for _, s in choices], default=NO_CONTACT)
-    return states.astype(np.int8)
+    unstable, unknown = (table == UNSTABLE).any(axis=0), (table == UNKNOWN).any(axis=0)
+    held = enough_contacts((table == STABLE).sum(axis=0), n_model_fingers)
+    return hand_states(unstable, unknown, held)

@@ -12,7 +12,7 @@ from matplotlib.patches import Patch
 from matplotlib.ticker import LogLocator, MaxNLocator, NullLocator
 
 from holdfast.contact import ContactState
-from holdfast.features import FEATURE_NAMES, Tare, fingertip_force, haar_features
+from holdfast.features import DEFAULT_WINDOW, FEATURE_NAMES, Tare, fingertip_force, haar_features
 from holdfast.plots.envelope import envelope
 from holdfast.recordings import GAP_PERIODS, Recording, Tactile
 from holdfast.sensors.types import Array
@@ -50,7 +50,9 @@ class _Curves:
     slip: tuple[Array, Array] | None
 
 
-def plot_recording(recording: Recording, tare: Tare | None = None, window: int = 14) -> Figure:
+def plot_recording(
+    recording: Recording, tare: Tare | None = None, window: int = DEFAULT_WINDOW
+) -> Figure:
     """Forces, sigma, labels and slip of each finger over time.
 
     Pads (names with "/") are left out where there are fingertips.

@@ -9,7 +9,7 @@ from sklearn.base import BaseEstimator, ClassifierMixin
 from sklearn.utils.validation import check_is_fitted
 
 from holdfast.contact import STABLE
-from holdfast.features import DEPLOYED, Tare, parse_features
+from holdfast.features import DEFAULT_WINDOW, DEPLOYED, Tare, parse_features
 from holdfast.recordings import Recording
 from holdfast.training.design import at_rate
 from holdfast.training.fitting import fit_all
@@ -41,7 +41,7 @@ class StabilityClassifier(ClassifierMixin, BaseEstimator):
     def __init__(
         self,
         classifier: str = "logreg",
-        window: int = 14,
+        window: int = DEFAULT_WINDOW,
         features: str = ",".join(DEPLOYED),
         tare: float | str = 0.5,
         C: float = 1.0,
