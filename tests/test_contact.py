@@ -17,6 +17,7 @@ from holdfast.contact import (
     HandEstimate,
     Reason,
     StateChanges,
+    enough_contacts,
     faults_of,
     hand_state,
     hand_states,
