@@ -22,9 +22,9 @@ from tempfile import TemporaryDirectory
 import numpy as np
 
 from holdfast.io import save_recording
-from holdfast.live.service import Service
 from holdfast.live.session import Session
 from holdfast.live.stream_detector import StreamDetector
+from holdfast.live.web.service import LiveService
 from holdfast.model import Model
 from holdfast.sources import open_source
 from holdfast.synthetic import synthetic_recording
@@ -122,7 +122,7 @@ def _serve(session: Session, model: Model) -> None:
     async def run() -> None:
         from aiohttp import ClientSession, web
 
-        runner = web.AppRunner(Service(session, model, Guard("127.0.0.1")).app)
+        runner = web.AppRunner(LiveService(session, model, Guard("127.0.0.1")).app)
         await runner.setup()
         site = web.TCPSite(runner, "127.0.0.1", 0)
         await site.start()

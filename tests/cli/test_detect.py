@@ -18,8 +18,8 @@ from holdfast.detector import detect
 from holdfast.features import FeatureSpec
 from holdfast.io import load_recording, save_recording
 from holdfast.io.mcap_writer import RecordingWriter
-from holdfast.live.play import XelaServer
 from holdfast.live.stream_detector import StreamDetector
+from holdfast.live.xela_server import XelaServer
 from holdfast.model import Debounce, FingerModel, Model
 from holdfast.recordings import Recording, Tactile
 from holdfast.sensors import sensor

@@ -15,7 +15,7 @@ import pytest
 import holdfast.sources.serial
 import holdfast.sources.twin
 from holdfast.io import save_recording
-from holdfast.live.play import XelaServer
+from holdfast.live.xela_server import XelaServer
 from holdfast.recordings import Recording, Tactile
 from holdfast.ros.cdr import MessageEncoder
 from holdfast.ros.messages import known_definition

@@ -9,7 +9,7 @@ import pytest
 
 PACKAGE = Path(str(resources.files("holdfast")))
 SHARED = PACKAGE / "web" / "static"
-PAGES = [PACKAGE / "live" / "page", PACKAGE / "labelling" / "page"]
+PAGES = [PACKAGE / "live" / "web" / "page", PACKAGE / "labelling" / "page"]
 NAMED = re.compile(r'(?:src|href)="([^"#]+)"|^(?:import|export)\b.* from "([^"]+)";$', re.MULTILINE)
 
 

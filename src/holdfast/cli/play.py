@@ -13,7 +13,7 @@ from holdfast.cli.options import check_speed
 from holdfast.cli.terminal.console import print_json, say
 
 if TYPE_CHECKING:
-    from holdfast.live.play import XelaServer
+    from holdfast.live.xela_server import XelaServer
 
 LOOK_EVERY = 0.2
 """How often it is looked whether it has ended [s]."""
@@ -61,7 +61,7 @@ def play(
       holdfast play grasp.parquet --once --separate --version 1.7
       holdfast detect builtin:twin xela://127.0.0.1:5000
     """
-    from holdfast.live.play import XelaServer
+    from holdfast.live.xela_server import XelaServer
     from holdfast.sources import open_source
     from holdfast.sources.xela.encoder import is_part_of_hand
 

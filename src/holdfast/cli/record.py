@@ -103,7 +103,7 @@ def _record(
     from holdfast.cli.terminal.keys import LEGEND, Keys
     from holdfast.cli.terminal.record_line import RecordLine
     from holdfast.errors import OutputError, SourceError
-    from holdfast.live.intake import plain
+    from holdfast.live.recording_buffer import plain
 
     say(f"recording {source.name} to {recorder.path}")
     try:

@@ -158,14 +158,14 @@ def show_page(
         OutputError: the address cannot be listened at.
         Exception: that which made the session fail.
     """
-    from holdfast.live.service import Service
     from holdfast.live.session import Session
     from holdfast.live.stream_detector import StreamDetector
+    from holdfast.live.web.service import LiveService
     from holdfast.web.guard import Guard
     from holdfast.web.server import run_server
 
     session = Session(stream or StreamDetector(model, source))
-    service = Service(session, model, guard or Guard(host), folder)
+    service = LiveService(session, model, guard or Guard(host), folder)
     for listener in listeners:
         session.add_listener(listener)
     session.start()

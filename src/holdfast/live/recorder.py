@@ -12,7 +12,7 @@ from typing import Any, NamedTuple, Self
 from holdfast.contact import Fault
 from holdfast.errors import OutputError
 from holdfast.io.mcap_writer import RecordingWriter
-from holdfast.live.intake import Intake
+from holdfast.live.recording_buffer import RecordingBuffer
 from holdfast.sensors import Sensor
 from holdfast.sources import Arrival
 
@@ -117,7 +117,7 @@ class Recorder:
         self.path = Path(path)
         self._writer = RecordingWriter(path, sensors, name=name, metadata=metadata, force=force)
         self._file = _identity(self.path)
-        self._intake = Intake(sensors)
+        self._intake = RecordingBuffer(sensors)
         self._queue: deque[Arrival | _Marker] = deque()
         self._newest = math.nan
         self._n_overflown = self._n_told = self._n_markers = 0

@@ -13,7 +13,7 @@ from holdfast.live.stream_detector import StreamUpdate
 _NAME = re.compile(r"\w[\w .-]{0,99}", re.ASCII)
 
 
-class Recordings:
+class SessionRecorder:
     """Begins, marks and ends recordings of a session; from any thread.
 
     Args:

@@ -1,6 +1,6 @@
 // Draws labels, proposals, and what is doubtful about them.
 
-import { colours, font, stateColour, stateLine } from "../web/theme.js";
+import { colours, font, stateColour, stateLineColour } from "../web/theme.js";
 import { cutText, hatch, line, shape } from "./pen.js";
 import { LEFT, RIGHT } from "./view.js";
 import { labelWord, percent, stateKey, stateWord } from "./words.js";
@@ -28,7 +28,7 @@ export function grounds(pen, view, row) {
 export function tints(pen, view, row, labels) {
   for (const [{ state }, [left, right]] of seen(view, labels)) {
     const key = stateKey(state);
-    pen.fillStyle = stateLine(key);
+    pen.fillStyle = stateLineColour(key);
     pen.globalAlpha = TINT[key] ?? 0.1;
     pen.fillRect(left, row.force[0] - 3, right - left, row.sigma[1] - row.force[0] + 3);
   }
@@ -63,8 +63,8 @@ export function proposed(pen, view, row, items, open) {
   for (const [item, [left, right]] of seen(view, items)) {
     const key = stateKey(item.state), todo = open.has(item);
     pen.globalAlpha = (0.25 + 0.75 * item.confidence) * (todo ? 1 : 0.3);
-    pen.fillStyle = stateLine(key);
-    if (key !== "no-contact") hatch(pen, left, top, right - left, bottom - top, stateLine(key), key === "stable" ? 7 : 4, key === "stable" ? 3 : 2);
+    pen.fillStyle = stateLineColour(key);
+    if (key !== "no-contact") hatch(pen, left, top, right - left, bottom - top, stateLineColour(key), key === "stable" ? 7 : 4, key === "stable" ? 3 : 2);
     else {
       pen.globalAlpha *= 0.5;
       pen.fillRect(left, top, right - left, bottom - top);

@@ -1,6 +1,6 @@
 // What keys and buttons do.
 
-import { call } from "../web/api.js";
+import { callService } from "../web/api.js";
 import { byId } from "../web/dom.js";
 import { toast } from "./dialogs.js";
 import { keys } from "./bindings.js";
@@ -109,7 +109,7 @@ export class Deeds {
     if (button.classList.contains("busy")) return;
     button.classList.add("busy");
     try {
-      const { proposals } = await call("POST", `recordings/${id}/propose`, { rule: byId("rule").value, parameters: {} });
+      const { proposals } = await callService("POST", `recordings/${id}/propose`, { rule: byId("rule").value, parameters: {} });
       if (turn !== this.page.turn) return;
       editor.recording.proposals = proposals;
       // Who asks again wants to see all of them.

@@ -1,7 +1,7 @@
 // Whose labels count: those of an earlier page that died, or of somebody else. Nothing is lost:
 // what is not taken is one step of undo away.
 
-import { call } from "../web/api.js";
+import { callService } from "../web/api.js";
 import { ask, toast } from "./dialogs.js";
 import { many, whenWord } from "./words.js";
 
@@ -21,7 +21,7 @@ export async function settle(page) {
   const { id, turn, editor, saver } = page;
   let theirs;
   try {
-    theirs = await call("GET", `recordings/${id}`);
+    theirs = await callService("GET", `recordings/${id}`);
   } catch (error) {
     toast(error.message, "bad");
     return;

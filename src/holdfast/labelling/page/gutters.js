@@ -1,6 +1,6 @@
 // Beside the plots of each finger: its name, what the lines are, and their values at the cursor.
 
-import { make, write } from "../web/dom.js";
+import { make, setText } from "../web/dom.js";
 import { colours, fingerColour } from "../web/theme.js";
 import { forceLines } from "./lines.js";
 import { number, unitWord } from "./words.js";
@@ -37,6 +37,6 @@ export class Gutters {
   }
 
   show(finger, found) {
-    for (const [key, element] of this.values.get(finger) ?? []) write(element, number(found?.[key]));
+    for (const [key, element] of this.values.get(finger) ?? []) setText(element, number(found?.[key]));
   }
 }

@@ -1,7 +1,7 @@
 // Puts the parts together.
 
-import { call } from "../web/api.js";
-import { byId, write } from "../web/dom.js";
+import { callService } from "../web/api.js";
+import { byId, setText } from "../web/dom.js";
 import { onTheme } from "../web/theme.js";
 import { Deeds } from "./deeds.js";
 import { alert, toast } from "./dialogs.js";
@@ -54,10 +54,10 @@ class Page {
 
   async start() {
     try {
-      const { schema, author, recordings } = await call("GET", "recordings");
+      const { schema, author, recordings } = await callService("GET", "recordings");
       if (schema !== SCHEMA) throw new Error(`the service speaks ${schema}, this page ${SCHEMA}: load the page anew`);
       this.author = author;
-      write(byId("author"), author);
+      setText(byId("author"), author);
       this.recordings.open(recordings);
       if (!recordings.length) throw new Error("there are no recordings");
     } catch (error) {
@@ -79,7 +79,7 @@ class Page {
     this.recordings.mark(id);
     let recording;
     try {
-      recording = await call("GET", `recordings/${id}`);
+      recording = await callService("GET", `recordings/${id}`);
     } catch (error) {
       if (turn === this.turn) this.broken(id, error);
       return;
@@ -106,7 +106,7 @@ class Page {
   }
 
   async change(id, turn) {
-    const { fingers } = await call("GET", `recordings/${id}/changes`).catch(() => ({ fingers: {} })); // nothing snaps, that is all
+    const { fingers } = await callService("GET", `recordings/${id}/changes`).catch(() => ({ fingers: {} })); // nothing snaps, that is all
     if (turn !== this.turn) return;
     this.plot.changes = fingers;
     this.plot.redraw("under");
@@ -120,10 +120,10 @@ class Page {
     this.state.open(recording);
     this.player.open(recording);
     this.plot.playhead = null;
-    write(byId("played"), "");
+    setText(byId("played"), "");
     this.plot.open();
     this.view.limit(recording.start, recording.end, LEAST_SAMPLES / (recording.rate || 100));
-    write(byId("name"), recording.name);
+    setText(byId("name"), recording.name);
     byId("name").title = recording.name;
     document.title = `${recording.name} · holdfast label`;
     byId("note").disabled = this.editor.readOnly;
@@ -178,7 +178,7 @@ class Page {
 
   played(time) {
     this.plot.playhead = time;
-    write(byId("played"), `${timeWord(time, 0.01)} s`);
+    setText(byId("played"), `${timeWord(time, 0.01)} s`);
     if (this.player.playing) this.view.follow(time);
     this.plot.redraw("over");
   }

@@ -1,6 +1,6 @@
 // Beside the plots: the recordings, and what is left to be looked at.
 
-import { byId, make, shape, write } from "../web/dom.js";
+import { byId, make, shape, setText } from "../web/dom.js";
 import { labelWord, lengthWord, many, percent, stateKey, stateWord, timeWord } from "./words.js";
 
 const MOST = 60; // rows of doubtful stretches
@@ -49,7 +49,7 @@ export class Recordings {
 
   progress() {
     const done = this.all.filter(({ labelled }) => labelled).length;
-    write(byId("progress"), `${done} of ${this.all.length} labelled`);
+    setText(byId("progress"), `${done} of ${this.all.length} labelled`);
     byId("progress-bar").style.transform = `scaleX(${this.all.length ? done / this.all.length : 0})`;
   }
 
@@ -78,11 +78,11 @@ export class Checks {
 
   show() {
     const { doubts, proposals, focus } = this.editor;
-    write(byId("open-proposals"), proposals.length ? `${many(proposals.length, "proposal")} open` : "no open proposals");
+    setText(byId("open-proposals"), proposals.length ? `${many(proposals.length, "proposal")} open` : "no open proposals");
     byId("accept-all").disabled = this.editor.readOnly || !proposals.length;
     if (this.shown !== doubts) {
       this.shown = doubts;
-      write(byId("n-doubts"), doubts.length ? String(doubts.length) : "");
+      setText(byId("n-doubts"), doubts.length ? String(doubts.length) : "");
       byId("doubts").replaceChildren(...doubts.slice(0, MOST).map((each) => this.row(each)));
     }
     [...byId("doubts").children].forEach((row, k) => row.firstElementChild.setAttribute("aria-current", String(doubts[k]?.item === focus?.item && focus !== null)));

@@ -1,7 +1,7 @@
 // Time that runs: the video's, where there is one, else the page's own.
 
-import { openAddress } from "../web/api.js";
-import { byId, make, write } from "../web/dom.js";
+import { addressWithToken } from "../web/api.js";
+import { byId, make, setText } from "../web/dom.js";
 import { keep, kept } from "./saver.js";
 
 const SMALL = 0.02; // [s], less the video need not be moved
@@ -50,7 +50,7 @@ export class Player {
       return;
     }
     this.video.hidden = false;
-    this.video.src = openAddress(`media/${this.id}/${medium.index}`).href;
+    this.video.src = addressWithToken(`media/${this.id}/${medium.index}`).href;
     this.video.playbackRate = this.rate;
   }
 
@@ -78,7 +78,7 @@ export class Player {
 
   tell(text) {
     byId("film-offset").hidden = true;
-    write(byId("film-problem"), text);
+    setText(byId("film-problem"), text);
     byId("film-problem").hidden = false;
   }
 

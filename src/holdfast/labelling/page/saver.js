@@ -1,6 +1,6 @@
 // Keeps the labels: in the browser at once, on the disk a moment later, and says how it stands.
 
-import { call } from "../web/api.js";
+import { callService } from "../web/api.js";
 
 const PAUSE = 300; // [ms] after the last change
 const RETRIES = [1000, 2000, 5000, 10000]; // [ms]
@@ -118,7 +118,7 @@ export class Saver {
     this.tell("saving");
     let answer, problem = null;
     try {
-      answer = await call("PUT", `recordings/${recording.id}/labels`, { labels, note, author: this.author, revision: this.revision });
+      answer = await callService("PUT", `recordings/${recording.id}/labels`, { labels, note, author: this.author, revision: this.revision });
     } catch (error) {
       problem = error;
     }

@@ -1,6 +1,6 @@
 // Signals of the recording: the whole of it coarsely, and what is looked at, finely, with a margin.
 
-import { call } from "../web/api.js";
+import { callService } from "../web/api.js";
 
 export const SERIES = ["F_a", "F_x", "F_y", "F_z", "sigma"];
 const MARGIN = 0.4; // of the window, on either side
@@ -59,7 +59,7 @@ export class Signals {
   async ask(start, end, points) {
     this.n_asked += 1;
     const query = new URLSearchParams({ start, end, points });
-    return read(await call("GET", `recordings/${this.id}/signals?${query}`), points);
+    return read(await callService("GET", `recordings/${this.id}/signals?${query}`), points);
   }
 
   /** Asks for what a window needs, unless it is there: one question at a time, the newest next. */

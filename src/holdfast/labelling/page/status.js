@@ -1,6 +1,6 @@
 // The line below: how the saving stands, what is pointed at, and when.
 
-import { byId, make, shape, write } from "../web/dom.js";
+import { byId, make, shape, setText } from "../web/dom.js";
 import { labelWord, percent, spanWord, stateKey, stateWord, timeWord, whenWord } from "./words.js";
 
 const SAVING = { saving: "saving …", waiting: "not saved yet …", conflict: "NOT SAVED: the file was changed by somebody else", none: "no labels yet" };
@@ -11,7 +11,7 @@ export class SaveState {
     this.by = { author, time };
     if (origin === "file") this.tell("saved");
     else this.tell("none", origin === "inside" ? "labels of the recording itself" : "");
-    if (read_only) write(byId("save-text"), `read-only${author ? ` · by ${author}, ${whenWord(time)}` : ""}`);
+    if (read_only) setText(byId("save-text"), `read-only${author ? ` · by ${author}, ${whenWord(time)}` : ""}`);
   }
 
   tell(state, why = "", by = null) {
@@ -20,7 +20,7 @@ export class SaveState {
     const saved = author || time ? `saved${author ? ` by ${author}` : ""}${time ? `, ${whenWord(time)}` : ""}` : "no changes";
     const words = { ...SAVING, saved, failed: `NOT SAVED: ${why}` };
     byId("save").dataset.save = state;
-    write(byId("save-text"), state === "none" && why ? why : words[state]);
+    setText(byId("save-text"), state === "none" && why ? why : words[state]);
     byId("save").title = state === "saved" && time ? new Date(time).toLocaleString("en-GB") : why;
   }
 }
@@ -54,5 +54,5 @@ export function tellWindow(view, signals) {
   const { part, whole } = signals, data = part && part.start <= view.start && part.end >= view.end ? part : whole;
   const digits = view.span > 20 ? 0.1 : view.span > 2 ? 0.01 : 0.001;
   const text = `${timeWord(view.start, digits)} – ${timeWord(view.end, digits)} s`;
-  write(byId("window"), data?.exact ? `${text} · every sample` : text);
+  setText(byId("window"), data?.exact ? `${text} · every sample` : text);
 }

@@ -1,6 +1,6 @@
 // Words and numbers as people read them. Pure functions.
 
-import { MINUS, NOTHING, plain } from "../web/text.js";
+import { MINUS, NO_VALUE, withSpaces } from "../web/text.js";
 
 export * from "../web/text.js";
 
@@ -10,10 +10,10 @@ export const CAUSES = ["closing", "disturbance", "slip", "lost", "released"]; //
 /** The key of a state in class names, shapes and colours: "no-contact". */
 export const stateKey = (state) => (STATES.includes(state) ? state.replace("_", "-") : "unknown");
 
-export const stateWord = (state) => plain(state ?? "unknown");
+export const stateWord = (state) => withSpaces(state ?? "unknown");
 
 /** "unstable, slip" */
-export const labelWord = ({ state, cause }) => stateWord(state) + (cause ? `, ${plain(cause)}` : "");
+export const labelWord = ({ state, cause }) => stateWord(state) + (cause ? `, ${withSpaces(cause)}` : "");
 
 /** A time with the digits that a step of the axis needs. */
 export const timeWord = (time, step) =>
@@ -25,7 +25,7 @@ export const spanWord = ({ start, end }) =>
 
 /** A length of time: "31 s", "4:05 min". */
 export function lengthWord(seconds) {
-  if (!Number.isFinite(seconds)) return NOTHING;
+  if (!Number.isFinite(seconds)) return NO_VALUE;
   const whole = Math.round(seconds);
   return whole < 100 ? `${whole} s` : `${Math.floor(whole / 60)}:${String(whole % 60).padStart(2, "0")} min`;
 }

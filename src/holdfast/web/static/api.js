@@ -6,14 +6,14 @@ const token = new URLSearchParams(window.location.search).get("token");
 const address = (path) => new URL(path, document.baseURI);
 
 /** An address with the token inside, for what the browser asks for without our headers. */
-export function openAddress(path) {
+export function addressWithToken(path) {
   const url = address(path);
   if (token !== null) url.searchParams.set("token", token);
   return url;
 }
 
 /** Calls the service; throws an Error with the service's own words where it refuses. */
-export async function call(method, path, body) {
+export async function callService(method, path, body) {
   const headers = token === null ? {} : { Authorization: `Bearer ${token}` };
   if (body !== undefined) headers["Content-Type"] = "application/json";
   let response;

@@ -13,7 +13,7 @@ export function make(tag, name = "", ...children) {
 }
 
 /** Sets a text where it differs, so that nothing is laid out anew for nothing. */
-export function write(element, text) {
+export function setText(element, text) {
   if (element.textContent !== text) element.textContent = text;
 }
 
@@ -29,7 +29,7 @@ export function shape(key) {
 }
 
 /** One button of a row of which exactly one is pressed. */
-export function choice(row, entries, chosen, choose) {
+export function fillChoice(row, entries, chosen, choose) {
   row.replaceChildren(...entries.map(({ value, label, title, mark }) => {
     const button = make("button", "", ...(mark ? [mark] : []), make("span", "", label));
     button.type = "button";
@@ -41,7 +41,7 @@ export function choice(row, entries, chosen, choose) {
   }));
 }
 
-export function press(row, value) {
+export function setPressed(row, value) {
   for (const button of row.children) {
     button.setAttribute("aria-pressed", String(button.dataset.value === String(value)));
   }

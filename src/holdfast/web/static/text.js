@@ -1,14 +1,14 @@
 // Words and numbers as people read them on every page. Pure functions.
 
 export const MINUS = "\u2212";
-export const NOTHING = "\u2013";
+export const NO_VALUE = "\u2013";
 
 /** What nobody has named yet is shown as it came, underscores apart. */
-export const plain = (word) => String(word).replaceAll("_", " ");
+export const withSpaces = (word) => String(word).replaceAll("_", " ");
 
 /** A number to three or four digits, with a real minus; a dash for none. */
 export function number(value) {
-  if (value === null || value === undefined || !Number.isFinite(value)) return NOTHING;
+  if (value === null || value === undefined || !Number.isFinite(value)) return NO_VALUE;
   const size = Math.abs(value);
   let text;
   if (size >= 99999.5) text = `${(size / 1000).toFixed(0)}k`;
@@ -20,4 +20,4 @@ export function number(value) {
 
 export const unitWord = (unit) => (unit === "count" ? "counts" : unit ?? "");
 
-export const percent = (share) => (Number.isFinite(share) ? `${Math.round(100 * share)}\u202f%` : NOTHING);
+export const percent = (share) => (Number.isFinite(share) ? `${Math.round(100 * share)}\u202f%` : NO_VALUE);

@@ -7,7 +7,7 @@ const NAMES = [
   "finger-0", "finger-1", "finger-2", "finger-3", "finger-4", "finger-5",
   "axis-x", "axis-y", "axis-z", "marker",
 ];
-export const light = window.matchMedia("(prefers-color-scheme: light)");
+export const lightTheme = window.matchMedia("(prefers-color-scheme: light)");
 
 export const colours = {};
 
@@ -22,11 +22,11 @@ function read() {
 
 /** Calls `changed` whenever the system turns from dark to light or back. */
 export function onTheme(changed) {
-  light.addEventListener("change", () => { read(); changed(); });
+  lightTheme.addEventListener("change", () => { read(); changed(); });
 }
 
 export const fingerColour = (place) => colours[`finger-${place % 6}`];
 export const stateColour = (key) => colours[key];
-export const stateLine = (key) => colours[`${key}-line`];
+export const stateLineColour = (key) => colours[`${key}-line`];
 
 read();

@@ -3,7 +3,7 @@
 import { colours, font } from "../web/theme.js";
 import { heat } from "./heat.js";
 import { hull, layout, turned } from "./layout.js";
-import { number, unitWord } from "./words.js";
+import { number, unitWord } from "./format.js";
 
 const FONT = font(11);
 // Readings under this are noise: the scale never gets finer.

@@ -1,7 +1,7 @@
 // The banner with the state of the hand, the alert below it, and the line of health.
 
-import { byId, make, write } from "../web/dom.js";
-import { NOTHING, delay, stateKey, stateWord } from "./words.js";
+import { byId, make, setText } from "../web/dom.js";
+import { NO_VALUE, delay, stateKey, stateWord } from "./format.js";
 
 const SPEAK = 1500; // [ms] between two announcements: a screen reader cannot follow 20 a second
 
@@ -13,14 +13,14 @@ export class Hand {
 
   start(hello) {
     const about = [hello.model, hello.source].map(String).join(" · ");
-    write(byId("about"), about);
+    setText(byId("about"), about);
     byId("about").title = about;
     document.title = `holdfast · ${hello.source}`;
   }
 
   tell(state, word = stateWord(state)) {
     const key = stateKey(state);
-    write(byId("hand-word"), word);
+    setText(byId("hand-word"), word);
     if (this.box.dataset.state !== key) {
       this.box.dataset.state = key;
       byId("hand-shape").setAttribute("href", `#shape-${key}`);
@@ -36,7 +36,7 @@ export class Hand {
 /** What must be seen at once, or nothing: the first of these texts that is not empty. */
 export function alert(...texts) {
   const text = texts.find(Boolean) ?? "", box = byId("alert");
-  write(box, text);
+  setText(box, text);
   box.hidden = !text;
 }
 
@@ -44,7 +44,7 @@ export function alert(...texts) {
 export class Health {
   constructor(footer) {
     const part = (key, label) => {
-      const value = make("b", "", NOTHING);
+      const value = make("b", "", NO_VALUE);
       footer.append(make("span", key, label, " ", value));
       return value;
     };
@@ -62,19 +62,19 @@ export class Health {
 
   connection(state, text) {
     this.footer.dataset.link = state;
-    write(this.link, text);
+    setText(this.link, text);
   }
 
   update(health) {
-    const whole = (n) => (n === null || n === undefined ? NOTHING : n.toLocaleString("en").replaceAll(",", "\u202f"));
-    write(this.rate, health.rate === null || health.rate === undefined ? NOTHING : `${health.rate.toFixed(1)} Hz`);
+    const whole = (n) => (n === null || n === undefined ? NO_VALUE : n.toLocaleString("en").replaceAll(",", "\u202f"));
+    setText(this.rate, health.rate === null || health.rate === undefined ? NO_VALUE : `${health.rate.toFixed(1)} Hz`);
     const latency = health.latency ?? {};
-    write(this.latency, delay(latency.p50));
-    write(this.late, delay(latency.p99));
-    write(this.worst, delay(latency.max));
-    write(this.packets, whole(health.n_packets));
+    setText(this.latency, delay(latency.p50));
+    setText(this.late, delay(latency.p99));
+    setText(this.worst, delay(latency.max));
+    setText(this.packets, whole(health.n_packets));
     [health.n_lost, health.n_refused, health.n_dropped].forEach((n, k) => {
-      write(this.counts[k], whole(n));
+      setText(this.counts[k], whole(n));
       this.counts[k].parentElement.classList.toggle("bad", n > 0);
     });
   }

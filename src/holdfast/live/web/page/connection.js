@@ -1,6 +1,6 @@
 // The connection to the service: it comes back by itself, and says how it is.
 
-import { call, openAddress } from "../web/api.js";
+import { callService, addressWithToken } from "../web/api.js";
 
 const SHORTEST = 500, LONGEST = 4000; // [ms] between attempts
 const PATIENCE = 4000; // [ms] without a message: a cable that was pulled closes nothing
@@ -8,7 +8,7 @@ const SCHEMA = "holdfast.live/1";
 
 // A browser cannot give a WebSocket headers, so the token is in its address.
 function liveAddress() {
-  const url = openAddress("api/v1/live");
+  const url = addressWithToken("api/v1/live");
   url.protocol = url.protocol === "https:" ? "wss:" : "ws:";
   return url.href;
 }
@@ -64,7 +64,7 @@ export class Feed {
     const socket = this.socket;
     this.on.link("lost", "");
     // A WebSocket does not tell why it was refused; a plain request does.
-    const refused = await call("GET", "info").then(() => null, (error) => error);
+    const refused = await callService("GET", "info").then(() => null, (error) => error);
     if (socket !== this.socket) return;
     if (refused?.status === 401 || refused?.status === 403) {
       this.on.link("refused", "the service wants its token: open the address that it printed");

@@ -1,11 +1,11 @@
 // Force, instability and probability over a common time, drawn by uPlot.
 
-import { make, write } from "../web/dom.js";
+import { make, setText } from "../web/dom.js";
 import { colours, fingerColour, font } from "../web/theme.js";
 import uPlot from "./uplot/uPlot.esm.js";
-import { RIBBON, level, markers, ribbons, shade } from "./shading.js";
+import { RIBBON, level, markers, ribbons, shade } from "./plot_layers.js";
 import { reduce } from "./store.js";
-import { number, unitWord } from "./words.js";
+import { number, unitWord } from "./format.js";
 
 const FONT = font(11);
 const AXES = [["fx", "x"], ["fy", "y"], ["fz", "z"]];
@@ -149,7 +149,7 @@ export class Plots {
   // Values beside the plot: under the cursor, or the newest.
   read(row) {
     const at = row.plot.cursor.idx ?? row.x.length - 1;
-    row.values.forEach((element, k) => write(element, number(row.plot.data[k + 1]?.[at])));
+    row.values.forEach((element, k) => setText(element, number(row.plot.data[k + 1]?.[at])));
   }
 
   draw(store) {

@@ -6,10 +6,10 @@ from collections import deque
 import numpy as np
 
 from holdfast.contact import ContactEstimate, ContactState, HandEstimate
-from holdfast.live import schema
 from holdfast.live.recorder import Recorder
 from holdfast.live.session import Session
 from holdfast.live.stream_detector import StreamUpdate
+from holdfast.live.web import schema
 from holdfast.model import Model
 from holdfast.sensors import Sensor
 
@@ -21,7 +21,7 @@ RATE_OVER = 1.0
 UNKNOWN = (np.nan, np.nan, np.nan)
 
 
-class Feed:
+class StatusPublisher:
     """Gathers what a session says until it is asked for it.
 
     `put` is called in the session's thread, `live` in another; between them stands a queue that
@@ -47,7 +47,7 @@ class Feed:
         """Tells readers something that no source says; for the thread of `live`."""
         self._notes.append(schema.Notice(time.time(), text))
 
-    def live(self, recorder: Recorder | None) -> schema.Live:
+    def live(self, recorder: Recorder | None) -> schema.LiveDocument:
         """All that was said since the last call."""
         said = [self._said.popleft() for _ in range(len(self._said))]
         notes = [self._notes.popleft() for _ in range(len(self._notes))]
@@ -57,14 +57,14 @@ class Feed:
             self._look_at_taxels([one for _, one in said])
         newest = self._newest
         fingers = {} if newest is None else newest.fingers
-        return schema.Live(
+        return schema.LiveDocument(
             time=np.nan if newest is None else newest.time,
             hand=ContactState.UNKNOWN if newest is None else newest.state,
             fingers={
                 name: finger_of(finger, self._taxels.get(name)) for name, finger in fingers.items()
             },
             series=_series(estimates, list(self._session.stream.fingers)),
-            events=[schema.Change(*event) for _, one in said for event in one.events],
+            events=[schema.StateChange(*event) for _, one in said for event in one.events],
             notices=notes + _notices(said),
             health=self._health(recorder),
             recording=None if recorder is None else recording_info(recorder),
@@ -111,10 +111,10 @@ def _notices(said: list[tuple[float, StreamUpdate]]) -> list[schema.Notice]:
     ]
 
 
-def hello(model: Model, session: Session, started: float, can_record: bool) -> schema.Hello:
+def hello(model: Model, session: Session, started: float, can_record: bool) -> schema.HelloDocument:
     """What a reader must know first."""
     source, stream = session.source, session.stream
-    return schema.Hello(
+    return schema.HelloDocument(
         model=model.name or "a model without a name",
         source=source.name,
         fingers={name: _info(model, name, sensor) for name, sensor in stream.fingers.items()},
@@ -127,9 +127,9 @@ def hello(model: Model, session: Session, started: float, can_record: bool) -> s
 
 def finger_of(
     estimate: ContactEstimate, taxels: list[schema.Vector] | None = None
-) -> schema.Finger:
+) -> schema.FingerDocument:
     """An estimate as the service tells it."""
-    return schema.Finger(
+    return schema.FingerDocument(
         time=estimate.time,
         state=estimate.state,
         reason=estimate.reason,
@@ -170,8 +170,8 @@ def _info(model: Model, name: str, sensor: Sensor) -> schema.FingerInfo:
 
 def _series(
     estimates: list[tuple[HandEstimate, tuple[str, ...]]], fingers: list[str]
-) -> schema.Series:
-    return schema.Series(
+) -> schema.HandSeries:
+    return schema.HandSeries(
         times=[estimate.time for estimate, _ in estimates],
         fingers={name: _finger_series(estimates, name) for name in fingers},
     )

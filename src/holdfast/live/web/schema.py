@@ -38,7 +38,7 @@ class FingerInfo(Struct, frozen=True, kw_only=True):
     probability_threshold: float
 
 
-class Hello(Struct, frozen=True, kw_only=True, tag_field="type", tag="hello"):
+class HelloDocument(Struct, frozen=True, kw_only=True, tag_field="type", tag="hello"):
     """The first document of every connection.
 
     Attributes:
@@ -61,7 +61,7 @@ class Hello(Struct, frozen=True, kw_only=True, tag_field="type", tag="hello"):
     schema: Literal["holdfast.live/1"] = "holdfast.live/1"
 
 
-class Finger(Struct, frozen=True, kw_only=True, gc=False):
+class FingerDocument(Struct, frozen=True, kw_only=True, gc=False):
     """The newest estimate of a finger: see `holdfast.ContactEstimate`.
 
     Attributes:
@@ -95,14 +95,14 @@ class FingerSeries(Struct, frozen=True, gc=False):
     state: list[int | None]
 
 
-class Series(Struct, frozen=True, gc=False):
+class HandSeries(Struct, frozen=True, gc=False):
     """All samples since the document before."""
 
     times: list[float]
     fingers: dict[str, FingerSeries]
 
 
-class Change(Struct, frozen=True, gc=False):
+class StateChange(Struct, frozen=True, gc=False):
     """A state that changed; the finger is "hand" for the hand as a whole."""
 
     finger: str
@@ -158,7 +158,7 @@ class RecordingInfo(Struct, frozen=True, kw_only=True, gc=False):
     n_dropped: int
 
 
-class Live(Struct, frozen=True, kw_only=True, tag_field="type", tag="live"):
+class LiveDocument(Struct, frozen=True, kw_only=True, tag_field="type", tag="live"):
     """How things stand, and what has happened since the document before.
 
     Attributes:
@@ -175,18 +175,20 @@ class Live(Struct, frozen=True, kw_only=True, tag_field="type", tag="live"):
 
     time: Number
     hand: ContactState
-    fingers: dict[str, Finger]
-    series: Series
-    events: list[Change]
+    fingers: dict[str, FingerDocument]
+    series: HandSeries
+    events: list[StateChange]
     notices: list[Notice]
     health: Health
     recording: RecordingInfo | None
     ended: bool
 
 
-class Estimate(Struct, frozen=True, kw_only=True, tag_field="type", tag="estimate", gc=False):
+class EstimateDocument(
+    Struct, frozen=True, kw_only=True, tag_field="type", tag="estimate", gc=False
+):
     """What was said at one instant: every one of them, as soon as it is said."""
 
     time: float
     hand: ContactState
-    fingers: dict[str, Finger]
+    fingers: dict[str, FingerDocument]

@@ -5,7 +5,7 @@ import re
 
 import pytest
 
-from live.page.feed import Service, Tape, made_up
+from live.web.page.fake_service import Service, Tape, made_up
 
 SIZES = [(1280, 720), (1024, 768), (768, 1024), (1920, 1080)]
 HOSTILE = "<img src=x onerror=alert(1)>"

@@ -6,8 +6,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from holdfast.contact import Fault
-from holdfast.live import intake as module
-from holdfast.live.intake import Intake, Track, plain
+from holdfast.live import recording_buffer as module
+from holdfast.live.recording_buffer import RecordingBuffer, Track, plain
 from holdfast.recordings import Tactile
 from holdfast.sensors import sensor
 from holdfast.sources import Arrival
@@ -71,7 +71,7 @@ def test_gaps_are_those_of_the_recording_however_it_was_drained(missing, cuts):
 
 
 def test_faults_last_until_an_arrival_clears_them():
-    sorted_ = Intake({"thumb": ANYSKIN, "index": ANYSKIN})
+    sorted_ = RecordingBuffer({"thumb": ANYSKIN, "index": ANYSKIN})
     late, values = {"thumb": (Fault.LATE,)}, {"thumb": np.zeros((5, 3))}
     told = []
     for k, (samples, faults) in enumerate(
@@ -94,7 +94,7 @@ def test_faults_last_until_an_arrival_clears_them():
 
 def test_a_device_that_babbles_fills_no_memory(monkeypatch):
     monkeypatch.setattr(module, "MOST_MARKERS", 500)
-    babbled = Intake({"thumb": ANYSKIN})
+    babbled = RecordingBuffer({"thumb": ANYSKIN})
     for k in range(10_000):
         babbled.take(notice_arrival(0.01 * k, f"noise {k}", n_refused=1))
     assert babbled.n_refused == 10_000

@@ -30,7 +30,7 @@ CLOSING = 1.0
 FAREWELL = 10.0
 """How long, at the end of a recording, clients have to take what they have not read yet [s]."""
 
-_QUIET = logging.getLogger("holdfast.live.play")
+_QUIET = logging.getLogger("holdfast.live.xela_server")
 _QUIET.addHandler(logging.NullHandler())
 
 

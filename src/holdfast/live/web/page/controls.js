@@ -1,8 +1,8 @@
 // Tare, recording, markers, full screen; and the toasts that tell how it went.
 
-import { call } from "../web/api.js";
-import { byId, make, write } from "../web/dom.js";
-import { bytes, clock } from "./words.js";
+import { callService } from "../web/api.js";
+import { byId, make, setText } from "../web/dom.js";
+import { bytes, clock } from "./format.js";
 
 const STAYS = 6000; // [ms]
 
@@ -54,7 +54,7 @@ export class Controls {
     button.disabled = !this.open || !this.canRecord;
     button.title = this.canRecord ? (r ? r.path : "Start or stop a recording (R)") : "This service does not record";
     button.setAttribute("aria-pressed", String(r !== null));
-    write(byId("record-text"), r ? `Stop ${clock(r.seconds)} · ${bytes(r.n_bytes)}${r.n_dropped > 0 ? ` · ${r.n_dropped} dropped` : ""}` : "Record");
+    setText(byId("record-text"), r ? `Stop ${clock(r.seconds)} · ${bytes(r.n_bytes)}${r.n_dropped > 0 ? ` · ${r.n_dropped} dropped` : ""}` : "Record");
     byId("mark").disabled = byId("marker-text").disabled = !this.open || !this.canRecord;
   }
 
@@ -73,7 +73,7 @@ export class Controls {
 
   tare() {
     return this.ask(byId("tare"), async () => {
-      await call("POST", "tare");
+      await callService("POST", "tare");
       toast("Taking the tare: nothing may touch the fingers", "good");
     });
   }
@@ -81,11 +81,11 @@ export class Controls {
   record() {
     return this.ask(byId("record"), async () => {
       if (this.recording) {
-        const { path, seconds } = await call("DELETE", "recording");
+        const { path, seconds } = await callService("DELETE", "recording");
         this.update(null);
         toast(`${clock(seconds ?? 0)} recorded: ${path}`, "good");
       } else {
-        const { path } = await call("POST", "recording", {});
+        const { path } = await callService("POST", "recording", {});
         toast(`Recording to ${path}`, "good");
       }
     });
@@ -94,7 +94,7 @@ export class Controls {
   mark() {
     const field = byId("marker-text"), text = field.value.trim();
     return this.ask(byId("mark"), async () => {
-      await call("POST", "markers", { text: text || "marker" });
+      await callService("POST", "markers", { text: text || "marker" });
       this.marked(text);
     });
   }

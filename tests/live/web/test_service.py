@@ -10,13 +10,12 @@ from aiohttp import ClientSession, WSServerHandshakeError, web
 
 from holdfast.detector import detect
 from holdfast.io import load_recording
-from holdfast.live import schema
-from holdfast.live.service import Service
 from holdfast.live.session import Session
 from holdfast.live.stream_detector import StreamDetector
+from holdfast.live.web import schema
+from holdfast.live.web.service import LiveService
 from holdfast.web.guard import Guard
-
-from . import build
+from live import build
 
 PATIENCE = 30.0
 
@@ -25,7 +24,7 @@ PATIENCE = 30.0
 async def served(source, token=None, host="127.0.0.1", folder=None, start=True):
     """A client of the service of a source, its address, and the session."""
     session = Session(StreamDetector(build.model(), source))
-    service = Service(session, build.model(), Guard(host, token), folder)
+    service = LiveService(session, build.model(), Guard(host, token), folder)
     runner = web.AppRunner(service.app, shutdown_timeout=0.5)
     await runner.setup()
     await web.TCPSite(runner, "127.0.0.1", 0).start()
@@ -76,7 +75,7 @@ def test_the_first_document_says_what_there_is(tmp_path):
     assert np.shape(thumb["positions"]) == (30, 3)
     assert np.shape(thumb["rotations"]) == (30, 3, 3)
     assert hello["can_record"] is True
-    msgspec.convert(hello, schema.Hello)
+    msgspec.convert(hello, schema.HelloDocument)
 
 
 def test_documents_hold_every_sample_once_and_what_is_newest():
@@ -97,7 +96,7 @@ def test_documents_hold_every_sample_once_and_what_is_newest():
 
     found = run(work())
     for document in found:
-        msgspec.convert(document, schema.Live, strict=False)
+        msgspec.convert(document, schema.LiveDocument, strict=False)
     expected = detect(build.model(), recording)
     times = [t for one in found for t in one["series"]["times"]]
     assert times == expected.times.tolist()
@@ -134,7 +133,7 @@ def test_estimates_are_told_one_by_one():
 
     expected = detect(build.model(), recording)
     for k, one in enumerate(run(work())):
-        msgspec.convert(one, schema.Estimate, strict=False)
+        msgspec.convert(one, schema.EstimateDocument, strict=False)
         assert one["time"] == expected.times[k]
         assert one["hand"] == ("UNKNOWN", "NO_CONTACT", "UNSTABLE", "STABLE")[expected.hand[k]]
         assert set(one["fingers"]) == set(build.FINGERS)
@@ -390,7 +389,7 @@ def test_the_schema_is_that_of_the_documents():
             return await answer.json()
 
     told = run(work())
-    assert {"Hello", "Live", "Estimate"} <= set(told["$defs"])
+    assert {"HelloDocument", "LiveDocument", "EstimateDocument"} <= set(told["$defs"])
     assert json.dumps(told)
 
 

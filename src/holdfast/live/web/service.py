@@ -12,11 +12,11 @@ import msgspec
 from aiohttp import WSMsgType, web
 
 from holdfast.errors import HoldfastError
-from holdfast.live import schema
-from holdfast.live.feed import Feed, finger_of, hello, recording_info
-from holdfast.live.recordings import Recordings
+from holdfast.live.recordings import SessionRecorder
 from holdfast.live.session import Session
+from holdfast.live.status import StatusPublisher, finger_of, hello, recording_info
 from holdfast.live.stream_detector import StreamUpdate
+from holdfast.live.web import schema
 from holdfast.model import Model
 from holdfast.web.guard import Guard
 
@@ -27,7 +27,7 @@ WAITING = {"live": 32, "estimates": 1024}
 HEARTBEAT = 10.0
 """A reader that does not answer within half of it is let go [s]."""
 
-PAGE = Path(str(resources.files("holdfast.live") / "page"))
+PAGE = Path(str(resources.files("holdfast.live.web") / "page"))
 """The page's files."""
 SHARED = Path(str(resources.files("holdfast.web") / "static"))
 """Files that all pages share."""
@@ -67,7 +67,7 @@ class Reader:
             await self._socket.send_str(await self._waiting.get())
 
 
-class Service:
+class LiveService:
     """The page and the programs that look at a session.
 
     Args:
@@ -82,8 +82,8 @@ class Service:
     ) -> None:
         self._session = session
         self._model = model
-        self._recordings = Recordings(session, folder)
-        self._feed = Feed(session)
+        self._recordings = SessionRecorder(session, folder)
+        self._feed = StatusPublisher(session)
         self._started = time.time()
         self._readers: dict[str, set[Reader]] = {"live": set(), "estimates": set()}
         self._state = b"{}"
@@ -148,7 +148,7 @@ class Service:
     def _tell_estimates(self, said: StreamUpdate) -> None:
         for estimate, fresh in said.estimates:
             fingers = {name: finger_of(estimate.fingers[name]) for name in fresh}
-            told = schema.Estimate(time=estimate.time, hand=estimate.state, fingers=fingers)
+            told = schema.EstimateDocument(time=estimate.time, hand=estimate.state, fingers=fingers)
             text = _encode(told).decode()
             for reader in self._readers["estimates"]:
                 reader.put(text)
@@ -172,7 +172,7 @@ class Service:
             readers.discard(reader)
         return socket
 
-    def _hello(self) -> schema.Hello:
+    def _hello(self) -> schema.HelloDocument:
         return hello(self._model, self._session, self._started, self._recordings.possible)
 
     async def _info(self, _: web.Request) -> web.Response:
@@ -231,6 +231,6 @@ async def _page(_: web.Request) -> web.FileResponse:
 
 async def _schema(_: web.Request) -> web.Response:
     """JSON Schema of all that the WebSockets tell."""
-    told = (schema.Hello, schema.Live, schema.Estimate)
+    told = (schema.HelloDocument, schema.LiveDocument, schema.EstimateDocument)
     schemas, components = msgspec.json.schema_components(told)
     return _json({"anyOf": schemas, "$defs": components})

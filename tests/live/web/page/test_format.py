@@ -1,8 +1,8 @@
-"""words.js: numbers and states as people read them."""
+"""format.js: numbers and states as people read them."""
 
 import pytest
 
-CALL = "async ([name, value]) => (await import('/page/words.js'))[name](value)"
+CALL = "async ([name, value]) => (await import('/page/format.js'))[name](value)"
 
 
 @pytest.mark.parametrize(
@@ -31,7 +31,7 @@ def test_words(module, name, value, text):
 def test_every_state_reason_and_fault_has_its_words(module):
     from holdfast.contact import ContactState, Fault, Reason
 
-    words = module.evaluate("import('/page/words.js').then((m) => m.STATES)")
+    words = module.evaluate("import('/page/format.js').then((m) => m.STATES)")
     assert words == [state.value for state in ContactState]
     for name, members in (("reasonWord", Reason), ("faultWord", Fault)):
         told = [module.evaluate(CALL, [name, member.value]) for member in members]

@@ -1,6 +1,6 @@
 import pytest
 
-from live.page.feed import Service, Tape, made_up
+from live.web.page.fake_service import Service, Tape, made_up
 
 
 @pytest.fixture(scope="session")

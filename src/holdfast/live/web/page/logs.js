@@ -1,7 +1,7 @@
 // The latest events and notices, newest first, fifty of each.
 
-import { make, shape, write } from "../web/dom.js";
-import { span, stateKey, stateWord, wall } from "./words.js";
+import { make, shape, setText } from "../web/dom.js";
+import { span, stateKey, stateWord, wall } from "./format.js";
 
 const MOST = 50;
 
@@ -44,7 +44,7 @@ export class Events {
   /** Says how long ago each was, at `now` on the source's clock [s]. */
   age(now) {
     for (const item of this.list.children) {
-      write(item.firstElementChild, span(now - this.times.get(item)));
+      setText(item.firstElementChild, span(now - this.times.get(item)));
     }
   }
 }

@@ -1,6 +1,6 @@
-"""A service that is none: it plays a tape to the page, and does what a test wants of it.
+"""A fake service: it plays recorded messages to the page, and a test controls it.
 
-By hand, to look at the page: `PYTHONPATH=tests python -m live.page.feed RECORDING [PORT]`.
+To look at the page: `PYTHONPATH=tests python -m live.web.page.fake_service RECORDING [PORT]`.
 """
 
 import asyncio
@@ -23,7 +23,7 @@ from holdfast.model import Model
 from holdfast.sensors import sensor
 from holdfast.web.guard import POLICY
 
-PAGE = Path(str(resources.files("holdfast.live"))) / "page"
+PAGE = Path(str(resources.files("holdfast.live.web"))) / "page"
 SHARED = Path(str(resources.files("holdfast.web"))) / "static"
 STATES = [state.value for state in ContactState]
 FAULTS = list(Fault)

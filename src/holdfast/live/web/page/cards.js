@@ -1,9 +1,9 @@
 // One card for each finger: its state, three figures, its faults and its map.
 
-import { make, shape, write } from "../web/dom.js";
+import { make, shape, setText } from "../web/dom.js";
 import { fingerColour } from "../web/theme.js";
 import { Scale, TaxelMap } from "./taxelmap.js";
-import { faultWord, number, percent, reasonWord, stateKey, stateWord, unitWord } from "./words.js";
+import { faultWord, number, percent, reasonWord, stateKey, stateWord, unitWord } from "./format.js";
 
 // Decades that the bar of sigma spans, by unit: from noise to a violent slip.
 const SIGMA = { count: [1, 1000], N: [1e-3, 1] };
@@ -133,21 +133,21 @@ class Card {
 
   update(finger, frozen) {
     this.tell(finger.state, reasonWord(finger.reason));
-    write(this.probability.value, percent(finger.stable_probability));
+    setText(this.probability.value, percent(finger.stable_probability));
     setBar(this.probability, finger.stable_probability ?? 0);
-    write(this.sigma.value, number(finger.instability));
+    setText(this.sigma.value, number(finger.instability));
     setBar(this.sigma, logShare(finger.instability, SIGMA[this.sensor.unit] ?? SIGMA.count));
     const force = finger.force ?? [null, null, null], known = force.every((x) => x !== null);
-    write(this.force, number(known ? Math.hypot(...force) : null));
-    this.axes.forEach(({ shown }, k) => write(shown, number(force[k])));
+    setText(this.force, number(known ? Math.hypot(...force) : null));
+    this.axes.forEach(({ shown }, k) => setText(shown, number(force[k])));
     this.tellFaults(finger.faults ?? [], finger.faulty_taxels ?? []);
     if (!frozen) this.map.update(finger.taxels, finger.faulty_taxels ?? []);
   }
 
   tell(state, reason) {
     const key = stateKey(state);
-    write(this.word, stateWord(state));
-    write(this.reason, reason);
+    setText(this.word, stateWord(state));
+    setText(this.reason, reason);
     if (this.element.dataset.state === key) return;
     this.element.dataset.state = key;
     this.shape.firstChild.setAttribute("href", `#shape-${key}`);

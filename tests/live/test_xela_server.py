@@ -10,8 +10,8 @@ import pytest
 from websockets.sync.client import connect
 
 from holdfast.errors import OutputError
-from holdfast.live import play as module
-from holdfast.live.play import XelaServer
+from holdfast.live import xela_server as module
+from holdfast.live.xela_server import XelaServer
 from holdfast.sensors import hand, sensor
 from holdfast.sources import Arrival, Source, open_source
 from holdfast.sources.base import notice_arrival

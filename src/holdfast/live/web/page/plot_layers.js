@@ -1,7 +1,7 @@
 // What lies behind and over the lines of the plots: states, thresholds, markers.
 
-import { colours, stateLine } from "../web/theme.js";
-import { NO_CONTACT, STABLE, STATES, UNKNOWN, UNSTABLE, stateKey } from "./words.js";
+import { colours, stateLineColour } from "../web/theme.js";
+import { NO_CONTACT, STABLE, STATES, UNKNOWN, UNSTABLE, stateKey } from "./format.js";
 
 const ALPHA = { [UNKNOWN]: 0.3, [NO_CONTACT]: 0.1, [UNSTABLE]: 0.34, [STABLE]: 0.16 };
 const KEYS = STATES.map(stateKey);
@@ -41,7 +41,7 @@ export function shade(plot, x, codes) {
   const { left, top, width, height } = plot.bbox, pen = plot.ctx;
   for (const [code, from, to] of runs(x, codes)) {
     const [a, b] = [from, to].map((at) => Math.min(left + width, Math.max(left, plot.valToPos(at, "x", true))));
-    pen.fillStyle = pen.strokeStyle = stateLine(KEYS[code] ?? "unknown");
+    pen.fillStyle = pen.strokeStyle = stateLineColour(KEYS[code] ?? "unknown");
     // Of different lightness too: red and green are one to many people.
     pen.globalAlpha = ALPHA[code] ?? 0.2;
     if (code === UNKNOWN) hatch(pen, a, top, b - a, height);
@@ -57,7 +57,7 @@ export function ribbons(plot, x, rows) {
     const y = top + (2 + row * RIBBON) * ratio(), height = (RIBBON - 2) * ratio();
     for (const [code, from, to] of runs(x, codes)) {
       const [a, b] = [from, to].map((at) => Math.min(left + width, Math.max(left, plot.valToPos(at, "x", true))));
-      pen.fillStyle = stateLine(KEYS[code] ?? "unknown");
+      pen.fillStyle = stateLineColour(KEYS[code] ?? "unknown");
       pen.fillRect(a, y, Math.max(1, b - a), height);
     }
   });

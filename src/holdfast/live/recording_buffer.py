@@ -87,7 +87,7 @@ class Track:
         self.n_gaps += int((steps > GAP_PERIODS * period).sum())
 
 
-class Intake:
+class RecordingBuffer:
     """Sorts arrivals into tracks and markers; has no clock and is for one thread.
 
     Args:

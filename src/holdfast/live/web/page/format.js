@@ -1,6 +1,6 @@
 // Words, numbers and names as people read them. Pure functions.
 
-import { NOTHING, plain } from "../web/text.js";
+import { NO_VALUE, withSpaces } from "../web/text.js";
 
 export * from "../web/text.js";
 
@@ -34,9 +34,9 @@ const FAULTS = {
 export const stateKey = (state) =>
   STATES.includes(state) ? state.toLowerCase().replace("_", "-") : "unknown";
 
-export const stateWord = (state) => plain(state ?? "UNKNOWN");
-export const reasonWord = (reason) => (reason ? REASONS[reason] ?? plain(reason) : "");
-export const faultWord = (fault) => FAULTS[fault] ?? plain(fault);
+export const stateWord = (state) => withSpaces(state ?? "UNKNOWN");
+export const reasonWord = (reason) => (reason ? REASONS[reason] ?? withSpaces(reason) : "");
+export const faultWord = (fault) => FAULTS[fault] ?? withSpaces(fault);
 
 /** A length of time in few characters: "0.8 s", "12 s", "3 min", "2 h". */
 export function span(seconds) {
@@ -48,7 +48,7 @@ export function span(seconds) {
 
 /** A latency: "0.21 ms", "12 ms", "1.3 s". */
 export function delay(seconds) {
-  if (seconds === null || seconds === undefined) return NOTHING;
+  if (seconds === null || seconds === undefined) return NO_VALUE;
   if (seconds >= 1) return `${seconds.toFixed(1)} s`;
   const ms = 1000 * seconds;
   return `${ms < 0.995 ? ms.toFixed(2) : ms < 9.95 ? ms.toFixed(1) : ms.toFixed(0)} ms`;

@@ -1,6 +1,6 @@
 // The last minute of every series, in memory that never grows.
 
-import { UNKNOWN } from "./words.js";
+import { UNKNOWN } from "./format.js";
 
 export const SECONDS = 60;
 const COLUMNS = ["fx", "fy", "fz", "force", "sigma", "probability"];

@@ -1,17 +1,17 @@
 // Puts the parts together: messages in, pictures out, at the browser's own pace.
 
-import { byId, choice, make, press, write } from "../web/dom.js";
+import { byId, fillChoice, make, setPressed, setText } from "../web/dom.js";
 import { fingerColour, onTheme } from "../web/theme.js";
 import { Cards } from "./cards.js";
 import { Controls } from "./controls.js";
-import { Feed } from "./feed.js";
-import { Hand, Health, alert } from "./hand.js";
+import { Feed } from "./connection.js";
+import { Hand, Health, alert } from "./banner.js";
 import { listen } from "./keys.js";
-import { Events, Notices } from "./lists.js";
-import { Pace } from "./pace.js";
+import { Events, Notices } from "./logs.js";
+import { Pace } from "./frame_rate.js";
 import { Plots } from "./plots.js";
 import { Store, capacityFor } from "./store.js";
-import { STATES, span } from "./words.js";
+import { STATES, span } from "./format.js";
 
 const WINDOWS = [5, 10, 30, 60]; // [s]
 
@@ -30,7 +30,7 @@ class Page {
     this.dirty = false;
     this.pace = new Pace();
     this.told = -Infinity; // when ages were last written
-    choice(byId("windows"), WINDOWS.map((value) => ({ value, label: `${value} s`, title: `Show ${value} seconds` })),
+    fillChoice(byId("windows"), WINDOWS.map((value) => ({ value, label: `${value} s`, title: `Show ${value} seconds` })),
       this.plots.window, (value) => this.look(value));
     byId("pause").addEventListener("click", () => this.pause());
     listen({
@@ -113,7 +113,7 @@ class Page {
       this.cards.draw();
       if (this.store.end) this.plots.draw(this.store);
     } else if (Number.isFinite(this.now)) {
-      write(byId("paused"), `PAUSED · ${span(this.now - this.frozen.latest)} ago`);
+      setText(byId("paused"), `PAUSED · ${span(this.now - this.frozen.latest)} ago`);
     }
     if (performance.now() - this.told < 250) return;
     this.told = performance.now();
@@ -125,7 +125,7 @@ class Page {
     this.frozen = this.frozen ? null : this.store.frozen();
     const button = byId("pause"), paused = this.frozen !== null;
     button.setAttribute("aria-pressed", String(paused));
-    write(button, paused ? "Resume" : "Pause");
+    setText(button, paused ? "Resume" : "Pause");
     byId("paused").hidden = !paused;
     document.body.classList.toggle("is-paused", paused);
     this.cards.freeze(paused);
@@ -135,14 +135,14 @@ class Page {
   look(seconds) {
     this.plots.window = seconds;
     if (this.store) this.plots.build();
-    press(byId("windows"), seconds);
+    setPressed(byId("windows"), seconds);
     this.redraw();
   }
 
   choose(name) {
     if (!this.store || name === this.plots.chosen) return;
     this.plots.chosen = name;
-    press(byId("fingers"), name ?? "");
+    setPressed(byId("fingers"), name ?? "");
     this.cards.select(name);
     this.plots.build();
     this.redraw();
@@ -160,7 +160,7 @@ class Page {
       return mark;
     };
     const fingers = this.plots.names.map((name, k) => ({ value: name, label: name, title: `Plots of ${name} (${k + 1})`, mark: swatch(k) }));
-    choice(byId("fingers"), [{ value: "", label: "all", title: "Plots of all fingers (0)" }, ...fingers],
+    fillChoice(byId("fingers"), [{ value: "", label: "all", title: "Plots of all fingers (0)" }, ...fingers],
       this.plots.chosen ?? "", (name) => this.choose(name || null));
     this.cards.select(this.plots.chosen);
   }

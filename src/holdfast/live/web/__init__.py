@@ -1,0 +1,1 @@
+"""The page, WebSocket and REST service of a live session."""
