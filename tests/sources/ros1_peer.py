@@ -11,8 +11,8 @@ import json
 import sys
 import time
 
-from holdfast.ros.messages import SENS_STREAM
 from holdfast.ros.rospy_node import rospy_module
+from holdfast.ros.sensor_messages import SENS_STREAM
 
 N_TAXELS = 30
 

@@ -18,7 +18,7 @@ from holdfast.io import save_recording
 from holdfast.live.xela_server import XelaServer
 from holdfast.recordings import Recording, Tactile
 from holdfast.ros.cdr import MessageEncoder
-from holdfast.ros.messages import known_definition
+from holdfast.ros.sensor_messages import known_definition
 from holdfast.sensors import sensor
 from holdfast.sources import Source, open_source
 from holdfast.twin.simulation import simulate

@@ -152,10 +152,11 @@ def poses_from_bag(path: str | Path, thing: str, tips: Mapping[str, str] | None 
         RecordingError: it cannot be read, a topic or frame is not there, or parents differ.
         MissingExtra: rosbags is not installed.
     """
-    from holdfast.labelling.bag_poses import read_bag
+    from holdfast.io.bags import read_poses
 
     wanted = {OBJECT: thing, **(tips or {})}
-    tracks = {body: _of_rows(rows, path) for body, rows in read_bag(Path(path), wanted).items()}
+    poses = read_poses(Path(path), wanted)
+    tracks = {body: _of_rows(rows, path) for body, rows in poses.items()}
     thing_track = tracks.pop(OBJECT)
     return Poses(Path(path).name, thing_track, tracks, same_clock=False)
 

@@ -1,8 +1,8 @@
-"""Messages of ROS as plain values: by their definition, out of the bytes of ROS 1 and ROS 2.
+"""Definitions of ROS messages, parsed from their text.
 
-A definition is the text that ROS keeps with a topic: the fields of a message, then, each after
-a line of `=` and `MSG: package/Type`, those of the messages inside it. It is read as data;
-nothing is generated from it.
+ROS keeps the text of a definition with each topic. It has the fields of a message. Then, for
+each message type that occurs in it, follow a line of `=`, a line `MSG: package/Type` and the
+fields of that type. A definition is data: nothing is generated from it or executed.
 """
 
 import re
@@ -24,10 +24,22 @@ NUMBERS = {
     "float32": "f4",
     "float64": "f8",
 }
-"""Number types of ROS, as NumPy calls them."""
+"""Number types of ROS and their codes in NumPy."""
 
 MAX_DEPTH = 8
-"""A message is nested no deeper than this."""
+"""Maximum depth of messages inside messages."""
+
+SEPARATOR = "\n" + "=" * 80 + "\nMSG: "
+"""Text between the types of a definition; the name of the next type follows."""
+
+ROS1_HEADER = SEPARATOR + "std_msgs/Header\nuint32 seq\ntime stamp\nstring frame_id\n"
+ROS2_HEADER = (
+    SEPARATOR
+    + "std_msgs/Header\nbuiltin_interfaces/Time stamp\nstring frame_id\n"
+    + SEPARATOR
+    + "builtin_interfaces/Time\nint32 sec\nuint32 nanosec\n"
+)
+"""Definition of the header of a message, to append to a definition."""
 
 _STAMPS = {"time": ("uint32 secs", "uint32 nsecs"), "duration": ("int32 secs", "int32 nsecs")}
 _SEPARATOR = re.compile(r"^=+\s*\nMSG:\s*(\S+)\s*$", re.MULTILINE)
@@ -41,9 +53,9 @@ class Field(NamedTuple):
     """One field of a message.
 
     Attributes:
-        name: what it is called.
-        kind: a number type of ROS, `string`, or the name of a message.
-        size: how many there are; None for one, 0 where the message says how many.
+        name: name of the field.
+        kind: a number type of ROS, `string`, or the name of a message type.
+        size: number of values; None for a single value, 0 for a sequence of any length.
     """
 
     name: str
@@ -52,11 +64,11 @@ class Field(NamedTuple):
 
 
 class Definition(NamedTuple):
-    """What a message looks like.
+    """Fields of a message type, and of all types that occur in it.
 
     Attributes:
         name: `package/Type`.
-        types: the fields of it, and of all messages inside it, by their name.
+        types: fields of each type by its name.
     """
 
     name: str
@@ -64,12 +76,12 @@ class Definition(NamedTuple):
 
     @property
     def fields(self) -> tuple[Field, ...]:
-        """Of the message itself."""
+        """Fields of the message itself."""
         return self.types[self.name]
 
 
 def short_name(name: str) -> str:
-    """The name of a type, of ROS 1 or ROS 2, as ROS 1 writes it.
+    """Return the name of a type of ROS 1 or ROS 2 as ROS 1 writes it.
 
     Example:
         >>> short_name("std_msgs/msg/String")
@@ -79,10 +91,14 @@ def short_name(name: str) -> str:
 
 
 def parse_definition(name: str, text: str) -> Definition:
-    r"""The definition of a message out of its text.
+    r"""Parse the definition of a message.
+
+    Args:
+        name: name of its type.
+        text: text of the definition.
 
     Raises:
-        ValueError: it is none, or names a type that it does not define.
+        ValueError: a line is not a field, or a type is not defined or is nested too deep.
 
     Example:
         >>> parse_definition("pkg/Named", "string name\nfloat64[] values # [N]").fields[1]
@@ -97,6 +113,27 @@ def parse_definition(name: str, text: str) -> Definition:
     definition = Definition(short_name(name), types)
     _check_depth(definition, definition.name, 0)
     return definition
+
+
+def field_paths(definition: Definition) -> set[str]:
+    r"""Return the path and type of every field, with fields inside messages.
+
+    Example:
+        >>> sorted(field_paths(parse_definition("p/A", "B[] b\n====\nMSG: p/B\nint8 x")))
+        ['b[].x int8']
+    """
+    found: set[str] = set()
+
+    def visit(name: str, prefix: str) -> None:
+        for field in definition.types[name]:
+            many = "" if field.size is None else "[]"
+            if field.kind in definition.types:
+                visit(field.kind, f"{prefix}{field.name}{many}.")
+            else:
+                found.add(f"{prefix}{field.name}{many} {field.kind}")
+
+    visit(definition.name, "")
+    return found
 
 
 def _fields(block: str, body: str, blocks: Mapping[str, str]) -> Iterator[Field]:

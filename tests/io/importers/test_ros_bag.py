@@ -8,7 +8,7 @@ from holdfast.cli import main
 from holdfast.errors import MissingExtra, RecordingError
 from holdfast.io import import_recordings, load_recording, save_recording
 from holdfast.io.files import is_recording
-from holdfast.ros.messages import DeviceSample
+from holdfast.ros.sensor_messages import DeviceSample
 from holdfast.sensors import hand
 from holdfast.sources.ros.translator import Translator
 from holdfast.sources.xela.decoder import Decoder

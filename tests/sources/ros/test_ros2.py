@@ -16,7 +16,7 @@ pytest.importorskip("rosbags", reason="rosbags is not installed")
 from holdfast.errors import MissingExtra, SourceError
 from holdfast.ros import dds
 from holdfast.ros.definitions import parse_definition
-from holdfast.ros.messages import known_definition
+from holdfast.ros.sensor_messages import known_definition
 from holdfast.sensors import sensor
 from holdfast.sources import open_source
 from holdfast.sources.ros import topic

@@ -5,7 +5,7 @@ import numpy as np
 import pytest
 
 from holdfast.errors import SourceError
-from holdfast.ros.messages import DeviceSample
+from holdfast.ros.sensor_messages import DeviceSample
 from holdfast.sensors import sensor
 from holdfast.sources.ros import topic
 from holdfast.sources.ros.topic import Link, Packet, Stranger, TopicSource, topic_of

@@ -3,7 +3,7 @@ import pytest
 
 from holdfast.contact import Fault
 from holdfast.errors import SourceError
-from holdfast.ros.messages import DeviceSample
+from holdfast.ros.sensor_messages import DeviceSample
 from holdfast.sensors import hand, sensor
 from holdfast.sources.ros.translator import Translator
 

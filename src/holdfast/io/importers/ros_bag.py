@@ -1,11 +1,10 @@
-"""Bags of ROS 1 and ROS 2 with topics of tactile sensors: XELA's uSkin, Contactile's PapillArray.
+"""Import of bags of ROS 1 and ROS 2 with topics of tactile sensors.
 
-A bag's messages are decoded by the definitions in it, as data. Topics of other types are left
-out.
+The topics are those of XELA's uSkin and of Contactile's PapillArray. Topics of other types are
+ignored.
 """
 
-import re
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any, NamedTuple
@@ -13,14 +12,12 @@ from typing import Any, NamedTuple
 import numpy as np
 import numpy.typing as npt
 
-from holdfast.errors import MissingExtra, RecordingError
-from holdfast.io.importers.table import natural
+from holdfast.errors import RecordingError
+from holdfast.io.bags import METADATA, Bag, BagTopic, check_rosbags, find_bags, open_bag
 from holdfast.recordings import Recording, Tactile
-from holdfast.ros.definitions import Definition, parse_definition, short_name
-from holdfast.ros.messages import (
+from holdfast.ros.sensor_messages import (
     DeviceSample,
     SampleDecoder,
-    known_definition,
     module_name,
     readings_of,
     sensors_of,
@@ -28,84 +25,59 @@ from holdfast.ros.messages import (
 from holdfast.sensors import xela_models
 from holdfast.sensors.types import Array
 
-METADATA = "metadata.yaml"
-MAGICS = {
-    ".bag": re.compile(rb"#ROSBAG V"),
-    ".db3": re.compile(rb"SQLite format 3\x00"),
-    ".mcap": re.compile(rb"\x89MCAP0\r\n\x01.{8}\x04\x00\x00\x00ros2", re.DOTALL),
-}
-"""How the files of bags begin; MCAP with the profile of ROS 2, which is not ours."""
 CLOCKS = ("device", "header", "bag")
-"""Whose stamps the times of a recording are, the best first."""
-APART = 1.0
-"""Clocks of two topics that run so far apart, as seen by the bag's, are two clocks [s]."""
+"""Clocks that the times of a recording can come from, best first."""
+MAX_CLOCK_DIFFERENCE = 1.0
+"""Topics whose clocks differ by more, compared with the bag's clock, have two clocks [s]."""
 
 
 def sniff(path: Path) -> bool:
-    """Whether it is a bag, or a folder that holds some."""
-    return bool(_bags(path))
+    """Return whether `path` is a bag, or a folder with bags."""
+    return bool(find_bags(path))
 
 
 def read(path: Path) -> Iterator[Recording]:
-    """The recording in a bag, or those in the bags of a folder.
+    """Read the recording in a bag, or those in the bags of a folder.
 
     Raises:
-        RecordingError: there is no bag, or one is damaged or has no topic that we know.
+        RecordingError: there is no bag, or one is damaged or has no known topic.
         MissingExtra: rosbags is not installed.
     """
-    bags = _bags(path)
+    bags = find_bags(path)
     if not bags and path.is_file():
-        what = "is no bag of ROS" if path.stat().st_size else "is empty"
-        raise RecordingError(f"{path} {what}; a .bag, .db3 or .mcap file of ROS expected")
+        problem = "is no bag of ROS" if path.stat().st_size else "is empty"
+        raise RecordingError(f"{path} {problem}; a .bag, .db3 or .mcap file of ROS expected")
     if not bags:
         raise RecordingError(f"no bag of ROS in {path}; a folder with {METADATA} or .bag expected")
-    try:
-        import rosbags.rosbag1
-        import rosbags.rosbag2  # noqa: F401 (what is missing is told before the first is read)
-    except ImportError as cause:
-        raise MissingExtra("rosbags", "bags") from cause
+    check_rosbags()
     return (_recording(bag) for bag in bags)
 
 
-def _bags(path: Path) -> list[Path]:
-    if _is_bag(path):
-        return [path]
-    return sorted((inside for inside in path.glob("*") if _is_bag(inside)), key=natural)
-
-
-def _is_bag(path: Path) -> bool:
-    if path.is_dir():
-        return (path / METADATA).is_file()
-    if path.suffix not in MAGICS or not path.is_file():
-        return False
-    with path.open("rb") as file:
-        return MAGICS[path.suffix].match(file.read(64)) is not None
-
-
 def _recording(path: Path) -> Recording:
-    try:
-        return _Bag(path).recording()
-    except RecordingError:
-        raise
-    except OSError as cause:
-        raise RecordingError(f"cannot read {path}: {cause.strerror or cause}") from cause
-    except Exception as cause:  # what rosbags raises on damage is its own affair
-        text = " ".join(str(cause).split())[:200] or type(cause).__name__
-        raise RecordingError(f"{path} is cut or damaged: {text}") from cause
+    with open_bag(path) as bag:
+        return _BagImport(path, bag).recording()
 
 
-class _Topic(NamedTuple):
-    """A topic of the bag, and how its messages are read."""
+class _TactileTopic(NamedTuple):
+    """A topic with samples: how to decode them, and its parts, one for each publisher."""
 
     name: str
     kind: str
-    unpack: SampleDecoder
-    connections: list[Any]
+    decode: SampleDecoder
+    parts: list[BagTopic]
 
 
 @dataclass
-class _Track:
-    """What one device said in one topic, message by message."""
+class _DeviceTrack:
+    """All samples of one device in one topic.
+
+    Attributes:
+        first: the first sample.
+        readings: (n_taxels, 3) of each sample.
+        stamps: times of each sample by each of `CLOCKS` [s]; None if there is none.
+        n_refused: number of samples with another number of taxels.
+        last: the last sample.
+    """
 
     first: DeviceSample
     readings: list[npt.NDArray[Any]] = field(default_factory=list)
@@ -113,18 +85,18 @@ class _Track:
     n_refused: int = 0
     last: DeviceSample | None = None
 
-    def add(self, message: DeviceSample, time: float) -> None:
-        """Takes a message that came at a time of the bag [s]; one that came twice, once."""
-        given = readings_of(message, "count")
-        if given.shape != readings_of(self.first, "count").shape:
+    def add(self, sample: DeviceSample, time: float) -> None:
+        """Append a sample that the bag has at `time` [s], unless it repeats the last one."""
+        readings = readings_of(sample, "count")
+        if readings.shape != readings_of(self.first, "count").shape:
             self.n_refused += 1
-        elif self.last is None or not _same(self.last, message):
-            self.readings.append(given)
-            self.stamps.append((message.time, message.stamp, time))
-        self.last = message
+        elif self.last is None or not _is_repeated(self.last, sample):
+            self.readings.append(readings)
+            self.stamps.append((sample.time, sample.stamp, time))
+        self.last = sample
 
     def times(self, clock: str) -> Array | None:
-        """By one of `CLOCKS` [s]; None where it misses one or does not go forward."""
+        """Return the times by a clock [s]; None if one is missing or they do not increase."""
         column = [stamps[CLOCKS.index(clock)] for stamps in self.stamps]
         if None in column:
             return None
@@ -132,63 +104,53 @@ class _Track:
         return times if (np.diff(times) > 0).all() else None
 
     def offset(self, clock: str) -> float:
-        """How far the bag's clock is ahead of that clock [s]."""
+        """Return how far the bag's clock is ahead of another clock [s]; NaN if unknown."""
         times = self.times(clock)
-        bag = np.array([stamps[-1] for stamps in self.stamps])
-        return np.nan if times is None else float(np.median(bag - times))
+        bag_times = np.array([stamps[-1] for stamps in self.stamps])
+        return np.nan if times is None else float(np.median(bag_times - times))
 
 
-def _same(one: DeviceSample, two: DeviceSample) -> bool:
-    """Whether a packet was sent again."""
+def _is_repeated(first: DeviceSample, second: DeviceSample) -> bool:
+    """Return whether the second sample is the first one, sent again."""
     return (
-        two.time is not None
-        and (one.time, one.sequence) == (two.time, two.sequence)
-        and np.array_equal(readings_of(one, "count"), readings_of(two, "count"))
+        second.time is not None
+        and (first.time, first.sequence) == (second.time, second.sequence)
+        and np.array_equal(readings_of(first, "count"), readings_of(second, "count"))
     )
 
 
-class _Bag:
-    """A bag, read once from its beginning to its end."""
+class _BagImport:
+    """Import of one bag, which is read once from its beginning to its end."""
 
-    def __init__(self, path: Path) -> None:
+    def __init__(self, path: Path, bag: Bag) -> None:
         self._path = path
-        self._ros2 = path.suffix != ".bag" or path.is_dir()
-        self._tracks: dict[tuple[str, int], _Track] = {}
+        self._bag = bag
+        self._tracks: dict[tuple[str, int], _DeviceTrack] = {}
 
     def recording(self) -> Recording:
-        with self._reader() as reader:
-            topics = self._topics(reader.connections)
-            for topic in topics:
-                self._read(reader, topic)
+        topics = self._tactile_topics()
+        for topic in topics:
+            self._read(topic)
         if not any(track.readings for track in self._tracks.values()):
             names = ", ".join(topic.name for topic in topics)
             raise RecordingError(f"{self._path} has no messages on {names}; at least one expected")
         clock = self._clock()
+        name = self._path.name if self._path.is_dir() else self._path.stem
         try:
-            return Recording(self._name(), self._modules(clock), self._metadata(topics, clock))
+            return Recording(name, self._modules(clock), self._metadata(topics, clock))
         except (RecordingError, ValueError) as cause:
             raise RecordingError(f"{self._path}: {cause}") from cause
 
-    def _reader(self) -> Any:  # noqa: ANN401 (one of two classes of rosbags)
-        if self._ros2:
-            from rosbags.rosbag2 import Reader
-
-            return Reader(self._path)
-        from rosbags.rosbag1 import Reader as Reader1
-
-        return Reader1(self._path)
-
-    def _topics(self, connections: Iterable[Any]) -> list[_Topic]:
-        topics: dict[str, _Topic] = {}
+    def _tactile_topics(self) -> list[_TactileTopic]:
+        topics: dict[str, _TactileTopic] = {}
         others: list[str] = []
-        for one in sorted(connections, key=lambda one: str(one.topic)):
-            kind = short_name(one.msgtype)
-            unpack = self._unpacker(one)
-            if unpack is None:
-                others.append(f"{one.topic} ({kind})")
+        for part in self._bag.topics:
+            decode = self._decoder(part)
+            if decode is None:
+                others.append(f"{part.name} ({part.kind})")
             else:
-                topic = topics.setdefault(one.topic, _Topic(one.topic, kind, unpack, []))
-                topic.connections.append(one)
+                topic = _TactileTopic(part.name, part.kind, decode, [])
+                topics.setdefault(part.name, topic).parts.append(part)
         if not topics:
             raise RecordingError(
                 f"{self._path} has no topic of a tactile sensor that holdfast knows; it has "
@@ -196,67 +158,59 @@ class _Bag:
             )
         return list(topics.values())
 
-    def _unpacker(self, connection: Any) -> SampleDecoder | None:  # noqa: ANN401 (a Connection)
-        """By the definition in the bag, or the one we know; None for any other topic."""
+    def _decoder(self, part: BagTopic) -> SampleDecoder | None:
         try:
-            definition = self._definition(connection)
-            return None if definition is None else SampleDecoder(definition, ros2=self._ros2)
-        except ValueError:
+            return part.definition and SampleDecoder(part.definition, ros2=self._bag.ros2)
+        except ValueError:  # messages of another kind
             return None
 
-    def _definition(self, connection: Any) -> Definition | None:  # noqa: ANN401
-        kept = connection.msgdef
-        if kept.format.name == "MSG" and kept.data.strip():
-            return parse_definition(connection.msgtype, kept.data)
-        return known_definition(connection.msgtype, ros2=self._ros2)
-
-    def _read(self, reader: Any, topic: _Topic) -> None:  # noqa: ANN401
+    def _read(self, topic: _TactileTopic) -> None:
         n_read = 0
-        for _, nanoseconds, data in reader.messages(topic.connections):
+        for _, time, data in self._bag.messages(topic.parts):
             n_read += 1
-            for message in topic.unpack(bytes(data)):
-                self._add(topic.name, message, nanoseconds * 1e-9)
-        n_expected = sum(one.msgcount for one in topic.connections)
+            for sample in topic.decode(data):
+                self._add(topic.name, sample, time)
+        n_expected = sum(part.n_messages for part in topic.parts)
         if n_read < n_expected:
             raise RecordingError(
                 f"{self._path} is cut or damaged: {n_read} messages on {topic.name}, "
                 f"{n_expected} expected"
             )
 
-    def _add(self, topic: str, message: DeviceSample, time: float) -> None:
-        if not len(readings_of(message, "count")):  # the server's word for a sensor that is off
+    def _add(self, topic: str, sample: DeviceSample, time: float) -> None:
+        if not len(readings_of(sample, "count")):  # XELA's server sends this for a sensor off
             return
-        number = 0 if message.number is None else message.number
-        self._tracks.setdefault((topic, number), _Track(message)).add(message, time)
+        number = 0 if sample.number is None else sample.number
+        self._tracks.setdefault((topic, number), _DeviceTrack(sample)).add(sample, time)
 
     def _clock(self) -> str:
-        """The best clock that all tracks have, that goes forward, and is one clock."""
+        """Return the best clock that all tracks have, that increases and that is one clock."""
         tracks = [track for track in self._tracks.values() if track.readings]
         for clock in CLOCKS[:-1]:
             offsets = [track.offset(clock) for track in tracks]
-            if np.ptp(offsets) <= APART:  # False where one is NaN
+            if np.ptp(offsets) <= MAX_CLOCK_DIFFERENCE:  # False if an offset is NaN
                 return clock
         return CLOCKS[-1]
 
     def _modules(self, clock: str) -> dict[str, Tactile]:
         modules: dict[str, Tactile] = {}
-        for (topic, finger), track in self._fingers().items():
-            made = _modules_of(finger, track, clock)
-            before = _free(modules, made, finger, topic.strip("/"))
-            modules.update({f"{before}{name}": module for name, module in made.items()})
+        for (topic, finger), track in self._tracks_by_finger().items():
+            new = _modules_of(finger, track, clock)
+            prefix = _unused_prefix(modules, new, finger, topic.strip("/"))
+            modules.update({f"{prefix}{name}": module for name, module in new.items()})
         return modules
 
-    def _fingers(self) -> dict[tuple[str, str], _Track]:
-        """Tracks by topic and finger; what has no number is counted, in order of the topics."""
-        fingers: dict[tuple[str, str], _Track] = {}
+    def _tracks_by_finger(self) -> dict[tuple[str, str], _DeviceTrack]:
+        """Return tracks by topic and finger; devices without a number are counted by topic."""
+        tracks: dict[tuple[str, str], _DeviceTrack] = {}
         n_without = 0
         for (topic, number), track in sorted(self._tracks.items()):
             n_without += track.first.number is None
-            place = n_without if track.first.number is None else number
-            fingers[topic, f"finger{place}"] = track
-        return fingers
+            finger = n_without if track.first.number is None else number
+            tracks[topic, f"finger{finger}"] = track
+        return tracks
 
-    def _metadata(self, topics: list[_Topic], clock: str) -> dict[str, Any]:
+    def _metadata(self, topics: list[_TactileTopic], clock: str) -> dict[str, Any]:
         hands = [xela_models.whole_hand(track.first.model) for track in self._tracks.values()]
         names = sorted({hand.name for hand in hands if hand is not None})
         n_refused = sum(track.n_refused for track in self._tracks.values())
@@ -268,24 +222,21 @@ class _Bag:
             **({"n_refused": n_refused} if n_refused else {}),
         }
 
-    def _name(self) -> str:
-        return self._path.name if self._path.is_dir() else self._path.stem
 
-
-def _free(
-    taken: Mapping[str, Tactile], made: Mapping[str, Tactile], finger: str, topic: str
+def _unused_prefix(
+    taken: Mapping[str, Tactile], new: Mapping[str, Tactile], finger: str, topic: str
 ) -> str:
-    """What comes before the names of modules, where others are called so."""
-    inner = [f"{topic}/"] if finger in made else [f"{finger}/", f"{topic}/", f"{topic}/{finger}/"]
+    """Return a prefix for the names of new modules that makes them different from others."""
+    longer = [f"{topic}/"] if finger in new else [f"{finger}/", f"{topic}/", f"{topic}/{finger}/"]
     return next(
-        (before for before in ("", *inner) if not any(f"{before}{name}" in taken for name in made)),
-        inner[-1],
+        (prefix for prefix in ("", *longer) if not any(f"{prefix}{name}" in taken for name in new)),
+        longer[-1],
     )
 
 
-def _modules_of(finger: str, track: _Track, clock: str) -> Mapping[str, Tactile]:
+def _modules_of(finger: str, track: _DeviceTrack, clock: str) -> Mapping[str, Tactile]:
     times = track.times(clock)
-    if times is None:  # the bag's own do not go forward either: let the check say where
+    if times is None:  # the bag's times do not increase either: Tactile names the place
         times = np.array([stamps[-1] for stamps in track.stamps])
     sensors = sensors_of(track.first, "count")
     parts = xela_models.split(track.first.model, np.array(track.readings))

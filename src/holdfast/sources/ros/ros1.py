@@ -10,7 +10,7 @@ from typing import Any
 from holdfast.errors import SourceError
 from holdfast.ros import rospy_node
 from holdfast.ros.definitions import parse_definition
-from holdfast.ros.messages import SUPPORTED_MESSAGES, DeviceSample, SampleDecoder
+from holdfast.ros.sensor_messages import SUPPORTED_MESSAGES, DeviceSample, SampleDecoder
 from holdfast.sources.base import Source
 from holdfast.sources.ros.topic import PATIENCE, Link, Packet, Stranger, TopicSource, topic_of
 from holdfast.sources.uri import Address

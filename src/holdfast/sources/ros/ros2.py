@@ -5,7 +5,7 @@ from collections import deque
 
 from holdfast.errors import SourceError
 from holdfast.ros import dds
-from holdfast.ros.messages import SampleDecoder, known_definition
+from holdfast.ros.sensor_messages import SampleDecoder, known_definition
 from holdfast.sources.base import Source
 from holdfast.sources.ros.topic import PATIENCE, Link, Packet, TopicSource, topic_of
 from holdfast.sources.uri import Address

@@ -7,7 +7,7 @@ from collections.abc import Callable
 from typing import NamedTuple
 
 from holdfast.errors import SourceError
-from holdfast.ros.messages import DeviceSample
+from holdfast.ros.sensor_messages import DeviceSample
 from holdfast.sensors.types import Unit
 from holdfast.sources.base import Arrival, Source, notice_arrival
 from holdfast.sources.ros.translator import Translator

@@ -9,7 +9,7 @@ import numpy.typing as npt
 
 from holdfast.contact import Fault
 from holdfast.errors import SourceError
-from holdfast.ros.messages import PAPILLARRAY, DeviceSample, readings_of
+from holdfast.ros.sensor_messages import PAPILLARRAY, DeviceSample, readings_of
 from holdfast.sensors import Sensor, sensor
 from holdfast.sensors.types import Unit
 from holdfast.sensors.xela_models import whole_hand

@@ -1,17 +1,16 @@
+"""Bags of poses for tests."""
+
 import pytest
 
-from holdfast.errors import RecordingError
-from holdfast.labelling.poses import poses_from_bag
 
+class PoseBagWriter:
+    """Writer of bags with poses, of ROS 1 or ROS 2, by rosbags."""
 
-class Bags:
-    """Writes bags of ROS 2 and ROS 1."""
-
-    def __init__(self, path, ros1):
+    def __init__(self, path, *, ros1):
         rosbags = pytest.importorskip("rosbags.typesys")
         store = rosbags.Stores.ROS1_NOETIC if ros1 else rosbags.Stores.ROS2_HUMBLE
         self.store, self.ros1, self.path = rosbags.get_typestore(store), ros1, path
-        if ros1:  # rosbags does not know it there; a bag brings its definition along
+        if ros1:  # rosbags does not have this type for ROS 1
             text, name = "geometry_msgs/TransformStamped[] transforms", "tf2_msgs/msg/TFMessage"
             self.store.register(rosbags.get_types_from_msg(text, name))
 
@@ -53,36 +52,3 @@ class Bags:
                     topics[topic] = writer.add_connection(topic, kind, typestore=self.store)
                 writer.write(topics[topic], number, bytes(serialize(message, kind)))
         return self.path
-
-
-@pytest.mark.parametrize("ros1", [False, True])
-def test_bags_of_poses(tmp_path, ros1):
-    bags = Bags(tmp_path / ("bag.bag" if ros1 else "bag"), ros1)
-    path = bags.write(
-        [("/marker", bags.pose(1e9 + k / 4, float(k))) for k in range(4)]
-        + [("/tf", bags.frames(1e9 + k / 4, k / 2, "thumb_tip", "camera")) for k in range(4)]
-    )
-    poses = poses_from_bag(path, "/marker", {"thumb": "thumb_tip"})
-    assert (poses.thing.times - 1e9).tolist() == [0, 0.25, 0.5, 0.75]
-    assert poses.thing.positions[:, 0].tolist() == [0, 1, 2, 3]
-    assert poses.tips["thumb"].positions[:, 0].tolist() == [0, 0.5, 1, 1.5]
-    assert poses.tips["thumb"].quaternions[0].tolist() == [1, 0, 0, 0]
-    assert not poses.same_clock
-
-
-def test_a_bag_without_that_frame(tmp_path):
-    bags = Bags(tmp_path / "bag", ros1=False)
-    path = bags.write([("/marker", bags.pose(1.0, 0.0)), ("/tf", bags.frames(1.0, 0.0, "tip"))])
-    with pytest.raises(RecordingError, match="has no pose of object; it has /marker, tip"):
-        poses_from_bag(path, "object")
-    with pytest.raises(RecordingError, match="poses in one frame expected, camera and world given"):
-        poses_from_bag(path, "/marker", {"thumb": "tip"})
-
-
-def test_what_is_no_bag(tmp_path):
-    path = tmp_path / "no.bag"
-    path.write_bytes(b"nothing")
-    with pytest.raises(RecordingError, match="is cut, damaged or no bag"):
-        poses_from_bag(path, "object")
-    with pytest.raises(RecordingError):
-        poses_from_bag(tmp_path / "away", "object")

@@ -8,30 +8,28 @@ import numpy as np
 import numpy.typing as npt
 
 from holdfast.ros.cdr import MessageDecoder
-from holdfast.ros.definitions import Definition, parse_definition, short_name
+from holdfast.ros.definitions import (
+    ROS1_HEADER,
+    ROS2_HEADER,
+    SEPARATOR,
+    Definition,
+    field_paths,
+    parse_definition,
+    short_name,
+)
 from holdfast.sensors import Sensor, sensor
 from holdfast.sensors.types import Array, Unit
 from holdfast.sensors.xela_models import module_sensors
 
-_LINE = "\n" + "=" * 80 + "\nMSG: "
-
-_HEADER_1 = _LINE + "std_msgs/Header\nuint32 seq\ntime stamp\nstring frame_id\n"
-_HEADER_2 = (
-    _LINE
-    + "std_msgs/Header\nbuiltin_interfaces/Time stamp\nstring frame_id\n"
-    + _LINE
-    + "builtin_interfaces/Time\nint32 sec\nuint32 nanosec\n"
-)
-
 SENS_STREAM = (
     "SensorFull[] sensors\n"
-    + _LINE
+    + SEPARATOR
     + "xela_server_ros/SensorFull\n"
     + "uint32 message\nfloat64 time\nstring model\nuint8 sensor_pos\n"
     + "Taxel[] taxels\nForces[] forces\n"
-    + _LINE
+    + SEPARATOR
     + "xela_server_ros/Taxel\nuint16 x\nuint16 y\nuint16 z\n"
-    + _LINE
+    + SEPARATOR
     + "xela_server_ros/Forces\nfloat32 x\nfloat32 y\nfloat32 z\n"
 )
 """XELA's, since 2021; in ROS 2 the package is called xela_server_ros2."""
@@ -41,7 +39,7 @@ _SENSOR_STATE = (
     "float32 gfX\nfloat32 gfY\nfloat32 gfZ\nfloat32 gtX\nfloat32 gtY\nfloat32 gtZ\n"
     "float32 friction_est\nfloat32 target_grip_force\n"
     "bool is_sd_active\nbool is_ref_loaded\nbool is_contact\n"
-    + _LINE
+    + SEPARATOR
     + "PACKAGE/PillarState\nstd_msgs/Header header\nint32 id\n"
     + "float32 dX\nfloat32 dY\nfloat32 dZ\nfloat32 fX\nfloat32 fY\nfloat32 fZ\n"
     + "bool in_contact\nint32 slip_state\n"
@@ -90,7 +88,7 @@ def known_definition(name: str, *, ros2: bool) -> Definition | None:
         return parse_definition(short, SENS_STREAM.replace("xela_server_ros/", f"{package}/"))
     if short in _PILLARS:
         text = _SENSOR_STATE.replace("PACKAGE", package)
-        return parse_definition(short, text + (_HEADER_2 if ros2 else _HEADER_1))
+        return parse_definition(short, text + (ROS2_HEADER if ros2 else ROS1_HEADER))
     return None
 
 
@@ -128,29 +126,13 @@ SUPPORTED_MESSAGES = (
 
 def _taker(definition: Definition) -> Callable[[Mapping[str, Any]], list[DeviceSample]]:
     """By the fields of the messages: packages change their names, and older ones differ."""
-    paths = _paths(definition)
+    paths = field_paths(definition)
     for needed, take in _TAKERS:
         if needed <= paths:
             return take
     raise ValueError(
         f"{definition.name} is of no kind that holdfast knows; there are {SUPPORTED_MESSAGES}"
     )
-
-
-def _paths(definition: Definition) -> set[str]:
-    """Names of the fields, with their types; those inside behind the name of the outer one."""
-    found: set[str] = set()
-
-    def walk(name: str, before: str) -> None:
-        for field in definition.types[name]:
-            many = "" if field.size is None else "[]"
-            if field.kind in definition.types:
-                walk(field.kind, f"{before}{field.name}{many}.")
-            else:
-                found.add(f"{before}{field.name}{many} {field.kind}")
-
-    walk(definition.name, "")
-    return found
 
 
 def _each(before: str, kind: str, names: str = "xyz") -> set[str]:
