@@ -93,7 +93,7 @@ def _own(path: Path) -> list[Path]:
     """Files of holdfast itself: the file at `path`, or those in that folder."""
     from holdfast.errors import RecordingError
     from holdfast.io.dataset import load_dataset
-    from holdfast.io.files import is_recording
+    from holdfast.io.recording_files import is_recording
 
     if path.is_dir():
         with suppress(RecordingError):

@@ -1,9 +1,8 @@
 """Recordings on disk: Parquet for analysis, MCAP while recording, and other people's data."""
 
 from holdfast.io.dataset import Dataset, load_dataset
-from holdfast.io.files import load_recording, read_chunks, save_recording
 from holdfast.io.importers import FORMATS, import_recordings
-from holdfast.io.labels import (
+from holdfast.io.label_files import (
     LabelFile,
     labels_from_csv,
     labels_path,
@@ -11,6 +10,7 @@ from holdfast.io.labels import (
     load_labels,
     save_labels,
 )
+from holdfast.io.recording_files import load_recording, read_chunks, save_recording
 
 __all__ = [
     "FORMATS",

@@ -11,7 +11,7 @@ import numpy as np
 import numpy.typing as npt
 
 from holdfast.io.header import Header
-from holdfast.io.labels import labels_for, labels_path
+from holdfast.io.label_files import labels_for, labels_path
 from holdfast.io.series import Samples, cut_labels, recording_from
 from holdfast.io.spans import spans
 from holdfast.recordings import Label, Recording

@@ -4,7 +4,7 @@ from collections.abc import Sequence
 
 from holdfast.errors import HoldfastError
 from holdfast.io.header import LabelData, label_data
-from holdfast.io.labels import labels_for
+from holdfast.io.label_files import labels_for
 from holdfast.labelling.doubt import doubtful
 from holdfast.labelling.page_schema import Doubted, Doubtful, Entry, Listing, Opened, Video
 from holdfast.labelling.shelf import Shelf, beside

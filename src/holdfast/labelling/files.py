@@ -3,9 +3,9 @@
 from pathlib import Path
 
 from holdfast.errors import RecordingError
-from holdfast.io.files import SUFFIXES, load_recording
 from holdfast.io.header import label_of
-from holdfast.io.labels import SUFFIX, labels_from_csv, load_labels
+from holdfast.io.label_files import SUFFIX, labels_from_csv, load_labels
+from holdfast.io.recording_files import SUFFIXES, load_recording
 from holdfast.labelling.label_studio import is_label_studio, labels_from_label_studio
 from holdfast.recordings import Label, Recording
 

@@ -19,7 +19,7 @@ from holdfast.contact import Cause, ContactState
 from holdfast.errors import HoldfastError, OutputError, RecordingError
 from holdfast.files import write_whole
 from holdfast.io.header import label_data
-from holdfast.io.labels import LabelFile, labels_for, labels_path, load_labels
+from holdfast.io.label_files import LabelFile, labels_for, labels_path, load_labels
 from holdfast.recordings import Label, Recording
 
 EDGE = 1e-6

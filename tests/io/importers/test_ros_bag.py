@@ -7,7 +7,7 @@ import pytest
 from holdfast.cli import main
 from holdfast.errors import MissingExtra, RecordingError
 from holdfast.io import import_recordings, load_recording, save_recording
-from holdfast.io.files import is_recording
+from holdfast.io.recording_files import is_recording
 from holdfast.ros.sensor_messages import DeviceSample
 from holdfast.sensors import hand
 from holdfast.sources.ros.translator import Translator

@@ -75,7 +75,7 @@ def refuse_persons(files: Sequence[Path]) -> None:
         OutputError: a person has.
     """
     from holdfast.errors import OutputError
-    from holdfast.io.labels import labels_path
+    from holdfast.io.label_files import labels_path
 
     theirs = [(path, who) for path in files if (who := _person(path)) is not None]
     if theirs:
@@ -90,7 +90,7 @@ def refuse_persons(files: Sequence[Path]) -> None:
 def _person(path: Path) -> str | None:
     """Who saved the labels of a recording by hand; None where nobody did."""
     from holdfast.errors import RecordingError
-    from holdfast.io.labels import labels_for, labels_path, load_labels
+    from holdfast.io.label_files import labels_for, labels_path, load_labels
     from holdfast.labelling.summary import summary_of
 
     try:
@@ -128,7 +128,7 @@ def write(path: Path, recording: "Recording", labels: "Labels", author: str) -> 
         OutputError: it cannot be written.
         RecordingError: the file there is of another recording, or none.
     """
-    from holdfast.io.labels import labels_for, labels_path, load_labels
+    from holdfast.io.label_files import labels_for, labels_path, load_labels
     from holdfast.labelling.store import revision_of, save_stored
 
     there = labels_for(path, recording.digest)
@@ -206,7 +206,7 @@ def finish(documents: Sequence[dict[str, Any]], *, written: bool) -> None:
 
 
 def _document(path: Path, recording: "Recording", labels: "Labels") -> dict[str, Any]:
-    from holdfast.io.labels import labels_path
+    from holdfast.io.label_files import labels_path
 
     return {
         "name": recording.name,

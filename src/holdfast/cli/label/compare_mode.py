@@ -131,8 +131,8 @@ def _found(place: Path) -> list[Path]:
     """The recordings in a folder, at a path, or beside a label file."""
     from holdfast.errors import RecordingError
     from holdfast.io import load_dataset
-    from holdfast.io.files import SUFFIXES
-    from holdfast.io.labels import SUFFIX, load_labels
+    from holdfast.io.label_files import SUFFIX, load_labels
+    from holdfast.io.recording_files import SUFFIXES
 
     if place.is_dir():
         try:

@@ -101,7 +101,7 @@ def recordings_at(paths: Sequence[Path]) -> list[Path]:
     """
     from holdfast.errors import RecordingError
     from holdfast.io import load_dataset
-    from holdfast.io.files import SUFFIXES
+    from holdfast.io.recording_files import SUFFIXES
 
     found: list[Path] = []
     for path in paths:

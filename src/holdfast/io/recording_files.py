@@ -6,7 +6,7 @@ from pathlib import Path
 from types import ModuleType
 
 from holdfast.errors import OutputError, RecordingError
-from holdfast.io.labels import labels_for
+from holdfast.io.label_files import labels_for
 from holdfast.recordings import Recording
 
 SUFFIXES = (".parquet", ".mcap")
