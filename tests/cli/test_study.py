@@ -9,10 +9,9 @@ from holdfast.cli import study as verb
 from holdfast.contact import ContactState
 from holdfast.io import save_recording
 from holdfast.recordings import Label
-from holdfast.study import study as whole
-from holdfast.study.paper import experiments
-from holdfast.study.paper import part as paper
-from holdfast.study.report.tables import Row, Table
+from holdfast.study import run as study_run
+from holdfast.study.paper import experiments, paper_tables
+from holdfast.study.report.result_tables import ResultTable, Row
 from holdfast.synthetic import synthetic_recording
 from holdfast.twin import simulation
 from holdfast.twin.profile import profile
@@ -22,9 +21,9 @@ from holdfast.twin.profile import profile
 def nowhere(monkeypatch, tmp_path):
     """No real recordings, and few tasks."""
     monkeypatch.setenv("HOLDFAST_DATA", str(tmp_path / "nothing"))
-    monkeypatch.setattr(whole, "PARTS", {"paper": paper, "experiments": experiments})
-    monkeypatch.setattr(paper, "QUICK_WINDOWS", (14,))
-    monkeypatch.setattr(paper, "ABLATED_AT", (14,))
+    monkeypatch.setattr(study_run, "PARTS", {"paper": paper_tables, "experiments": experiments})
+    monkeypatch.setattr(paper_tables, "QUICK_WINDOWS", (14,))
+    monkeypatch.setattr(paper_tables, "ABLATED_AT", (14,))
 
 
 @pytest.fixture
@@ -185,7 +184,7 @@ def test_what_is_printed_is_short(capsys):
     rows += [
         Row({"on": "by recording", "method": "d", "threshold": "for 1/min", "figure": "AUC"}, 1.0)
     ]
-    table = Table("methods", "Methods", "", rows, ("on", "method"), digits_of={"AUC": 3})
+    table = ResultTable("methods", "Methods", "", rows, ("on", "method"), digits_of={"AUC": 3})
     verb._show(table)
     assert capsys.readouterr().out.splitlines() == [
         "Methods (in parentheses: the paper)",

@@ -13,9 +13,8 @@ from holdfast.cli.terminal.progress import progress
 
 if TYPE_CHECKING:
     from holdfast.parallel import Engine
-    from holdfast.study.corpus import Corpus
-    from holdfast.study.plan import Plan
-    from holdfast.study.report.tables import Line, Row, Table
+    from holdfast.study.plan import Corpus, StudyPlan
+    from holdfast.study.report.result_tables import ResultTable, Row, TableLine
 
 HEADLINES: dict[str, tuple[str, ...]] = {
     "confusion": (),
@@ -65,15 +64,15 @@ def study(
       holdfast study --twin --out study/
       holdfast study recordings/ --out mine/ --engine dask:tcp://10.0.0.1:8786
     """
-    from holdfast.study.study import study as run
+    from holdfast.study.run import run_study
 
     engines = _checked(data, out, engine, jobs, seed, tare, twin=twin, force=force)
     begun = time.perf_counter()
     try:
         plan, left_out = _plan(data, out, seed, tare, jobs, quick=quick)
         made_in = time.perf_counter() - begun
-        tables = run(
-            plan, out, engines, follow=progress, tell=say, force=force, made_in=made_in,
+        tables = run_study(
+            plan, out, engines, progress=progress, notify=say, force=force, made_in=made_in,
             left_out=left_out,
         )  # fmt: skip
     except KeyboardInterrupt:
@@ -110,7 +109,7 @@ def _checked(
     """
     from holdfast.features import Tare
     from holdfast.parallel import Engine
-    from holdfast.study.report.folder import refuse_study
+    from holdfast.study.report.folder import check_output_folder
 
     if (data is None) != twin:
         given = "both" if twin else "neither"
@@ -121,7 +120,7 @@ def _checked(
         )
     Tare.parse(tare)
     chosen = Engine.parse(engine, jobs)
-    refuse_study(out, force=force)
+    check_output_folder(out, force=force)
     if chosen.scheduler is not None:
         list(chosen.each(abs, [(0,)]))
     return chosen
@@ -129,25 +128,24 @@ def _checked(
 
 def _plan(
     data: Path | None, out: Path, seed: int, tare: str, jobs: int, *, quick: bool
-) -> "tuple[Plan, list[str]]":
+) -> "tuple[StudyPlan, list[str]]":
     """What is studied, and what is left out; makes the twin's recordings where it is asked to."""
-    from holdfast.study.corpus import corpus_of
-    from holdfast.study.plan import Plan
-    from holdfast.study.study import refuse_plan
+    from holdfast.study.plan import StudyPlan, scan_corpus
+    from holdfast.study.run import check_plan
 
     if data is None:
         made = out / "data" / "quick" if quick else out / "data"
         corpora = twin_corpora(made, seed, quick=quick, jobs=jobs, tare=tare)
     else:
-        corpora = {"main": corpus_of("main", data, tare)}
-    refuse_plan(Plan(corpora))
+        corpora = {"main": scan_corpus("main", data, tare)}
+    check_plan(StudyPlan(corpora))
     real, left_out = real_corpus(out / "data" / "real")
-    return Plan(corpora, real, quick, seed), left_out
+    return StudyPlan(corpora, real, quick, seed), left_out
 
 
-def _show(table: "Table") -> None:
+def _show(table: "ResultTable") -> None:
     """A table for a terminal: ours, and the paper's in parentheses."""
-    from holdfast.study.report.tables import digits_of, pivot
+    from holdfast.study.report.result_tables import digits_of, pivot
 
     grid = pivot(_headline(table))
     paper = (
@@ -160,7 +158,7 @@ def _show(table: "Table") -> None:
     show()
 
 
-def _headline(table: "Table") -> "Table":
+def _headline(table: "ResultTable") -> "ResultTable":
     """The rows that are printed: of one split, at each method's own threshold."""
     from msgspec.structs import replace
 
@@ -177,13 +175,13 @@ def _headline(table: "Table") -> "Table":
     return replace(table, rows=rows)
 
 
-def _texts(line: "Line", digits: list[int]) -> list[str]:
+def _texts(line: "TableLine", digits: list[int]) -> list[str]:
     cells = zip(line.cells, digits, strict=True)
     return [*line.heads, *(_text(row, n) for row, n in cells)]
 
 
 def _text(row: "Row | None", digits: int) -> str:
-    from holdfast.study.report.tables import number_text
+    from holdfast.study.report.result_tables import number_text
 
     if row is None:
         return "-"
@@ -232,7 +230,7 @@ def twin_corpora(out: Path, seed: int, *, quick: bool, jobs: int, tare: str) -> 
     Raises:
         OutputError: what is there was made from another seed.
     """
-    from holdfast.study.corpus import corpus_of
+    from holdfast.study.plan import scan_corpus
 
     corpora = {}
     kinds = QUICK if quick else FULL
@@ -240,7 +238,7 @@ def twin_corpora(out: Path, seed: int, *, quick: bool, jobs: int, tare: str) -> 
         say(f"recordings of the twin, {number} of {len(kinds)}: {name}")
         repeats = FEW[name] if quick else REPEATS
         _simulate(out / name, kind, seed, repeats, jobs)
-        corpora[name] = corpus_of(name, out / name, tare)
+        corpora[name] = scan_corpus(name, out / name, tare)
     return corpora
 
 
@@ -263,7 +261,7 @@ def _simulate(folder: Path, kind: Kind, seed: int, repeats: int, jobs: int) -> N
 def real_corpus(out: Path) -> "tuple[Corpus | None, list[str]]":
     """The real recordings, imported into `out`; and in a sentence why they are left out."""
     from holdfast.errors import HoldfastError
-    from holdfast.study.corpus import corpus_of
+    from holdfast.study.plan import scan_corpus
 
     source = Path(os.environ.get("HOLDFAST_DATA", "../shared/data"), REAL)
     if not source.is_dir():
@@ -273,7 +271,7 @@ def real_corpus(out: Path) -> "tuple[Corpus | None, list[str]]":
         ]
     try:
         _import(source, out)
-        return corpus_of("real", out, REAL_TARE), []
+        return scan_corpus("real", out, REAL_TARE), []
     except (HoldfastError, ValueError) as cause:
         say(f"the real recordings are left out: {cause}")
         return None, [f"real recordings, for those of HOLDFAST_DATA cannot be used ({cause})."]

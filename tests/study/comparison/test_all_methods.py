@@ -15,15 +15,13 @@ from holdfast.study.comparison import (
 )
 from holdfast.study.comparison.error_tables import quarters
 from holdfast.study.comparison.rows import right_and_all
-from holdfast.study.corpus import corpus_of
 from holdfast.study.evaluation.error_breakdown import ErrorBreakdown, GripErrors
 from holdfast.study.evaluation.evaluate_method import EvaluationEffort
 from holdfast.study.methods import METHODS
-from holdfast.study.plan import Plan
-from holdfast.study.report.layouts import to_html, to_latex
-from holdfast.study.report.tables import to_json
-from study.build import written
-from study.told import told_recording
+from holdfast.study.plan import StudyPlan, scan_corpus
+from holdfast.study.report.result_tables import to_json
+from holdfast.study.report.table_layouts import to_html, to_latex
+from study.example_recordings import recording_with_truth, save_all
 
 FEW = ("logreg", "zhang", "jl_global_logreg")
 TABLES = (
@@ -37,12 +35,12 @@ def plan(tmp_path_factory):
     folder = tmp_path_factory.mktemp("comparison")
     seeds = {"main": range(4), "others": range(10, 13), "gentle": range(20, 22)}
     corpora = {
-        name: corpus_of(
-            name, written(folder / name, [told_recording(f"grasp-{s}", s) for s in each])
+        name: scan_corpus(
+            name, save_all(folder / name, [recording_with_truth(f"grasp-{s}", s) for s in each])
         )
         for name, each in seeds.items()
     }
-    return Plan(corpora)
+    return StudyPlan(corpora)
 
 
 @pytest.fixture(scope="module")
@@ -90,7 +88,7 @@ def rows_of(table, **keys):
 
 
 def test_names_of_tasks_are_unique_over_all_parts(plan, few):
-    both = Plan(plan.corpora, real=plan.main)
+    both = StudyPlan(plan.corpora, real=plan.main)
     tasks = [*comparison.tasks(both), *sensitivity.tasks(both), *real_recordings.tasks(both)]
     names = [task.name for task in tasks]
     assert len(set(names)) == len(names)
@@ -193,7 +191,7 @@ def test_costs_are_more_than_nothing(tables):
 
 
 def test_its_figures(plan, results):
-    drawn = comparison.pictures(plan, results)
+    drawn = comparison.figures(plan, results)
     assert [each.name for each in drawn] == [
         "methods", "alarms", "reliability", "grip", "directions",
     ]  # fmt: skip
@@ -214,7 +212,7 @@ def test_the_network_is_left_out_without_torch_and_the_note_says_how_to_get_it(p
 
 def test_a_quick_study_judges_less(plan, monkeypatch):
     monkeypatch.setattr(jobs, "METHODS", METHODS)
-    quick = Plan(plan.corpora, quick=True)
+    quick = StudyPlan(plan.corpora, quick=True)
     assert not set(jobs.SLOW) & set(jobs.titles(quick))
     assert jobs.job_of(quick, "zhang").tests == ()
     assert jobs.job_of(quick, "logreg").tests == (plan.corpora["others"], plan.corpora["gentle"])
@@ -243,7 +241,7 @@ def test_tables_and_figures_of_what_is_changed(plan, results):
     assert [row.keys["rate [Hz]"] for row in rates] == [30.0, 150.0]
     profiles = {row.keys["on"] for row in tables["profiles"].rows}
     assert profiles == {"same profile, by recording", "gentle profile"}
-    drawn = sensitivity.pictures(plan, results)
+    drawn = sensitivity.figures(plan, results)
     assert [each.name for each in drawn] == [
         "noise_curves", "margins_curves", "rates_curves", "sigma_energy_curves",
     ]  # fmt: skip
@@ -261,7 +259,7 @@ def test_sigma_beside_energy_is_compared_in_pairs(plan, results):
 
 
 def test_without_a_truth_there_are_no_margins(plan, tmp_path):
-    blind = [replace(told_recording(f"grasp-{s}", s), truth=None) for s in range(2)]
-    corpus = corpus_of("main", written(tmp_path / "main", blind))
-    assert [s.name for s in sensitivity.sweeps(Plan({"main": corpus}))] == ["noise", "rates"]
+    blind = [replace(recording_with_truth(f"grasp-{s}", s), truth=None) for s in range(2)]
+    corpus = scan_corpus("main", save_all(tmp_path / "main", blind))
+    assert [s.name for s in sensitivity.sweeps(StudyPlan({"main": corpus}))] == ["noise", "rates"]
     assert [s.name for s in sensitivity.sweeps(plan)] == ["noise", "margins", "rates"]

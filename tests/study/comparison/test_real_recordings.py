@@ -7,12 +7,11 @@ import pytest
 from holdfast.contact import ContactState
 from holdfast.recordings import Label
 from holdfast.study.comparison import real_recordings
-from holdfast.study.corpus import corpus_of
 from holdfast.study.methods import METHODS
-from holdfast.study.plan import Plan
-from holdfast.study.report.layouts import to_html
+from holdfast.study.plan import StudyPlan, scan_corpus
+from holdfast.study.report.table_layouts import to_html
 from holdfast.synthetic import synthetic_recording
-from study.build import written
+from study.example_recordings import save_all
 
 SHAKEN = [
     Label(3.0, 5.3, ContactState.STABLE),
@@ -40,8 +39,8 @@ def corpus(tmp_path_factory):
         if seed > 1:
             recording = recording.with_labels(dict.fromkeys(recording.modules, CALM))
         recordings.append(recording)
-    folder = written(tmp_path_factory.mktemp("real") / "real", recordings)
-    return corpus_of("real", folder, tare="first")
+    folder = save_all(tmp_path_factory.mktemp("real") / "real", recordings)
+    return scan_corpus("real", folder, tare="first")
 
 
 def held_part(recording):
@@ -58,7 +57,7 @@ def held_part(recording):
 def test_each_recording_is_judged_by_the_others(corpus, monkeypatch):
     names = ("logreg", "zhang", "jl_global_logreg")
     monkeypatch.setattr(real_recordings, "METHODS", {name: METHODS[name] for name in names})
-    plan = Plan({"main": corpus}, real=corpus)
+    plan = StudyPlan({"main": corpus}, real=corpus)
     (job,) = (
         task.arguments[0] for task in real_recordings.tasks(plan) if task.name == "real/logreg"
     )
@@ -76,9 +75,9 @@ def test_each_recording_is_judged_by_the_others(corpus, monkeypatch):
 
 
 def test_without_real_recordings_there_is_nothing_to_do(corpus):
-    plan = Plan({"main": corpus})
+    plan = StudyPlan({"main": corpus})
     assert (
         real_recordings.tasks(plan),
         real_recordings.tables(plan, {}),
-        real_recordings.pictures(plan, {}),
+        real_recordings.figures(plan, {}),
     ) == ([], [], [])

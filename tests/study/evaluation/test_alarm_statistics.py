@@ -11,7 +11,7 @@ from holdfast.study.evaluation.alarm_statistics import (
     find_slips,
     follows_jump,
 )
-from study.told import GLITCH, truth_of
+from study.example_recordings import GLITCH, truth_of
 
 TIMES = np.arange(1725) / 150
 TRUTH = truth_of(TIMES, ("thumb", "index"))

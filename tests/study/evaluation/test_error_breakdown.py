@@ -8,7 +8,7 @@ from holdfast.metrics import Decisions, FingerDecisions
 from holdfast.recordings import Truth
 from holdfast.study.evaluation.error_breakdown import break_down_errors, calibration_counts
 from holdfast.study.evaluation.recording_features import RecordingFeatures
-from study.told import PUSH, truth_of
+from study.example_recordings import PUSH, truth_of
 
 TIMES = np.arange(1725) / 150
 LABELS = np.where((TIMES >= 2.3) & (TIMES < 9.5), STABLE, UNSTABLE)

@@ -8,7 +8,6 @@ from holdfast.contact import STABLE, ContactState
 from holdfast.metrics import event_metrics
 from holdfast.recordings import Label
 from holdfast.study.comparison.pooled_split import judge_pooled
-from holdfast.study.corpus import corpus_of
 from holdfast.study.evaluation.evaluate_method import (
     FALSE_ALARM_RATES,
     EvaluationEffort,
@@ -21,20 +20,20 @@ from holdfast.study.evaluation.evaluate_method import (
     scored_recordings,
 )
 from holdfast.study.evaluation.variation import Variation
-from study.build import synthetic, written
-from study.told import told_recording
+from holdfast.study.plan import scan_corpus
+from study.example_recordings import recording_with_truth, save_all, save_synthetic
 
 EFFORT = EvaluationEffort(folds=3, inner=2, max_rows=1000)
 
 
 @pytest.fixture(scope="module")
 def recordings():
-    return [told_recording(f"grasp-{seed}", seed) for seed in range(6)]
+    return [recording_with_truth(f"grasp-{seed}", seed) for seed in range(6)]
 
 
 @pytest.fixture(scope="module")
 def corpus(tmp_path_factory, recordings):
-    return corpus_of("main", written(tmp_path_factory.mktemp("judging") / "main", recordings))
+    return scan_corpus("main", save_all(tmp_path_factory.mktemp("judging") / "main", recordings))
 
 
 @pytest.mark.parametrize("n", [2, 5, 12, 13])
@@ -65,7 +64,7 @@ def test_what_is_judged_has_no_say_in_its_judge(tmp_path, recordings, corpus, me
     """Labels and truth of the recordings of a fold turned round: the same decisions on them."""
     held = next(held_out([r.metadata["object"] for r in recordings], "recording", 3, 0))
     other = [turned(r) if k in held else r for k, r in enumerate(recordings)]
-    turned_corpus = corpus_of("main", written(tmp_path / "main", other))
+    turned_corpus = scan_corpus("main", save_all(tmp_path / "main", other))
     job = EvaluationJob(method, corpus, effort=EFFORT)
     (_, cases), (_, turned_cases) = (
         next(scored_recordings(each))
@@ -102,9 +101,9 @@ def same(case, twin):
 
 @pytest.fixture(scope="module")
 def judged(corpus, tmp_path_factory):
-    other = synthetic(tmp_path_factory.mktemp("judging-other") / "others", range(20, 23))
+    other = save_synthetic(tmp_path_factory.mktemp("judging-other") / "others", range(20, 23))
     job = EvaluationJob(
-        "logreg", corpus, ("recording", "object"), (corpus_of("others", other),), effort=EFFORT
+        "logreg", corpus, ("recording", "object"), (scan_corpus("others", other),), effort=EFFORT
     )
     data = msgspec.msgpack.encode(evaluate_method(job))
     return msgspec.msgpack.decode(data, type=dict[str, MethodEvaluation])
@@ -164,8 +163,8 @@ def test_recordings_of_one_class_are_judged_too(tmp_path, recordings):
     one = recordings[0].with_labels(
         {f: [Label(2.0, 9.0, ContactState.STABLE)] for f in recordings[0].modules}
     )
-    folder = written(tmp_path / "main", [one, *recordings[1:4]])
-    found = evaluate_method(EvaluationJob("zhang", corpus_of("main", folder), effort=EFFORT))[
+    folder = save_all(tmp_path / "main", [one, *recordings[1:4]])
+    found = evaluate_method(EvaluationJob("zhang", scan_corpus("main", folder), effort=EFFORT))[
         "recording"
     ]
     assert len(found.names) == 4
@@ -176,7 +175,7 @@ def test_two_recordings_of_which_one_has_one_class(tmp_path, recordings):
     one = replace(recordings[0], truth=None).with_labels(
         {f: [Label(2.0, 9.0, ContactState.STABLE)] for f in recordings[0].modules}
     )
-    corpus = corpus_of("main", written(tmp_path / "main", [one, recordings[1]]))
+    corpus = scan_corpus("main", save_all(tmp_path / "main", [one, recordings[1]]))
     found = evaluate_method(EvaluationJob("logreg", corpus, effort=EFFORT))["recording"]
     first, second = found.fingers.recordings
     assert first.fingers["thumb"].n > 0

@@ -5,13 +5,13 @@ import pytest
 
 from holdfast.contact import NO_CONTACT, STABLE, UNKNOWN, UNSTABLE
 from holdfast.metrics import FingerDecisions, hand_decisions
-from holdfast.study.corpus import corpus_of
 from holdfast.study.evaluation.fitted_method import FittedMethod, gather_training_samples
 from holdfast.study.evaluation.recording_features import RecordingFeatures, corpus_features
 from holdfast.study.evaluation.scores import RecordingScores
 from holdfast.study.evaluation.variation import Variation
 from holdfast.study.methods import HAND, METHODS
-from study.build import synthetic
+from holdfast.study.plan import scan_corpus
+from study.example_recordings import save_synthetic
 
 
 def seen_of(times):
@@ -72,7 +72,7 @@ def test_a_hand_judged_as_a_whole_has_no_fingers():
 
 @pytest.fixture(scope="module")
 def corpus(tmp_path_factory):
-    return corpus_of("main", synthetic(tmp_path_factory.mktemp("fitted") / "main", range(4)))
+    return scan_corpus("main", save_synthetic(tmp_path_factory.mktemp("fitted") / "main", range(4)))
 
 
 def test_what_is_learned_is_bounded_and_spread_over_all_recordings(corpus):

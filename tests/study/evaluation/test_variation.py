@@ -5,7 +5,7 @@ from holdfast.contact import UNSTABLE
 from holdfast.recordings import label_states
 from holdfast.study.evaluation.variation import Variation, relabelled
 from holdfast.synthetic import synthetic_recording
-from study.told import told_recording
+from study.example_recordings import recording_with_truth
 
 RECORDING = synthetic_recording("grasp", 3, ("thumb", "index"))
 
@@ -42,7 +42,7 @@ def test_every_third_sample_is_a_slower_sensor():
 
 
 def test_a_margin_draws_disturbances_longer_where_the_truth_is_known():
-    told = told_recording("grasp", 3)
+    told = recording_with_truth("grasp", 3)
     n = {}
     for margin in (0.0, 0.1, 0.2):
         module = Variation(margin=margin).apply(told).modules["index"]

@@ -4,11 +4,11 @@ from holdfast.study.comparison import costs, error_tables, event_tables, sample_
 from holdfast.study.comparison import pictures as drawn
 from holdfast.study.comparison.jobs import SECONDS, USUAL, Results, job_of, task_of, titles
 from holdfast.study.comparison.pooled_split import judge_pooled
-from holdfast.study.paper.counts import Counts
-from holdfast.study.plan import Plan
-from holdfast.study.report.page import Picture
-from holdfast.study.report.tables import Table
-from holdfast.study.work import Task
+from holdfast.study.paper.random_split import ConfusionCounts
+from holdfast.study.plan import StudyPlan
+from holdfast.study.report.html_report import ReportFigure
+from holdfast.study.report.result_tables import ResultTable
+from holdfast.study.tasks import Task
 
 MAKERS = (
     sample_tables.methods,
@@ -24,23 +24,23 @@ MAKERS = (
 )
 
 
-def tasks(plan: Plan) -> list[Task]:
+def tasks(plan: StudyPlan) -> list[Task]:
     """A task for each method, one for each that is also judged by a random split, and the costs."""
     judged = [task_of(plan, name) for name in titles(plan)]
     pooled = [_pooled(plan, name) for name in sample_tables.leaking(plan)]
     return [*judged, *pooled, *costs.tasks(plan)]
 
 
-def tables(plan: Plan, results: Results) -> list[Table]:
+def tables(plan: StudyPlan, results: Results) -> list[ResultTable]:
     """The methods side by side."""
     return [make(plan, results) for make in MAKERS]
 
 
-def pictures(plan: Plan, results: Results) -> list[Picture]:
+def figures(plan: StudyPlan, results: Results) -> list[ReportFigure]:
     """The same as figures."""
     return drawn.pictures(plan, results)
 
 
-def _pooled(plan: Plan, name: str) -> Task:
+def _pooled(plan: StudyPlan, name: str) -> Task:
     cost = SECONDS.get(name, USUAL) / 4
-    return Task(f"pooled/{name}", judge_pooled, (job_of(plan, name),), Counts, cost=cost)
+    return Task(f"pooled/{name}", judge_pooled, (job_of(plan, name),), ConfusionCounts, cost=cost)

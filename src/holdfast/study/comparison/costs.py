@@ -13,15 +13,14 @@ from holdfast.features.specs import HOLDFAST, FeatureSpec
 from holdfast.model import FingerModel, Model
 from holdfast.recordings import Recording
 from holdfast.study.comparison.jobs import Results, titles
-from holdfast.study.corpus import Corpus
 from holdfast.study.evaluation.fitted_method import FittedMethod, gather_training_samples
 from holdfast.study.evaluation.recording_features import corpus_features
 from holdfast.study.evaluation.variation import Variation
 from holdfast.study.methods import METHODS, hand_signal
 from holdfast.study.methods.paper import WINDOW
-from holdfast.study.plan import Plan
-from holdfast.study.report.tables import Key, Row, Table
-from holdfast.study.work import Task
+from holdfast.study.plan import Corpus, StudyPlan
+from holdfast.study.report.result_tables import Key, ResultTable, Row
+from holdfast.study.tasks import Task
 
 TASK = "cost"
 FITTED_TO = 4
@@ -64,7 +63,7 @@ class Costs(msgspec.Struct, frozen=True):
     n_fingers: int
 
 
-def tasks(plan: Plan) -> list[Task]:
+def tasks(plan: StudyPlan) -> list[Task]:
     """One task, for times are compared."""
     arguments = (plan.main, tuple(titles(plan)), plan.seed)
     return [Task(TASK, measure, arguments, Costs, cost=30.0)]
@@ -85,7 +84,7 @@ def measure(corpus: Corpus, names: Sequence[str], seed: int) -> Costs:
     return Costs(costs, live, len(_fingers(recording, few)))
 
 
-def table(plan: Plan, results: Results) -> Table:
+def table(plan: StudyPlan, results: Results) -> ResultTable:
     """What a decision costs."""
     costs: Costs = results[TASK]
     rows: list[Row] = []
@@ -103,7 +102,7 @@ def table(plan: Plan, results: Results) -> Table:
         "whole recording at once; forces are given to most, holdfast's are made anew. Live: the "
         f"median of one Detector.update of {costs.n_fingers} fingers, from readings to states."
     )
-    return Table("cost", "Cost of a decision", note, rows, ("method",), digits=2)
+    return ResultTable("cost", "Cost of a decision", note, rows, ("method",), digits=2)
 
 
 def _cost(name: str, corpus: Corpus, seed: int) -> Cost:

@@ -10,8 +10,8 @@ from holdfast.sensors.types import Array
 from holdfast.study.comparison.jobs import SPLITS, Results, found, titles
 from holdfast.study.comparison.rows import ratio_row
 from holdfast.study.evaluation.error_breakdown import AXES, ErrorBreakdown, GripErrors
-from holdfast.study.plan import Plan
-from holdfast.study.report.tables import Key, Row, Table
+from holdfast.study.plan import StudyPlan
+from holdfast.study.report.result_tables import Key, ResultTable, Row
 from holdfast.twin.labels import LabelRule
 
 DIRECTIONS = (*AXES, "oblique")
@@ -23,7 +23,7 @@ Keys = dict[str, Key]
 Line = tuple[Keys, Sequence[ErrorBreakdown]]
 
 
-def phases(plan: Plan, results: Results) -> Table:
+def phases(plan: StudyPlan, results: Results) -> ResultTable:
     """Errors by what was going on."""
     rows: list[Row] = []
     for keys, parts in _lines(plan, results):
@@ -33,10 +33,10 @@ def phases(plan: Plan, results: Results) -> Table:
                 rows.append(ratio_row(keys | {"phase": phase}, wrong, n, plan.seed))
     note = "Wrong samples of those in each phase of the true course of things; of all fingers."
     title = "Errors by phase [%]"
-    return Table("phases", title, note, rows, ("on", "method"), column="phase")
+    return ResultTable("phases", title, note, rows, ("on", "method"), column="phase")
 
 
-def force(plan: Plan, results: Results) -> Table:
+def force(plan: StudyPlan, results: Results) -> ResultTable:
     """Errors by how firm the grip is: the paper says that it does not matter."""
     rows: list[Row] = []
     lines = [line for line in _lines(plan, results) if any(each.grips for each in line[1])]
@@ -53,12 +53,12 @@ def force(plan: Plan, results: Results) -> Table:
         f"object is locked, of the recordings judged by recording (bounds {bounds} N). While the "
         "object is held; of methods that judge fingers."
     )
-    return Table(
+    return ResultTable(
         "force", "Errors by grip force [%]", note, rows, ("on", "error", "method"), column="grip"
     )
 
 
-def directions(plan: Plan, results: Results) -> Table:
+def directions(plan: StudyPlan, results: Results) -> ResultTable:
     """Disturbances missed by where they push to: the paper says all possible directions."""
     rows: list[Row] = []
     counts: dict[str, int] = dict.fromkeys(DIRECTIONS, 0)
@@ -80,7 +80,7 @@ def directions(plan: Plan, results: Results) -> Table:
         f"pulls down. Disturbances by recording: {told or 'none'}."
     )
     title = "Disturbed called stable, by direction [%]"
-    return Table("directions", title, note, rows, ("on", "method"), column="direction")
+    return ResultTable("directions", title, note, rows, ("on", "method"), column="direction")
 
 
 def quarters(parts: Sequence[ErrorBreakdown]) -> Array:
@@ -106,7 +106,7 @@ def _of_quarter(
     return counts
 
 
-def _lines(plan: Plan, results: Results) -> Iterator[Line]:
+def _lines(plan: StudyPlan, results: Results) -> Iterator[Line]:
     for name, title in titles(plan).items():
         for key, judged in found(plan, results, name):
             if key in SHOWN and any(each.phases for each in judged.breakdown):

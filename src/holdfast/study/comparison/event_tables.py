@@ -7,8 +7,8 @@ from holdfast.study.comparison.jobs import SPLITS, Results, found, titles
 from holdfast.study.comparison.rows import count_row, quantile_row, ratio_row
 from holdfast.study.evaluation.alarm_statistics import AFTER_GLITCH, AlarmStatistics
 from holdfast.study.evaluation.evaluate_method import COMPARED_RATE, HOLD_TIME, MethodEvaluation
-from holdfast.study.plan import Plan
-from holdfast.study.report.tables import Key, Row, Table
+from holdfast.study.plan import StudyPlan
+from holdfast.study.report.result_tables import Key, ResultTable, Row
 
 THRESHOLDS: dict[str, Callable[[MethodEvaluation], list[AlarmStatistics]]] = {
     "own": lambda judged: judged.own,
@@ -23,7 +23,7 @@ UNDER_STABLE = "in vain under stable label, per minute"
 Keys = dict[str, Key]
 
 
-def events(plan: Plan, results: Results) -> Table:
+def events(plan: StudyPlan, results: Results) -> ResultTable:
     """Onsets of instability, and alarms in vain."""
     rows: list[Row] = []
     for keys, heard in _lines(plan, results, tuple(THRESHOLDS), _of_events(plan)):
@@ -47,10 +47,10 @@ def events(plan: Plan, results: Results) -> Table:
     )
     digits = dict.fromkeys(("delay median [s]", "delay 95 % [s]"), 3) | {"events": 0}
     lines = ("on", "threshold", "method")
-    return Table("events", "Events", note, rows, lines, digits_of=digits)
+    return ResultTable("events", "Events", note, rows, lines, digits_of=digits)
 
 
-def slips(plan: Plan, results: Results) -> Table:
+def slips(plan: StudyPlan, results: Results) -> ResultTable:
     """Slips found in time, where false alarms are few."""
     rows: list[Row] = []
     for keys, heard in _lines(plan, results, OF_SLIPS, SHOWN):
@@ -73,11 +73,11 @@ def slips(plan: Plan, results: Results) -> Table:
         "counted in choosing it."
     )
     lines = ("on", "threshold", "method")
-    return Table("slips", "Slips found", note, rows, lines, digits_of={"slips": 0})
+    return ResultTable("slips", "Slips found", note, rows, lines, digits_of={"slips": 0})
 
 
 def _lines(
-    plan: Plan, results: Results, thresholds: Sequence[str], shown: Sequence[str]
+    plan: StudyPlan, results: Results, thresholds: Sequence[str], shown: Sequence[str]
 ) -> Iterator[tuple[Keys, list[AlarmStatistics]]]:
     for name, title in titles(plan).items():
         for key, judged in found(plan, results, name):
@@ -88,7 +88,7 @@ def _lines(
                 yield keys, THRESHOLDS[threshold](judged)
 
 
-def _of_events(plan: Plan) -> tuple[str, ...]:
+def _of_events(plan: StudyPlan) -> tuple[str, ...]:
     """The mildest and the hardest test: the table is long."""
     return "recording", "others" if "others" in plan.corpora else "object"
 

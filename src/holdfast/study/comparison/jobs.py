@@ -13,8 +13,8 @@ from holdfast.study.evaluation.evaluate_method import (
 )
 from holdfast.study.evaluation.variation import Variation
 from holdfast.study.methods import METHODS
-from holdfast.study.plan import Plan
-from holdfast.study.work import Task
+from holdfast.study.plan import StudyPlan
+from holdfast.study.tasks import Task
 
 PAPER = "logreg"
 """What all others are compared to."""
@@ -46,7 +46,7 @@ SPLITS = {
 Results = Mapping[str, Any]
 
 
-def titles(plan: Plan) -> dict[str, str]:
+def titles(plan: StudyPlan) -> dict[str, str]:
     """The methods that are compared, by name."""
     left_out = SLOW if plan.quick else () if has_network() else (NETWORK,)
     return {name: each.title for name, each in METHODS.items() if name not in left_out}
@@ -57,7 +57,7 @@ def has_network() -> bool:
     return find_spec("torch") is not None
 
 
-def network_note(plan: Plan) -> str:
+def network_note(plan: StudyPlan) -> str:
     """What a reader has to know of the network: how it was judged, or why it was not."""
     if plan.quick:
         return "Left out of a quick study: the TCN and the linear SVMs of James & Lepora."
@@ -70,7 +70,7 @@ def network_note(plan: Plan) -> str:
     )
 
 
-def task_of(plan: Plan, method: str) -> Task:
+def task_of(plan: StudyPlan, method: str) -> Task:
     """The task that judges a method on all that the plan has for it."""
     return judging(f"methods/{method}", job_of(plan, method), quick=plan.quick)
 
@@ -88,7 +88,7 @@ def judging(name: str, job: EvaluationJob, *, quick: bool = False) -> Task:
     return Task(name, evaluate_method, (job,), dict[str, MethodEvaluation], cost=seconds)
 
 
-def job_of(plan: Plan, method: str) -> EvaluationJob:
+def job_of(plan: StudyPlan, method: str) -> EvaluationJob:
     """All that is asked of a method."""
     tests = tuple(plan.corpora[role] for role in _roles(plan, method))
     splits: tuple[Split, ...] = ("recording", "object")
@@ -99,14 +99,14 @@ def job_of(plan: Plan, method: str) -> EvaluationJob:
     )
 
 
-def effort_of(plan: Plan, method: str) -> EvaluationEffort:
+def effort_of(plan: StudyPlan, method: str) -> EvaluationEffort:
     """How thoroughly a method is judged."""
     if method == NETWORK:
         return OF_NETWORK
     return QUICK if plan.quick else EvaluationEffort()
 
 
-def found(plan: Plan, results: Results, method: str) -> Iterator[tuple[str, MethodEvaluation]]:
+def found(plan: StudyPlan, results: Results, method: str) -> Iterator[tuple[str, MethodEvaluation]]:
     """By key of `SPLITS`, what a method is worth there."""
     judged: Mapping[str, MethodEvaluation] = results[f"methods/{method}"]
     for key in SPLITS:
@@ -115,7 +115,7 @@ def found(plan: Plan, results: Results, method: str) -> Iterator[tuple[str, Meth
             yield key, judged[name]
 
 
-def _roles(plan: Plan, method: str) -> list[str]:
+def _roles(plan: StudyPlan, method: str) -> list[str]:
     everywhere = method in (CORE if plan.quick else MAIN)
     wanted = list(SPLITS)[2:] if everywhere else [] if plan.quick else ["others"]
     return [role for role in wanted if role in plan.corpora]

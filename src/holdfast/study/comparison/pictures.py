@@ -5,6 +5,8 @@ from collections.abc import Mapping, Sequence
 import numpy as np
 
 from holdfast.metrics.events import POSTS
+from holdfast.plots.curves import Curve, draw_alarms, draw_reliability
+from holdfast.plots.dots import IntervalEstimate, draw_dots, draw_groups
 from holdfast.sensors.types import Array
 from holdfast.study.comparison import error_tables, sample_tables
 from holdfast.study.comparison.jobs import PAPER, SPLITS, Results, found, titles
@@ -15,11 +17,9 @@ from holdfast.study.evaluation.evaluate_method import (
     MethodEvaluation,
 )
 from holdfast.study.methods import METHODS
-from holdfast.study.plan import Plan
-from holdfast.study.report.curves import Curve, draw_alarms, draw_reliability
-from holdfast.study.report.dots import Estimate, draw_dots, draw_groups
-from holdfast.study.report.page import Picture
-from holdfast.study.report.tables import Row
+from holdfast.study.plan import StudyPlan
+from holdfast.study.report.html_report import ReportFigure
+from holdfast.study.report.result_tables import Row
 
 DRAWN = (
     "logreg", "zhang", "slip_servo", "anyskin", "jl_global_logreg", "tcn", "trees", "holdfast",
@@ -28,7 +28,7 @@ DRAWN = (
 FEW = ("logreg", "svm", "zhang", "trees", "holdfast")
 
 
-def pictures(plan: Plan, results: Results) -> list[Picture]:
+def pictures(plan: StudyPlan, results: Results) -> list[ReportFigure]:
     """All figures of the comparison."""
     drawn = [
         _methods(plan, results),
@@ -40,7 +40,7 @@ def pictures(plan: Plan, results: Results) -> list[Picture]:
     return [picture for picture in drawn if picture is not None]
 
 
-def _methods(plan: Plan, results: Results) -> Picture:
+def _methods(plan: StudyPlan, results: Results) -> ReportFigure:
     table = sample_tables.hands(plan, results)
     shown = ("recording", "object", "others")
     groups = {
@@ -60,10 +60,10 @@ def _methods(plan: Plan, results: Results) -> Picture:
         "All methods judged as hands, the task that they have in common. Lines: 95 % intervals, "
         "by bootstrap over recordings."
     )
-    return Picture("methods", caption, draw_dots(groups, strong))
+    return ReportFigure("methods", caption, draw_dots(groups, strong))
 
 
-def _alarms(plan: Plan, results: Results) -> Picture:
+def _alarms(plan: StudyPlan, results: Results) -> ReportFigure:
     first = f"{1000 * POSTS[0]:.0f} ms"
     groups: dict[str, dict[str, Curve]] = {
         f"events missed at {first} [%]": {},
@@ -80,7 +80,7 @@ def _alarms(plan: Plan, results: Results) -> Picture:
         f"{', '.join(f'{rate:g}' for rate in FALSE_ALARM_RATES)} per minute; drawn is what they "
         f"come to on the others. Large marks: chosen for {COMPARED_RATE:g} per minute."
     )
-    return Picture("alarms", caption, draw_alarms(groups, bar=COMPARED_RATE))
+    return ReportFigure("alarms", caption, draw_alarms(groups, bar=COMPARED_RATE))
 
 
 def _curves(judged: MethodEvaluation) -> tuple[Curve, Curve]:
@@ -106,7 +106,7 @@ def _share(part: int, whole: int) -> float:
     return 100 * part / whole if whole else np.nan
 
 
-def _reliability(plan: Plan, results: Results) -> Picture:
+def _reliability(plan: StudyPlan, results: Results) -> ReportFigure:
     curves, notes = {}, {}
     for name, title in _shown(plan, FEW).items():
         judged = dict(found(plan, results, name)).get("recording")
@@ -117,7 +117,7 @@ def _reliability(plan: Plan, results: Results) -> Picture:
     caption = (
         "How far probabilities can be believed, by recording. On the dotted line they are right."
     )
-    return Picture("reliability", caption, draw_reliability(curves, notes))
+    return ReportFigure("reliability", caption, draw_reliability(curves, notes))
 
 
 def _bins(judged: MethodEvaluation) -> Array:
@@ -127,7 +127,7 @@ def _bins(judged: MethodEvaluation) -> Array:
     return np.column_stack([p / n, stable / n, n])
 
 
-def _by_force(plan: Plan, results: Results) -> Picture | None:
+def _by_force(plan: StudyPlan, results: Results) -> ReportFigure | None:
     table = error_tables.force(plan, results)
     groups = {
         error: _groups(plan, [row for row in table.rows if row.keys["error"] == error], "grip")
@@ -138,10 +138,10 @@ def _by_force(plan: Plan, results: Results) -> Picture | None:
     caption = (
         "Errors by the force of the grip, by recording. The paper holds that it does not matter."
     )
-    return Picture("grip", caption, draw_groups(groups, "samples [%]"))
+    return ReportFigure("grip", caption, draw_groups(groups, "samples [%]"))
 
 
-def _by_direction(plan: Plan, results: Results) -> Picture | None:
+def _by_direction(plan: StudyPlan, results: Results) -> ReportFigure | None:
     table = error_tables.directions(plan, results)
     groups = {"direction of the push": _groups(plan, table.rows, "direction")}
     if not any(groups.values()):
@@ -151,10 +151,12 @@ def _by_direction(plan: Plan, results: Results) -> Picture | None:
         "that all directions are found."
     )
     drawn = draw_groups(groups, "disturbed, called stable [%]", per_row=1)
-    return Picture("directions", caption, drawn)
+    return ReportFigure("directions", caption, drawn)
 
 
-def _groups(plan: Plan, rows: Sequence[Row], key: str) -> dict[str, Mapping[str, Estimate]]:
+def _groups(
+    plan: StudyPlan, rows: Sequence[Row], key: str
+) -> dict[str, Mapping[str, IntervalEstimate]]:
     """By method, its values by group, out of those judged by recording."""
     own = [row for row in rows if row.keys["on"] == SPLITS["recording"]]
     drawn = {
@@ -164,11 +166,14 @@ def _groups(plan: Plan, rows: Sequence[Row], key: str) -> dict[str, Mapping[str,
     return {title: values for title, values in drawn.items() if values}
 
 
-def _estimates(rows: Sequence[Row], key: str) -> dict[str, Estimate]:
-    return {str(row.keys[key]): Estimate(row.ours, *(row.interval or (None, None))) for row in rows}
+def _estimates(rows: Sequence[Row], key: str) -> dict[str, IntervalEstimate]:
+    return {
+        str(row.keys[key]): IntervalEstimate(row.ours, *(row.interval or (None, None)))
+        for row in rows
+    }
 
 
-def _shown(plan: Plan, names: Sequence[str]) -> dict[str, str]:
+def _shown(plan: StudyPlan, names: Sequence[str]) -> dict[str, str]:
     """The titles, for legends without what stands in brackets."""
     return {name: _short(title) for name, title in titles(plan).items() if name in names}
 

@@ -12,7 +12,7 @@ from holdfast.study.evaluation.error_breakdown import evaluated_units
 from holdfast.study.evaluation.evaluate_method import EvaluationJob, find_method
 from holdfast.study.evaluation.fitted_method import FittedMethod, gather_training_samples
 from holdfast.study.evaluation.recording_features import RecordingFeatures, corpus_features
-from holdfast.study.paper.counts import Counts
+from holdfast.study.paper.random_split import ConfusionCounts
 
 FOLDS = 5
 """80 % train, 20 % test, by turns."""
@@ -20,7 +20,7 @@ FOLDS = 5
 Mask = npt.NDArray[np.bool_]
 
 
-def judge_pooled(job: EvaluationJob) -> Counts:
+def judge_pooled(job: EvaluationJob) -> ConfusionCounts:
     """[TN, FP, FN, TP] of each recording, out of fold in random folds of all samples.
 
     All else is as in the honest splits, so that the difference is the split's: the contact

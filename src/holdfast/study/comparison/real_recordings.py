@@ -4,7 +4,6 @@ from typing import Any
 
 from holdfast.metrics import RecordingMetrics
 from holdfast.study.comparison.jobs import NETWORK, SLOW, Results, has_network, judging
-from holdfast.study.corpus import Corpus
 from holdfast.study.evaluation.evaluate_method import (
     EvaluationEffort,
     EvaluationJob,
@@ -12,10 +11,10 @@ from holdfast.study.evaluation.evaluate_method import (
 )
 from holdfast.study.evaluation.variation import Variation
 from holdfast.study.methods import METHODS
-from holdfast.study.plan import Plan
-from holdfast.study.report.page import Picture
-from holdfast.study.report.tables import Row, Table
-from holdfast.study.work import Task
+from holdfast.study.plan import Corpus, StudyPlan
+from holdfast.study.report.html_report import ReportFigure
+from holdfast.study.report.result_tables import ResultTable, Row
+from holdfast.study.tasks import Task
 
 MOST_FOLDS = 20
 """Of more recordings, several are left out at a time."""
@@ -31,7 +30,7 @@ CAVEAT = (
 )
 
 
-def tasks(plan: Plan) -> list[Task]:
+def tasks(plan: StudyPlan) -> list[Task]:
     """A task for each method; none where there are no real recordings."""
     if plan.real is None:
         return []
@@ -41,7 +40,7 @@ def tasks(plan: Plan) -> list[Task]:
     ]
 
 
-def tables(plan: Plan, results: Results) -> list[Table]:
+def tables(plan: StudyPlan, results: Results) -> list[ResultTable]:
     """AUC by recording and finger; none where there are no real recordings."""
     if plan.real is None:
         return []
@@ -54,10 +53,12 @@ def tables(plan: Plan, results: Results) -> list[Table]:
     note = f"Leave one recording out. {CAVEAT}"
     lines = ("recording", "finger", "method")
     digits = {"stable samples": 0, "other samples": 0}
-    return [Table("real", "Real recordings: AUC", note, rows, lines, digits=2, digits_of=digits)]
+    return [
+        ResultTable("real", "Real recordings: AUC", note, rows, lines, digits=2, digits_of=digits)
+    ]
 
 
-def pictures(plan: Plan, results: Results) -> list[Picture]:
+def figures(plan: StudyPlan, results: Results) -> list[ReportFigure]:
     """None: five recordings make no curve."""
     del plan, results
     return []
@@ -80,12 +81,12 @@ def _rows(title: str, recording: RecordingMetrics) -> list[Row]:
     return rows
 
 
-def _methods(plan: Plan) -> dict[str, str]:
+def _methods(plan: StudyPlan) -> dict[str, str]:
     left_out = SLOW if plan.quick else () if has_network() else (NETWORK,)
     return {name: each.title for name, each in METHODS.items() if name not in left_out}
 
 
-def _job(plan: Plan, real: Corpus, name: str) -> EvaluationJob:
+def _job(plan: StudyPlan, real: Corpus, name: str) -> EvaluationJob:
     effort = EvaluationEffort(folds=min(len(real.recordings), MOST_FOLDS), inner=2)
     return EvaluationJob(name, real, ("recording",), (), Variation(), effort, plan.seed)
 

@@ -10,7 +10,7 @@ from holdfast.metrics.intervals import Statistic, quantile_of
 from holdfast.metrics.statistics import quantile
 from holdfast.sensors.types import Array
 from holdfast.study.evaluation.evaluate_method import MethodEvaluation
-from holdfast.study.report.tables import Key, Row
+from holdfast.study.report.result_tables import Key, Row
 
 Keys = Mapping[str, Key]
 

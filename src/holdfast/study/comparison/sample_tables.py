@@ -11,10 +11,10 @@ from holdfast.study.comparison.rows import (
 )
 from holdfast.study.evaluation.evaluate_method import MethodEvaluation
 from holdfast.study.methods import METHODS
-from holdfast.study.paper import printed
-from holdfast.study.paper.counts import Counts, figures
-from holdfast.study.plan import Plan
-from holdfast.study.report.tables import Key, Row, Table
+from holdfast.study.paper import published
+from holdfast.study.paper.random_split import ConfusionCounts, rate_rows
+from holdfast.study.plan import StudyPlan
+from holdfast.study.report.result_tables import Key, ResultTable, Row
 
 LEAKING = ("logreg", "svm", "trees", "holdfast")
 """Methods that are also judged by the random split."""
@@ -27,7 +27,7 @@ PRINTED: dict[str, dict[str, float]] = {
 """What the paper says of unseen data; of Zhang "not more than" and "up to"."""
 
 
-def methods(plan: Plan, results: Results) -> Table:
+def methods(plan: StudyPlan, results: Results) -> ResultTable:
     """Every method by every split, beside the paper's."""
     rows: list[Row] = []
     for name, title in titles(plan).items():
@@ -49,10 +49,10 @@ def methods(plan: Plan, results: Results) -> Table:
         f"paper's figures are of its own data, finger and split. {network_note(plan)}"
     )
     title = "Methods by sample"
-    return Table("methods", title, note, rows, ("on", "method"), digits_of=DIGITS)
+    return ResultTable("methods", title, note, rows, ("on", "method"), digits_of=DIGITS)
 
 
-def hands(plan: Plan, results: Results) -> Table:
+def hands(plan: StudyPlan, results: Results) -> ResultTable:
     """Every method judged as a hand: the task that all have in common."""
     rows: list[Row] = []
     for name, title in titles(plan).items():
@@ -67,17 +67,17 @@ def hands(plan: Plan, results: Results) -> Table:
         "A hand is not stable where a finger is not, stable where two hold. Its score is the "
         "least probability of the fingers in contact."
     )
-    return Table(
+    return ResultTable(
         "hands", "Methods by sample, hands", note, rows, ("on", "method"), digits_of=DIGITS
     )
 
 
-def splits(plan: Plan, results: Results) -> Table:
+def splits(plan: StudyPlan, results: Results) -> ResultTable:
     """What a random split of samples hides."""
     rows: list[Row] = []
     for name in leaking(plan):
         keys: dict[str, Key] = {"method": METHODS[name].title}
-        paper = printed.FIRST_FINGER["accuracy"] if name == PAPER else printed.UNSEEN.get(name)
+        paper = published.FIRST_FINGER["accuracy"] if name == PAPER else published.UNSEEN.get(name)
         rows.append(_pooled(keys, results[f"pooled/{name}"], paper, plan.seed))
         for key, judged in found(plan, results, name):
             (row,) = sample_rows({}, judged.metrics, ("accuracy [%]",))
@@ -87,10 +87,10 @@ def splits(plan: Plan, results: Results) -> Table:
         "Random: samples of all recordings pooled and dealt to five folds, as the paper's split; "
         "everything else is equal. The paper's figure is of its own data."
     )
-    return Table("splits", "Accuracy by split [%]", note, rows, ("method",), column="split")
+    return ResultTable("splits", "Accuracy by split [%]", note, rows, ("method",), column="split")
 
 
-def reliability(plan: Plan, results: Results) -> Table:
+def reliability(plan: StudyPlan, results: Results) -> ResultTable:
     """How far probabilities can be believed."""
     rows: list[Row] = []
     for name, title in titles(plan).items():
@@ -103,22 +103,22 @@ def reliability(plan: Plan, results: Results) -> Table:
         "the distance between what was given and what was so, mean over samples."
     )
     lines = ("on", "method")
-    return Table("reliability", "Probabilities", note, rows, lines, digits=3)
+    return ResultTable("reliability", "Probabilities", note, rows, lines, digits=3)
 
 
-def leaking(plan: Plan) -> list[str]:
+def leaking(plan: StudyPlan) -> list[str]:
     """Methods that are also judged by the random split."""
     return [
         name for name in titles(plan) if name in LEAKING and not (plan.quick and name == "trees")
     ]
 
 
-def _pooled(keys: dict[str, Key], counts: Counts, paper: float | None, seed: int) -> Row:
-    ((_, row),) = figures(counts, ("accuracy",), seed)
+def _pooled(keys: dict[str, Key], counts: ConfusionCounts, paper: float | None, seed: int) -> Row:
+    ((_, row),) = rate_rows(counts, ("accuracy",), seed)
     return Row(keys | {"split": "random"}, row.ours, paper, row.n, row.interval)
 
 
-def _paper(plan: Plan, results: Results, key: str) -> MethodEvaluation | None:
+def _paper(plan: StudyPlan, results: Results, key: str) -> MethodEvaluation | None:
     """The paper's method on the same recordings."""
     return dict(found(plan, results, PAPER)).get(key)
 

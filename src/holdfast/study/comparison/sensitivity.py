@@ -10,17 +10,17 @@ from typing import NamedTuple
 import numpy as np
 
 from holdfast.metrics.events import POSTS
+from holdfast.plots.curves import Curve, draw_lines
 from holdfast.study.comparison.jobs import CORE, SPLITS, Results, effort_of, job_of, judging
 from holdfast.study.comparison.rows import DIGITS, difference_row, ratio_row, sample_rows
 from holdfast.study.evaluation.evaluate_method import COMPARED_RATE, EvaluationJob, MethodEvaluation
 from holdfast.study.evaluation.variation import Variation
 from holdfast.study.methods import METHODS
 from holdfast.study.methods.cuts import CUTS
-from holdfast.study.plan import Plan
-from holdfast.study.report.curves import Curve, draw_lines
-from holdfast.study.report.page import Picture
-from holdfast.study.report.tables import Key, Row, Table
-from holdfast.study.work import Task
+from holdfast.study.plan import StudyPlan
+from holdfast.study.report.html_report import ReportFigure
+from holdfast.study.report.result_tables import Key, ResultTable, Row
+from holdfast.study.tasks import Task
 from holdfast.twin.labels import LabelRule
 
 SHOWN = ("logreg", "zhang", "trees", "holdfast")
@@ -58,7 +58,7 @@ class Sweep(NamedTuple):
     note: str
 
 
-def tasks(plan: Plan) -> list[Task]:
+def tasks(plan: StudyPlan) -> list[Task]:
     """What is judged under each change; what is judged without any is the comparison's."""
     named: dict[str, Task] = {}
     for sweep in sweeps(plan):
@@ -73,13 +73,13 @@ def tasks(plan: Plan) -> list[Task]:
     return list(named.values())
 
 
-def tables(plan: Plan, results: Results) -> list[Table]:
+def tables(plan: StudyPlan, results: Results) -> list[ResultTable]:
     """A table for each thing that is changed, the profiles, and sigma beside energy."""
     made = [_table(plan, results, sweep) for sweep in sweeps(plan)]
     return [*made, _profiles(plan, results), _sigma_energy(plan, results)]
 
 
-def pictures(plan: Plan, results: Results) -> list[Picture]:
+def figures(plan: StudyPlan, results: Results) -> list[ReportFigure]:
     """The same as curves."""
     drawn = [
         _picture(_table(plan, results, sweep), sweep, ("accuracy [%]", "AUC contact", FOUND))
@@ -90,7 +90,7 @@ def pictures(plan: Plan, results: Results) -> list[Picture]:
     return [*drawn, _picture(_sigma_energy(plan, results), sweep, figures)]
 
 
-def methods(plan: Plan) -> list[str]:
+def methods(plan: StudyPlan) -> list[str]:
     """The methods that are shown."""
     return [name for name in (CORE if plan.quick else SHOWN) if name in METHODS]
 
@@ -100,7 +100,7 @@ MARGIN = "margin [s]"
 RATE = "rate [Hz]"
 
 
-def sweeps(plan: Plan) -> list[Sweep]:
+def sweeps(plan: StudyPlan) -> list[Sweep]:
     """What is changed, one by one; the margin only where the truth tells the labels."""
     unit = plan.main.load()[0].modules[plan.main.fingers[0]].unit
     found = [
@@ -136,15 +136,15 @@ def sweeps(plan: Plan) -> list[Sweep]:
     return found
 
 
-def _noise(plan: Plan) -> dict[float, Variation]:
+def _noise(plan: StudyPlan) -> dict[float, Variation]:
     return {level: Variation(noise=level) for level in (_ends(LEVELS) if plan.quick else LEVELS)}
 
 
-def _every(plan: Plan) -> tuple[int, ...]:
+def _every(plan: StudyPlan) -> tuple[int, ...]:
     return (1, 3) if plan.quick else EVERY
 
 
-def _margins(plan: Plan) -> dict[float, Variation]:
+def _margins(plan: StudyPlan) -> dict[float, Variation]:
     """By margin; the labels as they are have that of the rule. None without a truth."""
     truth = plan.main.load()[0].truth
     if truth is None or "phase" not in truth.hand:
@@ -166,7 +166,7 @@ def _changes(sweep: Sweep, method: str) -> dict[float, Variation]:
     return dict(sorted({**dict(kept), **dict(plain)}.items()))
 
 
-def _task(plan: Plan, method: str, change: Variation) -> Task:
+def _task(plan: StudyPlan, method: str, change: Variation) -> Task:
     job = _job(plan, method, change)
     return judging(_name(method, change), job, quick=plan.quick)
 
@@ -176,7 +176,7 @@ def _name(method: str, change: Variation) -> str:
     return f"sensitivity/{method}/noise-{change.noise:g}/every-{change.every}{margin}"
 
 
-def _job(plan: Plan, method: str, change: Variation) -> EvaluationJob:
+def _job(plan: StudyPlan, method: str, change: Variation) -> EvaluationJob:
     """Unchanged it is the job of the comparison, which is so done once."""
     if method in METHODS and change == Variation():
         return job_of(plan, method)
@@ -184,7 +184,7 @@ def _job(plan: Plan, method: str, change: Variation) -> EvaluationJob:
     return EvaluationJob(method, plan.main, ("recording",), (), change, effort, plan.seed)
 
 
-def _table(plan: Plan, results: Results, sweep: Sweep) -> Table:
+def _table(plan: StudyPlan, results: Results, sweep: Sweep) -> ResultTable:
     rows: list[Row] = []
     for method in methods(plan):
         for value, change in _changes(sweep, method).items():
@@ -192,7 +192,9 @@ def _table(plan: Plan, results: Results, sweep: Sweep) -> Table:
             keys: Keys = {"method": METHODS[method].title, sweep.key: value}
             rows += _figures(keys, judged, plan.seed)
     lines = ("method", sweep.key)
-    return Table(sweep.name, sweep.title, f"{sweep.note} {_NOTE}", rows, lines, digits_of=DIGITS)
+    return ResultTable(
+        sweep.name, sweep.title, f"{sweep.note} {_NOTE}", rows, lines, digits_of=DIGITS
+    )
 
 
 _NOTE = (
@@ -201,7 +203,7 @@ _NOTE = (
 )
 
 
-def _profiles(plan: Plan, results: Results) -> Table:
+def _profiles(plan: StudyPlan, results: Results) -> ResultTable:
     rows: list[Row] = []
     for method in methods(plan):
         judged = results[_name(method, Variation())]
@@ -216,10 +218,10 @@ def _profiles(plan: Plan, results: Results) -> Table:
         "anything fitted anew; slips and alarms at the threshold chosen on main."
     )
     title = "Sensitivity to the profile"
-    return Table("profiles", title, note, rows, ("method", "on"), digits_of=DIGITS)
+    return ResultTable("profiles", title, note, rows, ("method", "on"), digits_of=DIGITS)
 
 
-def _sigma_energy(plan: Plan, results: Results) -> Table:
+def _sigma_energy(plan: StudyPlan, results: Results) -> ResultTable:
     rows: list[Row] = []
     for value, change in _noise(plan).items():
         first = results[_name("sigma_cut", change)]["recording"].metrics
@@ -239,7 +241,7 @@ def _sigma_energy(plan: Plan, results: Results) -> Table:
     )
     lines = (NOISE, "measure")
     title = "Sigma beside energy as noise grows"
-    return Table("sigma_energy", title, note, rows, lines, digits_of=DIGITS)
+    return ResultTable("sigma_energy", title, note, rows, lines, digits_of=DIGITS)
 
 
 def _figures(keys: Keys, judged: MethodEvaluation, seed: int) -> Iterator[Row]:
@@ -254,7 +256,7 @@ def _figures(keys: Keys, judged: MethodEvaluation, seed: int) -> Iterator[Row]:
     yield ratio_row(about, [each.under_stable for each in heard], minutes, seed, scale=1.0)
 
 
-def _picture(table: Table, sweep: Sweep, figures: Sequence[str]) -> Picture:
+def _picture(table: ResultTable, sweep: Sweep, figures: Sequence[str]) -> ReportFigure:
     head = table.lines[0] if table.lines[0] != sweep.key else table.lines[1]
     groups: dict[str, dict[str, Curve]] = {}
     for figure in figures:
@@ -264,7 +266,7 @@ def _picture(table: Table, sweep: Sweep, figures: Sequence[str]) -> Picture:
         if curves:
             groups[figure] = curves
     caption = f"{table.title}. Bands: 95 % intervals, by bootstrap over recordings."
-    return Picture(f"{sweep.name}_curves", caption, draw_lines(groups, sweep.key))
+    return ReportFigure(f"{sweep.name}_curves", caption, draw_lines(groups, sweep.key))
 
 
 def _curve(rows: Sequence[Row], key: str) -> Curve:

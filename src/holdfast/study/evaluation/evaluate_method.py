@@ -14,7 +14,6 @@ import numpy as np
 import numpy.typing as npt
 
 from holdfast.metrics import Decisions, Metrics, summarise
-from holdfast.study.corpus import Corpus
 from holdfast.study.evaluation.alarm_statistics import (
     AlarmStatistics,
     alarm_statistics,
@@ -37,6 +36,7 @@ from holdfast.study.evaluation.thresholds import FalseAlarmRanges, threshold_shi
 from holdfast.study.evaluation.variation import Variation
 from holdfast.study.methods import HAND, METHODS, Method
 from holdfast.study.methods.cuts import CUTS
+from holdfast.study.plan import Corpus
 
 FALSE_ALARM_RATES = (0.5, 1.0, 2.0, 5.0, 10.0, 20.0, 50.0)
 """False alarms per minute of stable label that thresholds are chosen for, in training."""

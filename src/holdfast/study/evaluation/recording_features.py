@@ -12,9 +12,9 @@ from holdfast.metrics import FingerDecisions, hand_decisions
 from holdfast.metrics.decisions import Codes
 from holdfast.recordings import Recording, Truth, label_states
 from holdfast.sensors.types import Array
-from holdfast.study.corpus import Corpus
 from holdfast.study.evaluation.variation import Variation, relabelled
 from holdfast.study.methods import HAND, Method, hand_signal
+from holdfast.study.plan import Corpus
 from holdfast.training.design import rest_moments
 
 

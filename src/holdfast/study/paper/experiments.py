@@ -12,7 +12,14 @@ import numpy as np
 
 from holdfast.errors import TrainingError
 from holdfast.features import Tare
-from holdfast.study.corpus import Corpus
+from holdfast.plots.traces import (
+    Codes,
+    Trace,
+    draw_experiment,
+    draw_features,
+    draw_forces,
+    trace_of,
+)
 from holdfast.study.evaluation.fitted_method import (
     FittedMethod,
     TrainingSamples,
@@ -21,19 +28,11 @@ from holdfast.study.evaluation.fitted_method import (
 from holdfast.study.evaluation.recording_features import corpus_features
 from holdfast.study.evaluation.variation import Variation
 from holdfast.study.methods import METHODS, Method
-from holdfast.study.paper.part import first_finger
-from holdfast.study.plan import Plan
-from holdfast.study.report.figures import (
-    Codes,
-    Trace,
-    draw_experiment,
-    draw_features,
-    draw_forces,
-    trace_of,
-)
-from holdfast.study.report.page import Picture
-from holdfast.study.report.tables import Table
-from holdfast.study.work import Task
+from holdfast.study.paper.paper_tables import first_finger
+from holdfast.study.plan import Corpus, StudyPlan
+from holdfast.study.report.html_report import ReportFigure
+from holdfast.study.report.result_tables import ResultTable
+from holdfast.study.tasks import Task
 
 TASK = "figures/experiments"
 SHOWN = ("logreg", "svm")
@@ -64,21 +63,21 @@ class Shown(msgspec.Struct, frozen=True):
     states: dict[str, list[int]] = {}
 
 
-def tasks(plan: Plan) -> list[Task]:
+def tasks(plan: StudyPlan) -> list[Task]:
     """One: what LogReg and SVM say of the recordings of the figures."""
     corpora = {role: plan.corpora[role] for role in UNSEEN if role in plan.corpora}
     arguments = (corpora, first_finger(plan), plan.seed)
     return [Task(TASK, predict, arguments, list[Shown], cost=5.0)]
 
 
-def tables(plan: Plan, results: Mapping[str, Any]) -> list[Table]:
+def tables(plan: StudyPlan, results: Mapping[str, Any]) -> list[ResultTable]:
     """None."""
     return []
 
 
-def pictures(plan: Plan, results: Mapping[str, Any]) -> list[Picture]:
+def figures(plan: StudyPlan, results: Mapping[str, Any]) -> list[ReportFigure]:
     """The paper's figures."""
-    drawn: list[Picture] = []
+    drawn: list[ReportFigure] = []
     for shown in results[TASK]:
         trace = _trace(plan.corpora[shown.role], shown.recording, shown.finger)
         if shown.experiment == "protocol":
@@ -165,15 +164,15 @@ def _trace(corpus: Corpus, name: str, finger: str) -> Trace:
     return trace_of(recording, finger, Tare.parse(corpus.tare))
 
 
-def _of_protocol(trace: Trace) -> Iterator[Picture]:
+def _of_protocol(trace: Trace) -> Iterator[ReportFigure]:
     chosen = "The first of the recordings with disturbances, by name."
-    yield Picture(
+    yield ReportFigure(
         "forces",
         "Components of the fingertip force over one recording, and what was going on (the paper's "
         f"figure of the phases). F_x is along the normal of the pad. {chosen}",
         draw_forces(trace),
     )
-    yield Picture(
+    yield ReportFigure(
         "features",
         "Features and labels of one experiment (the paper's figure of the same). From above: the "
         "components of the force; its amplitude F_a and mean m over the window; the instability "
@@ -189,7 +188,7 @@ _TITLES: dict[Experiment, tuple[str, str]] = {
 }
 
 
-def _of_experiment(shown: Shown, trace: Trace) -> Picture:
+def _of_experiment(shown: Shown, trace: Trace) -> ReportFigure:
     name, title = _TITLES[shown.experiment]
     predicted = {
         {"logreg": "LogReg", "svm": "SVM"}[method]: np.array(states)
@@ -204,4 +203,4 @@ def _of_experiment(shown: Shown, trace: Trace) -> Picture:
         f"{title}. F_a, sigma, the label, and what LogReg and SVM predict {where}. The share of "
         "labelled samples that they have right stands beside. Chosen: the first by name."
     )
-    return Picture(name, caption, draw_experiment(trace, predicted))
+    return ReportFigure(name, caption, draw_experiment(trace, predicted))

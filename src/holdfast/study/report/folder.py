@@ -8,10 +8,10 @@ from typing import Any
 import msgspec
 
 from holdfast.errors import OutputError
+from holdfast.study.report.html_report import Section, report
 from holdfast.study.report.images import png_of, svg_of
-from holdfast.study.report.layouts import to_latex, to_markdown
-from holdfast.study.report.page import Section, report
-from holdfast.study.report.tables import Table, to_csv, to_json
+from holdfast.study.report.result_tables import ResultTable, to_csv, to_json
+from holdfast.study.report.table_layouts import to_latex, to_markdown
 
 KEPT = ("work", "data")
 """Results of tasks, and data that were made, in the same folder: never replaced."""
@@ -42,11 +42,11 @@ def write_study(
         force: replace a study that is there.
 
     Raises:
-        OutputError: as `refuse_study`, or the disk refuses.
+        OutputError: as `check_output_folder`, or the disk refuses.
         ValueError: two tables or two figures have one name.
     """
     target = Path(out)
-    refuse_study(target, force=force)
+    check_output_folder(target, force=force)
     try:
         target.mkdir(exist_ok=True)
         with tempfile.TemporaryDirectory(prefix=".study.", dir=target) as name:
@@ -63,7 +63,7 @@ def write_study(
         raise OutputError(f"cannot write {target}: {cause.strerror or cause}") from cause
 
 
-def refuse_study(out: str | Path, *, force: bool = False) -> None:
+def check_output_folder(out: str | Path, *, force: bool = False) -> None:
     """Does nothing where a study may be written to `out`.
 
     Raises:
@@ -115,7 +115,7 @@ def _write_parts(
     (folder / SUMMARY).write_bytes(_json({"tables": tables, **summary}))
 
 
-def _write_table(folder: Path, table: Table) -> None:
+def _write_table(folder: Path, table: ResultTable) -> None:
     told = {"name": table.name, "title": table.title, "note": table.note, "rows": to_json(table)}
     (folder / f"{table.name}.json").write_bytes(_json(told))
     (folder / f"{table.name}.csv").write_text(to_csv(table), encoding="utf-8", newline="")

@@ -5,15 +5,15 @@ import pytest
 
 from holdfast.contact import STABLE, UNKNOWN
 from holdfast.features import fingertip_force, haar_features
-from holdfast.study.corpus import corpus_of
-from holdfast.study.paper.pools import COLUMNS, pooled
+from holdfast.study.paper.pooled_samples import COLUMNS, pooled
+from holdfast.study.plan import scan_corpus
 from holdfast.synthetic import synthetic_recording
-from study.build import synthetic, written
+from study.example_recordings import save_all, save_synthetic
 
 
 @pytest.fixture(scope="module")
 def corpus(tmp_path_factory):
-    return corpus_of("main", synthetic(tmp_path_factory.mktemp("pools") / "main", range(3)))
+    return scan_corpus("main", save_synthetic(tmp_path_factory.mktemp("pools") / "main", range(3)))
 
 
 def test_features_and_classes_are_those_of_each_recording(corpus):
@@ -61,7 +61,7 @@ def test_only_gives_the_features_in_the_order_asked_for(corpus):
 def test_a_recording_without_the_finger_has_no_samples(tmp_path):
     fingers = (["thumb", "index"], ["thumb"], ["thumb", "index"])
     recordings = [synthetic_recording(f"r{k}", k, names) for k, names in enumerate(fingers)]
-    corpus = corpus_of("main", written(tmp_path / "data", recordings))
+    corpus = scan_corpus("main", save_all(tmp_path / "data", recordings))
     assert set(pooled(corpus, corpus.rate, "index", 14, seed=0).samples.groups) == {0, 2}
     assert len(pooled(corpus, corpus.rate, "ring", 14, seed=0).samples.stable) == 0
 
@@ -69,6 +69,6 @@ def test_a_recording_without_the_finger_has_no_samples(tmp_path):
 def test_objects_are_those_of_the_metadata(tmp_path):
     recordings = [synthetic_recording(f"r{k}", k, ["index"]) for k in range(2)]
     recordings.append(replace(synthetic_recording("r2", 2, ["index"]), metadata={}))
-    corpus = corpus_of("main", written(tmp_path / "data", recordings))
+    corpus = scan_corpus("main", save_all(tmp_path / "data", recordings))
     pool = pooled(corpus, corpus.rate, "index", 14, seed=0)
     assert pool.objects == ("object 0", "object 1", None)

@@ -9,12 +9,11 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.ticker import FuncFormatter, NullLocator
 
-from holdfast.sensors.types import Array
-from holdfast.study.report.style import (
+from holdfast.plots.style import (
     FAINT,
     GREY,
     SMALL,
-    Style,
+    SeriesStyle,
     add_labels,
     add_legend,
     handles_of,
@@ -23,6 +22,7 @@ from holdfast.study.report.style import (
     styles_of,
     tidy,
 )
+from holdfast.sensors.types import Array
 
 MOST_TICKS = 9
 """Values of x that are all named on the axis."""
@@ -155,7 +155,7 @@ def draw_reliability(curves: Mapping[str, Array], notes: Mapping[str, str] | Non
     return figure
 
 
-def _draw_curve(axes: Axes, curve: Curve, style: Style, *, dots: bool = True) -> None:
+def _draw_curve(axes: Axes, curve: Curve, style: SeriesStyle, *, dots: bool = True) -> None:
     color, marker, dashes = style
     axes.plot(
         curve.x, curve.y, color=color, marker=marker if dots else "", linestyle=dashes,

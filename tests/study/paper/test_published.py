@@ -2,7 +2,7 @@
 
 import pytest
 
-from holdfast.study.paper.printed import (
+from holdfast.study.paper.published import (
     ABLATION,
     CONFUSION,
     FIRST_FINGER,

@@ -1,27 +1,30 @@
 """The paper's tables: its protocol as printed, and beside it what the protocol hides."""
 
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from typing import Any
 
+import numpy as np
+
 from holdfast.features import DEPLOYED, FEATURE_NAMES
-from holdfast.study.paper import printed
-from holdfast.study.paper.counts import figures
-from holdfast.study.paper.pools import ENERGY
-from holdfast.study.paper.protocol import (
+from holdfast.plots.curves import Curve, draw_lines
+from holdfast.plots.style import PAPER
+from holdfast.study.paper import published
+from holdfast.study.paper.pooled_samples import ENERGY
+from holdfast.study.paper.random_split import (
     ELSEWHERE,
     FRESH,
     HELD_OUT,
     OBJECTS,
     Cell,
-    Effort,
+    FitBudget,
     Kind,
     judge,
+    rate_rows,
 )
-from holdfast.study.paper.sweep import sweep
-from holdfast.study.plan import Plan
-from holdfast.study.report.page import Picture
-from holdfast.study.report.tables import Key, Row, Table
-from holdfast.study.work import Task
+from holdfast.study.plan import StudyPlan
+from holdfast.study.report.html_report import ReportFigure
+from holdfast.study.report.result_tables import Key, ResultTable, Row
+from holdfast.study.tasks import Task
 from holdfast.training.setting import MAX_SAMPLES
 
 WINDOW = 14
@@ -35,7 +38,7 @@ TESTS = (HELD_OUT, FRESH, ELSEWHERE, OBJECTS)
 Keys = dict[str, Key]
 
 
-def tasks(plan: Plan) -> list[Task]:
+def tasks(plan: StudyPlan) -> list[Task]:
     """What has to be computed for the paper's tables."""
     first = first_finger(plan)
     named = [
@@ -47,13 +50,13 @@ def tasks(plan: Plan) -> list[Task]:
         kinds = tuple(kind for kind in kinds if window != WINDOW or kind not in _BOTH)
         named.append(_task(plan, f"window/{window}", first, window, kinds))
     for window in ABLATED_AT:
-        kinds = tuple(("logreg", columns_of(subset)) for subset in printed.ABLATION)
+        kinds = tuple(("logreg", columns_of(subset)) for subset in published.ABLATION)
         kinds = tuple(kind for kind in kinds if kind[1] not in SETS.values())
         named.append(_task(plan, f"subsets/{window}", first, window, kinds))
     return named
 
 
-def tables(plan: Plan, results: Mapping[str, Any]) -> list[Table]:
+def tables(plan: StudyPlan, results: Mapping[str, Any]) -> list[ResultTable]:
     """The paper's tables, ours beside the paper's figures.
 
     Args:
@@ -62,15 +65,15 @@ def tables(plan: Plan, results: Mapping[str, Any]) -> list[Table]:
     """
     found = _Found(plan, results)
     makers = (_confusion, _window, _ablation, _unseen, _of_fingers, _zhang)
-    return [*(make(found) for make in makers), printed.discrepancies()]
+    return [*(make(found) for make in makers), published.discrepancies()]
 
 
-def pictures(plan: Plan, results: Mapping[str, Any]) -> list[Picture]:
+def figures(plan: StudyPlan, results: Mapping[str, Any]) -> list[ReportFigure]:
     """Table II as curves."""
-    return [sweep(_window(_Found(plan, results)))]
+    return [_window_figure(_window(_Found(plan, results)))]
 
 
-def first_finger(plan: Plan) -> str:
+def first_finger(plan: StudyPlan) -> str:
     """The finger of the tables: the paper does not name it, the index is taken."""
     return "index" if "index" in plan.main.fingers else plan.main.fingers[0]
 
@@ -92,7 +95,7 @@ _BEST_CUT: Kind = ("threshold", (ENERGY,))
 class _Found:
     """The results of the tasks, as rows of tables."""
 
-    def __init__(self, plan: Plan, results: Mapping[str, Any]) -> None:
+    def __init__(self, plan: StudyPlan, results: Mapping[str, Any]) -> None:
         self.plan = plan
         self.cells: dict[tuple[str, int, Kind], Cell] = {}
         for task in tasks(plan):
@@ -117,7 +120,7 @@ class _Found:
         for where in cell.counts:
             if on is not None and where not in on:
                 continue
-            for name, row in figures(cell.counts[where], names, self.plan.seed):
+            for name, row in rate_rows(cell.counts[where], names, self.plan.seed):
                 about = keys | {"on": where, "figure": name}
                 yield Row(about, row.ours, paper.get(name), row.n, row.interval)
 
@@ -130,13 +133,13 @@ class _Found:
         )
 
 
-def _confusion(found: _Found) -> Table:
+def _confusion(found: _Found) -> ResultTable:
     rows: list[Row] = []
     for name, title in TITLES.items():
         cell = found.cell((name, DEPLOYED))
         keys: Keys = {"classifier": title}
         rows += found.rows(
-            cell, keys, ("TNR", "FPR", "FNR", "TPR", "accuracy"), printed.CONFUSION[name]
+            cell, keys, ("TNR", "FPR", "FNR", "TPR", "accuracy"), published.CONFUSION[name]
         )
     note = " ".join(
         [
@@ -146,49 +149,49 @@ def _confusion(found: _Found) -> Table:
             *_protocol(found.plan, found.cell(("logreg", DEPLOYED))),
         ]
     )
-    return Table(
+    return ResultTable(
         "confusion", "The paper's Table I: confusion [%]", note, rows, ("classifier", "on")
     )
 
 
-def _window(found: _Found) -> Table:
+def _window(found: _Found) -> ResultTable:
     rows: list[Row] = []
     for window in _windows(found.plan):
         for title, names in SETS.items():
             keys: Keys = {"features": title, "N_w": window}
             cell = found.cell(("logreg", names), window)
-            rows += found.rows(cell, keys, printed.RATES, printed.WINDOW[window], found.tests)
+            rows += found.rows(cell, keys, published.RATES, published.WINDOW[window], found.tests)
     rows.sort(key=lambda row: str(row.keys["features"]))
     note = f"All six features: with m; the deployed five: without. {found.protocol}"
     title = "The paper's Table II: LogReg by window [%]"
-    return Table("window", title, note, rows, ("features", "N_w", "on"))
+    return ResultTable("window", title, note, rows, ("features", "N_w", "on"))
 
 
-def _ablation(found: _Found) -> Table:
+def _ablation(found: _Found) -> ResultTable:
     rows: list[Row] = []
     for window in ABLATED_AT:
-        for subset, paper in printed.ABLATION.items():
+        for subset, paper in published.ABLATION.items():
             keys: Keys = {"N_w": window, "features": ", ".join(subset)}
             cell = found.cell(("logreg", columns_of(subset)), window)
-            rows += found.rows(cell, keys, printed.RATES, paper, found.tests)
+            rows += found.rows(cell, keys, published.RATES, paper, found.tests)
     note = f"The paper prints one table; for which window is not sure. {found.protocol}"
     title = "The paper's Table III: LogReg by features [%]"
-    return Table("ablation", title, note, rows, ("N_w", "features", "on"))
+    return ResultTable("ablation", title, note, rows, ("N_w", "features", "on"))
 
 
-def _unseen(found: _Found) -> Table:
+def _unseen(found: _Found) -> ResultTable:
     rows: list[Row] = []
     for name, title in TITLES.items():
         keys: Keys = {"classifier": title}
-        paper = {"accuracy": printed.UNSEEN[name]}
+        paper = {"accuracy": published.UNSEEN[name]}
         on = (FRESH, ELSEWHERE, OBJECTS)
         rows += found.rows(found.cell((name, DEPLOYED)), keys, ("accuracy",), paper, on)
     title = "Accuracy on unseen data [%]"
     note = f"What the paper's unseen data are, it does not say. {found.protocol}"
-    return Table("unseen", title, note, rows, ("classifier", "on"))
+    return ResultTable("unseen", title, note, rows, ("classifier", "on"))
 
 
-def _of_fingers(found: _Found) -> Table:
+def _of_fingers(found: _Found) -> ResultTable:
     rows: list[Row] = []
     for finger in _fingers(found.plan):
         for name, title in TITLES.items():
@@ -201,14 +204,14 @@ def _of_fingers(found: _Found) -> Table:
         f"does not name stand beside ours of the {first_finger(found.plan)}. {found.protocol}"
     )
     lines = ("finger", "classifier", "on")
-    return Table("fingers", "Every finger [%]", note, rows, lines)
+    return ResultTable("fingers", "Every finger [%]", note, rows, lines)
 
 
-def _zhang(found: _Found) -> Table:
+def _zhang(found: _Found) -> ResultTable:
     methods = {
-        "energy of F_x (Zhang), SVM": (_ZHANG, printed.ZHANG),
+        "energy of F_x (Zhang), SVM": (_ZHANG, published.ZHANG),
         "energy of F_x, best cut": (_BEST_CUT, {}),
-        "LogReg (the paper)": (("logreg", DEPLOYED), printed.FIRST_FINGER),
+        "LogReg (the paper)": (("logreg", DEPLOYED), published.FIRST_FINGER),
     }
     rows: list[Row] = []
     for title, (kind, paper) in methods.items():
@@ -224,11 +227,11 @@ def _zhang(found: _Found) -> Table:
         f"particular; an FDR is missing where nothing is called stable. {found.protocol}"
     )
     title = "Zhang et al. beside the paper's method [%]"
-    return Table("zhang", title, note, rows, ("method", "N_w", "on"))
+    return ResultTable("zhang", title, note, rows, ("method", "N_w", "on"))
 
 
 def _task(
-    plan: Plan,
+    plan: StudyPlan,
     name: str,
     finger: str,
     window: int,
@@ -242,34 +245,34 @@ def _task(
     return Task(f"paper/{name}", judge, arguments, list[Cell], cost=_seconds(plan, kinds))
 
 
-def _seconds(plan: Plan, kinds: tuple[Kind, ...]) -> float:
+def _seconds(plan: StudyPlan, kinds: tuple[Kind, ...]) -> float:
     """About how long classifiers take on the twin's recordings [s]."""
     a_trial = {"logreg": 0.1, "svm": 0.3, "threshold": 0.0}
     return sum(1 + _effort(plan).trials * a_trial[classifier] for classifier, _ in kinds)
 
 
-def _effort(plan: Plan) -> Effort:
-    return Effort(trials=5, n_fit=40_000) if plan.quick else Effort(30, MAX_SAMPLES)
+def _effort(plan: StudyPlan) -> FitBudget:
+    return FitBudget(trials=5, n_fit=40_000) if plan.quick else FitBudget(30, MAX_SAMPLES)
 
 
-def _windows(plan: Plan) -> tuple[int, ...]:
-    return QUICK_WINDOWS if plan.quick else printed.WINDOWS
+def _windows(plan: StudyPlan) -> tuple[int, ...]:
+    return QUICK_WINDOWS if plan.quick else published.WINDOWS
 
 
-def _fingers(plan: Plan) -> list[str]:
+def _fingers(plan: StudyPlan) -> list[str]:
     """All fingers, the first of the tables first."""
     first = first_finger(plan)
     return [first, *(finger for finger in plan.main.fingers if finger != first)]
 
 
-def _of_finger(plan: Plan, finger: str) -> Mapping[str, float]:
+def _of_finger(plan: StudyPlan, finger: str) -> Mapping[str, float]:
     """The paper's figures of LogReg on a finger."""
     if finger == first_finger(plan):
-        return printed.FIRST_FINGER
-    return printed.OTHER_FINGERS.get(finger, {})
+        return published.FIRST_FINGER
+    return published.OTHER_FINGERS.get(finger, {})
 
 
-def _protocol(plan: Plan, cell: Cell) -> Iterator[str]:
+def _protocol(plan: StudyPlan, cell: Cell) -> Iterator[str]:
     """How the figures came about."""
     effort = _effort(plan)
     yield (
@@ -296,3 +299,47 @@ def _protocol(plan: Plan, cell: Cell) -> Iterator[str]:
         yield "Other objects: recordings of objects that did not train."
     else:
         yield "Other objects: each judged by a fit on the others, likewise."
+
+
+def _window_figure(window: ResultTable) -> ReportFigure:
+    """The deployed features by window, one panel a figure.
+
+    Args:
+        window: Table II, as `paper.tables` makes it.
+    """
+    rows = [row for row in window.rows if row.keys["features"] == "deployed"]
+    names = list(dict.fromkeys(str(row.keys["figure"]) for row in rows))
+    groups = {
+        f"{name} [%]": _curves([r for r in rows if r.keys["figure"] == name]) for name in names
+    }
+    caption = (
+        "The paper's Table II as curves: LogReg on the deployed features by window. Bands are 95 % "
+        "intervals, by bootstrap over recordings; the line 'held out' is the paper's protocol, "
+        "the others are recordings and objects that did not train."
+    )
+    return ReportFigure("window", caption, draw_lines(groups, "$N_w$ [samples]", per_row=2))
+
+
+def _curves(rows: Sequence[Row]) -> dict[str, Curve]:
+    """Of one figure: ours by what it was measured on, and the paper's."""
+    places = dict.fromkeys(str(row.keys["on"]) for row in rows)
+    curves = {on: _curve([row for row in rows if row.keys["on"] == on]) for on in places}
+    printed = {_x_of(row): row.paper for row in rows if row.paper is not None}
+    if printed:
+        curves[PAPER] = Curve(np.array(list(printed)), np.array(list(printed.values())))
+    return curves
+
+
+def _curve(rows: Sequence[Row]) -> Curve:
+    ends = [row.interval or (None, None) for row in rows]
+    low, high = (np.array([_number(end[k]) for end in ends]) for k in (0, 1))
+    x = np.array([_x_of(row) for row in rows])
+    return Curve(x, np.array([_number(row.ours) for row in rows]), low, high)
+
+
+def _x_of(row: Row) -> float:
+    return float(row.keys["N_w"])
+
+
+def _number(value: float | None) -> float:
+    return np.nan if value is None else value

@@ -7,8 +7,7 @@ from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
 from typing import Any
 
-from holdfast.study.corpus import Corpus
-from holdfast.study.plan import Plan
+from holdfast.study.plan import Corpus, StudyPlan
 
 PACKAGES = (
     "holdfast", "numpy", "scipy", "scikit-learn", "numba", "optuna", "mujoco", "msgspec",
@@ -32,12 +31,12 @@ def machine() -> dict[str, Any]:
     }
 
 
-def data(plan: Plan) -> dict[str, dict[str, Any]]:
+def data(plan: StudyPlan) -> dict[str, dict[str, Any]]:
     """What is in each corpus of a plan, by its role."""
     return {role: _told(corpus) for role, corpus in corpora(plan).items()}
 
 
-def corpora(plan: Plan) -> Mapping[str, Corpus]:
+def corpora(plan: StudyPlan) -> Mapping[str, Corpus]:
     """All that a plan has, by role."""
     return {**plan.corpora, **({"real": plan.real} if plan.real is not None else {})}
 

@@ -2,13 +2,11 @@ import msgspec
 import pytest
 
 from holdfast.features import DEPLOYED, FEATURE_NAMES
-from holdfast.study.corpus import Corpus, corpus_of
-from holdfast.study.paper import part as paper
-from holdfast.study.paper import printed, protocol
-from holdfast.study.paper.protocol import Effort
-from holdfast.study.plan import Plan
-from holdfast.study.report.tables import to_json
-from study.build import synthetic
+from holdfast.study.paper import paper_tables, published, random_split
+from holdfast.study.paper.random_split import FitBudget
+from holdfast.study.plan import Corpus, StudyPlan, scan_corpus
+from holdfast.study.report.result_tables import to_json
+from study.example_recordings import save_synthetic
 
 NAMES = ("confusion", "window", "ablation", "unseen", "fingers", "zhang", "discrepancies")
 
@@ -17,25 +15,25 @@ NAMES = ("confusion", "window", "ablation", "unseen", "fingers", "zhang", "discr
 def corpora(tmp_path_factory):
     folder = tmp_path_factory.mktemp("paper")
     seeds = {"main": range(4), "fresh": range(10, 12), "others": range(20, 22)}
-    return {name: corpus_of(name, synthetic(folder / name, s)) for name, s in seeds.items()}
+    return {name: scan_corpus(name, save_synthetic(folder / name, s)) for name, s in seeds.items()}
 
 
 def made(plan):
     """All tables of a plan, each task's result once through msgpack; one trial, few samples."""
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(paper, "_effort", lambda _: Effort(trials=1, n_fit=1000))
-        patch.setattr(protocol, "SEARCH_SAMPLES", 1000)
+        patch.setattr(paper_tables, "_effort", lambda _: FitBudget(trials=1, n_fit=1000))
+        patch.setattr(random_split, "SEARCH_SAMPLES", 1000)
         results = {}
-        for task in paper.tasks(plan):
+        for task in paper_tables.tasks(plan):
             msgspec.msgpack.encode(task.arguments)
             data = msgspec.msgpack.encode(task.function(*task.arguments))
             results[task.name] = msgspec.msgpack.decode(data, type=task.result)
-        return {table.name: table for table in paper.tables(plan, results)}
+        return {table.name: table for table in paper_tables.tables(plan, results)}
 
 
 @pytest.fixture(scope="module")
 def quick(corpora):
-    return made(Plan(corpora, quick=True))
+    return made(StudyPlan(corpora, quick=True))
 
 
 def rows_of(table, **keys):
@@ -71,7 +69,7 @@ def test_confusion_keeps_apart_what_it_was_measured_on(quick):
     for classifier, name in (("LogReg", "logreg"), ("SVM", "svm")):
         for where in on:
             found = rows_of(table, classifier=classifier, on=where)
-            assert {row.keys["figure"]: row.paper for row in found} == printed.CONFUSION[name]
+            assert {row.keys["figure"]: row.paper for row in found} == published.CONFUSION[name]
             ours = {row.keys["figure"]: row.ours for row in found}
             assert ours["TNR"] + ours["FPR"] == pytest.approx(100)
             assert ours["TPR"] + ours["FNR"] == pytest.approx(100)
@@ -80,10 +78,10 @@ def test_confusion_keeps_apart_what_it_was_measured_on(quick):
 def test_window_has_both_sets_of_features_beside_the_paper(quick):
     table = quick["window"]
     for features in ("all six", "deployed"):
-        for window in paper.QUICK_WINDOWS:
+        for window in paper_tables.QUICK_WINDOWS:
             for on in ("held out", "fresh recordings", "other objects"):
                 found = rows_of(table, features=features, N_w=window, on=on)
-                assert {r.keys["figure"]: r.paper for r in found} == printed.WINDOW[window]
+                assert {r.keys["figure"]: r.paper for r in found} == published.WINDOW[window]
 
 
 def test_ablation_has_all_subsets_at_both_windows(quick):
@@ -92,8 +90,8 @@ def test_ablation_has_all_subsets_at_both_windows(quick):
     for window in (14, 18):
         found = rows_of(table, N_w=window, on="held out")
         names = list(dict.fromkeys(row.keys["features"] for row in found))
-        assert names == [", ".join(subset) for subset in printed.ABLATION]
-        for subset, figures in printed.ABLATION.items():
+        assert names == [", ".join(subset) for subset in published.ABLATION]
+        for subset, figures in published.ABLATION.items():
             mine = [row for row in found if row.keys["features"] == ", ".join(subset)]
             assert {row.keys["figure"]: row.paper for row in mine} == figures
 
@@ -150,7 +148,7 @@ def test_zhang_stands_beside_the_method_of_the_paper(quick):
         ("LogReg (the paper)", "accuracy", 95.3),
         ("LogReg (the paper)", "FDR", 5.1),
     }
-    assert {row.keys["N_w"] for row in held} == set(paper.QUICK_WINDOWS)
+    assert {row.keys["N_w"] for row in held} == set(paper_tables.QUICK_WINDOWS)
 
 
 def test_rows_go_into_json(quick):
@@ -162,7 +160,7 @@ def test_rows_go_into_json(quick):
 
 
 def test_one_corpus_alone(corpora):
-    plan = Plan({"main": corpora["main"]}, quick=True)
+    plan = StudyPlan({"main": corpora["main"]}, quick=True)
     found = made(plan)
     on = {row.keys["on"] for row in found["unseen"].rows}
     assert on == {"other recordings", "other objects"}
@@ -171,11 +169,11 @@ def test_one_corpus_alone(corpora):
 
 
 def test_the_full_plan_has_every_window(corpora):
-    names = [task.name for task in paper.tasks(Plan(corpora))]
-    windows = [f"paper/window/{n}" for n in printed.WINDOWS]
+    names = [task.name for task in paper_tables.tasks(StudyPlan(corpora))]
+    windows = [f"paper/window/{n}" for n in published.WINDOWS]
     fingers = ["paper/fingers/index", "paper/fingers/thumb"]
     assert names == [*fingers, *windows, "paper/subsets/14", "paper/subsets/18"]
-    full, quick = (paper.tasks(Plan(corpora, quick=q))[0].cost for q in (False, True))
+    full, quick = (paper_tables.tasks(StudyPlan(corpora, quick=q))[0].cost for q in (False, True))
     assert full > quick
 
 
@@ -183,7 +181,7 @@ def test_each_classifier_is_fitted_once():
     corpus = Corpus("main", "data", ("a", "b"), "digest", ("thumb", "index"), 150.0)
     kinds = [
         (task.arguments[1], task.arguments[2], kind)
-        for task in paper.tasks(Plan({"main": corpus}))
+        for task in paper_tables.tasks(StudyPlan({"main": corpus}))
         for kind in task.arguments[3]
     ]
     assert len(kinds) == len(set(kinds)) == 2 * 2 + 8 * 4 - 1 + 2 * 9
@@ -191,12 +189,12 @@ def test_each_classifier_is_fitted_once():
 
 def test_the_first_finger_is_the_index_where_there_is_one():
     corpus = Corpus("main", "data", ("a", "b"), "digest", ("finger1", "finger2"), 150.0)
-    assert paper.first_finger(Plan({"main": corpus})) == "finger1"
+    assert paper_tables.first_finger(StudyPlan({"main": corpus})) == "finger1"
     named = msgspec.structs.replace(corpus, fingers=("thumb", "index"))
-    assert paper.first_finger(Plan({"main": named})) == "index"
+    assert paper_tables.first_finger(StudyPlan({"main": named})) == "index"
 
 
 def test_the_force_is_three_features():
-    assert paper.columns_of(("F_tip", "m")) == ("F_x", "F_y", "F_z", "m")
-    assert paper.columns_of(("F_a", "F_tip", "sigma")) == DEPLOYED
-    assert paper.columns_of(("F_a", "F_tip", "m", "sigma")) == FEATURE_NAMES
+    assert paper_tables.columns_of(("F_tip", "m")) == ("F_x", "F_y", "F_z", "m")
+    assert paper_tables.columns_of(("F_a", "F_tip", "sigma")) == DEPLOYED
+    assert paper_tables.columns_of(("F_a", "F_tip", "m", "sigma")) == FEATURE_NAMES

@@ -16,9 +16,9 @@ from holdfast.classifiers import Samples
 from holdfast.contact import STABLE, UNKNOWN
 from holdfast.features import FEATURE_NAMES, Tare, haar_features
 from holdfast.sensors.types import Array
-from holdfast.study.corpus import Corpus
 from holdfast.study.methods import FingerSignal, hand_signal
 from holdfast.study.methods.wavelets import detail_energy
+from holdfast.study.plan import Corpus
 from holdfast.training.design import at_rate
 
 N_PARTS = 25

@@ -7,18 +7,18 @@ difference, ours less the paper's.
 import html
 from collections.abc import Callable, Iterable, Sequence
 
-from holdfast.study.report.tables import (
+from holdfast.study.report.escape import as_html, as_latex, as_markdown
+from holdfast.study.report.result_tables import (
     INFINITE,
     MINUS,
     NOTHING,
-    Line,
+    ResultTable,
     Row,
-    Table,
+    TableLine,
     digits_of,
     number_text,
     pivot,
 )
-from holdfast.study.report.typeset import as_html, as_latex, as_markdown
 
 N = "recordings"
 """Head of the column that says how many recordings a line rests on."""
@@ -30,7 +30,7 @@ WIDE = 7
 """A LaTeX table with more columns goes over both columns of a page."""
 
 
-def to_html(table: Table, number: int | None = None) -> str:
+def to_html(table: ResultTable, number: int | None = None) -> str:
     """The table as an HTML `figure`: caption above, note below.
 
     Args:
@@ -64,7 +64,7 @@ def to_html(table: Table, number: int | None = None) -> str:
     )
 
 
-def to_latex(table: Table) -> str:
+def to_latex(table: ResultTable) -> str:
     r"""The table as a LaTeX `table`; it needs the packages booktabs and graphicx.
 
     The interval, and the paper's figure with the difference, stand in lines of their own. What
@@ -105,7 +105,7 @@ def to_latex(table: Table) -> str:
     )
 
 
-def to_markdown(table: Table) -> str:
+def to_markdown(table: ResultTable) -> str:
     """The table as GitHub's Markdown, with its title above and its notes below."""
     grid = pivot(table)
     counted = _n_varies(table)
@@ -123,7 +123,7 @@ def to_markdown(table: Table) -> str:
     return f"**{as_markdown(table.title)}**\n\n{body}\n" + f"\n{below}\n" * bool(below)
 
 
-def notes(table: Table) -> list[str]:
+def notes(table: ResultTable) -> list[str]:
     """What stands below the table: its own note; what its cells rest on and mean."""
     counts = {row.n for row in table.rows if row.n is not None}
     found = []
@@ -137,12 +137,12 @@ def notes(table: Table) -> list[str]:
     return [note for note in (table.note.strip(), " ".join(found)) if note]
 
 
-def _over(table: Table) -> str:
+def _over(table: ResultTable) -> str:
     """What the columns are, where they do not say it themselves."""
     return "" if table.column == "figure" else table.column
 
 
-def _html_over(table: Table, n_columns: int) -> str:
+def _html_over(table: ResultTable, n_columns: int) -> str:
     if not _over(table):
         return ""
     blank = "<td></td>" * len(table.lines)
@@ -150,7 +150,7 @@ def _html_over(table: Table, n_columns: int) -> str:
     return f"<tr>{blank}{over}</tr>\n"
 
 
-def _latex_over(table: Table, n_columns: int) -> list[str]:
+def _latex_over(table: ResultTable, n_columns: int) -> list[str]:
     if not _over(table):
         return []
     first = len(table.lines) + 1
@@ -161,7 +161,7 @@ def _latex_over(table: Table, n_columns: int) -> list[str]:
     ]
 
 
-def _html_line(line: Line, before: Line | None, cells: Iterable[str]) -> str:
+def _html_line(line: TableLine, before: TableLine | None, cells: Iterable[str]) -> str:
     """A line of the body; what it repeats of the line before is marked."""
     same = _n_same(line, before)
     again = ' class="again"'
@@ -188,7 +188,11 @@ def _html_cell(row: Row | None, digits: int) -> str:
 
 
 def _latex_lines(
-    table: Table, line: Line, before: Line | None, columns: Sequence[str], counted: bool
+    table: ResultTable,
+    line: TableLine,
+    before: TableLine | None,
+    columns: Sequence[str],
+    counted: bool,
 ) -> list[str]:
     """A line of the body, and under it those of the intervals and of the paper."""
     same = _n_same(line, before)
@@ -246,7 +250,7 @@ def _difference_text(row: Row, digits: int) -> str:
     return number_text(row.difference, digits, signed=True)
 
 
-def _n_varies(table: Table) -> bool:
+def _n_varies(table: ResultTable) -> bool:
     return len({row.n for row in table.rows if row.n is not None}) > 1
 
 
@@ -255,7 +259,7 @@ def _n_text(cells: Iterable[Row | None]) -> str:
     return "–".join(str(n) for n in dict.fromkeys([*counts[:1], *counts[-1:]])) or "–"
 
 
-def _n_same(line: Line, before: Line | None) -> int:
+def _n_same(line: TableLine, before: TableLine | None) -> int:
     """How many of the first heads the line repeats; the last is always told."""
     if before is None:
         return 0

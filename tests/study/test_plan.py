@@ -6,11 +6,10 @@ import pytest
 from holdfast.contact import ContactState
 from holdfast.errors import RecordingError, TrainingError
 from holdfast.recordings import Label
-from holdfast.study.corpus import Corpus, content_digest, corpus_of
-from holdfast.study.plan import Plan
+from holdfast.study.plan import Corpus, StudyPlan, content_digest, scan_corpus
 from holdfast.synthetic import synthetic_recording
 
-from .build import synthetic, written
+from .example_recordings import save_all, save_synthetic
 
 
 def relabelled(recording, state):
@@ -22,11 +21,11 @@ def relabelled(recording, state):
 
 @pytest.fixture(scope="module")
 def folder(tmp_path_factory):
-    return synthetic(tmp_path_factory.mktemp("corpus") / "main", range(3))
+    return save_synthetic(tmp_path_factory.mktemp("corpus") / "main", range(3))
 
 
 def test_it_says_what_is_in_a_folder(folder):
-    corpus = corpus_of("main", folder, tare="0.4")
+    corpus = scan_corpus("main", folder, tare="0.4")
     assert corpus.name == "main"
     assert corpus.recordings == ("grasp-0", "grasp-1", "grasp-2")
     assert corpus.fingers == ("thumb", "index")
@@ -35,8 +34,8 @@ def test_it_says_what_is_in_a_folder(folder):
 
 
 def test_it_loads_its_recordings_and_no_others(folder, tmp_path):
-    corpus = corpus_of("main", folder)
-    synthetic(folder, [7])
+    corpus = scan_corpus("main", folder)
+    save_synthetic(folder, [7])
     try:
         assert corpus.load().names == corpus.recordings
         assert corpus.load()[0].name == "grasp-0"
@@ -45,15 +44,15 @@ def test_it_loads_its_recordings_and_no_others(folder, tmp_path):
 
 
 def test_it_goes_over_the_wire_and_is_a_key(folder):
-    corpus = corpus_of("main", folder)
+    corpus = scan_corpus("main", folder)
     back = msgspec.msgpack.decode(msgspec.msgpack.encode(corpus), type=Corpus)
     assert back == corpus
     assert hash(back) == hash(corpus)
 
 
 def test_the_plan_names_what_is_trained_on(folder):
-    corpus = corpus_of("main", folder)
-    assert Plan({"main": corpus}).main is corpus
+    corpus = scan_corpus("main", folder)
+    assert StudyPlan({"main": corpus}).main is corpus
 
 
 def test_the_digest_follows_all_that_a_study_looks_at():
@@ -76,11 +75,11 @@ def test_a_finger_of_one_class_is_not_judged(tmp_path):
         one = synthetic_recording(f"grasp-{seed}", seed, ["thumb", "index"])
         lost = relabelled(one, ContactState.NO_CONTACT).modules["thumb"]
         recordings.append(replace(one, modules={**one.modules, "thumb": lost}))
-    assert corpus_of("main", written(tmp_path / "data", recordings)).fingers == ("index",)
+    assert scan_corpus("main", save_all(tmp_path / "data", recordings)).fingers == ("index",)
 
 
 def test_a_worker_without_the_folder_says_so(folder, tmp_path):
-    corpus = msgspec.structs.replace(corpus_of("main", folder), folder=str(tmp_path / "gone"))
+    corpus = msgspec.structs.replace(scan_corpus("main", folder), folder=str(tmp_path / "gone"))
     with pytest.raises(RecordingError) as error:
         corpus.load()
     assert str(error.value) == (
@@ -90,8 +89,8 @@ def test_a_worker_without_the_folder_says_so(folder, tmp_path):
 
 
 def test_a_recording_that_is_gone_is_named(tmp_path):
-    folder = synthetic(tmp_path / "data", range(3))
-    corpus = corpus_of("main", folder)
+    folder = save_synthetic(tmp_path / "data", range(3))
+    corpus = scan_corpus("main", folder)
     (folder / "grasp-1.parquet").unlink()
     with pytest.raises(RecordingError) as error:
         corpus.load()
@@ -103,7 +102,7 @@ def test_a_recording_that_is_gone_is_named(tmp_path):
 def test_no_labels(tmp_path):
     bare = [synthetic_recording(f"grasp-{s}", s, ["index"]).with_labels({}) for s in range(2)]
     with pytest.raises(TrainingError) as error:
-        corpus_of("main", written(tmp_path / "data", bare))
+        scan_corpus("main", save_all(tmp_path / "data", bare))
     assert str(error.value) == "none of the 2 recordings has labels to train from"
 
 
@@ -112,9 +111,9 @@ def test_one_class(tmp_path):
         relabelled(synthetic_recording(f"grasp-{s}", s, ["index"]), ContactState.STABLE)
         for s in range(2)
     ]
-    folder = written(tmp_path / "data", recordings)
+    folder = save_all(tmp_path / "data", recordings)
     with pytest.raises(TrainingError) as error:
-        corpus_of("main", folder)
+        scan_corpus("main", folder)
     assert str(error.value) == (
         f"{folder}: 3448 samples labelled stable and 0 labelled not stable given; "
         "a finger with both is needed"
@@ -125,9 +124,9 @@ def test_one_class(tmp_path):
 def test_one_recording(tmp_path, n_bare):
     recordings = [synthetic_recording("grasp-0", 0, ["index"])]
     recordings += [synthetic_recording("bare", 1, ["index"]).with_labels({})] * n_bare
-    folder = written(tmp_path / "data", recordings)
+    folder = save_all(tmp_path / "data", recordings)
     with pytest.raises(TrainingError) as error:
-        corpus_of("main", folder)
+        scan_corpus("main", folder)
     assert str(error.value) == (
         f"{folder}: one recording with labels given (grasp-0); at least two are needed, "
         "for what trains must not test"
@@ -136,4 +135,4 @@ def test_one_recording(tmp_path, n_bare):
 
 def test_an_unknown_tare(folder):
     with pytest.raises(ValueError, match="'sometimes' given"):
-        corpus_of("main", folder, tare="sometimes")
+        scan_corpus("main", folder, tare="sometimes")

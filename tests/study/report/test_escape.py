@@ -5,7 +5,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from holdfast.study.report.typeset import as_html, as_latex, as_markdown
+from holdfast.study.report.escape import as_html, as_latex, as_markdown
 
 
 @pytest.mark.parametrize(

@@ -8,9 +8,9 @@ from matplotlib.figure import Figure
 
 from holdfast.errors import OutputError
 from holdfast.study.report import images
-from holdfast.study.report.folder import refuse_study, write_study
-from holdfast.study.report.page import Picture, Section, report
-from holdfast.study.report.tables import Row, Table
+from holdfast.study.report.folder import check_output_folder, write_study
+from holdfast.study.report.html_report import ReportFigure, Section, report
+from holdfast.study.report.result_tables import ResultTable, Row
 
 VOID = {"meta", "br", "img", "link", "hr", "input"}
 
@@ -62,13 +62,15 @@ def drawn(n=3):
 
 def sections():
     tables = [
-        Table(name, "Some & <table>", "N_w", [Row({"m": "a", "figure": "x"}, 1.0, 2.0)], ("m",))
+        ResultTable(
+            name, "Some & <table>", "N_w", [Row({"m": "a", "figure": "x"}, 1.0, 2.0)], ("m",)
+        )
         for name in ("first", "second")
     ]
     return [
         Section("One & <b>", "Of sigma.\nStill.\n\n- a\n- <i>b</i>\n\nEnd.", tables[:1],
-                [Picture("curve", 'What "it" is. And more & so.', drawn())]),
-        Section("Two", "", tables[1:], [Picture("curve-2", "Other", drawn())]),
+                [ReportFigure("curve", 'What "it" is. And more & so.', drawn())]),
+        Section("Two", "", tables[1:], [ReportFigure("curve-2", "Other", drawn())]),
     ]  # fmt: skip
 
 
@@ -134,7 +136,7 @@ def test_names_are_used_once():
     with pytest.raises(
         ValueError, match=r"^a figure's name is letters, digits, - and _; 'a b' given$"
     ):
-        report("x", {}, [Section("x", "", [], [Picture("a b", "", drawn())])])
+        report("x", {}, [Section("x", "", [], [ReportFigure("a b", "", drawn())])])
 
 
 def write(out, **options):
@@ -175,7 +177,7 @@ def test_the_folder(tmp_path):
 def test_work_that_is_kept_from_a_stopped_study_stays(tmp_path):
     (tmp_path / "out/work").mkdir(parents=True)
     (tmp_path / "out/work/a.msgpack").write_bytes(b"x")
-    refuse_study(tmp_path / "out")
+    check_output_folder(tmp_path / "out")
     write(tmp_path / "out")
     assert (tmp_path / "out/work/a.msgpack").read_bytes() == b"x"
 
@@ -199,16 +201,16 @@ def test_a_folder_of_other_things_is_left_alone(tmp_path):
     with pytest.raises(OutputError, match=message):
         write(tmp_path, force=True)
     with pytest.raises(OutputError, match=r"is a file; the study is written to a folder$"):
-        refuse_study(tmp_path / "notes.txt", force=True)
+        check_output_folder(tmp_path / "notes.txt", force=True)
     with pytest.raises(OutputError, match=r"no does not exist$"):
-        refuse_study(tmp_path / "no/out")
+        check_output_folder(tmp_path / "no/out")
 
 
 def test_nothing_is_left_where_it_fails(tmp_path):
     out = tmp_path / "out"
     write(out)
     before = {name: (out / name).read_bytes() for name in files(out)}
-    broken = [Section("x", "", [], [Picture("a b", "", drawn())])]
+    broken = [Section("x", "", [], [ReportFigure("a b", "", drawn())])]
     with pytest.raises(ValueError, match="figure's name"):
         write_study(out, "Other", {}, broken, {}, force=True)
     assert {name: (out / name).read_bytes() for name in files(out)} == before

@@ -5,8 +5,8 @@ import subprocess
 
 import pytest
 
-from holdfast.study.report.layouts import notes, to_html, to_latex, to_markdown
-from holdfast.study.report.tables import Row, Table
+from holdfast.study.report.result_tables import ResultTable, Row
+from holdfast.study.report.table_layouts import notes, to_html, to_latex, to_markdown
 
 
 def confusion(**options):
@@ -35,7 +35,9 @@ def confusion(**options):
         ),
     ]
     given = {"note": "Of <all> N_w = 14.", "digits_of": {"delay [s]": 3}} | options
-    return Table("confusion", "Table I & more", rows=rows, lines=("classifier", "on"), **given)
+    return ResultTable(
+        "confusion", "Table I & more", rows=rows, lines=("classifier", "on"), **given
+    )
 
 
 def test_markdown_by_hand():
@@ -79,7 +81,7 @@ def test_every_line_of_latex_has_as_many_cells():
 def test_latex_compiles(tmp_path):
     odd = "".join(map(chr, range(32, 256))) + "−–—…×±·≤≥≈→°∞µσ“”ł漢 F_tip sigma"
     rows = [Row({f"[k]{odd}": f"[2mm]{odd}", "N_w": n}, 1.0) for n in range(9)]
-    tables = [confusion(), Table("odd", odd, odd, rows, (f"[k]{odd}",), column="N_w")]
+    tables = [confusion(), ResultTable("odd", odd, odd, rows, (f"[k]{odd}",), column="N_w")]
     text = "".join(map(to_latex, tables))
     (tmp_path / "t.tex").write_text(
         r"\documentclass{article}\usepackage{booktabs,graphicx}\begin{document}"
@@ -105,7 +107,7 @@ def test_html_cells():
 
 def test_what_the_columns_are_is_told_above_them():
     rows = [Row({"figure": "Acc", "N_w": n}, 95.0) for n in (4, 6)]
-    made = Table("window", "By window", "", rows, ("figure",), column="N_w")
+    made = ResultTable("window", "By window", "", rows, ("figure",), column="N_w")
     assert '<th colspan="2" scope="colgroup" class="over"><i>N</i><sub>w</sub></th>' in to_html(
         made
     )
@@ -121,7 +123,7 @@ def test_recordings_get_a_column_where_they_differ():
         Row({"m": "b", "figure": "y"}, 1.0, n=12),
         Row({"m": "c", "figure": "y"}, 1.0),
     ]
-    made = Table("t", "T", "", rows, ("m",))
+    made = ResultTable("t", "T", "", rows, ("m",))
     assert to_markdown(made).splitlines()[2:] == [
         "| m | x | y | recordings |",
         "| --- | --: | --: | --: |",
@@ -136,20 +138,20 @@ def test_recordings_get_a_column_where_they_differ():
 def test_an_interval_that_says_nothing_is_left_out():
     rows = [Row({"m": "a", "figure": "x"}, math.inf, interval=(math.inf, math.inf)),
             Row({"m": "a", "figure": "y"}, 1.0, interval=(None, None))]  # fmt: skip
-    text = to_markdown(Table("t", "T", "", rows, ("m",)))
+    text = to_markdown(ResultTable("t", "T", "", rows, ("m",)))
     assert "| a | infinite | 1.0 |" in text
 
 
 def test_an_interval_with_one_end():
     rows = [Row({"m": "a", "figure": "x"}, 1.0, interval=(0.5, None)),
             Row({"m": "a", "figure": "y"}, 1.0, interval=(None, 2.0))]  # fmt: skip
-    text = to_html(Table("t", "T", "", rows, ("m",)))
+    text = to_html(ResultTable("t", "T", "", rows, ("m",)))
     assert '<span class="interval">from 0.5</span>' in text
     assert '<span class="interval">to 2.0</span>' in text
 
 
 def test_an_empty_table_is_laid_out():
-    made = Table("t", "T", "", [], ("m",))
+    made = ResultTable("t", "T", "", [], ("m",))
     assert "<tbody>" in to_html(made)
     assert "| m |" in to_markdown(made)
     assert r"\begin{tabular}{l}" in to_latex(made)
@@ -157,7 +159,7 @@ def test_an_empty_table_is_laid_out():
 
 def test_a_figure_of_the_paper_alone_has_no_difference():
     rows = [Row({"where": "Table II", "figure": "printed"}, None, 95.3)]
-    alone = Table("said", "What is said", "", rows, ("where",))
+    alone = ResultTable("said", "What is said", "", rows, ("where",))
     assert "| Table II | *paper 95.3* |" in to_markdown(alone)
     assert "95.3</span>" in to_html(alone)
     assert "95.3 (" not in to_latex(alone)

@@ -1,7 +1,7 @@
 """Tables of the study: tidy rows, and how they are laid out and written as data.
 
 One row is one figure: what it is about, ours, the paper's. CSV and JSON write the rows as they
-are; `holdfast.study.report.layouts` lays them out, lines by columns, for people.
+are; `holdfast.study.report.table_layouts` lays them out, lines by columns, for people.
 """
 
 import csv
@@ -48,7 +48,7 @@ class Row(msgspec.Struct, frozen=True):
         return difference if math.isfinite(difference) else None
 
 
-class Table(msgspec.Struct, frozen=True):
+class ResultTable(msgspec.Struct, frozen=True):
     """Rows that belong together, and how they are laid out.
 
     Attributes:
@@ -92,7 +92,7 @@ class Table(msgspec.Struct, frozen=True):
             seen.add(cell)
 
 
-class Line(NamedTuple):
+class TableLine(NamedTuple):
     """A line of a table that is laid out.
 
     Attributes:
@@ -104,20 +104,20 @@ class Line(NamedTuple):
     cells: tuple[Row | None, ...]
 
 
-class Grid(NamedTuple):
+class TableGrid(NamedTuple):
     """A table laid out: lines by columns, in the order in which they first appear."""
 
     columns: tuple[str, ...]
-    lines: tuple[Line, ...]
+    lines: tuple[TableLine, ...]
 
 
-def pivot(table: Table) -> Grid:
+def pivot(table: ResultTable) -> TableGrid:
     """The table as lines by columns; lines that begin alike stand together.
 
     Example:
         >>> rows = [Row({"finger": "index", "figure": "Acc"}, 94.2),
         ...         Row({"finger": "thumb", "figure": "FDR"}, 5.0)]
-        >>> grid = pivot(Table("fingers", "Fingers", "", rows, ("finger",)))
+        >>> grid = pivot(ResultTable("fingers", "Fingers", "", rows, ("finger",)))
         >>> grid.columns, [line.heads for line in grid.lines]
         (('Acc', 'FDR'), [('index',), ('thumb',)])
         >>> grid.lines[1].cells[0] is None
@@ -131,10 +131,10 @@ def pivot(table: Table) -> Grid:
         columns[column] = None
     firsts = list(dict.fromkeys(heads[0] for heads in cells))
     lines = (
-        Line(heads, tuple(found.get(column) for column in columns))
+        TableLine(heads, tuple(found.get(column) for column in columns))
         for heads, found in sorted(cells.items(), key=lambda item: firsts.index(item[0][0]))
     )
-    return Grid(tuple(columns), tuple(lines))
+    return TableGrid(tuple(columns), tuple(lines))
 
 
 def number_text(value: float | None, digits: int, *, signed: bool = False) -> str:
@@ -156,12 +156,12 @@ def number_text(value: float | None, digits: int, *, signed: bool = False) -> st
     return text.replace("-", MINUS)
 
 
-def digits_of(table: Table, column: str) -> int:
+def digits_of(table: ResultTable, column: str) -> int:
     """How many digits a column shows behind the point."""
     return table.digits_of.get(column, table.digits)
 
 
-def to_json(table: Table) -> list[dict[str, Any]]:
+def to_json(table: ResultTable) -> list[dict[str, Any]]:
     """The rows as JSON takes them: keys beside `ours`, `paper`, `difference`, `n`, `interval`.
 
     JSON has no infinity: it is null, as in every output of the commands, and a row whose `ours`
@@ -170,7 +170,7 @@ def to_json(table: Table) -> list[dict[str, Any]]:
     return [_flat(row) for row in table.rows]
 
 
-def to_csv(table: Table) -> str:
+def to_csv(table: ResultTable) -> str:
     """The rows as comma-separated text with a header.
 
     Columns are the keys, then `ours,paper,difference,n,low,high`; an empty field is unknown,
@@ -216,7 +216,7 @@ def _keys(rows: Iterable[Row]) -> list[str]:
     return list(dict.fromkeys(key for row in rows for key in row.keys))
 
 
-def _cell(table: Table, row: Row) -> tuple[str, ...]:
+def _cell(table: ResultTable, row: Row) -> tuple[str, ...]:
     """Where the row stands: the heads of its line, and its column."""
     return tuple(_head(row.keys, key) for key in (*table.lines, table.column))
 

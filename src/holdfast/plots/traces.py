@@ -14,13 +14,12 @@ from matplotlib.patches import Patch
 from matplotlib.ticker import MaxNLocator, NullLocator
 
 from holdfast.contact import NO_CONTACT, STABLE, UNKNOWN, UNSTABLE, Phase
-from holdfast.features import FEATURE_NAMES, Tare, haar_features
+from holdfast.features import FEATURE_NAMES, Tare, fingertip_force, haar_features
 from holdfast.plots.envelope import envelope
 from holdfast.plots.recording import COMPONENT_COLOURS
+from holdfast.plots.style import INK, SMALL, add_labels, add_legend, sheet, tidy
 from holdfast.recordings import Recording
 from holdfast.sensors.types import Array
-from holdfast.study.methods import hand_signal
-from holdfast.study.report.style import INK, SMALL, add_labels, add_legend, sheet, tidy
 
 Codes = npt.NDArray[np.integer[Any]]
 PHASE_COLOURS = {
@@ -88,19 +87,20 @@ def trace_of(recording: Recording, finger: str, tare: Tare, window: int = 14) ->
         tare: how the baseline is found.
         window: N_w [samples].
     """
-    signal = hand_signal(recording, tare, (finger,)).fingers[finger]
-    features = haar_features(signal.force, window)
-    truth = recording.truth
-    phases = np.full(len(signal.times), "")
-    if truth is not None and "phase" in truth.hand and len(truth.times):
-        at = np.searchsorted(truth.times, signal.times, side="right") - 1
-        phases = np.asarray(truth.hand["phase"])[np.clip(at, 0, None)].astype(str)
     module = recording.modules[finger]
+    times = module.times
+    force = fingertip_force(module.readings, module.sensor, tare, times)
+    features = haar_features(force, window)
+    truth = recording.truth
+    phases = np.full(len(times), "")
+    if truth is not None and "phase" in truth.hand and len(truth.times):
+        at = np.searchsorted(truth.times, times, side="right") - 1
+        phases = np.asarray(truth.hand["phase"])[np.clip(at, 0, None)].astype(str)
     return Trace(
         name=f"{recording.name}, {finger}",
-        times=signal.times,
-        force=signal.force,
-        amplitude=signal.amplitude,
+        times=times,
+        force=force,
+        amplitude=np.asarray(np.linalg.norm(force, axis=1)),
         mean=features[:, FEATURE_NAMES.index("m")],
         sigma=features[:, FEATURE_NAMES.index("sigma")],
         labels=module.label_states,

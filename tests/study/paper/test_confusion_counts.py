@@ -4,7 +4,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from holdfast.classifiers import LinearClassifier, Samples
-from holdfast.study.paper.counts import FIGURES, confusions, figures
+from holdfast.study.paper.random_split import CONFUSION_RATES, confusion_counts, rate_rows
 
 RULE = LinearClassifier((0.0,), (1.0,), (1.0,), intercept=0.0, threshold=0.5)
 """Stable where the feature is at least 0."""
@@ -33,13 +33,13 @@ def test_confusions_are_those_of_a_loop(rows):
     features = np.array([[row[0]] for row in rows]).reshape(-1, 1)
     stable = np.array([row[1] for row in rows], dtype=bool)
     groups = np.array([row[2] for row in rows], dtype=np.int64)
-    found = confusions(RULE, Samples(features, stable, groups), 5)
+    found = confusion_counts(RULE, Samples(features, stable, groups), 5)
     assert found.tolist() == naive(features, stable, groups, 5)
 
 
 def test_figures_by_hand():
     counts = [[8, 2, 1, 9], [0, 0, 0, 0], [6, 4, 3, 7]]
-    found = dict(figures(counts, FIGURES, seed=0))
+    found = dict(rate_rows(counts, CONFUSION_RATES, seed=0))
     assert {name: row.ours for name, row in found.items()} == pytest.approx(
         {
             "TNR": 100 * 14 / 20,
@@ -56,11 +56,11 @@ def test_figures_by_hand():
 
 
 def test_nothing_called_stable_has_no_fdr():
-    ((_, row),) = figures([[5, 0, 5, 0]] * 3, ["FDR"], seed=0)
+    ((_, row),) = rate_rows([[5, 0, 5, 0]] * 3, ["FDR"], seed=0)
     assert row.ours is None
     assert row.interval is None
 
 
 def test_no_recordings():
-    ((_, row),) = figures([[0, 0, 0, 0]], ["accuracy"], seed=0)
+    ((_, row),) = rate_rows([[0, 0, 0, 0]], ["accuracy"], seed=0)
     assert (row.ours, row.n, row.interval) == (None, 0, None)

@@ -8,13 +8,13 @@ from typing import NamedTuple
 
 from matplotlib.figure import Figure
 
+from holdfast.study.report.escape import as_html
 from holdfast.study.report.images import inline_image
-from holdfast.study.report.layouts import to_html
-from holdfast.study.report.tables import FILE_NAME, Table
-from holdfast.study.report.typeset import as_html
+from holdfast.study.report.result_tables import FILE_NAME, ResultTable
+from holdfast.study.report.table_layouts import to_html
 
 
-class Picture(NamedTuple):
+class ReportFigure(NamedTuple):
     """A figure of the report.
 
     Attributes:
@@ -41,8 +41,8 @@ class Section(NamedTuple):
 
     title: str
     text: str
-    tables: Sequence[Table] = ()
-    figures: Sequence[Picture] = ()
+    tables: Sequence[ResultTable] = ()
+    figures: Sequence[ReportFigure] = ()
 
 
 def report(title: str, facts: Mapping[str, object], sections: Sequence[Section]) -> str:
@@ -153,7 +153,7 @@ def _paragraph(text: str) -> str:
     return f"<p>{as_html(' '.join(line.strip() for line in lines))}</p>\n"
 
 
-def _picture(picture: Picture, number: int) -> str:
+def _picture(picture: ReportFigure, number: int) -> str:
     name, caption, figure = picture
     return (
         f'<figure class="picture" id="figure-{name}">\n'

@@ -7,17 +7,16 @@ from typing import Any, Protocol
 
 from holdfast.errors import TrainingError
 from holdfast.parallel import Engine
-from holdfast.study import circumstances
-from holdfast.study.chapters import Made, sections
+from holdfast.study import environment as circumstances
 from holdfast.study.comparison import all_methods as comparison
 from holdfast.study.comparison import real_recordings, sensitivity
-from holdfast.study.paper import experiments
-from holdfast.study.paper import part as paper
-from holdfast.study.plan import Plan
-from holdfast.study.report.folder import refuse_study, write_study
-from holdfast.study.report.page import Picture
-from holdfast.study.report.tables import Table
-from holdfast.study.work import Follow, Task, Tell, Work
+from holdfast.study.paper import experiments, paper_tables
+from holdfast.study.plan import StudyPlan
+from holdfast.study.report.folder import check_output_folder, write_study
+from holdfast.study.report.html_report import ReportFigure
+from holdfast.study.report.result_tables import ResultTable
+from holdfast.study.sections import Made, sections
+from holdfast.study.tasks import Notify, ShowProgress, Task, TaskRunner
 
 TITLE = "Slip and disturbance at the fingertips: the study"
 
@@ -25,21 +24,21 @@ TITLE = "Slip and disturbance at the fingertips: the study"
 class Part(Protocol):
     """A module with tasks, and what is made of their results."""
 
-    def tasks(self, plan: Plan) -> list[Task]:
+    def tasks(self, plan: StudyPlan) -> list[Task]:
         """What has to be computed."""
         ...
 
-    def tables(self, plan: Plan, results: Mapping[str, Any]) -> list[Table]:
+    def tables(self, plan: StudyPlan, results: Mapping[str, Any]) -> list[ResultTable]:
         """Tables out of it."""
         ...
 
-    def pictures(self, plan: Plan, results: Mapping[str, Any]) -> list[Picture]:
+    def figures(self, plan: StudyPlan, results: Mapping[str, Any]) -> list[ReportFigure]:
         """Figures out of it."""
         ...
 
 
 PARTS: Mapping[str, Part] = {
-    "paper": paper,
+    "paper": paper_tables,
     "experiments": experiments,
     "comparison": comparison,
     "sensitivity": sensitivity,
@@ -48,17 +47,17 @@ PARTS: Mapping[str, Part] = {
 """The parts by name."""
 
 
-def study(
-    plan: Plan,
+def run_study(
+    plan: StudyPlan,
     out: str | Path,
     engine: Engine = Engine(),  # noqa: B008 (a tuple: it cannot change)
     *,
-    follow: Follow = lambda items, *_: iter(items),
-    tell: Tell = lambda _: None,
+    progress: ShowProgress = lambda items, *_: iter(items),
+    notify: Notify = lambda _: None,
     force: bool = False,
     made_in: float = 0.0,
     left_out: Sequence[str] = (),
-) -> list[Table]:
+) -> list[ResultTable]:
     """Does a study and writes it to a folder; the same plan gives the same tables.
 
     What each task returned is kept in `out/work`, so that a study that was stopped goes on where
@@ -68,8 +67,8 @@ def study(
         plan: what is studied.
         out: the folder; it may hold `work` and `data`.
         engine: where the work is done.
-        follow: goes through the tasks as they are done.
-        tell: is given what a person would want to know.
+        progress: goes through the tasks as they are done.
+        notify: is given what a person would want to know.
         force: replace a study that is there, but for `work` and `data`.
         made_in: how long it took to make the data [s].
         left_out: what a reader would expect and does not find, in sentences.
@@ -78,18 +77,18 @@ def study(
         Every table, in the order of the report.
 
     Raises:
-        OutputError: as `refuse_study`.
-        TrainingError: as `refuse_plan`, or the data cannot train something that is asked.
-        EngineError: as `Work.run`.
+        OutputError: as `check_output_folder`.
+        TrainingError: as `check_plan`, or the data cannot train something that is asked.
+        EngineError: as `TaskRunner.run`.
     """
-    refuse_study(out, force=force)
-    refuse_plan(plan)
+    check_output_folder(out, force=force)
+    check_plan(plan)
     begun = time.perf_counter()
     tasks = [task for part in PARTS.values() for task in part.tasks(plan)]
-    results = Work(Path(out), engine, follow, tell).run(tasks)
-    tell("making tables and figures")
+    results = TaskRunner(Path(out), engine, progress, notify).run(tasks)
+    notify("making tables and figures")
     made = {
-        name: Made(part.tables(plan, results), part.pictures(plan, results))
+        name: Made(part.tables(plan, results), part.figures(plan, results))
         for name, part in PARTS.items()
     }
     seconds = {"data": made_in, "study": time.perf_counter() - begun}
@@ -99,7 +98,7 @@ def study(
     return [table for section in found for table in section.tables]
 
 
-def refuse_plan(plan: Plan) -> None:
+def check_plan(plan: StudyPlan) -> None:
     """Does nothing where all methods can be compared.
 
     Raises:
@@ -113,12 +112,12 @@ def refuse_plan(plan: Plan) -> None:
         )
 
 
-def _of_twin(plan: Plan) -> bool:
+def _of_twin(plan: StudyPlan) -> bool:
     return plan.main.load()[0].metadata.get("source") == "twin"
 
 
 def _summary(
-    plan: Plan, seconds: Mapping[str, float], n_tasks: int, left_out: Sequence[str]
+    plan: StudyPlan, seconds: Mapping[str, float], n_tasks: int, left_out: Sequence[str]
 ) -> dict[str, Any]:
     """What `study.json` holds beside the tables."""
     return {

@@ -10,12 +10,11 @@ from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 
 from holdfast.plots.evaluation import COLOURS
-from holdfast.sensors.types import Array
-from holdfast.study.report.style import (
+from holdfast.plots.style import (
     FAINT,
     INK,
     PAPER,
-    Style,
+    SeriesStyle,
     add_labels,
     add_legend,
     handles_of,
@@ -24,9 +23,10 @@ from holdfast.study.report.style import (
     styles_of,
     tidy,
 )
+from holdfast.sensors.types import Array
 
 
-class Estimate(NamedTuple):
+class IntervalEstimate(NamedTuple):
     """One value, its interval, and what the paper prints; NaN or None for none."""
 
     value: float | None
@@ -35,7 +35,9 @@ class Estimate(NamedTuple):
     paper: float | None = None
 
 
-def draw_dots(groups: Mapping[str, Mapping[str, Estimate]], strong: Collection[str] = ()) -> Figure:
+def draw_dots(
+    groups: Mapping[str, Mapping[str, IntervalEstimate]], strong: Collection[str] = ()
+) -> Figure:
     """Methods compared: a dot with its interval, the highest of the first panel on top.
 
     Args:
@@ -67,7 +69,7 @@ def draw_dots(groups: Mapping[str, Mapping[str, Estimate]], strong: Collection[s
 
 
 def draw_groups(
-    groups: Mapping[str, Mapping[str, Mapping[str, Estimate]]], y: str, per_row: int = 2
+    groups: Mapping[str, Mapping[str, Mapping[str, IntervalEstimate]]], y: str, per_row: int = 2
 ) -> Figure:
     """Dots of several methods beside each other in each group, with their intervals.
 
@@ -99,9 +101,9 @@ def draw_groups(
     return figure
 
 
-def _ordered(groups: Mapping[str, Mapping[str, Estimate]]) -> list[str]:
+def _ordered(groups: Mapping[str, Mapping[str, IntervalEstimate]]) -> list[str]:
     """All names by their value in the first panel, the lowest first; then as they appear."""
-    first: Mapping[str, Estimate] = next(iter(groups.values()), {})
+    first: Mapping[str, IntervalEstimate] = next(iter(groups.values()), {})
 
     def value(name: str) -> float:
         return _number(first[name].value if name in first else None, -np.inf)
@@ -110,7 +112,7 @@ def _ordered(groups: Mapping[str, Mapping[str, Estimate]]) -> list[str]:
     return sorted(names, key=value, reverse=True)[::-1]
 
 
-def _draw_dot(axes: Axes, row: int, estimate: Estimate, *, bold: bool) -> None:
+def _draw_dot(axes: Axes, row: int, estimate: IntervalEstimate, *, bold: bool) -> None:
     colour = COLOURS[1] if bold else COLOURS[0]
     value = _number(estimate.value)
     axes.hlines(
@@ -124,7 +126,9 @@ def _draw_dot(axes: Axes, row: int, estimate: Estimate, *, bold: bool) -> None:
         )
 
 
-def _draw_bars(axes: Axes, at: Array, values: Sequence[Estimate], style: Style) -> None:
+def _draw_bars(
+    axes: Axes, at: Array, values: Sequence[IntervalEstimate], style: SeriesStyle
+) -> None:
     heights = np.array([_number(each.value) for each in values])
     low = np.array([_number(each.low, each.value) for each in values])
     high = np.array([_number(each.high, each.value) for each in values])

@@ -15,8 +15,8 @@ from threadpoolctl import threadpool_info
 from holdfast.cli.terminal.progress import progress
 from holdfast.errors import EngineError, OutputError
 from holdfast.parallel import Engine
-from holdfast.study import work
-from holdfast.study.work import Task, Work, source_digest
+from holdfast.study import tasks as work
+from holdfast.study.tasks import Task, TaskRunner, source_digest
 
 ENGINES = [Engine(1), Engine(2)]
 
@@ -84,7 +84,7 @@ def expected():
 @pytest.mark.parametrize("engine", ENGINES)
 @pytest.mark.parametrize("order", [1, -1])
 def test_results_are_the_same_on_every_engine_in_every_order(tmp_path, engine, order, expected):
-    results = Work(tmp_path, engine).run(tasks()[::order])
+    results = TaskRunner(tmp_path, engine).run(tasks()[::order])
     assert list(results) == list(expected)[::order]
     for name, result in results.items():
         assert isinstance(result, Figure)
@@ -115,8 +115,8 @@ def test_a_worker_of_a_cluster_that_is_killed_changes_no_result(tmp_path, log):
     ):
         engine = Engine.parse(f"dask:{cluster.scheduler_address}")
         wanted = tasks() + noted_tasks(log, 32)
-        there = Work(tmp_path / "there", engine, follow).run(wanted)
-    assert there == Work(tmp_path / "here").run(wanted)
+        there = TaskRunner(tmp_path / "there", engine, follow).run(wanted)
+    assert there == TaskRunner(tmp_path / "here").run(wanted)
     assert [path.name for path in kept(tmp_path / "there")] == [
         path.name for path in kept(tmp_path / "here")
     ]
@@ -125,15 +125,15 @@ def test_a_worker_of_a_cluster_that_is_killed_changes_no_result(tmp_path, log):
 @pytest.mark.parametrize("engine", ENGINES, ids=str)
 def test_a_task_has_one_thread(tmp_path, engine):
     before = n_threads()
-    results = Work(tmp_path, engine).run([Task("a", n_threads, (), list[int])])
+    results = TaskRunner(tmp_path, engine).run([Task("a", n_threads, (), list[int])])
     assert len(results["a"]) > 1 and set(results["a"]) == {1}
     assert n_threads()[0] == before[0]
 
 
 def test_what_is_kept_is_not_done_again(tmp_path, log):
     told = []
-    first = Work(tmp_path).run(noted_tasks(log, 4))
-    again = Work(tmp_path, tell=told.append).run(noted_tasks(log, 6))
+    first = TaskRunner(tmp_path).run(noted_tasks(log, 4))
+    again = TaskRunner(tmp_path, notify=told.append).run(noted_tasks(log, 6))
     assert set(calls(log).values()) == {1}
     assert again == {f"noted/{place}": place for place in range(6)}
     assert first.items() <= again.items()
@@ -144,8 +144,8 @@ def test_a_study_that_is_killed_does_only_what_is_missing(tmp_path, log):
     code = f"""if True:
         from pathlib import Path
         from holdfast.parallel import Engine
-        from study.test_work import Work, noted_tasks
-        Work(Path({str(tmp_path)!r}), Engine(2)).run(noted_tasks({str(log)!r}))
+        from study.test_tasks import TaskRunner, noted_tasks
+        TaskRunner(Path({str(tmp_path)!r}), Engine(2)).run(noted_tasks({str(log)!r}))
     """
     tests = str(Path(__file__).parents[1])
     with subprocess.Popen(
@@ -159,7 +159,7 @@ def test_a_study_that_is_killed_does_only_what_is_missing(tmp_path, log):
     n_kept = len(kept(tmp_path))
     assert 5 <= n_kept < 12
     done = calls(log)
-    results = Work(tmp_path).run(noted_tasks(log))
+    results = TaskRunner(tmp_path).run(noted_tasks(log))
     assert results == {f"noted/{place}": place for place in range(12)}
     again = [place for place, n in calls(log).items() if n != done.get(place, 0)]
     assert len(again) == 12 - n_kept
@@ -176,42 +176,42 @@ def test_a_study_that_is_killed_does_only_what_is_missing(tmp_path, log):
     ],
 )
 def test_a_damaged_result_is_computed_again(tmp_path, log, damage):
-    first = Work(tmp_path).run(noted_tasks(log, 3))
+    first = TaskRunner(tmp_path).run(noted_tasks(log, 3))
     path = kept(tmp_path)[1]
     whole = path.read_bytes()
     path.write_bytes(damage(whole))
-    assert Work(tmp_path).run(noted_tasks(log, 3)) == first
+    assert TaskRunner(tmp_path).run(noted_tasks(log, 3)) == first
     assert sorted(calls(log).values()) == [1, 1, 2]
     assert path.read_bytes() == whole
 
 
 def test_no_flipped_bit_changes_a_result(tmp_path):
-    first = Work(tmp_path).run(tasks(1))
+    first = TaskRunner(tmp_path).run(tasks(1))
     (path,) = kept(tmp_path)
     whole = path.read_bytes()
     for place in range(len(whole)):
         path.write_bytes(whole[:place] + bytes([whole[place] ^ 4]) + whole[place + 1 :])
-        assert Work(tmp_path).run(tasks(1)) == first
+        assert TaskRunner(tmp_path).run(tasks(1)) == first
 
 
 def test_other_arguments_or_another_function_are_other_work(tmp_path):
-    Work(tmp_path).run([Task("a", figure, (1, 7), Figure)])
-    Work(tmp_path).run([Task("a", figure, (1, 8), Figure)])
-    Work(tmp_path).run([Task("a", max, (1, 7), int)])
+    TaskRunner(tmp_path).run([Task("a", figure, (1, 7), Figure)])
+    TaskRunner(tmp_path).run([Task("a", figure, (1, 8), Figure)])
+    TaskRunner(tmp_path).run([Task("a", max, (1, 7), int)])
     assert len(kept(tmp_path)) == 3
 
 
 def test_another_source_is_other_work(tmp_path, log, monkeypatch):
-    Work(tmp_path).run(noted_tasks(log, 2))
+    TaskRunner(tmp_path).run(noted_tasks(log, 2))
     monkeypatch.setattr(work, "source_digest", lambda: "another")
-    Work(tmp_path).run(noted_tasks(log, 2))
+    TaskRunner(tmp_path).run(noted_tasks(log, 2))
     assert set(calls(log).values()) == {2}
 
 
 def test_a_worker_with_another_source_is_refused(tmp_path, monkeypatch):
     monkeypatch.setattr(work, "source_digest", lambda: "another")
     with pytest.raises(EngineError, match=r"^figure/\d: its worker has another version of holdf"):
-        Work(tmp_path, Engine(2)).run(tasks(2))
+        TaskRunner(tmp_path, Engine(2)).run(tasks(2))
 
 
 def test_the_source_leaves_out_the_command_line(tmp_path, monkeypatch):
@@ -235,19 +235,19 @@ def test_the_source_leaves_out_the_command_line(tmp_path, monkeypatch):
 
 def test_the_same_work_under_two_names_is_done_once(tmp_path, log):
     twins = [Task(name, noted, (1, str(log)), int) for name in "ab"]
-    assert Work(tmp_path).run(twins) == {"a": 1, "b": 1}
+    assert TaskRunner(tmp_path).run(twins) == {"a": 1, "b": 1}
     assert calls(log) == {"1": 1}
 
 
 def test_two_tasks_of_one_name_are_refused(tmp_path):
     with pytest.raises(ValueError, match=r"^two tasks are called figure/0$"):
-        Work(tmp_path).run(tasks(2) + tasks(1))
+        TaskRunner(tmp_path).run(tasks(2) + tasks(1))
 
 
 @pytest.mark.parametrize("engine", ENGINES)
 def test_a_failure_names_its_task_and_the_rest_stays_kept(tmp_path, engine):
     with pytest.raises(ValueError, match=r"^fail/2: no good$"):
-        Work(tmp_path, engine).run([Task(f"fail/{n}", fail, (n,), int) for n in (0, 1, 2)])
+        TaskRunner(tmp_path, engine).run([Task(f"fail/{n}", fail, (n,), int) for n in (0, 1, 2)])
     if engine.n_jobs == 1:
         assert len(kept(tmp_path)) == 2
 
@@ -255,19 +255,19 @@ def test_a_failure_names_its_task_and_the_rest_stays_kept(tmp_path, engine):
 @pytest.mark.parametrize("engine", ENGINES)
 def test_a_failure_of_several_parts_is_noted(tmp_path, engine):
     with pytest.raises(OSError, match="No space left") as failure:
-        Work(tmp_path, engine).run([Task("fail/3", fail, (3,), int)])
+        TaskRunner(tmp_path, engine).run([Task("fail/3", fail, (3,), int)])
     assert "in the task fail/3" in failure.value.__notes__
 
 
 def test_a_result_that_is_not_as_announced(tmp_path):
     with pytest.raises(TypeError, match=r"^figure/0 returned no <class 'int'>: Expected `int`"):
-        Work(tmp_path).run([Task("figure/0", figure, (0, 7), int)])
+        TaskRunner(tmp_path).run([Task("figure/0", figure, (0, 7), int)])
     assert kept(tmp_path) == []
 
 
 def test_a_result_that_cannot_be_kept(tmp_path):
     with pytest.raises(TypeError, match=r"^odd: a [a-zA-Z]*Path cannot be kept"):
-        Work(tmp_path).run([Task("odd", Path, ("x",), str)])
+        TaskRunner(tmp_path).run([Task("odd", Path, ("x",), str)])
 
 
 def test_long_ones_are_begun_first_and_weigh_more(tmp_path):
@@ -280,24 +280,24 @@ def test_long_ones_are_begun_first_and_weigh_more(tmp_path):
             yield item
 
     costs = {"short": 1.0, "long": 5.0, "middle": 2.0}
-    Work(tmp_path, follow=follow).run(
+    TaskRunner(tmp_path, progress=follow).run(
         [Task(name, figure, (0, place), Figure, costs[name]) for place, name in enumerate(costs)]
     )
     assert seen == [("working", 8.0), ("long", 5.0), ("middle", 2.0), ("short", 1.0)]
 
 
 def test_the_bar_of_the_command_line_follows(tmp_path, expected):
-    assert Work(tmp_path, follow=progress).run(tasks()).keys() == expected.keys()
+    assert TaskRunner(tmp_path, progress=progress).run(tasks()).keys() == expected.keys()
 
 
 def test_nothing_to_do(tmp_path):
-    assert Work(tmp_path).run([]) == {}
+    assert TaskRunner(tmp_path).run([]) == {}
 
 
 def test_a_folder_that_cannot_be(tmp_path):
     (tmp_path / "work").touch()
     with pytest.raises(OutputError, match=r"^cannot write .*work: File exists$"):
-        Work(tmp_path).run(tasks(1))
+        TaskRunner(tmp_path).run(tasks(1))
 
 
 def test_a_result_is_stored_before_the_next_is_awaited(tmp_path, log):
@@ -306,7 +306,7 @@ def test_a_result_is_stored_before_the_next_is_awaited(tmp_path, log):
             assert len(kept(tmp_path)) == len(calls(log))
             yield item
 
-    Work(tmp_path, follow=follow).run(noted_tasks(log, 3))
+    TaskRunner(tmp_path, progress=follow).run(noted_tasks(log, 3))
 
 
 def test_an_interrupt_costs_what_was_being_done(tmp_path, log):
@@ -317,5 +317,5 @@ def test_an_interrupt_costs_what_was_being_done(tmp_path, log):
             yield item
 
     with contextlib.suppress(KeyboardInterrupt):
-        Work(tmp_path, follow=follow).run(noted_tasks(log, 6))
+        TaskRunner(tmp_path, progress=follow).run(noted_tasks(log, 6))
     assert len(kept(tmp_path)) == 3

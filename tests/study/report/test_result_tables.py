@@ -8,7 +8,14 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from holdfast.study.report.tables import Row, Table, number_text, pivot, to_csv, to_json
+from holdfast.study.report.result_tables import (
+    ResultTable,
+    Row,
+    number_text,
+    pivot,
+    to_csv,
+    to_json,
+)
 
 
 def row(ours, paper=None, figure="Acc", **options):
@@ -17,7 +24,7 @@ def row(ours, paper=None, figure="Acc", **options):
 
 
 def table(*rows, **options):
-    return Table("some", "Some table", "", list(rows), ("classifier",), **options)
+    return ResultTable("some", "Some table", "", list(rows), ("classifier",), **options)
 
 
 def test_lines_and_columns_stand_in_the_order_of_first_appearance():
@@ -33,7 +40,7 @@ def test_lines_and_columns_stand_in_the_order_of_first_appearance():
 
 def test_lines_that_begin_alike_stand_together():
     rows = [Row({"on": on, "method": m, "figure": "x"}, 1.0) for m in "ab" for on in ("p", "q")]
-    grid = pivot(Table("some", "", "", rows, ("on", "method")))
+    grid = pivot(ResultTable("some", "", "", rows, ("on", "method")))
     heads = [("p", "a"), ("p", "b"), ("q", "a"), ("q", "b")]
     assert [line.heads for line in grid.lines] == heads
 
@@ -45,7 +52,7 @@ def test_a_cell_without_a_row_is_none():
 
 def test_numbers_as_keys():
     rows = [Row({"N_w": n, "C": 0.50, "figure": "Acc"}, n) for n in (4, 14)]
-    grid = pivot(Table("w", "", "", rows, ("C",), column="N_w"))
+    grid = pivot(ResultTable("w", "", "", rows, ("C",), column="N_w"))
     assert grid.columns == ("4", "14")
     assert grid.lines[0].heads == ("0.5",)
 
@@ -117,17 +124,17 @@ def test_json_is_strict_and_says_infinite():
 
 def test_a_table_comes_back_from_messagepack():
     made = table(row(math.inf, 95.3, n=60, interval=(None, 2.0)), digits_of={"Acc": 3})
-    assert msgspec.msgpack.decode(msgspec.msgpack.encode(made), type=Table) == made
+    assert msgspec.msgpack.decode(msgspec.msgpack.encode(made), type=ResultTable) == made
 
 
 @pytest.mark.parametrize(
     ("build", "message"),
     [
         (
-            lambda: Table("a/b", "", "", [], ("x",)),
+            lambda: ResultTable("a/b", "", "", [], ("x",)),
             "a table's name is letters, digits, - and _; 'a/b' given",
         ),
-        (lambda: Table("a", "", "", [], ()), "table a: no key names its lines"),
+        (lambda: ResultTable("a", "", "", [], ()), "table a: no key names its lines"),
         (
             lambda: table(Row({"paper": "x", "figure": "y"}, 1.0)),
             "table some: a key may not be called 'paper'",

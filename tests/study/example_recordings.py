@@ -5,6 +5,7 @@ from dataclasses import replace
 import numpy as np
 
 from holdfast.contact import Phase
+from holdfast.io import save_recording
 from holdfast.recordings import Truth
 from holdfast.synthetic import synthetic_recording
 
@@ -52,7 +53,19 @@ def phase_at(time):
     return [phase for start, phase in PHASES if start <= time + 1e-9][-1]
 
 
-def told_recording(name, seed, fingers=("thumb", "index")):
+def recording_with_truth(name, seed, fingers=("thumb", "index")):
     recording = synthetic_recording(name, seed, fingers)
     times = recording.modules[fingers[0]].times
     return replace(recording, truth=truth_of(times, fingers))
+
+
+def save_all(folder, recordings):
+    folder.mkdir(exist_ok=True)
+    for recording in recordings:
+        save_recording(recording, folder / f"{recording.name}.parquet")
+    return folder
+
+
+def save_synthetic(folder, seeds, fingers=("thumb", "index")):
+    """Recordings of three objects by turns, one for each seed."""
+    return save_all(folder, [synthetic_recording(f"grasp-{s}", s, fingers) for s in seeds])

@@ -5,10 +5,10 @@ from typing import NamedTuple, TypeVar
 
 import msgspec
 
-from holdfast.study.report.page import Picture, Section
-from holdfast.study.report.tables import Table
+from holdfast.study.report.html_report import ReportFigure, Section
+from holdfast.study.report.result_tables import ResultTable
 
-E = TypeVar("E", Table, Picture)
+E = TypeVar("E", ResultTable, ReportFigure)
 
 
 class Chapter(NamedTuple):
@@ -142,8 +142,8 @@ More idle time makes a better accuracy, not a better detector: look at phases an
 class Made(NamedTuple):
     """What one part of the study made."""
 
-    tables: Sequence[Table]
-    pictures: Sequence[Picture]
+    tables: Sequence[ResultTable]
+    pictures: Sequence[ReportFigure]
 
 
 def sections(made: Mapping[str, Made], run: Sequence[str], *, twin: bool) -> list[Section]:
@@ -179,7 +179,7 @@ def _own(chapter: Chapter, by_part: Mapping[str, Sequence[E]]) -> list[E]:
 _NAMED = frozenset(name for chapter in CHAPTERS for name in chapter.names)
 
 
-def _marked(table: Table, chapter: Chapter) -> Table:
+def _marked(table: ResultTable, chapter: Chapter) -> ResultTable:
     """The table with a word on the twin, where it rests on it."""
     if chapter.part == "real" or not any(row.n for row in table.rows):
         return table

@@ -23,7 +23,7 @@ Dashes = Literal["-"] | tuple[float, tuple[float, ...]]
 _DASHES: tuple[Dashes, ...] = ("-", (0, (5, 1.5)), (0, (1.5, 1.2)))
 
 
-class Style(NamedTuple):
+class SeriesStyle(NamedTuple):
     """How a series looks in every panel, as matplotlib's `plot` takes it."""
 
     color: str
@@ -31,18 +31,18 @@ class Style(NamedTuple):
     linestyle: Dashes
 
 
-def styles_of(names: Iterable[str]) -> dict[str, Style]:
+def styles_of(names: Iterable[str]) -> dict[str, SeriesStyle]:
     """A look for each name: by its place in the order of first appearance, the paper's apart.
 
     Eighteen looks differ in colour, mark or dashes; then they come again.
     """
-    styles: dict[str, Style] = {}
+    styles: dict[str, SeriesStyle] = {}
     others = [name for name in dict.fromkeys(names) if name != PAPER]
     for k, name in enumerate(others):
         lap = k // len(COLOURS)
         marker = MARKERS[(k + lap) % len(MARKERS)]
-        styles[name] = Style(COLOURS[k % len(COLOURS)], marker, _DASHES[lap % len(_DASHES)])
-    return styles | {PAPER: Style("black", "x", (0, (4, 2)))}
+        styles[name] = SeriesStyle(COLOURS[k % len(COLOURS)], marker, _DASHES[lap % len(_DASHES)])
+    return styles | {PAPER: SeriesStyle("black", "x", (0, (4, 2)))}
 
 
 def sheet(height: float) -> Figure:
@@ -107,7 +107,7 @@ def add_legend(
 
 
 def handles_of(
-    styles: Mapping[str, Style], groups: Iterable[Collection[str]], *, lines: bool = True
+    styles: Mapping[str, SeriesStyle], groups: Iterable[Collection[str]], *, lines: bool = True
 ) -> list[Line2D]:
     """Handles of a legend for the names that some panel shows."""
     seen = set().union(*groups)

@@ -17,7 +17,7 @@ from holdfast.files import write_whole
 from holdfast.parallel import Engine
 
 T = TypeVar("T")
-Tell = Callable[[str], None]
+Notify = Callable[[str], None]
 
 
 class Task(NamedTuple):
@@ -38,7 +38,7 @@ class Task(NamedTuple):
     cost: float = 1.0
 
 
-class Follow(Protocol):
+class ShowProgress(Protocol):
     """Goes through items, with a word on what for and what they cost; may show progress."""
 
     def __call__(
@@ -49,7 +49,7 @@ class Follow(Protocol):
 
 
 @dataclass(frozen=True)
-class Work:
+class TaskRunner:
     """Does tasks and keeps what each returns in a file of its own.
 
     A file is found again by what the result depends on: the package's source, the function and
@@ -59,14 +59,14 @@ class Work:
     Attributes:
         folder: of the study; results are kept in `folder/work`.
         engine: where the work is done.
-        follow: goes through the tasks as they are done.
-        tell: is given what a person would want to know.
+        progress: goes through the tasks as they are done.
+        notify: is given what a person would want to know.
     """
 
     folder: Path
     engine: Engine = Engine()  # noqa: RUF009 (a tuple: it cannot change)
-    follow: Follow = lambda items, _, __, ___: iter(items)
-    tell: Tell = lambda _: None
+    progress: ShowProgress = lambda items, _, __, ___: iter(items)
+    notify: Notify = lambda _: None
 
     def run(self, tasks: Sequence[Task]) -> dict[str, Any]:
         """What each task returns, by name; long ones are begun first.
@@ -83,9 +83,9 @@ class Work:
         results = {key: self._read(key, task) for key, task in by_key.items()}
         missing = [task for key, task in by_key.items() if results[key] is UNSET]
         if len(missing) < len(by_key):
-            self.tell(f"{len(by_key) - len(missing)} of {len(by_key)} tasks are done already")
+            self.notify(f"{len(by_key) - len(missing)} of {len(by_key)} tasks are done already")
         total = sum(task.cost for task in missing)
-        for task, result in self.follow(self._done(missing, keys), "working", total, _cost):
+        for task, result in self.progress(self._done(missing, keys), "working", total, _cost):
             results[keys[task.name]] = result
         return {name: results[key] for name, key in keys.items()}
 

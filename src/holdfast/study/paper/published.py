@@ -2,7 +2,7 @@
 
 from typing import NamedTuple
 
-from holdfast.study.report.tables import Row, Table
+from holdfast.study.report.result_tables import ResultTable, Row
 
 WINDOWS = (4, 6, 8, 10, 12, 14, 16, 18)
 RATES = ("FPR", "FNR", "FDR", "accuracy")
@@ -175,7 +175,7 @@ STATEMENTS: tuple[Statement, ...] = (
 )
 
 
-def discrepancies() -> Table:
+def discrepancies() -> ResultTable:
     """Where the paper disagrees with itself, or leaves open what a repetition needs."""
     rows = [
         Row(
@@ -185,7 +185,7 @@ def discrepancies() -> Table:
         )
         for each in STATEMENTS
     ]
-    return Table(
+    return ResultTable(
         name="discrepancies",
         title="Where the paper disagrees with itself, or leaves open what a repetition needs",
         note=(

@@ -8,12 +8,11 @@ from matplotlib.colors import to_hex
 
 from holdfast.contact import NO_CONTACT, STABLE, UNKNOWN, UNSTABLE, Phase
 from holdfast.features import Tare
+from holdfast.plots.curves import Curve, draw_alarms, draw_lines, draw_reliability
+from holdfast.plots.dots import IntervalEstimate, draw_dots, draw_groups
 from holdfast.plots.recording import COMPONENT_COLOURS
-from holdfast.recordings import Label, Recording, Tactile, Truth
-from holdfast.sensors import sensor
-from holdfast.study.report.curves import Curve, draw_alarms, draw_lines, draw_reliability
-from holdfast.study.report.dots import Estimate, draw_dots, draw_groups
-from holdfast.study.report.figures import (
+from holdfast.plots.style import PAPER, styles_of
+from holdfast.plots.traces import (
     PHASE_COLOURS,
     STATE_COLOURS,
     Trace,
@@ -23,7 +22,8 @@ from holdfast.study.report.figures import (
     runs,
     trace_of,
 )
-from holdfast.study.report.style import PAPER, styles_of
+from holdfast.recordings import Label, Recording, Tactile, Truth
+from holdfast.sensors import sensor
 
 
 def trace(n=200, seed=0, **options):
@@ -238,11 +238,11 @@ def test_dots_are_sorted_by_the_first_panel():
         draw_dots(
             {
                 "by recording": {
-                    "a": Estimate(90.0, 88.0, 91.0, 95.0),
-                    "b": Estimate(92.0),
-                    "c": Estimate(None),
+                    "a": IntervalEstimate(90.0, 88.0, 91.0, 95.0),
+                    "b": IntervalEstimate(92.0),
+                    "c": IntervalEstimate(None),
                 },
-                "by object": {"a": Estimate(80.0), "d": Estimate(85.0)},
+                "by object": {"a": IntervalEstimate(80.0), "d": IntervalEstimate(85.0)},
             },
             strong={"b"},
         )
@@ -262,8 +262,10 @@ def test_dots_are_sorted_by_the_first_panel():
 
 
 def test_groups_stand_in_their_place():
-    values = {"low": Estimate(5.0, 4.0, 6.0), "high": Estimate(9.0)}
-    figure = drawn(draw_groups({"force": {"a": values, "b": {"high": Estimate(1.0)}}}, "wrong [%]"))
+    values = {"low": IntervalEstimate(5.0, 4.0, 6.0), "high": IntervalEstimate(9.0)}
+    figure = drawn(
+        draw_groups({"force": {"a": values, "b": {"high": IntervalEstimate(1.0)}}}, "wrong [%]")
+    )
     (axes,) = figure.axes
     assert [label.get_text() for label in axes.get_xticklabels()] == ["low", "high"]
     first, second = (line for line in axes.lines if line.get_linestyle() == "None")
@@ -282,7 +284,7 @@ def test_eighteen_methods_look_different():
 def test_no_global_state_is_touched():
     """pyplot keeps every figure that it makes until somebody closes it."""
     program = (
-        "import sys; from holdfast.study.report import curves, dots, figures, page\n"
+        "import sys; from holdfast.plots import curves, dots, traces\n"
         "curves.draw_lines({}, 'x'); dots.draw_dots({})\n"
         "assert 'matplotlib.pyplot' not in sys.modules"
     )

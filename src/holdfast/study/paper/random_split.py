@@ -3,7 +3,7 @@
 Of the 25 parts of a pool, 0 to 4 are the 20 % held out; the rest train, in five folds of four.
 """
 
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 
 import msgspec
@@ -11,9 +11,12 @@ import numpy as np
 import numpy.typing as npt
 
 from holdfast.classifiers import RECIPES, Classifier, Parameters, Recipe, Samples, Threshold
-from holdfast.study.corpus import Corpus
-from holdfast.study.paper.counts import Counts, confusions
-from holdfast.study.paper.pools import Integers, Pool, pooled
+from holdfast.metrics import bootstrap_interval, ratio_of_sums
+from holdfast.metrics.intervals import Interval
+from holdfast.metrics.statistics import percent
+from holdfast.study.paper.pooled_samples import Integers, Pool, pooled
+from holdfast.study.plan import Corpus
+from holdfast.study.report.result_tables import Row
 from holdfast.training.setting import SEARCH_SAMPLES
 from holdfast.training.splits import inner_folds
 from holdfast.training.tuning import search
@@ -35,8 +38,21 @@ WAYS: dict[str, Recipe] = {**RECIPES, "threshold": Threshold(side="below")}
 Kind = tuple[str, tuple[str, ...]]
 """A classifier, and what it sees."""
 
+ConfusionCounts = list[list[int]]
+"""Of each recording [TN, FP, FN, TP]."""
 
-class Effort(msgspec.Struct, frozen=True):
+CONFUSION_RATES: dict[str, tuple[tuple[int, ...], tuple[int, ...]]] = {
+    "TNR": ((0,), (0, 1)),
+    "FPR": ((1,), (0, 1)),
+    "FNR": ((2,), (2, 3)),
+    "TPR": ((3,), (2, 3)),
+    "FDR": ((1,), (1, 3)),
+    "accuracy": ((0, 3), (0, 1, 2, 3)),
+}
+"""Which of TN, FP, FN, TP each figure divides by which."""
+
+
+class FitBudget(msgspec.Struct, frozen=True):
     """How much work goes into one classifier.
 
     Attributes:
@@ -63,7 +79,7 @@ class Cell(msgspec.Struct, frozen=True):
     features: tuple[str, ...]
     parameters: dict[str, float | str | None]
     n_fitted: int
-    counts: dict[str, Counts]
+    counts: dict[str, ConfusionCounts]
 
 
 def judge(
@@ -71,7 +87,7 @@ def judge(
     finger: str,
     window: int,
     kinds: Sequence[Kind],
-    effort: Effort,
+    effort: FitBudget,
     seed: int,
     thorough: bool,
 ) -> list[Cell]:
@@ -123,7 +139,7 @@ class _Fit:
         """The counts of samples judged by a fit without their fold."""
         counts = np.zeros((n_recordings, 4), dtype=np.int64)
         for held in folds:
-            counts += confusions(self(samples.take(~held)), samples.take(held), n_recordings)
+            counts += confusion_counts(self(samples.take(~held)), samples.take(held), n_recordings)
         return counts
 
 
@@ -136,7 +152,7 @@ def _judge(
     main: Pool,
     tests: Mapping[str, Pool],
     kind: Kind,
-    effort: Effort,
+    effort: FitBudget,
     seed: int,
     thorough: bool,
 ) -> Cell:
@@ -149,12 +165,12 @@ def _judge(
     parameters = _search(train, folds, how, effort.trials, seed)
     fit = _Fit(how, parameters, effort.n_fit, seed)
     rule = fit(train)
-    counts = {HELD_OUT: confusions(rule, samples.take(~trains), n)}
+    counts = {HELD_OUT: confusion_counts(rule, samples.take(~trains), n)}
     for on, pool in tests.items():
-        counts[on] = confusions(rule, pool.only(names), len(pool.objects))
+        counts[on] = confusion_counts(rule, pool.only(names), len(pool.objects))
     if thorough:
         each_fold = (folds == fold for fold in range(N_FOLDS))
-        counts[TRAINING] = confusions(rule, train, n)
+        counts[TRAINING] = confusion_counts(rule, train, n)
         counts[VALIDATED] = fit.out_of_fold(train, each_fold, n)
     for on, held in _without_corpora(main, tests, seed, thorough).items():
         counts[on] = fit.out_of_fold(samples, held, n)
@@ -190,3 +206,36 @@ def _search(train: Samples, folds: Integers, how: Recipe, trials: int, seed: int
     step = max(1, -(-len(folds) // SEARCH_SAMPLES))
     masks = [folds[::step] == fold for fold in range(N_FOLDS)]
     return search(few, masks, how, n_trials=trials, seed=seed)
+
+
+def confusion_counts(classifier: Classifier, samples: Samples, n_recordings: int) -> Integers:
+    """(n_recordings, 4) how many TN, FP, FN and TP each recording has; it alone decides."""
+    called = classifier.probability(samples.features) >= classifier.threshold
+    place = 4 * samples.groups + 2 * samples.stable + called
+    return np.bincount(place, minlength=4 * n_recordings).reshape(-1, 4)
+
+
+def rate_rows(
+    counts: ConfusionCounts, names: Iterable[str], seed: int
+) -> Iterator[tuple[str, Row]]:
+    """Each figure of confusion counts by recording, as a row that has no keys yet.
+
+    Args:
+        counts: [TN, FP, FN, TP] of each recording; recordings without samples do not count.
+        names: of `CONFUSION_RATES`.
+        seed: of the bootstrap.
+    """
+    table = np.array(counts, dtype=np.int64).reshape(-1, 4)
+    table = table[table.sum(axis=1) > 0]
+    for name in names:
+        part, whole = (table[:, list(columns)].sum(axis=1) for columns in CONFUSION_RATES[name])
+        ours = percent(int(part.sum()), int(whole.sum()))
+        interval = bootstrap_interval(ratio_of_sums(part, whole), len(table), seed=seed)
+        yield name, Row({}, ours, n=len(table), interval=_percent(interval))
+
+
+def _percent(interval: Interval | None) -> Interval | None:
+    if interval is None:
+        return None
+    low, high = (None if end is None else 100 * end for end in interval)
+    return low, high

@@ -9,25 +9,23 @@ import pytest
 from holdfast.contact import ContactState
 from holdfast.errors import OutputError, TrainingError
 from holdfast.parallel import Engine
-from holdfast.study import study as whole
-from holdfast.study.chapters import CHAPTERS, TWIN, Made, sections
-from holdfast.study.corpus import corpus_of
-from holdfast.study.paper import experiments
-from holdfast.study.paper import part as paper
-from holdfast.study.paper.printed import discrepancies
-from holdfast.study.plan import Plan
-from holdfast.study.report.page import Picture
-from holdfast.study.report.tables import Row, Table
-from holdfast.study.study import refuse_plan, study
+from holdfast.study import run
+from holdfast.study.paper import experiments, paper_tables
+from holdfast.study.paper.published import discrepancies
+from holdfast.study.plan import StudyPlan, scan_corpus
+from holdfast.study.report.html_report import ReportFigure
+from holdfast.study.report.result_tables import ResultTable, Row
+from holdfast.study.run import check_plan, run_study
+from holdfast.study.sections import CHAPTERS, TWIN, Made, sections
 from holdfast.synthetic import synthetic_recording
 
-from .build import synthetic, written
+from .example_recordings import save_all, save_synthetic
 
 PAPER = ("confusion", "window", "ablation", "unseen", "fingers", "zhang")
 
 
 def table(name, n=3):
-    return Table(name, name, "Note.", [Row({"m": "a", "figure": "x"}, 1.0, n=n)], ("m",))
+    return ResultTable(name, name, "Note.", [Row({"m": "a", "figure": "x"}, 1.0, n=n)], ("m",))
 
 
 def titles(found):
@@ -40,7 +38,7 @@ class TestChapters:
             "paper": Made(
                 [table("unseen"), table("more"), table("confusion"), discrepancies()], []
             ),
-            "real": Made([table("hand")], [Picture("forces", "", None)]),
+            "real": Made([table("hand")], [ReportFigure("forces", "", None)]),
         }
         found = sections(made, ["a", "b"], twin=False)
         assert titles(found) == [
@@ -85,8 +83,8 @@ def recordings(cases, start=0):
 
 class TestExperiments:
     def test_recordings_are_chosen_by_case_and_name_where_nothing_trained(self, tmp_path):
-        main = corpus_of("main", written(tmp_path / "a", recordings(["2", "failed", "1"])))
-        others = corpus_of("others", written(tmp_path / "b", recordings(["2", "2"], 5)))
+        main = scan_corpus("main", save_all(tmp_path / "a", recordings(["2", "failed", "1"])))
+        others = scan_corpus("others", save_all(tmp_path / "b", recordings(["2", "2"], 5)))
         shown = experiments.predict({"others": others, "main": main}, "index", 0)
         assert [(s.experiment, s.role, s.recording) for s in shown] == [
             ("protocol", "main", "2-0"),
@@ -108,13 +106,13 @@ class TestExperiments:
                 for name, module in first.modules.items()
             }
             place = tmp_path / state.value
-            main = corpus_of("main", written(place, [first.with_labels(labels), *rest]))
+            main = scan_corpus("main", save_all(place, [first.with_labels(labels), *rest]))
             found.append(experiments.predict({"main": main}, "index", 0)[1])
         assert found[0].recording == "2-0"
         assert found[0] == found[1]
 
     def test_without_cases_the_first_recording_is_shown(self, tmp_path):
-        main = corpus_of("main", synthetic(tmp_path / "a", range(2)))
+        main = scan_corpus("main", save_synthetic(tmp_path / "a", range(2)))
         shown = experiments.predict({"main": main}, "index", 0)
         assert [(s.experiment, s.recording) for s in shown] == [
             ("protocol", "grasp-0"),
@@ -126,24 +124,24 @@ class TestExperiments:
 def few():
     """A study of few tasks."""
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(paper, "QUICK_WINDOWS", (14,))
-        patch.setattr(paper, "ABLATED_AT", (14,))
-        patch.setattr(whole, "PARTS", {"paper": paper, "experiments": experiments})
+        patch.setattr(paper_tables, "QUICK_WINDOWS", (14,))
+        patch.setattr(paper_tables, "ABLATED_AT", (14,))
+        patch.setattr(run, "PARTS", {"paper": paper_tables, "experiments": experiments})
         yield
 
 
 @pytest.fixture(scope="module")
 def plan(tmp_path_factory):
     folder = tmp_path_factory.mktemp("plan") / "main"
-    return Plan({"main": corpus_of("main", written(folder, recordings(["2", "1", "failed", "2"])))},
-                quick=True)  # fmt: skip
+    corpus = scan_corpus("main", save_all(folder, recordings(["2", "1", "failed", "2"])))
+    return StudyPlan({"main": corpus}, quick=True)
 
 
 @pytest.fixture(scope="module")
 def done(few, plan, tmp_path_factory):
     """The folder of a finished study, and its tables."""
     out = tmp_path_factory.mktemp("done") / "out"
-    return out, study(plan, out, made_in=60.0, left_out=["the moon."])
+    return out, run_study(plan, out, made_in=60.0, left_out=["the moon."])
 
 
 def summary(out):
@@ -183,11 +181,11 @@ def test_nothing_tells_where_it_was_made(done, plan):
 def test_what_is_kept_is_not_computed_again(done, plan, tmp_path):
     out = shutil.copytree(done[0], tmp_path / "out")
     with pytest.raises(OutputError, match="holds a study already: choose another name, or give"):
-        study(plan, out)
+        run_study(plan, out)
     kept = {path.name: path.read_bytes() for path in (out / "work").iterdir()}
     (out / "data").mkdir()
     told = []
-    study(plan, out, tell=told.append, force=True)
+    run_study(plan, out, notify=told.append, force=True)
     assert told[0] == f"{len(kept)} of {len(kept)} tasks are done already"
     assert {path.name: path.read_bytes() for path in (out / "work").iterdir()} == kept
     assert (out / "data").is_dir()
@@ -195,7 +193,7 @@ def test_what_is_kept_is_not_computed_again(done, plan, tmp_path):
 
 
 def test_other_processes_find_the_same(done, plan, tmp_path):
-    assert study(plan, tmp_path / "out", Engine(2)) == done[1]
+    assert run_study(plan, tmp_path / "out", Engine(2)) == done[1]
 
 
 def test_a_browser_shows_the_report(done):
@@ -212,13 +210,13 @@ def test_a_browser_shows_the_report(done):
 
 
 def test_hands_of_one_finger_are_refused(tmp_path):
-    main = corpus_of("main", synthetic(tmp_path / "main", range(2), fingers=("thumb",)))
+    main = scan_corpus("main", save_synthetic(tmp_path / "main", range(2), fingers=("thumb",)))
     message = (
         r"one finger with labels of both classes given \(thumb\); the study compares classifiers "
         "of whole hands, which need at least two$"
     )
     with pytest.raises(TrainingError, match=message):
-        refuse_plan(Plan({"main": main}))
+        check_plan(StudyPlan({"main": main}))
     with pytest.raises(TrainingError, match=message):
-        study(Plan({"main": main}), tmp_path / "out")
+        run_study(StudyPlan({"main": main}), tmp_path / "out")
     assert not (tmp_path / "out").exists()

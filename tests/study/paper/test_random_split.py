@@ -5,9 +5,8 @@ import pytest
 from holdfast.classifiers import Samples, recipe
 from holdfast.classifiers.threshold import best_cut
 from holdfast.features import DEPLOYED
-from holdfast.study.corpus import corpus_of
-from holdfast.study.paper.pools import pooled
-from holdfast.study.paper.protocol import (
+from holdfast.study.paper.pooled_samples import pooled
+from holdfast.study.paper.random_split import (
     ELSEWHERE,
     FRESH,
     HELD_OUT,
@@ -15,13 +14,14 @@ from holdfast.study.paper.protocol import (
     TRAINING,
     VALIDATED,
     Cell,
-    Effort,
+    FitBudget,
     judge,
     spread,
 )
-from study.build import synthetic
+from holdfast.study.plan import scan_corpus
+from study.example_recordings import save_synthetic
 
-EFFORT = Effort(trials=1, n_fit=100_000)
+EFFORT = FitBudget(trials=1, n_fit=100_000)
 """One trial is the reference setting."""
 KINDS = (("logreg", DEPLOYED), ("svm", ("energy",)))
 
@@ -30,7 +30,7 @@ KINDS = (("logreg", DEPLOYED), ("svm", ("energy",)))
 def corpora(tmp_path_factory):
     folder = tmp_path_factory.mktemp("protocol")
     seeds = {"main": range(5), "fresh": range(10, 12), "others": range(20, 22)}
-    return {name: corpus_of(name, synthetic(folder / name, s)) for name, s in seeds.items()}
+    return {name: scan_corpus(name, save_synthetic(folder / name, s)) for name, s in seeds.items()}
 
 
 def judged(corpora, *, thorough=True, effort=EFFORT, seed=0):
@@ -43,7 +43,7 @@ def alone(corpora):
 
 
 def naive(corpora, on):
-    """Counts of LogReg of the deployed features, fitted and counted the long way."""
+    """ConfusionCounts of LogReg of the deployed features, fitted and counted the long way."""
     main = pooled(corpora["main"], 150.0, "index", 14, seed=0)
     data = main.only(DEPLOYED)
     every = np.arange(len(main.parts))
@@ -109,14 +109,14 @@ def test_80_percent_train(alone):
 
 
 def test_a_fit_takes_no_more_than_it_may(corpora):
-    cell = judged({"main": corpora["main"]}, thorough=False, effort=Effort(1, 500))[0]
+    cell = judged({"main": corpora["main"]}, thorough=False, effort=FitBudget(1, 500))[0]
     assert 400 < cell.n_fitted <= 500
 
 
 def test_a_search_tries_more_than_the_reference(corpora, alone):
     reference = recipe("logreg").reference
     assert alone[0].parameters == reference
-    cell = judged({"main": corpora["main"]}, thorough=False, effort=Effort(4, 500))[0]
+    cell = judged({"main": corpora["main"]}, thorough=False, effort=FitBudget(4, 500))[0]
     assert set(cell.parameters) == set(reference)
     assert cell.parameters != reference
 
