@@ -118,9 +118,9 @@ def flips(folder: Path, n: int, chance: random.Random) -> int:
     path, damaged = folder / "whole.mcap", folder / "damaged.mcap"
     with Recorder(path, SENSORS) as recorder:
         for k in range(int(2 * RATE)):
-            recorder.put(Arrival(k / RATE, values(k), received=k / RATE), patient=True)
+            recorder.put(Arrival(k / RATE, values(k), received=k / RATE), wait=True)
             if k % 100 == 50:
-                recorder.mark(f"mark {k}")
+                recorder.add_marker(f"mark {k}")
     raw = path.read_bytes()
     return sum(is_refused(damaged, raw, chance.randrange(8 * len(raw))) for _ in range(n))
 

@@ -87,7 +87,7 @@ def test_it_tells_how_far_it_is(path):
             recorder.put(arrival(k, "thumb", n_lost=k == 150, n_refused=2 * (k == 7)))
         until(lambda: recorder.status.n_samples == 150)
         until(lambda: recorder.status.rate > 0)
-        recorder.mark("one")
+        recorder.add_marker("one")
     status = recorder.status
     assert status.seconds == pytest.approx(1.99)
     assert status.modules == {"thumb": 150, "index": 0}
@@ -107,7 +107,7 @@ def test_all_is_on_disk_soon_though_the_source_falls_silent(path):
     with Recorder(path, TWO) as recorder:
         recorder.put(arrival(0))
         recorder.put(arrival(1))
-        recorder.mark("silence")
+        recorder.add_marker("silence")
         until(lambda: recorder.status.n_markers)
         copy = path.with_name("copy.mcap")
         until(lambda: shutil.copy(path, copy) and path.stat().st_size == recorder.status.n_bytes)
@@ -118,13 +118,13 @@ def test_all_is_on_disk_soon_though_the_source_falls_silent(path):
 
 def test_markers_stand_where_they_were_set(path):
     with Recorder(path, TWO) as recorder:
-        recorder.mark("early")
-        recorder.mark("before", 0.5)
+        recorder.add_marker("early")
+        recorder.add_marker("before", 0.5)
         recorder.put(arrival(100))
-        recorder.mark("at\nthe  newest\x00\ud800")
+        recorder.add_marker("at\nthe  newest\x00\ud800")
         recorder.put(arrival(101))
-        recorder.mark("nowhere", math.inf)
-        recorder.mark("x" * 1000, 1.005)
+        recorder.add_marker("nowhere", math.inf)
+        recorder.add_marker("x" * 1000, 1.005)
     assert load_recording(path).markers == (
         (1.0, "early"),
         (0.5, "before"),
@@ -159,10 +159,10 @@ def test_markers_of_a_recording_stay_markers_when_it_is_recorded_again(path):
         for k in range(100):
             recorder.put(arrival(k))
         for time, text in ((0.1, "closing"), (0.5, "mark"), (0.51, "mark"), (0.9, "note: a")):
-            recorder.mark(text, time)
+            recorder.add_marker(text, time)
     with open_source(str(first), speed=0) as source, Recorder(path, TWO) as recorder:
         for one in source:
-            recorder.put(one, patient=True)
+            recorder.put(one, wait=True)
     got, want = load_recording(path).markers, load_recording(first).markers
     assert [text for _, text in got] == [text for _, text in want]
     np.testing.assert_allclose([t for t, _ in got], [t for t, _ in want], atol=0.011)
@@ -175,7 +175,7 @@ def test_the_faults_of_the_last_second_are_there_now(path):
     with Recorder(path, TWO) as recorder:
         recorder.put(notice_arrival(now - 1.5, faults=old))
         recorder.put(notice_arrival(now + PATIENCE, faults=new))
-    assert recorder.status.faulty == {"index": (Fault.PACKET_GAP, Fault.LATE)}
+    assert recorder.status.recent_faults == {"index": (Fault.PACKET_GAP, Fault.LATE)}
 
 
 def test_the_same_words_are_a_marker_once_a_second(path):
@@ -213,7 +213,9 @@ def test_what_no_file_can_hold_is_dropped_and_told(path):
     assert thumb.readings[:, 0, 0].tolist() == [0, 7, 8, 9]
     assert thumb.readings.dtype == np.uint16
     assert recorder.status.n_dropped == len(wrong)
-    assert (0.0, "note: a sample of thumb is unfit: dropped") in load_recording(path).markers
+    assert (0.0, "note: a sample of thumb cannot be stored: dropped") in load_recording(
+        path
+    ).markers
 
 
 def test_half_precision_is_no_number_type_of_a_file(path):
@@ -225,7 +227,7 @@ def test_half_precision_is_no_number_type_of_a_file(path):
 
 
 def test_a_slow_disk_holds_nobody_up_and_fills_no_memory(path, stuck, monkeypatch):
-    monkeypatch.setattr(module, "MOST_WAITING", 50)
+    monkeypatch.setattr(module, "MAX_QUEUED_ARRIVALS", 50)
     with Recorder(path, TWO) as recorder:
         recorder.put(arrival(0))
         assert stuck.entered.wait(PATIENCE)
@@ -241,25 +243,25 @@ def test_a_slow_disk_holds_nobody_up_and_fills_no_memory(path, stuck, monkeypatc
 
 
 def test_markers_find_room_where_samples_do_not_but_not_without_end(path, stuck, monkeypatch):
-    monkeypatch.setattr(module, "MOST_WAITING", 5)
-    monkeypatch.setattr(module, "_MOST_MARKERS", 3)
+    monkeypatch.setattr(module, "MAX_QUEUED_ARRIVALS", 5)
+    monkeypatch.setattr(module, "_MAX_QUEUED_MARKERS", 3)
     with Recorder(path, TWO) as recorder:
         recorder.put(arrival(0))
         assert stuck.entered.wait(PATIENCE)
         for k in range(1, 10):
             recorder.put(arrival(k))
         for k in range(10):
-            recorder.mark(f"mark {k}")
+            recorder.add_marker(f"mark {k}")
         stuck.set()
     texts = [text for _, text in load_recording(path).markers if text.startswith("mark")]
     assert texts == ["mark 0", "mark 1", "mark 2"]
 
 
 def test_who_is_patient_loses_nothing(path, monkeypatch):
-    monkeypatch.setattr(module, "MOST_WAITING", 5)
+    monkeypatch.setattr(module, "MAX_QUEUED_ARRIVALS", 5)
     with Recorder(path, TWO) as recorder:
         for k in range(100):
-            recorder.put(arrival(k), patient=True)
+            recorder.put(arrival(k), wait=True)
     assert (recorder.status.n_dropped, recorder.status.n_samples) == (0, 100)
 
 
@@ -267,8 +269,8 @@ def test_after_the_end_nothing_is_taken(path):
     recorder = Recorder(path, TWO)
     recorder.put(arrival(0))
     recorder.close()
-    recorder.put(arrival(1), patient=True)
-    recorder.mark("late")
+    recorder.put(arrival(1), wait=True)
+    recorder.add_marker("late")
     recorder.close()
     assert recorder.status.n_dropped == 1
     assert load_recording(path).modules["thumb"].n_samples == 1
@@ -326,7 +328,7 @@ end = time.monotonic() + 30
 for k in range(10**9):
     values = noise.integers(0, 65535, (5, 3)).astype(np.uint16)
     values[0, 0] = k
-    recorder.put(Arrival(k / 100, {"thumb": values}, received=0.0), patient=True)
+    recorder.put(Arrival(k / 100, {"thumb": values}, received=0.0), wait=True)
     if recorder.failed or time.monotonic() > end:
         break
 resource.setrlimit(resource.RLIMIT_FSIZE, (resource.RLIM_INFINITY, resource.RLIM_INFINITY))

@@ -7,7 +7,7 @@ from hypothesis import strategies as st
 
 from holdfast.contact import Fault
 from holdfast.live import recording_buffer as module
-from holdfast.live.recording_buffer import RecordingBuffer, Track, plain
+from holdfast.live.recording_buffer import ModuleBuffer, RecordingBuffer, marker_text
 from holdfast.recordings import Tactile
 from holdfast.sensors import sensor
 from holdfast.sources import Arrival
@@ -19,16 +19,16 @@ NUMBERS = ("uint8", "uint16", "int16", "int64", "float32", "float64", "bool")
 
 
 @given(TIMES, st.lists(st.booleans()))
-def test_times_of_a_track_increase_and_nothing_else_is_refused(times, drains):
-    track, kept, last = Track(ANYSKIN), [], -math.inf
+def test_a_module_buffer_accepts_increasing_times_only(times, drains):
+    module_buffer, kept, last = ModuleBuffer(ANYSKIN), [], -math.inf
     for k, time in enumerate(times):
-        assert track.take(time, np.zeros((5, 3))) is (last < time < math.inf)
+        assert module_buffer.append(time, np.zeros((5, 3))) is (last < time < math.inf)
         last = max(last, time) if math.isfinite(time) else last
         if k < len(drains) and drains[k]:
-            kept += track.drain()[0].tolist()
-    kept += track.drain()[0].tolist()
+            kept += module_buffer.pop_samples()[0].tolist()
+    kept += module_buffer.pop_samples()[0].tolist()
     assert np.all(np.diff(kept) > 0)
-    assert len(kept) == track.n_samples
+    assert len(kept) == module_buffer.n_samples
     assert set(kept) <= set(times)
 
 
@@ -37,47 +37,47 @@ def test_times_of_a_track_increase_and_nothing_else_is_refused(times, drains):
     st.lists(st.tuples(st.sampled_from(NUMBERS), st.integers(-300, 70_000)), max_size=8),
 )
 def test_readings_keep_their_number_type_and_their_values(number, others):
-    track = Track(ANYSKIN)
-    track.take(0.0, np.ones((5, 3), number))
+    module_buffer = ModuleBuffer(ANYSKIN)
+    module_buffer.append(0.0, np.ones((5, 3), number))
     want = [np.ones((5, 3))]
     for k, (other, value) in enumerate(others):
         readings = np.full((5, 3), value).astype(other)
-        if track.take(1.0 + k, readings):
+        if module_buffer.append(1.0 + k, readings):
             want.append(readings)
         else:
             assert not np.array_equal(readings.astype(number), readings)
-    _, readings = track.drain()
+    _, readings = module_buffer.pop_samples()
     assert readings.dtype == number
     np.testing.assert_array_equal(readings, want)
 
 
-def test_what_a_float_rounds_it_does_not_hold():
-    track = Track(ANYSKIN)
-    track.take(0.0, np.zeros((5, 3)))
-    assert track.take(1.0, np.full((5, 3), 2**53))
-    assert not track.take(2.0, np.full((5, 3), 2**53 + 1))
+def test_integers_that_a_float_rounds_are_rejected():
+    module_buffer = ModuleBuffer(ANYSKIN)
+    module_buffer.append(0.0, np.zeros((5, 3)))
+    assert module_buffer.append(1.0, np.full((5, 3), 2**53))
+    assert not module_buffer.append(2.0, np.full((5, 3), 2**53 + 1))
 
 
 @given(st.sets(st.integers(20, 200), max_size=20), st.lists(st.integers(0, 200), max_size=20))
-def test_gaps_are_those_of_the_recording_however_it_was_drained(missing, cuts):
-    track = Track(ANYSKIN)
+def test_gaps_are_those_of_the_recording_for_any_chunks(missing, cuts):
+    module_buffer = ModuleBuffer(ANYSKIN)
     times = [k / 40 for k in range(220) if k // 4 * 4 not in missing]  # four at a time
     for k, time in enumerate(times):
-        track.take(time, np.zeros((5, 3)))
+        module_buffer.append(time, np.zeros((5, 3)))
         if k in cuts:
-            track.drain()
-    track.drain()
-    assert track.n_gaps == Tactile(ANYSKIN, times, np.zeros((len(times), 5, 3))).n_gaps
+            module_buffer.pop_samples()
+    module_buffer.pop_samples()
+    assert module_buffer.n_gaps == Tactile(ANYSKIN, times, np.zeros((len(times), 5, 3))).n_gaps
 
 
 def test_faults_last_until_an_arrival_clears_them():
-    sorted_ = RecordingBuffer({"thumb": ANYSKIN, "index": ANYSKIN})
+    buffer = RecordingBuffer({"thumb": ANYSKIN, "index": ANYSKIN})
     late, values = {"thumb": (Fault.LATE,)}, {"thumb": np.zeros((5, 3))}
-    told = []
+    markers = []
     for k, (samples, faults) in enumerate(
         [
             (values, late),  # begins
-            ({"index": values["thumb"]}, {}),  # says nothing of the thumb
+            ({"index": values["thumb"]}, {}),  # without the thumb
             (values, late),  # goes on
             (values, {}),  # over
             (values, late),  # begins again
@@ -85,23 +85,23 @@ def test_faults_last_until_an_arrival_clears_them():
             ({}, late),  # begins again
         ]
     ):
-        sorted_.take(Arrival(10.0 * k, samples, 10.0 * k, faults))
-        told.append([text for _, text in sorted_.drain_markers()])
+        buffer.add(Arrival(10.0 * k, samples, 10.0 * k, faults))
+        markers.append([text for _, text in buffer.pop_markers()])
     begins = ["fault thumb late"]
-    assert told == [begins, [], [], [], begins, [], begins]
-    assert sorted_.faults == {Fault.LATE: 4}
+    assert markers == [begins, [], [], [], begins, [], begins]
+    assert buffer.faults == {Fault.LATE: 4}
 
 
-def test_a_device_that_babbles_fills_no_memory(monkeypatch):
-    monkeypatch.setattr(module, "MOST_MARKERS", 500)
-    babbled = RecordingBuffer({"thumb": ANYSKIN})
+def test_a_device_with_endless_notices_fills_no_memory(monkeypatch):
+    monkeypatch.setattr(module, "MAX_PENDING_MARKERS", 500)
+    buffer = RecordingBuffer({"thumb": ANYSKIN})
     for k in range(10_000):
-        babbled.take(notice_arrival(0.01 * k, f"noise {k}", n_refused=1))
-    assert babbled.n_refused == 10_000
-    assert len(babbled._said) <= module.MOST_WORDS
-    assert babbled.drain_markers() == []  # before the first sample
-    babbled.take(Arrival(0.0, {"thumb": np.zeros((5, 3))}, 200.0))
-    assert len(babbled.drain_markers()) == 500
+        buffer.add(notice_arrival(0.01 * k, f"noise {k}", n_refused=1))
+    assert buffer.n_refused == 10_000
+    assert len(buffer._notice_times) <= module.MAX_NOTICES
+    assert buffer.pop_markers() == []  # before the first sample
+    buffer.add(Arrival(0.0, {"thumb": np.zeros((5, 3))}, 200.0))
+    assert len(buffer.pop_markers()) == 500
 
 
 @pytest.mark.parametrize(
@@ -114,6 +114,6 @@ def test_a_device_that_babbles_fills_no_memory(monkeypatch):
         ("x" * 300, "x" * 200),
     ],
 )
-def test_texts_are_made_plain(text, want):
-    assert plain(text) == want
-    plain(text).encode()
+def test_marker_text_is_one_printable_line(text, want):
+    assert marker_text(text) == want
+    marker_text(text).encode()

@@ -103,7 +103,7 @@ def _record(
     from holdfast.cli.terminal.keys import LEGEND, Keys
     from holdfast.cli.terminal.record_line import RecordLine
     from holdfast.errors import OutputError, SourceError
-    from holdfast.live.recording_buffer import plain
+    from holdfast.live.recording_buffer import marker_text
 
     say(f"recording {source.name} to {recorder.path}")
     try:
@@ -111,10 +111,10 @@ def _record(
             line.say(LEGEND if keys.live else "Ctrl-C stops")
             for arrival in arrivals:
                 if arrival is not None:
-                    recorder.put(arrival, patient=not source.paced)
-                    line.say(*map(plain, arrival.notices))
+                    recorder.put(arrival, wait=not source.paced)
+                    line.say(*map(marker_text, arrival.notices))
                 for text in keys.poll():
-                    recorder.mark(text)
+                    recorder.add_marker(text)
                 line.update()
                 if stop.asked or keys.stopped or recorder.failed:
                     break

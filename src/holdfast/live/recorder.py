@@ -1,13 +1,14 @@
-"""Arrivals go to disk in a thread of their own, so that whoever reads a source never waits."""
+"""Write arrivals to disk in a separate thread, so that reading a source never waits."""
 
 import math
+import re
 import time
 from collections import deque
 from collections.abc import Mapping
 from pathlib import Path
-from threading import Event, Thread
+from threading import Event, Lock, Thread
 from types import TracebackType
-from typing import Any, NamedTuple, Self
+from typing import TYPE_CHECKING, Any, NamedTuple, Self
 
 from holdfast.contact import Fault
 from holdfast.errors import OutputError
@@ -16,38 +17,45 @@ from holdfast.live.recording_buffer import RecordingBuffer
 from holdfast.sensors import Sensor
 from holdfast.sources import Arrival
 
-FLUSH_SECONDS = 0.2
-"""What was given is on disk after this time, and the time that writing takes [s]."""
-MOST_WAITING = 4096
-"""So many arrivals wait for the disk at most: some 30 MB of a whole hand, 27 s at 150 Hz."""
+if TYPE_CHECKING:
+    from holdfast.live.session import Session
+    from holdfast.live.stream_detector import StreamUpdate
 
-_MOST_MARKERS = 1024
-"""Markers may wait beyond the arrivals."""
-_PIECE = 64
-"""Arrivals that are written at a time."""
-_BREATH = 1e-4
-"""A pause between the modules of a piece, in which other threads go on [s]."""
-_RATE_OVER = 1.0
+FLUSH_INTERVAL = 0.2
+"""Time between two writes to disk [s]."""
+MAX_QUEUED_ARRIVALS = 4096
+"""Maximum number of arrivals that wait for the disk: some 30 MB of a whole hand, or 27 s at
+150 Hz."""
+
+_MAX_QUEUED_MARKERS = 1024
+"""Number of markers that may wait in addition to the arrivals."""
+_CHUNK_SIZE = 64
+"""Number of arrivals written at a time."""
+_YIELD_TIME = 1e-4
+"""Pause after each module of a chunk, so that other threads can run [s]."""
+_RATE_PERIOD = 1.0
+"""Period over which the rate is measured [s]."""
+_FILE_NAME = re.compile(r"\w[\w .-]{0,99}", re.ASCII)
 
 
 class RecorderStatus(NamedTuple):
-    """How far a recorder is.
+    """Progress of a recorder.
 
     Attributes:
         seconds: from the first to the newest sample [s].
         n_samples: instants with samples.
-        modules: samples of each module.
-        rate: instants that came over the last second, by the host's clock [Hz].
-        n_gaps: steps longer than three periods, of the module that has most.
+        modules: number of samples of each module.
+        rate: instants received over the last second, by the host's clock [Hz].
+        n_gaps: time steps longer than three periods, of the module that has most.
         n_lost: packets that are missing by the device's own count.
-        n_refused: packets that made no sense.
-        n_dropped: samples that were not kept, or not whole: the disk was too slow, or the file
-            cannot hold them.
-        n_bytes: length of the file so far.
-        n_markers: that were set, by people and by faults.
-        faults: how many arrivals told of each.
-        faulty: the faults of each module within the last second.
-        failure: why nothing is written any more; empty while all is well.
+        n_refused: packets that could not be decoded.
+        n_dropped: instants that were not stored completely: the disk was too slow, or the file
+            format cannot hold the samples.
+        n_bytes: size of the file so far.
+        n_markers: markers written, of people and of faults.
+        faults: number of arrivals that reported each fault.
+        recent_faults: the faults of each module within the last second.
+        failure: why writing has stopped; empty if it has not.
     """
 
     seconds: float
@@ -61,36 +69,36 @@ class RecorderStatus(NamedTuple):
     n_bytes: int
     n_markers: int
     faults: Mapping[Fault, int]
-    faulty: Mapping[str, tuple[Fault, ...]]
+    recent_faults: Mapping[str, tuple[Fault, ...]]
     failure: str
 
 
-class _Marker(NamedTuple):
+class _QueuedMarker(NamedTuple):
     time: float
     text: str
 
 
 class Recorder:
-    """Records what arrives from a source to MCAP; a kill loses at most half a second.
+    """Record the arrivals of a source to MCAP; a killed process loses at most half a second.
 
-    `put` and `mark` return at once, whatever the disk does: a thread writes what they were
-    given, and flushes it every 0.2 s, also when the source falls silent. Where the disk is so
-    slow that too much waits, samples are dropped, counted, and told in a marker. Faults and
-    notices of the source become markers as well. It is a context manager, for any thread.
+    `put` and `add_marker` return at once: a thread writes to disk and flushes every 0.2 s, also
+    while the source is silent. If the disk is too slow, samples are dropped and counted, and a
+    marker reports them. Faults and notices of the source become markers as well. The recorder
+    is a context manager, and can be used from any thread.
 
     Args:
         path: of the MCAP file.
-        sensors: of the modules to be recorded; others are left out.
-        name: of the recording; that of the file where it is not given.
+        sensors: of the modules to record; samples of other modules are ignored.
+        name: of the recording; by default that of the file.
         metadata: as in `Recording`.
-        force: replace what is at `path`.
+        force: replace an existing file.
 
     Attributes:
         path: of the file.
 
     Raises:
-        OutputError: the file exists already or cannot be written.
-        RecordingError: the metadata are no plain JSON values.
+        OutputError: the file exists already, or cannot be written.
+        RecordingError: the metadata are not plain JSON values.
 
     Example:
         >>> from tempfile import TemporaryDirectory
@@ -100,7 +108,7 @@ class Recorder:
         >>> with TemporaryDirectory() as folder:
         ...     with Recorder(f"{folder}/a.mcap", {"thumb": sensor("anyskin")}) as recorder:
         ...         recorder.put(Arrival(0.0, {"thumb": np.zeros((5, 3))}, received=0.0))
-        ...         recorder.mark("grasped")
+        ...         recorder.add_marker("grasped")
         ...     load_recording(f"{folder}/a.mcap").markers
         ((0.0, 'grasped'),)
     """
@@ -116,11 +124,11 @@ class Recorder:
     ) -> None:
         self.path = Path(path)
         self._writer = RecordingWriter(path, sensors, name=name, metadata=metadata, force=force)
-        self._file = _identity(self.path)
-        self._intake = RecordingBuffer(sensors)
-        self._queue: deque[Arrival | _Marker] = deque()
-        self._newest = math.nan
-        self._n_overflown = self._n_told = self._n_markers = 0
+        self._file_id = _file_id(self.path)
+        self._buffer = RecordingBuffer(sensors)
+        self._queue: deque[Arrival | _QueuedMarker] = deque()
+        self._newest_time = math.nan
+        self._n_dropped = self._n_dropped_reported = self._n_markers = 0
         self._n_bytes = self._writer.n_bytes
         self._rate = 0.0
         self._counts = deque([(time.monotonic(), 0)])
@@ -132,63 +140,63 @@ class Recorder:
 
     @property
     def failed(self) -> bool:
-        """Whether the disk has refused, so that nothing is written any more."""
+        """Whether writing has failed; nothing is written any more."""
         return self._failure is not None
 
     @property
     def status(self) -> RecorderStatus:
-        """How far it is."""
-        intake = self._intake
-        began = math.isfinite(intake.first)
+        """The progress."""
+        buffer = self._buffer
+        has_samples = math.isfinite(buffer.first_time)
         return RecorderStatus(
-            seconds=intake.newest - intake.first if began else 0.0,
-            n_samples=intake.n_samples,
-            modules={name: track.n_samples for name, track in intake.tracks.items()},
+            seconds=buffer.newest_time - buffer.first_time if has_samples else 0.0,
+            n_samples=buffer.n_samples,
+            modules={name: module.n_samples for name, module in buffer.modules.items()},
             rate=self._rate,
-            n_gaps=max((track.n_gaps for track in intake.tracks.values()), default=0),
-            n_lost=intake.n_lost,
-            n_refused=intake.n_refused,
-            n_dropped=self._n_overflown + intake.n_unfit,
+            n_gaps=max((module.n_gaps for module in buffer.modules.values()), default=0),
+            n_lost=buffer.n_lost,
+            n_refused=buffer.n_refused,
+            n_dropped=self._n_dropped + buffer.n_rejected,
             n_bytes=self._n_bytes,
             n_markers=self._n_markers,
-            faults=dict(intake.faults),
-            faulty=intake.faulty(time.monotonic()),
+            faults=dict(buffer.faults),
+            recent_faults=buffer.recent_faults(time.monotonic()),
             failure=str(self._failure or ""),
         )
 
-    def put(self, arrival: Arrival, *, patient: bool = False) -> None:
-        """Records an arrival; returns at once.
+    def put(self, arrival: Arrival, *, wait: bool = False) -> None:
+        """Record an arrival.
 
         Args:
-            arrival: as a source gives it; its arrays must not be written to any more.
-            patient: wait rather than drop where too much waits for the disk; for sources that
-                can be waited for.
+            arrival: of a source; its arrays must not change any more.
+            wait: block while the queue is full, instead of dropping the arrival. For sources
+                that do not keep real time.
         """
-        while patient and len(self._queue) >= MOST_WAITING and self._thread.is_alive():
+        while wait and len(self._queue) >= MAX_QUEUED_ARRIVALS and self._thread.is_alive():
             self._wake.set()
-            time.sleep(_BREATH)
-        if len(self._queue) >= MOST_WAITING or self._closing or self._failure:
-            self._n_overflown += bool(arrival.samples)
+            time.sleep(_YIELD_TIME)
+        if len(self._queue) >= MAX_QUEUED_ARRIVALS or self._closing or self._failure:
+            self._n_dropped += bool(arrival.samples)
             return
         if arrival.samples:
-            self._newest = arrival.time
+            self._newest_time = arrival.time
         self._queue.append(arrival)
 
-    def mark(self, text: str, time: float | None = None) -> None:
-        """Sets a marker; returns at once.
+    def add_marker(self, text: str, time: float | None = None) -> None:
+        """Add a marker.
 
         Args:
             text: what happened.
-            time: when [s]; at the newest sample where it is not given.
+            time: of the marker [s]; by default that of the newest sample.
         """
-        if len(self._queue) < MOST_WAITING + _MOST_MARKERS:
-            self._queue.append(_Marker(self._newest if time is None else time, text))
+        if len(self._queue) < MAX_QUEUED_ARRIVALS + _MAX_QUEUED_MARKERS:
+            self._queue.append(_QueuedMarker(self._newest_time if time is None else time, text))
 
     def close(self) -> None:
-        """Writes what is left and ends the file; again, it does nothing.
+        """Write the rest and close the file; a second call does nothing.
 
         Raises:
-            OutputError: the disk refused, or the file was removed; what was written stays.
+            OutputError: writing failed, or the file was removed; what was written remains.
         """
         if self._closing:
             return
@@ -216,72 +224,161 @@ class Recorder:
         self.close()
 
     def _run(self) -> None:
-        """Writes until the end; what goes wrong waits for `close` to be raised."""
+        """Write until the recorder closes; `close` raises what goes wrong."""
         try:
             while not self._closing:
-                self._wake.wait(FLUSH_SECONDS)
+                self._wake.wait(FLUSH_INTERVAL)
                 self._wake.clear()
-                self._drain()
-            self._drain()
+                self._write_queue()
+            self._write_queue()
         except Exception as failure:
             self._failure = failure
             self._queue.clear()
 
-    def _drain(self) -> None:
-        """Writes what waits now; what comes meanwhile is for the next time."""
+    def _write_queue(self) -> None:
+        """Write what is in the queue now, but not what is put into it meanwhile."""
         left = len(self._queue)
         while left:
-            n = min(left, _PIECE)
-            self._write([self._queue.popleft() for _ in range(n)])
+            n = min(left, _CHUNK_SIZE)
+            self._write_chunk([self._queue.popleft() for _ in range(n)])
             left -= n
-        self._tell_dropped()
+        self._report_dropped()
         self._write_markers()
         self._writer.flush()
         self._check_file()
-        self._count()
+        self._measure_rate()
 
-    def _write(self, piece: list[Arrival | _Marker]) -> None:
-        for one in piece:
-            if isinstance(one, _Marker):
-                self._intake.mark(*one)
+    def _write_chunk(self, chunk: list[Arrival | _QueuedMarker]) -> None:
+        for one in chunk:
+            if isinstance(one, _QueuedMarker):
+                self._buffer.add_marker(*one)
             else:
-                self._intake.take(one)
-        for module, track in self._intake.tracks.items():
-            times, readings = track.drain()
+                self._buffer.add(one)
+        for name, module in self._buffer.modules.items():
+            times, readings = module.pop_samples()
             if len(times):
-                self._writer.append(module, times, readings)
-                time.sleep(_BREATH)
+                self._writer.append(name, times, readings)
+                time.sleep(_YIELD_TIME)
         self._write_markers()
 
     def _write_markers(self) -> None:
-        for when, text in self._intake.drain_markers():
+        for when, text in self._buffer.pop_markers():
             self._writer.mark(when, text, at_once=False)
             self._n_markers += 1
 
-    def _tell_dropped(self) -> None:
-        """A marker where samples are missing because the disk was too slow."""
-        n = self._n_overflown - self._n_told
+    def _report_dropped(self) -> None:
+        """Add a marker where samples were dropped because the disk was too slow."""
+        n = self._n_dropped - self._n_dropped_reported
         if n:
-            self._n_told += n
-            self._intake.mark(self._newest, f"note: {n} samples dropped: the disk is too slow")
+            self._n_dropped_reported += n
+            text = f"note: {n} samples dropped: the disk is too slow"
+            self._buffer.add_marker(self._newest_time, text)
 
     def _check_file(self) -> None:
-        if _identity(self.path) != self._file:
+        if _file_id(self.path) != self._file_id:
             raise OutputError(f"cannot write {self.path}: it was removed while it was recorded")
 
-    def _count(self) -> None:
-        """The rate, as seen from the host."""
+    def _measure_rate(self) -> None:
         self._n_bytes = self._writer.n_bytes
         counts = self._counts
-        counts.append((time.monotonic(), self._intake.n_samples))
-        while len(counts) > 2 and counts[-1][0] - counts[1][0] >= _RATE_OVER:
+        counts.append((time.monotonic(), self._buffer.n_samples))
+        while len(counts) > 2 and counts[-1][0] - counts[1][0] >= _RATE_PERIOD:
             counts.popleft()
         (begin, before), (end, after) = counts[0], counts[-1]
         self._rate = (after - before) / (end - begin) if end > begin else 0.0
 
 
-def _identity(path: Path) -> tuple[int, int] | None:
-    """Which file is at `path`; None where none is."""
+class SessionRecorder:
+    """Start and stop recordings of a session, one at a time, from any thread.
+
+    Args:
+        session: to record.
+        folder: for the files; None if nothing may be recorded.
+
+    Attributes:
+        current: the recorder that is running; None if there is none.
+    """
+
+    def __init__(self, session: "Session", folder: Path | None) -> None:
+        self._session = session
+        self._folder = folder
+        self._lock = Lock()
+        self.current: Recorder | None = None
+
+    @property
+    def enabled(self) -> bool:
+        """Whether there is a folder for recordings."""
+        return self._folder is not None
+
+    def start(self, name: str = "") -> Path:
+        """Start a recording, and return the path of its file.
+
+        Args:
+            name: of the file, without a suffix; by default the date and time.
+
+        Raises:
+            OutputError: a recording is running already, the file exists, `name` is not a
+                valid file name, or the file cannot be written.
+        """
+        with self._lock:
+            recorder = self._new_recorder(name or time.strftime("%Y%m%d-%H%M%S"))
+            self.current = recorder
+            self._session.add_listener(self._put)
+            return recorder.path
+
+    def add_marker(self, text: str) -> None:
+        """Add a marker to the recording.
+
+        Raises:
+            OutputError: no recording is running.
+        """
+        self._running("start a recording, then set a marker").add_marker(text)
+
+    def stop(self) -> Recorder:
+        """Stop the recording, and return its recorder.
+
+        Raises:
+            OutputError: no recording is running, writing failed, or no samples arrived (then
+                the file is removed).
+        """
+        with self._lock:
+            recorder = self._running("there is nothing to stop")
+            self.current = None
+            self._session.remove_listener(self._put)
+            recorder.close()
+            if not recorder.status.n_samples:
+                recorder.path.unlink(missing_ok=True)
+                raise OutputError(f"no samples arrived: {recorder.path} is removed")
+            return recorder
+
+    def _running(self, hint: str) -> Recorder:
+        if self.current is None:
+            raise OutputError(f"no recording is running: {hint}")
+        return self.current
+
+    def _put(self, update: "StreamUpdate") -> None:
+        recorder = self.current
+        if recorder is not None and update.arrival is not None:
+            recorder.put(update.arrival)
+
+    def _new_recorder(self, name: str) -> Recorder:
+        if self._folder is None:
+            raise OutputError("no folder for recordings: start with --record-to FOLDER")
+        if self.current is not None:
+            raise OutputError(f"{self.current.path} is being recorded already")
+        if not _FILE_NAME.fullmatch(name):
+            raise OutputError(f"a name of letters, digits, _, - and . expected, {name!r} given")
+        try:
+            self._folder.mkdir(parents=True, exist_ok=True)
+        except OSError as cause:
+            raise OutputError(f"cannot write to {self._folder}: {cause.strerror}") from cause
+        source = self._session.source
+        path = self._folder / f"{name}.mcap"
+        return Recorder(path, source.sensors, metadata=dict(source.metadata))
+
+
+def _file_id(path: Path) -> tuple[int, int] | None:
+    """Return device and inode of the file at `path`; None if there is none."""
     try:
         found = path.stat()
     except OSError:

@@ -1,4 +1,4 @@
-"""What arrives, sorted for a recording: samples by module, words as markers, and counts."""
+"""Buffer of the samples, markers and packet statistics of a recording, before they are written."""
 
 import math
 from collections import Counter
@@ -15,197 +15,221 @@ from holdfast.sensors import Sensor
 from holdfast.sensors.types import Array
 from holdfast.sources import Arrival
 
-AGAIN = 1.0
-"""The same words become a marker again after so long [s]."""
-NOW = 1.0
-"""A fault that was told of so recently is there now [s]."""
-MOST_WORDS = 100
-"""So many different words become markers within `AGAIN`; of a device that babbles, no more."""
-MOST_MARKERS = 2048
-"""So many markers wait at most, for the first sample or to be written."""
-MOST_TEXT = 200
-"""Longer markers are cut."""
+NOTICE_REPEAT_INTERVAL = 1.0
+"""Minimum time between two markers of the same notice [s]."""
+RECENT_FAULT_AGE = 1.0
+"""Maximum age of a fault that counts as recent [s]."""
+MAX_NOTICES = 100
+"""Maximum number of different notices that become markers within `NOTICE_REPEAT_INTERVAL`."""
+MAX_PENDING_MARKERS = 2048
+"""Maximum number of markers that wait for the first sample, or to be written."""
+MAX_MARKER_LENGTH = 200
+"""Maximum length of a marker [characters]; longer ones are cut."""
 
-_MARKER = "marker: "
-"""How a recording that is played tells of its own markers."""
+_MARKER_PREFIX = "marker: "
+"""Prefix of the notices by which a replayed recording reports its own markers."""
 _N_STEPS = 32
-_N_STEPS_LEAST = 4
+"""Number of newest time steps from which the period is estimated."""
+_MIN_STEPS = 4
+"""Minimum number of steps for that; with fewer, the period is the sensor's."""
 
 
-class Track:
-    """What came of one module, and what of it is not written yet.
+class ModuleBuffer:
+    """Buffer of the samples of one module that are not written yet.
 
     Args:
         sensor: of the module.
 
     Attributes:
-        n_samples: that were taken.
-        n_gaps: steps in time longer than three periods, the period being the median of the
-            newest steps.
+        n_samples: samples that were appended.
+        n_gaps: time steps longer than three periods; the period is the median of the newest
+            steps.
     """
 
     def __init__(self, sensor: Sensor) -> None:
         self.n_samples = self.n_gaps = 0
         self._sensor = sensor
-        self._number: np.dtype[Any] | None = None
-        self._last = -math.inf
-        self._drained = math.nan
+        self._dtype: np.dtype[Any] | None = None
+        self._last_time = -math.inf
+        self._last_popped_time = math.nan
         self._steps: Array = np.empty(0)
         self._times: list[float] = []
         self._readings: list[npt.NDArray[Any]] = []
 
-    def take(self, time: float, readings: npt.NDArray[Any]) -> bool:
-        """Takes a sample, unless no file could hold it; whether it did."""
-        if not self._last < time < math.inf or readings.shape != (self._sensor.n_taxels, 3):
+    def append(self, time: float, readings: npt.NDArray[Any]) -> bool:
+        """Append a sample. Return False if its shape, dtype or time cannot be stored."""
+        if not self._last_time < time < math.inf or readings.shape != (self._sensor.n_taxels, 3):
             return False
-        if self._number is None and readings.dtype.name in NUMBERS:
-            self._number = readings.dtype
-        kept = readings if readings.dtype == self._number else _as(readings, self._number)
+        if self._dtype is None and readings.dtype.name in NUMBERS:
+            self._dtype = readings.dtype
+        kept = readings if readings.dtype == self._dtype else _cast(readings, self._dtype)
         if kept is None:
             return False
         self._times.append(time)
         self._readings.append(kept)
-        self._last = time
+        self._last_time = time
         self.n_samples += 1
         return True
 
-    def drain(self) -> tuple[Array, npt.NDArray[Any]]:
-        """Times (n,) and readings (n, n_taxels, 3) that were taken since the last time."""
+    def pop_samples(self) -> tuple[Array, npt.NDArray[Any]]:
+        """Remove and return times (n,) [s] and readings (n, n_taxels, 3)."""
         times, readings = np.array(self._times), np.array(self._readings)
         self._times.clear()
         self._readings.clear()
         if len(times):
-            self._count_gaps(np.diff(times, prepend=self._drained))
-            self._drained = self._last
+            self._count_gaps(np.diff(times, prepend=self._last_popped_time))
+            self._last_popped_time = self._last_time
         return times, readings
 
     def _count_gaps(self, steps: Array) -> None:
-        steps = steps[~np.isnan(steps)]  # nothing comes before the first sample
+        steps = steps[~np.isnan(steps)]  # there is no step before the first sample
         self._steps = np.concatenate([self._steps, steps])[-_N_STEPS:]
-        known = len(self._steps) >= _N_STEPS_LEAST
+        known = len(self._steps) >= _MIN_STEPS
         period = float(np.median(self._steps)) if known else 1 / self._sensor.rate
         self.n_gaps += int((steps > GAP_PERIODS * period).sum())
 
 
 class RecordingBuffer:
-    """Sorts arrivals into tracks and markers; has no clock and is for one thread.
+    """Buffer incoming samples, markers and packet statistics of a recording, by module.
+
+    It has no clock, and serves one thread.
 
     Args:
-        sensors: of the modules that are recorded; what comes of others is left out.
+        sensors: of the modules to record; samples of other modules are ignored.
 
     Attributes:
-        tracks: by module.
-        first: time of the first sample [s]; NaN before.
-        newest: time of the newest sample [s]; NaN before.
-        n_samples: instants that have a sample.
+        modules: buffer of each module.
+        first_time: time of the first sample [s]; NaN before.
+        newest_time: time of the newest sample [s]; NaN before.
+        n_samples: instants with at least one sample.
         n_lost: packets that are missing by the device's own count.
-        n_refused: packets that made no sense.
-        n_unfit: samples of which some or all could not be kept: of another shape, number type,
-            or not later than the last.
-        faults: how many arrivals told of each.
+        n_refused: packets that could not be decoded.
+        n_rejected: instants with samples that could not be stored: wrong shape or number type,
+            or a time that is not later than the last.
+        faults: number of arrivals that reported each fault.
     """
 
     def __init__(self, sensors: Mapping[str, Sensor]) -> None:
-        self.tracks = {module: Track(sensor) for module, sensor in sensors.items()}
-        self.first = self.newest = math.nan
-        self.n_samples = self.n_lost = self.n_refused = self.n_unfit = 0
+        self.modules = {module: ModuleBuffer(sensor) for module, sensor in sensors.items()}
+        self.first_time = self.newest_time = math.nan
+        self.n_samples = self.n_lost = self.n_refused = self.n_rejected = 0
         self.faults: Counter[Fault] = Counter()
-        self._there: dict[str, tuple[Fault, ...]] = {}
-        self._told: dict[tuple[str, Fault], float] = {}
-        self._said: dict[str, float] = {}
+        self._active_faults: dict[str, tuple[Fault, ...]] = {}
+        self._fault_times: dict[tuple[str, Fault], float] = {}
+        self._notice_times: dict[str, float] = {}
         self._markers: list[tuple[float, str]] = []
 
-    def take(self, arrival: Arrival) -> None:
-        """Takes the samples and the words of an arrival."""
+    def add(self, arrival: Arrival) -> None:
+        """Add the samples, faults and notices of an arrival."""
         self.n_lost += arrival.n_lost
         self.n_refused += arrival.n_refused
         if arrival.samples:
-            self._take_samples(arrival)
-        if arrival.faults or self._there:
-            self._take_faults(arrival)
+            self._add_samples(arrival)
+        if arrival.faults or self._active_faults:
+            self._add_faults(arrival)
         for notice in arrival.notices:
-            if notice.startswith(_MARKER):
-                self.mark(math.nan, notice.removeprefix(_MARKER))
+            if notice.startswith(_MARKER_PREFIX):
+                self.add_marker(math.nan, notice.removeprefix(_MARKER_PREFIX))
             else:
-                self.say(f"note: {notice}", arrival.received)
+                self.add_notice(f"note: {notice}", arrival.received)
 
-    def mark(self, time: float, text: str) -> None:
-        """Takes a marker; where the time is not finite, at the newest sample."""
-        if len(self._markers) < MOST_MARKERS:
-            self._markers.append((time if math.isfinite(time) else self.newest, plain(text)))
+    def add_marker(self, time: float, text: str) -> None:
+        """Add a marker; if the time is not finite, at the newest sample."""
+        if len(self._markers) < MAX_PENDING_MARKERS:
+            when = time if math.isfinite(time) else self.newest_time
+            self._markers.append((when, marker_text(text)))
 
-    def drain_markers(self) -> list[tuple[float, str]]:
-        """Times and texts of the markers since the last time; none before the first sample."""
-        if math.isnan(self.first):
+    def pop_markers(self) -> list[tuple[float, str]]:
+        """Remove and return the markers (time [s], text); none before the first sample."""
+        if math.isnan(self.first_time):
             return []
-        markers = [(self.first if math.isnan(time) else time, text) for time, text in self._markers]
+        first = self.first_time
+        markers = [(first if math.isnan(time) else time, text) for time, text in self._markers]
         self._markers.clear()
         return markers
 
-    def say(self, text: str, received: float) -> None:
-        """Makes words a marker, unless the same were said within the last second."""
-        if received - self._said.get(text, -math.inf) < AGAIN:
-            return
-        self._said = {one: when for one, when in self._said.items() if received - when < AGAIN}
-        if len(self._said) < MOST_WORDS:
-            self._said[text] = received
-            self.mark(math.nan, text)
+    def add_notice(self, text: str, received: float) -> None:
+        """Add a notice as a marker, unless the same notice became one within the last second.
 
-    def faulty(self, now: float) -> dict[str, tuple[Fault, ...]]:
-        """The faults that each module had within the last second."""
+        Args:
+            text: of the marker.
+            received: when the notice arrived, by `time.monotonic` [s].
+        """
+        if received - self._notice_times.get(text, -math.inf) < NOTICE_REPEAT_INTERVAL:
+            return
+        self._notice_times = {
+            one: when
+            for one, when in self._notice_times.items()
+            if received - when < NOTICE_REPEAT_INTERVAL
+        }
+        if len(self._notice_times) < MAX_NOTICES:
+            self._notice_times[text] = received
+            self.add_marker(math.nan, text)
+
+    def recent_faults(self, now: float) -> dict[str, tuple[Fault, ...]]:
+        """Return the faults of each module within the last second.
+
+        Args:
+            now: by `time.monotonic` [s].
+        """
         recent: dict[str, tuple[Fault, ...]] = {}
-        for (module, fault), when in self._told.copy().items():
-            if now - when < NOW:
+        for (module, fault), when in self._fault_times.copy().items():
+            if now - when < RECENT_FAULT_AGE:
                 recent[module] = (*recent.get(module, ()), fault)
         return recent
 
-    def _take_samples(self, arrival: Arrival) -> None:
-        unfit, n_taken = [], 0
+    def _add_samples(self, arrival: Arrival) -> None:
+        rejected, n_appended = [], 0
         for module, readings in arrival.samples.items():
-            if track := self.tracks.get(module):
-                taken = track.take(arrival.time, readings)
-                n_taken += taken
-                unfit += [module] * (not taken)
-        if n_taken:
+            if buffer := self.modules.get(module):
+                appended = buffer.append(arrival.time, readings)
+                n_appended += appended
+                rejected += [module] * (not appended)
+        if n_appended:
             self.n_samples += 1
-            self.newest = arrival.time
-            if math.isnan(self.first):
-                self.first = arrival.time
-        if unfit:
-            self.n_unfit += 1
-            self.say(f"note: a sample of {', '.join(unfit)} is unfit: dropped", arrival.received)
+            self.newest_time = arrival.time
+            if math.isnan(self.first_time):
+                self.first_time = arrival.time
+        if rejected:
+            self.n_rejected += 1
+            text = f"note: a sample of {', '.join(rejected)} cannot be stored: dropped"
+            self.add_notice(text, arrival.received)
 
-    def _take_faults(self, arrival: Arrival) -> None:
-        """Counts faults, and says which begin; they last as `Arrival` tells."""
+    def _add_faults(self, arrival: Arrival) -> None:
+        """Count the faults, and add a marker for each that begins.
+
+        A fault lasts until the next arrival with samples of the module, or with another list
+        of its faults.
+        """
         begun: dict[Fault, list[str]] = {}
-        for module in self.tracks:
+        for module in self.modules:
             faults = arrival.faults.get(module, ())
             for fault in faults:
-                self._told[module, fault] = arrival.received
-                if fault not in self._there.get(module, ()):
+                self._fault_times[module, fault] = arrival.received
+                if fault not in self._active_faults.get(module, ()):
                     begun.setdefault(fault, []).append(module)
             if faults:
-                self._there[module] = faults
+                self._active_faults[module] = faults
             elif module in arrival.samples or module in arrival.faults:
-                self._there.pop(module, None)
+                self._active_faults.pop(module, None)
         self.faults.update({fault for faults in arrival.faults.values() for fault in faults})
         for fault, modules in begun.items():
-            for module in modules if len(modules) < len(self.tracks) else ["all"]:
-                self.say(f"fault {module} {fault}", arrival.received)
+            for module in modules if len(modules) < len(self.modules) else ["all"]:
+                self.add_notice(f"fault {module} {fault}", arrival.received)
 
 
-def plain(text: str) -> str:
-    """A marker's text: one line of what can be printed, of bounded length."""
-    words = " ".join(text.split())[:MOST_TEXT]
-    return "".join(sign if sign.isprintable() else "?" for sign in words)
+def marker_text(text: str) -> str:
+    """Return a text as one line of printable characters, at most `MAX_MARKER_LENGTH` long."""
+    line = " ".join(text.split())[:MAX_MARKER_LENGTH]
+    return "".join(character if character.isprintable() else "?" for character in line)
 
 
-def _as(readings: npt.NDArray[Any], number: np.dtype[Any] | None) -> npt.NDArray[Any] | None:
-    """The readings in that number type, where it holds every one of them; else None."""
-    if number is None or readings.dtype.kind not in "biuf":
+def _cast(readings: npt.NDArray[Any], dtype: np.dtype[Any] | None) -> npt.NDArray[Any] | None:
+    """Return the readings in a dtype that holds all of them exactly; else None."""
+    if dtype is None or readings.dtype.kind not in "biuf":
         return None
     with np.errstate(invalid="ignore", over="ignore"):
-        cast = readings.astype(number)
+        cast = readings.astype(dtype)
         back = cast.astype(readings.dtype)  # comparing int64 with float64 rounds
-    same = all(np.array_equal(one, readings, equal_nan=number.kind == "f") for one in (cast, back))
+    same = all(np.array_equal(one, readings, equal_nan=dtype.kind == "f") for one in (cast, back))
     return cast if same else None

@@ -1,4 +1,4 @@
-"""What a session says, gathered for the documents of the web service."""
+"""Collect the updates of a session, and publish them as documents of the web service."""
 
 import time
 from collections import deque
@@ -8,82 +8,82 @@ import numpy as np
 from holdfast.contact import ContactEstimate, ContactState, HandEstimate
 from holdfast.live.recorder import Recorder
 from holdfast.live.session import Session
-from holdfast.live.stream_detector import StreamUpdate
+from holdfast.live.stream_detector import StreamEstimate, StreamUpdate
 from holdfast.live.web import schema
 from holdfast.model import Model
 from holdfast.sensors import Sensor
 
-MOST = 4096
-"""So many arrivals are kept for a reader that does not come; then the oldest go."""
-RATE_OVER = 1.0
-"""The rate is that of the packets in so long [s]."""
+MAX_BUFFERED_UPDATES = 4096
+"""Maximum number of updates between two documents; older ones are dropped."""
+RATE_PERIOD = 1.0
+"""Period over which the packet rate is measured [s]."""
 
-UNKNOWN = (np.nan, np.nan, np.nan)
+_NO_FORCE = (np.nan, np.nan, np.nan)
 
 
 class StatusPublisher:
-    """Gathers what a session says until it is asked for it.
+    """Collect the updates of a session until the next document is made.
 
-    `put` is called in the session's thread, `live` in another; between them stands a queue that
-    forgets the oldest.
+    The session's thread calls `put`, the service's thread `live_document`. A queue of bounded
+    length connects them.
 
     Args:
-        session: that is listened to.
+        session: to publish.
     """
 
     def __init__(self, session: Session) -> None:
         self._session = session
-        self._said: deque[tuple[float, StreamUpdate]] = deque(maxlen=MOST)
-        self._notes: deque[schema.Notice] = deque(maxlen=MOST)
+        self._updates: deque[tuple[float, StreamUpdate]] = deque(maxlen=MAX_BUFFERED_UPDATES)
+        self._own_notices: deque[schema.Notice] = deque(maxlen=MAX_BUFFERED_UPDATES)
         self._newest: HandEstimate | None = None
         self._taxels: dict[str, list[schema.Vector]] = {}
         self._counts: deque[tuple[float, int]] = deque([(time.monotonic(), 0)])
 
-    def put(self, said: StreamUpdate) -> None:
-        """Takes what the session says."""
-        self._said.append((time.time(), said))
+    def put(self, update: StreamUpdate) -> None:
+        """Append an update; a listener of the session."""
+        self._updates.append((time.time(), update))
 
-    def note(self, text: str) -> None:
-        """Tells readers something that no source says; for the thread of `live`."""
-        self._notes.append(schema.Notice(time.time(), text))
+    def add_notice(self, text: str) -> None:
+        """Add a notice of the service itself, in the service's thread."""
+        self._own_notices.append(schema.Notice(time.time(), text))
 
-    def live(self, recorder: Recorder | None) -> schema.LiveDocument:
-        """All that was said since the last call."""
-        said = [self._said.popleft() for _ in range(len(self._said))]
-        notes = [self._notes.popleft() for _ in range(len(self._notes))]
-        estimates = [(d.estimate, d.updated_fingers) for _, one in said for d in one.estimates]
+    def live_document(self, recorder: Recorder | None) -> schema.LiveDocument:
+        """Return everything since the last call as one document."""
+        updates = [self._updates.popleft() for _ in range(len(self._updates))]
+        own = [self._own_notices.popleft() for _ in range(len(self._own_notices))]
+        estimates = [one for _, update in updates for one in update.estimates]
         if estimates:
-            self._newest = estimates[-1][0]
-            self._look_at_taxels([one for _, one in said])
+            self._newest = estimates[-1].estimate
+            self._update_taxels([update for _, update in updates])
         newest = self._newest
         fingers = {} if newest is None else newest.fingers
         return schema.LiveDocument(
             time=np.nan if newest is None else newest.time,
             hand=ContactState.UNKNOWN if newest is None else newest.state,
             fingers={
-                name: finger_of(finger, self._taxels.get(name)) for name, finger in fingers.items()
+                name: finger_document(finger, self._taxels.get(name))
+                for name, finger in fingers.items()
             },
-            series=_series(estimates, list(self._session.stream.fingers)),
-            events=[schema.StateChange(*event) for _, one in said for event in one.events],
-            notices=notes + _notices(said),
+            series=_hand_series(estimates, list(self._session.stream.fingers)),
+            events=[schema.EventDocument(*event) for _, one in updates for event in one.events],
+            notices=own + _source_notices(updates),
             health=self._health(recorder),
             recording=None if recorder is None else recording_info(recorder),
             ended=self._session.ended,
         )
 
-    def _look_at_taxels(self, said: list[StreamUpdate]) -> None:
-        """The newest readings of every finger, without the tare."""
-        for one in said[-len(self._session.stream.fingers) :]:
-            if one.arrival is not None:
-                for name, readings in self._session.stream.subtract_tare(
-                    one.arrival.samples
-                ).items():
+    def _update_taxels(self, updates: list[StreamUpdate]) -> None:
+        """Keep the newest readings of every finger, minus the tare."""
+        stream = self._session.stream
+        for update in updates[-len(stream.fingers) :]:
+            if update.arrival is not None:
+                for name, readings in stream.subtract_tare(update.arrival.samples).items():
                     self._taxels[name] = readings.round(4).tolist()
 
     def _health(self, recorder: Recorder | None) -> schema.Health:
         session, latency = self._session, self._session.latency()
         return schema.Health(
-            rate=self._rate(),
+            rate=self._packet_rate(),
             n_packets=session.n_packets,
             n_lost=session.n_lost,
             n_refused=session.n_refused,
@@ -92,32 +92,24 @@ class StatusPublisher:
             latency=schema.LatencyInfo(latency.p50, latency.p99, latency.largest),
         )
 
-    def _rate(self) -> float:
-        """Packets per second, over the last second."""
+    def _packet_rate(self) -> float:
+        """Return the number of packets per second, over the last second."""
         self._counts.append((time.monotonic(), self._session.n_packets))
-        while len(self._counts) > 2 and self._counts[-1][0] - self._counts[1][0] >= RATE_OVER:
+        while len(self._counts) > 2 and self._counts[-1][0] - self._counts[1][0] >= RATE_PERIOD:
             self._counts.popleft()
         (begin, before), (end, after) = self._counts[0], self._counts[-1]
         return (after - before) / (end - begin) if end > begin else np.nan
 
 
-def _notices(said: list[tuple[float, StreamUpdate]]) -> list[schema.Notice]:
-    """What the source says to people."""
-    return [
-        schema.Notice(when, text)
-        for when, one in said
-        if one.arrival is not None
-        for text in one.arrival.notices
-    ]
-
-
-def hello(model: Model, session: Session, started: float, can_record: bool) -> schema.HelloDocument:
-    """What a reader must know first."""
+def hello_document(
+    model: Model, session: Session, started: float, can_record: bool
+) -> schema.HelloDocument:
+    """Return the first document of a connection."""
     source, stream = session.source, session.stream
     return schema.HelloDocument(
         model=model.name or "a model without a name",
         source=source.name,
-        fingers={name: _info(model, name, sensor) for name, sensor in stream.fingers.items()},
+        fingers={name: _finger_info(model, name, one) for name, one in stream.fingers.items()},
         modules={name: sensor.n_taxels for name, sensor in source.sensors.items()},
         rate=None if np.isnan(stream.rate) else stream.rate,
         started=started,
@@ -125,10 +117,10 @@ def hello(model: Model, session: Session, started: float, can_record: bool) -> s
     )
 
 
-def finger_of(
+def finger_document(
     estimate: ContactEstimate, taxels: list[schema.Vector] | None = None
 ) -> schema.FingerDocument:
-    """An estimate as the service tells it."""
+    """Return the estimate of a finger as a document."""
     return schema.FingerDocument(
         time=estimate.time,
         state=estimate.state,
@@ -143,7 +135,7 @@ def finger_of(
 
 
 def recording_info(recorder: Recorder) -> schema.RecordingInfo:
-    """How far a recorder is."""
+    """Return the progress of a recorder as a document."""
     status = recorder.status
     return schema.RecordingInfo(
         path=str(recorder.path),
@@ -154,7 +146,16 @@ def recording_info(recorder: Recorder) -> schema.RecordingInfo:
     )
 
 
-def _info(model: Model, name: str, sensor: Sensor) -> schema.FingerInfo:
+def _source_notices(updates: list[tuple[float, StreamUpdate]]) -> list[schema.Notice]:
+    return [
+        schema.Notice(when, text)
+        for when, update in updates
+        if update.arrival is not None
+        for text in update.arrival.notices
+    ]
+
+
+def _finger_info(model: Model, name: str, sensor: Sensor) -> schema.FingerInfo:
     part = model.finger(name)
     return schema.FingerInfo(
         sensor=sensor.name,
@@ -168,20 +169,16 @@ def _info(model: Model, name: str, sensor: Sensor) -> schema.FingerInfo:
     )
 
 
-def _series(
-    estimates: list[tuple[HandEstimate, tuple[str, ...]]], fingers: list[str]
-) -> schema.HandSeries:
+def _hand_series(estimates: list[StreamEstimate], fingers: list[str]) -> schema.HandSeries:
     return schema.HandSeries(
-        times=[estimate.time for estimate, _ in estimates],
+        times=[one.estimate.time for one in estimates],
         fingers={name: _finger_series(estimates, name) for name in fingers},
     )
 
 
-def _finger_series(
-    estimates: list[tuple[HandEstimate, tuple[str, ...]]], name: str
-) -> schema.FingerSeries:
-    rows = [estimate.fingers[name] if name in fresh else None for estimate, fresh in estimates]
-    forces = [UNKNOWN if row is None else row.force for row in rows]
+def _finger_series(estimates: list[StreamEstimate], name: str) -> schema.FingerSeries:
+    rows = [estimate.fingers[name] if name in updated else None for estimate, updated in estimates]
+    forces = [_NO_FORCE if row is None else row.force for row in rows]
     return schema.FingerSeries(
         force=([f[0] for f in forces], [f[1] for f in forces], [f[2] for f in forces]),
         instability=[np.nan if row is None else row.instability for row in rows],

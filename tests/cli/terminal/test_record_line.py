@@ -19,11 +19,15 @@ WELL = RecorderStatus(
     n_bytes=2_500_000,
     n_markers=2,
     faults={},
-    faulty={},
+    recent_faults={},
     failure="",
 )
 BAD = WELL._replace(
-    rate=0.0, n_gaps=1, n_lost=3, n_dropped=4, faulty={"index": (Fault.LATE, Fault.PACKET_GAP)}
+    rate=0.0,
+    n_gaps=1,
+    n_lost=3,
+    n_dropped=4,
+    recent_faults={"index": (Fault.LATE, Fault.PACKET_GAP)},
 )
 
 

@@ -225,7 +225,7 @@ def test_a_recording_without_samples_is_not_kept(tmp_path):
                 return answer.status, (await answer.json())["error"]
 
     path = tmp_path / "mine.mcap"
-    assert run(work()) == (409, f"no sample came: {path} is not kept")
+    assert run(work()) == (409, f"no samples arrived: {path} is removed")
     assert not path.exists()
 
 

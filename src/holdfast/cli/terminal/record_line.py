@@ -78,7 +78,7 @@ class RecordLine:
 
 def line(status: "RecorderStatus") -> list[tuple[str, bool]]:
     """What is told of a recording, piece by piece, and whether it is bad news."""
-    faults = [f"{name} {' '.join(here)}" for name, here in status.faulty.items()]
+    faults = [f"{name} {' '.join(here)}" for name, here in status.recent_faults.items()]
     return [
         (f"{status.seconds:.1f} s", False),
         (f"{status.rate:.1f} Hz", False) if status.rate else ("no samples", True),

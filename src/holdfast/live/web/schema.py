@@ -1,4 +1,4 @@
-"""What the web service says: the documents of `holdfast.live/1`."""
+"""Documents of the web service, schema `holdfast.live/1`."""
 
 from typing import Literal
 
@@ -7,25 +7,26 @@ from msgspec import Struct
 from holdfast.contact import ContactState, Fault, Reason
 
 SCHEMA = "holdfast.live/1"
-"""Fields may be added under this name; none changes its meaning or goes away."""
+"""Name of the schema. New fields may be added under this name; existing ones do not change."""
 
 Vector = tuple[float, float, float]
 Number = float | None
-"""A number, or null where nothing is known (NaN is written as null)."""
+"""A number, or null if it is not known (NaN is written as null)."""
 
 
 class FingerInfo(Struct, frozen=True, kw_only=True):
-    """What does not change of a finger.
+    """Constant properties of a finger.
 
     Attributes:
-        sensor: its name.
-        unit: of its readings, count or N.
-        n_taxels: how many taxels it has.
+        sensor: name of the sensor.
+        unit: of the readings, count or N.
+        n_taxels: number of taxels.
         positions: of the taxels in the fingertip frame [m].
         rotations: of each taxel, from its frame to the fingertip frame, row by row.
         normal: of the sensor in the fingertip frame.
-        contact_threshold: F_a below it is no contact [unit]; null where noise decides.
-        probability_threshold: of stability.
+        contact_threshold: F_a below which there is no contact [unit]; null if the model finds
+            it from the noise.
+        probability_threshold: probability from which a contact is stable.
     """
 
     sensor: str
@@ -39,16 +40,16 @@ class FingerInfo(Struct, frozen=True, kw_only=True):
 
 
 class HelloDocument(Struct, frozen=True, kw_only=True, tag_field="type", tag="hello"):
-    """The first document of every connection.
+    """First document of every connection.
 
     Attributes:
-        model: what judges.
-        source: what it judges.
-        fingers: that are judged.
-        modules: how many taxels each module of the source has.
+        model: name of the model.
+        source: name of the source.
+        fingers: the fingers that the model uses.
+        modules: number of taxels of each module of the source.
         rate: of the source [Hz]; null while it is not known.
-        started: when the service began [s since 1970].
-        can_record: whether recordings can be made.
+        started: when the service started [s since 1970].
+        can_record: whether the service can record.
     """
 
     model: str
@@ -62,10 +63,10 @@ class HelloDocument(Struct, frozen=True, kw_only=True, tag_field="type", tag="he
 
 
 class FingerDocument(Struct, frozen=True, kw_only=True, gc=False):
-    """The newest estimate of a finger: see `holdfast.ContactEstimate`.
+    """Newest estimate of a finger: see `holdfast.ContactEstimate`.
 
     Attributes:
-        taxels: readings without the tare, in taxel frames [unit]; null before the tare.
+        taxels: readings minus the tare, in taxel frames [unit]; null before the tare.
     """
 
     time: float
@@ -80,7 +81,7 @@ class FingerDocument(Struct, frozen=True, kw_only=True, gc=False):
 
 
 class FingerSeries(Struct, frozen=True, gc=False):
-    """What was said of a finger at each of the times; null where it had no sample.
+    """Estimates of a finger at each of the times; null where it has no sample.
 
     Attributes:
         force: F_x, F_y and F_z [unit].
@@ -96,14 +97,14 @@ class FingerSeries(Struct, frozen=True, gc=False):
 
 
 class HandSeries(Struct, frozen=True, gc=False):
-    """All samples since the document before."""
+    """All estimates since the previous document."""
 
     times: list[float]
     fingers: dict[str, FingerSeries]
 
 
-class StateChange(Struct, frozen=True, gc=False):
-    """A state that changed; the finger is "hand" for the hand as a whole."""
+class EventDocument(Struct, frozen=True, gc=False):
+    """Change of a contact state; the finger is "hand" for the hand as a whole."""
 
     finger: str
     state: ContactState
@@ -112,14 +113,14 @@ class StateChange(Struct, frozen=True, gc=False):
 
 
 class Notice(Struct, frozen=True, gc=False):
-    """What a person should know; time in seconds since 1970."""
+    """Message for the user; time in seconds since 1970."""
 
     time: float
     text: str
 
 
 class LatencyInfo(Struct, frozen=True, gc=False):
-    """From packet to decision, over the newest decisions [s]."""
+    """Time from packet to estimate, over the newest estimates [s]."""
 
     p50: Number
     p99: Number
@@ -127,16 +128,16 @@ class LatencyInfo(Struct, frozen=True, gc=False):
 
 
 class Health(Struct, frozen=True, kw_only=True, gc=False):
-    """How well the source does.
+    """Statistics of the source.
 
     Attributes:
-        rate: packets per second of late [Hz].
-        n_packets: that came with samples.
-        n_lost: that are missing by the device's count.
-        n_refused: that made no sense.
-        n_dropped: samples that the recorder could not keep up with.
-        silent: whether nothing arrives.
-        latency: from packet to decision.
+        rate: packets per second over the last second [Hz].
+        n_packets: packets with samples.
+        n_lost: packets that are missing by the device's own count.
+        n_refused: packets that could not be decoded.
+        n_dropped: samples that the recorder dropped.
+        silent: whether no samples arrive.
+        latency: from packet to estimate.
     """
 
     rate: Number
@@ -149,7 +150,7 @@ class Health(Struct, frozen=True, kw_only=True, gc=False):
 
 
 class RecordingInfo(Struct, frozen=True, kw_only=True, gc=False):
-    """The recording that is being made."""
+    """Progress of the recording."""
 
     path: str
     seconds: float
@@ -159,25 +160,25 @@ class RecordingInfo(Struct, frozen=True, kw_only=True, gc=False):
 
 
 class LiveDocument(Struct, frozen=True, kw_only=True, tag_field="type", tag="live"):
-    """How things stand, and what has happened since the document before.
+    """Current state, and everything since the previous document.
 
     Attributes:
         time: of the newest estimate, on the clock of the source [s].
-        hand: its state.
-        fingers: the newest estimate of each.
-        series: all samples since then.
-        events: changes of state since then.
-        notices: of the source since then.
-        health: of the source.
-        recording: that is being made, or null.
-        ended: whether the source is over.
+        hand: state of the hand.
+        fingers: the newest estimate of each finger.
+        series: all estimates since the previous document.
+        events: changes of state since the previous document.
+        notices: of the source and the service since the previous document.
+        health: statistics of the source.
+        recording: progress of the recording; null if none is running.
+        ended: whether the source has ended.
     """
 
     time: Number
     hand: ContactState
     fingers: dict[str, FingerDocument]
     series: HandSeries
-    events: list[StateChange]
+    events: list[EventDocument]
     notices: list[Notice]
     health: Health
     recording: RecordingInfo | None
@@ -187,7 +188,7 @@ class LiveDocument(Struct, frozen=True, kw_only=True, tag_field="type", tag="liv
 class EstimateDocument(
     Struct, frozen=True, kw_only=True, tag_field="type", tag="estimate", gc=False
 ):
-    """What was said at one instant: every one of them, as soon as it is said."""
+    """One estimate; sent as soon as it is made."""
 
     time: float
     hand: ContactState

@@ -1,4 +1,4 @@
-"""The web service: a page, a WebSocket and REST, beside a session that it never holds up."""
+"""Web service of a session: a page, WebSockets and REST. It never delays the session."""
 
 import asyncio
 import time
@@ -12,24 +12,30 @@ import msgspec
 from aiohttp import WSMsgType, web
 
 from holdfast.errors import HoldfastError
-from holdfast.live.recordings import SessionRecorder
+from holdfast.live.recorder import SessionRecorder
 from holdfast.live.session import Session
-from holdfast.live.status import StatusPublisher, finger_of, hello, recording_info
+from holdfast.live.status import (
+    StatusPublisher,
+    finger_document,
+    hello_document,
+    recording_info,
+)
 from holdfast.live.stream_detector import StreamUpdate
 from holdfast.live.web import schema
 from holdfast.model import Model
 from holdfast.web.guard import Guard
 
-DOCUMENTS_PER_SECOND = 20.0
-"""How often readers are told how things stand [Hz]."""
-WAITING = {"live": 32, "estimates": 1024}
-"""So many documents wait for a slow reader, a second or more; then it misses the oldest."""
-HEARTBEAT = 10.0
-"""A reader that does not answer within half of it is let go [s]."""
+LIVE_DOCUMENT_RATE = 20.0
+"""Number of live documents per second [Hz]."""
+MAX_QUEUED_DOCUMENTS = {"live": 32, "estimates": 1024}
+"""Maximum number of documents that wait for a slow client: more than a second. The oldest is
+dropped first."""
+HEARTBEAT_INTERVAL = 10.0
+"""Time between two pings; a client that does not answer within half of it is disconnected [s]."""
 
-PAGE = Path(str(resources.files("holdfast.live.web") / "page"))
-"""The page's files."""
-SHARED = Path(str(resources.files("holdfast.web") / "static"))
+PAGE_FOLDER = Path(str(resources.files("holdfast.live.web") / "page"))
+"""Files of the page."""
+SHARED_FOLDER = Path(str(resources.files("holdfast.web") / "static"))
 """Files that all pages share."""
 
 T = TypeVar("T")
@@ -37,21 +43,26 @@ T = TypeVar("T")
 _encode = msgspec.json.Encoder().encode
 
 
-class Reader:
-    """One WebSocket: documents wait in a short queue, so that a slow one holds nobody up."""
+class WebSocketClient:
+    """One WebSocket with a queue of documents, so that a slow client delays no other.
 
-    def __init__(self, socket: web.WebSocketResponse, waiting: int) -> None:
+    Args:
+        socket: that is connected.
+        max_queued: maximum number of documents in the queue.
+    """
+
+    def __init__(self, socket: web.WebSocketResponse, max_queued: int) -> None:
         self._socket = socket
-        self._waiting: asyncio.Queue[str] = asyncio.Queue(waiting)
+        self._queue: asyncio.Queue[str] = asyncio.Queue(max_queued)
 
     def put(self, text: str) -> None:
-        """Takes a document; the oldest goes where there are too many."""
-        if self._waiting.full():
-            self._waiting.get_nowait()
-        self._waiting.put_nowait(text)
+        """Append a document to the queue; drop the oldest if the queue is full."""
+        if self._queue.full():
+            self._queue.get_nowait()
+        self._queue.put_nowait(text)
 
     async def run(self) -> None:
-        """Sends until the reader leaves."""
+        """Send documents until the client disconnects."""
         sending = asyncio.ensure_future(self._send())
         try:
             async for message in self._socket:
@@ -64,17 +75,20 @@ class Reader:
 
     async def _send(self) -> None:
         while True:
-            await self._socket.send_str(await self._waiting.get())
+            await self._socket.send_str(await self._queue.get())
 
 
 class LiveService:
-    """The page and the programs that look at a session.
+    """Serve the page and the interfaces of a session.
 
     Args:
-        session: that is looked at; the service neither starts nor stops it.
+        session: to publish; the service neither starts nor stops it.
         model: of the session.
-        guard: who may come in.
-        folder: where recordings go; None where none can be made.
+        guard: check of every request.
+        folder: for recordings; None if the service may not record.
+
+    Attributes:
+        app: the web application.
     """
 
     def __init__(
@@ -82,137 +96,142 @@ class LiveService:
     ) -> None:
         self._session = session
         self._model = model
-        self._recordings = SessionRecorder(session, folder)
-        self._feed = StatusPublisher(session)
+        self._recorder = SessionRecorder(session, folder)
+        self._status = StatusPublisher(session)
         self._started = time.time()
-        self._readers: dict[str, set[Reader]] = {"live": set(), "estimates": set()}
-        self._state = b"{}"
+        self._clients: dict[str, set[WebSocketClient]] = {"live": set(), "estimates": set()}
+        self._newest_document = b"{}"
         self.app = web.Application(middlewares=[guard.middleware])
         self.app.add_routes(self._routes())
-        self.app.cleanup_ctx.append(self._running)
+        self.app.cleanup_ctx.append(self._publish)
 
     def _routes(self) -> list[web.AbstractRouteDef]:
         return [
-            web.get("/", _page),
-            web.static("/page", PAGE),
-            web.static("/web", SHARED),
-            web.get("/api/v1/live", self._read_live),
-            web.get("/api/v1/estimates", self._read_estimates),
-            web.get("/api/v1/info", self._info),
-            web.get("/api/v1/state", self._tell),
-            web.get("/api/v1/schema", _schema),
-            web.post("/api/v1/tare", self._tare),
-            web.post("/api/v1/recording", self._record),
-            web.delete("/api/v1/recording", self._stop_recording),
-            web.post("/api/v1/markers", self._mark),
+            web.get("/", _get_page),
+            web.static("/page", PAGE_FOLDER),
+            web.static("/web", SHARED_FOLDER),
+            web.get("/api/v1/live", self._serve_live),
+            web.get("/api/v1/estimates", self._serve_estimates),
+            web.get("/api/v1/info", self._get_info),
+            web.get("/api/v1/state", self._get_state),
+            web.get("/api/v1/schema", _get_schema),
+            web.post("/api/v1/tare", self._post_tare),
+            web.post("/api/v1/recording", self._post_recording),
+            web.delete("/api/v1/recording", self._delete_recording),
+            web.post("/api/v1/markers", self._post_marker),
         ]
 
-    async def _running(self, _: web.Application) -> AsyncIterator[None]:
+    async def _publish(self, _: web.Application) -> AsyncIterator[None]:
+        """Publish the session while the application runs."""
         loop = asyncio.get_running_loop()
 
-        def put(said: StreamUpdate) -> None:
-            self._feed.put(said)
-            if self._readers["estimates"]:
-                with suppress(RuntimeError):  # the service has ended; the session has not
-                    loop.call_soon_threadsafe(self._tell_estimates, said)
+        def put(update: StreamUpdate) -> None:
+            self._status.put(update)
+            if self._clients["estimates"]:
+                with suppress(RuntimeError):  # the service has ended before the session
+                    loop.call_soon_threadsafe(self._send_estimates, update)
 
         self._session.add_listener(put)
-        telling = asyncio.ensure_future(self._tell_live())
+        sending = asyncio.ensure_future(self._send_live())
         yield
-        telling.cancel()
+        sending.cancel()
         with suppress(asyncio.CancelledError):
-            await telling
+            await sending
         self._session.remove_listener(put)
-        if self._recordings.current is not None:
-            with suppress(HoldfastError):  # its readers have gone; the file tells what it has
-                await asyncio.to_thread(self._recordings.end)
+        if self._recorder.current is not None:
+            with suppress(HoldfastError):  # no client is left; the file contains what was written
+                await asyncio.to_thread(self._recorder.stop)
 
-    async def _tell_live(self) -> None:
-        """Every reader gets the same text, encoded once."""
+    async def _send_live(self) -> None:
+        """Send the live documents; each is encoded once for all clients."""
         while True:
-            await asyncio.sleep(1 / DOCUMENTS_PER_SECOND)
-            await self._end_failed_recording()
-            self._state = _encode(self._feed.live(self._recordings.current))
-            for reader in self._readers["live"]:
-                reader.put(self._state.decode())
+            await asyncio.sleep(1 / LIVE_DOCUMENT_RATE)
+            await self._stop_failed_recording()
+            document = self._status.live_document(self._recorder.current)
+            self._newest_document = _encode(document)
+            for client in self._clients["live"]:
+                client.put(self._newest_document.decode())
 
-    async def _end_failed_recording(self) -> None:
-        """Ends a recording that the disk refuses, and tells of it."""
-        recorder = self._recordings.current
+    async def _stop_failed_recording(self) -> None:
+        recorder = self._recorder.current
         if recorder is not None and recorder.failed:
             try:
-                await asyncio.to_thread(self._recordings.end)
+                await asyncio.to_thread(self._recorder.stop)
             except HoldfastError as failure:
-                self._feed.note(f"the recording has ended: {failure}")
+                self._status.add_notice(f"the recording has ended: {failure}")
 
-    def _tell_estimates(self, said: StreamUpdate) -> None:
-        for estimate, fresh in said.estimates:
-            fingers = {name: finger_of(estimate.fingers[name]) for name in fresh}
-            told = schema.EstimateDocument(time=estimate.time, hand=estimate.state, fingers=fingers)
-            text = _encode(told).decode()
-            for reader in self._readers["estimates"]:
-                reader.put(text)
+    def _send_estimates(self, update: StreamUpdate) -> None:
+        for estimate, updated in update.estimates:
+            fingers = {name: finger_document(estimate.fingers[name]) for name in updated}
+            document = schema.EstimateDocument(
+                time=estimate.time, hand=estimate.state, fingers=fingers
+            )
+            text = _encode(document).decode()
+            for client in self._clients["estimates"]:
+                client.put(text)
 
-    async def _read_live(self, request: web.Request) -> web.WebSocketResponse:
-        return await self._read(request, "live")
+    async def _serve_live(self, request: web.Request) -> web.WebSocketResponse:
+        return await self._serve_socket(request, "live")
 
-    async def _read_estimates(self, request: web.Request) -> web.WebSocketResponse:
-        return await self._read(request, "estimates")
+    async def _serve_estimates(self, request: web.Request) -> web.WebSocketResponse:
+        return await self._serve_socket(request, "estimates")
 
-    async def _read(self, request: web.Request, what: str) -> web.WebSocketResponse:
-        socket = web.WebSocketResponse(heartbeat=HEARTBEAT, compress=False, max_msg_size=1024)
+    async def _serve_socket(self, request: web.Request, kind: str) -> web.WebSocketResponse:
+        socket = web.WebSocketResponse(
+            heartbeat=HEARTBEAT_INTERVAL, compress=False, max_msg_size=1024
+        )
         await socket.prepare(request)
-        reader = Reader(socket, WAITING[what])
-        reader.put(_encode(self._hello()).decode())
-        readers = self._readers[what]
-        readers.add(reader)
+        client = WebSocketClient(socket, MAX_QUEUED_DOCUMENTS[kind])
+        client.put(_encode(self._hello()).decode())
+        clients = self._clients[kind]
+        clients.add(client)
         try:
-            await reader.run()
+            await client.run()
         finally:
-            readers.discard(reader)
+            clients.discard(client)
         return socket
 
     def _hello(self) -> schema.HelloDocument:
-        return hello(self._model, self._session, self._started, self._recordings.possible)
+        return hello_document(self._model, self._session, self._started, self._recorder.enabled)
 
-    async def _info(self, _: web.Request) -> web.Response:
+    async def _get_info(self, _: web.Request) -> web.Response:
         return _json(self._hello())
 
-    async def _tell(self, _: web.Request) -> web.Response:
-        return web.Response(body=self._state, content_type="application/json")
+    async def _get_state(self, _: web.Request) -> web.Response:
+        return web.Response(body=self._newest_document, content_type="application/json")
 
-    async def _tare(self, _: web.Request) -> web.Response:
-        return await _done(self._session.restart_tare)
+    async def _post_tare(self, _: web.Request) -> web.Response:
+        return await _answer(self._session.restart_tare)
 
-    async def _record(self, request: web.Request) -> web.Response:
-        name = (await _body(request, _Recording)).name
-        return await _done(lambda: {"path": str(self._recordings.begin(name))})
+    async def _post_recording(self, request: web.Request) -> web.Response:
+        name = (await _read_body(request, _RecordingRequest)).name
+        return await _answer(lambda: {"path": str(self._recorder.start(name))})
 
-    async def _stop_recording(self, _: web.Request) -> web.Response:
-        return await _done(lambda: recording_info(self._recordings.end()))
+    async def _delete_recording(self, _: web.Request) -> web.Response:
+        return await _answer(lambda: recording_info(self._recorder.stop()))
 
-    async def _mark(self, request: web.Request) -> web.Response:
-        text = (await _body(request, _Marker)).text
-        return await _done(lambda: self._recordings.mark(text))
+    async def _post_marker(self, request: web.Request) -> web.Response:
+        text = (await _read_body(request, _MarkerRequest)).text
+        return await _answer(lambda: self._recorder.add_marker(text))
 
 
-class _Recording(msgspec.Struct, forbid_unknown_fields=True):
+class _RecordingRequest(msgspec.Struct, forbid_unknown_fields=True):
     name: str = ""
 
 
-class _Marker(msgspec.Struct, forbid_unknown_fields=True):
+class _MarkerRequest(msgspec.Struct, forbid_unknown_fields=True):
     text: str
 
 
-async def _done(work: Callable[[], object]) -> web.Response:
-    """What `work` gives, from a thread; 409 with its one line where it cannot be done."""
+async def _answer(work: Callable[[], object]) -> web.Response:
+    """Run `work` in a thread, and return its result; 409 and the error message if it fails."""
     try:
         return _json(await asyncio.to_thread(work) or {})
     except HoldfastError as refusal:
         return _json({"error": str(refusal)}, status=409)
 
 
-async def _body(request: web.Request, kind: type[T]) -> T:
+async def _read_body(request: web.Request, kind: type[T]) -> T:
     data = await request.read() or b"{}"
     try:
         return msgspec.json.decode(data, type=kind)
@@ -225,12 +244,12 @@ def _json(value: object, status: int = 200) -> web.Response:
     return web.Response(body=_encode(value), content_type="application/json", status=status)
 
 
-async def _page(_: web.Request) -> web.FileResponse:
-    return web.FileResponse(PAGE / "index.html")
+async def _get_page(_: web.Request) -> web.FileResponse:
+    return web.FileResponse(PAGE_FOLDER / "index.html")
 
 
-async def _schema(_: web.Request) -> web.Response:
-    """JSON Schema of all that the WebSockets tell."""
-    told = (schema.HelloDocument, schema.LiveDocument, schema.EstimateDocument)
-    schemas, components = msgspec.json.schema_components(told)
+async def _get_schema(_: web.Request) -> web.Response:
+    """Return the JSON Schema of all documents of the WebSockets."""
+    documents = (schema.HelloDocument, schema.LiveDocument, schema.EstimateDocument)
+    schemas, components = msgspec.json.schema_components(documents)
     return _json({"anyOf": schemas, "$defs": components})
