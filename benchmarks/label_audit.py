@@ -28,7 +28,7 @@ import numpy as np
 from holdfast.contact import ContactState
 from holdfast.features import parse_features
 from holdfast.io import load_dataset
-from holdfast.labelling.audit import Suspect, audit
+from holdfast.labelling.review.audit import Suspect, audit
 from holdfast.metrics import bootstrap_interval, ratio_of_sums
 from holdfast.recordings import Label, Recording
 from holdfast.training import Setting

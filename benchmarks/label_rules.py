@@ -23,7 +23,13 @@ import numpy as np
 from scipy.spatial.transform import Rotation
 
 from holdfast.io import load_dataset
-from holdfast.labelling.compare import Agreement, PooledAgreement, RecordingAgreement, compare, pool
+from holdfast.labelling.review.compare import (
+    Agreement,
+    PooledAgreement,
+    RecordingAgreement,
+    compare,
+    pool,
+)
 from holdfast.labelling.rules import signal, tracking
 from holdfast.labelling.rules.tracking import TrackingRule
 from holdfast.metrics import Metrics, bootstrap_interval, ratio_of_sums

@@ -9,7 +9,7 @@ pytest.importorskip("rosbags", reason="rosbags is not installed")
 
 from holdfast.errors import RecordingError
 from holdfast.io.bags import find_bags, open_bag, read_poses
-from holdfast.labelling.poses import poses_from_bag
+from holdfast.labelling.rules.poses import poses_from_bag
 from ros.pose_bags import PoseBagWriter
 
 

@@ -15,7 +15,7 @@ from holdfast.cli.label import page_mode
 from holdfast.cli.label.inputs import Asking
 from holdfast.contact import ContactState
 from holdfast.io import labels_path, load_labels, load_recording, save_labels, save_recording
-from holdfast.labelling.audit import Audit, Suspect
+from holdfast.labelling.review.audit import Audit, Suspect
 from holdfast.recordings import Label
 from holdfast.synthetic import synthetic_recording
 
@@ -237,7 +237,7 @@ def audited(monkeypatch):
         given.append([recording.name for recording in recordings])
         return Audit(len(recordings), 20.0, [SUSPECT])
 
-    monkeypatch.setattr("holdfast.labelling.audit.audit", audit)
+    monkeypatch.setattr("holdfast.labelling.review.audit.audit", audit)
     return given
 
 
@@ -373,7 +373,8 @@ def save(url, labels):
 def test_poses_of_a_bag(monkeypatch):
     given = []
     monkeypatch.setattr(
-        "holdfast.labelling.poses.poses_from_bag", lambda *words: given.append(words) or "poses"
+        "holdfast.labelling.rules.poses.poses_from_bag",
+        lambda *words: given.append(words) or "poses",
     )
     asking = Asking("0.5", Path("run.bag"), ("object = /aruco/pose", "thumb=tip"), ("speed=0.01",))
     assert asking.arguments("tracking") == {"tare": "0.5", "speed": 0.01, "tracking": "poses"}

@@ -2,7 +2,7 @@
 
 import pytest
 
-from holdfast.labelling.store import CAUSES, STATES
+from holdfast.labelling.server.store import CAUSES, STATES
 
 CALL = "async ([name, given]) => (await import('/page/words.js'))[name](...given)"
 

@@ -10,8 +10,8 @@ from scipy.spatial.transform import Rotation
 from holdfast.contact import Cause
 from holdfast.errors import RecordingError
 from holdfast.io import import_recordings
-from holdfast.labelling.poses import Poses, Track, in_sight
 from holdfast.labelling.rules import tracking
+from holdfast.labelling.rules.poses import Poses, Track, in_sight
 from holdfast.labelling.rules.tracking import TrackingRule
 from holdfast.recordings import Recording, Truth, label_states
 

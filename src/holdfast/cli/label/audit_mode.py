@@ -8,7 +8,7 @@ from holdfast.cli.label.inputs import recordings_at
 from holdfast.cli.terminal.console import print_json, print_table, say, show
 
 if TYPE_CHECKING:
-    from holdfast.labelling.audit import Audit, Suspect
+    from holdfast.labelling.review.audit import Audit, Suspect
 
 
 def audit_labels(paths: Sequence[Path], jobs: int, *, as_json: bool) -> "Sequence[Suspect]":
@@ -26,7 +26,7 @@ def audit_labels(paths: Sequence[Path], jobs: int, *, as_json: bool) -> "Sequenc
     from msgspec import to_builtins
 
     from holdfast.io import Dataset
-    from holdfast.labelling.audit import audit
+    from holdfast.labelling.review.audit import audit
 
     files = recordings_at(paths)
     say(f"training on the labels of {len(files)} recordings, to judge each by the others")

@@ -18,7 +18,7 @@ from holdfast.cli.terminal.console import complain, print_json, print_table, say
 from holdfast.cli.terminal.progress import progress
 
 if TYPE_CHECKING:
-    from holdfast.labelling.store import Labels
+    from holdfast.labelling.server.store import Labels
     from holdfast.recordings import Recording
 
 
@@ -91,7 +91,7 @@ def _person(path: Path) -> str | None:
     """Who saved the labels of a recording by hand; None where nobody did."""
     from holdfast.errors import RecordingError
     from holdfast.io.label_files import labels_for, labels_path, load_labels
-    from holdfast.labelling.summary import summary_of
+    from holdfast.labelling.server.workspace import summary_of
 
     try:
         labels = labels_for(path, summary_of(path).digest)
@@ -129,7 +129,7 @@ def write(path: Path, recording: "Recording", labels: "Labels", author: str) -> 
         RecordingError: the file there is of another recording, or none.
     """
     from holdfast.io.label_files import labels_for, labels_path, load_labels
-    from holdfast.labelling.store import revision_of, save_stored
+    from holdfast.labelling.server.store import revision_of, save_stored
 
     there = labels_for(path, recording.digest)
     note = "" if there is None else load_labels(labels_path(path)).notes

@@ -9,7 +9,7 @@ from holdfast.cli.terminal.console import print_json, print_table, say, show
 from holdfast.cli.terminal.progress import progress
 
 if TYPE_CHECKING:
-    from holdfast.labelling.compare import (
+    from holdfast.labelling.review.compare import (
         Agreement,
         FingerAgreement,
         PooledAgreement,
@@ -39,7 +39,7 @@ def compare_labels(
     """
     from msgspec import to_builtins
 
-    from holdfast.labelling.compare import pool
+    from holdfast.labelling.review.compare import pool
 
     if len(paths) != 2:
         raise ValueError(f"--compare A B: two paths expected, {len(paths)} given")
@@ -75,7 +75,7 @@ def _each(
     """The name of each recording with its agreement, or with why there is none."""
     from holdfast.errors import RecordingError
     from holdfast.io import load_recording
-    from holdfast.labelling.compare import compare
+    from holdfast.labelling.review.compare import compare
 
     for path in progress(files, "comparing"):
         try:
@@ -92,7 +92,7 @@ def _each(
 
 
 def _labels_of(place: Path, asking: Asking, annotator: str | None) -> LabelsOf:
-    from holdfast.labelling.files import labels_of
+    from holdfast.labelling.exchange.read_labels import labels_of
 
     if _is_rule(place):
         return lambda recording: asking.propose(str(place), recording)

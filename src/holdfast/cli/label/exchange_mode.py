@@ -10,7 +10,7 @@ from holdfast.cli.terminal.console import print_json, show
 from holdfast.cli.terminal.progress import progress
 
 if TYPE_CHECKING:
-    from holdfast.labelling.store import Labels
+    from holdfast.labelling.server.store import Labels
     from holdfast.recordings import Recording
 
 FORMATS = ("label-studio", "csv")
@@ -41,7 +41,7 @@ def export_labels(
     if kind == "csv":
         written = _export_csv(recordings, out, force)
     else:
-        from holdfast.labelling.label_studio_export import CONFIG, save_label_studio
+        from holdfast.labelling.exchange.label_studio_export import CONFIG, save_label_studio
 
         tasks = save_label_studio(progress(recordings, "exporting"), out, force=force)
         written = [tasks, tasks.with_name(CONFIG)]
@@ -94,7 +94,7 @@ def import_labels(
         RecordingError: the labels cannot be read or do not fit.
     """
     from holdfast.errors import RecordingError
-    from holdfast.labelling.files import labels_of
+    from holdfast.labelling.exchange.read_labels import labels_of
 
     files = recordings_at(paths)
     if not source.exists():

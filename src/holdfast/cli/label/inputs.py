@@ -9,8 +9,8 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
-    from holdfast.labelling.poses import Poses
-    from holdfast.labelling.store import Labels
+    from holdfast.labelling.rules.poses import Poses
+    from holdfast.labelling.server.store import Labels
     from holdfast.recordings import Label, Recording
 
 STATES = ("stable", "unstable", "no_contact")
@@ -43,7 +43,7 @@ class Asking:
             RecordingError: the file cannot be read.
             MissingExtra: it is a bag, and rosbags is not installed.
         """
-        from holdfast.labelling.poses import OBJECT, poses_from_bag, poses_from_csv
+        from holdfast.labelling.rules.poses import OBJECT, poses_from_bag, poses_from_csv
 
         if self.poses is None or self.poses.suffix == ".csv":
             if self.tracks:
@@ -155,7 +155,7 @@ def seconds_of(labels: "Labels") -> dict[str, float]:
 
 def doubtful_of(labels: "Labels") -> list[dict[str, Any]]:
     """The labels of little confidence, the most doubtful first, as plain JSON values."""
-    from holdfast.labelling.doubt import doubtful
+    from holdfast.labelling.review.spans import doubtful
 
     return [
         {
@@ -174,7 +174,7 @@ def labels_json(labels: "Labels") -> Mapping[str, Any]:
     """Labels by finger as plain JSON values."""
     from msgspec import to_builtins
 
-    from holdfast.labelling.answers import labels_data
+    from holdfast.labelling.server.api import labels_data
 
     found: Mapping[str, Any] = to_builtins(labels_data(labels))
     return found

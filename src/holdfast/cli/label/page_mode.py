@@ -12,8 +12,8 @@ from holdfast.cli.serve import open_page
 from holdfast.cli.terminal.console import print_json, say
 
 if TYPE_CHECKING:
-    from holdfast.labelling.audit import Suspect
-    from holdfast.labelling.shelf import Shelf
+    from holdfast.labelling.review.audit import Suspect
+    from holdfast.labelling.server.workspace import Workspace
 
 
 def show_label_page(
@@ -38,14 +38,14 @@ def show_label_page(
         OutputError: the address cannot be listened at.
     """
     from holdfast.features import Tare
-    from holdfast.labelling.service import Service
-    from holdfast.labelling.shelf import Shelf
+    from holdfast.labelling.server.service import LabellingService
+    from holdfast.labelling.server.workspace import Workspace
     from holdfast.web.guard import Guard
     from holdfast.web.server import run_server
 
     guard = Guard(serving.host, serving.token)
     files = recordings_at(paths)
-    shelf = Shelf(
+    shelf = Workspace(
         files,
         author=login_name() if author is None else author,
         clock=now,
@@ -63,16 +63,16 @@ def show_label_page(
         where = "is open in the browser" if opened else "is the page"
         say(f"{page} {where} for {_what(files)}; Ctrl-C ends it")
 
-    for work in (_prepare, Shelf.warm_up):
+    for work in (_prepare, Workspace.warm_up):
         Thread(target=work, args=(shelf,), daemon=True).start()
-    run_server(Service(shelf, guard).app, serving.host, serving.port, tell)
+    run_server(LabellingService(shelf, guard).app, serving.host, serving.port, tell)
 
 
 def _what(files: Sequence[Path]) -> str:
     return f"{len(files)} recordings" if len(files) > 1 else str(files[0])
 
 
-def _prepare(shelf: "Shelf") -> None:
+def _prepare(shelf: "Workspace") -> None:
     """Reads the first recording while the browser starts."""
     from holdfast.errors import HoldfastError
 

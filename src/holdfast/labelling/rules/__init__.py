@@ -1,5 +1,5 @@
 """Rules that propose labels from evidence, for a person to check."""
 
-from holdfast.labelling.rules.proposing import RULES, propose
+from holdfast.labelling.rules.registry import RULES, propose
 
 __all__ = ["RULES", "propose"]

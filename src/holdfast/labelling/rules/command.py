@@ -30,8 +30,8 @@ from holdfast.contact import NO_CONTACT, STABLE, UNSTABLE, Cause, ContactState
 from holdfast.errors import RecordingError
 from holdfast.features import Tare
 from holdfast.features.tare import TareArgument
-from holdfast.labelling.rules.drawing import Drawing, Pen
-from holdfast.labelling.rules.hand import FingerForce, HandForce, hand_force
+from holdfast.labelling.rules.base import Drawing, Pen
+from holdfast.labelling.rules.forces import FingerForce, HandForce, hand_force
 from holdfast.metrics.masks import Mask
 from holdfast.recordings import Label, Recording
 

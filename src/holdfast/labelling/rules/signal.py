@@ -20,8 +20,8 @@ from holdfast.contact import (
 )
 from holdfast.features import Tare
 from holdfast.features.tare import TareArgument
-from holdfast.labelling.rules.drawing import Drawing, Pen
-from holdfast.labelling.rules.hand import (
+from holdfast.labelling.rules.base import Drawing, Pen, check_positive
+from holdfast.labelling.rules.forces import (
     SEEN,
     FingerForce,
     HandForce,
@@ -29,7 +29,6 @@ from holdfast.labelling.rules.hand import (
     hand_force,
     lost_at,
 )
-from holdfast.labelling.rules.limits import check_positive
 from holdfast.metrics.masks import Mask, drop_short_runs, fill_short_gaps, n_samples_of, runs
 from holdfast.recordings import Label, Recording
 from holdfast.sensors.types import Array

@@ -24,12 +24,17 @@ from holdfast.contact import (
 from holdfast.errors import RecordingError
 from holdfast.features import Tare
 from holdfast.features.tare import TareArgument
-from holdfast.labelling.poses import Poses, Track, names_of, poses_of
-from holdfast.labelling.rules.clocks import Offset, offset_of
-from holdfast.labelling.rules.drawing import Drawing, Pen
-from holdfast.labelling.rules.hand import FingerForce, HandForce, hand_force, lost_at, pressed_at
-from holdfast.labelling.rules.limits import check_positive
-from holdfast.labelling.rules.motion import SMOOTHING, Motion, motion_of, relative
+from holdfast.labelling.rules.base import Drawing, Pen, check_positive
+from holdfast.labelling.rules.forces import FingerForce, HandForce, hand_force, lost_at, pressed_at
+from holdfast.labelling.rules.motion import (
+    SMOOTHING,
+    Motion,
+    Offset,
+    motion_of,
+    offset_of,
+    relative,
+)
+from holdfast.labelling.rules.poses import Poses, Track, names_of, poses_of
 from holdfast.metrics.masks import (
     Mask,
     drop_short_runs,

@@ -1,0 +1,1 @@
+"""Labels in other formats: Label Studio, CSV, recordings, label files."""

@@ -1,0 +1,101 @@
+"""Labels of a recording by path, in whatever file they are."""
+
+from pathlib import Path
+
+from holdfast.errors import RecordingError
+from holdfast.io.header import label_of
+from holdfast.io.label_files import SUFFIX, labels_from_csv, load_labels
+from holdfast.io.recording_files import SUFFIXES, load_recording
+from holdfast.labelling.exchange.label_studio import is_label_studio, labels_from_label_studio
+from holdfast.recordings import Label, Recording
+
+Labels = dict[str, tuple[Label, ...]]
+
+
+def labels_of(path: str | Path, recording: Recording, annotator: str | None = None) -> Labels:
+    """The labels of a recording in a file, or in its file in a folder.
+
+    A file is a label file (`.labels.json`), a recording with labels inside or beside it
+    (`.parquet`, `.mcap`), a table (`.csv`) or a JSON export of Label Studio (`.json`). In a
+    folder that is the first there is of `NAME.labels.json`, `NAME.parquet`, `NAME.mcap`,
+    `NAME.labels.csv`, `NAME.csv`, `NAME.json`, and the only other `.json` file.
+
+    Args:
+        path: of the file or folder.
+        recording: whose labels are wanted.
+        annotator: of an export of Label Studio; see `labels_from_label_studio`.
+
+    Returns:
+        By finger, in order of time; fingers without labels are left out.
+
+    Raises:
+        RecordingError: there are none, they are of another recording or do not fit it, or the
+            file cannot be read.
+    """
+    file = Path(path)
+    if file.is_dir():
+        file = _in_folder(file, recording)
+    labels = _read(file, recording, annotator)
+    try:
+        checked = recording.with_labels(labels)
+    except RecordingError as cause:
+        raise RecordingError(f"{file}: {cause}") from cause
+    return {name: module.labels for name, module in checked.modules.items() if module.labels}
+
+
+def _read(file: Path, recording: Recording, annotator: str | None) -> Labels:
+    if file.suffix in SUFFIXES:
+        other = load_recording(file)
+        _check_digest(file, other.digest, other.name, recording)
+        return {name: module.labels for name, module in other.modules.items()}
+    if file.suffix == ".csv":
+        return labels_from_csv(file)
+    if file.suffix == ".json":
+        if not file.name.endswith(SUFFIX) and _is_label_studio(file):
+            return labels_from_label_studio(file, recording, annotator)
+        return _from_label_file(file, recording)
+    raise RecordingError(
+        f"cannot read labels from {file}: {file.suffix or 'no suffix'} given; {SUFFIX}, .json, "
+        f".csv, {' or '.join(SUFFIXES)} expected"
+    )
+
+
+def _from_label_file(file: Path, recording: Recording) -> Labels:
+    found = load_labels(file)
+    _check_digest(file, found.recording, found.name, recording)
+    try:
+        return {
+            name: tuple(label_of(label) for label in labels)
+            for name, labels in found.modules.items()
+        }
+    except ValueError as cause:
+        raise RecordingError(f"{file}: {cause}") from cause
+
+
+def _check_digest(file: Path, digest: str, name: str, recording: Recording) -> None:
+    if digest != recording.digest:
+        raise RecordingError(
+            f"{file} labels another recording ({name!r}, hash {digest[:12]}) than "
+            f"{recording.name!r} (hash {recording.digest[:12]})"
+        )
+
+
+def _is_label_studio(file: Path) -> bool:
+    try:
+        return is_label_studio(file.read_bytes())
+    except OSError as cause:
+        raise RecordingError(f"cannot read {file}: {cause.strerror}") from cause
+
+
+def _in_folder(folder: Path, recording: Recording) -> Path:
+    endings = (SUFFIX, *SUFFIXES, ".labels.csv", ".csv", ".json")
+    for ending in endings:
+        if (file := folder / f"{recording.name}{ending}").is_file():
+            return file
+    others = [file for file in sorted(folder.glob("*.json")) if not file.name.endswith(SUFFIX)]
+    if len(others) == 1:
+        return others[0]
+    raise RecordingError(
+        f"no labels of {recording.name!r} in {folder}; "
+        f"{recording.name} with one of {', '.join(endings)} expected"
+    )

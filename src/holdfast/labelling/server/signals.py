@@ -1,0 +1,272 @@
+"""Signals that the labelling page plots: force and sigma at any zoom, and change points.
+
+Zooming takes a few milliseconds: minima and maxima of 2, 4, 8, ... neighbouring samples are
+computed once. Edges of labels snap to change points. A change point is where the force begins or
+ends to change: within the next instants it moves much farther than it moved in the instants
+before, or the other way round.
+"""
+
+import math
+from collections.abc import Mapping
+from typing import NamedTuple
+
+import msgspec
+import numpy as np
+from scipy.ndimage import maximum_filter1d, uniform_filter1d
+
+from holdfast.features import Tare, haar_features
+from holdfast.features.force import tared_force
+from holdfast.features.tare import TareArgument
+from holdfast.recordings import GAP_PERIODS, Recording, Tactile
+from holdfast.sensors.types import Array
+
+SERIES = ("F_a", "F_x", "F_y", "F_z", "sigma")
+"""Signals of a finger: amplitude and components of the force, and the instability."""
+
+DEFAULT_POINTS = 1200
+"""Horizontal positions on a page that does not give their number."""
+MAX_POINTS = 10_000
+"""Largest number of horizontal positions."""
+
+SIGNIFICANT_DIGITS = 6
+"""Digits of a value in JSON, far more than a screen shows."""
+
+SMOOTHING_TIME = 0.03
+"""Time over which the force is averaged before change points are detected [s]."""
+COMPARED_TIME = 0.2
+"""Time before and after an instant in which the movement of the force is compared [s]."""
+MAX_COMPARED_STEPS = 16
+"""Largest number of instants that are compared in each direction."""
+MIN_DISTANCE = 0.1
+"""Shortest time between two change points; the clearer one is kept [s]."""
+MIN_RATIO = 2.5
+"""Least ratio of the movement on one side to that on the other."""
+NOISE_FACTOR = 2.0
+"""Movement below this multiple of its median is noise."""
+NOISE_SHARE = 0.01
+"""Movement below this share of the largest force is noise, invisible on a plot."""
+
+Series = dict[str, list[float | None]]
+
+
+class SignalPart(msgspec.Struct, frozen=True):
+    """Signals of a part of a recording.
+
+    Attributes:
+        start: of the part [s].
+        end: of the part [s].
+        exact: whether all samples are included; otherwise minima and maxima of neighbours.
+        fingers: by finger, `t` [s] and each of `SERIES`; None where a value is unknown.
+    """
+
+    start: float
+    end: float
+    exact: bool
+    fingers: dict[str, Series]
+
+
+class _Level(NamedTuple):
+    """Minima and maxima of blocks of neighbouring samples.
+
+    Attributes:
+        times: (n, 2) of the first sample of each block, and of one half way to the last [s].
+        low: (n, n_series) minima; NaN where all samples are unknown.
+        high: (n, n_series) maxima.
+    """
+
+    times: Array
+    low: Array
+    high: Array
+
+
+class FingerSignals:
+    """Force and sigma of one finger, with minima and maxima at every zoom.
+
+    Args:
+        module: readings of the finger.
+        tare: how the baseline is found; it is subtracted from earlier samples too.
+
+    Raises:
+        ValueError: the tare is unknown, or no finite sample lies in its time.
+    """
+
+    def __init__(self, module: Tactile, tare: TareArgument | Tare = 0.5) -> None:
+        self.times, self.values = _with_gaps(module, _values(module, Tare.parse(tare)))
+        self._levels: list[_Level] = []
+        level = _Level(np.column_stack([self.times, self.times]), self.values, self.values)
+        while len(level.times) > 2:
+            level = _halved(level)
+            self._levels.append(level)
+
+    def part(self, start: float, end: float, points: int) -> tuple[bool, Series]:
+        """Return whether all samples are included, and the series between two times.
+
+        One more sample is included on either side, so that lines reach the edges of a plot.
+
+        Args:
+            start: of the part [s].
+            end: of the part [s].
+            points: a series has at most twice as many values.
+        """
+        first = max(int(np.searchsorted(self.times, start)) - 1, 0)
+        last = min(int(np.searchsorted(self.times, end, side="right")) + 1, len(self.times))
+        n = last - first
+        if n <= 2 * points:
+            return True, _series(self.times[first:last], self.values[first:last])
+        depth = max(int(np.ceil(np.log2(n / max(points - 2, 1)))), 1)
+        depth = min(depth, len(self._levels))
+        level = self._levels[depth - 1]
+        blocks = slice(first >> depth, ((last - 1) >> depth) + 1)
+        pairs = np.stack([level.low[blocks], level.high[blocks]], axis=1)
+        return False, _series(level.times[blocks].ravel(), pairs.reshape(-1, len(SERIES)))
+
+
+class Signals:
+    """Force and sigma of every finger of a recording, computed once.
+
+    Args:
+        recording: the recording.
+        tare: how the baseline is found.
+
+    Raises:
+        ValueError: the tare is unknown, or no finite sample lies in its time.
+    """
+
+    def __init__(self, recording: Recording, tare: TareArgument | Tare = 0.5) -> None:
+        self.start, self.end = recording.start, recording.end
+        self.fingers: Mapping[str, FingerSignals] = {
+            name: FingerSignals(module, tare) for name, module in recording.modules.items()
+        }
+
+    def part(
+        self, start: float | None = None, end: float | None = None, points: float = DEFAULT_POINTS
+    ) -> SignalPart:
+        """Return the signals between two times.
+
+        Args:
+            start: of the part [s]; by default the start of the recording.
+            end: of the part [s]; by default the end of the recording.
+            points: horizontal positions on the page; a series has at most twice as many values.
+
+        Raises:
+            ValueError: the part ends before its start, or `points` is not 2 to `MAX_POINTS`.
+        """
+        first = self.start if start is None else start
+        last = self.end if end is None else end
+        if not (np.isfinite([first, last]).all() and first <= last):
+            raise ValueError(f"an end after the start expected, [{first}, {last}] s given")
+        if not 2 <= points <= MAX_POINTS:
+            raise ValueError(f"2 to {MAX_POINTS} points expected, {points:g} given")
+        parts = {name: each.part(first, last, int(points)) for name, each in self.fingers.items()}
+        exact = all(one for one, _ in parts.values())
+        return SignalPart(first, last, exact, {name: own for name, (_, own) in parts.items()})
+
+
+def _values(module: Tactile, tare: Tare) -> Array:
+    """Return (n, n_series) force and sigma of every sample; NaN where they are unknown."""
+    force = _force(module, tare)
+    sigma = haar_features(force)[:, 5:]
+    return np.concatenate([np.linalg.norm(force, axis=1, keepdims=True), force, sigma], axis=1)
+
+
+def _force(module: Tactile, tare: Tare) -> Array:
+    """Return (n, 3) force with one baseline for all samples; NaN without any finite sample."""
+    try:
+        return tared_force(module, tare, offline=True).force
+    except ValueError:
+        if np.isfinite(module.readings).all(axis=(1, 2)).any():
+            raise
+        return np.full((module.n_samples, 3), np.nan)
+
+
+def _with_gaps(module: Tactile, values: Array) -> tuple[Array, Array]:
+    """Return times and values with a row of NaN in every gap, so that lines are interrupted."""
+    times = module.times
+    gaps = np.flatnonzero(np.diff(times) > GAP_PERIODS * module.period) + 1
+    if not len(gaps):
+        return times, values
+    middles = (times[gaps - 1] + times[gaps]) / 2
+    return np.insert(times, gaps, middles), np.insert(values, gaps, np.nan, axis=0)
+
+
+def _halved(level: _Level) -> _Level:
+    """Return the next level: two neighbouring blocks become one; the last may stay alone."""
+    n = len(level.times) // 2 * 2
+    times = np.column_stack([level.times[0:n:2, 0], level.times[1:n:2, 0]])
+    low = np.fmin(level.low[0:n:2], level.low[1:n:2])
+    high = np.fmax(level.high[0:n:2], level.high[1:n:2])
+    if n == len(level.times):
+        return _Level(times, low, high)
+    halves = zip((times, low, high), level, strict=True)
+    return _Level(*(np.concatenate([half, own[n:]]) for half, own in halves))
+
+
+def _series(times: Array, values: Array) -> Series:
+    columns = zip(SERIES, rounded(values).T, strict=True)
+    return {"t": times.tolist(), **{name: column.tolist() for name, column in columns}}
+
+
+def rounded(values: Array) -> Array:
+    """Round values to `SIGNIFICANT_DIGITS`, which makes JSON short.
+
+    Example:
+        >>> rounded(np.array([1234.56789, -0.000123456789, 0.0])).tolist()
+        [1234.57, -0.000123457, 0.0]
+    """
+    size = np.abs(values)
+    with np.errstate(divide="ignore", over="ignore"):
+        power = np.where(size > 0, SIGNIFICANT_DIGITS - 1 - np.floor(np.log10(size)), 0.0)
+        power = np.clip(np.nan_to_num(power), -300, 300)
+        scale = 10.0 ** np.abs(power)
+        finer, coarser = np.rint(values * scale) / scale, np.rint(values / scale) * scale
+    return np.asarray(np.where(power >= 0, finer, coarser))
+
+
+def change_points(times: Array, force: Array, period: float) -> Array:
+    """Return the times at which the force on a finger begins or ends to change.
+
+    Args:
+        times: (n,) strictly increasing [s].
+        force: (n, 3) [any unit]; NaN where it is unknown.
+        period: of the samples [s].
+
+    Returns:
+        Increasing times [s].
+
+    Example:
+        >>> times = np.arange(300) / 150
+        >>> ramp = np.clip((times - 0.5) / 0.5, 0, 1)
+        >>> force = np.column_stack([ramp, 0 * ramp, 0 * ramp])
+        >>> change_points(times, force, 1 / 150).round(2).tolist()
+        [0.49, 1.01]
+    """
+    known = np.isfinite(force).all(axis=1)
+    own, values = times[known], force[known]
+    n = max(round(COMPARED_TIME / period), 1)
+    if len(own) <= 2 * n:
+        return np.empty(0)
+    values = uniform_filter1d(values, 2 * round(SMOOTHING_TIME / period / 2) + 1, axis=0)
+    after, before = _movements(values, n)
+    largest = float(np.quantile(np.linalg.norm(values, axis=1), 0.99))
+    tiny = float(np.finfo(float).tiny)
+    noise = max(NOISE_FACTOR * float(np.median(after)), NOISE_SHARE * largest, tiny)
+    contrast = np.abs(np.log((after + noise) / (before + noise)))
+    width = 2 * max(round(MIN_DISTANCE / period), 1) + 1
+    peaks = (contrast >= math.log(MIN_RATIO)) & (contrast == maximum_filter1d(contrast, width))
+    return np.asarray(own[peaks])
+
+
+def _movements(force: Array, n: int) -> tuple[Array, Array]:
+    """Return (n_samples,) mean distances of the force to its next n samples, and to its last n.
+
+    Before the first and after the last sample the force is taken as constant.
+    """
+    steps = np.unique(np.linspace(1, n, min(n, MAX_COMPARED_STEPS)).round().astype(int))
+    after, before = np.zeros(len(force)), np.zeros(len(force))
+    for step in steps.tolist():
+        moved = np.linalg.norm(force[step:] - force[:-step], axis=1)
+        after[:-step] += moved
+        before[step:] += moved
+        after[-step:] += np.linalg.norm(force[-1] - force[-step:], axis=1)
+        before[:step] += np.linalg.norm(force[0] - force[:step], axis=1)
+    return after / len(steps), before / len(steps)

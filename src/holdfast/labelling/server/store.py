@@ -1,0 +1,319 @@
+"""Label file of a recording: read, validate and save it without losing the work of others.
+
+A save returns when the file is on the disk. Each save names the revision that it was made from,
+a hash of the bytes of the file; a file with another revision is not replaced.
+"""
+
+import hashlib
+import os
+from collections.abc import Iterator, Mapping, Sequence
+from contextlib import contextmanager, suppress
+from dataclasses import dataclass, replace
+from itertools import pairwise
+from pathlib import Path
+from typing import Literal
+
+import msgspec
+
+from holdfast.contact import LABEL_STATES, Cause, ContactState
+from holdfast.errors import HoldfastError, OutputError, RecordingError
+from holdfast.files import write_whole
+from holdfast.io.header import label_data
+from holdfast.io.label_files import LabelFile, labels_for, labels_path, load_labels
+from holdfast.labelling.review.spans import TIME_TOLERANCE
+from holdfast.recordings import Label, Recording, Tactile
+
+NO_REVISION = "none"
+"""Revision of a label file that does not exist."""
+
+STATES = tuple(state.value.lower() for state in LABEL_STATES)
+CAUSES = tuple(cause.value for cause in Cause)
+
+Labels = Mapping[str, Sequence[Label]]
+Origin = Literal["file", "inside", "none"]
+
+
+class ReadOnlyError(OutputError):
+    """The label file or its folder is read-only. Change that, or label a copy."""
+
+
+class ConflictError(HoldfastError):
+    """The label file changed since it was read. Read it again before the next save.
+
+    Attributes:
+        revision: of the file on the disk.
+    """
+
+    def __init__(self, text: str, revision: str) -> None:
+        super().__init__(text)
+        self.revision = revision
+
+
+class LabelInput(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
+    """A label as a client sends it, not validated yet; fields as in `Label`."""
+
+    start: float
+    end: float
+    state: str
+    cause: str | None = None
+    evidence: str = ""
+    confidence: float = 1.0
+    author: str = ""
+
+
+@dataclass(frozen=True)
+class StoredLabels:
+    """The labels of a recording as they are on the disk.
+
+    Attributes:
+        labels: by finger, for every finger of the recording, in order of time.
+        origin: the label file, the recording file itself, or none.
+        revision: of the label file.
+        author: of the last save.
+        time: of the last save, as ISO 8601 text.
+        note: on the recording.
+    """
+
+    labels: Mapping[str, tuple[Label, ...]]
+    origin: Origin
+    revision: str
+    author: str = ""
+    time: str = ""
+    note: str = ""
+
+
+def read_stored(path: Path, recording: Recording) -> StoredLabels:
+    """Read the labels of a recording from its label file, else from the recording itself.
+
+    Args:
+        path: of the recording.
+        recording: with the labels of the recording file itself.
+
+    Raises:
+        RecordingError: the label file is damaged, of another recording, or does not fit it.
+    """
+    revision = revision_of(path)
+    beside = labels_for(path, recording.digest)
+    if beside is None:
+        inside = {name: module.labels for name, module in recording.modules.items()}
+        return StoredLabels(inside, "inside" if any(inside.values()) else "none", revision)
+    file = load_labels(labels_path(path))
+    try:
+        labels = validated(recording, beside)
+    except ValueError as cause:
+        raise RecordingError(f"{labels_path(path)}: {cause}") from cause
+    return StoredLabels(labels, "file", revision, file.author, file.time, file.notes)
+
+
+def save_stored(
+    path: Path,
+    recording: Recording,
+    labels: Labels,
+    *,
+    revision: str,
+    author: str,
+    time: str,
+    note: str = "",
+) -> StoredLabels:
+    """Save labels to the label file of a recording, and return what is stored.
+
+    Labels without an author get the author of the save.
+
+    Args:
+        path: of the recording.
+        recording: the recording.
+        labels: by finger; a finger that is missing has none.
+        revision: of the label file from which the labels were edited.
+        author: of the save.
+        time: of the save, as ISO 8601 text.
+        note: on the recording.
+
+    Raises:
+        ConflictError: the file has another revision.
+        ReadOnlyError: the file or its folder is read-only.
+        OutputError: the file cannot be written.
+        RecordingError: the existing file is of another recording, or no label file.
+        ValueError: the labels contradict each other or the recording.
+    """
+    signed = {
+        name: tuple(each if each.author else replace(each, author=author) for each in own)
+        for name, own in validated(recording, labels).items()
+    }
+    file = LabelFile(
+        recording=recording.digest,
+        name=recording.name,
+        modules={name: [label_data(each) for each in own] for name, own in signed.items()},
+        author=author,
+        time=time,
+        notes=note,
+    )
+    data = msgspec.json.format(msgspec.json.encode(file)) + b"\n"
+    target = labels_path(path)
+    if is_read_only(path):
+        raise ReadOnlyError(f"{target} cannot be written: it or its folder is read-only")
+    with _locked(target.parent):
+        current = revision_of(path)
+        if current != revision:
+            raise ConflictError(
+                f"{target.name} was changed by another program since it was read", current
+            )
+        labels_for(path, recording.digest)  # raises if the file is not this recording's
+        write_whole(target, data, force=True)
+        _flush(target)
+        return StoredLabels(signed, "file", revision_of(path), author, time, note)
+
+
+def revision_of(path: Path) -> str:
+    """Return the revision of the label file of the recording at `path`.
+
+    Raises:
+        RecordingError: it cannot be read.
+    """
+    try:
+        return hashlib.blake2b(labels_path(path).read_bytes(), digest_size=12).hexdigest()
+    except FileNotFoundError:
+        return NO_REVISION
+    except OSError as cause:
+        raise RecordingError(f"cannot read {labels_path(path)}: {cause.strerror}") from cause
+
+
+def is_read_only(path: Path) -> bool:
+    """Return whether the labels of the recording at `path` must not be saved.
+
+    A file without any write permission is respected, even if the folder would allow to replace
+    it, or an administrator could write it.
+    """
+    target = labels_path(path)
+    return not (_writable(target.parent) and (not target.exists() or _writable(target)))
+
+
+def validated(recording: Recording, labels: Labels) -> dict[str, tuple[Label, ...]]:
+    """Return the labels of every finger of a recording in order of time, after validation.
+
+    Args:
+        recording: the recording.
+        labels: by finger; a finger that is missing has none.
+
+    Raises:
+        ValueError: the recording has no such finger, or labels overlap or lie outside it. The
+            text names the finger and the times.
+    """
+    if unknown := sorted(set(labels) - set(recording.modules)):
+        raise ValueError(
+            f"labels for {', '.join(unknown)} given; recording {recording.name!r} "
+            f"has {', '.join(recording.modules)}"
+        )
+    for finger, own in labels.items():
+        _validate(finger, recording, own)
+    return {
+        finger: tuple(sorted(labels.get(finger, ()), key=lambda label: label.start))
+        for finger in recording.modules
+    }
+
+
+def parse_labels(given: Mapping[str, Sequence[LabelInput]]) -> dict[str, tuple[Label, ...]]:
+    """Return labels from what a client sent.
+
+    Args:
+        given: by finger.
+
+    Raises:
+        ValueError: a state, cause, interval or confidence is invalid. The text names the finger
+            and the times.
+    """
+    return {finger: tuple(_parse(finger, each) for each in own) for finger, own in given.items()}
+
+
+def cut_to_samples(recording: Recording, labels: Labels) -> dict[str, tuple[Label, ...]]:
+    """Cut each label to the samples of its own finger.
+
+    Fingers begin and end at different times, while a page has one time axis. Labels that exceed
+    the whole recording stay as they are, and `validated` rejects them. A label may end up to one
+    sample period after the last sample.
+
+    Args:
+        recording: the recording.
+        labels: by finger.
+    """
+    end = recording.end + max(module.period for module in recording.modules.values())
+    return {
+        finger: tuple(_cut(own, recording.modules.get(finger), recording.start, end))
+        for finger, own in labels.items()
+    }
+
+
+def _parse(finger: str, given: LabelInput) -> Label:
+    where = f"{finger}, [{given.start:.10g}, {given.end:.10g}) s"
+    if given.state not in STATES:
+        raise ValueError(f"{where}: state {', '.join(STATES)} expected, {given.state!r} given")
+    if given.cause not in (None, *CAUSES):
+        raise ValueError(
+            f"{where}: cause {', '.join(CAUSES)} or none expected, {given.cause!r} given"
+        )
+    state, cause = ContactState(given.state.upper()), given.cause and Cause(given.cause)
+    span = given.start, given.end
+    try:
+        return Label(*span, state, cause or None, given.evidence, given.confidence, given.author)
+    except ValueError as problem:
+        raise ValueError(f"{finger}: {problem}") from problem
+
+
+def _validate(finger: str, recording: Recording, labels: Sequence[Label]) -> None:
+    for one, two in pairwise(sorted(labels, key=lambda label: label.start)):
+        if two.start < one.end - TIME_TOLERANCE:
+            raise ValueError(f"{finger}: {_span_text(one)} and {_span_text(two)} overlap")
+    try:
+        replace(recording.modules[finger], labels=tuple(labels))
+    except RecordingError as cause:
+        raise ValueError(f"{finger}: {cause}") from cause
+
+
+def _span_text(label: Label) -> str:
+    return f"{label.state.value.lower()} [{label.start:.10g}, {label.end:.10g}) s"
+
+
+def _cut(labels: Sequence[Label], module: Tactile | None, start: float, end: float) -> list[Label]:
+    """Cut the labels within [start, end] to the time of the module; keep the others."""
+    if module is None or not module.n_samples:
+        return list(labels)
+    first, last = float(module.times[0]), float(module.times[-1])
+    cut = []
+    for each in labels:
+        if start - TIME_TOLERANCE <= each.start and each.end <= end + TIME_TOLERANCE:
+            begins, ends = max(each.start, first), min(each.end, last + module.period)
+            cut += [replace(each, start=begins, end=ends)] if begins < ends else []
+        else:
+            cut.append(each)
+    return cut
+
+
+def _writable(path: Path) -> bool:
+    return os.access(path, os.W_OK) and bool(path.stat().st_mode & 0o222)
+
+
+@contextmanager
+def _locked(folder: Path) -> Iterator[None]:
+    """Prevent other saves in a folder, by other processes too, where the system has locks."""
+    if os.name != "posix":
+        yield
+        return
+    import fcntl
+
+    handle = os.open(folder, os.O_RDONLY)
+    try:
+        with suppress(OSError):  # network file systems without locks
+            fcntl.flock(handle, fcntl.LOCK_EX)
+        yield
+    finally:
+        os.close(handle)
+
+
+def _flush(target: Path) -> None:
+    """Return when the file and its entry in the folder are physically on the disk."""
+    paths = (target, target.parent) if os.name == "posix" else ()
+    for path in paths:
+        handle = os.open(path, os.O_RDONLY)
+        try:
+            os.fsync(handle)
+        finally:
+            os.close(handle)

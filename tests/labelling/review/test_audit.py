@@ -1,0 +1,269 @@
+import json
+from dataclasses import replace
+
+import msgspec
+import numpy as np
+import pytest
+from tests.labelling.tiny import TINY, tiny_recording
+
+from holdfast.contact import ContactState
+from holdfast.errors import TrainingError
+from holdfast.features import DEPLOYED, parse_features
+from holdfast.labelling.review.audit import (
+    Audit,
+    LabelledFinger,
+    Suspect,
+    audit,
+    default_setting,
+    suspects,
+)
+from holdfast.recordings import Label, Recording, Tactile
+from holdfast.training import Setting
+
+NONE, UNSTABLE, STABLE = (
+    ContactState.NO_CONTACT,
+    ContactState.UNSTABLE,
+    ContactState.STABLE,
+)
+TIMES = np.arange(1000) / 100.0
+
+
+def painted(*spans, first=STABLE):
+    """Codes by sample: the first state, and others in those spans (start, end, state)."""
+    codes = np.full(len(TIMES), first.code)
+    for start, end, state in spans:
+        codes[np.searchsorted(TIMES, start - 1e-9) : np.searchsorted(TIMES, end - 1e-9)] = (
+            state.code
+        )
+    return codes
+
+
+def judged(labels, seen, *, name="one", finger="thumb", sure=0.9):
+    """Labels as codes, and probabilities that are sure of other codes."""
+    cuts = [0, *(np.flatnonzero(np.diff(labels)) + 1).tolist(), len(labels)]
+    each = [
+        Label(start / 100, end / 100, list(ContactState)[labels[start]])
+        for start, end in zip(cuts[:-1], cuts[1:], strict=True)  # noqa: RUF007 (as slices)
+    ]
+    probabilities = np.full((len(seen), 3), (1 - sure) / 2)
+    probabilities[np.arange(len(seen)), seen - 1] = sure
+    return LabelledFinger(name, finger, each, TIMES, 0.01, probabilities)
+
+
+def calm(name="calm", finger="thumb"):
+    """A recording in which all is well, with every kind of edge."""
+    codes = painted(
+        (0, 1, NONE), (1, 2, UNSTABLE), (5, 6, UNSTABLE), (8, 9, UNSTABLE), (9, 10, NONE)
+    )
+    return judged(codes, codes, name=name, finger=finger, sure=0.8)
+
+
+def told(labels, seen, **more):
+    others = [calm(f"calm {k}") for k in range(3)]
+    return suspects([judged(labels, seen, **more), *others])
+
+
+def test_labels_that_fit_are_not_suspect():
+    assert suspects([calm("a"), calm("b")]) == []
+
+
+def test_an_interval_within_a_label():
+    (found,) = told(painted(), painted((3.0, 3.4, UNSTABLE)))
+    assert found == Suspect(
+        "one", "thumb", "interval", 3.0, 3.4, "stable", "unstable", pytest.approx(0.9), None
+    )
+    assert found.weight == pytest.approx(0.36)
+
+
+def test_a_whole_label_that_is_wrong():
+    (found,) = told(painted((3.0, 3.4, NONE)), painted())
+    assert (found.kind, found.start, found.end) == ("interval", 3.0, 3.4)
+    assert (found.given, found.expected) == ("no_contact", "stable")
+
+
+def test_short_contradictions_are_not_told():
+    assert told(painted(), painted((3.0, 3.04, UNSTABLE))) == []
+    assert len(told(painted(), painted((3.0, 3.05, UNSTABLE)))) == 1
+
+
+def test_short_gaps_are_closed():
+    spans = [(3.0, 3.1, UNSTABLE), (3.14, 3.3, UNSTABLE)]
+    (found,) = told(painted(), painted(*spans))
+    assert (found.start, found.end) == (3.0, 3.3)
+    apart = [(3.0, 3.1, UNSTABLE), (3.15, 3.3, UNSTABLE)]
+    assert [(s.start, s.end) for s in told(painted(), painted(*apart))] == [(3.15, 3.3), (3.0, 3.1)]
+
+
+def test_contradictions_for_different_states_are_told_apart():
+    spans = [(3.0, 3.4, UNSTABLE), (3.4, 4.0, NONE)]
+    found = told(painted(), painted(*spans))
+    assert [(s.expected, s.start, s.end) for s in found] == [
+        ("no_contact", 3.4, 4.0),
+        ("unstable", 3.0, 3.4),
+    ]
+
+
+@pytest.mark.parametrize("shift", [-0.3, -0.15, 0.15, 0.3])
+def test_an_edge_that_is_drawn_elsewhere(shift):
+    """The label ends at 4 s; the contact is lost `shift` later."""
+    (found,) = told(painted((4.0, 10.0, UNSTABLE)), painted((4.0 + shift, 10.0, UNSTABLE)))
+    assert found.kind == "edge"
+    assert found.shift == pytest.approx(shift)
+    assert (found.start, found.end) == pytest.approx(sorted((4.0, 4.0 + shift)))
+    states = ("stable", "unstable") if shift < 0 else ("unstable", "stable")
+    assert (found.given, found.expected) == states
+    assert found.confidence == pytest.approx(0.9)
+
+
+def test_an_edge_may_be_a_little_elsewhere():
+    assert told(painted((4.0, 10.0, UNSTABLE)), painted((4.09, 10.0, UNSTABLE))) == []
+
+
+def test_what_all_edges_of_a_kind_have_in_common_is_no_error():
+    """A window of the past tells everything 0.12 s late."""
+    parts = [
+        judged(painted((at, 10, UNSTABLE)), painted((at + 0.12, 10, UNSTABLE)), name=f"at {at}")
+        for at in (3.0, 4.0, 5.0, 6.0)
+    ]
+    assert suspects(parts) == []
+    late = judged(painted((7.0, 10, UNSTABLE)), painted((7.32, 10, UNSTABLE)), name="late")
+    (found,) = suspects([*parts, late])
+    assert (found.recording, found.kind, found.start) == ("late", "edge", 7.0)
+    assert (found.shift, found.confidence) == (pytest.approx(0.2), pytest.approx(0.9))
+
+
+def test_an_edge_that_is_far_off_is_an_interval():
+    (found,) = told(painted((4.0, 10.0, UNSTABLE)), painted((4.8, 10.0, UNSTABLE)))
+    assert (found.kind, found.start, found.end) == ("interval", 4.0, 4.8)
+
+
+def test_doubtful_probabilities_tell_nothing():
+    parts = [calm(f"calm {k}") for k in range(3)]
+    doubtful = judged(painted(), painted((3.0, 3.4, UNSTABLE)), sure=0.5)
+    assert suspects([*parts, doubtful]) == []
+    edge = painted((4.0, 10.0, UNSTABLE)), painted((4.3, 10.0, UNSTABLE))
+    assert suspects([*parts, judged(*edge, sure=0.5)]) == []
+    assert len(suspects([*parts, judged(*edge, sure=0.7)])) == 1
+
+
+def test_stretches_without_label_or_probability_tell_nothing():
+    part = judged(painted(), painted((3.0, 3.4, UNSTABLE), (5.0, 6.0, UNSTABLE)))
+    part.probabilities[490:610] = np.nan
+    labels = [Label(0.0, 2.9, STABLE), Label(3.5, 10.0, STABLE)]
+    assert suspects([replace(part, labels=labels), calm("a"), calm("b")]) == []
+
+
+def test_the_weightiest_come_first_and_fingers_have_their_own_thresholds():
+    spans = [(2.0, 2.2, UNSTABLE), (3.0, 3.5, UNSTABLE)]
+    parts = [
+        calm("a"),
+        calm("b"),
+        calm("a", "index"),
+        calm("b", "index"),
+        judged(painted(), painted(*spans)),
+        judged(painted(), painted((4.0, 4.3, UNSTABLE)), finger="index"),
+    ]
+    found = suspects(parts)
+    assert [(s.finger, s.start) for s in found] == [("thumb", 3.0), ("index", 4.0), ("thumb", 2.0)]
+    assert found == suspects(parts[::-1])
+
+
+def test_nothing_is_told_of_nothing():
+    assert suspects([]) == []
+
+
+def mistaken(recordings, place, wrong):
+    """The recordings, with [start, end) of a thumb labelled with another state."""
+    start, end, state = wrong
+    labels = []
+    for label in recordings[place].modules["thumb"].labels:
+        if label.start < start:
+            labels.append(replace(label, end=min(label.end, start)))
+        if label.end > end:
+            labels.append(replace(label, start=max(label.start, end)))
+    labels.append(Label(start, end, state))
+    own = {"thumb": labels, "index": recordings[place].modules["index"].labels}
+    return [r.with_labels(own) if k == place else r for k, r in enumerate(recordings)]
+
+
+@pytest.fixture(scope="module")
+def grasps():
+    return [tiny_recording(seed) for seed in range(5)]
+
+
+def test_an_audit_finds_a_wrong_label(grasps):
+    found = audit(mistaken(grasps, 2, (5.0, 5.6, UNSTABLE)), n_folds=5)
+    first = found.suspects[0]
+    assert (first.recording, first.finger, first.kind) == ("grasp-2", "thumb", "interval")
+    assert (first.given, first.expected) == ("unstable", "stable")
+    assert first.start == pytest.approx(5.0, abs=0.15)
+    assert first.end == pytest.approx(5.6, abs=0.15)
+    assert found.n_recordings == 5
+    assert 5 * 2 * 4.0 < found.judged < 5 * 2 * 6.0
+
+
+def test_an_audit_of_a_sequence_that_reads_lazily(grasps):
+    class Lazy(list):
+        n_read = 0
+
+        def __getitem__(self, index):
+            self.n_read += not isinstance(index, slice)
+            return super().__getitem__(index)
+
+    lazy = Lazy(grasps)
+    assert audit(lazy, n_folds=2) == audit(grasps, n_folds=2)
+
+
+def test_the_json_document():
+    document = json.loads(
+        msgspec.json.encode(Audit(3, 12.5, told(painted(), painted((3, 4, NONE)))))
+    )
+    assert document["n_recordings"] == 3
+    assert document["judged"] == 12.5
+    assert document["suspects"] == [
+        {
+            "recording": "one",
+            "finger": "thumb",
+            "kind": "interval",
+            "start": 3.0,
+            "end": 4.0,
+            "given": "stable",
+            "expected": "no_contact",
+            "confidence": pytest.approx(0.9),
+            "shift": None,
+        }
+    ]
+
+
+def test_our_own_features_judge_counts_and_the_papers_newton(grasps):
+    assert default_setting(grasps).features == parse_features("holdfast")
+    module = grasps[0].modules["thumb"]
+    newton = Recording("n", {"thumb": Tactile(TINY, module.times, module.readings, unit="N")})
+    assert default_setting([newton]).features == parse_features(DEPLOYED)
+    assert default_setting([]).trials == 0
+
+
+@pytest.mark.parametrize(
+    ("recordings", "text"),
+    [
+        (
+            [],
+            "an audit judges the labels of a recording by those of others: at least 2 recordings "
+            "expected, 0 given",
+        ),
+        (
+            [tiny_recording(1, n=100), tiny_recording(2, n=100)],
+            "none of the labels of 2 recordings can be judged: a finger needs two states, after "
+            "tare and first window, in at least two recordings",
+        ),
+    ],
+)
+def test_recordings_that_cannot_be_audited(recordings, text):
+    with pytest.raises(TrainingError) as error:
+        audit(recordings)
+    assert str(error.value) == text
+
+
+def test_the_setting_may_be_chosen(grasps):
+    own = audit(grasps, Setting(trials=0), n_folds=2)
+    assert own.judged > audit(grasps, n_folds=2).judged  # a shorter first window

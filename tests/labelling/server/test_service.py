@@ -1,0 +1,494 @@
+import asyncio
+import json
+from contextlib import asynccontextmanager
+from dataclasses import replace
+
+import msgspec
+import pytest
+from aiohttp import ClientSession, web
+
+from holdfast.contact import ContactState
+from holdfast.io import labels_path, load_labels, load_recording, save_labels, save_recording
+from holdfast.labelling.review.audit import Suspect
+from holdfast.labelling.server.schema import RecordingDetails
+from holdfast.labelling.server.service import LabellingService
+from holdfast.labelling.server.workspace import Workspace
+from holdfast.recordings import Label
+from holdfast.synthetic import synthetic_recording
+from holdfast.web.guard import Guard
+
+PATIENCE = 60.0
+NOW = "2026-01-02T03:04:05+00:00"
+FINGERS = ("thumb", "index")
+HELD = {"start": 3.0, "end": 4.0, "state": "stable"}
+SLIP = {"start": 4.0, "end": 4.5, "state": "unstable", "cause": "slip", "author": "eve"}
+
+
+@asynccontextmanager
+async def served(paths, token=None, **words):
+    """A client of a service with these recordings."""
+    workspace = Workspace(paths, author="ada", clock=lambda: NOW, **words)
+    service = LabellingService(workspace, Guard("127.0.0.1", token))
+    runner = web.AppRunner(service.app, shutdown_timeout=0.5)
+    await runner.setup()
+    await web.TCPSite(runner, "127.0.0.1", 0).start()
+    url = f"http://127.0.0.1:{runner.addresses[0][1]}"
+    try:
+        async with ClientSession(base_url=url) as client:
+            yield client
+    finally:
+        await runner.cleanup()
+
+
+def run(work):
+    return asyncio.run(asyncio.wait_for(work, PATIENCE))
+
+
+def ask(paths, *requests, **words):
+    """The status and the JSON of each request: (method, path) or (method, path, body)."""
+
+    async def work():
+        found = []
+        async with served(paths, **words) as client:
+            for method, path, *body in requests:
+                data = {"json": body[0]} if body and not isinstance(body[0], bytes) else {}
+                data = {"data": body[0]} if body and isinstance(body[0], bytes) else data
+                async with client.request(method, path, **data) as answer:
+                    found.append((answer.status, await answer.json()))
+        return found
+
+    return run(work())
+
+
+def made(folder, name="grasp", seed=0, suffix=".parquet", bare=True, **changes):
+    """Save a synthetic recording and return its path."""
+    recording = replace(synthetic_recording(name, seed, FINGERS), **changes)
+    path = folder / f"{name}{suffix}"
+    save_recording(recording.with_labels({}) if bare else recording, path)
+    return path
+
+
+def labels(*thumb, revision="none", **words):
+    given = {"labels": {"thumb": list(thumb)}, "note": "", "author": "", **words}
+    return ("PUT", "/api/v1/recordings/0/labels", {**given, "revision": revision})
+
+
+OPEN = ("GET", "/api/v1/recordings/0")
+LIST = ("GET", "/api/v1/recordings")
+PROPOSE = ("POST", "/api/v1/recordings/0/propose", {"rule": "signal", "parameters": {}})
+
+
+@pytest.mark.parametrize("suffix", [".parquet", ".mcap"])
+def test_a_recording_is_opened(tmp_path, suffix):
+    path = made(tmp_path, suffix=suffix, markers=((2.0, "closing"),))
+    recording = load_recording(path)
+    (_, listed), (status, reply) = ask([path], LIST, OPEN)
+    assert listed["schema"] == "holdfast.label/1"
+    assert listed["author"] == "ada"
+    (entry,) = listed["recordings"]
+    assert entry["duration"] == pytest.approx(recording.duration, rel=0.01)
+    del entry["duration"]
+    assert entry == {
+        "id": 0, "name": "grasp", "fingers": ["thumb", "index"], "labelled": False,
+        "n_labels": 0, "n_proposals": 0, "n_doubtful": 0, "error": None,
+    }  # fmt: skip
+    assert status == 200
+    assert (reply["name"], reply["start"], reply["end"]) == ("grasp", 0.0, recording.end)
+    assert reply["fingers"] == ["thumb", "index"]
+    assert reply["unit"] == {"thumb": "count", "index": "count"}
+    assert reply["rate"] == pytest.approx(150.0)
+    assert reply["labels"] == {"thumb": [], "index": []}
+    assert reply["markers"] == [[2.0, "closing"]]
+    assert (reply["origin"], reply["revision"], reply["read_only"]) == ("none", "none", False)
+    msgspec.convert(reply, RecordingDetails)
+
+
+def test_signals_of_a_recording(tmp_path):
+    path = made(tmp_path)
+    part = "/api/v1/recordings/0/signals"
+    whole, near, changes = ask(
+        [path],
+        ("GET", f"{part}?points=100"),
+        ("GET", f"{part}?start=3.0&end=3.5&points=1200"),
+        ("GET", "/api/v1/recordings/0/changes"),
+    )
+    assert [status for status, _ in (whole, near, changes)] == [200] * 3
+    assert whole[1]["exact"] is False
+    assert near[1]["exact"] is True
+    assert set(near[1]["fingers"]["thumb"]) == {"t", "F_a", "F_x", "F_y", "F_z", "sigma"}
+    times = load_recording(path).modules["index"].times
+    inside = times[(times >= 3.0) & (times <= 3.5)].tolist()
+    assert near[1]["fingers"]["index"]["t"][1:-1] == inside
+    assert max(map(len, whole[1]["fingers"]["thumb"].values())) <= 200
+    for finger in FINGERS:  # closing, held, shaken, held, let go, free
+        found = changes[1]["fingers"][finger]
+        assert found == pytest.approx([1.5, 2.3, 5.3, 6.5, 9.5, 10.0], abs=0.06)
+
+
+@pytest.mark.parametrize(
+    ("query", "text"),
+    [
+        ("start=x", "start: a number expected, 'x' given"),
+        ("start=2&end=1", "an end after the start expected, [2.0, 1.0] s given"),
+        ("end=nan", "an end after the start expected, [0.0, nan] s given"),
+        ("points=1", "2 to 10000 points expected, 1 given"),
+        ("points=inf", "2 to 10000 points expected, inf given"),
+    ],
+)
+def test_invalid_parts_are_rejected(tmp_path, query, text):
+    ((status, reply),) = ask([made(tmp_path)], ("GET", f"/api/v1/recordings/0/signals?{query}"))
+    assert status == 422
+    assert reply["error"] == text
+
+
+def test_labels_are_saved_and_returned(tmp_path):
+    path = made(tmp_path)
+    (status, saved), (_, reply), (_, listed) = ask(
+        [path], labels(SLIP, HELD, note="good", author="bob"), OPEN, LIST
+    )
+    assert status == 200
+    assert saved == {"revision": reply["revision"], "time": NOW}
+    assert reply["labels"]["thumb"] == [
+        {**HELD, "cause": None, "evidence": "", "confidence": 1.0, "author": "bob"},
+        {**SLIP, "evidence": "", "confidence": 1.0},
+    ]
+    assert (reply["note"], reply["author"], reply["time"]) == ("good", "bob", NOW)
+    assert reply["origin"] == "file"
+    entry = listed["recordings"][0]
+    assert (entry["labelled"], entry["n_labels"]) == (True, 2)
+    file = load_labels(labels_path(path))
+    assert (file.author, file.notes, file.time) == ("bob", "good", NOW)
+    assert [label.author for label in load_recording(path).modules["thumb"].labels] == [
+        "bob", "eve",
+    ]  # fmt: skip
+
+
+def test_the_last_sample_of_every_finger_can_be_labelled(tmp_path):
+    whole = synthetic_recording("grasp", 0, FINGERS)
+    shorter = whole.modules["index"].slice(10, -10)  # begins later and ends earlier
+    path = made(tmp_path, modules={**whole.modules, "index": shorter})
+    recording = load_recording(path)
+    all_of_it = {"start": 0.0, "end": recording.end + 1 / recording.rate, "state": "stable"}
+    given = {"thumb": [all_of_it], "index": [all_of_it]}
+    (status, _), (_, reply) = ask([path], labels(labels=given), OPEN)
+    assert status == 200
+    for finger, module in recording.modules.items():
+        ((start, end),) = [(each["start"], each["end"]) for each in reply["labels"][finger]]
+        assert start == module.times[0]
+        assert end == pytest.approx(module.times[-1] + module.period)
+    stable = load_recording(path).modules
+    assert all(
+        (module.label_states == ContactState.STABLE.code).all() for module in stable.values()
+    )
+
+
+def test_the_default_author_is_that_of_the_workspace(tmp_path):
+    path = made(tmp_path)
+    ask([path], labels(HELD))
+    assert load_labels(labels_path(path)).author == "ada"
+
+
+def test_labels_inside_are_kept_by_the_first_to_save(tmp_path):
+    path = made(tmp_path, bare=False)
+    _, reply = ask([path], OPEN)[0]
+    assert reply["origin"] == "inside"
+    assert reply["labels"]["thumb"]
+    body = {name: reply[name] for name in ("labels", "note", "author", "revision")}
+    ask([path], ("PUT", "/api/v1/recordings/0/labels", body))
+    assert load_recording(path).modules["thumb"].labels == tuple(
+        replace(label, author=label.author or "ada")
+        for label in load_recording(path, labels=False).modules["thumb"].labels
+    )
+
+
+def test_two_pages_on_one_file(tmp_path):
+    path = made(tmp_path)
+    first, second, reply = ask([path], labels(HELD), labels(SLIP), OPEN)
+    assert first[0] == 200
+    assert second == (
+        409,
+        {
+            "error": "grasp.labels.json was changed by another program since it was read",
+            "revision": first[1]["revision"],
+        },
+    )
+    assert [each["state"] for each in reply[1]["labels"]["thumb"]] == ["stable"]
+
+
+def test_two_pages_at_the_same_instant(tmp_path):
+    path = made(tmp_path)
+
+    async def work():
+        async with served([path]) as client:
+            method, url, body = labels(HELD)
+
+            async def put():
+                async with client.request(method, url, json=body) as answer:
+                    return answer.status
+
+            body = {**body, "note": "x"}
+            return await asyncio.gather(*(put() for _ in range(6)))
+
+    assert sorted(run(work())) == [200, 409, 409, 409, 409, 409]
+
+
+@pytest.mark.parametrize(
+    ("request_", "text"),
+    [
+        (
+            labels(HELD, {**SLIP, "start": 3.9}),
+            "thumb: stable [3, 4) s and unstable [3.9, 4.5) s overlap",
+        ),
+        (labels({**HELD, "end": 2.0}), "thumb: a label ends after its start; [3.0, 2.0) s given"),
+        (
+            labels({**HELD, "state": "firm"}),
+            "thumb, [3, 4) s: state stable, unstable, no_contact expected, 'firm' given",
+        ),
+        (
+            labels({**HELD, "cause": "magic"}),
+            "thumb, [3, 4) s: cause closing, disturbance, slip, lost, released or none "
+            "expected, 'magic' given",
+        ),
+        (labels({**HELD, "end": 50.0}), "thumb: label [3, 50) s lies outside the recording"),
+        (labels({**HELD, "colour": "red"}), "/api/v1/recordings/0/labels: Object contains unknown"),
+        (
+            ("PUT", "/api/v1/recordings/0/labels", {"labels": {"toe": [HELD]}, "revision": "none"}),
+            "labels for toe given; recording 'grasp' has thumb, index",
+        ),
+        (("PUT", "/api/v1/recordings/0/labels", b"{"), "/api/v1/recordings/0/labels: "),
+        (("PUT", "/api/v1/recordings/0/labels", b""), "/api/v1/recordings/0/labels: Object miss"),
+        (
+            (
+                "PUT", "/api/v1/recordings/0/labels",
+                b'{"revision":"none","labels":{"thumb":[{"start":0,"end":1e999,"state":"stable"}]}}',
+            ),
+            "",
+        ),
+    ],
+)  # fmt: skip
+def test_labels_that_are_refused(tmp_path, request_, text):
+    path = made(tmp_path)
+    (status, reply), (_, after) = ask([path], request_, OPEN)
+    assert status == 422
+    assert reply["error"].startswith(text)
+    assert "\n" not in reply["error"]
+    assert after["revision"] == "none"
+    assert not labels_path(path).exists()
+
+
+def test_a_label_file_of_another_recording(tmp_path):
+    path, good = made(tmp_path), made(tmp_path, "good", 2)
+    save_labels(synthetic_recording("other", 1, FINGERS), path)
+    before = labels_path(path).read_bytes()
+    listed, reply, saved = ask([path, good], LIST, OPEN, labels(HELD))
+    first, second = listed[1]["recordings"]
+    assert "grasp.labels.json labels another recording ('other'" in first["error"]
+    assert second["error"] is None
+    assert (reply[0], saved[0]) == (422, 409)
+    assert reply[1]["error"] == first["error"]
+    assert labels_path(path).read_bytes() == before
+
+
+def test_recordings_that_cannot_be_read_are_listed(tmp_path):
+    good, cut, gone = made(tmp_path), tmp_path / "cut.parquet", tmp_path / "gone.mcap"
+    cut.write_bytes(good.read_bytes()[:1000])
+    (_, listed), opened, drawn = ask(
+        [cut, gone, good], LIST, OPEN, ("GET", "/api/v1/recordings/0/signals")
+    )
+    errors = [each["error"] for each in listed["recordings"]]
+    assert "cut.parquet is cut or damaged" in errors[0]
+    assert "gone.mcap" in errors[1]
+    assert errors[2] is None
+    assert (opened[0], drawn[0]) == (422, 422)
+    assert opened[1]["error"] == errors[0]
+
+
+def test_a_file_that_may_only_be_read(tmp_path):
+    path = made(tmp_path)
+    ask([path], labels(HELD))
+    labels_path(path).chmod(0o444)
+    (_, reply), saved = ask([path], OPEN, labels())
+    assert reply["read_only"] is True
+    assert saved[0] == 403
+    assert saved[1]["error"].endswith("cannot be written: it or its folder is read-only")
+
+
+def test_a_disk_that_refuses(tmp_path, monkeypatch):
+    path = made(tmp_path)
+
+    def full(*_):
+        raise OSError(28, "No space left on device")
+
+    monkeypatch.setattr("pathlib.Path.write_bytes", full)
+    ((status, reply),) = ask([path], labels(HELD))
+    assert status == 500
+    assert reply["error"].endswith("No space left on device")
+
+
+def test_proposals_are_made_kept_and_counted(tmp_path):
+    path = made(tmp_path)
+    (_, none), (status, reply), (_, opened), (_, listed) = ask([path], OPEN, PROPOSE, OPEN, LIST)
+    assert none["proposals"] == {}
+    assert status == 200
+    assert reply["rule"] == "signal"
+    assert opened["proposals"] == reply["proposals"]
+    assert opened["doubtful"] == reply["doubtful"]
+    states = {each["state"] for each in reply["proposals"]["thumb"]}
+    assert states == {"stable", "unstable", "no_contact"}
+    assert {each["author"] for each in reply["proposals"]["index"]} == {"rule:signal"}
+    sure = [each["confidence"] for each in reply["doubtful"]]
+    assert sure == sorted(sure)
+    entry = listed["recordings"][0]
+    assert entry["n_proposals"] == sum(map(len, reply["proposals"].values()))
+    assert entry["n_doubtful"] == len(sure)
+
+
+def test_proposals_that_are_labelled_are_done(tmp_path):
+    path = made(tmp_path)
+
+    async def work():
+        async with served([path]) as client:
+            method, url, body = PROPOSE
+            async with client.request(method, url, json=body) as answer:
+                reply = await answer.json()
+            method, url, body = labels(*reply["proposals"]["thumb"])
+            async with client.request(method, url, json=body) as answer:
+                assert answer.status == 200
+            async with client.get("/api/v1/recordings") as answer:
+                return reply, await answer.json()
+
+    reply, listed = run(work())
+    assert listed["recordings"][0]["n_proposals"] == len(reply["proposals"]["index"])
+    authors = {label.author for label in load_recording(path).modules["thumb"].labels}
+    assert authors == {"rule:signal"}
+
+
+@pytest.mark.parametrize(
+    ("body", "text"),
+    [
+        ({"rule": "magic"}, "unknown rule 'magic'; there are signal, tracking, command"),
+        ({"rule": "tracking"}, "no poses in 'grasp': "),
+        ({"rule": "command"}, "recording 'grasp' has no marker of the protocol"),
+        ({"parameters": {"tare": "soon"}}, "tare: seconds above 0"),
+        (
+            {"rule": "tracking", "parameters": {"tracking": "/etc/passwd"}},
+            "parameter 'tracking' given; a page may not set it",
+        ),
+        ({"parameters": {"delay": 1.0}}, "rule 'signal' knows no delay"),
+        ({"rule": "command", "parameters": {"delay": "x"}}, ""),
+        ({"rules": "signal"}, "/api/v1/recordings/0/propose: Object contains unknown"),
+    ],
+)
+def test_invalid_proposal_requests(tmp_path, body, text):
+    path = made(tmp_path, markers=((2.0, "closing"),) if body.get("parameters") else ())
+    (status, reply), (_, opened) = ask([path], (*PROPOSE[:2], body), OPEN)
+    assert status == 422
+    assert reply["error"].startswith(text)
+    assert opened["proposals"] == {}
+
+
+def test_suspects_of_an_audit_are_returned(tmp_path):
+    found = [
+        Suspect("grasp", "thumb", "interval", 1.0, 2.0, "stable", "unstable", 0.9),
+        Suspect("other", "thumb", "interval", 3.0, 4.0, "stable", "unstable", 0.9),
+    ]
+    _, reply = ask([made(tmp_path)], OPEN, suspects=found)[0]
+    assert reply["suspects"] == [
+        {
+            "finger": "thumb", "start": 1.0, "end": 2.0, "given": "stable",
+            "expected": "unstable", "confidence": 0.9, "kind": "interval",
+        }
+    ]  # fmt: skip
+
+
+def test_doubtful_labels_of_a_file_are_returned(tmp_path):
+    path = made(tmp_path)
+    sure, unsure = (
+        Label(k, k + 1, ContactState.STABLE, confidence=c) for k, c in ((2, 0.9), (4, 0.3))
+    )
+    save_labels(load_recording(path).with_labels({"thumb": [sure, unsure]}), path)
+    _, reply = ask([path], OPEN)[0]
+    assert reply["doubtful"] == [
+        {"finger": "thumb", "start": 4.0, "end": 5.0, "state": "stable", "confidence": 0.3}
+    ]
+
+
+def test_videos_beside_the_recording_and_nothing_else(tmp_path):
+    folder = tmp_path / "inside"
+    folder.mkdir()
+    (tmp_path / "secret.txt").write_text("secret")
+    (folder / "wrist.mp4").write_bytes(bytes(range(256)))
+    (folder / "link.mp4").symlink_to(tmp_path / "secret.txt")
+    names = ("wrist.mp4", "gone.mp4", "../secret.txt", str(tmp_path / "secret.txt"), "link.mp4", "")
+    path = made(folder, media=tuple((name, 1.25) for name in names))
+
+    async def work():
+        async with served([path]) as client:
+            async with client.get("/api/v1/recordings/0") as answer:
+                media = (await answer.json())["media"]
+            found = []
+            for index in range(7):
+                async with client.get(f"/media/0/{index}") as answer:
+                    found.append((answer.status, await answer.read()))
+            headers = {"Range": "bytes=10-19"}
+            async with client.get("/media/0/0", headers=headers) as answer:
+                return media, found, (answer.status, await answer.read())
+
+    media, found, part = run(work())
+    assert media[0] == {"index": 0, "name": "wrist.mp4", "offset": 1.25, "missing": False}
+    assert [each["missing"] for each in media] == [False, True, True, True, True, True]
+    assert found[0] == (200, bytes(range(256)))
+    assert [status for status, _ in found[1:]] == [404] * 6
+    assert all(b"secret" not in body for _, body in found)
+    assert json.loads(found[1][1]) == {"error": "there is no such video beside the recording"}
+    assert part == (206, bytes(range(10, 20)))
+
+
+def test_there_are_no_other_recordings(tmp_path):
+    path = made(tmp_path)
+    found = ask(
+        [path],
+        ("GET", "/api/v1/recordings/1"),
+        ("GET", "/api/v1/recordings/1/signals"),
+        ("GET", "/media/1/0"),
+    )
+    assert found == [(404, {"error": "recording 0 to 0 expected, 1 given"})] * 3
+
+
+@pytest.mark.parametrize("path", ["/", "/page/main.js", "/page/style.css", "/web/base.css"])
+def test_the_files_of_the_page(tmp_path, path):
+    async def work():
+        async with served([made(tmp_path)]) as client, client.get(path) as answer:
+            return answer.status, len(await answer.read())
+
+    status, size = run(work())
+    assert status == 200
+    assert size > 100
+
+
+@pytest.mark.parametrize(
+    "path", ["/page/../service.py", "/page/%2e%2e/service.py", "/web/../guard.py"]
+)
+def test_no_files_but_the_pages(tmp_path, path):
+    async def work():
+        async with served([made(tmp_path)]) as client, client.get(path) as answer:
+            return answer.status
+
+    assert run(work()) in (403, 404)
+
+
+def test_other_origins_and_those_without_the_token_are_refused(tmp_path):
+    async def work():
+        async with served([made(tmp_path)], token="secret") as client:
+            found = []
+            for headers in (
+                {},
+                {"Authorization": "Bearer secret"},
+                {"Authorization": "Bearer secret", "Origin": "http://evil.example"},
+                {"Authorization": "Bearer secret", "Host": "evil.example"},
+            ):
+                async with client.get("/api/v1/recordings", headers=headers) as answer:
+                    found.append(answer.status)
+            return found
+
+    assert run(work()) == [401, 200, 403, 403]
