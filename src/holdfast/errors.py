@@ -60,3 +60,10 @@ class MissingExtra(HoldfastError):  # noqa: N818 (it names what to install, not 
             f"this needs the package {package}, which is not installed: "
             f'pip install "holdfast[{extra}]"'
         )
+
+
+def listen_error(host: str, port: int, cause: Exception) -> OutputError:
+    """Return the error of a server whose address is in use or cannot be bound."""
+    text = getattr(cause, "strerror", None) or str(cause)
+    reason = "it is in use" if "in use" in text else text
+    return OutputError(f"cannot listen at {host}:{port} ({reason}); --port 0 finds a free port")

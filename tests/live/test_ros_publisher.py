@@ -5,7 +5,7 @@ import pytest
 
 from holdfast.contact import ContactState, Fault, Reason
 from holdfast.live import ros_publisher
-from holdfast.live.ros_publisher import ERROR, OK, WARN, RosPublisher, statuses_of, topic_names
+from holdfast.live.ros_publisher import ERROR, OK, WARN, RosPublisher, diagnostics_of, topic_names
 from holdfast.live.stream_detector import StreamEstimate, StreamUpdate
 
 from .estimates import UNITS, estimate, finger
@@ -34,17 +34,17 @@ class Noted(RosPublisher):
             raise RuntimeError("no network")
         self.said.append((topic, what))
 
-    def _text(self, topic, text):
+    def _publish_text(self, topic, text):
         self._note(topic, text)
 
-    def _number(self, topic, number):
+    def _publish_number(self, topic, number):
         self._note(topic, number)
 
-    def _force(self, topic, stamp, finger, force, *, newtons):
+    def _publish_force(self, topic, stamp, finger, force, *, newtons):
         self._note(topic, (finger, force, newtons))
         self.stamp = stamp
 
-    def _diagnostics(self, stamp, statuses):
+    def _publish_diagnostics(self, stamp, statuses):
         self._note("/diagnostics", [(one.name, one.level) for one in statuses])
 
     def of(self, topic):
@@ -92,7 +92,7 @@ def test_a_listener_of_a_session_publishes_what_is_new():
 
 
 def test_it_never_holds_up_and_drops_the_oldest(monkeypatch):
-    monkeypatch.setattr(ros_publisher, "N_QUEUED", 4)
+    monkeypatch.setattr(ros_publisher, "MAX_QUEUED_ESTIMATES", 4)
     with Noted() as publisher:
         publisher.gate.clear()
         for k in range(20):
@@ -142,7 +142,7 @@ def test_opened_again_and_closed_twice():
 
 class TestStatuses:
     def of(self, **fingers):
-        return {s.name: s for s in statuses_of((estimate(**fingers), 100.0), 100.5)}
+        return {s.name: s for s in diagnostics_of((estimate(**fingers), 100.0), 100.5)}
 
     def test_of_a_hand_that_is_well(self):
         found = self.of(thumb=finger())
@@ -173,9 +173,9 @@ class TestStatuses:
         assert found["thumb"].level == OK
 
     def test_before_and_after_estimates(self):
-        (before,) = statuses_of(None, 100.0)
+        (before,) = diagnostics_of(None, 100.0)
         assert before[:3] == ("hand", WARN, "no estimate yet")
-        (after,) = statuses_of((estimate(), 100.0), 103.2)
+        (after,) = diagnostics_of((estimate(), 100.0), 103.2)
         assert after[:3] == ("hand", ERROR, "no estimates any more")
         assert after.values == (("seconds_since_estimate", "3"),)
 

@@ -229,7 +229,7 @@ def test_word_without_samples_is_no_packet():
 
 
 def test_a_client_that_does_not_read_is_dropped_and_holds_up_nobody(monkeypatch):
-    monkeypatch.setattr(module, "BACKLOG", 100_000)
+    monkeypatch.setattr(module, "MAX_BACKLOG", 100_000)
     with played(Made(WHOLE)) as server, socket.socket() as lazy:
         lazy.setsockopt(socket.SOL_SOCKET, socket.SO_RCVBUF, 4096)
         lazy.connect(("127.0.0.1", int(server.uri.rsplit(":", maxsplit=1)[1])))
@@ -303,7 +303,7 @@ def test_by_which_it_is_found(host, expected):
 
 def test_the_end_waits_for_clients_that_are_behind(monkeypatch):
     behind = [1]
-    monkeypatch.setattr(module, "_behind", lambda client: behind[0])
+    monkeypatch.setattr(module, "_unsent_bytes", lambda client: behind[0])
     with played(Made(n=5), wait=True) as server, open_source(server.uri):
         assert eventually(lambda: server.n_packets == 5)
         assert not server.wait(0.3)
@@ -312,15 +312,15 @@ def test_the_end_waits_for_clients_that_are_behind(monkeypatch):
 
 
 def test_the_end_does_not_wait_for_ever(monkeypatch):
-    monkeypatch.setattr(module, "_behind", lambda client: 1)
-    monkeypatch.setattr(module, "FAREWELL", 0.1)
+    monkeypatch.setattr(module, "_unsent_bytes", lambda client: 1)
+    monkeypatch.setattr(module, "DRAIN_TIMEOUT", 0.1)
     with played(Made(n=5), wait=True) as server, open_source(server.uri):
         assert server.wait(PATIENCE)
 
 
 def test_who_closes_it_waits_for_nobody(monkeypatch):
-    monkeypatch.setattr(module, "_behind", lambda client: 1)
-    monkeypatch.setattr(module, "FAREWELL", 1e6)
+    monkeypatch.setattr(module, "_unsent_bytes", lambda client: 1)
+    monkeypatch.setattr(module, "DRAIN_TIMEOUT", 1e6)
     with ExitStack() as stack:
         with played(Made(n=5), wait=True) as server:
             stack.enter_context(open_source(server.uri))

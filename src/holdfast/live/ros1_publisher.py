@@ -1,28 +1,28 @@
-"""Estimates on ROS 1 topics: by rospy."""
+"""Publish estimates on ROS 1 topics, with rospy."""
 
 from collections.abc import Iterable, Mapping
 from importlib import import_module
 from typing import Any
 
 from holdfast.errors import SourceError
-from holdfast.live.ros_publisher import DIAGNOSTICS, VECTOR, WRENCH, RosPublisher, Status
+from holdfast.live.ros_publisher import DIAGNOSTICS, VECTOR, WRENCH, DiagnosticStatus, RosPublisher
 from holdfast.ros import rospy_node
 from holdfast.sensors.types import Unit
 
-N_SENDING = 10
-"""Messages that rospy keeps for a subscriber that is slow; then the oldest goes."""
+QUEUE_SIZE = 10
+"""Messages that rospy keeps for a slow subscriber; the oldest is dropped first."""
 
 
 class Ros1Publisher(RosPublisher):
-    """Publishes on ROS 1 topics.
+    """Publish estimates on ROS 1 topics.
 
     Args:
         units: of the readings, by finger.
-        namespace: that topics begin with.
-        master: URI of the ROS master; that of `ROS_MASTER_URI` where not given.
+        namespace: prefix of the topics.
+        master: URI of the ROS master; by default `ROS_MASTER_URI`.
 
     Raises:
-        ValueError: as `RosPublisher`, or it is no URI of a master.
+        ValueError: as `RosPublisher`, or `master` is not a URI.
     """
 
     def __init__(
@@ -34,17 +34,17 @@ class Ros1Publisher(RosPublisher):
         super().__init__(units, namespace)
         self._master = rospy_node.master_uri(master)
         self._publishers: dict[str, Any] = {}
-        self._kinds: dict[str, type[Any]] = {}
+        self._message_types: dict[str, type[Any]] = {}
         self._rospy: Any = None
 
     def _connect(self, topics: Mapping[str, str]) -> None:
         self._rospy = rospy_node.start_node(self._master)
-        self._kinds = {kind: _message(kind) for kind in set(topics.values())}
+        self._message_types = {name: _message_type(name) for name in set(topics.values())}
         for name in ("DiagnosticStatus", "KeyValue"):
-            self._kinds[name] = _message(f"diagnostic_msgs/{name}")
+            self._message_types[name] = _message_type(f"diagnostic_msgs/{name}")
         self._publishers = {
-            topic: self._rospy.Publisher(topic, self._kinds[kind], queue_size=N_SENDING)
-            for topic, kind in topics.items()
+            topic: self._rospy.Publisher(topic, self._message_types[name], queue_size=QUEUE_SIZE)
+            for topic, name in topics.items()
         }
 
     def _disconnect(self) -> None:
@@ -52,13 +52,13 @@ class Ros1Publisher(RosPublisher):
         for publisher in publishers.values():
             publisher.unregister()
 
-    def _text(self, topic: str, text: str) -> None:
+    def _publish_text(self, topic: str, text: str) -> None:
         self._publishers[topic].publish(str(text))
 
-    def _number(self, topic: str, number: float) -> None:
+    def _publish_number(self, topic: str, number: float) -> None:
         self._publishers[topic].publish(number)
 
-    def _force(
+    def _publish_force(
         self,
         topic: str,
         stamp: float,
@@ -67,18 +67,18 @@ class Ros1Publisher(RosPublisher):
         *,
         newtons: bool,
     ) -> None:
-        message = self._kinds[WRENCH if newtons else VECTOR]()
+        message = self._message_types[WRENCH if newtons else VECTOR]()
         vector = message.wrench.force if newtons else message.vector
         self._stamp(message.header, stamp, finger)
         vector.x, vector.y, vector.z = force
         self._publishers[topic].publish(message)
 
-    def _diagnostics(self, stamp: float, statuses: Iterable[Status]) -> None:
-        message = self._kinds[DIAGNOSTICS]()
+    def _publish_diagnostics(self, stamp: float, statuses: Iterable[DiagnosticStatus]) -> None:
+        message = self._message_types[DIAGNOSTICS]()
         self._stamp(message.header, stamp, "")
         for status in statuses:
-            values = [self._kinds["KeyValue"](key, value) for key, value in status.values]
-            one = self._kinds["DiagnosticStatus"](
+            values = [self._message_types["KeyValue"](key, value) for key, value in status.values]
+            one = self._message_types["DiagnosticStatus"](
                 status.level, f"holdfast: {status.name}", status.message, "holdfast", values
             )
             message.status.append(one)
@@ -89,9 +89,9 @@ class Ros1Publisher(RosPublisher):
         header.frame_id = frame
 
 
-def _message(kind: str) -> type[Any]:
-    """The class of a message of ROS."""
-    package, name = kind.split("/")
+def _message_type(full_name: str) -> type[Any]:
+    """Return the class of a ROS message."""
+    package, name = full_name.split("/")
     try:
         found: type[Any] = getattr(import_module(f"{package}.msg"), name)
     except ImportError as cause:

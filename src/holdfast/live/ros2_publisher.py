@@ -1,4 +1,4 @@
-"""Estimates on ROS 2 topics: by Cyclone DDS, with or without ROS 2 on this machine."""
+"""Publish estimates on ROS 2 topics, with Cyclone DDS; no ROS installation is needed."""
 
 from collections.abc import Callable, Iterable, Mapping
 from typing import Any
@@ -9,8 +9,8 @@ from holdfast.live.ros_publisher import (
     STRING,
     VECTOR,
     WRENCH,
+    DiagnosticStatus,
     RosPublisher,
-    Status,
 )
 from holdfast.ros import dds
 from holdfast.ros.cdr import MessageEncoder
@@ -47,21 +47,21 @@ DEFINITIONS = {
         + "diagnostic_msgs/KeyValue\nstring key\nstring value"
     ),
 }
-"""Messages that are published, as ROS 2 defines them."""
+"""Message definitions of ROS 2, by message type."""
 
 NO_TORQUE = {"x": 0.0, "y": 0.0, "z": 0.0}
 
 
 class Ros2Publisher(RosPublisher):
-    """Publishes on ROS 2 topics.
+    """Publish estimates on ROS 2 topics.
 
     Args:
         units: of the readings, by finger.
-        namespace: that topics begin with.
-        domain: of ROS; that of `ROS_DOMAIN_ID` where not given.
+        namespace: prefix of the topics.
+        domain: ROS domain; by default `ROS_DOMAIN_ID`.
 
     Raises:
-        ValueError: as `RosPublisher`, or there is no such domain.
+        ValueError: as `RosPublisher`, or the domain does not exist.
     """
 
     def __init__(
@@ -83,13 +83,13 @@ class Ros2Publisher(RosPublisher):
         self._writers.clear()
         self._node = None
 
-    def _text(self, topic: str, text: str) -> None:
+    def _publish_text(self, topic: str, text: str) -> None:
         self._writers[topic]({"data": text})
 
-    def _number(self, topic: str, number: float) -> None:
+    def _publish_number(self, topic: str, number: float) -> None:
         self._writers[topic]({"data": number})
 
-    def _force(
+    def _publish_force(
         self,
         topic: str,
         stamp: float,
@@ -104,7 +104,7 @@ class Ros2Publisher(RosPublisher):
             message["wrench"] = {"force": vector, "torque": NO_TORQUE}
         self._writers[topic](message)
 
-    def _diagnostics(self, stamp: float, statuses: Iterable[Status]) -> None:
+    def _publish_diagnostics(self, stamp: float, statuses: Iterable[DiagnosticStatus]) -> None:
         found = [
             {
                 "level": status.level,

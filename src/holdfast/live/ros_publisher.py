@@ -1,4 +1,4 @@
-"""Estimates on topics of ROS, whichever ROS: what is published, when, and by which thread."""
+"""Publish estimates on ROS topics: the part that ROS 1 and ROS 2 share."""
 
 import re
 import time
@@ -15,30 +15,30 @@ from holdfast.sensors.types import Unit
 if TYPE_CHECKING:
     from holdfast.live.stream_detector import StreamUpdate
 
-N_QUEUED = 64
-"""Estimates that wait for ROS; then the oldest goes."""
+MAX_QUEUED_ESTIMATES = 64
+"""Maximum number of estimates that wait for ROS; the oldest is dropped first."""
 DIAGNOSTICS_PERIOD = 1.0
-"""Diagnostics come at least so often [s]."""
-STALE = 1.0
-"""An estimate that is older is none any more [s]."""
+"""Maximum time between two diagnostics messages [s]."""
+MAX_ESTIMATE_AGE = 1.0
+"""Age from which an estimate counts as missing in the diagnostics [s]."""
 STRING, FLOAT = "std_msgs/String", "std_msgs/Float64"
 VECTOR, WRENCH = "geometry_msgs/Vector3Stamped", "geometry_msgs/WrenchStamped"
 DIAGNOSTICS = "diagnostic_msgs/DiagnosticArray"
-"""Types of what is published."""
+"""Message types of the topics."""
 OK, WARN, ERROR = 0, 1, 2
-"""Levels of diagnostics, as in ROS."""
+"""Levels of diagnostics in ROS."""
 
 _Force = tuple[float, float, float]
 
 
-class Status(NamedTuple):
-    """The health of a finger or of the hand, for `/diagnostics`.
+class DiagnosticStatus(NamedTuple):
+    """Health of a finger or of the hand, for `/diagnostics`.
 
     Attributes:
         name: of the finger, or `hand`.
         level: OK, WARN or ERROR.
-        message: for people.
-        values: the same for programs.
+        message: one line for the user.
+        values: names and values for programs.
     """
 
     name: str
@@ -48,51 +48,52 @@ class Status(NamedTuple):
 
 
 class RosPublisher(ABC):
-    """Publishes what a detector says, in a thread of its own; it never holds up who calls.
+    """Publish estimates in a separate thread; it never delays the caller.
 
-    Of each finger `NAMESPACE/FINGER/state` (text), `stable_probability` and `instability`
-    (numbers), `force` (a wrench where the unit is N, else a vector); of the hand
-    `NAMESPACE/hand/state`; and `/diagnostics`, once a second and when faults change. Stamps are
-    the host's, of when an estimate was given.
+    The topics of each finger are `NAMESPACE/FINGER/state` (text), `stable_probability` and
+    `instability` (numbers), and `force` (a wrench if the unit is N, else a vector). The topic
+    of the hand is `NAMESPACE/hand/state`. `/diagnostics` is published once a second, and when
+    faults change. Time stamps are the host's time when `publish` was called.
 
     Args:
         units: of the readings, by finger.
-        namespace: that topics begin with.
+        namespace: prefix of the topics.
 
     Attributes:
-        n_dropped: estimates that ROS was too slow for.
+        n_dropped: estimates that were dropped because ROS was too slow.
         n_failed: estimates that ROS refused.
 
     Raises:
-        ValueError: two fingers would have the same topics, or the namespace is no name of ROS.
+        ValueError: two fingers would have the same topics, or the namespace is not a valid
+            ROS name.
     """
 
     def __init__(self, units: Mapping[str, Unit], namespace: str = "/holdfast") -> None:
         self._units = dict(units)
         self._names = topic_names(units, namespace)
         self._namespace = namespace.rstrip("/")
-        self._waiting: deque[tuple[HandEstimate, tuple[str, ...], float]] = deque()
-        self._came = Condition()
+        self._queue: deque[tuple[HandEstimate, tuple[str, ...], float]] = deque()
+        self._queue_changed = Condition()
         self._thread: Thread | None = None
         self._newest: tuple[HandEstimate, float] | None = None
-        self._health: tuple[int, ...] = ()
-        self._due = 0.0
-        self._ending = False
+        self._levels: tuple[int, ...] = ()
+        self._diagnostics_due = 0.0
+        self._closing = False
         self.n_dropped = self.n_failed = 0
 
     def open(self) -> None:
-        """Becomes a node of ROS, and starts.
+        """Connect to ROS, and start the thread.
 
         Raises:
             SourceError: ROS cannot be reached.
         """
         self._connect(self.topics())
-        self._ending = False
+        self._closing = False
         self._thread = Thread(target=self._run, name="holdfast-ros", daemon=True)
         self._thread.start()
 
     def topics(self) -> dict[str, str]:
-        """The type of each topic."""
+        """Return the message type of each topic."""
         topics = {f"{self._namespace}/hand/state": STRING, "/diagnostics": DIAGNOSTICS}
         for finger, name in self._names.items():
             topics[f"{name}/state"] = STRING
@@ -101,10 +102,10 @@ class RosPublisher(ABC):
         return topics
 
     def close(self) -> None:
-        """Publishes what waits, and ends; again, it does nothing."""
-        with self._came:
-            self._ending = True
-            self._came.notify()
+        """Publish what is in the queue, and disconnect; a second call does nothing."""
+        with self._queue_changed:
+            self._closing = True
+            self._queue_changed.notify()
         thread, self._thread = self._thread, None
         if thread is not None:
             thread.join()
@@ -116,82 +117,84 @@ class RosPublisher(ABC):
             self.publish(one.estimate, one.updated_fingers)
 
     def publish(self, estimate: HandEstimate, fingers: Iterable[str] | None = None) -> None:
-        """Publishes an estimate, soon.
+        """Append an estimate to the queue.
 
         Args:
             estimate: of the hand.
-            fingers: whose estimates are new; all where not given.
+            fingers: fingers whose estimate is new; by default all.
         """
-        new = tuple(estimate.fingers if fingers is None else fingers)
-        with self._came:
-            if len(self._waiting) == N_QUEUED:
-                self._waiting.popleft()
+        updated = tuple(estimate.fingers if fingers is None else fingers)
+        with self._queue_changed:
+            if len(self._queue) == MAX_QUEUED_ESTIMATES:
+                self._queue.popleft()
                 self.n_dropped += 1
-            self._waiting.append((estimate, new, time.time()))
-            self._came.notify()
+            self._queue.append((estimate, updated, time.time()))
+            self._queue_changed.notify()
 
     @abstractmethod
     def _connect(self, topics: Mapping[str, str]) -> None:
-        """Becomes a node with these topics, of these types."""
+        """Connect to ROS, with these topics and message types."""
 
     @abstractmethod
     def _disconnect(self) -> None:
-        """Ends the node."""
+        """Disconnect from ROS."""
 
     @abstractmethod
-    def _text(self, topic: str, text: str) -> None: ...
+    def _publish_text(self, topic: str, text: str) -> None: ...
 
     @abstractmethod
-    def _number(self, topic: str, number: float) -> None: ...
+    def _publish_number(self, topic: str, number: float) -> None: ...
 
     @abstractmethod
-    def _force(
+    def _publish_force(
         self, topic: str, stamp: float, finger: str, force: _Force, *, newtons: bool
     ) -> None: ...
 
     @abstractmethod
-    def _diagnostics(self, stamp: float, statuses: Iterable[Status]) -> None: ...
+    def _publish_diagnostics(self, stamp: float, statuses: Iterable[DiagnosticStatus]) -> None: ...
 
     def _run(self) -> None:
         while True:
-            with self._came:
-                until = max(self._due - time.monotonic(), 0.0)
-                self._came.wait_for(lambda: self._waiting or self._ending, until)
-                if self._ending and not self._waiting:
+            with self._queue_changed:
+                until = max(self._diagnostics_due - time.monotonic(), 0.0)
+                self._queue_changed.wait_for(lambda: self._queue or self._closing, until)
+                if self._closing and not self._queue:
                     return
-                item = self._waiting.popleft() if self._waiting else None
+                item = self._queue.popleft() if self._queue else None
             try:
-                self._say(item)
-            except Exception:  # whatever ROS raises: the next may do
+                self._publish_item(item)
+            except Exception:  # of any kind; the next estimate may succeed
                 self.n_failed += 1
 
-    def _say(self, item: tuple[HandEstimate, tuple[str, ...], float] | None) -> None:
+    def _publish_item(self, item: tuple[HandEstimate, tuple[str, ...], float] | None) -> None:
         if item is not None:
             estimate, fingers, stamp = item
             self._newest = estimate, stamp
-            self._estimate(estimate, fingers, stamp)
-        self._look_after()
+            self._publish_estimate(estimate, fingers, stamp)
+        self._update_diagnostics()
 
-    def _estimate(self, estimate: HandEstimate, fingers: Iterable[str], stamp: float) -> None:
+    def _publish_estimate(
+        self, estimate: HandEstimate, fingers: Iterable[str], stamp: float
+    ) -> None:
         for finger in fingers:
             one, name = estimate.fingers[finger], self._names[finger]
-            self._text(f"{name}/state", one.state)
-            self._number(f"{name}/stable_probability", one.stable_probability)
-            self._number(f"{name}/instability", one.instability)
+            self._publish_text(f"{name}/state", one.state)
+            self._publish_number(f"{name}/stable_probability", one.stable_probability)
+            self._publish_number(f"{name}/instability", one.instability)
             newtons = self._units[finger] == "N"
-            self._force(f"{name}/force", stamp, finger, one.force, newtons=newtons)
-        self._text(f"{self._namespace}/hand/state", estimate.state)
+            self._publish_force(f"{name}/force", stamp, finger, one.force, newtons=newtons)
+        self._publish_text(f"{self._namespace}/hand/state", estimate.state)
 
-    def _look_after(self) -> None:
-        """Diagnostics, where they are due or the health is another."""
+    def _update_diagnostics(self) -> None:
+        """Publish the diagnostics if they are due or have changed."""
         now = time.time()
-        statuses = statuses_of(self._newest, now)
-        health = tuple(hash((one.level, one.message)) for one in statuses)
-        if health == self._health and time.monotonic() < self._due:
+        statuses = diagnostics_of(self._newest, now)
+        levels = tuple(hash((one.level, one.message)) for one in statuses)
+        if levels == self._levels and time.monotonic() < self._diagnostics_due:
             return
-        self._health = health
-        self._due = time.monotonic() + DIAGNOSTICS_PERIOD
-        self._diagnostics(now, statuses)
+        self._levels = levels
+        self._diagnostics_due = time.monotonic() + DIAGNOSTICS_PERIOD
+        self._publish_diagnostics(now, statuses)
 
     def __enter__(self) -> Self:
         self.open()
@@ -207,13 +210,14 @@ class RosPublisher(ABC):
 
 
 def topic_names(fingers: Iterable[str], namespace: str) -> dict[str, str]:
-    """What the topics of each finger begin with.
+    """Return the prefix of each finger's topics.
 
-    Names of ROS are of letters, digits and `_`, and no part begins with a digit: `index/1`
-    becomes `index_1`.
+    A ROS name has letters, digits and `_`, and no part begins with a digit: `index/1` becomes
+    `index_1`.
 
     Raises:
-        ValueError: two fingers would have the same, or the namespace is no name of ROS.
+        ValueError: two fingers would have the same prefix, or the namespace is not a valid ROS
+            name.
 
     Example:
         >>> topic_names(["thumb", "index/1"], "/holdfast")
@@ -222,47 +226,49 @@ def topic_names(fingers: Iterable[str], namespace: str) -> dict[str, str]:
     base = namespace.rstrip("/")
     if not re.fullmatch(r"(/[A-Za-z][A-Za-z0-9_]*)*", base):
         raise ValueError(f"a namespace as /holdfast expected, {namespace!r} given")
-    names = {finger: f"{base}/{_name(finger)}" for finger in fingers}
+    names = {finger: f"{base}/{_ros_name(finger)}" for finger in fingers}
     if len({*names.values(), f"{base}/hand"}) <= len(names):
         raise ValueError(f"fingers {', '.join(names)} would share topics: rename one")
     return names
 
 
-def _name(finger: str) -> str:
-    plain = re.sub(r"[^A-Za-z0-9_/]", "_", finger).strip("/")
-    plain = re.sub(r"/+(?=[0-9_])", "_", re.sub(r"_{2,}", "_", plain))
-    return plain if plain[:1].isalpha() else f"finger_{plain.lstrip('_')}"
+def _ros_name(finger: str) -> str:
+    name = re.sub(r"[^A-Za-z0-9_/]", "_", finger).strip("/")
+    name = re.sub(r"/+(?=[0-9_])", "_", re.sub(r"_{2,}", "_", name))
+    return name if name[:1].isalpha() else f"finger_{name.lstrip('_')}"
 
 
-def statuses_of(newest: tuple[HandEstimate, float] | None, now: float) -> list[Status]:
-    """The health of each finger and of the hand.
+def diagnostics_of(newest: tuple[HandEstimate, float] | None, now: float) -> list[DiagnosticStatus]:
+    """Return the health of the hand and of each finger.
 
     Args:
-        newest: estimate, and when it was given [s].
-        now: on the same clock [s].
+        newest: estimate, and when it was published [s].
+        now: current time on the same clock [s].
     """
     if newest is None:
-        return [Status("hand", WARN, "no estimate yet", ())]
-    estimate, given = newest
-    if now - given > STALE:
-        silent = (("seconds_since_estimate", f"{now - given:.0f}"),)
-        return [Status("hand", ERROR, "no estimates any more", silent)]
-    fingers = [_status(name, finger) for name, finger in estimate.fingers.items()]
+        return [DiagnosticStatus("hand", WARN, "no estimate yet", ())]
+    estimate, published = newest
+    if now - published > MAX_ESTIMATE_AGE:
+        silent = (("seconds_since_estimate", f"{now - published:.0f}"),)
+        return [DiagnosticStatus("hand", ERROR, "no estimates any more", silent)]
+    fingers = [_diagnostic(name, finger) for name, finger in estimate.fingers.items()]
     worst = max((status.level for status in fingers), default=OK)
     faulty = [status.name for status in fingers if status.level == worst] if worst else []
     text = f"look at {', '.join(faulty)}" if faulty else "all fingers are well"
-    hand = Status("hand", worst, text, (("state", str(estimate.state)),))
+    hand = DiagnosticStatus("hand", worst, text, (("state", str(estimate.state)),))
     return [hand, *fingers]
 
 
-def _status(name: str, finger: ContactEstimate) -> Status:
+def _diagnostic(name: str, finger: ContactEstimate) -> DiagnosticStatus:
     faults = ", ".join(finger.faults)
-    is_blind = finger.state is ContactState.UNKNOWN and finger.reason in (Reason.FAULT, Reason.GAP)
-    level = ERROR if is_blind else WARN if faults else OK
+    is_lost = finger.state is ContactState.UNKNOWN and finger.reason in (Reason.FAULT, Reason.GAP)
+    level = ERROR if is_lost else WARN if faults else OK
     values = (
         ("state", str(finger.state)),
         ("reason", str(finger.reason)),
         ("faults", faults),
         ("faulty_taxels", ", ".join(map(str, finger.faulty_taxels))),
     )
-    return Status(name, level, faults or (str(finger.reason) if is_blind else "well"), values)
+    return DiagnosticStatus(
+        name, level, faults or (str(finger.reason) if is_lost else "well"), values
+    )

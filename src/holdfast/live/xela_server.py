@@ -1,4 +1,4 @@
-"""A stand-in for XELA's server: what a source gives, sent to whoever connects."""
+"""Send the samples of a source to clients, in the protocol of XELA's server."""
 
 import asyncio
 import logging
@@ -11,7 +11,7 @@ from typing import Self
 from websockets.asyncio.server import ServerConnection, broadcast, serve
 from websockets.exceptions import ConnectionClosed
 
-from holdfast.errors import OutputError
+from holdfast.errors import listen_error
 from holdfast.sources import Source
 from holdfast.sources.xela.encoder import (
     NEW_VERSION,
@@ -21,40 +21,41 @@ from holdfast.sources.xela.encoder import (
 )
 
 HOST, PORT = "127.0.0.1", 5000
-PATIENCE = 0.2
-"""How long the source is waited for before it is looked whether to stop [s]."""
-BACKLOG = 32 * 2**20
-"""A client that is so many bytes behind is dropped; nobody waits for it."""
-CLOSING = 1.0
-"""How long clients have to say goodbye [s]."""
-FAREWELL = 10.0
-"""How long, at the end of a recording, clients have to take what they have not read yet [s]."""
+READ_TIMEOUT = 0.2
+"""Maximum time to wait for the source before the stop flag is checked [s]."""
+MAX_BACKLOG = 32 * 2**20
+"""Maximum unsent data of a client [bytes]; a client with more is disconnected."""
+CLOSE_TIMEOUT = 1.0
+"""Time for the closing handshake of a client [s]."""
+DRAIN_TIMEOUT = 10.0
+"""Maximum time, after the source has ended, to wait for clients that read slowly [s]."""
 
-_QUIET = logging.getLogger("holdfast.live.xela_server")
-_QUIET.addHandler(logging.NullHandler())
+_SILENT_LOGGER = logging.getLogger("holdfast.live.xela_server")
+_SILENT_LOGGER.addHandler(logging.NullHandler())
 
 
 class XelaServer:
-    """Acts as a XELA server for a source, in threads of its own.
+    """XELA server that sends the samples of a source; it runs in its own threads.
 
-    Stamps are the times of the source, shifted by one constant that makes the first one now. A
-    packet is sent when the source gives it. A client that does not read holds up nobody.
+    The time stamps are the times of the source, shifted by a constant so that the first one is
+    the current time. Packets are sent as soon as the source provides the samples. A client
+    that does not read delays no other client.
 
     Args:
-        source: that is open; whoever opened it closes it.
-        version: of the server, 1.7 or 1.8.
+        source: an open source; the caller closes it.
+        version: of the server protocol, 1.7 or 1.8.
         host: address to listen at.
-        port: 0 for any that is free.
+        port: 0 for any free port.
         whole_hand: send fingertips as part of a whole hand.
-        wait: begin when the first client is there.
+        wait: start to read the source when the first client connects.
 
     Attributes:
-        encoder: that makes the packets.
-        n_packets: that were sent.
-        failure: why it ended, where it failed.
+        encoder: encoder of the packets.
+        n_packets: number of packets sent.
+        failure: the exception that ended the server; None if there was none.
 
     Raises:
-        ValueError: the source cannot be sent so.
+        ValueError: the protocol cannot represent the sensors of the source.
 
     Example:
         >>> with XelaServer(source, port=0) as server:  # doctest: +SKIP
@@ -77,95 +78,97 @@ class XelaServer:
         self._address = host, port
         self.n_packets = 0
         self.failure: Exception | None = None
-        self._refusal: Exception | None = None
+        self._start_failure: Exception | None = None
         self._clients: set[ServerConnection] = set()
-        self._began = Event()
+        self._listening = Event()
         self._stopping = Event()
-        self._over = Event()
-        self._someone = Event()
+        self._ended = Event()
+        self._client_seen = Event()
         if not wait:
-            self._someone.set()
-        self._shift: float | None = None
-        self._serving = Thread(target=self._serve, name="holdfast-play", daemon=True)
-        self._feeding = Thread(target=self._feed, name="holdfast-play-source", daemon=True)
+            self._client_seen.set()
+        self._time_offset: float | None = None
+        self._server_thread = Thread(target=self._serve, name="holdfast-play", daemon=True)
+        self._source_thread = Thread(
+            target=self._read_source, name="holdfast-play-source", daemon=True
+        )
 
     @property
     def n_clients(self) -> int:
-        """How many are connected."""
+        """Number of connected clients."""
         return len(self._clients)
 
     @property
     def ended(self) -> bool:
-        """Whether the source is over, or sending it failed."""
-        return self._over.is_set()
+        """Whether the source has ended, or sending has failed."""
+        return self._ended.is_set()
 
     @property
     def uri(self) -> str:
-        """By which `open_source` finds it, with the names of the modules."""
+        """URI for `open_source`, with the names of the modules."""
         host, port = self._address
         shown = "127.0.0.1" if host in ("0.0.0.0", "::", "") else host
-        place = f"xela://[{shown}]:{port}" if ":" in shown else f"xela://{shown}:{port}"
+        address = f"xela://[{shown}]:{port}" if ":" in shown else f"xela://{shown}:{port}"
         if self.encoder.is_hand:
-            return place
+            return address
         names = ",".join(f"{number}:{name}" for number, (name,) in self.encoder.modules.items())
-        return f"{place}?fingers={names}"
+        return f"{address}?fingers={names}"
 
     def wait(self, timeout: float) -> bool:
-        """Waits until it has ended, for `timeout` [s] at the most; whether it has."""
-        return self._over.wait(timeout)
+        """Wait at most `timeout` [s] for the end. Return whether it has ended."""
+        return self._ended.wait(timeout)
 
     def __enter__(self) -> Self:
-        self._serving.start()
-        self._began.wait()
-        if self._refusal is not None:
-            self._serving.join()
-            raise self._refusal
-        self._feeding.start()
+        self._server_thread.start()
+        self._listening.wait()
+        if self._start_failure is not None:
+            self._server_thread.join()
+            raise self._start_failure
+        self._source_thread.start()
         return self
 
     def __exit__(self, *_: object) -> None:
         self._stopping.set()
-        self._feeding.join()
+        self._source_thread.join()
         self._loop.call_soon_threadsafe(self._stop.set)
-        self._serving.join()
+        self._server_thread.join()
 
-    def _feed(self) -> None:
-        """Reads the source, and hands its packets to the loop that sends them."""
+    def _read_source(self) -> None:
+        """Read the source, and pass its packets to the event loop that sends them."""
         try:
-            while not self._stopping.is_set() and not self._someone.wait(PATIENCE):
+            while not self._stopping.is_set() and not self._client_seen.wait(READ_TIMEOUT):
                 pass
             while not self._stopping.is_set() and not self._source.ended:
-                arrival = self._source.read(PATIENCE)
+                arrival = self._source.read(READ_TIMEOUT)
                 if arrival is not None and arrival.samples:
-                    self._tell(self._batcher.add(arrival.samples, arrival.time))
-            self._tell(self._batcher.flush())
-        except Exception as failure:  # told by whoever started it
+                    self._queue_packets(self._batcher.add(arrival.samples, arrival.time))
+            self._queue_packets(self._batcher.flush())
+        except Exception as failure:  # the caller reads it
             self.failure = failure
         finally:
             if not self._stopping.is_set() and self.failure is None:
-                self._wait_for_readers()
-            self._over.set()
+                self._wait_for_clients()
+            self._ended.set()
 
-    def _tell(self, due: Iterator[SampleBatch]) -> None:
-        for batch in due:
+    def _queue_packets(self, batches: Iterator[SampleBatch]) -> None:
+        for batch in batches:
             self._loop.call_soon_threadsafe(self._send, self._packet(batch))
 
     def _packet(self, batch: SampleBatch) -> str:
         now = time.time()
-        if self._shift is None:
-            self._shift = now - batch.time
-        times = {name: one + self._shift for name, one in batch.times.items()}
-        packet = self.encoder.packet(batch.samples, batch.time + self._shift, now, times)
+        if self._time_offset is None:
+            self._time_offset = now - batch.time
+        times = {name: one + self._time_offset for name, one in batch.times.items()}
+        packet = self.encoder.packet(batch.samples, batch.time + self._time_offset, now, times)
         return packet.decode()
 
-    def _wait_for_readers(self) -> None:
-        asyncio.run_coroutine_threadsafe(self._emptied(), self._loop).result()
+    def _wait_for_clients(self) -> None:
+        asyncio.run_coroutine_threadsafe(self._drain(), self._loop).result()
 
-    async def _emptied(self) -> None:
-        """Waits until the last packet is on its way to everybody."""
-        until = time.monotonic() + FAREWELL
-        while any(_behind(client) for client in self._clients):
-            if self._stopping.is_set() or time.monotonic() > until:
+    async def _drain(self) -> None:
+        """Wait until the last packet has been sent to all clients."""
+        deadline = time.monotonic() + DRAIN_TIMEOUT
+        while any(_unsent_bytes(client) for client in self._clients):
+            if self._stopping.is_set() or time.monotonic() > deadline:
                 return
             await asyncio.sleep(0.01)
 
@@ -178,26 +181,25 @@ class XelaServer:
         host, port = self._address
         try:
             server = await serve(
-                self._greet, host, port,
-                compression=None, close_timeout=CLOSING, max_size=2**16, logger=_QUIET,
+                self._serve_client, host, port,
+                compression=None, close_timeout=CLOSE_TIMEOUT, max_size=2**16,
+                logger=_SILENT_LOGGER,
             )  # fmt: skip
         except (OSError, OverflowError) as cause:
-            self._refusal = OutputError(
-                f"cannot listen at {host}:{port} ({_reason(cause)}); --port 0 finds a free port"
-            )
-            self._began.set()
+            self._start_failure = listen_error(host, port, cause)
+            self._listening.set()
             return
         async with server:
             self._address = host, next(iter(server.sockets)).getsockname()[1]
-            self._began.set()
+            self._listening.set()
             await self._stop.wait()
 
-    async def _greet(self, client: ServerConnection) -> None:
-        """Tells a client "Welcome", then lets it have all packets until it leaves."""
+    async def _serve_client(self, client: ServerConnection) -> None:
+        """Send "Welcome" to a client, then all packets until it disconnects."""
         with suppress(ConnectionClosed):
             await client.send(self.encoder.welcome().decode())
             self._clients.add(client)
-            self._someone.set()
+            self._client_seen.set()
             try:
                 async for _ in client:  # a XELA server takes no commands
                     pass
@@ -205,18 +207,13 @@ class XelaServer:
                 self._clients.discard(client)
 
     def _send(self, packet: str) -> None:
-        for client in [one for one in self._clients if _behind(one) > BACKLOG]:
+        for client in [one for one in self._clients if _unsent_bytes(one) > MAX_BACKLOG]:
             client.transport.abort()
         broadcast(self._clients, packet)
         self.n_packets += 1
 
 
-def _behind(client: ServerConnection) -> int:
-    """Bytes that wait to be sent to a client."""
-    waiting: int = client.transport.get_write_buffer_size()
-    return waiting
-
-
-def _reason(cause: Exception) -> str:
-    text = getattr(cause, "strerror", None) or str(cause)
-    return "it is in use" if "in use" in text else text
+def _unsent_bytes(client: ServerConnection) -> int:
+    """Return the number of bytes that wait to be sent to a client."""
+    n_bytes: int = client.transport.get_write_buffer_size()
+    return n_bytes

@@ -1,1 +1,1 @@
-"""What every page of holdfast stands on: who may come in, and serving until Ctrl-C."""
+"""What the web pages of holdfast share: access control, server, scripts and styles."""

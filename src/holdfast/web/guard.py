@@ -1,4 +1,4 @@
-"""Who may talk to the web service: this machine, or who knows the token; no foreign pages."""
+"""Access control of the web services: by host, origin and token."""
 
 import hmac
 from collections.abc import Awaitable, Callable
@@ -6,31 +6,33 @@ from ipaddress import ip_address
 
 from aiohttp import web
 
-POLICY = {
+SECURITY_HEADERS = {
     "Content-Security-Policy": "default-src 'self'; connect-src 'self'; img-src 'self' data:; "
     "frame-ancestors 'none'; base-uri 'none'; form-action 'none'",
     "X-Content-Type-Options": "nosniff",
     "Referrer-Policy": "no-referrer",
     "Cache-Control": "no-cache",
 }
-"""What every answer says: nothing from elsewhere, nothing inside another page."""
+"""Headers of every response: the page loads nothing from other servers, and no other page may
+embed it."""
 
-GUARDED = ("/api/", "/media/")
-"""Where the token is needed; a page itself holds no secret."""
+TOKEN_PATHS = ("/api/", "/media/")
+"""Paths that need the token; the page itself contains no secret."""
 
 Handler = Callable[[web.Request], Awaitable[web.StreamResponse]]
 
 
 class Guard:
-    """Refuses requests from other origins, by other names, or without the token.
+    """Refuse requests with another host name, from another origin, or without the token.
 
     Args:
-        host: that the service is bound to.
-        token: that requests must show, as `Authorization: Bearer TOKEN` or `?token=TOKEN`;
-            None for none.
+        host: address that the service listens at.
+        token: secret of every request, as `Authorization: Bearer TOKEN` or `?token=TOKEN`;
+            None if no token is needed.
 
     Raises:
-        ValueError: another host than this machine without a token, or an empty token.
+        ValueError: the host can be reached from the network but there is no token, or the
+            token is empty.
     """
 
     def __init__(self, host: str, token: str | None = None) -> None:
@@ -45,26 +47,26 @@ class Guard:
 
     @web.middleware
     async def middleware(self, request: web.Request, handler: Handler) -> web.StreamResponse:
-        """Passes on what may pass, and marks the answer."""
+        """Check a request, and add the security headers to its response."""
         self._check(request)
         response = await handler(request)
         if not response.prepared:
-            response.headers.update(POLICY)
+            response.headers.update(SECURITY_HEADERS)
         return response
 
     def _check(self, request: web.Request) -> None:
-        if self._local and not is_local(_name(request.host)):
+        if self._local and not is_local(_without_port(request.host)):
             raise web.HTTPForbidden(text=f"host {request.host!r} refused: this machine expected")
         origin = request.headers.get("Origin")
         if origin is not None and origin.partition("://")[2] != request.host:
             raise web.HTTPForbidden(text=f"origin {origin!r} refused: {request.host} expected")
-        if request.path.startswith(GUARDED) and not self._knows_token(request):
+        if request.path.startswith(TOKEN_PATHS) and not self._has_token(request):
             raise web.HTTPUnauthorized(
                 text="token expected: Authorization: Bearer TOKEN, or ?token=TOKEN",
                 headers={"WWW-Authenticate": "Bearer"},
             )
 
-    def _knows_token(self, request: web.Request) -> bool:
+    def _has_token(self, request: web.Request) -> bool:
         if self._token is None:
             return True
         bearer = request.headers.get("Authorization", "").removeprefix("Bearer ")
@@ -73,15 +75,15 @@ class Guard:
 
 
 def is_local(host: str) -> bool:
-    """Whether it is a name of this machine that only this machine reaches."""
+    """Return whether a host name can only be reached from this machine."""
     try:
         return ip_address(host.strip("[]")).is_loopback
     except ValueError:
         return host == "localhost"
 
 
-def _name(host: str) -> str:
-    """A host without its port."""
+def _without_port(host: str) -> str:
+    """Return a host without its port."""
     if host.startswith("["):
         return host.partition("]")[0] + "]"
     return host.partition(":")[0]

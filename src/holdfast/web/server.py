@@ -1,4 +1,4 @@
-"""Serving a web application until somebody has enough."""
+"""Run a web application until it is interrupted."""
 
 import asyncio
 import signal
@@ -7,65 +7,65 @@ from contextlib import suppress
 
 from aiohttp import web
 
-from holdfast.errors import OutputError
+from holdfast.errors import listen_error
 
-LOOK_EVERY = 0.2
-"""How often it is asked whether all is over [s]."""
-SHUTDOWN = 1.0
-"""How long readers have to leave [s]."""
+POLL_INTERVAL = 0.2
+"""Time between two calls of `is_over` [s]."""
+SHUTDOWN_TIMEOUT = 1.0
+"""Time that clients have to disconnect [s]."""
 
 
 def run_server(
     app: web.Application,
     host: str,
     port: int,
-    tell: Callable[[str], None],
-    over: Callable[[], bool] = lambda: False,
+    announce: Callable[[str], None],
+    is_over: Callable[[], bool] = lambda: False,
 ) -> None:
-    """Serves until Ctrl-C, SIGTERM or SIGHUP, and then ends in order.
+    """Run a web application until Ctrl-C, SIGTERM or SIGHUP, then shut it down in order.
 
     Args:
-        app: what is served.
+        app: the application.
         host: address to listen at.
-        port: 0 for any that is free.
-        tell: is given the address of the page once it can be opened.
-        over: whether there is nothing to serve any more; asked a few times a second.
+        port: 0 for any free port.
+        announce: called with the address of the page once the page can be opened.
+        is_over: returns whether the server should stop; called a few times a second.
 
     Raises:
-        OutputError: the address cannot be listened at.
+        OutputError: the address is in use or cannot be bound.
     """
     with suppress(KeyboardInterrupt):
-        asyncio.run(_serve(app, host, port, tell, over))
+        asyncio.run(_serve(app, host, port, announce, is_over))
 
 
 async def _serve(
     app: web.Application,
     host: str,
     port: int,
-    tell: Callable[[str], None],
-    over: Callable[[], bool],
+    announce: Callable[[str], None],
+    is_over: Callable[[], bool],
 ) -> None:
-    runner = web.AppRunner(app, access_log=None, shutdown_timeout=SHUTDOWN)
+    runner = web.AppRunner(app, access_log=None, shutdown_timeout=SHUTDOWN_TIMEOUT)
     await runner.setup()
     try:
         await _listen(runner, host, port)
-        tell(_address(runner, host))
+        announce(_address(runner, host))
         stopped = asyncio.Event()
-        _end_by_signal(stopped)
-        while not stopped.is_set() and not over():
+        _stop_by_signal(stopped)
+        while not stopped.is_set() and not is_over():
             with suppress(TimeoutError):
-                await asyncio.wait_for(stopped.wait(), LOOK_EVERY)
+                await asyncio.wait_for(stopped.wait(), POLL_INTERVAL)
     finally:
         await runner.cleanup()
 
 
-def _end_by_signal(stopped: asyncio.Event) -> None:
-    """SIGTERM, and a terminal that goes away unless that is ignored, end it; so does Ctrl-C."""
+def _stop_by_signal(stopped: asyncio.Event) -> None:
+    """Set `stopped` on SIGTERM, and on SIGHUP unless the process ignores it."""
     loop = asyncio.get_running_loop()
     for name in ("SIGTERM", "SIGHUP"):
         number = getattr(signal, name, None)
         if number is not None and signal.getsignal(number) is not signal.SIG_IGN:
-            with suppress(NotImplementedError):  # Windows knows no handlers here
+            with suppress(NotImplementedError):  # Windows has no signal handlers in event loops
                 loop.add_signal_handler(number, stopped.set)
 
 
@@ -73,14 +73,7 @@ async def _listen(runner: web.AppRunner, host: str, port: int) -> None:
     try:
         await web.TCPSite(runner, host, port).start()
     except (OSError, OverflowError) as cause:
-        raise OutputError(
-            f"cannot listen at {host}:{port} ({_reason(cause)}); --port 0 finds a free port"
-        ) from cause
-
-
-def _reason(cause: Exception) -> str:
-    text = getattr(cause, "strerror", None) or str(cause)
-    return "it is in use" if "in use" in text else text
+        raise listen_error(host, port, cause) from cause
 
 
 def _address(runner: web.AppRunner, host: str) -> str:

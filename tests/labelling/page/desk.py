@@ -13,7 +13,7 @@ from pathlib import Path
 import numpy as np
 from aiohttp import web
 
-from holdfast.web.guard import POLICY
+from holdfast.web.guard import SECURITY_HEADERS
 
 PAGE = Path(str(resources.files("holdfast.labelling"))) / "page"
 SHARED = Path(str(resources.files("holdfast.web"))) / "static"
@@ -172,7 +172,7 @@ class Desk:
     async def guard(self, request, handler):
         answer = await handler(request)
         if not answer.prepared:
-            answer.headers.update(POLICY)
+            answer.headers.update(SECURITY_HEADERS)
         return answer
 
     def of(self, request):

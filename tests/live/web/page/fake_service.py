@@ -21,7 +21,7 @@ from holdfast.detector import detect
 from holdfast.io import load_recording
 from holdfast.model import Model
 from holdfast.sensors import sensor
-from holdfast.web.guard import POLICY
+from holdfast.web.guard import SECURITY_HEADERS
 
 PAGE = Path(str(resources.files("holdfast.live.web"))) / "page"
 SHARED = Path(str(resources.files("holdfast.web"))) / "static"
@@ -265,7 +265,7 @@ class Service:
                 return web.json_response({"error": self.refusal}, status=409)
         answer = await handler(request)
         if not answer.prepared:
-            answer.headers.update(POLICY)
+            answer.headers.update(SECURITY_HEADERS)
         return answer
 
     async def index(self, _):
