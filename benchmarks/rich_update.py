@@ -10,7 +10,7 @@ import numpy as np
 
 from holdfast.classifiers import LinearClassifier
 from holdfast.detector import Detector
-from holdfast.features import DEPLOYED, parse_features
+from holdfast.features import DEPLOYED_FEATURES, parse_features
 from holdfast.model import FingerModel, Model
 from holdfast.sensors import sensor
 
@@ -22,7 +22,7 @@ N_WARM = 200
 
 def deployed() -> Model:
     """A model of the paper's shape for any finger; its numbers do not matter here."""
-    features = parse_features(DEPLOYED, 14)
+    features = parse_features(DEPLOYED_FEATURES, 14)
     ones = (1.0,) * len(features)
     rule = LinearClassifier(mean=ones, scale=ones, coefficients=(0.01,) * len(ones), intercept=0.1)
     finger = FingerModel(features=features, classifier=rule, contact_threshold=20.0)

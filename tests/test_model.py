@@ -228,7 +228,7 @@ class TestFingers:
         with pytest.raises(ModelError) as raised:
             judge.fingers_of({"b": sensor(3, "big")})
         assert str(raised.value) == (
-            "the model judges fingers with the sensor 'tiny'; given are b (big)"
+            "the model is for fingers with the sensor 'tiny'; given are b (big)"
         )
 
 
@@ -307,7 +307,7 @@ class TestTwin:
         with pytest.raises(ModelError) as raised:
             judge.predict_proba(recording(index=tactile()))
         assert str(raised.value) == (
-            "the model judges fingers with the sensor 'uskin-curved'; given are index (tiny)"
+            "the model is for fingers with the sensor 'uskin-curved'; given are index (tiny)"
         )
 
     def test_a_copy_in_a_file_is_the_same(self, tmp_path):

@@ -10,7 +10,7 @@ import pytest
 
 from holdfast import parallel
 from holdfast.errors import EngineError, MissingExtra
-from holdfast.parallel import Engine, each
+from holdfast.parallel import Engine, map_ordered
 
 PRIVATE = {
     "threads_per_worker": 1,
@@ -33,7 +33,7 @@ def total(place, array):
 
 
 def die_once(place, folder):
-    """The process dies at every fourth call, the first time that it is made."""
+    """Kill the process at every fourth call, the first time that it is made."""
     time.sleep(0.02)
     try:
         (folder / str(place)).touch(exist_ok=False)
@@ -52,11 +52,11 @@ def die_at(place, deadly):
 
 @contextmanager
 def two_workers(**settings):
-    """A cluster of two worker processes on this machine that nobody else can reach."""
+    """A cluster of two worker processes on this machine that no other machine can reach."""
     distributed = pytest.importorskip("distributed")
     from dask import config
 
-    soon = {"distributed.comm.timeouts.connect": "1s"}  # that a dead worker is given up
+    soon = {"distributed.comm.timeouts.connect": "1s"}  # until a dead worker counts as lost
     with config.set(soon | settings), distributed.LocalCluster(n_workers=2, **PRIVATE) as cluster:
         yield cluster
 
@@ -79,13 +79,15 @@ def pids(cluster):
         return list(client.run(os.getpid).values())
 
 
-class TestEach:
+class TestMapOrdered:
     @pytest.mark.parametrize("n_jobs", [1, 2])
     def test_results_come_in_the_order_of_the_arguments(self, n_jobs):
         arguments = [(base, base % 3) for base in range(20)]
-        assert [n for n, _ in each(power, iter(arguments), n_jobs)] == [b**e for b, e in arguments]
+        assert [n for n, _ in map_ordered(power, iter(arguments), n_jobs)] == [
+            b**e for b, e in arguments
+        ]
 
-    def test_one_at_a_time_happens_here_and_when_it_is_asked_for(self):
+    def test_one_at_a_time_runs_in_this_process_when_the_result_is_needed(self):
         taken = []
 
         def arguments():
@@ -93,22 +95,22 @@ class TestEach:
                 taken.append(base)
                 yield base, 1
 
-        results = each(power, arguments())
+        results = map_ordered(power, arguments())
         assert taken == []
         assert next(results) == (0, os.getpid())
         assert taken == [0]
 
-    def test_two_at_a_time_happen_elsewhere(self):
-        assert os.getpid() not in {pid for _, pid in each(power, [(1, 1)] * 4, n_jobs=2)}
+    def test_two_at_a_time_run_in_other_processes(self):
+        assert os.getpid() not in {pid for _, pid in map_ordered(power, [(1, 1)] * 4, n_jobs=2)}
 
     @pytest.mark.parametrize("n_jobs", [1, 2])
     def test_nothing_to_do(self, n_jobs):
-        assert list(each(power, [], n_jobs)) == []
+        assert list(map_ordered(power, [], n_jobs)) == []
 
     @pytest.mark.parametrize("n_jobs", [1, 2])
-    def test_a_failure_comes_through(self, n_jobs):
+    def test_an_exception_of_the_function_is_raised(self, n_jobs):
         with pytest.raises(ValueError, match="negative"):
-            list(each(power, [(1, 1), (1, -1)], n_jobs))
+            list(map_ordered(power, [(1, 1), (1, -1)], n_jobs))
 
 
 class TestEngine:
@@ -123,7 +125,7 @@ class TestEngine:
     def test_a_text_names_it(self, text, engine):
         assert Engine.parse(text, 3) == engine
 
-    def test_as_many_jobs_as_processors_unless_told(self):
+    def test_as_many_jobs_as_processors_by_default(self):
         assert Engine.parse() == Engine(-1)
 
     @pytest.mark.parametrize("text", ["", "dask", "dask:", "loky:2", "spark:10.0.0.1:8786"])
@@ -134,17 +136,17 @@ class TestEngine:
     @pytest.mark.parametrize("engine", [HERE, PROCESSES])
     def test_results_carry_the_name_of_their_call(self, engine):
         calls = {f"{base}²": (base, 2) for base in range(9)}
-        done = dict(engine.as_done(power, calls.items()))
+        done = dict(engine.map_unordered(power, calls.items()))
         assert {name: n for name, (n, _) in done.items()} == {f"{b}²": b**2 for b in range(9)}
 
     def test_a_quick_call_does_not_wait_for_a_slow_one(self):
         calls = [("slow", (1.0,)), ("quick", (0.0,))]
-        assert [name for name, _ in PROCESSES.as_done(time.sleep, calls)] == ["quick", "slow"]
+        assert [name for name, _ in PROCESSES.map_unordered(time.sleep, calls)] == ["quick", "slow"]
 
 
 class TestProcesses:
-    def test_a_death_costs_what_was_being_done(self, tmp_path):
-        done = list(PROCESSES.each(die_once, [(place, tmp_path) for place in range(8)]))
+    def test_calls_of_a_process_that_died_are_made_again(self, tmp_path):
+        done = list(PROCESSES.map_ordered(die_once, [(place, tmp_path) for place in range(8)]))
         assert [place for place, _ in done] == list(range(8))
         assert [done[place][1] for place in (1, 5)] == ["again", "again"]
 
@@ -152,22 +154,22 @@ class TestProcesses:
         calls = [(f"call {place}", (place, 4)) for place in range(8)]
         done = []
         with pytest.raises(EngineError, match=r"^call 4: its process died 3 times, killed or out"):
-            done.extend(result for _, result in PROCESSES.as_done(die_at, calls))
+            done.extend(result for _, result in PROCESSES.map_unordered(die_at, calls))
 
 
 class TestCluster:
-    def test_a_worker_that_is_killed_costs_nothing_but_time(self, cluster):
+    def test_a_killed_worker_loses_no_result(self, cluster):
         arguments = [(place, np.full(10_000, float(place))) for place in range(60)]
         results = []
-        for result in engine_of(cluster).each(total, arguments):
+        for result in engine_of(cluster).map_ordered(total, arguments):
             results.append(result)
             if len(results) == 20:
                 os.kill(pids(cluster)[0], signal.SIGKILL)
-        assert results == list(HERE.each(total, arguments))
+        assert results == list(HERE.map_ordered(total, arguments))
 
-    def test_a_failure_comes_through(self, cluster):
+    def test_an_exception_of_the_function_is_raised(self, cluster):
         with pytest.raises(ValueError, match="negative"):
-            list(engine_of(cluster).each(power, [(1, 1), (1, -1)]))
+            list(engine_of(cluster).map_ordered(power, [(1, 1), (1, -1)]))
 
     def test_a_call_that_always_kills_is_named(self):
         calls = [(place, 2) for place in range(6)]
@@ -175,32 +177,32 @@ class TestCluster:
             two_workers(**{"distributed.scheduler.allowed-failures": 0}) as cluster,
             pytest.raises(EngineError, match=r"^2: its worker died again and again"),
         ):
-            list(engine_of(cluster).each(die_at, calls))
+            list(engine_of(cluster).map_ordered(die_at, calls))
 
     def test_without_workers(self, monkeypatch):
         distributed = pytest.importorskip("distributed")
-        monkeypatch.setattr(parallel, "LONELY", 0.5)
+        monkeypatch.setattr(parallel, "NO_WORKER_TIMEOUT", 0.5)
         with distributed.LocalCluster(n_workers=0, **PRIVATE) as empty:
             address = empty.scheduler_address
             with pytest.raises(EngineError, match=f"^the Dask scheduler at {address} has no work"):
-                list(engine_of(empty).each(power, [(1, 1)]))
+                list(engine_of(empty).map_ordered(power, [(1, 1)]))
 
-    @pytest.mark.parametrize("address", ["nobody", "127.0.0.1:1", "spark://127.0.0.1:1"])
-    def test_where_nobody_answers(self, monkeypatch, address):
+    @pytest.mark.parametrize("address", ["missing", "127.0.0.1:1", "spark://127.0.0.1:1"])
+    def test_no_scheduler_at_the_address(self, monkeypatch, address):
         pytest.importorskip("distributed")
-        monkeypatch.setattr(parallel, "PATIENCE", 0.5)
+        monkeypatch.setattr(parallel, "CONNECT_TIMEOUT", 0.5)
         with pytest.raises(EngineError, match=rf"^no Dask scheduler answers at {address}: start"):
-            list(Engine.parse(f"dask:{address}").each(power, [(1, 1)]))
+            list(Engine.parse(f"dask:{address}").map_ordered(power, [(1, 1)]))
 
-    def test_where_something_else_listens(self, monkeypatch):
+    def test_another_server_at_the_address(self, monkeypatch):
         pytest.importorskip("distributed")
-        monkeypatch.setattr(parallel, "PATIENCE", 0.5)
+        monkeypatch.setattr(parallel, "CONNECT_TIMEOUT", 0.5)
         with socket.create_server(("127.0.0.1", 0)) as silent:
             engine = Engine.parse("dask:{}:{}".format(*silent.getsockname()))
             with pytest.raises(EngineError, match=r"^no Dask scheduler answers at 127\.0\.0\.1:"):
-                list(engine.each(power, [(1, 1)]))
+                list(engine.map_ordered(power, [(1, 1)]))
 
     def test_without_dask(self, monkeypatch):
         monkeypatch.setitem(sys.modules, "distributed", None)
         with pytest.raises(MissingExtra, match=r"needs the package distributed.*holdfast\[cluster"):
-            list(Engine.parse("dask:127.0.0.1:1").each(power, [(1, 1)]))
+            list(Engine.parse("dask:127.0.0.1:1").map_ordered(power, [(1, 1)]))

@@ -13,8 +13,7 @@ import numpy.typing as npt
 from holdfast.classifiers import LinearClassifier
 from holdfast.errors import ModelError, OutputError
 from holdfast.features import DEFAULT_WINDOW, FeatureSpec, Tare
-from holdfast.features.extract import extract
-from holdfast.features.stream import StreamPlan
+from holdfast.features.stream import StreamPlan, extract
 from holdfast.files import write_whole
 from holdfast.recordings import Recording
 from holdfast.sensors import Sensor
@@ -186,7 +185,7 @@ class Model(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=Tru
         return self.fingers[name]
 
     def fingers_of(self, modules: Mapping[str, Sensor]) -> dict[str, Sensor]:
-        """The fingers that the model judges on a hand with those modules, and their sensors.
+        """The fingers that the model is for on a hand with those modules, and their sensors.
 
         All fingers that the model names, even those that the hand lacks; a model for any
         finger judges every module of its sensor (fingertips only, where there are any).
@@ -200,7 +199,7 @@ class Model(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=Tru
             self._check_sensor(name, modules[name])
         if not set(self.fingers) & set(modules):
             raise ModelError(
-                f"the model judges {', '.join(self.fingers)}; {', '.join(modules)} given"
+                f"the model is for {', '.join(self.fingers)}; {', '.join(modules)} given"
             )
         return {
             name: modules[name] if name in modules else self.sensors[str(finger.sensor)]
@@ -249,7 +248,7 @@ class Model(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=Tru
         fitting = {name: sensor for name, sensor in tips.items() if sensor.name == wanted}
         if not fitting:
             raise ModelError(
-                f"the model judges fingers with the sensor {wanted!r}; given are "
+                f"the model is for fingers with the sensor {wanted!r}; given are "
                 + ", ".join(f"{name} ({sensor.name})" for name, sensor in modules.items())
             )
         for name, sensor in fitting.items():

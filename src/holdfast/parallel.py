@@ -1,7 +1,7 @@
-"""Work side by side: in processes of this machine by joblib, or on a Dask cluster.
+"""Parallel calls: in processes of this machine by joblib, or on a Dask cluster.
 
-A process that dies costs the calls that it was at: they are done again. Results do not depend
-on where or in which order the work is done.
+When a process dies, the calls that were running are made again. Results do not depend on where
+or in which order the calls are made.
 """
 
 import warnings
@@ -21,22 +21,22 @@ K = TypeVar("K", bound=Hashable)
 Arguments = tuple[object, ...]
 Call = tuple[K, Arguments]
 
-MORE_LIVES = 2
-"""A call whose process died is done again so many times, alone."""
+MAX_RETRIES = 2
+"""Number of times that a call whose process died is made again, alone."""
 
-PATIENCE = 10.0
-"""A scheduler must answer within this [s]."""
+CONNECT_TIMEOUT = 10.0
+"""Time within which a scheduler must answer [s]."""
 
-LONELY = 30.0
-"""A cluster may be without any worker, and without a result, for this long [s]."""
+NO_WORKER_TIMEOUT = 30.0
+"""Time for which a cluster may have neither a worker nor a new result [s]."""
 
 
 class Engine(NamedTuple):
-    """Where work is done: here, in processes of this machine, or on a Dask cluster.
+    """Place where calls are made: this process, processes of this machine, or a Dask cluster.
 
     Attributes:
-        n_jobs: how many calls at a time; -1 for as many as there are processors. With 1 all
-            happens here, one after the other. A cluster does as many as it has threads.
+        n_jobs: number of calls at a time; -1 for one per processor. With 1, all calls are made
+            in this process. On a cluster, its number of threads counts instead.
         scheduler: address of a Dask scheduler; None for this machine.
     """
 
@@ -45,11 +45,11 @@ class Engine(NamedTuple):
 
     @classmethod
     def parse(cls, text: str = "loky", n_jobs: int = -1) -> Self:
-        """The engine that a text names.
+        """Return the engine that a text names.
 
         Args:
             text: `loky` for processes of this machine, `dask:ADDRESS` for a cluster.
-            n_jobs: how many calls at a time on this machine.
+            n_jobs: number of calls at a time on this machine.
 
         Raises:
             ValueError: the text names no engine.
@@ -65,114 +65,121 @@ class Engine(NamedTuple):
             return cls(n_jobs, address)
         raise ValueError(f"unknown engine {text!r}; there are loky and dask:ADDRESS")
 
-    def each(self, function: Callable[..., T], arguments: Iterable[Arguments]) -> Iterator[T]:
-        """The results of a function for many arguments, in their order, as they come.
+    def map_ordered(
+        self, function: Callable[..., T], arguments: Iterable[Arguments]
+    ) -> Iterator[T]:
+        """Call a function with many arguments; yield the results in the order of the arguments.
 
         Args:
-            function: that can be sent to another process.
-            arguments: of each call.
+            function: any function that can be sent to another process.
+            arguments: the arguments of each call.
 
         Yields:
-            What the function returns.
+            The result of each call, as soon as all earlier results have been yielded.
 
         Raises:
-            EngineError: as `as_done`; it names the place of the call, counted from 0.
+            EngineError: as `map_unordered`; the text names the index of the call, from 0.
         """
-        early: dict[int, T] = {}
-        turn = 0
-        for place, result in self.as_done(function, enumerate(arguments)):
-            early[place] = result
-            while turn in early:
-                yield early.pop(turn)
-                turn += 1
+        waiting: dict[int, T] = {}
+        next_index = 0
+        for index, result in self.map_unordered(function, enumerate(arguments)):
+            waiting[index] = result
+            while next_index in waiting:
+                yield waiting.pop(next_index)
+                next_index += 1
 
-    def as_done(
+    def map_unordered(
         self, function: Callable[..., T], calls: Iterable[Call[K]]
     ) -> Iterator[tuple[K, T]]:
-        """The results of a function for many arguments, in the order in which they are done.
+        """Call a function with many arguments; yield each result as soon as it exists.
 
         Args:
-            function: that can be sent to another process.
-            calls: the name of each call, all different, and its arguments.
+            function: any function that can be sent to another process.
+            calls: the name of each call and its arguments. All names differ.
 
         Yields:
-            The name of a call and what the function returns.
+            The name of a call and its result.
 
         Raises:
-            EngineError: the cluster cannot be reached or has no workers, or a process died
-                again and again at one call, which the text names.
+            EngineError: the cluster cannot be reached or has no workers, or the process died
+                every time that one call was made. The text names that call.
             MissingExtra: dask is not installed.
         """
         if self.scheduler is not None:
             return _on_cluster(function, calls, self.scheduler)
         if self.n_jobs != 1:
             return _in_processes(function, calls, self.n_jobs)
-        return ((name, function(*given)) for name, given in calls)
+        return ((name, function(*arguments)) for name, arguments in calls)
 
 
-def each(
+def map_ordered(
     function: Callable[..., T], arguments: Iterable[Arguments], n_jobs: int = 1
 ) -> Iterator[T]:
-    """The results of a function for many arguments, in their order, as they come.
+    """Call a function with many arguments on this machine, as `Engine.map_ordered` does.
 
     Args:
-        function: that can be sent to another process.
-        arguments: of each call.
-        n_jobs: how many calls at a time; -1 for as many as there are processors. With 1 all
-            happens here, one after the other.
+        function: any function that can be sent to another process.
+        arguments: the arguments of each call.
+        n_jobs: number of calls at a time; -1 for one per processor. With 1, all calls are made
+            in this process.
 
     Yields:
-        What the function returns.
+        The result of each call, in the order of the arguments.
 
     Raises:
-        EngineError: a process died again and again at one call.
+        EngineError: the process died every time that one call was made.
     """
-    return Engine(n_jobs).each(function, arguments)
+    return Engine(n_jobs).map_ordered(function, arguments)
 
 
 def _in_processes(
     function: Callable[..., T], calls: Iterable[Call[K]], n_jobs: int
 ) -> Iterator[tuple[K, T]]:
-    """A death breaks the whole pool; what it was at is then done alone, the rest in a new one."""
+    """Make calls with joblib.
+
+    A process that dies breaks the whole pool. Then each call that was running is made again
+    alone, and the other calls in a new pool.
+    """
     from joblib import Parallel, delayed
     from joblib.externals.loky.process_executor import TerminatedWorkerError
 
-    # A worker that grew is replaced by loky with a warning; nothing is lost.
+    # loky replaces a worker whose memory grew, with a warning. No result is lost.
     warnings.filterwarnings("ignore", "A worker stopped while some jobs were given")
-    rest, begun = iter(calls), dict[K, Arguments]()
+    rest, started = iter(calls), dict[K, Arguments]()
     ended = False
-    while begun or not ended:
-        for name in list(begun):
-            yield name, _alone(function, name, begun.pop(name))
-        tasks = (delayed(_named)(function, *call) for call in _noted(rest, begun))
+    while started or not ended:
+        for name in list(started):
+            yield name, _call_alone(function, name, started.pop(name))
+        tasks = (delayed(_call_named)(function, *call) for call in _record(rest, started))
         with suppress(TerminatedWorkerError):
             for name, result in Parallel(n_jobs, return_as="generator_unordered")(tasks):
-                del begun[name]
+                del started[name]
                 yield name, result
             ended = True
 
 
-def _noted(calls: Iterator[Call[K]], begun: dict[K, Arguments]) -> Iterator[Call[K]]:
-    for name, given in calls:
-        begun[name] = given
-        yield name, given
+def _record(calls: Iterator[Call[K]], started: dict[K, Arguments]) -> Iterator[Call[K]]:
+    """Yield the calls, each added to `started` before."""
+    for name, arguments in calls:
+        started[name] = arguments
+        yield name, arguments
 
 
-def _named(function: Callable[..., T], name: K, given: Arguments) -> tuple[K, T]:
-    return name, function(*given)
+def _call_named(function: Callable[..., T], name: K, arguments: Arguments) -> tuple[K, T]:
+    return name, function(*arguments)
 
 
-def _alone(function: Callable[..., T], name: object, given: Arguments) -> T:
-    """The result of one call in another process, where nothing else is to blame for a death."""
+def _call_alone(function: Callable[..., T], name: object, arguments: Arguments) -> T:
+    """Make one call in another process; only this call can be the cause if the process dies."""
     from joblib import Parallel, delayed
     from joblib.externals.loky.process_executor import TerminatedWorkerError
 
-    for _ in range(MORE_LIVES):
+    for _ in range(MAX_RETRIES):
         with suppress(TerminatedWorkerError):
-            result: T = Parallel(n_jobs=2)([delayed(function)(*given)])[0]
+            result: T = Parallel(n_jobs=2)([delayed(function)(*arguments)])[0]
             return result
     raise EngineError(
-        f"{name}: its process died {1 + MORE_LIVES} times, killed or out of memory; "
+        f"{name}: its process died {1 + MAX_RETRIES} times, killed or out of memory; "
         "try with fewer jobs"
     )
 
@@ -180,23 +187,27 @@ def _alone(function: Callable[..., T], name: object, given: Arguments) -> T:
 def _on_cluster(
     function: Callable[..., T], calls: Iterable[Call[K]], scheduler: str
 ) -> Iterator[tuple[K, T]]:
-    """Dask does again what a worker was at when it died; decision 0006 tells the rest."""
+    """Make calls on a Dask cluster, which repeats the calls of a worker that died.
+
+    Dask counts a death against every call that the worker held (decision 0006). So a call that
+    Dask gives up is made again alone.
+    """
     with _client(scheduler) as client:
         suspects: list[Call[K]] = []
-        yield from _together(client, function, calls, suspects)
+        yield from _submit(client, function, calls, suspects)
         for call in suspects:
-            guilty: list[Call[K]] = []
-            yield from _together(client, function, [call], guilty)
-            if guilty:
+            failed: list[Call[K]] = []
+            yield from _submit(client, function, [call], failed)
+            if failed:
                 raise EngineError(
                     f"{call[0]}: its worker died again and again, killed or out of memory"
                 )
 
 
-def _together(
+def _submit(
     client: "Client", function: Callable[..., T], calls: Iterable[Call[K]], suspects: list[Call[K]]
 ) -> Iterator[tuple[K, T]]:
-    """What is done; `suspects` takes the calls during which, or beside which, workers died."""
+    """Make calls on a cluster; append to `suspects` those whose workers died."""
     from distributed import KilledWorker
 
     done: SimpleQueue[Future] = SimpleQueue()
@@ -206,7 +217,7 @@ def _together(
         waiting[future.key] = call, future
         future.add_done_callback(done.put)
     while waiting:
-        call, future = waiting.pop(_next(done, client).key)
+        call, future = waiting.pop(_next_done(done, client).key)
         try:
             result = _result(future)
         except KilledWorker:
@@ -217,49 +228,49 @@ def _together(
 
 @contextmanager
 def _client(scheduler: str) -> Iterator["Client"]:
-    """A connection to the scheduler; what it is asked to do is dropped at the end."""
+    """Connect to a scheduler; at the end, drop the calls that are not done."""
     try:
         import distributed  # noqa: F401 (fills dask's configuration, so it must be first)
         from dask import config
     except ImportError as missing:
         raise MissingExtra("distributed", "cluster") from missing
     large = {"distributed.admin.large-graph-warning-threshold": "1GB"}
-    with config.set(large), _connected(scheduler) as client:
+    with config.set(large), _connect(scheduler) as client:
         yield client
 
 
-def _connected(scheduler: str) -> "Client":
+def _connect(scheduler: str) -> "Client":
     from asyncio import run, wait_for
     from concurrent.futures import ThreadPoolExecutor
     from logging import CRITICAL, getLogger
 
     from distributed import Client
 
-    getLogger("distributed.client").setLevel(CRITICAL)  # what it tells, our errors tell in a line
+    getLogger("distributed.client").setLevel(CRITICAL)  # our errors say the same in one line
     try:
-        with ThreadPoolExecutor(1) as thread:  # has no event loop yet, whoever calls
-            thread.submit(run, wait_for(_knock(scheduler), PATIENCE)).result()
-        return Client(scheduler, timeout=PATIENCE, set_as_default=False)
-    except Exception as cause:  # whatever answers there may be anything
+        with ThreadPoolExecutor(1) as thread:  # the calling thread may have an event loop
+            thread.submit(run, wait_for(_connect_once(scheduler), CONNECT_TIMEOUT)).result()
+        return Client(scheduler, timeout=CONNECT_TIMEOUT, set_as_default=False)
+    except Exception as cause:  # a server of any other kind may answer there
         raise EngineError(
             f"no Dask scheduler answers at {scheduler}: start one with `dask scheduler` "
             "and give the address that it shows, tcp://HOST:8786"
         ) from cause
 
 
-async def _knock(scheduler: str) -> None:
-    """Connects once: a `Client` that cannot leaves threads behind and holds up the exit."""
+async def _connect_once(scheduler: str) -> None:
+    """Test the connection: a `Client` that cannot connect leaves threads and delays the exit."""
     from distributed.comm import connect
 
     comm = await connect(scheduler)
     await comm.close()
 
 
-def _next(done: "SimpleQueue[Future]", client: "Client") -> "Future":
-    """The next future that is done."""
+def _next_done(done: "SimpleQueue[Future]", client: "Client") -> "Future":
+    """Wait for the next future that is done."""
     while True:
         with suppress(Empty):
-            return done.get(timeout=LONELY)
+            return done.get(timeout=NO_WORKER_TIMEOUT)
         if not client.scheduler_info()["workers"]:
             scheduler = client.scheduler.address
             raise EngineError(

@@ -264,7 +264,7 @@ def test_refusals(capsys, model, grasp, save, tmp_path):
         "thumb: 24 taxels (uskin-4x6) given, the model expects 30 (uskin-curved)"
     )
     other = save(synthetic_recording("b", 1, ("ring",)), "b.parquet")
-    assert refusal(capsys, model, other) == "the model judges thumb, index; ring given"
+    assert refusal(capsys, model, other) == "the model is for thumb, index; ring given"
     missing = tmp_path / "none.parquet"
     assert refusal(capsys, model, missing) == (
         f"{missing} does not exist; a recording's file expected"

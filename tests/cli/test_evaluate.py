@@ -143,7 +143,7 @@ def test_refusals(capsys, folder, tmp_path):
     other = tmp_path / "other"
     other.mkdir()
     save_recording(synthetic_recording("ring", 9, ("ring",)), other / "a.parquet")
-    assert refusal(capsys, model, other) == "the model judges thumb, index; ring given"
+    assert refusal(capsys, model, other) == "the model is for thumb, index; ring given"
 
 
 def test_a_damaged_recording(capsys, folder, tmp_path):
@@ -196,5 +196,5 @@ def test_the_model_of_the_twin_refuses_another_sensor(capsys, folder, tmp_path):
     module = replace(one.modules["thumb"], sensor=skin)
     save_recording(replace(one, modules={"thumb": module}), tmp_path / "flat.parquet")
     assert refusal(capsys, "builtin:twin", tmp_path / "flat.parquet") == (
-        "the model judges fingers with the sensor 'uskin-curved'; given are thumb (flat)"
+        "the model is for fingers with the sensor 'uskin-curved'; given are thumb (flat)"
     )

@@ -152,7 +152,7 @@ class TestBadInput:
             "unknown engine 'spark'; there are loky and dask:ADDRESS"
         )
         pytest.importorskip("distributed")
-        monkeypatch.setattr(parallel, "PATIENCE", 0.3)
+        monkeypatch.setattr(parallel, "CONNECT_TIMEOUT", 0.3)
         told = refusal(capsys, data, *out, "--engine", "dask:tcp://127.0.0.1:9")
         assert told.startswith("no Dask scheduler answers at tcp://127.0.0.1:9: start one with")
         assert not (tmp_path / "out").exists()

@@ -11,8 +11,7 @@ from holdfast.contact import ContactState
 from holdfast.detector import Detector, detect
 from holdfast.errors import ModelError, StreamError
 from holdfast.features import fingertip_force, haar_features, parse_features
-from holdfast.features.extract import extract
-from holdfast.features.stream import StreamPlan
+from holdfast.features.stream import StreamPlan, extract
 from holdfast.features.tare import Tare
 from holdfast.model import ANY_FINGER, Debounce, Model
 from holdfast.recordings import Recording
@@ -248,13 +247,13 @@ class TestRefusals:
     def test_none_of_the_fingers(self):
         with pytest.raises(ModelError) as raised:
             detect(model(), recording(ring=tactile()))
-        assert str(raised.value) == "the model judges thumb, index; ring given"
+        assert str(raised.value) == "the model is for thumb, index; ring given"
 
     def test_run_with_none_of_the_fingers(self):
         with pytest.raises(StreamError) as raised:
             Detector(model()).run(recording(ring=tactile()))
         assert str(raised.value) == (
-            "recording 'made' has samples of ring; the model judges thumb, index"
+            "recording 'made' has samples of ring; the model is for thumb, index"
         )
 
     def test_run_with_other_taxels(self):

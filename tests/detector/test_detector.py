@@ -12,6 +12,7 @@ from holdfast.detector import HAND, Detector, detect
 from holdfast.detector.detector import MAX_EVENTS
 from holdfast.errors import ModelError, StreamError
 from holdfast.features import FeatureSpec
+from holdfast.features.arrays import NOISE
 from holdfast.model import ANY_FINGER, Debounce, Model
 
 from .build import (
@@ -276,9 +277,9 @@ def test_reset_forgets_everything():
 
 REFUSED = {
     "unknown finger": ({"ring": np.zeros((2, 3))}, 1.0,
-                       "finger 'ring' given; the model judges thumb, index"),
+                       "finger 'ring' given; the model is for thumb, index"),
     "after a known one": ({"thumb": np.zeros((2, 3)), "ring": np.zeros((2, 3))}, 1.0,
-                          "finger 'ring' given; the model judges thumb, index"),
+                          "finger 'ring' given; the model is for thumb, index"),
     "taxels": ({"thumb": np.zeros((2, 3)), "index": np.zeros((3, 3))}, 1.0,
                "index: a sample of shape (3, 3) given, (2, 3) expected (tiny)"),
     "axes": ({"thumb": np.zeros((2, 2))}, 1.0,
@@ -384,8 +385,8 @@ class TestConstruction:
         with pytest.raises(ModelError) as raised:
             Detector(Model.load("builtin:noise-floor"))
         assert str(raised.value) == (
-            "the model builtin:noise-floor serves any finger: say which fingers the hand has, "
-            "and with which sensors"
+            "the model builtin:noise-floor is for any finger: the fingers of the hand and "
+            "their sensors expected"
         )
 
     def test_another_sensor(self):
@@ -419,14 +420,14 @@ class TestNoiseFloor:
         rng = np.random.default_rng(7)
         detector = Detector(by_force(tare=tare), {"f": FLAT})
         feed(detector, rng.normal(scale=level, size=(250, 1, 3)), "f")
-        found = detector._memory.levels[0, 4]
+        found = detector._stream.memory.levels[0, NOISE]
         # half a second holds 50 samples only: 10 % is one and a half standard errors
         assert found == pytest.approx(level, rel=0.1 if tare == "2" else 0.2)
 
     def test_no_sensor_in_counts_is_more_quiet_than_its_step(self):
         detector = Detector(model(("thumb",)))
         feed(detector, np.full((40, 2, 3), 500.0))
-        assert detector._memory.levels[0, 4] == pytest.approx(np.sqrt(2 / 12))
+        assert detector._stream.memory.levels[0, NOISE] == pytest.approx(np.sqrt(2 / 12))
 
 
 class TestBaselines:

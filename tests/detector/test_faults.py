@@ -366,7 +366,7 @@ class TestIgnore:
     @pytest.mark.parametrize(
         ("ignore", "message"),
         [
-            ({"ring": [0]}, "taxels of 'ring' to be ignored; the model judges thumb"),
+            ({"ring": [0]}, "taxels of 'ring' to be ignored; the model is for thumb"),
             ({"thumb": [0, 6]}, "thumb: taxel 6 to be ignored; it has the taxels 0 to 5"),
             ({"thumb": [-1]}, "thumb: taxel -1 to be ignored; it has the taxels 0 to 5"),
         ],

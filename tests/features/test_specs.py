@@ -1,12 +1,12 @@
 import numpy as np
 import pytest
 
-from holdfast.features import DEPLOYED, FeatureSpec, parse_features
+from holdfast.features import DEPLOYED_FEATURES, FeatureSpec, parse_features
 from holdfast.features.specs import spec_codes
 
 
 def test_the_deployed_features_drop_m():
-    assert DEPLOYED == ("F_a", "F_x", "F_y", "F_z", "sigma")
+    assert DEPLOYED_FEATURES == ("F_a", "F_x", "F_y", "F_z", "sigma")
 
 
 @pytest.mark.parametrize(
@@ -16,7 +16,7 @@ def test_the_deployed_features_drop_m():
         (" sigma , F_a", "sigma[14] F_a"),
         ("F_tip,m", "F_x F_y F_z m[14]"),
         (["sigma"], "sigma[14]"),
-        (DEPLOYED, "F_a F_x F_y F_z sigma[14]"),
+        (DEPLOYED_FEATURES, "F_a F_x F_y F_z sigma[14]"),
     ],
 )
 def test_names(names, expected):

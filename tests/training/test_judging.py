@@ -69,7 +69,7 @@ def test_a_built_in_model(grasps):
 def test_a_model_for_other_fingers(model):
     with pytest.raises(ModelError) as refusal:
         evaluate(model, [tiny_recording(0, fingers=("ring",))])
-    assert str(refusal.value) == "the model judges thumb, index; ring given"
+    assert str(refusal.value) == "the model is for thumb, index; ring given"
 
 
 def test_pick_takes_each_sample_from_the_judge_that_its_unit_names(grasps):

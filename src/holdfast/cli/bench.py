@@ -242,11 +242,11 @@ def _scipy(force: "Array") -> "Array":
 def _model() -> "Model":
     """A model of the deployed shape; its numbers do not matter here."""
     from holdfast.classifiers import LinearClassifier
-    from holdfast.features import DEPLOYED, parse_features
+    from holdfast.features import DEPLOYED_FEATURES, parse_features
     from holdfast.model import FingerModel, Model
     from holdfast.sensors import sensor
 
-    features = parse_features(DEPLOYED, WINDOW)
+    features = parse_features(DEPLOYED_FEATURES, WINDOW)
     ones = (1.0,) * len(features)
     rule = LinearClassifier(mean=ones, scale=ones, coefficients=(0.01,) * len(ones), intercept=0.1)
     tip = sensor("uskin-curved")

@@ -72,14 +72,14 @@ def simulate(
 
 def make_all(wanted: "Sequence[Grasp]", out: Path, *, jobs: int, force: bool) -> list[str]:
     """Simulates what is not there yet; the names of what was written."""
-    from holdfast.parallel import each
+    from holdfast.parallel import map_ordered
 
     tasks = [(grasp, out, force) for grasp in wanted if force or not _done(grasp, out)]
     if len(tasks) < len(wanted):
         say(f"{len(wanted) - len(tasks)} of {len(wanted)} recordings are there already")
     made = []
     with Bar("simulating", len(tasks)) as bar:
-        for names in each(make, tasks, 1 if len(tasks) == 1 else jobs):
+        for names in map_ordered(make, tasks, 1 if len(tasks) == 1 else jobs):
             made += names
             bar.advance()
     return made

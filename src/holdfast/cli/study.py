@@ -122,7 +122,7 @@ def _checked(
     chosen = Engine.parse(engine, jobs)
     check_output_folder(out, force=force)
     if chosen.scheduler is not None:
-        list(chosen.each(abs, [(0,)]))
+        list(chosen.map_ordered(abs, [(0,)]))
     return chosen
 
 

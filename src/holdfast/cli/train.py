@@ -130,7 +130,7 @@ def _setting(init: str | None, rule: dict[str, Any], **options: Any) -> "Setting
         rule: classifier, window and features.
         options: all else that `Setting` takes.
     """
-    from holdfast.features import DEPLOYED, Tare, parse_features
+    from holdfast.features import DEPLOYED_FEATURES, Tare, parse_features
     from holdfast.training import Setting
 
     rule, chosen = (
@@ -141,7 +141,7 @@ def _setting(init: str | None, rule: dict[str, Any], **options: Any) -> "Setting
         chosen["tare"] = Tare.parse(chosen["tare"])
     if init is not None:
         return Setting.adapting(_model(init, rule), **chosen)
-    names = rule.get("features", ",".join(DEPLOYED))
+    names = rule.get("features", ",".join(DEPLOYED_FEATURES))
     rule["features"] = parse_features(names, rule.get("window", Setting.window))
     return Setting(**rule, **chosen)
 

@@ -1,6 +1,6 @@
-"""The detector, live and offline."""
+"""The detector: from samples to estimates, live and offline."""
 
+from holdfast.detector.detection import Detection, FingerTrace
 from holdfast.detector.detector import HAND, Detector, detect
-from holdfast.detector.traces import Detection, FingerTrace
 
 __all__ = ["HAND", "Detection", "Detector", "FingerTrace", "detect"]

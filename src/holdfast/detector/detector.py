@@ -1,12 +1,11 @@
-"""The detector: samples of a hand in, estimates out. No I/O, no clock, no growth of memory.
+"""The detector: from samples of a hand to estimates. No I/O, no clock, no growth of memory.
 
-Offline detection is the same detector fed with a recording: one kernel computes the features,
-one the probability, one rule turns it into a state.
+Offline detection is the same detector, fed with a recording: one kernel computes the features
+and the probability, and one rule turns them into a state.
 """
 
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
-from itertools import pairwise
 from math import inf
 from typing import Self
 
@@ -21,37 +20,39 @@ from holdfast.contact import (
     StateChanges,
     taxels_of,
 )
-from holdfast.detector.rule import N_REPORT, Live, Traces, new_decision, rule_of, run, step_live
-from holdfast.detector.traces import STATES, VERDICTS, Detection, detection_of
+from holdfast.detector.decision_rule import TraceRows, new_decision_memory, rule_of, run
+from holdfast.detector.detection import ESTIMATES, STATES, Detection, detection_of
+from holdfast.detector.fast_step import REPORT_WIDTH, StepArrays, fast_step
 from holdfast.errors import ModelError, StreamError
-from holdfast.features.arrays import TARED, TAXELS, Array
-from holdfast.features.stream import StreamPlan, give_baseline, new_memory, new_output, samples_of
+from holdfast.features.arrays import TAXELS, Array
+from holdfast.features.stream import FeatureStream, StreamPlan
 from holdfast.model import Model
 from holdfast.recordings import Recording
 from holdfast.resampling import resample
 from holdfast.sensors import Sensor
 
-Ignored = Mapping[str, Sequence[int]]
+IgnoredTaxels = Mapping[str, Sequence[int]]
 HAND = "hand"
-"""Name of the hand as a whole among the fingers of events and metrics."""
+"""Name of the hand as a whole, beside the fingers of events and metrics."""
 MAX_EVENTS = 1000
-"""Events that a detector keeps until they are fetched; the oldest go first."""
+"""Number of events that a detector keeps until `events` is called; the oldest are dropped."""
 
 
 class Detector:
-    """Judges a hand, sample by sample.
+    """Detector of contact states for one hand, sample by sample.
 
     Args:
-        model: that judges.
-        fingers: sensor of each finger, for a model that serves any finger; by default all
-            fingers that the model names.
-        rate: of the source [Hz], for a model that takes any.
+        model: features, classifiers and decision rule.
+        fingers: sensor of each finger, for a model of any finger; by default all fingers that
+            the model names.
+        rate: samples per second of the source [Hz], for a model of any rate; by default the
+            rate of the first sensor.
         ignore: taxels by finger, from 0, that contribute nothing and cause no fault.
 
     Raises:
-        ModelError: the model serves any finger and `fingers` is missing, one of them has
-            another sensor, or the model's tare is an interval, which nobody can know live.
-        ValueError: `ignore` names a finger or a taxel that there is not.
+        ModelError: the model is for any finger and `fingers` is missing; a finger has another
+            sensor; or the tare of the model is an interval, which is not known live.
+        ValueError: `ignore` names a finger or a taxel that does not exist.
 
     Example:
         >>> from holdfast.sensors import sensor
@@ -67,60 +68,69 @@ class Detector:
         fingers: Mapping[str, Sensor] | None = None,
         rate: float | None = None,
         *,
-        ignore: Ignored | None = None,
+        ignore: IgnoredTaxels | None = None,
     ) -> None:
-        sensors = model.fingers_of(fingers) if fingers is not None else _own_fingers(model)
+        sensors = model.fingers_of(fingers) if fingers is not None else _sensors_of(model)
         first = next(iter(sensors.values()))
-        plan = _without(model.plan(sensors, rate or first.rate), ignore)
+        plan = _ignoring(model.plan(sensors, rate or first.rate), ignore)
         if plan.tare.kind == "interval":
             raise ModelError(
                 f"the model's tare is the interval {model.tare} s of a recording; "
                 "seconds, 'first' or 'none' expected where samples come one by one"
             )
-        self._start(model, plan)
+        self._start(model, FeatureStream(plan))
 
     @classmethod
     def for_recording(
-        cls, model: Model, recording: Recording, *, ignore: Ignored | None = None
+        cls, model: Model, recording: Recording, *, ignore: IgnoredTaxels | None = None
     ) -> Self:
-        """The detector for a recording, whose tare may be an interval of it.
+        """Return a detector for a recording, whose tare may be an interval of it.
 
         Args:
-            model: that judges.
-            recording: whose fingers and rate it is for; or its first piece, where `run` gets
-                it in pieces (a tare by interval then needs that interval in the first).
+            model: features, classifiers and decision rule.
+            recording: the recording; or its first part, if `run` receives it in parts. A tare by
+                interval then needs that interval in the first part.
             ignore: taxels by finger, from 0, that contribute nothing and cause no fault.
 
         Raises:
             ModelError: the recording has none of the model's fingers, or another sensor.
             ValueError: a tare by interval finds no samples, or `ignore` names a finger or a
-                taxel that there is not.
+                taxel that does not exist.
         """
         detector = cls.__new__(cls)
         sensors = model.fingers_of({name: m.sensor for name, m in recording.modules.items()})
-        detector._start(model, _without(model.plan(sensors, recording.rate), ignore))
-        if detector._plan.tare.kind == "interval":
-            give_baseline(detector._plan, detector._memory, recording)
+        plan = _ignoring(model.plan(sensors, recording.rate), ignore)
+        detector._start(model, FeatureStream.for_recording(plan, recording))
         return detector
 
-    def _start(self, model: Model, plan: StreamPlan) -> None:
-        self._plan = plan
-        self._names = (*plan.fingers, HAND)
-        self._layout = plan.layout()
-        self._rule = rule_of(model, plan)
-        n_fingers, n_taxels = len(plan.fingers), int(self._layout.offsets[-1])
-        self._readings = np.zeros((n_taxels, 3))
-        self._flags = bytearray(n_fingers)  # which are present: an array is slower to write to
+    def _start(self, model: Model, stream: FeatureStream) -> None:
+        self._rule = rule_of(model, stream.plan)
+        n_fingers = len(stream.plan.fingers)
+        self._names = (*stream.plan.fingers, HAND)
+        self._readings = np.zeros((len(stream.layout.rotations), 3))
+        self._flags = bytearray(n_fingers)  # present fingers: an array is slower to write to
         self._present = np.frombuffer(self._flags, dtype=np.bool_)
-        self._report = np.zeros((n_fingers, N_REPORT))
-        bounds = pairwise(self._layout.offsets.tolist())
+        self._report = np.zeros((n_fingers, REPORT_WIDTH))
         self._slots = {
-            finger: (place, self._readings[start:stop], (stop - start, 3))
-            for place, (finger, (start, stop)) in enumerate(zip(plan.fingers, bounds, strict=True))
+            finger: (place, self._readings[taxels], (taxels.stop - taxels.start, 3))
+            for place, (finger, taxels) in enumerate(stream.slices.items())
         }
-        self.reset()
-        # Compiles, and changes nothing: no finger is present.
-        step_live(self._table, 0.0)
+        self._use(stream)
+        # Compile, and change nothing: no finger is present.
+        fast_step(self._table, 0.0)
+
+    def _use(self, stream: FeatureStream) -> None:
+        """Begin with a stream, and with no decision."""
+        self._stream = stream
+        self._decision = new_decision_memory(len(stream.plan.fingers))
+        arrays = StepArrays(
+            stream.layout, stream.memory, stream.output, self._rule, self._decision,
+            self._readings, self._present, self._report,
+        )  # fmt: skip
+        self._table, self._arrays = arrays.table()
+        self._changes = StateChanges(self._names)
+        self._last_time = -inf
+        self._events: list[ContactEvent] = []
 
     def __getstate__(self) -> object:
         # A copy would share memory with this one, by address.
@@ -128,87 +138,74 @@ class Detector:
 
     @property
     def n_fingers(self) -> int:
-        """How many fingers the model has: the hand's state depends on it."""
-        return self._rule.n_fingers
+        """Number of fingers of the model, on which the state of the hand depends."""
+        return self._rule.n_model_fingers
 
     def baselines(self) -> dict[str, Array]:
-        """(n_taxels, 3) the tare of each finger [unit of the readings], once it is complete."""
-        bounds = pairwise(self._layout.offsets.tolist())
-        return {
-            finger: self._memory.baseline[start:stop].copy()
-            for finger, (start, stop), n in zip(
-                self._plan.fingers, bounds, self._memory.counts[:, TARED], strict=True
-            )
-            if n < 0
-        }
+        """Return (n_taxels, 3) the tare of each finger whose tare is complete [its unit]."""
+        return self._stream.baselines()
 
     def reset(self) -> None:
-        """Forgets everything, the tare included."""
-        n_fingers = len(self._plan.fingers)
-        self._memory = new_memory(self._layout)
-        self._output = new_output(self._layout)
-        self._decision = new_decision(n_fingers)
-        live = Live(
-            self._layout, self._memory, self._output, self._rule, self._decision,
-            self._readings, self._present, self._report,
-        )  # fmt: skip
-        self._table, self._arrays = live.table()
-        self._changes = StateChanges(self._names)
-        self._last = -inf
-        self._events: list[ContactEvent] = []
+        """Forget all samples, events and the tare."""
+        self._use(FeatureStream(self._stream.plan))
 
     def update(self, samples: Mapping[str, npt.ArrayLike], time: float) -> HandEstimate:
-        """Takes one sample of some or all fingers, and says how the hand is.
+        """Process one sample of some or all fingers.
 
         Args:
             samples: (n_taxels, 3) by finger, in taxel frames, in the unit of the training.
             time: of the samples, later than the last [s].
 
         Returns:
-            The latest estimate of every finger; fingers without a sample keep theirs until the
-            time since is a gap.
+            The latest estimate of every finger. A finger without a sample keeps its estimate
+            until the time since its last sample is a gap.
 
         Raises:
             StreamError: an unknown finger, another number of taxels or axes, or a time that
-                does not go forward. The detector is as it was before.
+                does not go forward. The detector has not changed then.
         """
         time = float(time)
-        if not self._last < time < inf:
+        if not self._last_time < time < inf:
             self._refuse_time(time)
-        self._place(samples)
-        self._last = time
-        return self._tell(time, step_live(self._table, time))
+        self._store(samples)
+        self._last_time = time
+        return self._estimate(time, fast_step(self._table, time))
 
     def events(self) -> list[ContactEvent]:
-        """The changes of state since the last call, at most `MAX_EVENTS`, oldest first."""
+        """Return the changes of state since the last call, at most `MAX_EVENTS`, oldest first."""
         events, self._events = self._events, []
         return events
 
     def run(self, recording: Recording) -> Detection:
-        """Takes all samples of a recording, from where the detector stands.
+        """Process all samples of a recording, after those that the detector has had.
 
         Args:
-            recording: that has some of the fingers. A long one may be given in pieces.
+            recording: that has some of the fingers. A long recording may come in parts, one
+                call for each.
 
         Returns:
-            What `update` would have said, sample by sample.
+            The estimates that `update` would return, sample by sample.
+
+        Raises:
+            StreamError: the recording has no sample of the fingers, another number of taxels,
+                or begins before the last sample.
         """
         self._check_recording(recording)
-        pieces = []
-        for times, present, readings in samples_of(self._plan, recording):
-            traces = Traces.empty(len(times), present.shape[1])
+        stream, chunks = self._stream, []
+        for times, present, readings in stream.samples_of(recording):
+            rows = TraceRows.empty(len(times), present.shape[1])
             run(
-                self._layout, self._memory, self._output, self._rule, self._decision,
-                readings, present, times, traces,
+                stream.layout, stream.memory, stream.output, self._rule, self._decision,
+                readings, present, times, rows,
             )  # fmt: skip
-            codes = np.column_stack([traces.state, traces.hand])
+            codes = np.column_stack([rows.state, rows.hand])
             self._keep_events(self._changes.update_chunk(times, codes))
-            self._last = float(times[-1])
-            pieces.append((times, present, traces))
-        return detection_of(recording.name, self._plan.fingers, pieces)
+            self._last_time = float(times[-1])
+            chunks.append((times, present, rows))
+        return detection_of(recording.name, stream.plan.fingers, chunks)
 
     def _refuse_time(self, time: float) -> None:
-        after = "" if self._last == -inf else f" after {self._last:.15g} s"
+        after = "" if self._last_time == -inf else f" after {self._last_time:.15g} s"
         raise StreamError(f"time {time:.15g} s given{after}; finite times that go forward expected")
 
     def _check_recording(self, recording: Recording) -> None:
@@ -216,12 +213,12 @@ class Detector:
         if not any(module.n_samples for module in modules.values()):
             raise StreamError(
                 f"recording {recording.name!r} has samples of {', '.join(recording.modules)}; "
-                f"the model judges {', '.join(self._slots)}"
+                f"the model is for {', '.join(self._slots)}"
             )
         for finger, module in modules.items():
             self._check_shape(finger, module.readings.shape[1:])
         start = min(float(m.times[0]) for m in modules.values() if m.n_samples)
-        if not self._last < start < inf:
+        if not self._last_time < start < inf:
             self._refuse_time(start)
 
     def _check_shape(self, finger: str, shape: tuple[int, ...]) -> None:
@@ -229,16 +226,17 @@ class Detector:
         if shape != expected:
             raise StreamError(
                 f"{finger}: a sample of shape {shape} given, {expected} expected "
-                f"({self._plan.sensors[finger].name})"
+                f"({self._stream.plan.sensors[finger].name})"
             )
 
-    def _place(self, samples: Mapping[str, npt.ArrayLike]) -> None:
+    def _store(self, samples: Mapping[str, npt.ArrayLike]) -> None:
+        """Copy the samples into the array that the kernel reads."""
         slots, flags = self._slots, self._flags
         if len(samples) != len(slots):
             flags[:] = bytes(len(flags))
         for finger, sample in samples.items():
             if finger not in slots:
-                raise StreamError(f"finger {finger!r} given; the model judges {', '.join(slots)}")
+                raise StreamError(f"finger {finger!r} given; the model is for {', '.join(slots)}")
             place, slot, shape = slots[finger]
             values = sample if isinstance(sample, ndarray) else np.asarray(sample)
             if values.shape != shape:
@@ -246,15 +244,17 @@ class Detector:
             slot[...] = values
             flags[place] = 1
 
-    def _tell(self, time: float, hand_code: int) -> HandEstimate:
+    def _estimate(self, time: float, hand_code: int) -> HandEstimate:
+        """Return the estimate that the kernel reported, and keep its changes as events."""
         fingers, states = {}, []
+        status = self._stream.output.status
         for place, row in enumerate(self._report.tolist()):
-            seen, code, probability, sigma, x, y, z = row
-            state, reason, faults = VERDICTS[code]
-            taxels = taxels_of(int(self._output.status[place, TAXELS])) if faults else ()
+            sample_time, code, probability, sigma, x, y, z = row
+            state, reason, faults = ESTIMATES[code]
+            taxels = taxels_of(int(status[place, TAXELS])) if faults else ()
             states.append(state)
             fingers[self._names[place]] = ContactEstimate(
-                seen, state, reason, probability, sigma, (x, y, z), faults, taxels
+                sample_time, state, reason, probability, sigma, (x, y, z), faults, taxels
             )
         hand = STATES[hand_code]
         states.append(hand)
@@ -268,40 +268,48 @@ class Detector:
 
 
 def detect(model: Model, recording: Recording) -> Detection:
-    """What the model says of a recording: what a detector says when fed sample by sample.
+    """Return the estimates of a whole recording, the same as `Detector.update` gives.
 
     Args:
-        model: that judges.
-        recording: that has some of its fingers. One whose rate is not within 20 % of the
-            model's is resampled to it first.
+        model: features, classifiers and decision rule.
+        recording: that has some of the model's fingers. It is resampled first, if its rate is
+            not within 20 % of the model's.
 
     Returns:
-        The traces of the fingers that the recording has, and of the hand.
+        The trace of each finger that the recording has, and of the hand.
 
     Raises:
         ModelError: the recording has none of the model's fingers, or another sensor.
         ValueError: a tare by interval finds no samples.
+
+    Example:
+        >>> from holdfast.synthetic import synthetic_recording
+        >>> recording = synthetic_recording("made", seed=0)
+        >>> found = detect(Model.load("builtin:noise-floor"), recording)
+        >>> sorted(found.fingers), len(found.fingers["index"]), found.hand.shape
+        (['index', 'middle', 'thumb'], 1725, (1725,))
     """
     if model.rate is not None and not model.rate_fits(recording.rate):
         recording = resample(recording, model.rate)
     return Detector.for_recording(model, recording).run(recording)
 
 
-def _own_fingers(model: Model) -> dict[str, Sensor]:
+def _sensors_of(model: Model) -> dict[str, Sensor]:
+    """Return the sensors of all fingers that a model names."""
     if any(finger == "*" or part.sensor is None for finger, part in model.fingers.items()):
         raise ModelError(
-            f"the model {model.name or 'given'} serves any finger: say which fingers the hand "
-            "has, and with which sensors"
+            f"the model {model.name or 'given'} is for any finger: the fingers of the hand and "
+            "their sensors expected"
         )
     return {name: model.sensors[str(part.sensor)] for name, part in model.fingers.items()}
 
 
-def _without(plan: StreamPlan, ignore: Ignored | None) -> StreamPlan:
-    """The plan without those taxels."""
+def _ignoring(plan: StreamPlan, ignore: IgnoredTaxels | None) -> StreamPlan:
+    """Return the plan without some taxels."""
     for finger, taxels in (ignore or {}).items():
         if finger not in plan.sensors:
             raise ValueError(
-                f"taxels of {finger!r} to be ignored; the model judges {', '.join(plan.fingers)}"
+                f"taxels of {finger!r} to be ignored; the model is for {', '.join(plan.fingers)}"
             )
         n_taxels = plan.sensors[finger].n_taxels
         for taxel in taxels:

@@ -2,12 +2,12 @@
 
 from holdfast.features.force import fingertip_force
 from holdfast.features.haar import DEFAULT_WINDOW, FEATURE_NAMES, haar_features
-from holdfast.features.specs import DEPLOYED, FeatureSpec, parse_features
+from holdfast.features.specs import DEPLOYED_FEATURES, FeatureSpec, parse_features
 from holdfast.features.tare import Tare
 
 __all__ = [
     "DEFAULT_WINDOW",
-    "DEPLOYED",
+    "DEPLOYED_FEATURES",
     "FEATURE_NAMES",
     "FeatureSpec",
     "Tare",

@@ -1,66 +1,86 @@
-"""What the readings of a finger show of faulty taxels. Compiled, no objects.
+"""Faults that readings show: of single taxels and of whole fingers. Compiled, no objects.
 
-A taxel is judged beside the others of its finger, over the samples that changed any of them:
-a server that sends a sample twice says nothing of a taxel.
+A taxel is compared with the other taxels of its finger. Only samples that changed a reading of
+the finger count, because a sample that a server sends twice shows nothing about a taxel.
 
-Loops that run at every sample count without a sign: of a signed index, compiled code asks each
-time whether it counts from the end, which takes as long as the sums.
+Loops that run at every sample have an unsigned index. For a signed index, compiled code tests
+at each access whether it counts from the end, which takes as long as the sums.
 """
 
 import math
 
 import numpy as np
-import numpy.typing as npt
 
-from holdfast.compiled import compiled
-
-Array = npt.NDArray[np.float64]
-Flags = npt.NDArray[np.bool_]
+from holdfast.compiled import compiled, inlined
+from holdfast.features.arrays import (
+    CHANGED_AT,
+    FAULTY_TAXELS,
+    FIRST_POWER,
+    FIRST_TIME,
+    HIGH_LIMIT,
+    LAST_CHANGE,
+    LOW_LIMIT,
+    MAX_AMPLITUDE,
+    N_CHANGED,
+    N_CHANGES,
+    N_PULLED,
+    N_SEEN,
+    N_UNCHANGED,
+    N_USED,
+    NOISE,
+    ROUNDING_NOISE,
+    SECOND_POWER,
+    TAXEL_FAULTS,
+    Array,
+    Flags,
+    Integers,
+    Layout,
+    Memory,
+)
 
 # Bits of holdfast.contact.Fault.
 NOT_FINITE, STUCK, SATURATED, TARE_LOADED = 1, 2, 4, 8
 DEAD, NOISY, OUT_OF_RANGE, TARE_DRIFT = 16, 32, 64, 128
-SPOILING = STUCK | NOISY
+SERIOUS = STUCK | NOISY
 """Faults whose samples no window may hold, though they have a force."""
 
 STUCK_SECONDS = 0.5
-"""Readings that changed for so long and then have not for so long are stuck [s]."""
+"""Readings that changed for this long and then do not change for this long are stuck [s]."""
 DEAD_SECONDS = 2.0
-"""A taxel that has not changed so long after the first sample, while others did, is dead [s]."""
-COMPANY = 0.8
-"""Share of the taxels that must move, each in more than half of the samples, for others to be
-at fault that stand still."""
-BUSY = 0.9
-"""Who changed in more of the samples has noise of about a count, and cannot stand still by
-chance: readings that flicker between two counts change in half, three of them in 7 of 8."""
+"""A taxel that has not changed for this long since the first sample, while others change, is
+dead [s]."""
+MOVING_SHARE = 0.8
+"""Minimum share of taxels that must move, each in more than half of the samples, before a taxel
+that does not move counts as faulty."""
+BUSY_SHARE = 0.9
+"""A taxel that changed in a larger share of samples does not stop by chance. Its noise is about
+a count: readings that flicker between two counts change in 1/2 of the samples, three such
+readings together in 7/8."""
 NOISE_SMOOTHING = 0.25
-"""Over which the noise of a taxel is smoothed [s]."""
-WHITE = 2.5
-"""Mean square of second over that of first differences: 2 for steps that know nothing of each
-other, 3 for white noise, 4 for a value that jumps to and fro; less for all that moves."""
-LONE = 0.9
-"""Share of a finger's second differences in one taxel: skin spreads a touch to neighbours."""
-LOUD = 100.0
-"""So many times as loud as a taxel's least noise is no noise of the sensor."""
-LEAST_TAXELS = 4
-"""Of fewer, one alone may well feel a touch."""
-N_BITS = 63
-"""Taxels that a mask can tell."""
-
-# Columns of Memory.taxels.
-STEP = 0  # its last change, in three axes
-N_CHANGED = 3  # samples that changed it
-CHANGED_AT = 4  # changes of its finger when it last changed
-ROUGH = 5  # mean square of its changes, smoothed
-ROUGHER = 6  # mean square of the change from one to the next, smoothed
-N_TAXEL = 7
+"""Time constant over which the noise of a taxel is smoothed [s]."""
+WHITE_RATIO = 2.5
+"""Minimum ratio of the mean squares of second and first differences in noise. It is 2 for
+independent steps, 3 for white noise, 4 for a value that jumps up and down, and less for motion."""
+LONE_SHARE = 0.9
+"""Minimum share of a finger's second differences in one noisy taxel. A touch spreads over the
+skin to neighbouring taxels."""
+LOUD_RATIO = 100.0
+"""A taxel is noisy when it exceeds its least possible noise by this factor."""
+MIN_TAXELS = 4
+"""Number of taxels from which one may count as noisy; of fewer, one alone may feel a touch."""
+N_MASK_BITS = 63
+"""Number of taxels that a mask can hold."""
+LOADED_SECONDS = 0.25
+"""A pull for this long means that the tare was taken under load: nothing pulls a skin [s]."""
 
 
 @compiled
-def survey(readings: Array, ignored: Flags, first: int, last: int) -> tuple[float, float, float]:
-    """A sum that is finite where all readings are, and the smallest and largest of them.
+def scan_readings(
+    readings: Array, ignored: Flags, first: int, last: int
+) -> tuple[float, float, float]:
+    """Return a sum that is finite if all readings are, their minimum and their maximum.
 
-    Those of ignored taxels become zero.
+    The readings of ignored taxels are set to zero.
     """
     sum_x = sum_y = sum_z = 0.0
     least, most = math.inf, -math.inf
@@ -72,7 +92,7 @@ def survey(readings: Array, ignored: Flags, first: int, last: int) -> tuple[floa
         sum_x += x
         sum_y += y
         sum_z += z
-        low, high = (x, y) if x < y else (y, x)  # half as long as min and max take
+        low, high = (x, y) if x < y else (y, x)  # takes half as long as min and max
         low = z if z < low else low
         high = z if z > high else high
         least = low if low < least else least
@@ -81,8 +101,8 @@ def survey(readings: Array, ignored: Flags, first: int, last: int) -> tuple[floa
 
 
 @compiled
-def keep(readings: Array, previous: Array, first: int, last: int) -> None:
-    """Copies the readings of a finger: a copy by slices would take three times as long."""
+def copy_readings(readings: Array, previous: Array, first: int, last: int) -> None:
+    """Copy the readings of a finger. A copy by slices takes three times as long."""
     for i in range(np.uint64(first), np.uint64(last)):
         previous[i, 0], previous[i, 1], previous[i, 2] = (
             readings[i, 0],
@@ -92,18 +112,10 @@ def keep(readings: Array, previous: Array, first: int, last: int) -> None:
 
 
 @compiled
-def differ(readings: Array, previous: Array, first: int, last: int) -> bool:
-    """Whether any reading changed."""
-    for i in range(first, last):
-        for axis in range(3):
-            if readings[i, axis] != previous[i, axis]:
-                return True
-    return False
-
-
-@compiled
-def outside(readings: Array, ignored: Flags, first: int, last: int, low: float, high: float) -> int:
-    """A bit for each taxel that has a reading not strictly between low and high."""
+def taxels_outside(
+    readings: Array, ignored: Flags, first: int, last: int, low: float, high: float
+) -> int:
+    """Return the bits of the taxels with a reading that is not strictly between low and high."""
     found = 0
     for i in range(first, last):
         for axis in range(3):
@@ -112,8 +124,90 @@ def outside(readings: Array, ignored: Flags, first: int, last: int, low: float, 
     return found
 
 
+@inlined
+def track_changes(
+    layout: Layout, memory: Memory, readings: Array, f: int, time: float, after_gap: bool
+) -> None:
+    """Count a valid sample of a finger, and compare it with the one before."""
+    counts = memory.counts
+    first, last = layout.offsets[f], layout.offsets[f + 1]
+    if counts[f, N_SEEN] == 0:
+        memory.levels[f, FIRST_TIME] = time
+    elif _differ(readings, memory.previous, first, last):
+        counts[f, N_UNCHANGED] = 0
+        counts[f, N_CHANGES] += 1
+        _find_taxel_faults(layout, memory, readings, f, after_gap)
+    else:
+        counts[f, N_UNCHANGED] += 1
+    counts[f, N_SEEN] += 1
+
+
 @compiled
-def watch_taxels(
+def is_stuck(counts: Integers, f: int, period: float) -> bool:
+    """Return whether the readings of a finger stopped changing after they had changed."""
+    n_steps = counts[f, N_SEEN] - 1 - counts[f, N_UNCHANGED]
+    changed_often = 2 * counts[f, N_CHANGES] > n_steps
+    long = STUCK_SECONDS / period
+    return bool(changed_often and counts[f, N_UNCHANGED] >= long and counts[f, N_CHANGES] >= long)
+
+
+@compiled
+def is_pulled(counts: Integers, levels: Array, f: int, normal: float, period: float) -> bool:
+    """Return whether the normal readings show a pull, well above noise, for a long time.
+
+    Args:
+        counts: of all fingers; is changed.
+        levels: of all fingers.
+        f: the finger.
+        normal: sum of its normal readings [unit of the readings].
+        period: of the samples [s].
+    """
+    limit = max(20.0 * levels[f, NOISE], 0.1 * levels[f, MAX_AMPLITUDE])
+    counts[f, N_PULLED] = counts[f, N_PULLED] + 1 if normal < -limit else 0
+    return bool(counts[f, N_PULLED] * period >= LOADED_SECONDS)
+
+
+@compiled
+def _differ(readings: Array, previous: Array, first: int, last: int) -> bool:
+    for i in range(first, last):
+        for axis in range(3):
+            if readings[i, axis] != previous[i, axis]:
+                return True
+    return False
+
+
+@inlined
+def _find_taxel_faults(
+    layout: Layout, memory: Memory, readings: Array, f: int, after_gap: bool
+) -> None:
+    """Find the faulty taxels of a finger at a sample that changed a reading."""
+    first, last, period = layout.offsets[f], layout.offsets[f + 1], layout.period
+    taxels, constants, counts = memory.taxels, layout.constants, memory.counts
+    n_changes, long = counts[f, N_CHANGES], STUCK_SECONDS / period
+    share = min(1.0, period / NOISE_SMOOTHING)
+    any_still, alone, loudest = _update_taxels(
+        readings, memory.previous, taxels, first, last, n_changes, long, share
+    )
+    if after_gap:
+        _forget_noise(taxels, first, last)
+    counts[f, TAXEL_FAULTS] = counts[f, FAULTY_TAXELS] = 0
+    if any_still:
+        low, high, ignored = constants[f, LOW_LIMIT], constants[f, HIGH_LIMIT], layout.ignored
+        at_limit = taxels_outside(readings, ignored, first, last, low, high)
+        counts[f, TAXEL_FAULTS], counts[f, FAULTY_TAXELS] = _still_taxels(
+            taxels, ignored, first, last, n_changes, period, at_limit
+        )
+    if alone and constants[f, N_USED] >= MIN_TAXELS:
+        quiet = constants[f, ROUNDING_NOISE]
+        if math.isnan(quiet):  # its share in the noise of the finger
+            quiet = memory.levels[f, NOISE] / math.sqrt(constants[f, N_USED])
+        if _is_noisy(taxels, loudest, quiet):
+            counts[f, TAXEL_FAULTS] |= NOISY
+            counts[f, FAULTY_TAXELS] |= bit_of(loudest - first)
+
+
+@compiled
+def _update_taxels(
     readings: Array,
     previous: Array,
     taxels: Array,
@@ -123,81 +217,93 @@ def watch_taxels(
     long: float,
     share: float,
 ) -> tuple[bool, bool, int]:
-    """Takes a sample that changed something.
+    """Update the memory of each taxel with a sample that changed a reading.
 
     Args:
         readings: of this sample.
-        previous: of the last.
-        taxels: is changed.
-        first: taxel of the finger.
-        last: one past its last.
-        n_changes: samples that changed the finger, this one too.
-        long: so many of them without a change are suspicious.
-        share: of this sample in what is smoothed.
+        previous: of the last sample.
+        taxels: memory of all taxels; is changed.
+        first: first taxel of the finger.
+        last: one past its last taxel.
+        n_changes: number of samples that changed the finger, with this one.
+        long: number of them without a change after which a taxel may be faulty.
+        share: weight of this sample in the smoothed values.
 
     Returns:
-        Whether any taxel stood still for so long; whether one has most of the second
-        differences, and which.
+        Whether any taxel did not change for so long, whether one taxel has most of the second
+        differences, and that taxel.
     """
     any_still = False
-    total = loudest = 0.0
-    which = first
+    total = largest = 0.0
+    loudest = first
     for i in range(np.uint64(first), np.uint64(last)):
         x = readings[i, 0] - previous[i, 0]
         y = readings[i, 1] - previous[i, 1]
         z = readings[i, 2] - previous[i, 2]
         square = x * x + y * y + z * z
-        rough, rougher = (1.0 - share) * taxels[i, ROUGH], (1.0 - share) * taxels[i, ROUGHER]
+        power, power_2 = (
+            (1.0 - share) * taxels[i, FIRST_POWER],
+            (1.0 - share) * taxels[i, SECOND_POWER],
+        )
         if square > 0.0:
-            if (n_changes - taxels[i, CHANGED_AT]) * share > 1.0:  # to and fro takes less
-                taxels[i, STEP] = taxels[i, STEP + 1] = taxels[i, STEP + 2] = 0.0
+            if (n_changes - taxels[i, CHANGED_AT]) * share > 1.0:  # jumps follow faster
+                _forget_change(taxels, i)
             if _has_reading(readings, i) and _has_reading(previous, i):
-                dx, dy, dz = x - taxels[i, STEP], y - taxels[i, STEP + 1], z - taxels[i, STEP + 2]
-                rough += share * square
-                rougher += share * (dx * dx + dy * dy + dz * dz)
-                taxels[i, STEP], taxels[i, STEP + 1], taxels[i, STEP + 2] = x, y, z
+                dx = x - taxels[i, LAST_CHANGE]
+                dy = y - taxels[i, LAST_CHANGE + 1]
+                dz = z - taxels[i, LAST_CHANGE + 2]
+                power += share * square
+                power_2 += share * (dx * dx + dy * dy + dz * dz)
+                taxels[i, LAST_CHANGE] = x
+                taxels[i, LAST_CHANGE + 1] = y
+                taxels[i, LAST_CHANGE + 2] = z
             else:
-                taxels[i, STEP] = taxels[i, STEP + 1] = taxels[i, STEP + 2] = 0.0
+                _forget_change(taxels, i)
             taxels[i, N_CHANGED] += 1.0
             taxels[i, CHANGED_AT] = n_changes
         elif n_changes - taxels[i, CHANGED_AT] >= long:
             any_still = True
-        taxels[i, ROUGH], taxels[i, ROUGHER] = rough, rougher
-        total += rougher
-        if rougher > loudest:
-            loudest, which = rougher, int(np.int64(i))
-    return any_still, loudest >= LONE * total, which
+        taxels[i, FIRST_POWER], taxels[i, SECOND_POWER] = power, power_2
+        total += power_2
+        if power_2 > largest:
+            largest, loudest = power_2, int(np.int64(i))
+    return any_still, largest >= LONE_SHARE * total, loudest
 
 
 @compiled
 def _has_reading(readings: Array, i: int) -> bool:
-    """False for zeros: a sensor with a dead band jumps to and from them, which is no noise."""
+    """Return False for zeros: a sensor with a dead band jumps to and from zero without noise."""
     return bool(readings[i, 0] != 0.0 or readings[i, 1] != 0.0 or readings[i, 2] != 0.0)
 
 
 @compiled
-def forget_noise(taxels: Array, first: int, last: int) -> None:
-    """After a gap, over which a change says nothing of noise."""
-    for i in range(first, last):
-        taxels[i, STEP] = taxels[i, STEP + 1] = taxels[i, STEP + 2] = 0.0
-        taxels[i, ROUGH] = taxels[i, ROUGHER] = 0.0
+def _forget_change(taxels: Array, i: int) -> None:
+    taxels[i, LAST_CHANGE] = taxels[i, LAST_CHANGE + 1] = taxels[i, LAST_CHANGE + 2] = 0.0
 
 
 @compiled
-def is_noisy(taxels: Array, i: int, quiet: float) -> bool:
-    """Whether a taxel that has most of the second differences shows noise, and loud.
+def _forget_noise(taxels: Array, first: int, last: int) -> None:
+    """Forget the noise of the taxels after a gap, over which a change is no noise."""
+    for i in range(first, last):
+        _forget_change(taxels, i)
+        taxels[i, FIRST_POWER] = taxels[i, SECOND_POWER] = 0.0
+
+
+@compiled
+def _is_noisy(taxels: Array, i: int, quiet: float) -> bool:
+    """Return whether a taxel that has most of the second differences is noisy.
 
     Args:
-        taxels: what is remembered of them.
+        taxels: memory of all taxels.
         i: the taxel.
-        quiet: the least noise of a reading [unit of the readings]; NaN while it is not known.
+        quiet: least noise of a reading [unit of the readings]; NaN while unknown.
     """
-    white = taxels[i, ROUGHER] > WHITE * taxels[i, ROUGH]
-    return bool(white and taxels[i, ROUGHER] > 6.0 * (LOUD * quiet) ** 2)
+    white = taxels[i, SECOND_POWER] > WHITE_RATIO * taxels[i, FIRST_POWER]
+    return bool(white and taxels[i, SECOND_POWER] > 6.0 * (LOUD_RATIO * quiet) ** 2)
 
 
 @compiled
-def still_taxels(
+def _still_taxels(
     taxels: Array,
     ignored: Flags,
     first: int,
@@ -206,16 +312,16 @@ def still_taxels(
     period: float,
     at_limit: int,
 ) -> tuple[int, int]:
-    """DEAD or STUCK or neither, and a bit for each such taxel, where enough others move.
+    """Return the faults DEAD and STUCK, and the bits of their taxels, if enough others move.
 
     Args:
-        taxels: what is remembered of them.
-        ignored: taxels that are not looked at.
-        first: taxel of the finger.
-        last: one past its last.
-        n_changes: samples that changed the finger.
+        taxels: memory of all taxels.
+        ignored: taxels that are not tested.
+        first: first taxel of the finger.
+        last: one past its last taxel.
+        n_changes: number of samples that changed the finger.
         period: of the samples [s].
-        at_limit: bits of taxels at a limit of their range: they are saturated, not stuck.
+        at_limit: bits of the taxels at a limit of their range: they are saturated, not stuck.
     """
     faults = bits = n_used = n_moving = 0
     long = STUCK_SECONDS / period
@@ -231,18 +337,18 @@ def still_taxels(
             faults |= DEAD
             bits |= bit_of(i - first)
         elif still >= long and _was_busy(changed, changed_at, long):
-            at_it = at_limit & bit_of(i - first) != 0
-            faults |= 0 if at_it else STUCK
-            bits |= 0 if at_it else bit_of(i - first)
-    return (faults, bits) if n_moving >= COMPANY * n_used else (0, 0)
+            saturated = at_limit & bit_of(i - first) != 0
+            faults |= 0 if saturated else STUCK
+            bits |= 0 if saturated else bit_of(i - first)
+    return (faults, bits) if n_moving >= MOVING_SHARE * n_used else (0, 0)
 
 
 @compiled
 def _was_busy(changed: float, changed_at: float, long: float) -> bool:
-    return bool(changed >= long and changed > BUSY * changed_at)
+    return bool(changed >= long and changed > BUSY_SHARE * changed_at)
 
 
 @compiled
 def bit_of(taxel: int) -> int:
-    """The bit of a taxel in a mask; none for those that a mask cannot tell."""
-    return 1 << taxel if taxel < N_BITS else 0
+    """Return the bit of a taxel in a mask; 0 for a taxel that the mask cannot hold."""
+    return 1 << taxel if taxel < N_MASK_BITS else 0

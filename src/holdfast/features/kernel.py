@@ -1,8 +1,8 @@
-"""What happens to one sample of a hand: tare, force, faults, features. Compiled, no objects.
+"""One sample of a hand: tare, force, faults and features. Compiled, no objects.
 
-`advance` is the only path from readings to features that a model sees: live, offline and in
-training. All memory is laid out beforehand and never grows. What belongs to one finger is a
-row of an array, and columns have names: a slice would cost as much as the sum it is for.
+`advance` is the only path from readings to the features that a model receives: live, offline and
+in training. All memory is allocated beforehand and never grows. Steps that take all arrays are
+inlined: passing the arrays costs as much as the step.
 """
 
 import math
@@ -11,38 +11,47 @@ import numpy as np
 
 from holdfast.compiled import compiled, inlined
 from holdfast.features.arrays import (
+    AFTER_GAP,
     AMPLITUDE,
-    CHANGES,
-    END,
+    CHANGE,
     FAULT,
     FAULTS,
-    FIRST,
-    FROZEN,
+    FAULTY_TAXELS,
+    FIRST_TIME,
+    FIRST_WINDOWED,
     GAP,
-    GAPPED,
-    LARGEST,
-    LAST,
-    LEAST,
-    LONGEST,
+    HIGH_LIMIT,
+    HISTORY_END,
+    KIND,
+    LAST_TIME,
+    LONGEST_WINDOW,
+    LOW_LIMIT,
+    MAX_AMPLITUDE,
     MEAN,
-    MOST,
-    N_USED,
-    N_VALUES,
+    MIN_NOISE,
+    N_PULLED,
+    N_SEEN,
+    N_STEPS,
+    N_STRETCH,
+    N_TARED,
+    N_UNCHANGED,
     NOISE,
-    PULLING,
     READY,
     REASON,
-    ROUNDING,
-    RUN,
-    SEEN,
+    SAME_AS,
+    SCOPE,
     SIGMA,
     SIGMA_WINDOW,
+    SIGMA_XYZ,
+    SQUARED_STEPS,
     TARE,
     TARE_SECONDS,
+    TAXEL_FAULTS,
     TAXELS,
+    TRANSFORM,
+    VALUES_WIDTH,
     WARM_UP,
-    WRONG,
-    WRONG_TAXELS,
+    WINDOW,
     Array,
     Flags,
     Integers,
@@ -50,80 +59,76 @@ from holdfast.features.arrays import (
     Memory,
     Output,
 )
-from holdfast.features.baseline import prepared
 from holdfast.features.faults import (
-    LEAST_TAXELS,
-    NOISE_SMOOTHING,
-    NOISY,
     NOT_FINITE,
     OUT_OF_RANGE,
     SATURATED,
-    SPOILING,
+    SERIOUS,
     STUCK,
-    STUCK_SECONDS,
     TARE_LOADED,
-    bit_of,
-    differ,
-    forget_noise,
-    is_noisy,
-    outside,
-    still_taxels,
-    survey,
-    watch_taxels,
+    copy_readings,
+    is_pulled,
+    is_stuck,
+    scan_readings,
+    taxels_outside,
+    track_changes,
 )
 from holdfast.features.force import sum_taxels
-from holdfast.features.values import blank, fill_features, moments, own_features
+from holdfast.features.haar import haar_window
+from holdfast.features.tare import update_baseline
 
-LOADED_SECONDS = 0.25
-"""Pulling for so long means that the tare was taken under load: nothing pulls a skin [s]."""
-GAP_LIMIT = 3.0003
-"""Sample periods; a longer step is a gap. The part over 3 is for the rounding of times."""
+GAP_LIMIT_PERIODS = 3.0003
+"""A step in time of more sample periods is a gap. The part over 3 allows for rounding."""
+
+NOISE_SECONDS = 0.5
+"""Time over which the noise of a sensor is measured, where the tare takes no time [s]."""
 
 
 @compiled
 def advance(
     layout: Layout, memory: Memory, output: Output, readings: Array, present: Flags, time: float
 ) -> None:
-    """Takes one sample of the fingers that are present, and fills the output.
+    """Process one sample of the fingers that are present, and fill the output.
 
     Args:
         layout: of the hand.
         memory: is changed.
         output: is filled.
-        readings: (n_taxels, 3) of all fingers; those of absent ones are not looked at, and
-            those of ignored taxels become zero.
-        present: (n_fingers,) which fingers have a sample.
+        readings: (n_taxels, 3) of all fingers. Those of absent fingers are not read, and those
+            of ignored taxels are set to zero.
+        present: (n_fingers,) True for each finger with a sample.
         time: of the sample [s].
     """
     counts, status = memory.counts, output.status
     for f in range(len(present)):
-        if time - memory.levels[f, LAST] > GAP_LIMIT * layout.period:  # False while LAST is NaN
-            counts[f, RUN] = counts[f, FROZEN] = counts[f, PULLING] = 0
-            blank(memory.own, f)
-            counts[f, GAPPED] = 1
+        # False while LAST_TIME is NaN.
+        if time - memory.levels[f, LAST_TIME] > GAP_LIMIT_PERIODS * layout.period:
+            counts[f, N_STRETCH] = counts[f, N_UNCHANGED] = counts[f, N_PULLED] = 0
+            _clear(memory.own, f)
+            counts[f, AFTER_GAP] = 1
             status[f, REASON], status[f, FAULTS], status[f, TAXELS] = GAP, 0, 0
-            blank(output.values, f)
+            _clear(output.values, f)
         if present[f]:
-            status[f, REASON], status[f, FAULTS], status[f, TAXELS] = _take(
+            status[f, REASON], status[f, FAULTS], status[f, TAXELS] = _process(
                 layout, memory, output.values, readings, time, f
             )
     for f in range(len(present)):
         if present[f]:
-            own_features(layout, memory, output, f)
+            _compute_own(layout, memory, output, f)
     for f in range(len(present)):
         if status[f, REASON] != READY:
-            blank(output.features, f)
+            _clear(output.features, f)
         elif present[f]:
-            total = fill_features(layout, memory, output, f)
+            total = _fill_features(layout, memory, output, f)
             if math.isnan(total):  # the noise is not known yet
                 status[f, REASON] = TARE
 
 
 @inlined
-def _take(
+def _process(
     layout: Layout, memory: Memory, values: Array, readings: Array, time: float, f: int
 ) -> tuple[int, int, int]:
-    """One finger's sample up to its force; the reason, the faults and their taxels after it."""
+    """Process a sample of one finger. Return its reason, its faults and their taxels."""
     counts, levels, constants, ignored = (
         memory.counts,
         memory.levels,
@@ -131,119 +136,102 @@ def _take(
         layout.ignored,
     )
     first, last = layout.offsets[f], layout.offsets[f + 1]
-    low, high = constants[f, LEAST], constants[f, MOST]
-    for column in range(N_VALUES):
+    low, high = constants[f, LOW_LIMIT], constants[f, HIGH_LIMIT]
+    for column in range(VALUES_WIDTH):
         values[f, column] = math.nan
-    fresh = time - levels[f, LAST] > GAP_LIMIT * layout.period
-    levels[f, LAST] = time
-    total, least, most = survey(readings, ignored, first, last)
+    after_gap = time - levels[f, LAST_TIME] > GAP_LIMIT_PERIODS * layout.period
+    levels[f, LAST_TIME] = time
+    total, least, most = scan_readings(readings, ignored, first, last)
     if not math.isfinite(total):
-        counts[f, RUN] = 0
-        return FAULT, NOT_FINITE, outside(readings, ignored, first, last, -math.inf, math.inf)
+        counts[f, N_STRETCH] = 0
+        bits = taxels_outside(readings, ignored, first, last, -math.inf, math.inf)
+        return FAULT, NOT_FINITE, bits
     if least < low or most > high:
-        counts[f, RUN] = 0
+        counts[f, N_STRETCH] = 0
         low, high = np.nextafter(low, -math.inf), np.nextafter(high, math.inf)
-        return FAULT, OUT_OF_RANGE, outside(readings, ignored, first, last, low, high)
-    _watch(layout, memory, readings, f, time, fresh)
-    elapsed = time - levels[f, FIRST] + 0.5 * layout.period  # half: rounding moves no sample
-    if not prepared(layout, memory, readings, f, elapsed):
+        return FAULT, OUT_OF_RANGE, taxels_outside(readings, ignored, first, last, low, high)
+    track_changes(layout, memory, readings, f, time, after_gap)
+    # Half a period of tolerance: the rounding of times moves no sample.
+    elapsed = time - levels[f, FIRST_TIME] + 0.5 * layout.period
+    if not _update_tare(layout, memory, readings, f, elapsed):
         return TARE, 0, 0
-    faults, bits = counts[f, WRONG], counts[f, WRONG_TAXELS]
+    faults, bits = counts[f, TAXEL_FAULTS], counts[f, FAULTY_TAXELS]
     if least <= low or most >= high:
         faults |= SATURATED
-        bits |= outside(readings, ignored, first, last, low, high)
-    return _feel(layout, memory, values, readings, f, faults, bits)
+        bits |= taxels_outside(readings, ignored, first, last, low, high)
+    return _process_force(layout, memory, values, readings, f, faults, bits)
 
 
 @inlined
-def _feel(
-    layout: Layout, memory: Memory, values: Array, readings: Array, f: int, faults: int, bits: int
-) -> tuple[int, int, int]:
-    """The force of a sample, with its faults so far; what `_take` returns."""
-    counts, levels, windows = memory.counts, memory.levels, layout.windows
+def _update_tare(layout: Layout, memory: Memory, readings: Array, f: int, elapsed: float) -> bool:
+    """Add a sample to the noise and to the tare. Return whether the tare is complete."""
+    counts, kind, seconds = memory.counts, layout.tare_kind, layout.tare_seconds
     first, last = layout.offsets[f], layout.offsets[f + 1]
-    x, y, z, pressing = sum_taxels(readings, memory.baseline, layout.rotations, first, last)
-    _remember(memory.history, counts, values, f, x, y, z)
-    if _stuck(counts, f, layout.period):
-        faults |= STUCK
-    if faults & SPOILING:
-        counts[f, RUN] = counts[f, PULLING] = 0
-        return FAULT, faults, bits
-    levels[f, LARGEST] = max(levels[f, LARGEST], values[f, AMPLITUDE])
-    if counts[f, RUN] >= windows[f, SIGMA_WINDOW]:
-        found = moments(memory.history, counts, f, 0, windows[f, SIGMA_WINDOW])
-        values[f, MEAN], values[f, SIGMA] = found
-    if layout.tare_kind == TARE_SECONDS and _pulled(counts, levels, f, pressing, layout.period):
-        faults |= TARE_LOADED
-    if faults:
-        return FAULT, faults, bits
-    if counts[f, RUN] < windows[f, LONGEST]:
-        return GAP if counts[f, GAPPED] else WARM_UP, 0, 0
-    counts[f, GAPPED] = 0
-    return READY, 0, 0
-
-
-@inlined
-def _watch_taxels(layout: Layout, memory: Memory, readings: Array, f: int, fresh: bool) -> None:
-    """Takes a sample that changed something, and finds the taxels that are at fault."""
-    first, last, period = layout.offsets[f], layout.offsets[f + 1], layout.period
-    taxels, constants, counts = memory.taxels, layout.constants, memory.counts
-    n_changes, long = counts[f, CHANGES], STUCK_SECONDS / period
-    share = min(1.0, period / NOISE_SMOOTHING)
-    any_still, alone, which = watch_taxels(
-        readings, memory.previous, taxels, first, last, n_changes, long, share
-    )
-    if fresh:
-        forget_noise(taxels, first, last)
-    counts[f, WRONG] = counts[f, WRONG_TAXELS] = 0
-    if any_still:
-        low, high, ignored = constants[f, LEAST], constants[f, MOST], layout.ignored
-        at_limit = outside(readings, ignored, first, last, low, high)
-        counts[f, WRONG], counts[f, WRONG_TAXELS] = still_taxels(
-            taxels, ignored, first, last, n_changes, period, at_limit
-        )
-    if alone and constants[f, N_USED] >= LEAST_TAXELS:
-        quiet = constants[f, ROUNDING]
-        if math.isnan(quiet):  # its share in the noise of the finger
-            quiet = memory.levels[f, NOISE] / math.sqrt(constants[f, N_USED])
-        if is_noisy(taxels, which, quiet):
-            counts[f, WRONG] |= NOISY
-            counts[f, WRONG_TAXELS] |= bit_of(which - first)
-
-
-@inlined
-def _watch(
-    layout: Layout, memory: Memory, readings: Array, f: int, time: float, fresh: bool
-) -> None:
-    """Counts the sample, and what it changes."""
-    counts = memory.counts
-    first, last = layout.offsets[f], layout.offsets[f + 1]
-    if counts[f, SEEN] == 0:
-        memory.levels[f, FIRST] = time
-    elif differ(readings, memory.previous, first, last):
-        counts[f, FROZEN] = 0
-        counts[f, CHANGES] += 1
-        _watch_taxels(layout, memory, readings, f, fresh)
-    else:
-        counts[f, FROZEN] += 1
-    counts[f, SEEN] += 1
+    if math.isnan(memory.levels[f, NOISE]):
+        complete = elapsed >= (seconds if kind == TARE_SECONDS else NOISE_SECONDS)
+        _measure_noise(layout, memory, readings, f, complete)
+    copy_readings(readings, memory.previous, first, last)
+    if counts[f, N_TARED] < 0:
+        return True
+    running = elapsed < seconds or counts[f, N_TARED] == 0  # one sample at least
+    return bool(update_baseline(readings, memory.baseline, counts, f, first, last, kind, running))
 
 
 @compiled
-def _remember(
-    history: Array,
-    counts: Integers,
-    values: Array,
-    f: int,
-    x: float,
-    y: float,
-    z: float,
+def _measure_noise(layout: Layout, memory: Memory, readings: Array, f: int, complete: bool) -> None:
+    """Measure the noise of a force component by the steps from sample to sample.
+
+    A step has the noise of two samples, in three components: sixfold the variance.
+    """
+    levels = memory.levels
+    if complete:
+        measured = math.sqrt(levels[f, SQUARED_STEPS] / (6.0 * max(levels[f, N_STEPS], 1.0)))
+        levels[f, NOISE] = max(measured, layout.constants[f, MIN_NOISE])
+    elif memory.counts[f, N_SEEN] > 1:
+        first, last = layout.offsets[f], layout.offsets[f + 1]
+        x, y, z, _ = sum_taxels(readings, memory.previous, layout.rotations, first, last)
+        levels[f, SQUARED_STEPS] += x * x + y * y + z * z
+        levels[f, N_STEPS] += 1.0
+
+
+@inlined
+def _process_force(
+    layout: Layout, memory: Memory, values: Array, readings: Array, f: int, faults: int, bits: int
+) -> tuple[int, int, int]:
+    """Compute the force of a sample, given its faults so far. Return the same as `_process`."""
+    counts, levels, windows = memory.counts, memory.levels, layout.windows
+    first, last = layout.offsets[f], layout.offsets[f + 1]
+    x, y, z, normal = sum_taxels(readings, memory.baseline, layout.rotations, first, last)
+    _append(memory.history, counts, values, f, x, y, z)
+    if is_stuck(counts, f, layout.period):
+        faults |= STUCK
+    if faults & SERIOUS:
+        counts[f, N_STRETCH] = counts[f, N_PULLED] = 0
+        return FAULT, faults, bits
+    levels[f, MAX_AMPLITUDE] = max(levels[f, MAX_AMPLITUDE], values[f, AMPLITUDE])
+    if counts[f, N_STRETCH] >= windows[f, SIGMA_WINDOW]:
+        found = _moments(memory.history, counts, f, 0, windows[f, SIGMA_WINDOW])
+        values[f, MEAN], values[f, SIGMA] = found
+    if layout.tare_kind == TARE_SECONDS and is_pulled(counts, levels, f, normal, layout.period):
+        faults |= TARE_LOADED
+    if faults:
+        return FAULT, faults, bits
+    if counts[f, N_STRETCH] < windows[f, LONGEST_WINDOW]:
+        return GAP if counts[f, AFTER_GAP] else WARM_UP, 0, 0
+    counts[f, AFTER_GAP] = 0
+    return READY, 0, 0
+
+
+@compiled
+def _append(
+    history: Array, counts: Integers, values: Array, f: int, x: float, y: float, z: float
 ) -> None:
+    """Append a force to the history of a finger, and write it to the output."""
     amplitude = math.sqrt(x * x + y * y + z * z)
     length = history.shape[2] // 2
-    place = counts[f, RUN] % length
-    counts[f, RUN] += 1
-    counts[f, END] = place + length + 1
+    place = counts[f, N_STRETCH] % length
+    counts[f, N_STRETCH] += 1
+    counts[f, HISTORY_END] = place + length + 1
     history[f, 0, place] = history[f, 0, place + length] = amplitude
     history[f, 1, place] = history[f, 1, place + length] = x
     history[f, 2, place] = history[f, 2, place + length] = y
@@ -252,17 +240,101 @@ def _remember(
     values[f, AMPLITUDE] = amplitude
 
 
-@compiled
-def _stuck(counts: Integers, f: int, period: float) -> bool:
-    """Whether nothing of the finger changes any more, though it used to."""
-    lively = 2 * counts[f, CHANGES] > counts[f, SEEN] - 1 - counts[f, FROZEN]
-    long = STUCK_SECONDS / period
-    return bool(lively and counts[f, FROZEN] >= long and counts[f, CHANGES] >= long)
+@inlined
+def _compute_own(layout: Layout, memory: Memory, output: Output, f: int) -> None:
+    """Compute the features of a finger by itself; NaN where its stretch is too short."""
+    specs, floors, reported = layout.specs, layout.floors, layout.windows[f, SIGMA_WINDOW]
+    _, _, _, history, counts, levels, own = memory
+    for place in range(specs.shape[1]):
+        kind, window = specs[f, place, KIND], specs[f, place, WINDOW]
+        if kind < 0:
+            own[f, place] = 0.0  # padding
+        elif specs[f, place, SAME_AS] < place:
+            own[f, place] = own[f, specs[f, place, SAME_AS]]
+        elif counts[f, N_STRETCH] < max(window, 1):
+            own[f, place] = math.nan
+        else:
+            if window == reported and kind < SIGMA_XYZ:
+                value = output.values[f, MEAN + kind - FIRST_WINDOWED]
+            else:
+                value = _feature(kind, window, history, counts, f)
+            noise, floor = levels[f, NOISE], floors[f, place]
+            own[f, place] = _transform(value, specs[f, place, TRANSFORM], window, noise, floor)
+
+
+@inlined
+def _fill_features(layout: Layout, memory: Memory, output: Output, f: int) -> float:
+    """Fill the features of a finger, with the maximum of the hand by scope. Return their sum."""
+    own = memory.own
+    total = 0.0
+    for place in range(layout.specs.shape[1]):
+        value = own[f, place]
+        if layout.specs[f, place, SCOPE] == 1:
+            for other in range(len(own)):
+                rival = own[other, place]
+                if not layout.alike:
+                    rival = _feature_of_other(layout, memory, f, place, other)
+                if rival > value or math.isnan(value):
+                    value = rival
+        output.features[f, place] = value
+        total += value
+    return total
 
 
 @compiled
-def _pulled(counts: Integers, levels: Array, f: int, pressing: float, period: float) -> bool:
-    """Whether the normal readings say that something pulls, well above noise, and for long."""
-    limit = max(20.0 * levels[f, NOISE], 0.1 * levels[f, LARGEST])
-    counts[f, PULLING] = counts[f, PULLING] + 1 if pressing < -limit else 0
-    return bool(counts[f, PULLING] * period >= LOADED_SECONDS)
+def _feature_of_other(layout: Layout, memory: Memory, f: int, place: int, other: int) -> float:
+    """Return a feature of finger f for another finger; NaN where its stretch is too short."""
+    kind, window = layout.specs[f, place, KIND], layout.specs[f, place, WINDOW]
+    if memory.counts[other, N_STRETCH] < max(window, 1):
+        return math.nan
+    value = _feature(kind, window, memory.history, memory.counts, other)
+    transform, floor = layout.specs[f, place, TRANSFORM], layout.floors[f, place]
+    return float(_transform(value, transform, window, memory.levels[other, NOISE], floor))
+
+
+@compiled
+def _feature(kind: int, window: int, history: Array, counts: Integers, f: int) -> float:
+    if kind < FIRST_WINDOWED:
+        return float(history[f, kind, counts[f, HISTORY_END] - 1])
+    if kind < SIGMA_XYZ:
+        return _moments(history, counts, f, 0, window)[kind - FIRST_WINDOWED]
+    total, newest = 0.0, counts[f, HISTORY_END] - 1
+    for axis in range(1, 4):
+        if kind == CHANGE:
+            value = history[f, axis, newest] - history[f, axis, newest + 1 - window]
+        else:
+            value = _moments(history, counts, f, axis, window)[1]
+        total += value * value
+    return math.sqrt(total)
+
+
+@compiled
+def _moments(
+    history: Array, counts: Integers, f: int, channel: int, window: int
+) -> tuple[float, float]:
+    """Return m and sigma of the last `window` values; the stretch must have as many."""
+    end = counts[f, HISTORY_END]
+    return haar_window(history[f, channel, end - window : end], window)
+
+
+@compiled
+def _transform(value: float, transform: int, window: int, noise: float, floor: float) -> float:
+    if transform == 0:
+        return float(value)
+    if transform == 1:
+        return math.log(math.sqrt(value * value + floor * floor))
+    expected = noise_sigma(noise, window)
+    return math.log(max(value, 1e-3 * expected) / expected)
+
+
+@compiled
+def noise_sigma(noise: float, window: int) -> float:
+    """Return the sigma that noise of a standard deviation gives."""
+    return noise * math.sqrt((window - 2.0) / (2.0 * window))
+
+
+@compiled
+def _clear(values: Array, f: int) -> None:
+    """Set the values of a finger to NaN."""
+    for place in range(values.shape[1]):
+        values[f, place] = math.nan

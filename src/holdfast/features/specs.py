@@ -16,7 +16,7 @@ SCOPES = ("finger", "hand")
 WINDOWED = ("m", "sigma", "sigma_xyz", "change")
 """Kinds that look at a window; the others look at one sample."""
 
-DEPLOYED = ("F_a", "F_x", "F_y", "F_z", "sigma")
+DEPLOYED_FEATURES = ("F_a", "F_x", "F_y", "F_z", "sigma")
 """The features of the paper's deployed model, which drops m."""
 
 
@@ -69,7 +69,11 @@ def _rich(scope: Literal["finger", "hand"]) -> tuple[FeatureSpec, ...]:
     )
 
 
-HOLDFAST = (FeatureSpec("F_a", 0, "log", floor=FORCE_FLOOR), *_rich("finger"), *_rich("hand"))
+HOLDFAST_FEATURES = (
+    FeatureSpec("F_a", 0, "log", floor=FORCE_FLOOR),
+    *_rich("finger"),
+    *_rich("hand"),
+)
 """Our own features, `holdfast` by name: see `holdfast.study.methods.holdfast`."""
 
 
@@ -91,7 +95,7 @@ def parse_features(
         ['F_a', 'sigma[14]']
     """
     if names == "holdfast":
-        return HOLDFAST
+        return HOLDFAST_FEATURES
     given = names.split(",") if isinstance(names, str) else list(names)
     wanted: list[str] = []
     for name in (name.strip() for name in given):

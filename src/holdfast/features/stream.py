@@ -1,35 +1,41 @@
-"""A stream of samples of a hand on its way to features: layout, memory, and their feeding."""
+"""The feature stream of a hand: its plan, arrays and memory, for detectors and recordings."""
 
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import reduce
-from typing import NamedTuple
+from itertools import pairwise
+from typing import NamedTuple, Self
 
 import numpy as np
-import numpy.typing as npt
 
+from holdfast.compiled import compiled
+from holdfast.features import kernel
 from holdfast.features.arrays import (
-    FIRST,
-    LAST,
-    LONGEST,
-    N_COUNTS,
-    N_LEVELS,
-    N_STATUS,
-    N_VALUES,
+    AMPLITUDE,
+    CHANGED_AT,
+    COUNTS_WIDTH,
+    FIRST_TIME,
+    LAST_TIME,
+    LEVELS_WIDTH,
+    LONGEST_WINDOW,
+    N_TARED,
     NOISE,
     REASON,
+    STATUS_WIDTH,
     TARE,
     TARE_FIRST,
-    TARE_GIVEN,
+    TARE_INTERVAL,
     TARE_NONE,
     TARE_SECONDS,
+    TAXELS_WIDTH,
+    VALUES_WIDTH,
     WARM_UP,
     Array,
+    Flags,
     Layout,
     Memory,
     Output,
 )
-from holdfast.features.faults import CHANGED_AT, N_TAXEL
 from holdfast.features.specs import FeatureSpec, spec_codes
 from holdfast.features.tare import Tare, baseline_of
 from holdfast.recordings import Recording
@@ -39,23 +45,23 @@ TARE_KINDS = {
     "seconds": TARE_SECONDS,
     "first": TARE_FIRST,
     "none": TARE_NONE,
-    "interval": TARE_GIVEN,
+    "interval": TARE_INTERVAL,
 }
-COUNT_STEP_NOISE = float(1 / np.sqrt(12))
-"""Standard deviation of rounding to whole counts: no sensor in counts is more quiet."""
+COUNT_NOISE = float(1 / np.sqrt(12))
+"""Standard deviation of rounding to whole counts: the least noise of a reading [count]."""
 NEWTON_NOISE = 1e-6
-"""The same for readings in newtons, whose step nobody knows [N]."""
-CHUNK = 2048
+"""Least noise of a reading in newtons, whose step is not known [N]."""
+CHUNK_SAMPLES = 2048
 """Instants that are packed at a time: bounds the memory of offline work."""
 
 
 @dataclass(frozen=True)
 class StreamPlan:
-    """What a stream has to know before its first sample.
+    """Fingers, features, tare and rate of a feature stream.
 
     Attributes:
-        sensors: of each finger, in the order of the kernel's arrays.
-        features: of each finger.
+        sensors: sensor of each finger, in the order of the arrays.
+        features: features of each finger.
         window: N_w of the sigma that is reported [samples].
         tare: how the baseline is found.
         rate: samples per second [Hz].
@@ -71,158 +77,250 @@ class StreamPlan:
 
     @property
     def fingers(self) -> tuple[str, ...]:
-        """Names of the fingers, in the order of the kernel's arrays."""
+        """Names of the fingers, in the order of the arrays."""
         return tuple(self.sensors)
 
-    def layout(self) -> Layout:
-        """The plan as the kernel's constant arrays."""
-        sensors = list(self.sensors.values())
-        features = [self.features[finger] for finger in self.fingers]
-        width = max(1, *(len(specs) for specs in features))
-        longest = [max([self.window, *(spec.window for spec in specs)]) for specs in features]
-        floors = np.zeros((len(sensors), width))
-        for row, specs in zip(floors, features, strict=True):
-            row[: len(specs)] = [spec.floor for spec in specs]
-        ignored = [self._ignored(finger) for finger in self.fingers]
-        rotations = [
-            np.where(i[:, None, None], 0, s.rotations)
-            for i, s in zip(ignored, sensors, strict=True)
+
+class FingerFeatures(NamedTuple):
+    """Features of one finger over a recording.
+
+    Attributes:
+        features: (n, n_features); NaN where there are none.
+        amplitude: (n,) F_a [unit of the readings]; NaN where there is no force.
+    """
+
+    features: Array
+    amplitude: Array
+
+
+class HandSamples(NamedTuple):
+    """Samples of several fingers at successive instants.
+
+    Attributes:
+        times: (n,) [s].
+        present: (n, n_fingers) True for each finger with a sample at that instant.
+        readings: (n, n_taxels, 3) of all fingers, one after the other.
+    """
+
+    times: Array
+    present: Flags
+    readings: Array
+
+
+class FeatureStream:
+    """Feature stream of a hand: from samples to features, by `kernel.advance`.
+
+    Args:
+        plan: fingers, features, tare and rate.
+
+    Attributes:
+        plan: the same.
+        layout: the plan as constant arrays.
+        memory: of the stream, before the first sample.
+        output: of the stream, before the first sample.
+        slices: taxels of each finger in the arrays of all taxels.
+    """
+
+    def __init__(self, plan: StreamPlan) -> None:
+        self.plan = plan
+        self.layout = _layout(plan)
+        self.memory = _memory(self.layout)
+        self.output = _output(self.layout)
+        bounds = pairwise(self.layout.offsets.tolist())
+        self.slices = dict(zip(plan.fingers, map(slice, *zip(*bounds, strict=True)), strict=True))
+
+    @classmethod
+    def for_recording(cls, plan: StreamPlan, recording: Recording) -> Self:
+        """Return the stream for a recording, from which a tare by interval is taken.
+
+        A finger that the recording lacks has no baseline then.
+
+        Raises:
+            ValueError: a finger has no finite sample in the interval.
+        """
+        stream = cls(plan)
+        if plan.tare.kind == "interval":
+            stream._take_baseline(recording)
+        return stream
+
+    def baselines(self) -> dict[str, Array]:
+        """Return (n_taxels, 3) the tare of each finger that has it [unit of the readings]."""
+        complete = self.memory.counts[:, N_TARED] < 0
+        return {
+            finger: self.memory.baseline[taxels].copy()
+            for (finger, taxels), done in zip(self.slices.items(), complete, strict=True)
+            if done
+        }
+
+    def samples_of(self, recording: Recording) -> Iterator[HandSamples]:
+        """Yield the samples of the plan's fingers in order of time, in chunks.
+
+        Fingers that have a sample at the same time share an instant. A finger that the
+        recording lacks is never present.
+
+        Args:
+            recording: that has at least one of the fingers.
+
+        Yields:
+            At most `CHUNK_SAMPLES` instants at a time.
+        """
+        modules = [
+            (place, taxels, recording.modules[finger])
+            for place, (finger, taxels) in enumerate(self.slices.items())
+            if finger in recording.modules
         ]
-        return Layout(
-            offsets=np.cumsum([0, *(sensor.n_taxels for sensor in sensors)]),
-            rotations=np.concatenate(rotations),
-            constants=np.array(
-                [_constants(s, int((~i).sum())) for i, s in zip(ignored, sensors, strict=True)]
-            ),
-            specs=np.stack([spec_codes(specs, width) for specs in features]),
-            floors=floors,
-            windows=np.array([(self.window, most) for most in longest], dtype=np.int64),
-            ignored=np.concatenate(ignored),
-            alike=len({tuple(specs) for specs in features}) == 1,
-            tare_kind=TARE_KINDS[self.tare.kind],
-            tare_seconds=self.tare.seconds,
-            period=1.0 / self.rate,
-        )
+        times = reduce(_union, (module.times for _, _, module in modules))
+        for start in range(0, len(times), CHUNK_SAMPLES):
+            chunk = times[start : start + CHUNK_SAMPLES]
+            present = np.zeros((len(chunk), len(self.slices)), dtype=np.bool_)
+            readings = np.zeros((len(chunk), len(self.layout.rotations), 3))
+            for place, taxels, module in modules:
+                first = np.searchsorted(module.times, chunk[0], side="left")
+                last = np.searchsorted(module.times, chunk[-1], side="right")
+                rows = np.searchsorted(chunk, module.times[first:last])
+                present[rows, place] = True
+                readings[rows, taxels] = module.readings[first:last]
+            yield HandSamples(chunk, present, readings)
 
-    def _ignored(self, finger: str) -> npt.NDArray[np.bool_]:
-        flags = np.zeros(self.sensors[finger].n_taxels, dtype=np.bool_)
-        flags[list(self.ignore.get(finger, ()))] = True
-        return flags
+    def _take_baseline(self, recording: Recording) -> None:
+        plan = self.plan
+        for finger, taxels in self.slices.items():
+            if finger not in recording.modules:
+                continue
+            module = recording.modules[finger]
+            rows = slice(*np.searchsorted(module.times, plan.tare.interval))
+            readings = np.array(module.readings[rows], dtype=np.float64)
+            readings[:, list(plan.ignore.get(finger, ()))] = 0.0
+            try:
+                baseline, _ = baseline_of(readings, module.times[rows], plan.tare, 1 / plan.rate)
+            except ValueError as cause:
+                raise ValueError(
+                    f"{finger} of {recording.name!r}, which runs from {recording.start:.15g} to "
+                    f"{recording.end:.15g} s: {cause}"
+                ) from cause
+            self.memory.baseline[taxels] = baseline
 
 
-def new_memory(layout: Layout) -> Memory:
-    """The memory of a stream that has seen nothing."""
-    n_fingers = len(layout.windows)
-    n_taxels = len(layout.rotations)
-    longest = int(layout.windows[:, LONGEST].max())
-    levels = np.zeros((n_fingers, N_LEVELS))
-    taxels = np.zeros((n_taxels, N_TAXEL))
+def extract(plan: StreamPlan, recording: Recording) -> dict[str, FingerFeatures]:
+    """Return the features of every finger of the plan, at each of its samples.
+
+    Args:
+        plan: fingers, features, tare and rate.
+        recording: that has all fingers of the plan.
+
+    Returns:
+        By finger, one row for each sample of its module.
+
+    Raises:
+        ValueError: a tare by interval finds no samples.
+    """
+    stream = FeatureStream.for_recording(plan, recording)
+    width = stream.layout.specs.shape[1]
+    chunks: dict[str, list[FingerFeatures]] = {finger: [] for finger in plan.fingers}
+    for times, present, readings in stream.samples_of(recording):
+        features = np.full((*present.shape, width), np.nan)
+        amplitude = np.full(present.shape, np.nan)
+        _extract(
+            stream.layout, stream.memory, stream.output,
+            readings, present, times, features, amplitude,
+        )  # fmt: skip
+        for place, finger in enumerate(plan.fingers):
+            rows, n_features = present[:, place], len(plan.features[finger])
+            own = FingerFeatures(features[rows, place, :n_features], amplitude[rows, place])
+            chunks[finger].append(own)
+    return {
+        finger: FingerFeatures(*(np.concatenate(parts) for parts in zip(*found, strict=True)))
+        for finger, found in chunks.items()
+    }
+
+
+@compiled
+def _extract(
+    layout: Layout,
+    memory: Memory,
+    output: Output,
+    readings: Array,
+    present: Flags,
+    times: Array,
+    features: Array,
+    amplitude: Array,
+) -> None:
+    for k in range(len(times)):
+        kernel.advance(layout, memory, output, readings[k], present[k], times[k])
+        features[k] = output.features
+        amplitude[k] = output.values[:, AMPLITUDE]
+
+
+def _layout(plan: StreamPlan) -> Layout:
+    sensors = list(plan.sensors.values())
+    features = [plan.features[finger] for finger in plan.fingers]
+    width = max(1, *(len(specs) for specs in features))
+    longest = [max([plan.window, *(spec.window for spec in specs)]) for specs in features]
+    floors = np.zeros((len(sensors), width))
+    for row, specs in zip(floors, features, strict=True):
+        row[: len(specs)] = [spec.floor for spec in specs]
+    ignored = [_ignored(plan, finger) for finger in plan.fingers]
+    rotations = [
+        np.where(i[:, None, None], 0, s.rotations) for i, s in zip(ignored, sensors, strict=True)
+    ]
+    constants = [_constants(s, int((~i).sum())) for i, s in zip(ignored, sensors, strict=True)]
+    return Layout(
+        offsets=np.cumsum([0, *(sensor.n_taxels for sensor in sensors)]),
+        rotations=np.concatenate(rotations),
+        constants=np.array(constants),
+        specs=np.stack([spec_codes(specs, width) for specs in features]),
+        floors=floors,
+        windows=np.array([(plan.window, most) for most in longest], dtype=np.int64),
+        ignored=np.concatenate(ignored),
+        alike=len({tuple(specs) for specs in features}) == 1,
+        tare_kind=TARE_KINDS[plan.tare.kind],
+        tare_seconds=plan.tare.seconds,
+        period=1.0 / plan.rate,
+    )
+
+
+def _ignored(plan: StreamPlan, finger: str) -> Flags:
+    flags = np.zeros(plan.sensors[finger].n_taxels, dtype=np.bool_)
+    flags[list(plan.ignore.get(finger, ()))] = True
+    return flags
+
+
+def _constants(sensor: Sensor, n_used: int) -> tuple[float, ...]:
+    """Return a row of `Layout.constants`; each taxel that is used rounds its readings."""
+    low, high = sensor.limits or (-np.inf, np.inf)
+    noise = COUNT_NOISE if sensor.unit == "count" else NEWTON_NOISE
+    rounding = noise if sensor.unit == "count" else np.nan
+    return low, high, float(noise * np.sqrt(n_used)), rounding, n_used
+
+
+def _memory(layout: Layout) -> Memory:
+    n_fingers, n_taxels = len(layout.windows), len(layout.rotations)
+    longest = int(layout.windows[:, LONGEST_WINDOW].max())
+    levels = np.zeros((n_fingers, LEVELS_WIDTH))
+    levels[:, [FIRST_TIME, LAST_TIME, NOISE]] = np.nan
+    taxels = np.zeros((n_taxels, TAXELS_WIDTH))
     taxels[layout.ignored, CHANGED_AT] = np.inf  # never long ago
-    levels[:, [FIRST, LAST, NOISE]] = np.nan
     return Memory(
         baseline=np.zeros((n_taxels, 3)),
         previous=np.zeros((n_taxels, 3)),
         taxels=taxels,
         history=np.zeros((n_fingers, 4, 2 * longest)),
-        counts=np.zeros((n_fingers, N_COUNTS), dtype=np.int64),
+        counts=np.zeros((n_fingers, COUNTS_WIDTH), dtype=np.int64),
         levels=levels,
         own=np.full((n_fingers, layout.specs.shape[1]), np.nan),
     )
 
 
-def new_output(layout: Layout) -> Output:
-    """An output to be filled, as before the first sample."""
+def _output(layout: Layout) -> Output:
     n_fingers = len(layout.windows)
-    status = np.zeros((n_fingers, N_STATUS), dtype=np.int64)
-    taring = layout.tare_kind == TARE_SECONDS
-    status[:, REASON] = TARE if taring else WARM_UP
+    status = np.zeros((n_fingers, STATUS_WIDTH), dtype=np.int64)
+    status[:, REASON] = TARE if layout.tare_kind == TARE_SECONDS else WARM_UP
     return Output(
         features=np.full((n_fingers, layout.specs.shape[1]), np.nan),
-        values=np.full((n_fingers, N_VALUES), np.nan),
+        values=np.full((n_fingers, VALUES_WIDTH), np.nan),
         status=status,
     )
 
 
-class Samples(NamedTuple):
-    """Samples of several fingers at successive instants.
-
-    Attributes:
-        times: (n,) [s].
-        present: (n, n_fingers) which finger has a sample then.
-        readings: (n, n_taxels, 3) of all fingers, one after the other.
-    """
-
-    times: Array
-    present: npt.NDArray[np.bool_]
-    readings: Array
-
-
-def samples_of(plan: StreamPlan, recording: Recording) -> Iterator[Samples]:
-    """The samples of the plan's fingers in order of time, a bounded number at a time.
-
-    Fingers that have a sample at the same time share an instant; one that the recording lacks
-    is never present.
-
-    Args:
-        plan: of which fingers.
-        recording: that has some of them.
-
-    Yields:
-        At most `CHUNK` instants at a time.
-    """
-    offsets = np.cumsum([0, *(sensor.n_taxels for sensor in plan.sensors.values())])
-    modules = [
-        (place, slice(offsets[place], offsets[place + 1]), recording.modules[finger])
-        for place, finger in enumerate(plan.fingers)
-        if finger in recording.modules
-    ]
-    times = reduce(_union, (module.times for _, _, module in modules))
-    for start in range(0, len(times), CHUNK):
-        chunk = times[start : start + CHUNK]
-        present = np.zeros((len(chunk), len(plan.sensors)), dtype=np.bool_)
-        readings = np.zeros((len(chunk), int(offsets[-1]), 3))
-        for place, taxels, module in modules:
-            first = np.searchsorted(module.times, chunk[0], side="left")
-            last = np.searchsorted(module.times, chunk[-1], side="right")
-            rows = np.searchsorted(chunk, module.times[first:last])
-            present[rows, place] = True
-            readings[rows, taxels] = module.readings[first:last]
-        yield Samples(chunk, present, readings)
-
-
 def _union(one: Array, two: Array) -> Array:
     return one if np.array_equal(one, two) else np.union1d(one, two)
-
-
-def give_baseline(plan: StreamPlan, memory: Memory, recording: Recording) -> None:
-    """Puts the mean over the plan's interval into the memory, for a tare by interval.
-
-    A finger that the recording lacks keeps the baseline that it has.
-
-    Raises:
-        ValueError: a finger has no finite sample in that interval.
-    """
-    ends = np.cumsum([sensor.n_taxels for sensor in plan.sensors.values()])
-    for (finger, sensor), end in zip(plan.sensors.items(), ends, strict=True):
-        if finger not in recording.modules:
-            continue
-        module = recording.modules[finger]
-        rows = slice(*np.searchsorted(module.times, plan.tare.interval))
-        readings = np.array(module.readings[rows], dtype=np.float64)
-        readings[:, list(plan.ignore.get(finger, ()))] = 0.0
-        try:
-            baseline, _ = baseline_of(readings, module.times[rows], plan.tare, 1 / plan.rate)
-        except ValueError as cause:
-            raise ValueError(
-                f"{finger} of {recording.name!r}, which runs from {recording.start:.15g} to "
-                f"{recording.end:.15g} s: {cause}"
-            ) from cause
-        memory.baseline[end - sensor.n_taxels : end] = baseline
-
-
-def _constants(sensor: Sensor, n_used: int) -> tuple[float, ...]:
-    """A row of `Layout.constants`; the taxels that are used round their readings each."""
-    low, high = sensor.limits or (-np.inf, np.inf)
-    step = COUNT_STEP_NOISE if sensor.unit == "count" else NEWTON_NOISE
-    known = step if sensor.unit == "count" else np.nan
-    return low, high, float(step * np.sqrt(n_used)), known, n_used

@@ -12,7 +12,7 @@ import numpy as np
 import numpy.typing as npt
 
 from holdfast.compiled import compiled
-from holdfast.features.arrays import TARE_FIRST, TARE_SECONDS, TARED, Array, Integers
+from holdfast.features.arrays import N_TARED, TARE_FIRST, TARE_SECONDS, Array, Integers
 from holdfast.recordings import Tactile
 
 TareArgument = float | str | tuple[float, float]
@@ -183,10 +183,10 @@ def update_baseline(
     elif kind == TARE_SECONDS:
         if running:
             baseline[first:last] += readings[first:last]
-            counts[f, TARED] += 1
+            counts[f, N_TARED] += 1
             return False
-        baseline[first:last] /= max(counts[f, TARED], 1)
-    counts[f, TARED] = -1
+        baseline[first:last] /= max(counts[f, N_TARED], 1)
+    counts[f, N_TARED] = -1
     return True
 
 

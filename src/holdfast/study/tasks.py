@@ -73,7 +73,7 @@ class TaskRunner:
 
         Raises:
             ValueError: two tasks have one name.
-            EngineError: as `Engine.as_done`, or a worker has another source of the package.
+            EngineError: as `Engine.map_unordered`, or a worker has another source of the package.
             Exception: what a task raises, its text beginning with the task's name; it stops the
                 work. What was done before stays kept.
         """
@@ -94,7 +94,7 @@ class TaskRunner:
         by_name = {task.name: task for task in sorted(tasks, key=lambda task: -task.cost)}
         source = source_digest()
         calls = ((name, (source, *task[:3])) for name, task in by_name.items())
-        for name, data in self.engine.as_done(_do, calls):
+        for name, data in self.engine.map_unordered(_do, calls):
             result = _decoded(data, by_name[name])
             kept = _Kept(name, sha256(data).hexdigest(), Raw(data))
             write_whole(self._path(keys[name]), msgpack.encode(kept), force=True)

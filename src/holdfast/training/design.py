@@ -11,9 +11,8 @@ from holdfast.classifiers import Samples
 from holdfast.contact import STABLE, UNKNOWN
 from holdfast.errors import TrainingError
 from holdfast.features import FeatureSpec, Tare
-from holdfast.features.extract import extract
 from holdfast.features.force import rest_amplitude
-from holdfast.features.stream import StreamPlan
+from holdfast.features.stream import StreamPlan, extract
 from holdfast.model import ANY_FINGER, RATE_TOLERANCE
 from holdfast.recordings import Recording, Tactile, label_states
 from holdfast.resampling import resample

@@ -9,7 +9,7 @@ from sklearn.base import BaseEstimator, ClassifierMixin
 from sklearn.utils.validation import check_is_fitted
 
 from holdfast.contact import STABLE
-from holdfast.features import DEFAULT_WINDOW, DEPLOYED, Tare, parse_features
+from holdfast.features import DEFAULT_WINDOW, DEPLOYED_FEATURES, Tare, parse_features
 from holdfast.recordings import Recording
 from holdfast.training.design import at_rate
 from holdfast.training.fitting import fit_all
@@ -42,7 +42,7 @@ class StabilityClassifier(ClassifierMixin, BaseEstimator):
         self,
         classifier: str = "logreg",
         window: int = DEFAULT_WINDOW,
-        features: str = ",".join(DEPLOYED),
+        features: str = ",".join(DEPLOYED_FEATURES),
         tare: float | str = 0.5,
         C: float = 1.0,
         class_weight: str | None = "balanced",

@@ -6,7 +6,7 @@ from typing import Any, Literal, Self
 
 from holdfast.classifiers import Adapted, LinearRecipe, recipe
 from holdfast.errors import ModelError
-from holdfast.features import DEFAULT_WINDOW, DEPLOYED, FeatureSpec, Tare, parse_features
+from holdfast.features import DEFAULT_WINDOW, DEPLOYED_FEATURES, FeatureSpec, Tare, parse_features
 from holdfast.features.haar import check_window
 from holdfast.model import ANY_FINGER, Debounce, Model
 
@@ -47,7 +47,9 @@ class Setting:
     """
 
     classifier: str = "logreg"
-    features: tuple[FeatureSpec, ...] = field(default_factory=lambda: parse_features(DEPLOYED))
+    features: tuple[FeatureSpec, ...] = field(
+        default_factory=lambda: parse_features(DEPLOYED_FEATURES)
+    )
     window: int = DEFAULT_WINDOW
     tare: Tare = field(default_factory=lambda: Tare.parse(0.5))
     split: Split = "recording"

@@ -11,7 +11,7 @@ import msgspec
 from holdfast.classifiers import Parameters, Samples
 from holdfast.metrics import Decisions, Metrics, summarise
 from holdfast.model import ANY_FINGER, Model, Training
-from holdfast.parallel import each
+from holdfast.parallel import map_ordered
 from holdfast.recordings import Recording
 from holdfast.training.design import gather, thin
 from holdfast.training.fitting import Material, fit_model, fit_whole
@@ -144,7 +144,7 @@ class _Trainer:
             for held in without
             for finger, design in self.designs.items()
         ]
-        found = list(self.follow(each(_search, tasks, self.n_jobs), "searching", len(tasks)))
+        found = list(self.follow(map_ordered(_search, tasks, self.n_jobs), "searching", len(tasks)))
         for warning in dict.fromkeys(warning for _, warning in found if warning):
             self.tell(warning)
         parameters = iter(parameters for parameters, _ in found)
@@ -161,7 +161,7 @@ class _Trainer:
             (self.material, self.setting, found[unit % len(found)], {unit})
             for unit in range(n_units)
         ]
-        models = list(self.follow(each(fit_model, tasks, self.n_jobs), "fitting", n_units))
+        models = list(self.follow(map_ordered(fit_model, tasks, self.n_jobs), "fitting", n_units))
         judged = (
             self._judge(models, place, recording)
             for place, recording in enumerate(self._read("judging"))

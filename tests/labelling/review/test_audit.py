@@ -8,7 +8,7 @@ from tests.labelling.tiny import TINY, tiny_recording
 
 from holdfast.contact import ContactState
 from holdfast.errors import TrainingError
-from holdfast.features import DEPLOYED, parse_features
+from holdfast.features import DEPLOYED_FEATURES, parse_features
 from holdfast.labelling.review.audit import (
     Audit,
     LabelledFinger,
@@ -239,7 +239,7 @@ def test_our_own_features_judge_counts_and_the_papers_newton(grasps):
     assert default_setting(grasps).features == parse_features("holdfast")
     module = grasps[0].modules["thumb"]
     newton = Recording("n", {"thumb": Tactile(TINY, module.times, module.readings, unit="N")})
-    assert default_setting([newton]).features == parse_features(DEPLOYED)
+    assert default_setting([newton]).features == parse_features(DEPLOYED_FEATURES)
     assert default_setting([]).trials == 0
 
 

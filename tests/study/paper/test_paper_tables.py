@@ -1,7 +1,7 @@
 import msgspec
 import pytest
 
-from holdfast.features import DEPLOYED, FEATURE_NAMES
+from holdfast.features import DEPLOYED_FEATURES, FEATURE_NAMES
 from holdfast.study.paper import paper_tables, published, random_split
 from holdfast.study.paper.random_split import FitBudget
 from holdfast.study.plan import Corpus, StudyPlan, scan_corpus
@@ -196,5 +196,5 @@ def test_the_first_finger_is_the_index_where_there_is_one():
 
 def test_the_force_is_three_features():
     assert paper_tables.columns_of(("F_tip", "m")) == ("F_x", "F_y", "F_z", "m")
-    assert paper_tables.columns_of(("F_a", "F_tip", "sigma")) == DEPLOYED
+    assert paper_tables.columns_of(("F_a", "F_tip", "sigma")) == DEPLOYED_FEATURES
     assert paper_tables.columns_of(("F_a", "F_tip", "m", "sigma")) == FEATURE_NAMES

@@ -4,7 +4,7 @@ import pytest
 
 from holdfast.classifiers import Samples, recipe
 from holdfast.classifiers.threshold import best_cut
-from holdfast.features import DEPLOYED
+from holdfast.features import DEPLOYED_FEATURES
 from holdfast.study.paper.pooled_samples import pooled
 from holdfast.study.paper.random_split import (
     ELSEWHERE,
@@ -23,7 +23,7 @@ from study.example_recordings import save_synthetic
 
 EFFORT = FitBudget(trials=1, n_fit=100_000)
 """One trial is the reference setting."""
-KINDS = (("logreg", DEPLOYED), ("svm", ("energy",)))
+KINDS = (("logreg", DEPLOYED_FEATURES), ("svm", ("energy",)))
 
 
 @pytest.fixture(scope="module")
@@ -45,7 +45,7 @@ def alone(corpora):
 def naive(corpora, on):
     """ConfusionCounts of LogReg of the deployed features, fitted and counted the long way."""
     main = pooled(corpora["main"], 150.0, "index", 14, seed=0)
-    data = main.only(DEPLOYED)
+    data = main.only(DEPLOYED_FEATURES)
     every = np.arange(len(main.parts))
     train = every[main.parts >= 5]
     folds = {

@@ -19,7 +19,7 @@ import numpy as np
 from holdfast.contact import ContactState
 from holdfast.errors import TrainingError
 from holdfast.model import ANY_FINGER, Model
-from holdfast.parallel import each
+from holdfast.parallel import map_ordered
 from holdfast.recordings import Label, Recording
 from holdfast.sensors.types import Array
 from holdfast.training.design import at_rate, gather
@@ -148,7 +148,7 @@ class _Judges:
             for fold in range(min(n_folds, len(order)))
         ]
         fingers = recordings.fingers - one_sided.keys()
-        models = list(each(fit_model, tasks, n_jobs))
+        models = list(map_ordered(fit_model, tasks, n_jobs))
         return cls(fingers, {**certain, **one_sided}, models, fold_of)
 
     def judge(self, place: int, recording: Recording) -> Probabilities:

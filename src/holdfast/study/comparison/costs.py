@@ -8,8 +8,8 @@ import numpy as np
 
 from holdfast.classifiers import LinearClassifier
 from holdfast.detector import Detector
-from holdfast.features import DEPLOYED, Tare, parse_features
-from holdfast.features.specs import HOLDFAST, FeatureSpec
+from holdfast.features import DEPLOYED_FEATURES, Tare, parse_features
+from holdfast.features.specs import HOLDFAST_FEATURES, FeatureSpec
 from holdfast.model import FingerModel, Model
 from holdfast.recordings import Recording
 from holdfast.study.comparison.jobs import Results, titles
@@ -29,9 +29,9 @@ ROUNDS = 7
 N_UPDATES = 3_000
 N_WARM = 200
 LIVE: dict[str, tuple[FeatureSpec, ...]] = {
-    "logreg": parse_features(DEPLOYED, WINDOW),
-    "svm": parse_features(DEPLOYED, WINDOW),
-    "holdfast": HOLDFAST,
+    "logreg": parse_features(DEPLOYED_FEATURES, WINDOW),
+    "svm": parse_features(DEPLOYED_FEATURES, WINDOW),
+    "holdfast": HOLDFAST_FEATURES,
 }
 """Features of the methods whose model the detector runs; all have a linear rule."""
 MICRO = 1e6

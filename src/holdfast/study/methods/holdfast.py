@@ -12,9 +12,8 @@ The rule stays linear.
 from collections.abc import Mapping
 
 from holdfast.classifiers import recipe
-from holdfast.features.extract import extract
-from holdfast.features.specs import HOLDFAST as FEATURES
-from holdfast.features.stream import StreamPlan
+from holdfast.features.specs import HOLDFAST_FEATURES
+from holdfast.features.stream import StreamPlan, extract
 from holdfast.sensors.types import Array
 from holdfast.study.methods.method import Method
 from holdfast.study.methods.paper import WINDOW
@@ -23,7 +22,9 @@ from holdfast.study.methods.signals import HandSignal
 
 def _features(hand: HandSignal) -> Mapping[str, Array]:
     sensors = {name: finger.sensor for name, finger in hand.fingers.items()}
-    plan = StreamPlan(sensors, dict.fromkeys(sensors, FEATURES), WINDOW, hand.tare, hand.rate)
+    plan = StreamPlan(
+        sensors, dict.fromkeys(sensors, HOLDFAST_FEATURES), WINDOW, hand.tare, hand.rate
+    )
     return {name: rows.features for name, rows in extract(plan, hand.recording).items()}
 
 

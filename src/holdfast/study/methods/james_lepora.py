@@ -9,7 +9,7 @@ import numpy.typing as npt
 
 from holdfast.classifiers import recipe
 from holdfast.errors import TrainingError
-from holdfast.features.kernel import GAP_LIMIT
+from holdfast.features.kernel import GAP_LIMIT_PERIODS
 from holdfast.sensors.types import Array
 from holdfast.study.methods.method import HAND, Method
 from holdfast.study.methods.signals import FingerSignal, HandSignal, stretchwise
@@ -40,7 +40,7 @@ def whole(hand: HandSignal) -> dict[str, Array]:
             f"{len(hand.fingers)} given ({', '.join(hand.fingers) or 'none'})"
         )
     times = next(iter(hand.fingers.values())).times
-    oldest = GAP_LIMIT / hand.rate
+    oldest = GAP_LIMIT_PERIODS / hand.rate
     parts = [_held(hand.fingers[n].times, rows, times, oldest) for n, rows in local(hand).items()]
     return {HAND: np.hstack(parts)}
 

@@ -5,7 +5,7 @@ from collections.abc import Mapping, Sequence
 import numpy as np
 
 from holdfast.classifiers import recipe
-from holdfast.features import DEPLOYED, FEATURE_NAMES, haar_features
+from holdfast.features import DEPLOYED_FEATURES, FEATURE_NAMES, haar_features
 from holdfast.sensors.types import Array
 from holdfast.study.methods.method import Method
 from holdfast.study.methods.signals import FingerSignal, HandSignal, stretchwise
@@ -15,7 +15,7 @@ SOURCE = "Kitouni, Khoramshahi and Perdereau: the deployed features, without m, 
 
 
 def haar(
-    hand: HandSignal, names: Sequence[str] = DEPLOYED, window: int = WINDOW
+    hand: HandSignal, names: Sequence[str] = DEPLOYED_FEATURES, window: int = WINDOW
 ) -> dict[str, Array]:
     """The paper's features of every finger."""
     columns = [FEATURE_NAMES.index(name) for name in names]

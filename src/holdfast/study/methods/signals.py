@@ -10,7 +10,7 @@ from numpy.lib.stride_tricks import sliding_window_view
 
 from holdfast.features import Tare
 from holdfast.features.force import fingertip_force
-from holdfast.features.kernel import GAP_LIMIT
+from holdfast.features.kernel import GAP_LIMIT_PERIODS
 from holdfast.features.tare import baseline_of
 from holdfast.recordings import Recording, Tactile
 from holdfast.sensors import Sensor
@@ -74,7 +74,7 @@ class FingerSignal:
     def stretches(self) -> tuple[slice, ...]:
         """The unbroken stretches: no gap longer than 3 sample periods, every force known."""
         known = np.isfinite(self.force.sum(axis=1))
-        broken = np.diff(self.times) > GAP_LIMIT / self.rate
+        broken = np.diff(self.times) > GAP_LIMIT_PERIODS / self.rate
         edges = np.flatnonzero(broken | (known[1:] != known[:-1])) + 1
         bounds = [0, *edges.tolist(), len(known)]
         return tuple(slice(a, b) for a, b in pairwise(bounds) if b > a and known[a])

@@ -5,7 +5,7 @@ from typing import Any
 
 import numpy as np
 
-from holdfast.features import DEPLOYED, FEATURE_NAMES
+from holdfast.features import DEPLOYED_FEATURES, FEATURE_NAMES
 from holdfast.plots.curves import Curve, draw_lines
 from holdfast.plots.style import PAPER
 from holdfast.study.paper import published
@@ -31,7 +31,7 @@ WINDOW = 14
 ABLATED_AT = (14, 18)
 QUICK_WINDOWS = (4, 10, 14, 18)
 TITLES = {"logreg": "LogReg", "svm": "SVM"}
-SETS = {"all six": FEATURE_NAMES, "deployed": DEPLOYED}
+SETS = {"all six": FEATURE_NAMES, "deployed": DEPLOYED_FEATURES}
 TESTS = (HELD_OUT, FRESH, ELSEWHERE, OBJECTS)
 """What the tables of many lines are measured on."""
 
@@ -87,7 +87,7 @@ def columns_of(subset: Iterable[str]) -> tuple[str, ...]:
     )
 
 
-_BOTH: tuple[Kind, ...] = tuple((name, DEPLOYED) for name in TITLES)
+_BOTH: tuple[Kind, ...] = tuple((name, DEPLOYED_FEATURES) for name in TITLES)
 _ZHANG: Kind = ("svm", (ENERGY,))
 _BEST_CUT: Kind = ("threshold", (ENERGY,))
 
@@ -136,7 +136,7 @@ class _Found:
 def _confusion(found: _Found) -> ResultTable:
     rows: list[Row] = []
     for name, title in TITLES.items():
-        cell = found.cell((name, DEPLOYED))
+        cell = found.cell((name, DEPLOYED_FEATURES))
         keys: Keys = {"classifier": title}
         rows += found.rows(
             cell, keys, ("TNR", "FPR", "FNR", "TPR", "accuracy"), published.CONFUSION[name]
@@ -146,7 +146,7 @@ def _confusion(found: _Found) -> ResultTable:
             "Rates within each true class, 1 = stable: TNR and FPR share class 0, FNR and TPR "
             "class 1. The paper prints one matrix, of 'the training process', beside which every "
             "line stands.",
-            *_protocol(found.plan, found.cell(("logreg", DEPLOYED))),
+            *_protocol(found.plan, found.cell(("logreg", DEPLOYED_FEATURES))),
         ]
     )
     return ResultTable(
@@ -185,7 +185,7 @@ def _unseen(found: _Found) -> ResultTable:
         keys: Keys = {"classifier": title}
         paper = {"accuracy": published.UNSEEN[name]}
         on = (FRESH, ELSEWHERE, OBJECTS)
-        rows += found.rows(found.cell((name, DEPLOYED)), keys, ("accuracy",), paper, on)
+        rows += found.rows(found.cell((name, DEPLOYED_FEATURES)), keys, ("accuracy",), paper, on)
     title = "Accuracy on unseen data [%]"
     note = f"What the paper's unseen data are, it does not say. {found.protocol}"
     return ResultTable("unseen", title, note, rows, ("classifier", "on"))
@@ -197,7 +197,7 @@ def _of_fingers(found: _Found) -> ResultTable:
         for name, title in TITLES.items():
             keys: Keys = {"finger": finger, "classifier": title}
             paper = _of_finger(found.plan, finger) if name == "logreg" else {}
-            cell = found.cell((name, DEPLOYED), finger=finger)
+            cell = found.cell((name, DEPLOYED_FEATURES), finger=finger)
             rows += found.rows(cell, keys, ("accuracy", "FDR"), paper)
     note = (
         "The paper names the middle finger and the thumb; its figures of the finger that it "
@@ -211,7 +211,7 @@ def _zhang(found: _Found) -> ResultTable:
     methods = {
         "energy of F_x (Zhang), SVM": (_ZHANG, published.ZHANG),
         "energy of F_x, best cut": (_BEST_CUT, {}),
-        "LogReg (the paper)": (("logreg", DEPLOYED), published.FIRST_FINGER),
+        "LogReg (the paper)": (("logreg", DEPLOYED_FEATURES), published.FIRST_FINGER),
     }
     rows: list[Row] = []
     for title, (kind, paper) in methods.items():

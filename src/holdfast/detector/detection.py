@@ -1,4 +1,4 @@
-"""What a detector said of a recording, as arrays."""
+"""Estimates of a whole recording, as arrays."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
@@ -16,13 +16,14 @@ from holdfast.contact import (
     faults_of,
     taxels_of,
 )
-from holdfast.detector.rule import Traces, verdict_code
+from holdfast.detector.decision_rule import TraceRows
+from holdfast.detector.fast_step import estimate_code
 from holdfast.features.arrays import SIGMA, Array
 
 STATES = tuple(ContactState)
 REASONS = tuple(Reason)
-VERDICTS: dict[float, tuple[ContactState, Reason, tuple[Fault, ...]]] = {
-    verdict_code(state.code, reason, mask): (state, REASONS[reason], faults_of(mask))
+ESTIMATES: dict[float, tuple[ContactState, Reason, tuple[Fault, ...]]] = {
+    estimate_code(state.code, reason, mask): (state, REASONS[reason], faults_of(mask))
     for state in STATES
     for reason in range(len(REASONS))
     for mask in range(1 << len(SIGNAL_FAULTS))
@@ -31,17 +32,17 @@ VERDICTS: dict[float, tuple[ContactState, Reason, tuple[Fault, ...]]] = {
 
 
 class FingerTrace(NamedTuple):
-    """What was decided of one finger over a recording: one row a sample of its module.
+    """Estimates of one finger over a recording: one row for each sample of its module.
 
     Attributes:
         times: (n,) [s].
         state: (n,) codes of `ContactState`.
         reason: (n,) codes of `Reason`.
         stable_probability: (n,); NaN while UNKNOWN.
-        instability: (n,) sigma, in the unit of the readings.
-        force: (n, 3) in the fingertip frame, in the unit of the readings.
+        instability: (n,) sigma [unit of the readings].
+        force: (n, 3) F_tip in the fingertip frame [unit of the readings].
         faults: (n,) bits in the order of `Fault`.
-        faulty_taxels: (n,) bit i is taxel i, of those at fault by themselves.
+        faulty_taxels: (n,) bit i is set if taxel i is faulty by itself.
     """
 
     times: Array
@@ -57,7 +58,7 @@ class FingerTrace(NamedTuple):
         return len(self.times)
 
     def estimate(self, k: int) -> ContactEstimate:
-        """The estimate of sample k."""
+        """Return the estimate of sample k."""
         return ContactEstimate(
             float(self.times[k]),
             STATES[self.state[k]],
@@ -72,11 +73,11 @@ class FingerTrace(NamedTuple):
 
 @dataclass(frozen=True)
 class Detection:
-    """What a model says of a whole recording.
+    """Estimates of a whole recording.
 
     Attributes:
         name: of the recording.
-        fingers: of each finger that the recording has.
+        fingers: trace of each finger that the recording has.
         times: (n,) instants at which any finger had a sample [s].
         hand: (n,) codes of the hand's state at those instants.
     """
@@ -90,26 +91,32 @@ class Detection:
 def detection_of(
     name: str,
     fingers: Sequence[str],
-    pieces: Sequence[tuple[Array, npt.NDArray[np.bool_], Traces]],
+    chunks: Sequence[tuple[Array, npt.NDArray[np.bool_], TraceRows]],
 ) -> Detection:
-    """Puts together what the kernel filled: (times, present, traces) a piece, or no piece."""
-    if not pieces:
+    """Join the chunks that the compiled rule filled.
+
+    Args:
+        name: of the recording.
+        fingers: in the order of the columns.
+        chunks: times, present fingers and rows of each chunk.
+    """
+    if not chunks:
         return Detection(name, {}, np.empty(0), np.empty(0, dtype=np.int8))
-    traces = Traces(*(np.concatenate(parts) for parts in zip(*(p[2] for p in pieces), strict=True)))
-    times = np.concatenate([piece[0] for piece in pieces])
-    present = np.concatenate([piece[1] for piece in pieces])
+    rows = TraceRows(*(np.concatenate(x) for x in zip(*(c[2] for c in chunks), strict=True)))
+    times = np.concatenate([chunk[0] for chunk in chunks])
+    present = np.concatenate([chunk[1] for chunk in chunks])
     found = {}
     for place, finger in enumerate(fingers):
-        rows = present[:, place]
-        if rows.any():
+        own = present[:, place]
+        if own.any():
             found[finger] = FingerTrace(
-                times[rows],
-                traces.state[rows, place],
-                traces.reason[rows, place],
-                traces.probability[rows, place],
-                traces.values[rows, place, SIGMA],
-                traces.values[rows, place, :3],
-                traces.faults[rows, place],
-                traces.taxels[rows, place],
+                times[own],
+                rows.state[own, place],
+                rows.reason[own, place],
+                rows.probability[own, place],
+                rows.values[own, place, SIGMA],
+                rows.values[own, place, :3],
+                rows.faults[own, place],
+                rows.taxels[own, place],
             )
-    return Detection(name, found, times, traces.hand)
+    return Detection(name, found, times, rows.hand)

@@ -2,7 +2,7 @@ import numba
 import numpy as np
 import pytest
 
-from holdfast.detector.table import floats3, integers2, table_of
+from holdfast.detector.fast_step import floats3, integers2, table_of
 
 
 @numba.njit  # not kept: its cache would not follow the module that it tests

@@ -1,0 +1,313 @@
+"""The decision rule: from features to contact states, compiled, for one sample or for many."""
+
+import math
+from typing import NamedTuple, Self
+
+import numpy as np
+import numpy.typing as npt
+
+from holdfast import contact
+from holdfast.classifiers.linear import linear_probability
+from holdfast.compiled import compiled
+from holdfast.features import kernel
+from holdfast.features.arrays import (
+    AMPLITUDE,
+    FAULT,
+    FAULTS,
+    MEAN,
+    NOISE,
+    READY,
+    REASON,
+    SIGMA,
+    SIGMA_WINDOW,
+    TAXELS,
+    VALUES_WIDTH,
+    Array,
+    Flags,
+    Integers,
+    Layout,
+    Memory,
+    Output,
+)
+from holdfast.features.faults import TARE_DRIFT
+from holdfast.features.stream import StreamPlan
+from holdfast.model import ANY_FINGER, Model
+
+UNKNOWN, NO_CONTACT, UNSTABLE, STABLE = (
+    contact.UNKNOWN,
+    contact.NO_CONTACT,
+    contact.UNSTABLE,
+    contact.STABLE,
+)
+_hand_state = compiled(contact.hand_state)
+_is_held = compiled(contact.is_held)
+
+# Columns of DecisionRule.limits.
+THRESHOLD = 0  # of the probability
+CONTACT, CONTACT_NOISE = 1, 2  # of F_a: absolute, and as a multiple of the noise; NaN for none
+LIMITS_WIDTH = 3
+
+# Columns of DecisionMemory.codes.
+STATE = 0  # the state that is reported, as a code of holdfast.contact
+CANDIDATE = 1  # the state of the last sample, which may not have lasted long enough yet
+LOAD = 2  # how F_a came over the threshold of contact: one of the next three
+NO_LOAD, TOUCH, DRIFT = range(3)
+CODES_WIDTH = 3
+
+# Columns of DecisionMemory.values.
+PROBABILITY = 0
+CANDIDATE_SINCE = 1  # when the candidate began [s]
+LAST_UNSTABLE = 2  # time of the last sample that was unstable before the hold time [s]
+SMOOTHED = 3  # F_a, smoothed over DRIFT_SECONDS [unit of the readings]
+RESTLESS_AT = 4  # when the finger was last not calm [s]
+DECIDED_WIDTH = 5
+
+DRIFT_SECONDS = 1.0
+"""A touch brings F_a over the threshold of contact in less time than this; a drift does not [s]."""
+CALM_RATIO = 3.0
+"""A finger is calm while sigma is at most this many times the sigma of noise alone."""
+
+
+class DecisionRule(NamedTuple):
+    """Constants of the decision rule, for every finger of a stream."""
+
+    weights: Array  # (n_fingers, n_features + 1)
+    n_weights: Integers  # (n_fingers,)
+    limits: Array  # (n_fingers, LIMITS_WIDTH)
+    hysteresis: float
+    min_duration: float
+    hold: float
+    n_model_fingers: int
+
+
+class DecisionMemory(NamedTuple):
+    """Memory of the decision rule, for every finger of a stream."""
+
+    codes: Integers  # (n_fingers, CODES_WIDTH)
+    values: Array  # (n_fingers, DECIDED_WIDTH)
+
+
+class TraceRows(NamedTuple):
+    """Rows that `run` fills, one for each instant."""
+
+    state: npt.NDArray[np.int8]  # (n, n_fingers)
+    reason: npt.NDArray[np.int8]
+    faults: npt.NDArray[np.int16]
+    taxels: Integers  # bits of faulty taxels
+    probability: Array
+    values: Array  # (n, n_fingers, VALUES_WIDTH), as in Output
+    hand: npt.NDArray[np.int8]  # (n,)
+
+    @classmethod
+    def empty(cls, n: int, n_fingers: int) -> Self:
+        """Return rows for n instants."""
+        shape = (n, n_fingers)
+        return cls(
+            state=np.zeros(shape, dtype=np.int8),
+            reason=np.zeros(shape, dtype=np.int8),
+            faults=np.zeros(shape, dtype=np.int16),
+            taxels=np.zeros(shape, dtype=np.int64),
+            probability=np.zeros(shape),
+            values=np.zeros((*shape, VALUES_WIDTH)),
+            hand=np.zeros(n, dtype=np.int8),
+        )
+
+
+def rule_of(model: Model, plan: StreamPlan) -> DecisionRule:
+    """Return the constants of a model for the fingers of a plan, in its order."""
+    parts = [model.finger(name) for name in plan.fingers]
+    width = max(part.classifier.n_features for part in parts) + 1
+    weights = np.zeros((len(parts), width))
+    for row, part in zip(weights, parts, strict=True):
+        row[: part.classifier.n_features + 1] = part.classifier.weights()
+    limits = [
+        (part.classifier.threshold, part.contact_threshold, part.contact_noise) for part in parts
+    ]
+    any_finger = ANY_FINGER in model.fingers
+    return DecisionRule(
+        weights=weights,
+        n_weights=np.array([part.classifier.n_features + 1 for part in parts]),
+        limits=np.array(limits, dtype=np.float64),  # None becomes NaN
+        hysteresis=float(model.debounce.hysteresis),
+        min_duration=float(model.debounce.min_duration),
+        hold=float(model.debounce.hold),
+        n_model_fingers=len(plan.fingers) if any_finger else len(model.fingers),
+    )
+
+
+def new_decision_memory(n_fingers: int) -> DecisionMemory:
+    """Return the memory before the first sample."""
+    return DecisionMemory(
+        codes=np.full((n_fingers, CODES_WIDTH), UNKNOWN, dtype=np.int64),
+        values=np.full((n_fingers, DECIDED_WIDTH), np.nan),
+    )
+
+
+@compiled
+def step(
+    layout: Layout,
+    memory: Memory,
+    output: Output,
+    rule: DecisionRule,
+    decision: DecisionMemory,
+    readings: Array,
+    present: Flags,
+    time: float,
+) -> int:
+    """Process one sample of a hand. Return the code of the hand's state after it.
+
+    Args:
+        layout: of the feature stream.
+        memory: of the feature stream; is changed.
+        output: of the feature stream; is filled.
+        rule: of the model.
+        decision: memory of the rule; is changed.
+        readings: (n_taxels, 3) of all fingers.
+        present: (n_fingers,) True for each finger with a sample.
+        time: of the sample [s].
+    """
+    kernel.advance(layout, memory, output, readings, present, time)
+    for finger in range(len(present)):
+        codes, decided = decision.codes[finger], decision.values[finger]
+        noise, values = memory.levels[finger, NOISE], output.values[finger]
+        threshold = _contact_threshold(noise, rule.limits[finger])
+        ready = output.status[finger, REASON] == READY
+        if ready and present[finger]:
+            quiet = kernel.noise_sigma(noise, layout.windows[finger, SIGMA_WINDOW])
+            if _has_drifted(values, codes, decided, threshold, quiet, time, layout.period):
+                output.status[finger, REASON] = FAULT
+                output.status[finger, FAULTS] = TARE_DRIFT
+                ready = False
+        if not ready:
+            codes[STATE] = codes[CANDIDATE] = UNKNOWN
+            decided[PROBABILITY] = decided[LAST_UNSTABLE] = math.nan
+        elif present[finger]:
+            if values[AMPLITUDE] < threshold:
+                decided[PROBABILITY] = 0.0
+                state = NO_CONTACT
+            else:
+                weights = rule.weights[finger, : rule.n_weights[finger]]
+                decided[PROBABILITY] = linear_probability(output.features[finger], weights)
+                limit = rule.limits[finger, THRESHOLD]
+                state = _contact_state(decided[PROBABILITY], limit, rule.hysteresis, codes[STATE])
+                state = _hold(state, decided, rule.hold, time, layout.period)
+            _debounce(codes, decided, state, rule.min_duration, time, layout.period)
+    return _hand_state(decision.codes[:, STATE], rule.n_model_fingers)
+
+
+@compiled
+def run(
+    layout: Layout,
+    memory: Memory,
+    output: Output,
+    rule: DecisionRule,
+    decision: DecisionMemory,
+    readings: Array,
+    present: Flags,
+    times: Array,
+    rows: TraceRows,
+) -> None:
+    """Process successive samples of a hand by `step`, and fill one row for each of them.
+
+    Args:
+        layout: of the feature stream.
+        memory: of the feature stream; is changed.
+        output: of the feature stream; is filled.
+        rule: of the model.
+        decision: memory of the rule; is changed.
+        readings: (n, n_taxels, 3) of all fingers.
+        present: (n, n_fingers) True for each finger with a sample.
+        times: (n,) of the samples [s].
+        rows: are filled.
+    """
+    for k in range(len(times)):
+        rows.hand[k] = step(
+            layout, memory, output, rule, decision, readings[k], present[k], times[k]
+        )
+        rows.state[k] = decision.codes[:, STATE]
+        rows.reason[k] = output.status[:, REASON]
+        rows.faults[k] = output.status[:, FAULTS]
+        rows.taxels[k] = output.status[:, TAXELS]
+        rows.probability[k] = decision.values[:, PROBABILITY]
+        rows.values[k] = output.values
+
+
+@compiled
+def _contact_threshold(noise: float, limits: Array) -> float:
+    """Return the threshold of contact of F_a; NaN, which no value is under, if there is none."""
+    if math.isnan(limits[CONTACT]):
+        return float(limits[CONTACT_NOISE] * noise)
+    return float(limits[CONTACT])
+
+
+@compiled
+def _has_drifted(
+    values: Array,
+    codes: Integers,
+    decided: Array,
+    threshold: float,
+    quiet: float,
+    time: float,
+    period: float,
+) -> bool:
+    """Return whether F_a crept over the threshold of contact, slower and calmer than a touch.
+
+    Args:
+        values: of the finger, as in `Output`.
+        codes: of the finger, as in `DecisionMemory`; is changed.
+        decided: of the finger, as in `DecisionMemory`; is changed.
+        threshold: of contact; NaN for none.
+        quiet: the sigma of noise alone; 0 for a window of two samples.
+        time: of the sample [s].
+        period: of the samples [s].
+    """
+    amplitude, mean = values[AMPLITUDE], math.sqrt(2.0) * values[MEAN]
+    if math.isnan(decided[SMOOTHED]):
+        decided[SMOOTHED], decided[RESTLESS_AT] = amplitude, time
+    away = abs(mean - decided[SMOOTHED])
+    jumped = abs(amplitude - decided[SMOOTHED]) > 0.5 * threshold
+    decided[SMOOTHED] += min(1.0, period / DRIFT_SECONDS) * (amplitude - decided[SMOOTHED])
+    calm = quiet > 0.0 and values[SIGMA] <= CALM_RATIO * quiet and away <= 0.5 * threshold
+    if not calm:
+        decided[RESTLESS_AT] = time
+    if amplitude < threshold:
+        codes[LOAD] = NO_LOAD
+    elif not calm:
+        codes[LOAD] = TOUCH
+    elif codes[LOAD] == NO_LOAD:
+        long = time - decided[RESTLESS_AT] + 0.5 * period >= DRIFT_SECONDS
+        codes[LOAD] = DRIFT if long and not jumped else TOUCH
+    return bool(codes[LOAD] == DRIFT)
+
+
+@compiled
+def _contact_state(probability: float, threshold: float, hysteresis: float, reported: int) -> int:
+    """Return STABLE from the threshold on, which hysteresis moves away from the reported state."""
+    if reported == STABLE:
+        threshold -= hysteresis
+    elif reported != UNKNOWN:
+        threshold += hysteresis
+    return STABLE if probability >= threshold else UNSTABLE
+
+
+@compiled
+def _hold(state: int, decided: Array, hold: float, time: float, period: float) -> int:
+    """Return UNSTABLE while it is held, else the state."""
+    if state == UNSTABLE:
+        decided[LAST_UNSTABLE] = time
+    elif _is_held(time, decided[LAST_UNSTABLE], hold, period):
+        return UNSTABLE
+    return state
+
+
+@compiled
+def _debounce(
+    codes: Integers, decided: Array, state: int, min_duration: float, time: float, period: float
+) -> None:
+    """Report the state if it has lasted long enough, or if the reported state is UNKNOWN."""
+    if state != codes[CANDIDATE]:
+        codes[CANDIDATE] = state
+        decided[CANDIDATE_SINCE] = time
+    lasted = time - decided[CANDIDATE_SINCE] + 0.5 * period
+    if codes[STATE] == UNKNOWN or lasted >= min_duration:
+        codes[STATE] = state
