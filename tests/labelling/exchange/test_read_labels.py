@@ -2,13 +2,13 @@ import json
 from dataclasses import replace
 
 import pytest
-from holdfast.labelling.exchange.read_labels import labels_of
 from tests.labelling.tiny import tiny_recording
 
 from holdfast.contact import ContactState
 from holdfast.errors import RecordingError
 from holdfast.io import labels_to_csv, save_labels, save_recording
 from holdfast.labelling.exchange.label_studio_export import save_label_studio
+from holdfast.labelling.exchange.read_labels import labels_of
 from holdfast.recordings import Label
 
 
