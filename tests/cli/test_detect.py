@@ -319,7 +319,7 @@ def test_a_damaged_file(capsys, save):
     data[len(data) // 2] ^= 1
     path.write_bytes(data)
     assert refusal(capsys, NOISE_FLOOR, path) == (
-        f"{path} is damaged: its content does not match its seal"
+        f"{path} is damaged: its content does not match its checksum"
     )
 
 

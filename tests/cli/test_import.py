@@ -141,7 +141,7 @@ class TestOutputs:
         def full(*_, **__):
             raise OSError(28, "No space left on device")
 
-        monkeypatch.setattr("holdfast.io.parquet.seal", full)
+        monkeypatch.setattr("holdfast.io.parquet.write_checksum", full)
         out = tmp_path / "out"
         assert refusal(capsys, table(), out) == (
             f"cannot write {out / 'press.parquet'}: No space left on device"

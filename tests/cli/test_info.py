@@ -195,4 +195,4 @@ def test_refusals(capsys, path):
     data = bytearray(path.read_bytes())
     data[1000] ^= 1
     path.write_bytes(data)
-    assert refusal(capsys, path) == f"{path} is damaged: its content does not match its seal"
+    assert refusal(capsys, path) == f"{path} is damaged: its content does not match its checksum"

@@ -5,12 +5,12 @@ import msgspec
 import pytest
 
 from holdfast.errors import RecordingError
-from holdfast.io.header import decode, encode, header_of
+from holdfast.io.header import decode_header, encode_header, header_of
 
 
 def test_it_comes_back(make_recording):
     header = header_of(make_recording(), "a")
-    assert decode(encode(header), Path("a")) == header
+    assert decode_header(encode_header(header), Path("a")) == header
 
 
 @pytest.mark.parametrize(
@@ -27,13 +27,13 @@ def test_it_comes_back(make_recording):
     ],
 )
 def test_what_is_not_as_described_is_refused(make_recording, change, text):
-    data = msgspec.json.decode(encode(header_of(make_recording(), "a")))
+    data = msgspec.json.decode(encode_header(header_of(make_recording(), "a")))
     change(data)
     with pytest.raises(RecordingError, match=re.escape(text)) as caught:
-        decode(msgspec.json.encode(data), Path("a.parquet"))
+        decode_header(msgspec.json.encode(data), Path("a.parquet"))
     assert str(caught.value).startswith("a.parquet: the header of the recording is refused: ")
 
 
 def test_what_is_no_json_is_refused():
     with pytest.raises(RecordingError, match="the header of the recording is refused: Input data"):
-        decode(b"", Path("a.parquet"))
+        decode_header(b"", Path("a.parquet"))

@@ -79,7 +79,7 @@ def changed(path, change):
 @pytest.mark.parametrize(
     ("change", "text"),
     [
-        (lambda d: d.update(extra=1), "is no label file: Object contains unknown field `extra`"),
+        (lambda d: d.update(extra=1), "is not a label file: Object contains unknown field `extra`"),
         (lambda d: d.update(schema="holdfast.labels/2"), "Invalid enum value 'holdfast.labels/2'"),
         (lambda d: d["modules"]["thumb"][0].update(state="fine"), "Invalid enum value 'fine'"),
         (lambda d: d["modules"]["thumb"][0].update(start="now"), "Expected `float`, got `str`"),
@@ -100,7 +100,9 @@ def test_wrong_label_files_are_refused(saved, change, text):
 def test_what_is_no_json_is_refused(saved):
     _, path = saved
     labels_path(path).write_text("finger,start\n")
-    with pytest.raises(RecordingError, match=r"can\.labels\.json is no label file: JSON is malf"):
+    with pytest.raises(
+        RecordingError, match=r"can\.labels\.json is not a label file: JSON is malf"
+    ):
         load_recording(path)
 
 

@@ -5,7 +5,7 @@ from hypothesis import strategies as st
 from mcap_ros2._dynamic import generate_dynamic
 
 from holdfast.io import mcap_messages as messages
-from holdfast.io.header import NUMBERS
+from holdfast.io.header import NUMBER_TYPES
 
 SHAPES = [(), (3,), (2, 3), (0,)]
 
@@ -17,7 +17,7 @@ def example(number, n, shape):
     return (np.arange(size) % 100).astype(number).reshape(n, *shape)
 
 
-@pytest.mark.parametrize("number", NUMBERS)
+@pytest.mark.parametrize("number", NUMBER_TYPES)
 @pytest.mark.parametrize("shape", SHAPES)
 @pytest.mark.parametrize("n", [1, 3])
 def test_samples_come_back_and_others_read_them(number, shape, n):

@@ -89,7 +89,7 @@ def test_wrong_samples_are_refused(tmp_path):
         ("thumb", [1.0], readings(1, np.float32), "thumb: uint16 expected, float32 given"),
         ("thumb", [0.0], readings(1), "thumb: finite, strictly increasing times expected"),
         ("thumb", [np.nan], readings(1), "thumb: finite, strictly increasing times expected"),
-        ("thumb", [1.0], readings(1, np.float16), "readings of thumb are float16; a file holds"),
+        ("thumb", [1.0], readings(1, np.float16), "readings of thumb are float16; a file stores"),
     ]
     with RecordingWriter(tmp_path / "a.mcap", {"thumb": ANYSKIN}) as writer:
         writer.append("thumb", [0.0], readings(1))
@@ -116,7 +116,9 @@ def test_a_full_disk_is_told(tmp_path, monkeypatch):
     def full(data):
         raise OSError(errno.ENOSPC, "No space left on device")
 
-    monkeypatch.setattr("holdfast.io.message_log._Direct.write", lambda self, data: full(data))
+    monkeypatch.setattr(
+        "holdfast.io.mcap_writer._UnbufferedStream.write", lambda self, data: full(data)
+    )
     with pytest.raises(OutputError, match=r"cannot write .*a\.mcap: No space left on device"):
         writer.append("thumb", np.arange(100) * 0.1, readings(100))
     with pytest.raises(OutputError, match="No space left on device"):
@@ -155,7 +157,7 @@ def test_after_a_refusal_nothing_more_is_written(tmp_path, monkeypatch):
     writer.append("thumb", np.arange(100) * 0.01, readings(100))
     writer.flush()
     size = path.stat().st_size
-    disk = writer._log._direct._file
+    disk = writer._log._stream._file
 
     class Full:
         def write(self, data):
@@ -163,7 +165,7 @@ def test_after_a_refusal_nothing_more_is_written(tmp_path, monkeypatch):
                 return disk.write(data[:10])
             raise OSError(errno.ENOSPC, "No space left on device")
 
-    monkeypatch.setattr(writer._log._direct, "_file", Full())
+    monkeypatch.setattr(writer._log._stream, "_file", Full())
     with pytest.raises(OutputError, match="No space left on device"):
         writer.mark(1.0, "full")
     monkeypatch.undo()

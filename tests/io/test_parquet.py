@@ -9,7 +9,7 @@ from hypothesis import strategies as st
 
 from holdfast.errors import OutputError, RecordingError
 from holdfast.io import load_recording, save_recording
-from holdfast.io.seal import KEY
+from holdfast.io.parquet import CHECKSUM_KEY
 from holdfast.recordings import Recording, Tactile, Truth
 from holdfast.sensors import sensor
 
@@ -93,12 +93,12 @@ def test_any_flipped_bit_is_found(make_recording, flipped, tmp_path):
             load_recording(damaged)
 
 
-def test_every_bit_of_the_seal_counts(make_recording, tmp_path):
+def test_every_character_of_the_checksum_counts(make_recording, tmp_path):
     path = tmp_path / "a.parquet"
     save_recording(make_recording(90), path)
     raw = path.read_bytes()
-    start = raw.index(KEY.encode())
-    for place in range(start, start + len(KEY) + 66):
+    start = raw.index(CHECKSUM_KEY.encode())
+    for place in range(start, start + len(CHECKSUM_KEY) + 66):
         damaged = bytearray(raw)
         damaged[place] ^= 1
         path.write_bytes(damaged)

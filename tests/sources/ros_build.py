@@ -4,7 +4,7 @@ import numpy as np
 from hypothesis import strategies as st
 from rosbags.typesys import Stores, get_types_from_msg, get_typestore
 
-from holdfast.ros.definitions import NUMBERS
+from holdfast.ros.definitions import NUMBER_CODES
 
 SENSOR_FULL = """uint32 message
 float64 time
@@ -121,12 +121,14 @@ def counts(n_taxels, seed=0):
 
 
 INNER = "bool flag\nstring name\nfloat64[2] pair\n"
-TEXT = "\n".join(f"{kind} a_{kind}\n{kind}[] many_{kind}" for kind in NUMBERS if kind != "byte")
+TEXT = "\n".join(
+    f"{kind} a_{kind}\n{kind}[] many_{kind}" for kind in NUMBER_CODES if kind != "byte"
+)
 OUTER = f"uint8 X=3\nstring S=a # b\n{TEXT}\nInner inner\nInner[] inners\nstring[] words\n"
 
 
 def number_of(kind, draw):
-    dtype = np.dtype(NUMBERS[kind])
+    dtype = np.dtype(NUMBER_CODES[kind])
     if kind == "bool":
         return draw(st.booleans())
     if dtype.kind == "f":
@@ -145,7 +147,7 @@ def values(draw):
         return {"flag": draw(st.booleans()), "name": draw(words), "pair": pair}
 
     fields = {}
-    for kind in NUMBERS:
+    for kind in NUMBER_CODES:
         if kind != "byte":
             fields[f"a_{kind}"] = number_of(kind, draw)
             n = draw(st.integers(0, 3))
@@ -159,10 +161,7 @@ def message_of(types, values):
         return types.types["p/msg/Inner"](one["flag"], one["name"], np.array(one["pair"]))
 
     fields = {
-        name: np.array(
-            value,
-            NUMBERS[name[5:]].replace("u1", "?") if name == "many_bool" else NUMBERS[name[5:]],
-        )
+        name: np.array(value, NUMBER_CODES[name.removeprefix("many_")])
         if name.startswith("many_")
         else value
         for name, value in values.items()

@@ -1,4 +1,4 @@
-"""Recordings on disk: Parquet for analysis, MCAP while recording, and other people's data."""
+"""Files of recordings (Parquet, MCAP) and of labels, datasets, and import of other formats."""
 
 from holdfast.io.dataset import Dataset, load_dataset
 from holdfast.io.importers import FORMATS, import_recordings

@@ -1,4 +1,4 @@
-"""A folder of recordings, read one at a time."""
+"""Datasets: folders of recordings, loaded one at a time."""
 
 from collections.abc import Sequence
 from pathlib import Path
@@ -10,15 +10,15 @@ from holdfast.recordings import Recording
 
 
 class Dataset(Sequence[Recording]):
-    """The recordings of a folder, sorted by name, each read when it is asked for.
+    """Sequence of the recordings of a folder, in the order of their names.
 
-    It holds paths only, so that a folder may hold more than memory does. Files that are no
-    recordings are ignored; where a recording lies there as Parquet and as MCAP, the Parquet
-    file is taken.
+    It stores paths only and loads a recording when it is accessed, so that a dataset may be
+    larger than memory. Other files in the folder are ignored. If a recording is stored both as
+    Parquet and as MCAP, the Parquet file is used.
 
     Args:
-        paths: of the recordings.
-        labels: take the labels of `<name>.labels.json` where there is one.
+        paths: paths of the recordings.
+        labels: use the labels of `<name>.labels.json` if there is one.
     """
 
     def __init__(self, paths: Sequence[Path], *, labels: bool = True) -> None:
@@ -27,12 +27,12 @@ class Dataset(Sequence[Recording]):
 
     @property
     def paths(self) -> tuple[Path, ...]:
-        """Where the recordings are, in order."""
+        """Paths of the recordings, in order."""
         return self._paths
 
     @property
     def names(self) -> tuple[str, ...]:
-        """What the recordings are called, in order."""
+        """Names of the recordings, in order."""
         return tuple(path.stem for path in self._paths)
 
     def __len__(self) -> int:
@@ -49,14 +49,14 @@ class Dataset(Sequence[Recording]):
 
 
 def load_dataset(folder: str | Path, *, labels: bool = True) -> Dataset:
-    """The recordings in a folder, sorted by name; nothing is read yet.
+    """Find the recordings in a folder, sorted by name; they are loaded when accessed.
 
     Args:
-        folder: where they are; a single recording's file is a dataset of one.
-        labels: take the labels of `<name>.labels.json` where there is one.
+        folder: path of the folder; the path of one recording gives a dataset of one.
+        labels: use the labels of `<name>.labels.json` if there is one.
 
     Raises:
-        RecordingError: there is no such folder, or no recording in it.
+        RecordingError: the folder does not exist, or has no recording.
     """
     place = Path(folder)
     if place.is_file():
@@ -67,9 +67,9 @@ def load_dataset(folder: str | Path, *, labels: bool = True) -> Dataset:
     for suffix in reversed(SUFFIXES):
         by_name.update({p.stem: p for p in place.glob(f"[!.]*{suffix}") if is_recording(p)})
     if not by_name:
-        found = len(list(place.iterdir()))
+        n_entries = len(list(place.iterdir()))
         raise RecordingError(
-            f"no recording in {place} ({found} other entries); files "
+            f"no recording in {place} ({n_entries} other entries); files "
             f"{' or '.join('*' + suffix for suffix in SUFFIXES)} expected: "
             "`holdfast import` makes them"
         )

@@ -1,4 +1,4 @@
-"""What a file says of its recording besides the numbers: one JSON, checked when read."""
+"""Header of a recording's file: all of the recording but its arrays, as JSON."""
 
 from collections.abc import Mapping
 from pathlib import Path
@@ -14,15 +14,15 @@ from holdfast.recordings import Label, Recording, Truth
 from holdfast.sensors import Sensor
 from holdfast.sensors.types import Unit
 
-NUMBERS = (
+NUMBER_TYPES = (
     *("int8", "int16", "int32", "int64", "uint8", "uint16", "uint32", "uint64"),
     *("float32", "float64", "bool", "str"),
 )
-"""Number types that a file can hold."""
+"""Number types that a file can store."""
 
 
 class LabelData(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
-    """A label as a file holds it; fields as in `Label`, states in lower case."""
+    """A label in a file. Fields as in `Label`; states in lower case."""
 
     start: float
     end: float
@@ -34,7 +34,7 @@ class LabelData(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
 
 
 class ModuleData(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
-    """What is known of a module; `number` and `n_samples` are None while recording."""
+    """A module in a file; `number` and `n_samples` are None while recording."""
 
     sensor: dict[str, Any]
     unit: Unit
@@ -44,14 +44,14 @@ class ModuleData(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
 
 
 class ArrayData(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
-    """Number type and shape of one value of a truth array."""
+    """Number type of a truth array, and shape of one of its values."""
 
     number: str
     shape: list[int]
 
 
 class TruthData(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
-    """Which truth arrays there are, and how many rows each has."""
+    """Truth arrays in a file, and the number of their rows."""
 
     n_rows: int
     hand: dict[str, ArrayData]
@@ -59,14 +59,15 @@ class TruthData(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
 
 
 class Header(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
-    """All of a recording but its numbers.
+    """All of a recording but its arrays.
 
     Attributes:
-        schema: which kind and version of header it is.
-        name: of the recording.
-        file: stem of the file's name as written; a file renamed since lends its new name.
-        modules: by name, in the order of the recording.
-        truth: the layout of the truth arrays.
+        schema: kind and version of the header.
+        name: name of the recording.
+        file: stem of the file's name when it was written. If the file is renamed, its stem is
+            the name of the recording.
+        modules: modules by name, in the order of the recording.
+        truth: layout of the truth arrays.
         metadata: as in `Recording`.
         markers: as in `Recording`.
         media: as in `Recording`.
@@ -87,12 +88,12 @@ class Header(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=Tr
 
 
 def header_of(recording: Recording, file: str) -> Header:
-    """The header of a recording that is to be written to a file with the stem `file`."""
+    """Return the header of a recording, for a file with the stem `file`."""
     modules = {
         name: ModuleData(
             module.sensor.to_dict(),
             module.unit or module.sensor.unit,
-            number_of(module.readings, f"readings of {name}"),
+            number_type(module.readings, f"readings of {name}"),
             module.n_samples,
             [label_data(label) for label in module.labels],
         )
@@ -111,14 +112,14 @@ def header_of(recording: Recording, file: str) -> Header:
     )
 
 
-def encode(header: Header) -> bytes:
-    """The header as JSON.
+def encode_header(header: Header) -> bytes:
+    """Encode a header as JSON.
 
     Raises:
-        RecordingError: the metadata hold what JSON cannot.
+        RecordingError: the metadata have values that JSON cannot store.
     """
     try:
-        return msgspec.json.encode(header, enc_hook=_plain)
+        return msgspec.json.encode(header, enc_hook=_json_value)
     except (TypeError, ValueError, UnicodeError) as cause:
         raise RecordingError(
             f"recording {header.name!r} cannot be written: its metadata, names and texts must be "
@@ -126,31 +127,35 @@ def encode(header: Header) -> bytes:
         ) from cause
 
 
-def decode(data: bytes | str, path: Path) -> Header:
-    """The header out of its JSON.
+def decode_header(data: bytes | str, path: Path) -> Header:
+    """Decode the JSON of a header.
+
+    Args:
+        data: JSON text.
+        path: path of the file, for the error message.
 
     Raises:
-        RecordingError: it is none, or of another schema.
+        RecordingError: the JSON is not a header, or has another schema.
     """
     try:
         header = msgspec.json.decode(data, type=Header)
-        sensors_of(header)
+        header_sensors(header)
     except (msgspec.DecodeError, ValueError, TypeError, IndexError) as cause:
         raise RecordingError(f"{path}: the header of the recording is refused: {cause}") from cause
     return header
 
 
-def sensors_of(header: Header) -> dict[str, Sensor]:
-    """The sensor of each module.
+def header_sensors(header: Header) -> dict[str, Sensor]:
+    """Return the sensor of each module.
 
     Raises:
-        ValueError: a sensor that `Sensor` does not accept.
+        ValueError: `Sensor` does not accept one.
     """
     return {name: Sensor.from_dict(module.sensor) for name, module in header.modules.items()}
 
 
 def label_data(label: Label) -> LabelData:
-    """The label as a file holds it."""
+    """Convert a label to its form in a file."""
     state: Any = label.state.value.lower()
     return LabelData(
         float(label.start),
@@ -164,10 +169,10 @@ def label_data(label: Label) -> LabelData:
 
 
 def label_of(data: LabelData) -> Label:
-    """The label that a file holds.
+    """Convert a label in a file to a `Label`.
 
     Raises:
-        ValueError: its interval or its confidence is none.
+        ValueError: its interval or its confidence is not valid.
     """
     return Label(
         data.start,
@@ -180,16 +185,20 @@ def label_of(data: LabelData) -> Label:
     )
 
 
-def number_of(array: npt.NDArray[Any], what: str) -> str:
-    """The name of an array's number type.
+def number_type(array: npt.NDArray[Any], name: str) -> str:
+    """Return the name of an array's number type.
+
+    Args:
+        array: the array.
+        name: name of the array, for the error message.
 
     Raises:
-        RecordingError: a file cannot hold it.
+        RecordingError: a file cannot store it.
     """
-    name = "str" if array.dtype.kind == "U" else array.dtype.name
-    if name not in NUMBERS:
-        raise RecordingError(f"{what} are {name}; a file holds {', '.join(NUMBERS)}")
-    return name
+    number = "str" if array.dtype.kind == "U" else array.dtype.name
+    if number not in NUMBER_TYPES:
+        raise RecordingError(f"{name} are {number}; a file stores {', '.join(NUMBER_TYPES)}")
+    return number
 
 
 def _truth_data(truth: Truth) -> TruthData:
@@ -198,19 +207,19 @@ def _truth_data(truth: Truth) -> TruthData:
         raise RecordingError("truth needs finite, strictly increasing times to be written")
     return TruthData(
         len(truth.times),
-        _arrays_data(truth.hand),
-        {finger: _arrays_data(arrays) for finger, arrays in truth.fingers.items()},
+        _array_data(truth.hand),
+        {finger: _array_data(arrays) for finger, arrays in truth.fingers.items()},
     )
 
 
-def _arrays_data(arrays: Mapping[str, npt.NDArray[Any]]) -> dict[str, ArrayData]:
+def _array_data(arrays: Mapping[str, npt.NDArray[Any]]) -> dict[str, ArrayData]:
     return {
-        name: ArrayData(number_of(array, f"truth {name}"), list(array.shape[1:]))
+        name: ArrayData(number_type(array, f"truth {name}"), list(array.shape[1:]))
         for name, array in arrays.items()
     }
 
 
-def _plain(value: object) -> object:
+def _json_value(value: object) -> object:
     if isinstance(value, np.generic | np.ndarray):
         return value.tolist()
     if isinstance(value, Mapping):

@@ -1,4 +1,4 @@
-"""Labels of a person or a rule: `<name>.labels.json` beside the recording, and CSV."""
+"""Files of labels: `<name>.labels.json` beside a recording, and CSV."""
 
 import csv
 from collections.abc import Mapping, Sequence
@@ -19,15 +19,15 @@ CSV_COLUMNS = ("finger", "start", "end", "state", "cause")
 
 
 class LabelFile(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
-    """What a label file says.
+    """Content of a label file.
 
     Attributes:
-        schema: which kind and version of file it is.
-        recording: `Recording.digest` of the recording that was labelled.
-        name: of that recording.
-        modules: labels by module; a module that is not named has none.
-        author: who or what labelled.
-        time: when, as ISO 8601 text; empty where nobody said.
+        schema: kind and version of the file.
+        recording: `Recording.digest` of the labelled recording.
+        name: name of that recording.
+        modules: labels by module; a module that is missing has none.
+        author: person or program that made the labels.
+        time: time of labelling, as ISO 8601 text; empty if unknown.
         notes: free text.
     """
 
@@ -41,7 +41,7 @@ class LabelFile(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only
 
 
 def labels_path(path: str | Path) -> Path:
-    """Where the labels of the recording at `path` are kept.
+    """Return the path of the label file of the recording at `path`.
 
     Example:
         >>> labels_path("grasps/can_1.parquet").name
@@ -60,21 +60,21 @@ def save_labels(
     notes: str = "",
     force: bool = False,
 ) -> Path:
-    """Writes the labels of a recording into the label file beside it.
+    """Save the labels of a recording in the label file beside it.
 
     Args:
-        recording: whose labels are written.
-        path: of the recording.
-        author: who or what labelled.
-        time: when, as ISO 8601 text; io has no clock of its own.
+        recording: recording with the labels.
+        path: path of the recording.
+        author: person or program that made the labels.
+        time: time of labelling, as ISO 8601 text; this package reads no clock.
         notes: free text.
-        force: replace a label file that is there.
+        force: replace an existing label file.
 
     Returns:
         The path of the label file.
 
     Raises:
-        OutputError: it exists already or cannot be written.
+        OutputError: the label file exists or cannot be written.
     """
     file = LabelFile(
         recording=recording.digest,
@@ -93,28 +93,28 @@ def save_labels(
 
 
 def load_labels(path: str | Path) -> LabelFile:
-    """What the label file at `path` says.
+    """Load the label file at `path`.
 
     Raises:
-        RecordingError: it cannot be read or is no label file.
+        RecordingError: it cannot be read or is not a label file.
     """
     try:
         return msgspec.json.decode(Path(path).read_bytes(), type=LabelFile)
     except OSError as cause:
         raise RecordingError(f"cannot read {path}: {cause.strerror}") from cause
     except (msgspec.DecodeError, UnicodeError) as cause:
-        raise RecordingError(f"{path} is no label file: {cause}") from cause
+        raise RecordingError(f"{path} is not a label file: {cause}") from cause
 
 
 def labels_for(path: Path, digest: str) -> Mapping[str, tuple[Label, ...]] | None:
-    """The labels beside the recording at `path`, or None where there are none.
+    """Return the labels in the label file of a recording, or None if there is no such file.
 
     Args:
-        path: of the recording.
-        digest: of the recording.
+        path: path of the recording.
+        digest: digest of the recording.
 
     Raises:
-        RecordingError: the label file is of another recording, or none.
+        RecordingError: the file is not a label file, or belongs to another recording.
     """
     file_path = labels_path(path)
     if not file_path.exists():
@@ -135,33 +135,34 @@ def labels_for(path: Path, digest: str) -> Mapping[str, tuple[Label, ...]] | Non
 
 
 def labels_to_csv(labels: Mapping[str, Sequence[Label]]) -> str:
-    """Labels by finger as CSV with the columns finger,start,end,state,cause; times in [s]."""
+    """Write labels by finger as CSV: finger,start,end,state,cause; times in seconds."""
     text = StringIO()
     writer = csv.writer(text, lineterminator="\n")
     writer.writerow(CSV_COLUMNS)
     for finger, intervals in labels.items():
         for label in intervals:
-            span = (repr(float(label.start)), repr(float(label.end)))  # NumPy's own repr is none
+            # repr of a NumPy number is not a plain number
+            span = (repr(float(label.start)), repr(float(label.end)))
             writer.writerow([finger, *span, label.state.value.lower(), label.cause or ""])
     return text.getvalue()
 
 
 def labels_from_csv(path: str | Path, *, author: str = "") -> dict[str, tuple[Label, ...]]:
-    """Labels by finger out of a CSV file with the columns finger,start,end,state,cause.
+    """Read labels by finger from CSV with the columns finger,start,end,state,cause.
 
     Args:
-        path: of the CSV file; times in [s].
-        author: who or what labelled.
+        path: path of the CSV file; times in seconds.
+        author: person or program that made the labels.
 
     Raises:
-        RecordingError: a column is missing, or a row is no label.
+        RecordingError: a column is missing, or a row is not a label.
     """
     try:
         rows = list(csv.DictReader(StringIO(Path(path).read_text("utf-8-sig"))))
     except OSError as cause:
         raise RecordingError(f"cannot read {path}: {cause.strerror}") from cause
     except (UnicodeError, csv.Error) as cause:
-        raise RecordingError(f"{path} is no CSV text: {cause}") from cause
+        raise RecordingError(f"{path} is not CSV text: {cause}") from cause
     labels: dict[str, list[Label]] = {}
     for number, row in enumerate(rows, start=2):
         finger, label = _from_row(row, f"{path}, row {number}", author)

@@ -1,44 +1,65 @@
-"""Recordings as MCAP while they are made: what has been written stays, whatever happens."""
+"""MCAP files of recordings, written while recording: data on disk survives a crash."""
 
 from collections.abc import Mapping, Sequence
+from io import FileIO
 from pathlib import Path
 from types import TracebackType
-from typing import Any, Self
+from typing import IO, Any, Self, cast
 
+import msgspec
 import numpy as np
 import numpy.typing as npt
+from mcap.writer import CompressionType, Writer
 
-from holdfast.errors import RecordingError
-from holdfast.io.header import Header, ModuleData, number_of
-from holdfast.io.message_log import MARKERS_TOPIC, MessageLog
-from holdfast.io.spans import spans
+from holdfast.errors import OutputError, RecordingError
+from holdfast.files import refuse_overwrite
+from holdfast.io.arrays import TACTILE, time_spans
+from holdfast.io.header import Header, ModuleData, encode_header, number_type
+from holdfast.io.mcap_messages import (
+    TEXT_SCHEMA,
+    TEXT_TYPE,
+    encode_samples,
+    encode_text,
+    samples_schema,
+    samples_type,
+)
 from holdfast.sensors import Sensor
 from holdfast.sensors.types import Array, Unit
 
 MESSAGE_SECONDS = 0.1
+"""Maximum duration of the samples in a message [s]."""
+CHUNK_SECONDS = 0.3
+"""Maximum duration of a chunk of the file [s]."""
+MAX_CHUNK_SIZE = 1 << 24
+"""Number of bytes above which a chunk ends early."""
 
-_NEVER = -np.inf
+HEADER_TOPIC = "/holdfast/header"
+MARKERS_TOPIC = "/holdfast/markers"
+LIBRARY = "holdfast"
+"""Name of the program in the first record of the file."""
+
+_MAX_NANOSECONDS = (1 << 63) - 1
 
 
 class RecordingWriter:
-    """Writes a recording while it is made; a kill loses at most half a second.
+    """Writer of a recording while it is made; a crash loses at most half a second.
 
-    Samples go to disk in messages of at most 0.1 s and chunks of at most 0.3 s of the
-    stream's own time: the writer has no clock, so that `flush` is for streams that may fall
-    silent. It is a context manager and is to be used by one thread.
+    Samples are written in messages of at most 0.1 s and chunks of at most 0.3 s, by the times
+    of the samples: the writer has no clock. Call `flush` if samples may stop to arrive. Use the
+    writer as a context manager, and from one thread only.
 
     Args:
-        path: of the MCAP file.
-        sensors: by module.
-        name: of the recording; that of the file where it is not given.
-        units: by module, where readings are calibrated.
+        path: path of the MCAP file.
+        sensors: sensor by module.
+        name: name of the recording; by default the stem of the file.
+        units: unit by module, for calibrated readings.
         metadata: as in `Recording`.
         media: as in `Recording`.
-        force: replace what is at `path`.
+        force: replace an existing file.
 
     Raises:
-        OutputError: the file exists already or cannot be written.
-        RecordingError: the metadata are no plain JSON values.
+        OutputError: the file exists or cannot be written.
+        RecordingError: the metadata are not plain JSON values.
 
     Example:
         >>> from tempfile import TemporaryDirectory
@@ -64,12 +85,12 @@ class RecordingWriter:
         force: bool = False,
     ) -> None:
         target = Path(path)
-        given = units or {}
+        units = units or {}
         header = Header(
             name=name or target.stem,
             file=target.stem,
             modules={
-                module: ModuleData(sensor.to_dict(), given.get(module, sensor.unit))
+                module: ModuleData(sensor.to_dict(), units.get(module, sensor.unit))
                 for module, sensor in sensors.items()
             },
             metadata=dict(metadata or {}),
@@ -78,69 +99,69 @@ class RecordingWriter:
         self._sensors = dict(sensors)
         self._pending: dict[str, list[tuple[Array, npt.NDArray[Any]]]] = {m: [] for m in sensors}
         self._numbers: dict[str, str] = {}
-        self._last = dict.fromkeys(sensors, _NEVER)
-        self._newest = _NEVER
+        self._last_times = dict.fromkeys(sensors, -np.inf)
+        self._newest = -np.inf
         self._log = MessageLog(target, header, force=force)
 
     def append(self, module: str, times: npt.ArrayLike, readings: npt.ArrayLike) -> None:
-        """Takes the next samples of a module.
+        """Append the next samples of a module.
 
         Args:
-            module: whose they are.
-            times: (n,) later than those before [s].
-            readings: (n, n_taxels, 3), of the same number type each time.
+            module: name of the module.
+            times: (n,) strictly increasing and later than all times before [s].
+            readings: (n, n_taxels, 3), of the same number type in each call.
 
         Raises:
-            RecordingError: unknown module, wrong shape or number type, times that do not
-                increase.
-            OutputError: the disk refuses.
+            RecordingError: the module is unknown, the shape or the number type is wrong, or
+                the times do not increase.
+            OutputError: the disk reports an error.
         """
-        when = np.array(times, dtype=np.float64)
+        sample_times = np.array(times, dtype=np.float64)
         values = np.array(readings)
-        self._check(module, when, values)
-        if len(when) == 0:
+        self._check(module, sample_times, values)
+        if len(sample_times) == 0:
             return
-        self._pending[module].append((when, values))
-        self._last[module] = float(when[-1])
-        self._newest = max(self._newest, self._last[module])
+        self._pending[module].append((sample_times, values))
+        self._last_times[module] = float(sample_times[-1])
+        self._newest = max(self._newest, self._last_times[module])
         for name, parts in self._pending.items():
             if parts and parts[0][0][0] <= self._newest - MESSAGE_SECONDS:
                 self._write(name, before=self._newest - MESSAGE_SECONDS)
 
     def mark(self, time: float, text: str, *, at_once: bool = True) -> None:
-        """Writes a marker.
+        """Append a marker.
 
         Args:
-            time: on the clock of the samples [s].
-            text: what happened.
-            at_once: False leaves it to the next `flush`, or to the samples that follow.
+            time: time of the event, on the clock of the samples [s].
+            text: description of the event.
+            at_once: write to disk now; otherwise with the next `flush` or later samples.
 
         Raises:
-            OutputError: the disk refuses.
+            OutputError: the disk reports an error.
         """
-        self._log.text(MARKERS_TOPIC, time, text)
+        self._log.write_text(MARKERS_TOPIC, time, text)
         if at_once:
             self._log.flush()
 
     def flush(self) -> None:
-        """Writes all that was given so far: a kill from now on does not lose it.
+        """Write all samples and markers to disk; a later crash does not lose them.
 
         Raises:
-            OutputError: the disk refuses.
+            OutputError: the disk reports an error.
         """
         self._write_all()
         self._log.flush()
 
     @property
     def n_bytes(self) -> int:
-        """How long the file is."""
+        """Length of the file in bytes."""
         return self._log.n_bytes
 
     def close(self) -> None:
-        """Writes what is left and the end of the file; again, it does nothing.
+        """Write the remaining samples and the end of the file; a second call does nothing.
 
         Raises:
-            OutputError: the disk refuses.
+            OutputError: the disk reports an error.
         """
         try:
             if not self._log.closed:
@@ -170,10 +191,10 @@ class RecordingWriter:
                 f"{module}: times (n,) and readings (n, {n_taxels}, 3) expected, "
                 f"{times.shape} and {values.shape} given"
             )
-        number = number_of(values, f"readings of {module}")
+        number = number_type(values, f"readings of {module}")
         if self._numbers.setdefault(module, number) != number:
             raise RecordingError(f"{module}: {self._numbers[module]} expected, {number} given")
-        steps = np.diff(times, prepend=self._last[module])
+        steps = np.diff(times, prepend=self._last_times[module])
         if not (np.isfinite(times).all() and (steps > 0).all()):
             raise RecordingError(f"{module}: finite, strictly increasing times expected")
 
@@ -183,15 +204,182 @@ class RecordingWriter:
                 self._write(name, before=np.inf)
 
     def _write(self, module: str, before: float) -> None:
-        """Writes the spans that begin no later than `before`; the rest stays pending."""
+        """Write the messages that begin at `before` or earlier; keep the rest."""
         parts = self._pending[module]
         times = np.concatenate([part[0] for part in parts])
         values = np.concatenate([part[1] for part in parts])
-        left = len(times)
-        for span in spans({module: times}, MESSAGE_SECONDS):
+        n_written = len(times)
+        for span in time_spans({module: times}, MESSAGE_SECONDS):
             cut = span[module]
             if times[cut.start] > before:
-                left = cut.start
+                n_written = cut.start
                 break
-            self._log.samples(f"/tactile/{module}", times[cut], values[cut])
-        self._pending[module] = [(times[left:], values[left:])] if left < len(times) else []
+            self._log.write_samples(f"{TACTILE}{module}", times[cut], values[cut])
+        has_rest = n_written < len(times)
+        self._pending[module] = [(times[n_written:], values[n_written:])] if has_rest else []
+
+
+class MessageLog:
+    """MCAP file of messages of samples and texts, in chunks of at most 0.3 s.
+
+    After an error of the disk nothing more is written. The file can then be read like a file
+    whose end was cut off.
+
+    Args:
+        path: path of the file.
+        header: header of the recording; it is written to disk at once.
+        force: replace an existing file.
+
+    Attributes:
+        closed: whether the end of the file has been written.
+
+    Raises:
+        OutputError: the file exists or cannot be written.
+    """
+
+    def __init__(self, path: Path, header: Header, *, force: bool = False) -> None:
+        header_text = encode_header(header).decode()
+        refuse_overwrite(path, force=force)
+        self._path = path
+        self._channels: dict[str, int] = {}
+        self._schemas: dict[str, int] = {}
+        self._n_messages = 0
+        self._chunk_span = (np.inf, -np.inf)
+        self.closed = False
+        with _disk_errors(path):
+            self._file = path.open("wb" if force else "xb", buffering=0)
+            self._stream = _UnbufferedStream(self._file)
+            self._writer = Writer(
+                cast("IO[bytes]", self._stream),
+                MAX_CHUNK_SIZE,
+                CompressionType.ZSTD,
+                enable_data_crcs=True,
+            )
+            self._writer.start("", LIBRARY)
+            self._writer.add_metadata("holdfast", _summary(header))
+        self.write_text(HEADER_TOPIC, 0.0, header_text)
+        self.flush()
+
+    def write_samples(self, topic: str, times: Array, values: npt.NDArray[Any]) -> None:
+        """Write one message of samples: times (n,) [s] and values (n, ...)."""
+        start = float(times[0])
+        self._limit_chunk(start, float(times[-1]))
+        number = number_type(values, topic)
+        channel = self._channel(topic, samples_type(number), samples_schema(number))
+        self._write_message(channel, start, encode_samples(times, values))
+
+    def write_text(self, topic: str, time: float, text: str) -> None:
+        """Write one message of a text and its time [s]."""
+        self._limit_chunk(time, time)
+        channel = self._channel(topic, TEXT_TYPE, TEXT_SCHEMA)
+        self._write_message(channel, time, encode_text(time, text))
+
+    def flush(self) -> None:
+        """End the chunk and pass it to the operating system."""
+        with _disk_errors(self._path):
+            self._writer.flush()  # type: ignore[no-untyped-call]
+        self._chunk_span = (np.inf, -np.inf)
+
+    @property
+    def n_bytes(self) -> int:
+        """Length of the file in bytes."""
+        return self._stream.n_bytes
+
+    def close(self) -> None:
+        """Write the end of the file; a second call does nothing."""
+        if self.closed:
+            return
+        self.closed = True
+        with _disk_errors(self._path), self._file:
+            self._writer.finish()  # type: ignore[no-untyped-call]
+            self._writer.flush()  # type: ignore[no-untyped-call]
+
+    def _limit_chunk(self, start: float, end: float) -> None:
+        """End the chunk if a message from `start` to `end` [s] would make it too long."""
+        first, last = min(start, self._chunk_span[0]), max(end, self._chunk_span[1])
+        if last - first > CHUNK_SECONDS:
+            self.flush()
+            first, last = start, end
+        self._chunk_span = (first, last)
+
+    def _channel(self, topic: str, kind: str, definition: str) -> int:
+        if topic not in self._channels:
+            with _disk_errors(self._path):
+                if kind not in self._schemas:
+                    self._schemas[kind] = self._writer.register_schema(
+                        kind, "ros2msg", definition.encode()
+                    )
+                self._channels[topic] = self._writer.register_channel(
+                    topic, "cdr", self._schemas[kind]
+                )
+        return self._channels[topic]
+
+    def _write_message(self, channel: int, time: float, data: bytes) -> None:
+        nanoseconds = int(min(max(time * 1e9, 0.0), _MAX_NANOSECONDS))
+        sequence = self._n_messages & 0xFFFFFFFF
+        with _disk_errors(self._path):
+            self._writer.add_message(channel, nanoseconds, data, nanoseconds, sequence)
+        self._n_messages += 1
+
+
+class _UnbufferedStream:
+    """Output stream without a buffer; `mcap` would add one to a plain file.
+
+    After the first error of the disk every write fails. Without this, the end of the file could
+    follow a missing part, and the file would be damaged instead of cut.
+
+    Args:
+        file: file that was opened with `buffering=0`.
+
+    Attributes:
+        n_bytes: number of bytes written.
+    """
+
+    def __init__(self, file: FileIO) -> None:
+        self.n_bytes = 0
+        self._file = file
+        self._error: OSError | None = None
+
+    def write(self, data: bytes) -> int:
+        if self._error:
+            raise OSError(*self._error.args)
+        left = memoryview(data)
+        try:
+            while left:
+                n = self._file.write(left)
+                self.n_bytes += n
+                left = left[n:]
+        except OSError as error:
+            self._error = error
+            raise
+        return len(data)
+
+    def tell(self) -> int:
+        return self.n_bytes
+
+    def flush(self) -> None:
+        """Do nothing: there is no buffer."""
+
+
+class _disk_errors:  # noqa: N801 (used like a function)
+    """Context manager that turns an `OSError` into an `OutputError`."""
+
+    def __init__(self, path: Path) -> None:
+        self._path = path
+
+    def __enter__(self) -> None:
+        return None
+
+    def __exit__(self, kind: object, error: BaseException | None, trace: object) -> None:
+        if isinstance(error, OSError):
+            raise OutputError(f"cannot write {self._path}: {error.strerror}") from error
+
+
+def _summary(header: Header) -> dict[str, str]:
+    """Return the metadata that `mcap get metadata` shows; the header itself is a message."""
+    return {
+        "name": header.name,
+        "schema": header.schema,
+        "modules": ", ".join(header.modules),
+        "metadata": msgspec.json.encode(header.metadata, enc_hook=str).decode(),
+    }

@@ -1,10 +1,14 @@
-"""Recordings as Parquet, for analysis: one wide table that opens in pandas.
+"""Parquet files of recordings: one wide table that opens in pandas.
 
-Row groups are spans of time of at most a minute; within one, row i holds the i-th sample of
-every module, and a module with fewer samples has nulls below its last. `docs/formats.md` is
-the full description.
+A row group is a span of time of at most a minute. Row i of a row group has the i-th sample of
+every module in that span. A module with fewer samples has nulls in the rows after its last
+sample. `docs/formats.md` is the full description.
+
+A checksum over all bytes is stored in the footer of the file, so that any flipped bit is found.
 """
 
+import hashlib
+from collections import Counter
 from collections.abc import Iterator, Mapping
 from itertools import product
 from pathlib import Path
@@ -17,38 +21,48 @@ import pyarrow.parquet as pq
 
 from holdfast.errors import RecordingError
 from holdfast.files import whole_file
-from holdfast.io.header import Header, decode, encode, header_of
-from holdfast.io.seal import BLANK, KEY, check_seal, read_footer, seal
-from holdfast.io.series import (
-    Samples,
-    Series,
-    n_components,
+from holdfast.io.arrays import (
+    TRUTH_TIME,
+    ArraySpec,
+    TimedArray,
+    TimedArrays,
+    array_specs,
+    arrays_of,
     recording_from,
-    samples_of,
-    series_of,
+    time_spans,
 )
-from holdfast.io.spans import spans
+from holdfast.io.header import Header, decode_header, encode_header, header_of
 from holdfast.recordings import Recording
 from holdfast.sensors.types import Array
 
 HEADER_KEY = "holdfast.header"
+CHECKSUM_KEY = "holdfast.seal"
+"""Keys of the header and of the checksum in the metadata of the file."""
+BLANK_CHECKSUM = "0" * 64
+"""Text in place of the checksum while the checksum is computed; it has the same length."""
 MAGIC = b"PAR1"
+FOOTER_END_SIZE = 8
+"""A Parquet file ends with the length of its footer (4 bytes) and the magic (4 bytes)."""
 GROUP_SECONDS = 60.0
+"""Maximum duration of a row group [s]."""
 GROUP_ROWS = 1 << 16
+"""Maximum number of rows in a row group."""
+BLOCK_SIZE = 1 << 20
+"""Number of bytes that are read at a time."""
 
 
 def save(recording: Recording, path: Path, *, force: bool = False) -> None:
-    """Writes a recording, sealed.
+    """Save a recording.
 
     Raises:
-        OutputError: as `whole_file`.
-        RecordingError: it holds what Parquet cannot.
+        OutputError: as in `whole_file`.
+        RecordingError: the file cannot store the recording.
     """
     header = header_of(recording, path.stem)
-    text = encode(header)
-    every = series_of(header)
-    schema = _schema(every)
-    samples = samples_of(recording)
+    text = encode_header(header)
+    specs = array_specs(header)
+    schema = _schema(specs)
+    arrays = arrays_of(recording)
     with whole_file(path, force=force) as part:
         with pq.ParquetWriter(
             str(part),
@@ -58,52 +72,62 @@ def save(recording: Recording, path: Path, *, force: bool = False) -> None:
             column_encoding=_encodings(schema),
             write_page_checksum=True,
         ) as writer:
-            for span in spans(_track_times(every, samples), GROUP_SECONDS, GROUP_ROWS):
-                writer.write_batch(_batch(every, samples, span, schema), row_group_size=1 << 30)
-            writer.add_key_value_metadata({HEADER_KEY: text, KEY: BLANK})
-        seal(part)
+            times = {_track_key(spec): arrays[spec.topic][0] for spec in specs}
+            for span in time_spans(times, GROUP_SECONDS, GROUP_ROWS):
+                writer.write_batch(_batch(specs, arrays, span, schema), row_group_size=1 << 30)
+            writer.add_key_value_metadata({HEADER_KEY: text, CHECKSUM_KEY: BLANK_CHECKSUM})
+        write_checksum(part)
 
 
 def load(path: Path) -> Recording:
-    """The recording in a file.
+    """Load the recording in a file.
 
     Raises:
-        RecordingError: it is cut, damaged or no recording.
+        RecordingError: the file is cut, damaged or not a recording.
     """
     header, file = _open(path)
     n_rows = file.metadata.num_rows
-    filled = {s.topic: _Filled(s, n_rows, path) for s in series_of(header)}
-    for samples in _groups(header, file, path):
-        for topic, (times, values) in samples.items():
-            filled[topic].append(times, values)
-    recording = recording_from(
-        header, {topic: fill.whole() for topic, fill in filled.items()}, path
-    )
+    buffers = {spec.topic: _ArrayBuffer(spec, n_rows, path) for spec in array_specs(header)}
+    for arrays in _groups(header, file, path):
+        for topic, (times, values) in arrays.items():
+            buffers[topic].append(times, values)
+    complete = {topic: buffer.result() for topic, buffer in buffers.items()}
+    recording = recording_from(header, complete, path)
     if recording.digest != header.digest:
         raise RecordingError(f"{path} is damaged: its samples do not match their digest")
     return recording
 
 
-def chunks(path: Path) -> tuple[Header, Iterator[Samples], bool]:
-    """The header, the samples of one row group after the other, and that the file is whole.
+def read_groups(path: Path) -> tuple[Header, Iterator[TimedArrays], bool]:
+    """Return the header, an iterator over the arrays of the row groups, and True: complete.
 
     Raises:
-        RecordingError: as `load`.
+        RecordingError: as in `load`.
     """
     header, file = _open(path)
     return header, _groups(header, file, path), True
 
 
 def is_foreign(path: Path) -> bool:
-    """Whether it is sound Parquet that holds something else than a recording."""
-    _, footer = read_footer(path)
-    return footer.endswith(MAGIC) and not any(key.encode() in footer for key in (HEADER_KEY, KEY))
+    """Return whether a file is Parquet, but not a recording."""
+    _, footer = _read_footer(path)
+    keys = (HEADER_KEY, CHECKSUM_KEY)
+    return footer.endswith(MAGIC) and not any(key.encode() in footer for key in keys)
+
+
+def write_checksum(path: Path) -> None:
+    """Replace the blank checksum in the footer by the checksum of the file."""
+    place = _checksum_place(path)
+    checksum = _checksum(path, place)
+    with path.open("r+b") as file:
+        file.seek(place)
+        file.write(checksum)
 
 
 def _open(path: Path) -> tuple[Header, pq.ParquetFile]:
     _check_ends(path)
     try:
-        check_seal(path)
+        _check_checksum(path)
     except RecordingError:
         if is_foreign(path):
             raise RecordingError(
@@ -113,8 +137,9 @@ def _open(path: Path) -> tuple[Header, pq.ParquetFile]:
     try:
         file = pq.ParquetFile(path, page_checksum_verification=True)
     except (pa.ArrowException, OSError) as cause:
-        raise RecordingError(f"{path} is damaged: {_line(cause)}") from cause
-    return decode((file.metadata.metadata or {}).get(HEADER_KEY.encode(), b""), path), file
+        raise RecordingError(f"{path} is damaged: {_one_line(cause)}") from cause
+    metadata = file.metadata.metadata or {}
+    return decode_header(metadata.get(HEADER_KEY.encode(), b""), path), file
 
 
 def _check_ends(path: Path) -> None:
@@ -134,20 +159,66 @@ def _check_ends(path: Path) -> None:
         )
 
 
-def _schema(every: list[Series]) -> pa.Schema:
+def _check_checksum(path: Path) -> None:
+    """Check that the file is unchanged since it was written, without loading it whole.
+
+    Raises:
+        RecordingError: the file has no checksum, or its content has changed.
+    """
+    place = _checksum_place(path)
+    with path.open("rb") as file:
+        file.seek(place)
+        stored = file.read(len(BLANK_CHECKSUM))
+    if stored != _checksum(path, place):
+        raise RecordingError(f"{path} is damaged: its content does not match its checksum")
+
+
+def _checksum_place(path: Path) -> int:
+    """Return the place of the first character of the checksum in the file."""
+    start, footer = _read_footer(path)
+    # In the thrift encoding of the footer a value follows its key: field header, varint length.
+    mark = CHECKSUM_KEY.encode() + b"\x18" + bytes([len(BLANK_CHECKSUM)])
+    if footer.count(mark) != 1:
+        raise RecordingError(f"{path} is damaged: its checksum is missing or broken")
+    return start + footer.index(mark) + len(mark)
+
+
+def _checksum(path: Path, place: int) -> bytes:
+    """Return the blake2b-256 of all bytes of the file, with a blank checksum at `place`."""
+    state = hashlib.blake2b(digest_size=len(BLANK_CHECKSUM) // 2)
+    n_left = place
+    with path.open("rb") as file:
+        while n_left and (block := file.read(min(BLOCK_SIZE, n_left))):
+            state.update(block)
+            n_left -= len(block)
+        state.update(BLANK_CHECKSUM.encode())
+        file.seek(place + len(BLANK_CHECKSUM))
+        while block := file.read(BLOCK_SIZE):
+            state.update(block)
+    return state.hexdigest().encode()
+
+
+def _read_footer(path: Path) -> tuple[int, bytes]:
+    """Return the place of the footer in a Parquet file, and its bytes."""
+    size = path.stat().st_size
+    with path.open("rb") as file:
+        file.seek(max(0, size - FOOTER_END_SIZE))
+        footer_size = int.from_bytes(file.read()[:4], "little") + FOOTER_END_SIZE
+        file.seek(max(0, size - footer_size))
+        start = file.tell()
+        return start, file.read()
+
+
+def _schema(specs: list[ArraySpec]) -> pa.Schema:
     fields = []
-    for series in every:
-        if series.track != "truth":
-            fields.append((f"{series.column}.time", pa.float64()))
-        fields += [(name, _arrow_type(series.number)) for name in _columns(series)]
-    names = [name for name, _ in fields]
-    if twice := sorted({name for name in names if names.count(name) > 1} if _double(names) else ()):
-        raise RecordingError(f"two arrays of the recording would share the column {twice[0]!r}")
+    for spec in specs:
+        if spec.track != "truth":
+            fields.append((f"{spec.column}.time", pa.float64()))
+        fields += [(name, _arrow_type(spec.number)) for name in _column_names(spec)]
+    counts = Counter(name for name, _ in fields)
+    if repeated := sorted(name for name, n in counts.items() if n > 1):
+        raise RecordingError(f"two arrays of the recording would share the column {repeated[0]!r}")
     return pa.schema(fields)
-
-
-def _double(names: list[str]) -> bool:
-    return len(set(names)) < len(names)
 
 
 def _arrow_type(number: str | None) -> pa.DataType:
@@ -159,36 +230,32 @@ def _encodings(schema: pa.Schema) -> dict[str, str]:
     return {f.name: "BYTE_STREAM_SPLIT" if f.name in split else "PLAIN" for f in schema}
 
 
-def _columns(series: Series) -> list[str]:
-    """The column of each component of a value, in order."""
-    if series.track != "truth":
-        n_taxels = series.shape[0]
+def _column_names(spec: ArraySpec) -> list[str]:
+    """Return the name of the column of each component of a value."""
+    if spec.track != "truth":
+        n_taxels = spec.shape[0]
         width = max(2, len(str(n_taxels)))
         taxels = [f"t{taxel + 1:0{width}d}" for taxel in range(n_taxels)]
-        return [f"{series.column}.{taxel}.{axis}" for taxel, axis in product(taxels, "xyz")]
-    places = product(*(range(size) for size in series.shape))
-    return [".".join([series.column, *map(str, place)]) for place in places]
+        return [f"{spec.column}.{taxel}.{axis}" for taxel, axis in product(taxels, "xyz")]
+    places = product(*(range(size) for size in spec.shape))
+    return [".".join([spec.column, *map(str, place)]) for place in places]
 
 
-def _track_times(every: list[Series], samples: Samples) -> dict[str, Array]:
-    return {_track_key(series): samples[series.topic][0] for series in every}
-
-
-def _track_key(series: Series) -> str:
-    return "/truth/time" if series.track == "truth" else series.topic
+def _track_key(spec: ArraySpec) -> str:
+    return TRUTH_TIME if spec.track == "truth" else spec.topic
 
 
 def _batch(
-    every: list[Series], samples: Samples, span: Mapping[str, slice], schema: pa.Schema
+    specs: list[ArraySpec], arrays: TimedArrays, span: Mapping[str, slice], schema: pa.Schema
 ) -> pa.RecordBatch:
     n_rows = max(cut.stop - cut.start for cut in span.values())
     columns: list[pa.Array] = []
-    for series in every:
-        cut = span[_track_key(series)]
-        times, values = samples[series.topic]
-        if series.track != "truth":
+    for spec in specs:
+        cut = span[_track_key(spec)]
+        times, values = arrays[spec.topic]
+        if spec.track != "truth":
             columns.append(_padded(times[cut], n_rows))
-        flat = values[cut].reshape(cut.stop - cut.start, n_components(series))
+        flat = values[cut].reshape(cut.stop - cut.start, spec.n_components)
         columns += [_padded(column, n_rows) for column in np.ascontiguousarray(flat.T)]
     return pa.RecordBatch.from_arrays(columns, schema=schema)
 
@@ -199,42 +266,48 @@ def _padded(values: npt.NDArray[Any], n_rows: int) -> pa.Array:
     return pa.concat_arrays([array, pa.nulls(missing, array.type)]) if missing else array
 
 
-def _groups(header: Header, file: pq.ParquetFile, path: Path) -> Iterator[Samples]:
-    every = series_of(header)
-    if file.schema_arrow.names != _schema(every).names:
+def _groups(header: Header, file: pq.ParquetFile, path: Path) -> Iterator[TimedArrays]:
+    specs = array_specs(header)
+    if file.schema_arrow.names != _schema(specs).names:
         raise RecordingError(f"{path}: its columns are not those that its header names")
     for group in range(file.num_row_groups):
         try:
             table = file.read_row_group(group)
-            yield _samples(every, table)
+            yield _arrays(specs, table)
         except (pa.ArrowException, OSError, ValueError) as cause:
             raise RecordingError(
-                f"{path} is damaged in row group {group}: {_line(cause)}"
+                f"{path} is damaged in row group {group}: {_one_line(cause)}"
             ) from cause
 
 
-def _samples(every: list[Series], table: pa.Table) -> Samples:
+def _arrays(specs: list[ArraySpec], table: pa.Table) -> TimedArrays:
     columns = iter(table.columns)
-    samples: dict[str, tuple[Array, npt.NDArray[Any]]] = {}
+    arrays: dict[str, TimedArray] = {}
     times: Array = np.empty(0)
-    for series in every:
-        if series.track != "truth":
-            times = _numbers(next(columns), None)
-        elif series.topic == "/truth/time":
-            times = _numbers(next(columns), None)
-            samples[series.topic] = (times, times)
+    for spec in specs:
+        if spec.track != "truth":
+            times = _values(next(columns), None)
+        elif spec.topic == TRUTH_TIME:
+            times = _values(next(columns), None)
+            arrays[spec.topic] = (times, times)
             continue
-        values = [_numbers(next(columns), len(times)) for _ in range(n_components(series))]
-        dtype: Any = object if series.number == "str" else series.number
-        flat = np.empty((len(times), len(values)), dtype)
-        for place, column in enumerate(values):
-            flat[:, place] = column
-        samples[series.topic] = (times, flat.reshape(len(times), *series.shape))
-    return samples
+        flat = np.empty((len(times), spec.n_components), _memory_type(spec))
+        for place in range(spec.n_components):
+            flat[:, place] = _values(next(columns), len(times))
+        arrays[spec.topic] = (times, flat.reshape(len(times), *spec.shape))
+    return arrays
 
 
-def _numbers(column: pa.ChunkedArray, n: int | None) -> npt.NDArray[Any]:
-    """The values above the nulls that pad a column; a null among them is an error."""
+def _values(column: pa.ChunkedArray, n: int | None) -> npt.NDArray[Any]:
+    """Return the `n` values of a column before the nulls at its end.
+
+    Args:
+        column: column of a row group.
+        n: expected number of values; None if any number is right.
+
+    Raises:
+        ValueError: there are nulls between values, or another number of values.
+    """
     n = len(column) - column.null_count if n is None else n
     values = column.slice(0, n)
     if values.null_count or len(values) != n:
@@ -243,17 +316,21 @@ def _numbers(column: pa.ChunkedArray, n: int | None) -> npt.NDArray[Any]:
     return array
 
 
-class _Filled:
-    """An array of known length that fills piece by piece."""
+def _memory_type(spec: ArraySpec) -> Any:  # noqa: ANN401 (a dtype)
+    """Return the dtype of values while they are read: texts are objects first."""
+    return object if spec.number == "str" else spec.number
 
-    def __init__(self, series: Series, n_rows: int, path: Path) -> None:
-        self._n = series.n or 0
+
+class _ArrayBuffer:
+    """Buffer of known length for one array, filled one row group after the other."""
+
+    def __init__(self, spec: ArraySpec, n_rows: int, path: Path) -> None:
+        self._n = spec.n or 0
         if self._n > n_rows:
-            raise RecordingError(f"{path}: {series.column} names {self._n} samples of {n_rows}")
-        dtype: Any = object if series.number == "str" else series.number
-        self._text = series.number == "str"
+            raise RecordingError(f"{path}: {spec.column} names {self._n} samples of {n_rows}")
+        self._is_text = spec.number == "str"
         self._times = np.empty(self._n)
-        self._values = np.empty((self._n, *series.shape), dtype)
+        self._values = np.empty((self._n, *spec.shape), _memory_type(spec))
         self._end = 0
         self._path = path
 
@@ -265,11 +342,11 @@ class _Filled:
         self._values[self._end : end] = values
         self._end = end
 
-    def whole(self) -> tuple[Array, npt.NDArray[Any]]:
+    def result(self) -> TimedArray:
         if self._end != self._n:
             raise RecordingError(f"{self._path}: {self._end} samples, its header names {self._n}")
-        return self._times, self._values.astype(str) if self._text else self._values
+        return self._times, self._values.astype(str) if self._is_text else self._values
 
 
-def _line(cause: BaseException) -> str:
+def _one_line(cause: BaseException) -> str:
     return " ".join(str(cause).split())[:200]

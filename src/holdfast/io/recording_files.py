@@ -1,107 +1,125 @@
-"""Recordings by path: the suffix says the format."""
+"""Load and save recordings by path; the suffix of the file chooses the format."""
 
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
 from types import ModuleType
 
+import msgspec
+import numpy as np
+
 from holdfast.errors import OutputError, RecordingError
-from holdfast.io.label_files import labels_for
-from holdfast.recordings import Recording
+from holdfast.io.arrays import (
+    TACTILE,
+    TimedArray,
+    TimedArrays,
+    cut_labels,
+    recording_from,
+    time_spans,
+)
+from holdfast.io.header import Header
+from holdfast.io.label_files import labels_for, labels_path
+from holdfast.recordings import Label, Recording
 
 SUFFIXES = (".parquet", ".mcap")
+"""Suffixes of the formats; the first is preferred if a recording exists in both."""
+
+MAX_MODULE_LAG = 1.0
+"""An MCAP file has the samples of one module after those of another. Samples that are newer
+than this may be incomplete [s]."""
 
 
 def load_recording(path: str | Path, labels: bool = True) -> Recording:
-    """The recording in a file, Parquet or MCAP by its suffix.
+    """Load a recording, Parquet or MCAP by the suffix of the file.
 
-    A file that was cut off gives what could be recovered, with `complete=False`; samples
+    If the end of the file was cut off, the rest is recovered and `complete` is False. Samples
     whose checksum fails are never returned.
 
     Args:
-        path: of the file.
-        labels: take the labels of `<name>.labels.json` where there is one, in place of those
-            inside.
+        path: path of the file.
+        labels: use the labels of `<name>.labels.json`, if there is one, instead of those in
+            the file.
 
     Raises:
-        RecordingError: it cannot be read, is damaged or no recording, or the label file
-            beside it is of another recording.
+        RecordingError: the file cannot be read, is damaged or not a recording, or the label
+            file belongs to another recording.
     """
     file = Path(path)
     try:
         recording: Recording = _format_of(file).load(file)
     except OSError as cause:
         raise RecordingError(f"cannot read {file}: {cause.strerror or cause}") from cause
-    beside = labels_for(file, recording.digest) if labels else None
-    if beside is None:
+    file_labels = labels_for(file, recording.digest) if labels else None
+    if file_labels is None:
         return recording
     try:
-        return recording.with_labels(beside)
+        return recording.with_labels(file_labels)
     except RecordingError as cause:
         raise RecordingError(f"{file.stem}.labels.json: {cause}") from cause
 
 
 def save_recording(recording: Recording, path: str | Path, force: bool = False) -> None:
-    """Writes a recording, Parquet or MCAP by the suffix, whole or not at all.
+    """Save a recording, as Parquet or MCAP by the suffix; on an error nothing is written.
 
     Args:
-        recording: what to write.
-        path: where to.
-        force: replace what is there.
+        recording: recording to save.
+        path: path of the file.
+        force: replace an existing file.
 
     Raises:
-        OutputError: something is there already, the suffix is unknown, or the disk refuses.
-        RecordingError: it holds what the format cannot.
+        OutputError: the file exists, its suffix is unknown, or the disk reports an error.
+        RecordingError: the format cannot store the recording.
     """
     target = Path(path)
     if target.suffix not in SUFFIXES:
-        raise OutputError(f"cannot write {target}: {_suffixes(target)}")
-    _module(target.suffix).save(_native(recording), target, force=force)
+        raise OutputError(f"cannot write {target}: {_expected_suffixes(target)}")
+    _format_module(target.suffix).save(_with_native_readings(recording), target, force=force)
 
 
 def read_chunks(
     path: str | Path, n_samples: int = 16384, labels: bool = True
 ) -> Iterator[Recording]:
-    """Consecutive pieces of a recording, in bounded memory.
+    """Read a recording in consecutive chunks, in bounded memory.
 
-    Put together they are what `load_recording` gives. Labels, truth and markers are cut to
-    the piece; a module may have no samples in a piece.
+    All chunks together are what `load_recording` returns. Labels, truth and markers are cut to
+    the chunk; a module may have no samples in a chunk.
 
     Args:
-        path: of the file.
-        n_samples: how many samples of a module a piece holds at most.
-        labels: take the labels of `<name>.labels.json`, as `load_recording` does.
+        path: path of the file.
+        n_samples: maximum number of samples of a module in a chunk.
+        labels: use the labels of `<name>.labels.json`, as `load_recording` does.
 
     Yields:
-        Recordings of the same name and modules.
+        Recordings with the same name and modules.
 
     Raises:
-        RecordingError: as `load_recording`.
-        ValueError: `n_samples` is under 1.
+        RecordingError: as in `load_recording`.
+        ValueError: `n_samples` is less than 1.
     """
     if n_samples < 1:
-        raise ValueError(f"at least 1 sample a piece expected, {n_samples} given")
-    from holdfast.io.pieces import pieces
-
+        raise ValueError(f"at least 1 sample in a chunk expected, {n_samples} given")
     file = Path(path)
-    return pieces(_format_of(file), file, n_samples, labels=labels)
+    return _chunks(_format_of(file), file, n_samples, labels=labels)
 
 
 def is_recording(path: Path) -> bool:
-    """Whether a file claims to be a recording, be it cut or damaged."""
-    return path.suffix in SUFFIXES and path.is_file() and not _module(path.suffix).is_foreign(path)
+    """Return whether a file is a recording, which may be cut or damaged."""
+    if path.suffix not in SUFFIXES or not path.is_file():
+        return False
+    return not _format_module(path.suffix).is_foreign(path)
 
 
 def _format_of(path: Path) -> ModuleType:
     if not path.is_file():
-        what = "is a folder" if path.is_dir() else "does not exist"
-        raise RecordingError(f"{path} {what}; a recording's file expected")
+        problem = "is a folder" if path.is_dir() else "does not exist"
+        raise RecordingError(f"{path} {problem}; a recording's file expected")
     if path.suffix not in SUFFIXES:
-        raise RecordingError(f"cannot read {path}: {_suffixes(path)}")
-    return _module(path.suffix)
+        raise RecordingError(f"cannot read {path}: {_expected_suffixes(path)}")
+    return _format_module(path.suffix)
 
 
-def _module(suffix: str) -> ModuleType:
+def _format_module(suffix: str) -> ModuleType:
+    """Return the module of a format, which imports its libraries only when it is used."""
     if suffix == ".parquet":
         from holdfast.io import parquet
 
@@ -111,15 +129,15 @@ def _module(suffix: str) -> ModuleType:
     return mcap
 
 
-def _suffixes(path: Path) -> str:
+def _expected_suffixes(path: Path) -> str:
     return (
         f"{path.suffix or 'no suffix'} given, {' or '.join(SUFFIXES)} expected "
-        "(`holdfast import` brings other formats in)"
+        "(`holdfast import` converts other formats)"
     )
 
 
-def _native(recording: Recording) -> Recording:
-    """The recording with its readings in the byte order of the machine."""
+def _with_native_readings(recording: Recording) -> Recording:
+    """Return the recording with its readings in the byte order of the machine."""
     modules = {
         name: replace(m, readings=m.readings.astype(m.readings.dtype.newbyteorder("=")))
         if not m.readings.dtype.isnative
@@ -127,3 +145,89 @@ def _native(recording: Recording) -> Recording:
         for name, m in recording.modules.items()
     }
     return replace(recording, modules=modules)
+
+
+def _chunks(
+    file_format: ModuleType, path: Path, n_samples: int, *, labels: bool
+) -> Iterator[Recording]:
+    header, groups, complete = file_format.read_groups(path)
+    file_labels = _labels_beside(file_format, path, header, complete) if labels else None
+    markers = sorted(header.markers)
+    for arrays, end in _chunk_arrays(groups, n_samples):
+        n_markers = sum(marker[0] < end for marker in markers)
+        part = msgspec.structs.replace(header, markers=markers[:n_markers])
+        markers = markers[n_markers:]
+        chunk = recording_from(part, arrays, path, complete=complete)
+        yield chunk if file_labels is None else _with_labels(chunk, file_labels)
+
+
+def _labels_beside(
+    file_format: ModuleType, path: Path, header: Header, complete: bool
+) -> Mapping[str, tuple[Label, ...]] | None:
+    """Return the labels of the label file; a cut file is loaded to compute its digest."""
+    if not labels_path(path).exists():
+        return None
+    digest = header.digest if complete else ""
+    return labels_for(path, digest or file_format.load(path).digest)
+
+
+def _with_labels(chunk: Recording, labels: Mapping[str, tuple[Label, ...]]) -> Recording:
+    modules = {
+        name: replace(module, labels=cut_labels(labels.get(name, ()), module))
+        for name, module in chunk.modules.items()
+    }
+    return replace(chunk, modules=modules)
+
+
+def _chunk_arrays(
+    groups: Iterable[TimedArrays], n_samples: int
+) -> Iterator[tuple[TimedArrays, float]]:
+    """Yield the arrays of each chunk, and the time at which the next chunk begins."""
+    parts: list[TimedArrays] = []
+    n_buffered = dict[str, int]()
+    for group in groups:
+        parts.append(group)
+        for topic, (times, _) in group.items():
+            n_buffered[topic] = n_buffered.get(topic, 0) + len(times)
+        if max((n for topic, n in n_buffered.items() if _is_tactile(topic)), default=0) > n_samples:
+            chunks = _split(_joined(parts), n_samples)
+            starts = [_start(chunk) for chunk in chunks]
+            n_ready = int(np.searchsorted(starts[1:], _end(chunks[-1]) - MAX_MODULE_LAG))
+            yield from zip(chunks[:n_ready], starts[1:], strict=False)
+            rest = _joined(chunks[n_ready:])
+            parts, n_buffered = [rest], {topic: len(times) for topic, (times, _) in rest.items()}
+    if parts:
+        chunks = _split(_joined(parts), n_samples)
+        yield from zip(chunks, [*(_start(chunk) for chunk in chunks[1:]), np.inf], strict=True)
+
+
+def _split(arrays: TimedArrays, n_samples: int) -> list[dict[str, TimedArray]]:
+    times = {topic: pair[0] for topic, pair in arrays.items()}
+    tactile = [topic for topic in times if _is_tactile(topic)]
+    return [
+        {topic: (arrays[topic][0][cut], arrays[topic][1][cut]) for topic, cut in span.items()}
+        for span in time_spans(times, np.inf, n_samples, tactile)
+    ]
+
+
+def _joined(parts: Sequence[TimedArrays]) -> dict[str, TimedArray]:
+    topics = list(dict.fromkeys(topic for part in parts for topic in part))
+    return {
+        topic: (
+            np.concatenate([part[topic][0] for part in parts if topic in part]),
+            np.concatenate([part[topic][1] for part in parts if topic in part]),
+        )
+        for topic in topics
+    }
+
+
+def _start(arrays: TimedArrays) -> float:
+    return min(float(times[0]) for times, _ in arrays.values() if len(times))
+
+
+def _end(arrays: TimedArrays) -> float:
+    return max(float(times[-1]) for times, _ in arrays.values() if len(times))
+
+
+def _is_tactile(topic: str) -> bool:
+    return topic.startswith(TACTILE)

@@ -9,7 +9,7 @@ import numpy as np
 import numpy.typing as npt
 
 from holdfast.contact import Fault
-from holdfast.io.header import NUMBERS
+from holdfast.io.header import NUMBER_TYPES
 from holdfast.recordings import GAP_PERIODS
 from holdfast.sensors import Sensor
 from holdfast.sensors.types import Array
@@ -60,7 +60,7 @@ class ModuleBuffer:
         """Append a sample. Return False if its shape, dtype or time cannot be stored."""
         if not self._last_time < time < math.inf or readings.shape != (self._sensor.n_taxels, 3):
             return False
-        if self._dtype is None and readings.dtype.name in NUMBERS:
+        if self._dtype is None and readings.dtype.name in NUMBER_TYPES:
             self._dtype = readings.dtype
         kept = readings if readings.dtype == self._dtype else _cast(readings, self._dtype)
         if kept is None:

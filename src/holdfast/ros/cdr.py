@@ -11,14 +11,14 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from holdfast.ros.definitions import NUMBERS, Definition, Field
+from holdfast.ros.definitions import NUMBER_CODES, Definition, Field
 
 HEAD = b"\x00\x01\x00\x00"
 """First bytes of a CDR message: little endian, no options. Alignment counts from their end."""
 
-_CODES = dict(zip(NUMBERS, "?BBbBhHiIqQfd", strict=True))
+_CODES = dict(zip(NUMBER_CODES, "?BBbBhHiIqQfd", strict=True))
 """Codes of `struct` for the number types of ROS."""
-_DTYPES = {kind: np.dtype("<" + code) for kind, code in NUMBERS.items()}
+_DTYPES = {kind: np.dtype("<" + code) for kind, code in NUMBER_CODES.items()}
 _PADDING = tuple(bytes(n) for n in range(8))
 
 
@@ -68,7 +68,7 @@ class MessageDecoder:
         if field.size is None:
             return self._value(source, field.kind)
         n = field.size or source.length()
-        if field.kind in NUMBERS:
+        if field.kind in NUMBER_CODES:
             return source.array(field.kind, n)
         if (number := self._points.get(field.kind)) is not None:
             return source.array(number, 3 * n).reshape(n, 3)
@@ -77,7 +77,7 @@ class MessageDecoder:
         return [self._value(source, field.kind) for _ in range(n)]
 
     def _value(self, source: "_Ros1Bytes", kind: str) -> Any:  # noqa: ANN401 (any ROS type)
-        if kind in NUMBERS:
+        if kind in NUMBER_CODES:
             return source.array(kind, 1)[0].item()
         return source.text() if kind == "string" else self._message(source, kind)
 
@@ -122,14 +122,14 @@ class MessageEncoder:
             _append_numbers(data, "uint32", (len(value),))
         elif len(value) != field.size:
             raise ValueError(f"{field.name}: {field.size} values expected, {len(value)} given")
-        if field.kind in NUMBERS:
+        if field.kind in NUMBER_CODES:
             _append_numbers(data, field.kind, value)
             return
         for one in value:
             self._value(data, field.kind, one)
 
     def _value(self, data: bytearray, kind: str, value: Any) -> None:  # noqa: ANN401
-        if kind in NUMBERS:
+        if kind in NUMBER_CODES:
             _append_numbers(data, kind, (value,))
         elif kind == "string":
             encoded = value.encode() + b"\x00"
@@ -154,7 +154,7 @@ def _point_types(definition: Definition) -> dict[str, str]:
     return {
         name: number
         for name, fields in definition.types.items()
-        for number in NUMBERS
+        for number in NUMBER_CODES
         if fields == tuple(Field(axis, number) for axis in "xyz")
     }
 
@@ -175,7 +175,7 @@ class _Ros1Bytes:
         return len(self._data) - self._place
 
     def array(self, kind: str, n: int) -> npt.NDArray[Any]:
-        dtype = np.dtype(self._byte_order + NUMBERS[kind])
+        dtype = np.dtype(self._byte_order + NUMBER_CODES[kind])
         if n:
             self._align(dtype.itemsize)
         if n * dtype.itemsize > self.n_left:

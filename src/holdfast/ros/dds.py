@@ -6,7 +6,7 @@ from functools import cache
 from typing import Any, Self
 
 from holdfast.errors import MissingExtra, SourceError
-from holdfast.ros.definitions import NUMBERS, Definition, Field
+from holdfast.ros.definitions import NUMBER_CODES, Definition, Field
 
 try:
     from cyclonedds.builtin import BuiltinDataReader, BuiltinTopicDcpsPublication
@@ -53,7 +53,11 @@ _PRIMITIVES = {
     "string": str,
     "byte": idl.uint8,
     "char": idl.uint8,
-    **{name: getattr(idl, name) for name in NUMBERS if hasattr(idl, name) and name[-1].isdigit()},
+    **{
+        name: getattr(idl, name)
+        for name in NUMBER_CODES
+        if hasattr(idl, name) and name[-1].isdigit()
+    },
 }
 _domains: dict[int, Domain] = {}
 

@@ -9,7 +9,7 @@ import re
 from collections.abc import Iterator, Mapping
 from typing import NamedTuple
 
-NUMBERS = {
+NUMBER_CODES = {
     "bool": "?",
     "byte": "u1",
     "char": "u1",
@@ -152,7 +152,7 @@ def _fields(block: str, body: str, blocks: Mapping[str, str]) -> Iterator[Field]
 
 
 def _kind(kind: str, block: str, blocks: Mapping[str, str]) -> str:
-    if kind in NUMBERS or kind in ("string", *_STAMPS):
+    if kind in NUMBER_CODES or kind in ("string", *_STAMPS):
         return kind
     kind = short_name(kind)
     package = block.split("/", maxsplit=1)[0]

@@ -152,4 +152,4 @@ def test_files_that_are_none(tmp_path, bare):
     )
     assert refusal(tmp_path / "no.json", bare) == "cannot read PATH: No such file or directory"
     (tmp_path / "odd.json").write_text("[]")
-    assert refusal(tmp_path / "odd.json", bare).startswith("PATH is no label file: ")
+    assert refusal(tmp_path / "odd.json", bare).startswith("PATH is not a label file: ")

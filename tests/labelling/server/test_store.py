@@ -123,8 +123,8 @@ def test_a_label_file_of_another_recording(bare):
 @pytest.mark.parametrize(
     ("content", "text"),
     [
-        (b"{", r"bare\.labels\.json is no label file: "),
-        (b'{"schema": "holdfast.labels/9"}', r"is no label file: "),
+        (b"{", r"bare\.labels\.json is not a label file: "),
+        (b'{"schema": "holdfast.labels/9"}', r"is not a label file: "),
     ],
 )
 def test_a_damaged_label_file_is_left_alone(bare, content, text):
