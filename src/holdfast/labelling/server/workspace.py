@@ -302,7 +302,7 @@ def _header(path: Path) -> tuple[Header | None, bool]:
     if path.suffix not in (".parquet", ".mcap"):
         return None, False
     source = parquet if path.suffix == ".parquet" else mcap
-    header, samples, complete = source.chunks(path)
+    header, samples, complete = source.read_groups(path)
     getattr(samples, "close", lambda: None)()
     return header, complete
 
