@@ -42,7 +42,7 @@ def test_it_is_drawn_without_a_screen(form):
 
 
 def test_no_global_state_is_touched():
-    """pyplot keeps every figure that it makes until somebody closes it."""
+    """pyplot keeps every figure that it makes until it is closed."""
     program = (
         "import sys; from holdfast.plots.evaluation import draw_evaluation\n"
         "from holdfast.metrics import summarise\n"

@@ -1,4 +1,4 @@
-"""Figures of single values with their intervals: methods compared, errors by group."""
+"""Figures of single values with intervals: methods compared, errors by group."""
 
 from collections.abc import Collection, Mapping, Sequence
 from itertools import chain
@@ -9,25 +9,25 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 
-from holdfast.plots.evaluation import COLOURS
 from holdfast.plots.style import (
+    COLOURS,
     FAINT,
     INK,
     PAPER,
     SeriesStyle,
     add_labels,
     add_legend,
-    handles_of,
+    legend_handles,
+    page_figure,
     panels,
-    sheet,
-    styles_of,
-    tidy,
+    series_styles,
+    style_axes,
 )
 from holdfast.sensors.types import Array
 
 
 class IntervalEstimate(NamedTuple):
-    """One value, its interval, and what the paper prints; NaN or None for none."""
+    """A value, its interval and the paper's value; NaN or None where there is none."""
 
     value: float | None
     low: float | None = None
@@ -38,19 +38,18 @@ class IntervalEstimate(NamedTuple):
 def draw_dots(
     groups: Mapping[str, Mapping[str, IntervalEstimate]], strong: Collection[str] = ()
 ) -> Figure:
-    """Methods compared: a dot with its interval, the highest of the first panel on top.
+    """Draw a dot with an interval for each method; the highest of the first panel is on top.
 
     Args:
-        groups: by the label of the panel's x axis, "accuracy by object [%]": by method, its
-            value; what the paper prints is a hollow diamond.
+        groups: by label of a panel's x axis, "accuracy by object [%]": by method, its value;
+            the paper's value is a hollow diamond.
         strong: methods whose names are bold.
     """
     names = _ordered(groups)
-    n = max(len(groups), 1)
-    figure = sheet(0.8 + 0.21 * max(len(names), 3))
-    grid = figure.subplots(1, n, squeeze=False, sharey=True)[0]
+    figure = page_figure(0.8 + 0.21 * max(len(names), 3))
+    grid = figure.subplots(1, max(len(groups), 1), squeeze=False, sharey=True)[0]
     for axes, (x, values) in zip(grid, groups.items(), strict=False):
-        tidy(axes)
+        style_axes(axes)
         axes.grid(axis="both", color=FAINT, linewidth=0.5)
         axes.tick_params(axis="y", length=0)
         for row, name in enumerate(names):
@@ -71,38 +70,44 @@ def draw_dots(
 def draw_groups(
     groups: Mapping[str, Mapping[str, Mapping[str, IntervalEstimate]]], y: str, per_row: int = 2
 ) -> Figure:
-    """Dots of several methods beside each other in each group, with their intervals.
-
-    For errors by quantile of grip force and by direction.
+    """Draw the values of several methods side by side in each group, with their intervals.
 
     Args:
-        groups: by the label of the panel's x axis, "grip force": by method: by group, its value.
+        groups: by label of a panel's x axis, "grip force": by method: by group, its value.
         y: label of the y axes, with its unit.
-        per_row: panels beside each other.
+        per_row: panels in a row.
     """
     figure, grid = panels(len(groups), per_row, 2.6, sharey=True)
-    styles = styles_of(chain.from_iterable(groups.values()))
+    styles = series_styles(chain.from_iterable(groups.values()))
     for k, (axes, (x, methods)) in enumerate(zip(grid, groups.items(), strict=True)):
-        places = list(dict.fromkeys(chain.from_iterable(methods.values())))
-        axes.grid(axis="y", color=FAINT, linewidth=0.5)
-        for rank, (name, values) in enumerate(methods.items()):
-            shift = 0.7 * ((rank + 0.5) / len(methods) - 0.5)
-            at = np.array([places.index(place) for place in values]) + shift
-            _draw_bars(axes, at, list(values.values()), styles[name])
-        axes.set_xticks(range(len(places)), places)
-        axes.set_xlim(-0.5, len(places) - 0.5)
-        for edge in range(1, len(places)):
-            axes.axvline(edge - 0.5, color=FAINT, linewidth=0.5)
-        axes.tick_params(axis="x", length=0)
+        _draw_panel(axes, methods, styles)
         add_labels(axes, x, y if k % max(per_row, 1) == 0 else None)
     if grid:
         grid[0].set_ylim(bottom=0)
-    add_legend(figure, handles_of(styles, groups.values(), lines=False), per_row=5)
+    add_legend(figure, legend_handles(styles, groups.values(), lines=False), per_row=5)
     return figure
 
 
+def _draw_panel(
+    axes: Axes,
+    methods: Mapping[str, Mapping[str, IntervalEstimate]],
+    styles: Mapping[str, SeriesStyle],
+) -> None:
+    names = list(dict.fromkeys(chain.from_iterable(methods.values())))
+    axes.grid(axis="y", color=FAINT, linewidth=0.5)
+    for rank, (method, values) in enumerate(methods.items()):
+        shift = 0.7 * ((rank + 0.5) / len(methods) - 0.5)
+        x = np.array([names.index(name) for name in values]) + shift
+        _draw_intervals(axes, x, list(values.values()), styles[method])
+    axes.set_xticks(range(len(names)), names)
+    axes.set_xlim(-0.5, len(names) - 0.5)
+    for edge in range(1, len(names)):
+        axes.axvline(edge - 0.5, color=FAINT, linewidth=0.5)
+    axes.tick_params(axis="x", length=0)
+
+
 def _ordered(groups: Mapping[str, Mapping[str, IntervalEstimate]]) -> list[str]:
-    """All names by their value in the first panel, the lowest first; then as they appear."""
+    """Return all names by their value in the first panel, the lowest first."""
     first: Mapping[str, IntervalEstimate] = next(iter(groups.values()), {})
 
     def value(name: str) -> float:
@@ -126,18 +131,18 @@ def _draw_dot(axes: Axes, row: int, estimate: IntervalEstimate, *, bold: bool) -
         )
 
 
-def _draw_bars(
-    axes: Axes, at: Array, values: Sequence[IntervalEstimate], style: SeriesStyle
+def _draw_intervals(
+    axes: Axes, x: Array, values: Sequence[IntervalEstimate], style: SeriesStyle
 ) -> None:
     heights = np.array([_number(each.value) for each in values])
     low = np.array([_number(each.low, each.value) for each in values])
     high = np.array([_number(each.high, each.value) for each in values])
-    axes.vlines(at, low, high, color=style.color, linewidth=1.1)
-    axes.plot(at, heights, color=style.color, marker=style.marker, linestyle="", markersize=4)
+    axes.vlines(x, low, high, color=style.color, linewidth=1.1)
+    axes.plot(x, heights, color=style.color, marker=style.marker, linestyle="", markersize=4)
 
 
 def _number(value: float | None, otherwise: float | None = None) -> float:
-    """The value where it is finite, else the other, else NaN."""
+    """Return the first of the two that is neither None nor NaN, else NaN."""
     for each in (value, otherwise):
         if each is not None and not np.isnan(each):
             return float(each)

@@ -1,4 +1,4 @@
-"""The look of the study's figures: one page wide, colours for all eyes, no screen needed."""
+"""Style that all figures share: sizes, colours, axes and legends. No screen is needed."""
 
 from collections.abc import Collection, Iterable, Mapping, Sequence
 from typing import Literal, NamedTuple
@@ -8,33 +8,50 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 
-from holdfast.plots.evaluation import COLOURS, MARKERS
+from holdfast.contact import NO_CONTACT, STABLE, UNSTABLE, Phase
 
-WIDTH = 7.2
-"""Of every figure [inch]: the text width of a page in two columns."""
-SMALL = 7.5
-"""Size of letters at that width [pt]."""
-INK = "#222222"
+PAGE_WIDTH = 7.2
+"""Width of a figure [inch]: the text width of a page with two columns."""
+FONT_SIZE = 7.5
+"""Font size at that width [pt]."""
+INK = "#333333"
 GREY = "#999999"
 FAINT = "#e6e6e6"
+
+COLOURS = ("#0072b2", "#d55e00", "#009e73", "#cc79a7", "#56b4e9", "#e69f00")
+"""Colours of series, distinct for colour-blind readers too (Okabe and Ito)."""
+MARKERS = "osD^vP"
+COMPONENT_COLOURS = {"F_x": "#0072B2", "F_y": "#E69F00", "F_z": "#CC79A7", "F_a": "#000000"}
+STATE_COLOURS = {STABLE: "#009e73", UNSTABLE: "#e08a3c", NO_CONTACT: "#c8c8c8"}
+"""Colour of each contact state, by its code."""
+PHASE_COLOURS = {
+    Phase.FREE: "#eeeeee",
+    Phase.CLOSING: "#fbe3b5",
+    Phase.LOCKED: "#c9ead9",
+    Phase.DISTURBED: "#cfe6f7",
+    Phase.SLIPPING: "#f6cdb6",
+    Phase.RELEASED: "#e6d8ec",
+}
+
 PAPER = "the paper"
-"""A series of this name is what the paper prints: drawn black and dashed everywhere."""
+"""Name of the series with the paper's values; it is black and dashed in every figure."""
 Dashes = Literal["-"] | tuple[float, tuple[float, ...]]
 _DASHES: tuple[Dashes, ...] = ("-", (0, (5, 1.5)), (0, (1.5, 1.2)))
 
 
 class SeriesStyle(NamedTuple):
-    """How a series looks in every panel, as matplotlib's `plot` takes it."""
+    """Colour, marker and dashes of a series, named as in matplotlib's `plot`."""
 
     color: str
     marker: str
     linestyle: Dashes
 
 
-def styles_of(names: Iterable[str]) -> dict[str, SeriesStyle]:
-    """A look for each name: by its place in the order of first appearance, the paper's apart.
+def series_styles(names: Iterable[str]) -> dict[str, SeriesStyle]:
+    """Return a style for each name, in the order of first appearance.
 
-    Eighteen looks differ in colour, mark or dashes; then they come again.
+    Eighteen styles differ in colour, marker or dashes; then they repeat. The paper's series has
+    its own style, which does not shift those of the others.
     """
     styles: dict[str, SeriesStyle] = {}
     others = [name for name in dict.fromkeys(names) if name != PAPER]
@@ -45,49 +62,50 @@ def styles_of(names: Iterable[str]) -> dict[str, SeriesStyle]:
     return styles | {PAPER: SeriesStyle("black", "x", (0, (4, 2)))}
 
 
-def sheet(height: float) -> Figure:
-    """An empty figure as wide as a page.
+def page_figure(height: float, width: float = PAGE_WIDTH) -> Figure:
+    """Return an empty figure.
 
     Args:
-        height: [inch].
+        height: of the figure [inch].
+        width: of the figure [inch]; by default that of a page.
     """
-    return Figure(figsize=(WIDTH, height), dpi=160, layout="constrained")
+    return Figure(figsize=(width, height), dpi=200, layout="constrained")
 
 
 def panels(
     n: int, per_row: int, height: float, *, sharey: bool = False
 ) -> tuple[Figure, list[Axes]]:
-    """A figure of `n` axes, `per_row` beside each other, each `height` [inch] high."""
+    """Return a figure and its `n` axes, `per_row` in a row, each `height` [inch] high."""
     per_row = max(1, min(n, per_row))
     n_rows = -(-max(n, 1) // per_row)
-    figure = sheet(n_rows * height + 0.35)
+    figure = page_figure(n_rows * height + 0.35)
     grid = figure.subplots(n_rows, per_row, squeeze=False, sharey=sharey).ravel()
     for axes in grid[n:]:
         axes.remove()
     for axes in grid[:n]:
-        tidy(axes)
+        style_axes(axes)
     return figure, list(grid[:n])
 
 
-def tidy(axes: Axes) -> None:
-    """Small letters, thin lines, two spines."""
-    axes.tick_params(labelsize=SMALL, width=0.6, length=2.5)
+def style_axes(axes: Axes) -> None:
+    """Set small letters and thin lines, and hide the top and right spines."""
+    axes.tick_params(labelsize=FONT_SIZE, width=0.6, length=2.5)
     axes.spines[["top", "right"]].set_visible(False)
     axes.spines[["left", "bottom"]].set_linewidth(0.6)
     axes.set_axisbelow(True)
 
 
 def add_title(axes: Axes, text: str) -> None:
-    """A small title above the left end."""
-    axes.set_title(text, fontsize=SMALL + 0.5, loc="left")
+    """Add a title above the left end of the axes."""
+    axes.set_title(text, fontsize=FONT_SIZE + 0.5, loc="left")
 
 
 def add_labels(axes: Axes, x: str | None = None, y: str | None = None) -> None:
-    """Names of the axes, with units."""
+    """Add the names of the axes, with units."""
     if x is not None:
-        axes.set_xlabel(x, fontsize=SMALL)
+        axes.set_xlabel(x, fontsize=FONT_SIZE)
     if y is not None:
-        axes.set_ylabel(y, fontsize=SMALL)
+        axes.set_ylabel(y, fontsize=FONT_SIZE)
 
 
 def add_legend(
@@ -96,26 +114,32 @@ def add_legend(
     place: Literal["outside upper center", "outside lower center"] = "outside upper center",
     per_row: int = 8,
 ) -> None:
-    """A legend above all axes, or below."""
+    """Add a legend above or below all axes."""
     if not handles:
         return
     n_lines = -(-len(handles) // per_row)
     figure.legend(
         handles=handles, loc=place, ncols=-(-len(handles) // n_lines),
-        fontsize=SMALL, frameon=False, handlelength=2.8, columnspacing=1.3, borderaxespad=0.3,
+        fontsize=FONT_SIZE, frameon=False, handlelength=2.8, columnspacing=1.3, borderaxespad=0.3,
     )  # fmt: skip
 
 
-def handles_of(
+def legend_handles(
     styles: Mapping[str, SeriesStyle], groups: Iterable[Collection[str]], *, lines: bool = True
 ) -> list[Line2D]:
-    """Handles of a legend for the names that some panel shows."""
-    seen = set().union(*groups)
+    """Return legend handles for the names that appear in some group.
+
+    Args:
+        styles: of all names.
+        groups: the names that each panel shows.
+        lines: whether a handle shows a line beside the marker.
+    """
+    shown = set().union(*groups)
     return [
         Line2D(
             [], [], color=style.color, marker=style.marker, markersize=4, linewidth=1.1,
             linestyle=style.linestyle if lines else "", label=name,
         )
         for name, style in styles.items()
-        if name in seen
+        if name in shown
     ]  # fmt: skip

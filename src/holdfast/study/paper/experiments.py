@@ -12,14 +12,8 @@ import numpy as np
 
 from holdfast.errors import TrainingError
 from holdfast.features import Tare
-from holdfast.plots.traces import (
-    Codes,
-    Trace,
-    draw_experiment,
-    draw_features,
-    draw_forces,
-    trace_of,
-)
+from holdfast.plots.experiment import draw_experiment, draw_features, draw_forces
+from holdfast.plots.time_series import Codes, FingerSeries, finger_series
 from holdfast.study.evaluation.fitted_method import (
     FittedMethod,
     TrainingSamples,
@@ -79,11 +73,11 @@ def figures(plan: StudyPlan, results: Mapping[str, Any]) -> list[ReportFigure]:
     """The paper's figures."""
     drawn: list[ReportFigure] = []
     for shown in results[TASK]:
-        trace = _trace(plan.corpora[shown.role], shown.recording, shown.finger)
+        series = _series(plan.corpora[shown.role], shown.recording, shown.finger)
         if shown.experiment == "protocol":
-            drawn += _of_protocol(trace)
+            drawn += _of_protocol(series)
         else:
-            drawn.append(_of_experiment(shown, trace))
+            drawn.append(_of_experiment(shown, series))
     return drawn
 
 
@@ -159,25 +153,26 @@ def _of(corpus: Corpus, finger: str, recording: str | None = None) -> Corpus:
     return msgspec.structs.replace(corpus, fingers=(finger,), recordings=names)
 
 
-def _trace(corpus: Corpus, name: str, finger: str) -> Trace:
+def _series(corpus: Corpus, name: str, finger: str) -> FingerSeries:
     (recording,) = _of(corpus, finger, name).load()
-    return trace_of(recording, finger, Tare.parse(corpus.tare))
+    series = finger_series(recording, finger, Tare.parse(corpus.tare))
+    return series._replace(name=f"{name}, {finger}")
 
 
-def _of_protocol(trace: Trace) -> Iterator[ReportFigure]:
+def _of_protocol(series: FingerSeries) -> Iterator[ReportFigure]:
     chosen = "The first of the recordings with disturbances, by name."
     yield ReportFigure(
         "forces",
         "Components of the fingertip force over one recording, and what was going on (the paper's "
         f"figure of the phases). F_x is along the normal of the pad. {chosen}",
-        draw_forces(trace),
+        draw_forces(series),
     )
     yield ReportFigure(
         "features",
         "Features and labels of one experiment (the paper's figure of the same). From above: the "
         "components of the force; its amplitude F_a and mean m over the window; the instability "
         f"sigma; the label, 1 = stable. {chosen}",
-        draw_features(trace),
+        draw_features(series),
     )
 
 
@@ -188,7 +183,7 @@ _TITLES: dict[Experiment, tuple[str, str]] = {
 }
 
 
-def _of_experiment(shown: Shown, trace: Trace) -> ReportFigure:
+def _of_experiment(shown: Shown, series: FingerSeries) -> ReportFigure:
     name, title = _TITLES[shown.experiment]
     predicted = {
         {"logreg": "LogReg", "svm": "SVM"}[method]: np.array(states)
@@ -203,4 +198,4 @@ def _of_experiment(shown: Shown, trace: Trace) -> ReportFigure:
         f"{title}. F_a, sigma, the label, and what LogReg and SVM predict {where}. The share of "
         "labelled samples that they have right stands beside. Chosen: the first by name."
     )
-    return ReportFigure(name, caption, draw_experiment(trace, predicted))
+    return ReportFigure(name, caption, draw_experiment(series, predicted))

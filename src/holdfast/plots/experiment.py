@@ -1,0 +1,146 @@
+"""Figures of the paper: one finger over one recording, its features and predicted states."""
+
+from collections.abc import Iterable, Mapping, Sequence
+
+import numpy as np
+from matplotlib.artist import Artist
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+from matplotlib.patches import Patch
+
+from holdfast.contact import NO_CONTACT, STABLE, UNKNOWN, UNSTABLE
+from holdfast.plots.style import (
+    COMPONENT_COLOURS,
+    FONT_SIZE,
+    INK,
+    STATE_COLOURS,
+    add_labels,
+    add_legend,
+    page_figure,
+    style_axes,
+)
+from holdfast.plots.time_series import (
+    Codes,
+    FingerSeries,
+    component_handles,
+    draw_components,
+    draw_curve,
+    draw_sigma,
+    equal_spans,
+    line_handle,
+    phase_handles,
+    shade_phases,
+)
+
+STATE_TITLES = {STABLE: "1: stable", UNSTABLE: "0: not stable", NO_CONTACT: "0: no contact"}
+LABEL_STRIP = "label"
+AMPLITUDE_COLOUR = COMPONENT_COLOURS["F_a"]
+MEAN_COLOUR = "#56b4e9"
+
+
+def draw_forces(series: FingerSeries) -> Figure:
+    """Draw the components of the fingertip force, with the phases shaded and named.
+
+    The paper's figure of one recording (`pics_force`).
+    """
+    figure = page_figure(3.1)
+    axes = figure.subplots()
+    shade_phases(axes, series, named=True)
+    draw_components(axes, series)
+    add_labels(axes, y=f"fingertip force {series.unit_label}")
+    _finish(figure, [axes], series)
+    add_legend(figure, component_handles())
+    return figure
+
+
+def draw_features(series: FingerSeries) -> Figure:
+    """Draw force, amplitude, mean, sigma and the label of one experiment.
+
+    The paper's figure of features and labels (`expiriment`).
+    """
+    figure = page_figure(5.7)
+    rows = figure.subplots(4, 1, sharex=True, height_ratios=(1.6, 1.4, 1.1, 0.3))
+    for axes in rows[:3]:
+        shade_phases(axes, series, named=axes is rows[0])
+    draw_components(rows[0], series)
+    draw_curve(rows[1], series, series.amplitude, AMPLITUDE_COLOUR)
+    draw_curve(rows[1], series, series.mean, MEAN_COLOUR)
+    draw_sigma(rows[2], series)
+    _draw_strips(rows[3], series, {LABEL_STRIP: series.labels})
+    for axes, name in zip(rows, ("$F_{tip}$", "$F_a$, $m$", "$\\sigma$"), strict=False):
+        add_labels(axes, y=f"{name} {series.unit_label}")
+    _finish(figure, rows, series)
+    lines = [line_handle(AMPLITUDE_COLOUR, "$F_a$"), line_handle(MEAN_COLOUR, "$m$")]
+    add_legend(figure, [*component_handles(), *lines, *_state_handles([series.labels])])
+    return figure
+
+
+def draw_experiment(
+    series: FingerSeries, predicted: Mapping[str, Codes], span: tuple[float, float] | None = None
+) -> Figure:
+    """Draw F_a, sigma, the label and predicted states.
+
+    The paper's figures of experiment 1 (a failed grasp) and 2 (locked, disturbed, released).
+
+    Args:
+        series: of the finger.
+        predicted: by title of the method: (n,) state codes, UNKNOWN where there is no decision.
+        span: the part to show [s]; everything by default.
+    """
+    strips = {LABEL_STRIP: series.labels, **predicted}
+    figure = page_figure(3.7 + 0.3 * len(strips))
+    rows = figure.subplots(3, 1, sharex=True, height_ratios=(1.5, 1.1, 0.3 * len(strips)))
+    for axes in rows[:2]:
+        shade_phases(axes, series, named=axes is rows[0])
+    draw_curve(rows[0], series, series.amplitude, AMPLITUDE_COLOUR)
+    draw_sigma(rows[1], series)
+    _draw_strips(rows[2], series, strips)
+    add_labels(rows[0], y=f"$F_a$ {series.unit_label}")
+    add_labels(rows[1], y=f"$\\sigma$ {series.unit_label}")
+    _finish(figure, rows, series)
+    if span is not None:
+        rows[0].set_xlim(span)
+    add_legend(figure, _state_handles(strips.values()))
+    return figure
+
+
+def _draw_strips(axes: Axes, series: FingerSeries, strips: Mapping[str, Codes]) -> None:
+    """Draw a coloured strip for each list of states, with its name and accuracy beside it."""
+    names = []
+    for row, (name, codes) in enumerate(strips.items()):
+        spans = list(equal_spans(series.times, codes))
+        for state, colour in STATE_COLOURS.items():
+            bars = [(start, end - start) for first, start, end in spans if codes[first] == state]
+            axes.broken_barh(bars, (row - 0.4, 0.8), facecolors=colour, linewidth=0)
+        names.append(name if name == LABEL_STRIP else f"{name}\n{_accuracy(series.labels, codes)}")
+    axes.set_yticks(range(len(strips)), names)
+    axes.set_ylim(len(strips) - 0.5, -0.5)
+
+
+def _accuracy(labels: Codes, codes: Codes) -> str:
+    known = (labels != UNKNOWN) & (codes != UNKNOWN)
+    if not known.any():
+        return "no label"
+    return f"{100 * np.mean((labels == STABLE)[known] == (codes == STABLE)[known]):.1f} % correct"
+
+
+def _finish(figure: Figure, rows: Sequence[Axes], series: FingerSeries) -> None:
+    for axes in rows:
+        style_axes(axes)
+        if axes.yaxis_inverted():  # strips
+            axes.tick_params(axis="y", length=0)
+        if len(series.times) > 1:
+            axes.set_xlim(series.times[0], series.times[-1])
+    add_labels(rows[-1], x="time [s]")
+    rows[0].set_title(series.name, fontsize=FONT_SIZE + 0.5, loc="left", pad=14, color=INK)
+    figure.align_ylabels([axes for axes in rows if not axes.yaxis_inverted()])
+    add_legend(figure, phase_handles(series), "outside lower center")
+
+
+def _state_handles(strips: Iterable[Codes]) -> list[Artist]:
+    present = {int(code) for codes in strips for code in np.unique(codes)}
+    return [
+        Patch(facecolor=colour, label=STATE_TITLES[state])
+        for state, colour in STATE_COLOURS.items()
+        if state in present
+    ]

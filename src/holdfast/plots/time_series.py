@@ -1,0 +1,246 @@
+"""Curves and shades over time, which the figures of recordings and of experiments share."""
+
+from collections.abc import Iterable, Iterator
+from itertools import pairwise
+from typing import Any, NamedTuple
+
+import numpy as np
+import numpy.typing as npt
+from matplotlib.artist import Artist
+from matplotlib.axes import Axes
+from matplotlib.lines import Line2D
+from matplotlib.patches import Patch
+from matplotlib.ticker import LogLocator, MaxNLocator, NullLocator
+
+from holdfast.contact import Phase
+from holdfast.features import DEFAULT_WINDOW, FEATURE_NAMES, Tare, haar_features
+from holdfast.features.force import tared_force
+from holdfast.plots.style import COMPONENT_COLOURS, FONT_SIZE, INK, PHASE_COLOURS
+from holdfast.recordings import GAP_PERIODS, Recording, Tactile
+from holdfast.sensors.types import Array
+
+Codes = npt.NDArray[np.integer[Any]]
+
+LOG_SCALE_RATIO = 15.0
+"""Sigma has a logarithmic axis if its maximum is this many times its median."""
+N_STRETCHES = 1500
+"""Number of stretches of a long curve; the minimum and the maximum of each are drawn."""
+LETTER_WIDTH = 0.0083
+"""Width of a letter of a phase's name, as a fraction of the width of the axes."""
+
+
+class FingerSeries(NamedTuple):
+    """Force, features and labels of one finger over one recording.
+
+    Attributes:
+        name: of the finger, or of recording and finger.
+        times: (n,) [s].
+        force: (n, 3) F_tip [unit].
+        amplitude: (n,) F_a [unit].
+        mean: (n,) m [unit]; NaN without a full window.
+        sigma: (n,) [unit]; NaN without a full window.
+        labels: (n,) state codes; UNKNOWN without a label.
+        phases: (n,) phase of the experiment; empty where it is not known.
+        unit: of the readings, "count" or "N".
+        gaps: positions of the first samples after a gap, where curves are interrupted.
+        slip: times [s] and slip speed [m/s], if the recording has them.
+    """
+
+    name: str
+    times: Array
+    force: Array
+    amplitude: Array
+    mean: Array
+    sigma: Array
+    labels: Codes
+    phases: npt.NDArray[np.str_]
+    unit: str = "count"
+    gaps: Codes = np.empty(0, dtype=np.int64)
+    slip: tuple[Array, Array] | None = None
+
+    @property
+    def unit_label(self) -> str:
+        """Unit as it stands in a label of an axis."""
+        return "[counts]" if self.unit == "count" else f"[{self.unit}]"
+
+
+def finger_series(
+    recording: Recording, finger: str, tare: Tare, window: int = DEFAULT_WINDOW
+) -> FingerSeries:
+    """Return the series of a finger of a recording.
+
+    Args:
+        recording: with ground truth, if phases and slip are to be known.
+        finger: name of the module.
+        tare: how the baseline is found.
+        window: N_w [samples].
+
+    Raises:
+        ValueError: no finite sample lies in the time of the tare.
+    """
+    module = recording.modules[finger]
+    force = _force(module, tare)
+    gaps = np.flatnonzero(np.diff(module.times) > GAP_PERIODS * module.period) + 1
+    features = haar_features(np.insert(force, gaps, np.nan, axis=0), window)
+    features = np.delete(features, gaps + np.arange(len(gaps)), axis=0)
+    return FingerSeries(
+        name=finger,
+        times=module.times,
+        force=force,
+        amplitude=np.asarray(np.linalg.norm(force, axis=1)),
+        mean=features[:, FEATURE_NAMES.index("m")],
+        sigma=features[:, FEATURE_NAMES.index("sigma")],
+        labels=module.label_states,
+        phases=_phases(recording, module.times),
+        unit=str(module.unit),
+        gaps=gaps,
+        slip=_slip(recording, finger),
+    )
+
+
+def envelope(times: Array, values: Array, n_stretches: int = 2000) -> tuple[Array, Array]:
+    """Return the minimum and the maximum of each of `n_stretches` stretches of samples.
+
+    Drawn as a curve they look as all samples would. Short curves are returned unchanged.
+
+    Args:
+        times: (n,) [s].
+        values: (n,) of any unit; NaN where there is none.
+        n_stretches: number of stretches; each gives two points.
+
+    Returns:
+        Times and values, (2 n_stretches,); NaN where a stretch has no value.
+
+    Example:
+        >>> times, values = envelope(np.arange(6.0), np.array([0, 1, 2, 9, -9, 0.0]), 2)
+        >>> times.tolist(), values.tolist()
+        ([0.0, 2.0, 3.0, 5.0], [0.0, 2.0, -9.0, 9.0])
+    """
+    n = len(values)
+    if n <= 2 * n_stretches:
+        return times, values
+    edges = np.linspace(0, n, n_stretches + 1).astype(int)
+    low = np.fmin.reduceat(values, edges[:-1])
+    high = np.fmax.reduceat(values, edges[:-1])
+    ends = times[np.stack([edges[:-1], edges[1:] - 1], axis=1)]
+    return ends.ravel(), np.stack([low, high], axis=1).ravel()
+
+
+def draw_curve(
+    axes: Axes, series: FingerSeries, values: Array, colour: str, width: float = 1.0
+) -> None:
+    """Draw (n,) values of a finger over time, interrupted at gaps."""
+    times = np.insert(series.times, series.gaps, series.times[series.gaps - 1])
+    draw_line(axes, times, np.insert(values, series.gaps, np.nan), colour, width)
+
+
+def draw_line(
+    axes: Axes, times: Array, values: Array, colour: str = INK, width: float = 1.0
+) -> None:
+    """Draw values over time; of a long curve the envelope."""
+    axes.plot(*envelope(times, values, N_STRETCHES), color=colour, linewidth=width, zorder=2)
+
+
+def draw_components(axes: Axes, series: FingerSeries) -> None:
+    """Draw the components of the fingertip force, and the zero line."""
+    for column, name in enumerate(("F_x", "F_y", "F_z")):
+        draw_curve(axes, series, series.force[:, column], COMPONENT_COLOURS[name])
+    axes.axhline(0, color=INK, linewidth=0.4, zorder=1)
+
+
+def draw_sigma(axes: Axes, series: FingerSeries) -> None:
+    """Draw sigma; on a logarithmic axis if peaks would flatten everything else."""
+    draw_curve(axes, series, series.sigma, INK, 0.8)
+    known = series.sigma[np.isfinite(series.sigma) & (series.sigma > 0)]
+    if not len(known) or known.max() <= LOG_SCALE_RATIO * np.median(known):
+        axes.set_ylim(bottom=0)
+        axes.yaxis.set_major_locator(MaxNLocator(4))
+        return
+    axes.set_yscale("log", nonpositive="clip")
+    axes.set_ylim(np.quantile(known, 0.005) / 1.5, known.max() * 1.5)
+    axes.yaxis.set_major_locator(LogLocator(numticks=4))
+    axes.yaxis.set_minor_locator(NullLocator())
+
+
+def shade_phases(axes: Axes, series: FingerSeries, *, named: bool = False) -> None:
+    """Shade each phase.
+
+    Args:
+        axes: to draw on.
+        series: with phases.
+        named: write the name above each phase that is wide enough.
+    """
+    spans = list(equal_spans(series.times, series.phases))
+    duration = spans[-1][2] - spans[0][1] if spans else 1.0
+    for first, start, end in spans:
+        name = str(series.phases[first])
+        if not name:
+            continue
+        axes.axvspan(start, end, facecolor=PHASE_COLOURS[Phase(name)], linewidth=0, zorder=0)
+        if named and (end - start) / duration > LETTER_WIDTH * (len(name) + 1):
+            axes.annotate(
+                name, ((start + end) / 2, 1), xycoords=("data", "axes fraction"),
+                xytext=(0, 2), textcoords="offset points", ha="center", fontsize=FONT_SIZE - 0.5,
+            )  # fmt: skip
+
+
+def equal_spans(times: Array, values: npt.NDArray[Any]) -> Iterator[tuple[int, float, float]]:
+    """Yield the position of the first sample, the start and the end [s] of each equal run."""
+    if len(times) < 2:
+        return
+    period = float(np.median(np.diff(times)))
+    ends = np.append(times[1:], times[-1] + period)
+    for first, stop in equal_runs(values):
+        yield first, float(times[first]), float(ends[stop - 1])
+
+
+def equal_runs(values: npt.NDArray[Any]) -> Iterator[tuple[int, int]]:
+    """Yield the first position and the end of each run of equal values.
+
+    Example:
+        >>> list(equal_runs(np.array([3, 3, 1])))
+        [(0, 2), (2, 3)]
+    """
+    edges = np.flatnonzero(values[1:] != values[:-1]) + 1
+    return pairwise([0, *edges.tolist(), len(values)]) if len(values) else iter(())
+
+
+def component_handles(names: Iterable[str] = ("F_x", "F_y", "F_z")) -> list[Artist]:
+    """Return the legend handles of components of the force."""
+    return [line_handle(COMPONENT_COLOURS[name], f"${name}$") for name in names]
+
+
+def line_handle(colour: str, label: str) -> Line2D:
+    """Return the legend handle of a curve."""
+    return Line2D([], [], color=colour, linewidth=1.4, label=label)
+
+
+def phase_handles(series: FingerSeries) -> list[Artist]:
+    """Return the legend handles of the phases of a series."""
+    present = set(series.phases.tolist())
+    return [
+        Patch(facecolor=colour, label=str(phase))
+        for phase, colour in PHASE_COLOURS.items()
+        if phase in present
+    ]
+
+
+def _force(module: Tactile, tare: Tare) -> Array:
+    """Return F_tip (n, 3); NaN if no sample is finite."""
+    if not np.isfinite(module.readings).all(axis=(1, 2)).any():
+        return np.full((module.n_samples, 3), np.nan)
+    return tared_force(module, tare).force
+
+
+def _phases(recording: Recording, times: Array) -> npt.NDArray[np.str_]:
+    truth = recording.truth
+    if truth is None or "phase" not in truth.hand or not len(truth.times):
+        return np.full(len(times), "")
+    latest = np.searchsorted(truth.times, times, side="right") - 1
+    return np.asarray(truth.hand["phase"])[np.clip(latest, 0, None)].astype(str)
+
+
+def _slip(recording: Recording, finger: str) -> tuple[Array, Array] | None:
+    truth = recording.truth
+    values = truth.fingers.get(finger, {}) if truth is not None else {}
+    return (truth.times, values["slip_speed"]) if truth and "slip_speed" in values else None

@@ -1,0 +1,20 @@
+import subprocess
+import sys
+
+from holdfast.plots.style import PAPER, series_styles
+
+
+def test_eighteen_methods_look_different():
+    styles = series_styles(f"method {k}" for k in range(18))
+    assert len(set(styles.values())) == 19  # and the paper's
+    assert series_styles(["a", PAPER, "b"])["b"] == series_styles(["a", "b"])["b"]
+
+
+def test_no_global_state_is_touched():
+    """pyplot keeps every figure that it makes until it is closed."""
+    program = (
+        "import sys; from holdfast.plots import curves, dots, experiment\n"
+        "curves.draw_lines({}, 'x'); dots.draw_dots({})\n"
+        "assert 'matplotlib.pyplot' not in sys.modules"
+    )
+    subprocess.run([sys.executable, "-c", program], check=True)
