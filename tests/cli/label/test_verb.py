@@ -278,7 +278,7 @@ def test_an_audit_needs_labels_to_learn_from(capsys, folder):
         (("--auto", "magic", "F"), "unknown rule 'magic'; there are signal, tracking, command"),
         (("--auto", "signal", "F", "--tare", "soon"), "tare: seconds above 0"),
         (("--auto", "signal", "F", "--set", "share"), "--set NAME=VALUE expected, 'share' given"),
-        (("--auto", "signal", "F", "--set", "magic=1"), "rule 'signal' knows no magic"),
+        (("--auto", "signal", "F", "--set", "magic=1"), "rule 'signal' has no parameter magic"),
         (("--auto", "signal", "F", "--poses", "p.csv"), "--poses are for the rule tracking; rule"),
         (("--auto", "tracking", "F", "--poses", "gone.csv"), "cannot read gone.csv: No such file"),
         (("--auto", "tracking", "F", "--poses", "a.bag"), "a.bag is no .csv, so taken for a bag: "),

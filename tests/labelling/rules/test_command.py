@@ -30,7 +30,7 @@ def test_markers_of_the_protocol():
 
 
 def test_case_order_and_other_words_do_not_matter():
-    spoken = (
+    other_words = (
         (RELEASE, "OPENING the hand"),
         (0.5, "mark 3"),
         (CLOSING - 0.5, "Hand closing"),
@@ -39,7 +39,10 @@ def test_case_order_and_other_words_do_not_matter():
         (PUSHED, "End of disturbance"),
         (5.0, "battery low"),
     )
-    here, there = command.propose(grasp(markers=MARKERS)), command.propose(grasp(markers=spoken))
+    here, there = (
+        command.propose(grasp(markers=MARKERS)),
+        command.propose(grasp(markers=other_words)),
+    )
     assert drawn(there["thumb"]) == drawn(here["thumb"])
 
 
@@ -58,11 +61,11 @@ def test_case_order_and_other_words_do_not_matter():
         ("Grasp", "closing"),
     ],
 )
-def test_what_a_marker_says(text, word):
-    assert command.word_of(text) == word
+def test_the_command_of_a_marker(text, word):
+    assert command.command_word(text) == word
 
 
-def test_a_disturbance_that_nobody_ends_is_doubtful():
+def test_a_disturbance_without_an_end_has_less_confidence():
     ended = command.propose(grasp(markers=MARKERS))["thumb"][3]
     again = [*MARKERS[:3], (PUSH + 0.4, "disturbance"), *MARKERS[3:]]
     open_end = command.propose(grasp(markers=again))["thumb"][3]
@@ -70,12 +73,12 @@ def test_a_disturbance_that_nobody_ends_is_doubtful():
     assert open_end.confidence < ended.confidence
 
 
-def test_whoever_is_late_is_put_right():
+def test_the_delay_of_a_person_is_corrected():
     late = tuple((time + 0.4, text) for time, text in MARKERS)
     check(command.propose(grasp(markers=late), delay=0.4)["thumb"], EDGE)
 
 
-def test_before_a_first_marker_that_is_not_closing_nobody_knows():
+def test_nothing_is_labelled_before_a_first_marker_that_is_not_closing():
     labels = command.propose(grasp(markers=((LOCKED, "locked"), (RELEASE, "released"))))["thumb"]
     assert labels[0].state == "STABLE"
     assert labels[0].start == pytest.approx(LOCKED, abs=0.02)
@@ -111,6 +114,6 @@ def test_labels_fit_the_recording():
         (((1.0, "mark"), (2.0, "mark 1"), (3.0, "mark")), "it has 'mark', 'mark 1'"),
     ],
 )
-def test_no_marker_says_anything(markers, shown):
+def test_no_marker_with_a_known_word(markers, shown):
     with pytest.raises(RecordingError, match=f"no marker of the protocol: one of closing.*{shown}"):
         command.propose(grasp(markers=markers))

@@ -3,18 +3,18 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from holdfast.labelling.rules.forces import grip, hand_force, lost_at, pressed_at
+from holdfast.labelling.rules.forces import centre_of_pressure, final_drop, grip_force, hand_force
 from holdfast.recordings import Recording, Tactile
 
 from .build import CLOSING, FREE, GRIP, NOISE, PATCH, RELEASE, clock, grasp, module, profile
 
 
-def test_the_force_is_told_from_the_first_sample_on():
+def test_the_tare_is_subtracted_from_the_first_sample_on():
     hand = hand_force(grasp())
     finger = hand.fingers["thumb"]
     assert finger.known.all()
     assert finger.amplitude[:10].max() < GRIP / 50
-    assert grip(finger, finger.contact) == pytest.approx(GRIP, rel=0.02)
+    assert grip_force(finger, finger.contact) == pytest.approx(GRIP, rel=0.02)
 
 
 def test_noise_is_that_of_the_tare_stretch():
@@ -30,7 +30,7 @@ def test_contact_begins_and_ends_where_the_force_does():
     assert touching[-1] == pytest.approx(FREE, abs=0.05)
 
 
-def test_a_knock_is_not_the_grip():
+def test_a_short_knock_is_not_the_grip_force_force():
     times = clock()
     force = GRIP * profile(times)
     force[500:505] *= 30
@@ -52,24 +52,28 @@ def test_modules_of_other_times_and_rates_share_a_grid():
     assert np.median(np.abs(one - two)) < GRIP / 100
 
 
-def test_where_the_force_drops_for_good():
+def test_the_final_drop_of_the_force():
     times = clock()
     held = np.where(times < RELEASE, GRIP, 0.0)[:, None] * [0, 0, 1.0]
     held[:, 0] += GRIP / 10 * np.sin(3 * times)
     hand = hand_force(Recording("held", {"thumb": module(times, held)}), "first")
-    assert times[lost_at(hand)] == pytest.approx(RELEASE, abs=0.05)
+    assert times[final_drop(hand)] == pytest.approx(RELEASE, abs=0.05)
 
 
-def test_a_force_that_comes_back_did_not_drop_for_good():
+def test_a_force_that_rises_again_has_no_final_drop():
     times = clock()
     held = np.where((times < 5) | (times > 6), GRIP, 0.0)[:, None] * [0, 0, 1.0]
-    assert lost_at(hand_force(Recording("held", {"thumb": module(times, held)}), "first")) is None
+    assert (
+        final_drop(hand_force(Recording("held", {"thumb": module(times, held)}), "first")) is None
+    )
 
 
-def test_a_force_that_stays_did_not_drop():
+def test_a_constant_force_has_no_final_drop():
     times = clock()
     held = GRIP * np.ones((len(times), 1)) * [0, 0, 1.0]
-    assert lost_at(hand_force(Recording("held", {"thumb": module(times, held)}), "first")) is None
+    assert (
+        final_drop(hand_force(Recording("held", {"thumb": module(times, held)}), "first")) is None
+    )
 
 
 def test_the_centre_of_pressure_is_where_it_is_pressed():
@@ -79,7 +83,7 @@ def test_the_centre_of_pressure_is_where_it_is_pressed():
     readings[:, 5, 2] = load * (times < 6)
     readings[:, 10, 2] = load * (times >= 6)
     recording = Recording("one", {"thumb": Tactile(PATCH, times, readings)})
-    place = pressed_at(recording.modules["thumb"], 0.5, hand_force(recording))
+    place = centre_of_pressure(recording.modules["thumb"], 0.5, hand_force(recording))
     assert place[400] == pytest.approx(PATCH.positions[5])
     assert place[800] == pytest.approx(PATCH.positions[10])
     assert np.isfinite(place).all()

@@ -5,22 +5,22 @@ from hypothesis import given, settings
 from scipy.spatial.transform import Rotation
 
 from holdfast.labelling.rules.motion import (
-    ALIKE,
-    BRIDGED,
-    FARTHEST,
+    MAX_CLOCK_OFFSET,
+    MAX_POSE_GAP,
+    MIN_CORRELATION,
+    clock_offset,
     motion_of,
-    offset_of,
-    relative,
+    relative_track,
     slope,
 )
-from holdfast.labelling.rules.poses import Track
+from holdfast.labelling.rules.poses import PoseTrack
 
 GRID = np.arange(0, 3, 0.01)
 INSIDE = slice(20, -20)
 
 
 def track(places, turns, times=GRID):
-    return Track(times, places, np.roll(turns.as_quat(), 1, axis=1))
+    return PoseTrack(times, places, np.roll(turns.as_quat(), 1, axis=1))
 
 
 def turning(rate, axis, times=GRID):
@@ -60,13 +60,13 @@ def test_rolling_has_no_speed_at_the_contact():
 
 @given(seed=st.integers(0, 1000))
 @settings(max_examples=20)
-def test_relative_motion_knows_no_world(seed):
+def test_relative_motion_does_not_depend_on_the_world_frame(seed):
     rng = np.random.default_rng(seed)
     places, carried = rng.normal(size=(2, 300, 3)).cumsum(axis=1) * 1e-3
     turns, tip_turns = (Rotation.from_rotvec(v * 3) for v in (carried, places))
     world, shift = Rotation.random(rng=seed), rng.normal(size=3)
-    here = relative(track(places, turns), track(carried, tip_turns))
-    there = relative(
+    here = relative_track(track(places, turns), track(carried, tip_turns))
+    there = relative_track(
         track(world.apply(places) + shift, world * turns),
         track(world.apply(carried) + shift, world * tip_turns),
     )
@@ -79,7 +79,7 @@ def test_a_tip_at_other_times_is_taken_between_its_poses():
     late = GRID[:-1] + 0.004
     thing = track(np.outer(GRID, [0.1, 0, 0]), turning(1, [0, 0, 1]))
     tip = track(np.outer(late, [0.1, 0, 0]), turning(1, [0, 0, 1], late), late)
-    found = relative(thing, tip)
+    found = relative_track(thing, tip)
     assert found.positions[5:-5] == pytest.approx(0, abs=1e-9)
 
 
@@ -87,23 +87,23 @@ def test_quaternions_of_either_sign_are_one_rotation():
     tip = track(nowhere(), turning(1, [0, 0, 1]))
     tip.quaternions[100:200] *= -1
     thing = track(np.tile([0.1, 0, 0], (len(GRID), 1)), turning(1, [0, 0, 1]))
-    speeds = motion_of(relative(thing, tip), GRID + 0.001).speed[INSIDE]
+    speeds = motion_of(relative_track(thing, tip), GRID + 0.001).speed[INSIDE]
     assert np.nanmax(speeds) == pytest.approx(0.1, rel=0.02)
 
 
-def test_where_poses_are_missing_nothing_is_known():
+def test_motion_is_unknown_where_poses_are_missing():
     places = nowhere()
     places[100:105] = places[200:250] = np.nan
     motion = motion_of(track_with_nan(places), GRID)
     assert motion.known[95:110].all()
     assert not motion.known[201:249].any()
     assert np.isnan(motion.speed[201:249]).all()
-    assert pytest.approx(0.1) == BRIDGED
+    assert pytest.approx(0.1) == MAX_POSE_GAP
 
 
 def track_with_nan(places):
     quaternions = np.tile([1.0, 0, 0, 0], (len(places), 1))
-    return Track(GRID, places, quaternions)
+    return PoseTrack(GRID, places, quaternions)
 
 
 @given(jitter=st.floats(1e-5, 1e-2))
@@ -157,39 +157,39 @@ def bursts(seed=0):
 @settings(max_examples=20)
 def test_the_shift_is_found(shift):
     felt = bursts()
-    found = offset_of(np.roll(felt, -shift), felt, EVERY, PERIOD)
+    found = clock_offset(np.roll(felt, -shift), felt, EVERY, PERIOD)
     assert found.seconds == pytest.approx(shift * PERIOD, abs=PERIOD)
-    assert found.believed
+    assert found.reliable
 
 
-def test_one_huge_knock_does_not_outvote_the_rest():
+def test_one_large_peak_does_not_dominate():
     felt = bursts()
     seen = np.roll(felt, -20)
     felt[950] = 1e6
-    assert offset_of(seen, felt, EVERY, PERIOD).seconds == pytest.approx(0.2, abs=PERIOD)
+    assert clock_offset(seen, felt, EVERY, PERIOD).seconds == pytest.approx(0.2, abs=PERIOD)
 
 
-def test_what_is_out_of_sight_does_not_count():
+def test_samples_out_of_sight_are_ignored():
     felt = bursts()
     seen = np.roll(felt, -20)
     known = EVERY.copy()
     known[400:600] = False
     seen[400:600] = 1e6
-    assert offset_of(seen, felt, known, PERIOD).seconds == pytest.approx(0.2, abs=PERIOD)
+    assert clock_offset(seen, felt, known, PERIOD).seconds == pytest.approx(0.2, abs=PERIOD)
 
 
-def test_what_is_not_alike_gives_no_offset():
+def test_uncorrelated_signals_give_no_offset():
     rng = np.random.default_rng(0)
-    found = offset_of(rng.uniform(size=1000), rng.uniform(size=1000), EVERY, PERIOD)
+    found = clock_offset(rng.uniform(size=1000), rng.uniform(size=1000), EVERY, PERIOD)
     assert found.seconds == 0
-    assert found.alike < ALIKE
-    assert not found.believed
+    assert found.correlation < MIN_CORRELATION
+    assert not found.reliable
 
 
-def test_nothing_that_moves_gives_no_offset():
-    assert offset_of(np.zeros(1000), bursts(), EVERY, PERIOD).seconds == 0
+def test_no_motion_gives_no_offset():
+    assert clock_offset(np.zeros(1000), bursts(), EVERY, PERIOD).seconds == 0
 
 
-def test_no_more_than_the_farthest_is_tried():
+def test_offsets_are_limited():
     felt = bursts()
-    assert abs(offset_of(np.roll(felt, 80), felt, EVERY, PERIOD).seconds) <= FARTHEST
+    assert abs(clock_offset(np.roll(felt, 80), felt, EVERY, PERIOD).seconds) <= MAX_CLOCK_OFFSET

@@ -3,12 +3,12 @@ import pytest
 
 from holdfast.errors import RecordingError
 from holdfast.labelling.rules.poses import (
-    Track,
+    PoseTrack,
     in_sight,
-    names_of,
     poses_from_csv,
     poses_from_truth,
     poses_of,
+    tip_tracks_of,
 )
 from holdfast.recordings import Recording, Tactile, Truth
 from holdfast.sensors import sensor
@@ -32,10 +32,10 @@ def recording(truth=None):
 
 def test_a_file_of_one_body_is_the_object_in_the_hands_frame(tmp_path):
     poses = poses_from_csv(written(tmp_path, [ROW.format(t=k / 10, x=k) for k in range(5)]))
-    assert poses.thing.positions[:, 0].tolist() == [0, 1, 2, 3, 4]
-    assert poses.thing.quaternions[0].tolist() == [1, 0, 0, 0]
-    assert (poses.tips, poses.same_clock, poses.source) == ({}, False, "poses.csv")
-    assert names_of(poses, ["thumb", "index"]) == {"thumb": None, "index": None}
+    assert poses.object_track.positions[:, 0].tolist() == [0, 1, 2, 3, 4]
+    assert poses.object_track.quaternions[0].tolist() == [1, 0, 0, 0]
+    assert (poses.tip_tracks, poses.same_clock, poses.source) == ({}, False, "poses.csv")
+    assert tip_tracks_of(poses, ["thumb", "index"]) == {"thumb": None, "index": None}
 
 
 def test_a_file_of_many_bodies(tmp_path):
@@ -43,20 +43,20 @@ def test_a_file_of_many_bodies(tmp_path):
         f"{ROW.format(t=k / 10, x=k)},{body}" for k in range(3) for body in ("object", "thumb")
     ]
     poses = poses_from_csv(written(tmp_path, lines, HEADER + ",body"))
-    assert poses.thing.positions.shape == (3, 3)
-    assert list(names_of(poses, ["index", "thumb"])) == ["thumb"]
+    assert poses.object_track.positions.shape == (3, 3)
+    assert list(tip_tracks_of(poses, ["index", "thumb"])) == ["thumb"]
 
 
 def test_rows_out_of_order_and_twice(tmp_path):
     lines = [ROW.format(t=t, x=x) for t, x in [(0.2, 2), (0.0, 0), (0.1, 1), (0.1, 9)]]
-    track = poses_from_csv(written(tmp_path, lines)).thing
+    track = poses_from_csv(written(tmp_path, lines)).object_track
     assert track.times.tolist() == [0, 0.1, 0.2]
     assert track.positions[:, 0].tolist() == [0, 1, 2]
 
 
 def test_a_quaternion_is_brought_to_unit_length(tmp_path):
     lines = ["0,0,0,0,1.02,0,0,0", "1,0,0,0,0,0,0,0", "2,1,0,0,nan,0,0,0", "3,2,0,0,1,0,0,0"]
-    track = poses_from_csv(written(tmp_path, lines)).thing
+    track = poses_from_csv(written(tmp_path, lines)).object_track
     assert track.seen.tolist() == [True, False, False, True]
     assert track.quaternions[0].tolist() == [1, 0, 0, 0]
 
@@ -73,7 +73,7 @@ def test_no_column(tmp_path):
 
 
 def test_no_pose_among_the_rows(tmp_path):
-    with pytest.raises(RecordingError, match="no pose of 1 rows is one; positions"):
+    with pytest.raises(RecordingError, match="no valid pose in 1 rows; positions"):
         poses_from_csv(written(tmp_path, ["0,10,10,10,1,0,0,0"]))
 
 
@@ -83,14 +83,14 @@ def test_fingers_of_another_hand(tmp_path):
     with pytest.raises(
         RecordingError, match="has poses of thumb; the recording's fingers are a, b"
     ):
-        names_of(poses, ["a", "b"])
+        tip_tracks_of(poses, ["a", "b"])
 
 
 def test_truth_with_poses_of_both():
     pose = np.tile([0, 0, 0, 1.0, 0, 0, 0], (5, 1))
     truth = Truth(np.arange(5.0), {"object_pose": pose}, {"thumb": {"tip_pose": pose}})
     poses = poses_of(recording(truth))
-    assert (list(poses.tips), poses.same_clock, poses.source) == (["thumb"], True, "truth")
+    assert (list(poses.tip_tracks), poses.same_clock, poses.source) == (["thumb"], True, "truth")
 
 
 def test_truth_with_something_else():
@@ -108,13 +108,15 @@ def test_poses_of_another_shape():
 
 
 def test_times_of_a_track_go_forward():
-    with pytest.raises(RecordingError, match="times of poses are finite and strictly increasing"):
-        Track(np.array([0.0, 0.0]), np.zeros((2, 3)), np.zeros((2, 4)))
+    with pytest.raises(
+        RecordingError, match="times of poses must be finite and strictly increasing"
+    ):
+        PoseTrack(np.array([0.0, 0.0]), np.zeros((2, 3)), np.zeros((2, 4)))
 
 
 def test_arrays_of_a_track_belong_together():
     with pytest.raises(RecordingError, match=r"poses of shapes \(2, 3\) and \(2, 4\) expected"):
-        Track(np.arange(2.0), np.zeros((2, 2)), np.zeros((2, 4)))
+        PoseTrack(np.arange(2.0), np.zeros((2, 2)), np.zeros((2, 4)))
 
 
 def test_frozen_and_sentinel_poses_are_out_of_sight_a_slow_tracker_is_not():
@@ -123,5 +125,5 @@ def test_frozen_and_sentinel_poses_are_out_of_sight_a_slow_tracker_is_not():
     place[20:40] = place[20]
     place[50:] = 10.0
     turns = np.tile([1.0, 0, 0, 0], (60, 1))
-    seen = in_sight(Track(times, place, turns)).seen
+    seen = in_sight(PoseTrack(times, place, turns)).seen
     assert seen.tolist() == [True] * 20 + [False] * 20 + [True] * 10 + [False] * 10

@@ -30,7 +30,7 @@ from .build import (
 EDGE = 0.2  # the window that changes are seen in, and a little for noise
 
 
-def test_a_grasp_is_drawn_as_a_person_would():
+def test_a_grasp_is_labelled_as_by_a_person():
     for labels in signal.propose(grasp()).values():
         check(labels, EDGE)
         causes = [label.cause for label in labels]
@@ -38,7 +38,7 @@ def test_a_grasp_is_drawn_as_a_person_would():
         assert causes == expected
 
 
-def test_labels_are_signed_and_say_what_they_rest_on():
+def test_labels_have_author_and_evidence():
     labels = signal.propose(grasp())["thumb"]
     assert {label.author for label in labels} == {"rule:signal"}
     assert all(label.evidence.startswith("force ") for label in labels)
@@ -62,14 +62,14 @@ def test_another_unit_of_force_changes_nothing(power):
     assert drawn(signal.propose(grasp(scale=2.0**power))["thumb"]) == here
 
 
-def test_neither_labels_nor_truth_are_looked_at():
+def test_labels_and_truth_are_ignored():
     recording = grasp()
     blind = Recording("another", {n: replace(m, labels=()) for n, m in recording.modules.items()})
     labelled = recording.with_labels({"thumb": signal.propose(recording)["index"]})
     assert signal.propose(labelled) == signal.propose(blind)
 
 
-def test_a_push_too_faint_for_one_finger_is_drawn_where_two_others_show_it():
+def test_a_disturbance_of_two_fingers_applies_to_all():
     times = clock()
     modules = {
         name: module(times, GRIP * profile(times, push), seed)
@@ -79,7 +79,7 @@ def test_a_push_too_faint_for_one_finger_is_drawn_where_two_others_show_it():
     assert (codes[(times > PUSH) & (times < PUSHED)] == 2).mean() > 0.9
 
 
-def test_a_change_of_one_finger_is_its_own():
+def test_a_change_of_one_finger_applies_to_it_alone():
     times = clock()
     modules = {
         name: module(times, GRIP * profile(times, push), seed)
@@ -90,7 +90,7 @@ def test_a_change_of_one_finger_is_its_own():
     assert "DISTURBANCE" not in [label.cause and label.cause.name for label in labels["index"]]
 
 
-def test_a_stronger_push_is_surer():
+def test_a_stronger_push_has_more_confidence():
     def surety(push):
         labels = signal.propose(grasp(push=push))["thumb"]
         return next(x.confidence for x in labels if x.cause is Cause.DISTURBANCE)
@@ -98,7 +98,7 @@ def test_a_stronger_push_is_surer():
     assert surety(0.02) < surety(0.05) < surety(0.5)
 
 
-def test_what_the_skin_keeps_of_its_load_is_no_contact():
+def test_creep_is_no_contact():
     times = clock()
     force = GRIP * profile(times)
     after = times > FREE
@@ -133,7 +133,7 @@ def test_a_grasp_that_never_settles_is_closing_to_its_end():
     assert "STABLE" not in [label.state.value for label in labels]
 
 
-def test_an_object_that_is_gone_at_once_is_lost():
+def test_a_sudden_end_of_the_force_is_a_loss():
     times = clock()
     force = GRIP * profile(times, 0.0) * (times < RELEASE - 1)[:, None]
     labels = signal.propose(Recording("dropped", {"thumb": module(times, force)}))["thumb"]
@@ -161,7 +161,7 @@ def test_a_gap_has_no_label():
     assert (label_states(labels, np.array([3.5, 5.5])) == 3).all()
 
 
-def test_samples_that_are_no_numbers_are_a_gap():
+def test_samples_that_are_not_finite_are_a_gap():
     recording = grasp(fingers=("thumb",))
     readings = recording.modules["thumb"].readings.copy()
     readings[400:500] = np.nan
@@ -170,7 +170,7 @@ def test_samples_that_are_no_numbers_are_a_gap():
     assert (label_states(labels, np.linspace(4.05, 4.95, 50)) == 0).all()
 
 
-def test_a_dead_finger_has_no_labels_and_disturbs_nobody():
+def test_a_dead_finger_has_no_labels_and_does_not_affect_others():
     recording = grasp()
     dead = replace(
         recording.modules["index"],
@@ -181,12 +181,12 @@ def test_a_dead_finger_has_no_labels_and_disturbs_nobody():
     check(labels["thumb"], EDGE)
 
 
-def test_labels_fit_the_recording_they_are_for():
+def test_labels_fit_the_recording():
     recording = grasp()
     assert recording.with_labels(signal.propose(recording)).modules["thumb"].labels
 
 
-def test_nothing_to_take_the_tare_from():
+def test_no_sample_for_the_tare():
     recording = grasp(fingers=("thumb",))
     with pytest.raises(RecordingError, match=r"no finite sample to take the tare from \(20:21\)"):
         signal.propose(recording, tare=(20, 21))

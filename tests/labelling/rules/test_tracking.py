@@ -11,7 +11,7 @@ from holdfast.contact import Cause
 from holdfast.errors import RecordingError
 from holdfast.io import import_recordings
 from holdfast.labelling.rules import tracking
-from holdfast.labelling.rules.poses import Poses, Track, in_sight
+from holdfast.labelling.rules.poses import Poses, PoseTrack, in_sight
 from holdfast.labelling.rules.tracking import TrackingRule
 from holdfast.recordings import Recording, Truth, label_states
 
@@ -43,7 +43,7 @@ def sliding(jitter=0.0, **more):
     return tracked(poses(times, slide(times, MOVES), jitter=jitter), **more)
 
 
-def test_a_grasp_is_drawn_by_what_moves():
+def test_a_grasp_is_labelled_by_motion():
     for labels in tracking.propose(sliding()).values():
         check(labels, EDGE)
         causes = [label.cause for label in labels]
@@ -51,7 +51,7 @@ def test_a_grasp_is_drawn_by_what_moves():
         assert causes == expected
 
 
-def test_labels_are_signed_and_say_what_they_rest_on():
+def test_labels_have_author_and_evidence():
     labels = tracking.propose(sliding())["thumb"]
     assert {label.author for label in labels} == {"rule:tracking"}
     assert "against the finger" in labels[3].evidence
@@ -92,7 +92,7 @@ def test_turning_on_the_spot_is_motion():
     check(tracking.propose(tracked(poses(times, 0 * times, turn)))["thumb"], EDGE)
 
 
-def test_what_is_slower_than_the_threshold_rests():
+def test_motion_below_the_threshold_is_stable():
     times = clock()
     crawl = poses(times, slide(times, ((0, DURATION),), speed=0.0005))
     states = {label.state.value for label in tracking.propose(tracked(crawl))["thumb"]}
@@ -169,19 +169,19 @@ def test_another_clock_is_found(offset):
     way = 0.01 * np.where((times > PUSH) & (times < PUSHED), np.sin(5 * np.pi * (times - PUSH)), 0)
     way = way + slide(times, ((CLOSING, LOCKED), (RELEASE, 9.5)))
     pose = poses(times, way, jitter=1e-5)
-    other = Poses("file", Track(times - offset, pose[:, :3], pose[:, 3:]), same_clock=False)
+    other = Poses("file", PoseTrack(times - offset, pose[:, :3], pose[:, 3:]), same_clock=False)
     labels = tracking.propose(grasp(), tracking=other)["thumb"]
     check(labels, EDGE)
-    told = re.search("later by (.*) s", labels[0].evidence)
-    assert (float(told[1]) if told else 0.0) == pytest.approx(offset, abs=0.05)
+    found = re.search("later by (.*) s", labels[0].evidence)
+    assert (float(found[1]) if found else 0.0) == pytest.approx(offset, abs=0.05)
     given = tracking.propose(grasp(), tracking=other, offset=offset)["thumb"]
     assert [x.start for x in given] == pytest.approx([x.start for x in labels], abs=0.05)
 
 
-def test_clocks_that_nothing_aligns_halve_the_confidence():
+def test_unreliable_clocks_halve_the_confidence():
     times = clock()
     pose = poses(times, 0 * times, jitter=1e-4)
-    other = Poses("file", Track(times, pose[:, :3], pose[:, 3:]), same_clock=False)
+    other = Poses("file", PoseTrack(times, pose[:, :3], pose[:, 3:]), same_clock=False)
     free = {n: module(times, np.zeros((len(times), 3)), k) for k, n in enumerate(["thumb"])}
     (label,) = tracking.propose(Recording("nothing", free), tracking=other)["thumb"]
     assert "clocks not aligned" in label.evidence
@@ -200,7 +200,7 @@ def test_displacement_is_trouble_until_the_object_is_back():
     assert states[2][1:] == pytest.approx([PUSH + 0.4, 8.6], abs=EDGE)
 
 
-def test_labels_fit_the_recording_and_do_not_rest_on_its_own():
+def test_labels_of_the_recording_are_ignored():
     recording = sliding()
     labels = tracking.propose(recording)
     assert tracking.propose(recording.with_labels(labels)) == labels
@@ -232,7 +232,9 @@ def replace_times(truth, offset):
 def test_an_object_that_is_never_in_sight():
     times = clock()
     lost = np.full((len(times), 7), np.nan)
-    with pytest.raises(RecordingError, match="truth: the object is never in sight twice"):
+    with pytest.raises(
+        RecordingError, match="truth: at least 2 poses of the object in sight expected, 0 found"
+    ):
         tracking.propose(tracked(lost))
 
 
@@ -253,8 +255,8 @@ def test_real_marker_is_never_in_sight_at_the_sentinel(data_folder):
     assert labels[-1].start == pytest.approx(own.start, abs=0.1)
 
 
-def test_in_sight_is_what_the_recording_of_the_twin_needs_not():
+def test_exact_poses_of_the_twin_are_not_checked_for_repeats():
     still = np.tile([0, 0, 0, 1.0, 0, 0, 0], (100, 1))
-    track = Track(clock()[:100], still[:, :3], still[:, 3:])
+    track = PoseTrack(clock()[:100], still[:, :3], still[:, 3:])
     assert track.seen.all()
     assert not in_sight(track).seen.any()

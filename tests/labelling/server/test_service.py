@@ -374,7 +374,7 @@ def test_proposals_that_are_labelled_are_done(tmp_path):
             {"rule": "tracking", "parameters": {"tracking": "/etc/passwd"}},
             "parameter 'tracking' given; a page may not set it",
         ),
-        ({"parameters": {"delay": 1.0}}, "rule 'signal' knows no delay"),
+        ({"parameters": {"delay": 1.0}}, "rule 'signal' has no parameter delay"),
         ({"rule": "command", "parameters": {"delay": "x"}}, ""),
         ({"rules": "signal"}, "/api/v1/recordings/0/propose: Object contains unknown"),
     ],

@@ -1,4 +1,4 @@
-"""From a state at every instant to labels with their evidence and confidence."""
+"""What all rules share: states over time, the labels made from them, checks of parameters."""
 
 import math
 from collections.abc import Callable
@@ -13,28 +13,31 @@ from holdfast.metrics.masks import Mask
 from holdfast.recordings import Label
 from holdfast.sensors.types import Array
 
-SHORT = 0.2
+CONFIDENCE_TIME = 0.2
 """Duration at which a label keeps 63 % of its confidence [s]."""
 
-WEAKEST = 0.25
-"""Share of a label's time that its evidence is judged by: the time where that is weakest."""
+EVIDENCE_QUANTILE = 0.25
+"""Quantile of the evidence within a label that its confidence rests on."""
 
 _CAUSES = (None, *Cause)
 _STATES = tuple(ContactState)
 
-Evidence = Callable[[ContactState, Cause | None, float], str]
-"""What a label rests on, from its state, its cause, and how many times over its threshold."""
+EvidenceText = Callable[[ContactState, Cause | None, float], str]
+"""Function that returns the evidence of a label from its state, cause and evidence ratio."""
 
 
 @dataclass(frozen=True, eq=False)
-class Drawing:
-    """What a rule says of one finger, instant by instant; it is drawn over, like a picture.
+class StateTimeline:
+    """State, cause and evidence of one finger at every instant. Later settings replace earlier.
+
+    The evidence ratio is the measured quantity over its threshold (or the threshold over the
+    quantity, for states below it): 1 at the threshold, larger for clearer evidence.
 
     Attributes:
-        times: (n,) a sample period apart [s].
-        codes: (n,) of the state; UNKNOWN where there is no label.
-        causes: (n,) place of the cause, 0 for none.
-        ratio: (n,) how many times the evidence is over (or under) its threshold; 1 at it.
+        times: (n,) on a regular grid [s].
+        codes: (n,) of the states; UNKNOWN where there is no label.
+        causes: (n,) index of the causes, 0 for none.
+        ratio: (n,) evidence ratios.
     """
 
     times: Array
@@ -43,86 +46,88 @@ class Drawing:
     ratio: Array
 
     @classmethod
-    def blank(cls, times: Array) -> Self:
-        """No label anywhere."""
+    def unknown(cls, times: Array) -> Self:
+        """Return a timeline without any label."""
         codes = np.full(len(times), UNKNOWN, dtype=np.int8)
         return cls(times, codes, np.zeros(len(times), dtype=np.int8), np.ones(len(times)))
 
-    def paint(
+    def set_state(
         self, mask: Mask, state: int, cause: Cause | None = None, ratio: Array | float = 1.0
     ) -> None:
-        """Sets state, cause and evidence where the mask is."""
+        """Set the state, cause and evidence ratio where the mask is True."""
         self.codes[mask] = state
         self.causes[mask] = _CAUSES.index(cause)
         self.ratio[mask] = np.broadcast_to(ratio, mask.shape)[mask]
 
-    def recause(self, mask: Mask, cause: Cause) -> None:
-        """Sets another cause where the mask is."""
+    def set_cause(self, mask: Mask, cause: Cause) -> None:
+        """Set only the cause where the mask is True."""
         self.causes[mask] = _CAUSES.index(cause)
 
 
 @dataclass(frozen=True)
-class Pen:
-    """How a rule signs its labels.
+class LabelWriter:
+    """Maker of labels from a timeline, with the author and evidence of a rule.
 
     Attributes:
-        author: the rule.
-        evidence: what a label rests on.
-        trust: by which every confidence is multiplied.
-        note: after the evidence of every label.
+        author: name of the rule.
+        evidence: returns the evidence text of a label.
+        trust: factor on every confidence, from 0 to 1.
+        note: text after the evidence of every label.
     """
 
     author: str
-    evidence: Evidence
+    evidence: EvidenceText
     trust: float = 1.0
     note: str = ""
 
-    def labels(self, drawing: Drawing, span: tuple[float, float]) -> tuple[Label, ...]:
-        """The intervals of equal state and cause, cut to the span of the module [s]."""
-        times, found = drawing.times, []
-        change = (np.diff(drawing.codes) != 0) | (np.diff(drawing.causes) != 0)
+    def labels(self, timeline: StateTimeline, span: tuple[float, float]) -> tuple[Label, ...]:
+        """Return intervals of equal state and cause, cut to the span of the module [s]."""
+        times, found = timeline.times, []
+        change = (np.diff(timeline.codes) != 0) | (np.diff(timeline.causes) != 0)
         edges = np.concatenate([[0], np.flatnonzero(change) + 1, [len(times)]])
         ends = np.append(times, np.inf)
         for first, last in zip(edges[:-1].tolist(), edges[1:].tolist(), strict=True):
             start, end = max(float(times[first]), span[0]), min(float(ends[last]), span[1])
-            if drawing.codes[first] != UNKNOWN and start < end:
-                found.append(self._label(drawing, slice(first, last), start, end))
+            if timeline.codes[first] != UNKNOWN and start < end:
+                found.append(self._label(timeline, slice(first, last), start, end))
         return tuple(found)
 
-    def _label(self, drawing: Drawing, part: slice, start: float, end: float) -> Label:
-        state = _STATES[drawing.codes[part.start]]
-        cause = _CAUSES[drawing.causes[part.start]]
-        ratio = max(float(np.quantile(drawing.ratio[part], WEAKEST)), 1.0)
-        confidence = self.trust * certainty(ratio, end - start)
+    def _label(self, timeline: StateTimeline, part: slice, start: float, end: float) -> Label:
+        state = _STATES[timeline.codes[part.start]]
+        cause = _CAUSES[timeline.causes[part.start]]
+        ratio = max(float(np.quantile(timeline.ratio[part], EVIDENCE_QUANTILE)), 1.0)
+        confidence = self.trust * label_confidence(ratio, end - start)
         text = self.evidence(state, cause, ratio) + (f"; {self.note}" if self.note else "")
         return Label(start, end, state, cause, text, round(confidence, 3), self.author)
 
 
-def certainty(ratio: float, duration: float) -> float:
-    """From 0 to 1: how far the evidence is from its threshold, over how long a time.
+def label_confidence(ratio: float, duration: float) -> float:
+    """Return the confidence of a label, from 0 to 1.
 
-    At the threshold it is a half, at twice the threshold three quarters, at ten times 0.95;
-    times 1 - exp(-duration / SHORT), which takes nothing from a label of a second.
+        (1 - 0.5 / ratio) (1 - exp(-duration / CONFIDENCE_TIME))
+
+    The first factor is 0.5 at the threshold, 0.75 at twice and 0.95 at ten times the threshold.
+    The second factor is close to 1 for labels of a second or more.
 
     Args:
-        ratio: how many times over (or under) its threshold the evidence is.
+        ratio: evidence ratio.
         duration: of the label [s].
 
     Example:
-        >>> round(certainty(2.0, 10.0), 2), round(certainty(10.0, 10.0), 2)
+        >>> round(label_confidence(2.0, 10.0), 2), round(label_confidence(10.0, 10.0), 2)
         (0.75, 0.95)
     """
-    return float((1 - 0.5 / max(ratio, 1.0)) * (1 - np.exp(-duration / SHORT)))
+    return float((1 - 0.5 / max(ratio, 1.0)) * (1 - np.exp(-duration / CONFIDENCE_TIME)))
 
 
-def check_positive(rule: Any) -> None:  # noqa: ANN401 (any dataclass)
-    """Refuses a limit that is not a number above 0; text is not looked at.
+def check_positive(parameters: Any) -> None:  # noqa: ANN401 (any dataclass)
+    """Check that all fields of a dataclass are finite numbers above 0, or text.
 
     Raises:
-        ValueError: one is not.
+        ValueError: a field is not.
     """
-    for field in fields(rule):
-        value = getattr(rule, field.name)
+    for field in fields(parameters):
+        value = getattr(parameters, field.name)
         if isinstance(value, str):
             continue
         if not (isinstance(value, int | float) and math.isfinite(value) and value > 0):

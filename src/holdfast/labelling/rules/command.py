@@ -1,8 +1,8 @@
-"""Labels from the protocol's own markers: closing, locked, disturbance, released.
+"""Labels from the markers of the protocol: closing, locked, disturbance, released.
 
-What a marker says holds until the next one that says something:
+A marker with a known word applies until the next one:
 
-| marker | until the next one |
+| marker | label |
 |---|---|
 | (before the first, if that is `closing`) | no contact |
 | `closing` | unstable, closing |
@@ -13,10 +13,9 @@ What a marker says holds until the next one that says something:
 | `released` | unstable, released; no contact after `opening` |
 | `free` | no contact |
 
-A word that is said again changes nothing. A disturbance is sure where it is said once and its end
-is said; otherwise it is doubtful. A finger that does not touch, by its force, has no contact
-whatever the marker says; where the force tells nothing of contact (tare `first` or `none`), the
-markers alone count.
+A repeated marker changes nothing. A disturbance has a high confidence only if one marker begins it
+and one ends it. A finger without contact by its force is labelled no contact, whatever the markers
+are. If no contact threshold is known (tare `first` or `none`), only the markers count.
 """
 
 import re
@@ -30,7 +29,7 @@ from holdfast.contact import NO_CONTACT, STABLE, UNSTABLE, Cause, ContactState
 from holdfast.errors import RecordingError
 from holdfast.features import Tare
 from holdfast.features.tare import TareArgument
-from holdfast.labelling.rules.base import Drawing, Pen
+from holdfast.labelling.rules.base import LabelWriter, StateTimeline
 from holdfast.labelling.rules.forces import FingerForce, HandForce, hand_force
 from holdfast.metrics.masks import Mask
 from holdfast.recordings import Label, Recording
@@ -46,9 +45,13 @@ WORDS = {
     "released": ("released", "release", "releasing", "open", "opening", "opened"),
     "free": ("free", "empty", "off"),
 }
-"""What a marker may say, in any case, anywhere in its text; the first word that is known counts."""
-ENDS = ("end", "ended", "over", "stop", "stopped", "done", "finished")
-"""A disturbance or slip with one of these words is over: the object is locked again."""
+"""Synonyms of each command in a marker, in any case and position. The first known word counts."""
+END_WORDS = ("end", "ended", "over", "stop", "stopped", "done", "finished")
+"""Words that end a disturbance or slip: the object is locked again."""
+CLEAR_RATIO = 5.0
+"""Evidence ratio of a marker: nine in ten are right."""
+OPEN_ENDED_RATIO = 1.5
+"""Evidence ratio of a disturbance without an end, or with repeated beginnings."""
 
 _STATES: dict[str, tuple[int, Cause | None]] = {
     "closing": (UNSTABLE, Cause.CLOSING),
@@ -59,16 +62,14 @@ _STATES: dict[str, tuple[int, Cause | None]] = {
     "released": (UNSTABLE, Cause.RELEASED),
     "free": (NO_CONTACT, None),
 }
-_SURE = 5.0  # times over a threshold that a marker counts as: nine in ten are right
-_VAGUE = 1.5  # a disturbance without a word of its end, or with many of its begin
 
 
-class Order(NamedTuple):
-    """What a marker says.
+class Command(NamedTuple):
+    """A marker of the protocol.
 
     Attributes:
-        time: from when on [s].
-        word: one of `WORDS`.
+        time: when it begins to apply [s].
+        word: a key of `WORDS`.
     """
 
     time: float
@@ -81,85 +82,89 @@ def propose(
     delay: float = 0.0,
     opening: float = 1.0,
 ) -> dict[str, tuple[Label, ...]]:
-    """Labels by finger from the markers of a recording.
+    """Return labels by finger from the markers of a recording.
 
     Args:
-        recording: with markers, as `holdfast record` keeps them.
-        tare: how the baseline is found, by which the force tells contact.
-        delay: by which whoever set the markers was late [s].
-        opening: how long the hand takes to open [s].
+        recording: with markers, as `holdfast record` writes them.
+        tare: how the baseline is found; the force decides on contact.
+        delay: of the person who set the markers [s].
+        opening: time that the hand takes to open [s].
 
     Raises:
-        RecordingError: no marker that says something, or no tare.
-        ValueError: an unknown tare.
+        RecordingError: no marker has a known word, or no sample for the tare.
+        ValueError: the tare is unknown.
     """
-    orders = [Order(order.time - delay, order.word) for order in orders_of(recording)]
-    if not orders:
+    commands = [Command(each.time - delay, each.word) for each in commands_of(recording)]
+    if not commands:
         raise RecordingError(
             f"recording {recording.name!r} has no marker of the protocol: one of "
             f"{', '.join(WORDS)} expected, it has {_shown(recording)}"
         )
     hand = hand_force(recording, tare)
-    pen = Pen(AUTHOR, _evidence)
+    writer = LabelWriter(AUTHOR, _evidence)
     return {
-        name: pen.labels(_drawing(finger, hand, orders, opening), finger.span)
+        name: writer.labels(_timeline(finger, hand, commands, opening), finger.span)
         for name, finger in hand.fingers.items()
     }
 
 
-def orders_of(recording: Recording) -> list[Order]:
-    """The markers that say something, in order of time; all others are passed over."""
-    found = ((time, word_of(text)) for time, text in sorted(recording.markers))
-    return [Order(time, word) for time, word in found if word]
+def commands_of(recording: Recording) -> list[Command]:
+    """Return the markers with a known word in order of time; others are ignored."""
+    found = ((time, command_word(text)) for time, text in sorted(recording.markers))
+    return [Command(time, word) for time, word in found if word]
 
 
-def word_of(text: str) -> str | None:
-    """What a marker says, as one of `WORDS`; None for any other text.
+def command_word(text: str) -> str | None:
+    """Return the command in the text of a marker, as a key of `WORDS`; None if there is none.
 
     Example:
-        >>> word_of("Hand CLOSING now"), word_of("end of disturbance"), word_of("mark 3")
-        ('closing', 'locked', None)
+        >>> command_word("Hand CLOSING now"), command_word("end of disturbance")
+        ('closing', 'locked')
+        >>> command_word("mark 3") is None
+        True
     """
     words = re.findall(r"[a-z]+", text.lower())
     if "contact" in words and "no" in words:
         return "free"
-    known = {given: word for word, every in WORDS.items() for given in every}
+    known = {synonym: word for word, synonyms in WORDS.items() for synonym in synonyms}
     word = next((known[given] for given in words if given in known), None)
-    if word in ("disturbance", "slip") and any(end in words for end in ENDS):
+    if word in ("disturbance", "slip") and any(end in words for end in END_WORDS):
         return "locked"
     return word
 
 
-def _drawing(finger: FingerForce, hand: HandForce, orders: list[Order], opening: float) -> Drawing:
-    drawing = Drawing.blank(hand.times)
+def _timeline(
+    finger: FingerForce, hand: HandForce, commands: list[Command], opening: float
+) -> StateTimeline:
+    timeline = StateTimeline.unknown(hand.times)
     times, known = hand.times, finger.known
-    if orders[0].word == "closing":
-        drawing.paint(known & (times < orders[0].time), NO_CONTACT, None, _SURE)
-    for one, end, ratio in _spans(orders):
+    if commands[0].word == "closing":
+        timeline.set_state(known & (times < commands[0].time), NO_CONTACT, None, CLEAR_RATIO)
+    for one, end, ratio in _spans(commands):
         state, cause = _STATES[one.word]
         inside = known & (times >= one.time) & (times < end)
-        drawing.paint(inside, state, cause, ratio)
+        timeline.set_state(inside, state, cause, ratio)
         if one.word == "released":
-            drawing.paint(inside & (times >= one.time + opening), NO_CONTACT, None, ratio)
+            timeline.set_state(inside & (times >= one.time + opening), NO_CONTACT, None, ratio)
     if finger.threshold is not None:
-        _correct(drawing, finger, times >= orders[0].time)
-    return drawing
+        _correct_by_force(timeline, finger, times >= commands[0].time)
+    return timeline
 
 
-def _spans(orders: list[Order]) -> Iterator[tuple[Order, float, float]]:
-    """Each order that is not the one before again, until when it holds, and how sure it is."""
-    runs = [list(run) for _, run in groupby(orders, key=lambda order: order.word)]
-    for run, following in pairwise([*runs, [Order(np.inf, "")]]):
-        ended = len(run) == 1 and following[0].word in ("locked", "lost")
-        vague = run[0].word == "disturbance" and not ended
-        yield run[0], following[0].time, _VAGUE if vague else _SURE
+def _spans(commands: list[Command]) -> Iterator[tuple[Command, float, float]]:
+    """Yield each command that is not a repetition, its end [s], and its evidence ratio."""
+    groups = [list(group) for _, group in groupby(commands, key=lambda each: each.word)]
+    for group, following in pairwise([*groups, [Command(np.inf, "")]]):
+        ended = len(group) == 1 and following[0].word in ("locked", "lost")
+        open_ended = group[0].word == "disturbance" and not ended
+        yield group[0], following[0].time, OPEN_ENDED_RATIO if open_ended else CLEAR_RATIO
 
 
-def _correct(drawing: Drawing, finger: FingerForce, told: Mask) -> None:
-    """Lets the force have its say: no contact where there is none, doubt where there is some."""
-    untouched = told & ~finger.contact & np.isin(drawing.codes, (STABLE, UNSTABLE))
-    drawing.paint(untouched, NO_CONTACT, None, _SURE)
-    drawing.ratio[finger.contact & (drawing.codes == NO_CONTACT)] = 1.0
+def _correct_by_force(timeline: StateTimeline, finger: FingerForce, commanded: Mask) -> None:
+    """Label no contact where the force shows none; lower the confidence where it shows contact."""
+    held = np.isin(timeline.codes, (STABLE, UNSTABLE))
+    timeline.set_state(commanded & ~finger.contact & held, NO_CONTACT, None, CLEAR_RATIO)
+    timeline.ratio[finger.contact & (timeline.codes == NO_CONTACT)] = 1.0
 
 
 def _evidence(state: ContactState, cause: Cause | None, ratio: float) -> str:
@@ -168,6 +173,7 @@ def _evidence(state: ContactState, cause: Cause | None, ratio: float) -> str:
 
 
 def _shown(recording: Recording) -> str:
+    """Return the first distinct marker texts."""
     texts = list(dict.fromkeys(text for _, text in recording.markers))
     shown = ", ".join(repr(text[:40]) for text in texts[:6])
     return (shown + (f" and {len(texts) - 6} more" if len(texts) > 6 else "")) or "none"

@@ -1,4 +1,4 @@
-"""The forces of a hand's fingers on one grid of time, and where each of them touches."""
+"""Forces of the fingers of a hand on one time grid, and their contact intervals."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -9,38 +9,37 @@ from scipy.ndimage import maximum_filter1d, minimum_filter1d, uniform_filter1d
 
 from holdfast.contact import MERGE_GAP, MIN_CONTACT_DURATION
 from holdfast.errors import RecordingError
-from holdfast.features import Tare, fingertip_force
-from holdfast.features.tare import TareArgument, baseline_of
+from holdfast.features import Tare
+from holdfast.features.force import tared_force
+from holdfast.features.tare import TareArgument, baseline_of, offline_tare
 from holdfast.metrics.masks import Mask, covered, drop_short_runs, fill_short_gaps, n_samples_of
 from holdfast.recordings import GAP_PERIODS, Recording, Tactile
 from holdfast.sensors.types import Array
 from holdfast.training.design import contact_threshold, rest_moments
 
-SMOOTHING = 0.05
-"""Over which the force is averaged before anything is read off it [s]: its noise goes, a push,
-which lasts 0.2 s and more, stays."""
-SEEN = 0.02
-"""Share of the grip that a person sees on a plot of the recording: less is neither contact, for
-baselines drift, nor a change."""
+FORCE_SMOOTHING_TIME = 0.05
+"""Time over which the force is averaged: short against a push, which lasts 0.2 s or more [s]."""
+VISIBLE_SHARE = 0.02
+"""Share of the grip force that is visible on a plot. Less is neither contact, because baselines
+drift, nor a change."""
 CREEP_LEVEL = 0.2
-"""An elastomer that is let go keeps a part of its load and gives it back slowly. Below this
-share of the grip..."""
+"""Share of the grip force below which a released elastomer may still keep a load (creep)."""
 CREEP_RATE = 0.1
-"""...a force that changes by less than this share of the grip in a second is creep [1/s]."""
+"""Share of the grip force per second below which a change of the force is creep [1/s]."""
 
 
 @dataclass(frozen=True, eq=False)
 class FingerForce:
-    """The force on one finger, on the grid of its hand.
+    """The force on one finger, on the time grid of its hand.
 
     Attributes:
-        force: (n, 3) smoothed, in the finger's frame [unit of the readings].
+        force: (n, 3) smoothed, in the fingertip frame [unit of the readings].
         known: (n,) where there are samples.
-        threshold: F_a from which on there is contact; None where the tare tells nothing of it.
+        threshold: F_a above which there is contact; None if the tare was not without contact.
         noise: standard deviation of a component of the force without contact; 0 if unknown.
         normal: (3,) of the sensor.
         period: of the grid [s].
-        span: first instant and the first after the last [s].
+        span: start of the first sample, and end of the last [s].
     """
 
     force: Array
@@ -58,16 +57,16 @@ class FingerForce:
 
     @cached_property
     def contact(self) -> Mask:
-        """(n,) where it touches; wherever it has samples, if the tare tells nothing of it."""
+        """(n,) where the finger is in contact; without a threshold, where it has samples."""
         if self.threshold is None:
             return self.known
-        touching = self.known & (self.amplitude > max(self.threshold, SEEN * self._grip))
+        touching = self.known & (self.amplitude > max(self.threshold, VISIBLE_SHARE * self._grip))
         n = self._n(MIN_CONTACT_DURATION)
         return drop_short_runs(fill_short_gaps(touching & ~self._creep(), n), n)
 
     @cached_property
     def _grip(self) -> float:
-        """The largest F_a that lasts, in the whole recording: a knock does not."""
+        """The largest F_a of the recording that lasts; a short knock does not."""
         lasting = minimum_filter1d(np.where(self.known, self.amplitude, 0.0), self._n(MERGE_GAP))
         return float(lasting.max())
 
@@ -75,14 +74,14 @@ class FingerForce:
         return n_samples_of(duration, self.period)
 
     def _creep(self) -> Mask:
-        """Where a finger that was loaded only gives back what its skin kept."""
+        """Return where a finger that was loaded only shows the creep of its elastomer."""
         loaded = np.logical_or.accumulate(self.known & (self.amplitude > self._grip / 2))
         rate = np.abs(np.gradient(self.amplitude, self.period))
         slow = _moving_mean(rate, self._n(MIN_CONTACT_DURATION)) < CREEP_RATE * self._grip
         return np.asarray(loaded & slow & (self.amplitude < CREEP_LEVEL * self._grip))
 
     def change(self, window: float) -> Array:
-        """(n,) by how much the force changes within a window about each instant."""
+        """Return (n,) how much the force changes within a window [s] around each instant."""
         n = self._n(window)
         span = maximum_filter1d(self.force, n, axis=0) - minimum_filter1d(self.force, n, axis=0)
         return np.asarray(np.linalg.norm(span, axis=1))
@@ -90,10 +89,10 @@ class FingerForce:
 
 @dataclass(frozen=True, eq=False)
 class HandForce:
-    """The forces of all fingers on one grid.
+    """The forces of all fingers on one time grid.
 
     Attributes:
-        times: (n,) a sample period apart [s].
+        times: (n,) one sample period apart [s].
         period: of the grid [s].
         fingers: by name of the module.
     """
@@ -104,21 +103,21 @@ class HandForce:
 
     @cached_property
     def n_touching(self) -> Array:
-        """(n,) how many fingers touch."""
+        """(n,) number of fingers in contact."""
         touching = [finger.contact for finger in self.fingers.values()]
         return np.asarray(np.sum(touching, axis=0))
 
 
 def hand_force(recording: Recording, tare: TareArgument | Tare = 0.5) -> HandForce:
-    """The forces of a recording's fingers, offline: the tare counts for the time before it too.
+    """Return the forces of a recording's fingers, with the tare subtracted from all samples.
 
     Args:
-        recording: of any sensors; modules that say nothing are left out.
+        recording: with any sensors. Modules without a finite sample in the tare are left out.
         tare: how the baseline is found.
 
     Raises:
-        RecordingError: no module has a finite sample to take the tare from.
-        ValueError: an unknown tare.
+        RecordingError: no module has a finite sample for the tare.
+        ValueError: the tare is unknown.
     """
     how = Tare.parse(tare)
     period = 1 / recording.rate
@@ -126,7 +125,7 @@ def hand_force(recording: Recording, tare: TareArgument | Tare = 0.5) -> HandFor
     fingers = {
         name: _finger(module, how, times, period)
         for name, module in recording.modules.items()
-        if _speaks(module, how)
+        if _has_tare(module, how)
     }
     if not fingers:
         raise RecordingError(
@@ -136,7 +135,7 @@ def hand_force(recording: Recording, tare: TareArgument | Tare = 0.5) -> HandFor
     return HandForce(times, period, fingers)
 
 
-def _speaks(module: Tactile, tare: Tare) -> bool:
+def _has_tare(module: Tactile, tare: Tare) -> bool:
     if module.n_samples < 2:
         return False
     finite = np.isfinite(module.readings).all(axis=(1, 2))
@@ -146,11 +145,11 @@ def _speaks(module: Tactile, tare: Tare) -> bool:
 
 
 def _finger(module: Tactile, tare: Tare, grid: Array, period: float) -> FingerForce:
-    force = fingertip_force(module.readings, module.sensor, _offline(tare, module), module.times)
+    force = tared_force(module, tare, offline=True).force
     finite = np.isfinite(force).all(axis=1)
     times = module.times[finite]
     columns = [np.interp(grid, times, column) for column in force[finite].T]
-    smooth = _moving_mean(np.stack(columns, axis=1), n_samples_of(SMOOTHING, period))
+    smooth = _moving_mean(np.stack(columns, axis=1), n_samples_of(FORCE_SMOOTHING_TIME, period))
     resting = (grid >= times[0]) & (grid < times[0] + tare.seconds)
     return FingerForce(
         force=smooth,
@@ -163,72 +162,61 @@ def _finger(module: Tactile, tare: Tare, grid: Array, period: float) -> FingerFo
     )
 
 
-def _offline(tare: Tare, module: Tactile) -> Tare:
-    """The same baseline for all samples, those that it is taken from among them."""
-    if not tare.without_contact:
-        return tare
-    finite = np.isfinite(module.readings).all(axis=(1, 2))
-    start = float(module.times[int(finite.argmax())])
-    return Tare("interval", interval=(start, start + max(tare.seconds, module.period / 2)))
-
-
 def _threshold(module: Tactile, tare: Tare) -> float | None:
     if not tare.without_contact:
         return None
     return contact_threshold(np.array([rest_moments(module, tare, module.rate)]))
 
 
-def pressed_at(module: Tactile, tare: TareArgument | Tare, hand: HandForce) -> Array:
-    """The centre of pressure of a finger on the grid: its taxels by what presses on them.
+def centre_of_pressure(module: Tactile, tare: TareArgument | Tare, hand: HandForce) -> Array:
+    """Return the centre of pressure of a finger on the grid: taxels weighted by normal readings.
 
     Args:
         module: readings of the finger.
         tare: how the baseline is found.
-        hand: its forces.
+        hand: forces of the hand.
 
     Returns:
-        (n, 3) in the finger's frame [m]; the mean over the recording where nothing presses.
+        (n, 3) in the fingertip frame [m]; the mean over the recording without contact.
     """
-    baseline, _ = baseline_of(
-        np.asarray(module.readings, dtype=np.float64), module.times,
-        _offline(Tare.parse(tare), module), module.period,
-    )  # fmt: skip
-    pressing = np.nan_to_num(np.maximum(module.readings[:, :, 2] - baseline[:, 2], 0.0))
-    load = np.column_stack([pressing @ module.sensor.positions, pressing.sum(axis=1)])
-    smooth = _moving_mean(load, n_samples_of(SMOOTHING, module.period))
+    how = offline_tare(tare, module)
+    baseline, _ = baseline_of(module.readings, module.times, how, module.period)
+    normal = np.nan_to_num(np.maximum(module.readings[:, :, 2] - baseline[:, 2], 0.0))
+    load = np.column_stack([normal @ module.sensor.positions, normal.sum(axis=1)])
+    smooth = _moving_mean(load, n_samples_of(FORCE_SMOOTHING_TIME, module.period))
     mean = load[:, :3].sum(axis=0) / max(load[:, 3].sum(), np.finfo(float).tiny)
-    light = smooth[:, 3] < SEEN * smooth[:, 3].max()
-    place = np.where(light[:, None], mean, smooth[:, :3] / np.maximum(smooth[:, 3:], 1e-300))
-    return np.stack([np.interp(hand.times, module.times, column) for column in place.T], axis=1)
+    light = smooth[:, 3] < VISIBLE_SHARE * smooth[:, 3].max()
+    centre = np.where(light[:, None], mean, smooth[:, :3] / np.maximum(smooth[:, 3:], 1e-300))
+    return np.stack([np.interp(hand.times, module.times, column) for column in centre.T], axis=1)
 
 
-def grip(finger: FingerForce, mask: Mask) -> float:
-    """The finger's usual force in a stretch: the median of F_a where it touches."""
+def grip_force(finger: FingerForce, mask: Mask) -> float:
+    """Return the median of F_a where the mask is True and the finger is in contact; else 0."""
     touching = finger.contact & mask
     return float(np.median(finger.amplitude[touching])) if touching.any() else 0.0
 
 
-def lost_at(hand: HandForce, jump: float = 0.2, times_over: float = 5.0) -> int | None:
-    """The place where the whole hand's normal force drops for good, where it does.
+def final_drop(hand: HandForce, duration: float = 0.2, factor: float = 5.0) -> int | None:
+    """Return the sample at which the normal force of the whole hand drops for good; else None.
 
-    For recordings that begin in contact, where no force tells what none is: it drops within
-    `jump` by many times what it changed by before, and does not come back.
+    This serves recordings that begin in contact, where no threshold of contact is known. Such a
+    drop is much larger than all changes before it, and the force does not rise again.
 
     Args:
-        hand: its forces.
-        jump: in which it drops [s].
-        times_over: how often the spread of the force before.
+        hand: forces of the hand.
+        duration: of the drop [s].
+        factor: least ratio of the drop to the range of the force before it.
     """
-    pressing = np.sum([each.force @ each.normal for each in hand.fingers.values()], axis=0)
-    n = n_samples_of(jump, hand.period)
-    if len(pressing) <= 2 * n:
+    normal = np.sum([each.force @ each.normal for each in hand.fingers.values()], axis=0)
+    n = n_samples_of(duration, hand.period)
+    if len(normal) <= 2 * n:
         return None
-    fall = pressing[:-n] - pressing[n:]
+    fall = normal[:-n] - normal[n:]
     start = int(np.argmax(fall))
-    if start < n or fall[start] <= times_over * np.ptp(np.quantile(pressing[:start], (0.05, 0.95))):
+    if start < n or fall[start] <= factor * np.ptp(np.quantile(normal[:start], (0.05, 0.95))):
         return None
-    stays = pressing[start + n :].max() < pressing[start] - fall[start] / 2
-    middle = start + int(np.argmax(pressing[start:] < pressing[start] - fall[start] / 2))
+    stays = normal[start + n :].max() < normal[start] - fall[start] / 2
+    middle = start + int(np.argmax(normal[start:] < normal[start] - fall[start] / 2))
     return middle if stays else None
 
 

@@ -1,4 +1,4 @@
-"""How an object moves against what holds it: relative poses, speeds, and their noise."""
+"""Motion of an object relative to a fingertip: poses, speeds, their noise, and clock offsets."""
 
 from dataclasses import dataclass
 from typing import NamedTuple
@@ -7,27 +7,31 @@ import numpy as np
 from scipy.ndimage import convolve1d
 from scipy.spatial.transform import Rotation
 
-from holdfast.labelling.rules.poses import Track
+from holdfast.labelling.rules.poses import PoseTrack
 from holdfast.metrics.masks import Mask, covered, n_samples_of
 from holdfast.sensors.types import Array
 
-BRIDGED = 0.1
-"""Gaps in the poses that are bridged [s]."""
-SMOOTHING = 0.15
-"""Over which a straight line is laid through the poses to read their speed [s]."""
+MAX_POSE_GAP = 0.1
+"""Longest gap between poses that is interpolated [s]."""
+SPEED_WINDOW = 0.15
+"""Length of the straight line that is fitted to the poses for their speed [s]."""
+MAX_CLOCK_OFFSET = 0.5
+"""Largest clock offset that is tried, in both directions [s]."""
+MIN_CORRELATION = 0.3
+"""Correlation from which two signals are taken to show the same motion."""
 
 
 @dataclass(frozen=True, eq=False)
-class Motion:
-    """The object's pose in the frame of what holds it, on a grid, and how fast it changes.
+class RelativeMotion:
+    """Pose of an object in another body's frame on a time grid, and its speed.
 
     Attributes:
         position: (n, 3) [m].
-        matrix: (n, 3, 3) its rotation; near enough, where poses are interpolated.
+        matrix: (n, 3, 3) rotation; approximate between poses.
         speed: (n,) of the object's material at the contact [m/s]; NaN without poses.
-        spin: (n,) [rad/s]; NaN without poses.
-        speed_noise: standard deviation that the jitter of the poses gives a body at rest [m/s].
-        spin_noise: the same [rad/s].
+        spin: (n,) angular speed [rad/s]; NaN without poses.
+        speed_noise: standard deviation of the speed of a body at rest, from pose noise [m/s].
+        spin_noise: standard deviation of its spin [rad/s].
         known: (n,) where there are poses.
     """
 
@@ -39,48 +43,75 @@ class Motion:
     spin_noise: float
     known: Mask
 
-    def away_from(self, place: Array, turn: Array, point: Array | None) -> tuple[Array, Array]:
-        """How far it is from a pose: its material at the contact (n,) [m], and turned (n,) [rad].
+    def away_from(self, position: Array, matrix: Array, point: Array | None) -> tuple[Array, Array]:
+        """Return the distance (n,) [m] and the angle (n,) [rad] from a reference pose.
+
+        The distance is that of the object's material at the contact.
 
         Args:
-            place: (3,) position to measure from [m].
-            turn: (3, 3) rotation to measure from.
-            point: (3,) of the contact [m]; None for the object's own origin.
+            position: (3,) of the reference pose [m].
+            matrix: (3, 3) rotation of the reference pose.
+            point: (3,) of the contact [m]; None for the origin of the object.
         """
-        inside = np.zeros(3) if point is None else turn.T @ (point - place)
-        moved = self.position - place + (self.matrix - turn) @ inside
-        chord = np.linalg.norm(self.matrix - turn, axis=(1, 2)) / np.sqrt(8)
+        lever = np.zeros(3) if point is None else matrix.T @ (point - position)
+        moved = self.position - position + (self.matrix - matrix) @ lever
+        chord = np.linalg.norm(self.matrix - matrix, axis=(1, 2)) / np.sqrt(8)
         return np.linalg.norm(moved, axis=1), 2 * np.arcsin(np.minimum(chord, 1.0))
 
 
-def relative(thing: Track, tip: Track | None) -> Track:
-    """The object's pose in the frame of the fingertip, at the times of the object's poses.
+class ClockOffset(NamedTuple):
+    """Time that is added to one clock to get the time of another.
 
-    Poses of the fingertip are linear between theirs.
+    Attributes:
+        seconds: the offset [s]; 0 if the correlation is too low at every offset.
+        correlation: of the two signals at that offset, from -1 to 1.
     """
-    if tip is None:
-        return thing
-    here = _at(tip, thing.times)
-    seen = thing.seen & here.seen
-    positions, quaternions = np.full((len(seen), 3), np.nan), np.full((len(seen), 4), np.nan)
-    back = _rotation(here.quaternions[seen]).inv()
-    positions[seen] = back.apply(thing.positions[seen] - here.positions[seen])
-    turned = back * _rotation(thing.quaternions[seen])
-    quaternions[seen] = np.roll(turned.as_quat(), 1, axis=1)
-    return Track(thing.times, positions, quaternions)
+
+    seconds: float
+    correlation: float
+
+    @property
+    def reliable(self) -> bool:
+        """Whether the correlation is high enough."""
+        return self.correlation >= MIN_CORRELATION
 
 
-def motion_of(track: Track, grid: Array, point: Array | None = None, offset: float = 0.0) -> Motion:
-    """The motion of an object against a frame, on a grid of time.
+def relative_track(body: PoseTrack, reference: PoseTrack | None) -> PoseTrack:
+    """Return the poses of a body in the frame of a reference body, at the times of the body.
 
-    The rotation is taken as a matrix of nine numbers: their rates of change give the spin, and
-    with it the speed of the material at the contact, v = dp/dt + dR/dt u, whatever the angle.
+    Poses of the reference are interpolated linearly.
 
     Args:
-        track: of the object, in that frame; in sight twice at least.
+        body: poses of the body.
+        reference: poses of the reference; None if the body is already in its frame.
+    """
+    if reference is None:
+        return body
+    frame = _interpolated(reference, body.times)
+    seen = body.seen & frame.seen
+    positions, quaternions = np.full((len(seen), 3), np.nan), np.full((len(seen), 4), np.nan)
+    inverse = _rotation(frame.quaternions[seen]).inv()
+    positions[seen] = inverse.apply(body.positions[seen] - frame.positions[seen])
+    turned = inverse * _rotation(body.quaternions[seen])
+    quaternions[seen] = np.roll(turned.as_quat(), 1, axis=1)
+    return PoseTrack(body.times, positions, quaternions)
+
+
+def motion_of(
+    track: PoseTrack, grid: Array, point: Array | None = None, offset: float = 0.0
+) -> RelativeMotion:
+    """Return the motion of a body on a time grid.
+
+    The rates of change of the nine elements of the rotation matrix R give the spin, and with the
+    position p the velocity of the material at the contact, at any angle:
+
+        v = dp/dt + dR/dt u, u the contact in the frame of the body
+
+    Args:
+        track: poses of the body; at least two are in sight.
         grid: (n,) [s].
-        point: (n, 3) of the contact, in that frame [m]; None for the object's own origin.
-        offset: by which the clock of the poses is behind that of the grid [s].
+        point: (n, 3) of the contact, in the frame of the poses [m]; None for the body's origin.
+        offset: added to the times of the poses [s].
     """
     seen = track.seen
     times = track.times[seen] + offset
@@ -89,65 +120,85 @@ def motion_of(track: Track, grid: Array, point: Array | None = None, offset: flo
     period = float(grid[1] - grid[0])
     pose = np.stack([np.interp(grid, times, column) for column in numbers.T], axis=1)
     rate = slope(pose, period)
-    place, turn = pose[:, :3], pose[:, 3:].reshape(-1, 3, 3)
-    inside = np.zeros_like(place)
+    position, matrix = pose[:, :3], pose[:, 3:].reshape(-1, 3, 3)
+    lever = np.zeros_like(position)
     if point is not None:
-        inside = np.einsum("nji,nj->ni", turn, point - place)
-    velocity = rate[:, :3] + np.einsum("nij,nj->ni", rate[:, 3:].reshape(-1, 3, 3), inside)
-    known = covered(grid, times, BRIDGED)
-    jitter = _slope_noise(numbers, float(np.median(np.diff(times))))
-    lever = float(np.median(np.linalg.norm(inside, axis=1)))
-    spin_noise = float(np.linalg.norm(jitter[3:]) / np.sqrt(2))
-    return Motion(
-        position=place,
-        matrix=turn,
+        lever = np.einsum("nji,nj->ni", matrix, point - position)
+    velocity = rate[:, :3] + np.einsum("nij,nj->ni", rate[:, 3:].reshape(-1, 3, 3), lever)
+    known = covered(grid, times, MAX_POSE_GAP)
+    noise = _slope_noise(numbers, float(np.median(np.diff(times))))
+    lever_length = float(np.median(np.linalg.norm(lever, axis=1)))
+    spin_noise = float(np.linalg.norm(noise[3:]) / np.sqrt(2))
+    return RelativeMotion(
+        position=position,
+        matrix=matrix,
         speed=np.where(known, np.linalg.norm(velocity, axis=1), np.nan),
         spin=np.where(known, np.linalg.norm(rate[:, 3:], axis=1) / np.sqrt(2), np.nan),
-        speed_noise=float(np.hypot(np.linalg.norm(jitter[:3]), lever * spin_noise)),
+        speed_noise=float(np.hypot(np.linalg.norm(noise[:3]), lever_length * spin_noise)),
         spin_noise=spin_noise,
         known=known,
     )
 
 
 def slope(values: Array, period: float) -> Array:
-    """(n, k) rate of change: that of the straight line through SMOOTHING about each sample."""
-    half = max(n_samples_of(SMOOTHING, period) // 2, 1)
-    places = np.arange(-half, half + 1)
-    weights = places / ((places**2).sum() * period)
+    """Return (n, k) rates of change: slopes of lines fitted over SPEED_WINDOW around a sample."""
+    half = max(n_samples_of(SPEED_WINDOW, period) // 2, 1)
+    steps = np.arange(-half, half + 1)
+    weights = steps / ((steps**2).sum() * period)
     return np.asarray(convolve1d(values, weights[::-1], axis=0, mode="nearest"))
 
 
-def _slope_noise(values: Array, step: float) -> Array:
-    """(k,) standard deviation of the slope that jitter alone makes.
+def clock_offset(seen: Array, felt: Array, known: Mask, period: float) -> ClockOffset:
+    """Return the offset of the clock of poses against the clock of tactile samples.
 
-    The jitter is read off second differences, to which smooth motion adds little; their median
-    is that of the calmer half, and so of rest.
+    Ranks of the two signals are correlated at every offset, so that one large peak does not
+    dominate the result.
+
+    Args:
+        seen: (n,) speed by the poses, at least 0, on the grid.
+        felt: (n,) change of the force, at least 0, on the grid.
+        known: (n,) where there are poses.
+        period: of the grid [s].
+    """
+    reach = min(round(MAX_CLOCK_OFFSET / period), len(seen) // 2)
+    a, b = _ranks(seen, known), _ranks(felt, np.ones_like(known))
+    found = [
+        (_correlation(a, b, known, shift), -abs(shift), shift) for shift in range(-reach, reach + 1)
+    ]
+    correlation, _, shift = max(found)
+    return ClockOffset(shift * period if correlation >= MIN_CORRELATION else 0.0, correlation)
+
+
+def _slope_noise(values: Array, step: float) -> Array:
+    """Return (k,) standard deviations of the slope from pose noise alone.
+
+    Smooth motion adds little to second differences, and the median is that of the calmer half.
     """
     if len(values) < 3:
         return np.zeros(values.shape[1])
     second = values[2:] - 2 * values[1:-1] + values[:-2]
-    jitter = np.median(np.abs(second), axis=0) / (0.6745 * np.sqrt(6))
-    half = max(n_samples_of(SMOOTHING, step) // 2, 1)
-    return np.asarray(jitter / (step * np.sqrt((np.arange(-half, half + 1) ** 2).sum())))
+    noise = np.median(np.abs(second), axis=0) / (0.6745 * np.sqrt(6))
+    half = max(n_samples_of(SPEED_WINDOW, step) // 2, 1)
+    return np.asarray(noise / (step * np.sqrt((np.arange(-half, half + 1) ** 2).sum())))
 
 
-def _at(track: Track, times: Array) -> Track:
-    """The track at other times; NaN where its poses are further apart than BRIDGED."""
+def _interpolated(track: PoseTrack, times: Array) -> PoseTrack:
+    """Return the track at other times; NaN in gaps longer than MAX_POSE_GAP."""
     seen = track.seen
-    known = covered(times, track.times[seen], BRIDGED)
+    known = covered(times, track.times[seen], MAX_POSE_GAP)
     positions, quaternions = np.full((len(times), 3), np.nan), np.full((len(times), 4), np.nan)
     if known.any():
         own = track.times[seen]
         values = np.concatenate([track.positions[seen], _continuous(track.quaternions[seen])], 1)
-        there = np.stack([np.interp(times, own, column) for column in values.T], axis=1)
-        positions[known] = there[known, :3]
-        turns = there[known, 3:]
+        between = np.stack([np.interp(times, own, column) for column in values.T], axis=1)
+        positions[known] = between[known, :3]
+        turns = between[known, 3:]
         quaternions[known] = turns / np.linalg.norm(turns, axis=1, keepdims=True)
-    return Track(times, positions, quaternions)
+    return PoseTrack(times, positions, quaternions)
 
 
 def _continuous(quaternions: Array) -> Array:
-    """The same rotations, each by the quaternion that is nearer to the one before."""
+    """Return the same rotations with signs such that neighbours are close to each other."""
     flips = np.sign((quaternions[1:] * quaternions[:-1]).sum(axis=1))
     signs = np.concatenate([[1.0], np.cumprod(np.where(flips == 0, 1.0, flips))])
     return np.asarray(quaternions * signs[:, None])
@@ -157,59 +208,17 @@ def _rotation(quaternions: Array) -> Rotation:
     return Rotation.from_quat(np.roll(quaternions, -1, axis=-1))
 
 
-FARTHEST = 0.5
-"""Offsets that are tried, to both sides [s]."""
-ALIKE = 0.3
-"""Correlation from which on the two are believed to show the same motion."""
-
-
-class Offset(NamedTuple):
-    """What is added to the times of one to have them on the clock of the other.
-
-    Attributes:
-        seconds: the offset [s]; 0 where the two are not alike at any.
-        alike: their correlation there, from -1 to 1.
-    """
-
-    seconds: float
-    alike: float
-
-    @property
-    def believed(self) -> bool:
-        """Whether the two are alike enough to believe it."""
-        return self.alike >= ALIKE
-
-
-def offset_of(seen: Array, felt: Array, known: Mask, period: float) -> Offset:
-    """By how much what was seen is behind what was felt, on one grid.
-
-    The logarithms of both are compared, by the correlation of ranks in all but name: one huge
-    knock must not outvote all else.
-
-    Args:
-        seen: (n,) how much moved, at least 0.
-        felt: (n,) how much was felt, at least 0.
-        known: (n,) where something was seen.
-        period: of the grid [s].
-    """
-    reach = min(round(FARTHEST / period), len(seen) // 2)
-    a, b = _level(seen, known), _level(felt, np.ones_like(known))
-    found = [(_alike(a, b, known, shift), -abs(shift), shift) for shift in range(-reach, reach + 1)]
-    alike, _, shift = max(found)
-    return Offset(shift * period if alike >= ALIKE else 0.0, alike)
-
-
-def _level(values: Array, known: Mask) -> Array:
-    """Ranks between 0 and 1 where values are known; 0 elsewhere."""
-    level = np.zeros(len(values))
+def _ranks(values: Array, known: Mask) -> Array:
+    """Return ranks between 0 and 1 where values are known; 0 elsewhere."""
+    ranks = np.zeros(len(values))
     inside = values[known]
     order = np.argsort(np.argsort(inside, kind="stable"), kind="stable")
-    level[known] = order / max(len(inside) - 1, 1)
-    return level
+    ranks[known] = order / max(len(inside) - 1, 1)
+    return ranks
 
 
-def _alike(a: Array, b: Array, known: Mask, shift: int) -> float:
-    """The correlation of a, later by `shift` samples, with b."""
+def _correlation(a: Array, b: Array, known: Mask, shift: int) -> float:
+    """Return the correlation of b with a delayed by `shift` samples."""
     n = len(a)
     first, last = max(0, -shift), min(n, n - shift)
     mask = known[first:last]

@@ -17,10 +17,10 @@ from holdfast.sensors.types import Array
 OBJECT = "object"
 """Name of the object among the bodies of a file."""
 COLUMNS = ("time", "x", "y", "z", "qw", "qx", "qy", "qz")
-"""Of a CSV file of poses: [s], [m], and a unit quaternion; a column `body` may name whose."""
-SENTINEL = 10.0
-"""A marker at (10, 10, 10) m is out of sight: trackers put it there."""
-FROZEN = 0.1
+"""Columns of a CSV file of poses: [s], [m], unit quaternion. Column `body` is optional."""
+LOST_COORDINATE = 10.0
+"""Coordinates that trackers report for a marker out of sight [m]."""
+MAX_REPEAT_TIME = 0.1
 """A measured pose that repeats to the last digit for longer than this is out of sight [s]."""
 EXPECTED = (
     "truth with object_pose and tip_pose, or marker_pose, or a CSV file or a bag with poses "
@@ -29,16 +29,16 @@ EXPECTED = (
 
 
 @dataclass(frozen=True, eq=False)
-class Track:
-    """Where a body is over time.
+class PoseTrack:
+    """Poses of a body over time.
 
     Attributes:
         times: (n,) strictly increasing [s].
-        positions: (n, 3) [m]; NaN where it is out of sight.
-        quaternions: (n, 4) w x y z; NaN where it is out of sight.
+        positions: (n, 3) [m]; NaN while the body is out of sight.
+        quaternions: (n, 4) w x y z; NaN while the body is out of sight.
 
     Raises:
-        RecordingError: shapes or times contradict each other.
+        RecordingError: shapes or times are invalid.
     """
 
     times: Array
@@ -53,7 +53,7 @@ class Track:
                 f"{self.positions.shape} and {self.quaternions.shape} given"
             )
         if not (np.isfinite(self.times).all() and (np.diff(self.times) > 0).all()):
-            raise RecordingError("times of poses are finite and strictly increasing")
+            raise RecordingError("times of poses must be finite and strictly increasing")
 
     @property
     def seen(self) -> Mask:
@@ -64,31 +64,31 @@ class Track:
 
 @dataclass(frozen=True, eq=False)
 class Poses:
-    """Tracks of an object and of what holds it, in one frame.
+    """Tracks of an object and of the fingertips that hold it, in one frame.
 
     Attributes:
         source: where they come from, for a person.
-        thing: the object.
-        tips: fingertips by name; a finger that is not named moves with the frame itself, as
-            where a camera on the wrist sees the object.
-        same_clock: whether their times are on the clock of the recording for certain.
+        object_track: of the object.
+        tip_tracks: of fingertips, by finger. Empty if the fingers do not move in the frame of the
+            poses, as with a camera on the wrist.
+        same_clock: whether the times are known to be on the clock of the recording.
     """
 
     source: str
-    thing: Track
-    tips: Mapping[str, Track] = field(default_factory=dict)
+    object_track: PoseTrack
+    tip_tracks: Mapping[str, PoseTrack] = field(default_factory=dict)
     same_clock: bool = True
 
 
 def poses_of(recording: Recording, tracking: str | Path | Poses | None = None) -> Poses:
-    """The poses for a recording: those given, or what its truth holds.
+    """Return the given poses, or the poses in the truth of a recording.
 
     Args:
-        recording: whose truth is taken where nothing is given.
+        recording: its truth is used if nothing is given.
         tracking: path of a CSV file, or poses.
 
     Raises:
-        RecordingError: there are none, or the file cannot be read.
+        RecordingError: there are no poses, or the file cannot be read.
     """
     if isinstance(tracking, Poses):
         return tracking
@@ -98,10 +98,10 @@ def poses_of(recording: Recording, tracking: str | Path | Poses | None = None) -
 
 
 def poses_from_truth(recording: Recording) -> Poses:
-    """Poses out of `truth`: `object_pose` and `tip_pose`, or `marker_pose` in the hand's frame.
+    """Return poses from `truth`: `object_pose` and `tip_pose`, or `marker_pose` in the hand frame.
 
     Raises:
-        RecordingError: it has neither.
+        RecordingError: the truth has neither.
     """
     truth = recording.truth
     if truth is not None and "object_pose" in truth.hand:
@@ -113,17 +113,17 @@ def poses_from_truth(recording: Recording) -> Poses:
             return Poses("truth", _track(truth.times, truth.hand["object_pose"]), tracks)
     if truth is not None and "marker_pose" in truth.hand:
         return Poses("marker_pose", in_sight(_track(truth.times, truth.hand["marker_pose"])))
-    raise RecordingError(f"no poses in {recording.name!r}: it has {_has(truth)}; {EXPECTED}")
+    raise RecordingError(f"no poses in {recording.name!r}: it has {_contents(truth)}; {EXPECTED}")
 
 
 def poses_from_csv(path: str | Path) -> Poses:
-    """Poses out of a CSV file with the columns time,x,y,z,qw,qx,qy,qz and maybe body.
+    """Read poses from a CSV file with columns time,x,y,z,qw,qx,qy,qz and optionally body.
 
-    The body `object` is the object, the others are fingertips, called as the recording calls
-    its fingers. Without a column `body`, all rows are the object's, in the frame of the hand.
+    The body `object` is the object. Other bodies are fingertips, with the finger names of the
+    recording. Without a column `body` all rows are of the object, in the frame of the hand.
 
     Raises:
-        RecordingError: it cannot be read, a column is missing, or no row is the object's.
+        RecordingError: the file cannot be read, or a column or the object is missing.
     """
     table, text = read_table(Path(path), text=("body",))
     values = table.columns(COLUMNS)
@@ -132,97 +132,102 @@ def poses_from_csv(path: str | Path) -> Poses:
         raise RecordingError(
             f"{path}: no body {OBJECT!r}; it has {', '.join(sorted(set(bodies.tolist())))}"
         )
-    tracks = {str(body): _of_rows(values[bodies == body], path) for body in np.unique(bodies)}
-    thing = tracks.pop(OBJECT)
-    return Poses(Path(path).name, thing, tracks, same_clock=False)
+    return _measured({str(body): values[bodies == body] for body in np.unique(bodies)}, Path(path))
 
 
-def poses_from_bag(path: str | Path, thing: str, tips: Mapping[str, str] | None = None) -> Poses:
-    """Poses out of a bag of ROS 1 or 2: topics of PoseStamped, or frames of TFMessage.
+def poses_from_bag(
+    path: str | Path, object_name: str, tip_names: Mapping[str, str] | None = None
+) -> Poses:
+    """Read poses from a bag of ROS 1 or ROS 2: topics of PoseStamped, or frames of TFMessage.
 
-    A name with a slash at its beginning is a topic of `geometry_msgs/PoseStamped`; any other is
-    a child frame in `tf2_msgs/TFMessage`. All must have one parent frame.
+    A name that begins with a slash is a topic of `geometry_msgs/PoseStamped`. Any other name is a
+    child frame of `tf2_msgs/TFMessage`. All must have the same parent frame.
 
     Args:
         path: of the bag.
-        thing: topic or frame of the object.
-        tips: topic or frame of each fingertip.
+        object_name: topic or frame of the object.
+        tip_names: topic or frame of each fingertip, by finger.
 
     Raises:
-        RecordingError: it cannot be read, a topic or frame is not there, or parents differ.
+        RecordingError: the bag cannot be read, a topic or frame is missing, or parents differ.
         MissingExtra: rosbags is not installed.
     """
     from holdfast.io.bags import read_poses
 
-    wanted = {OBJECT: thing, **(tips or {})}
-    poses = read_poses(Path(path), wanted)
-    tracks = {body: _of_rows(rows, path) for body, rows in poses.items()}
-    thing_track = tracks.pop(OBJECT)
-    return Poses(Path(path).name, thing_track, tracks, same_clock=False)
+    names = {OBJECT: object_name, **(tip_names or {})}
+    return _measured(read_poses(Path(path), names), Path(path))
 
 
-def in_sight(track: Track) -> Track:
-    """The track without poses that are none: at the sentinel, frozen, or not of unit length.
+def in_sight(track: PoseTrack) -> PoseTrack:
+    """Return the track with NaN for invalid poses.
 
-    Measured poses tremble: what repeats to the last digit for longer than FROZEN is what a
-    tracker says of a body that it has lost.
+    A pose is invalid at LOST_COORDINATE, without a unit quaternion, or if it repeats to the last
+    digit for longer than MAX_REPEAT_TIME: measured poses have noise.
     """
     pose = np.concatenate([track.positions, track.quaternions], axis=1)
     length = np.linalg.norm(track.quaternions, axis=1)
-    bad = (track.positions == SENTINEL).all(axis=1) | ~(np.abs(length - 1) < 0.1)
+    bad = (track.positions == LOST_COORDINATE).all(axis=1) | ~(np.abs(length - 1) < 0.1)
     repeats = np.concatenate([[False], (pose[1:] == pose[:-1]).all(axis=1)])
     for start, end in runs(repeats):
-        if track.times[end - 1] - track.times[start - 1] > FROZEN:
+        if track.times[end - 1] - track.times[start - 1] > MAX_REPEAT_TIME:
             bad[start - 1 : end] = True
     keep = ~bad[:, None]
-    return Track(
+    return PoseTrack(
         track.times,
         np.where(keep, track.positions, np.nan),
         np.where(keep, track.quaternions / np.where(keep, length[:, None], 1.0), np.nan),
     )
 
 
-def _track(times: Array, pose: npt.NDArray[np.generic]) -> Track:
+def tip_tracks_of(poses: Poses, fingers: Sequence[str]) -> dict[str, PoseTrack | None]:
+    """Return the fingers that the poses apply to, with their tracks; None for the frame itself.
+
+    Raises:
+        RecordingError: there are poses of fingertips, but none of these fingers.
+    """
+    if not poses.tip_tracks:
+        return dict.fromkeys(fingers)
+    tips = poses.tip_tracks
+    known: dict[str, PoseTrack | None] = {f: tips[f] for f in fingers if f in tips}
+    if not known:
+        raise RecordingError(
+            f"{poses.source} has poses of {', '.join(tips)}; "
+            f"the recording's fingers are {', '.join(fingers)}"
+        )
+    return known
+
+
+def _track(times: Array, pose: npt.NDArray[np.generic]) -> PoseTrack:
     values = np.asarray(pose, dtype=np.float64)
     if values.shape[1:] != (7,):
         raise RecordingError(
             f"poses of shape (n, 7) expected, position and quaternion w x y z; {values.shape} given"
         )
-    return Track(times, values[:, :3], values[:, 3:])
+    return PoseTrack(times, values[:, :3], values[:, 3:])
 
 
-def _of_rows(rows: Array, path: str | Path) -> Track:
-    """A measured track from rows of time and pose; of equal times the first is kept."""
+def _measured(rows: Mapping[str, Array], path: Path) -> Poses:
+    """Return poses from rows of time and pose by body, on a clock of their own."""
+    tracks = {body: _measured_track(own, path) for body, own in rows.items()}
+    object_track = tracks.pop(OBJECT)
+    return Poses(path.name, object_track, tracks, same_clock=False)
+
+
+def _measured_track(rows: Array, path: Path) -> PoseTrack:
+    """Return a track from rows of time and pose; of equal times the first is kept."""
     timed = rows[np.isfinite(rows[:, 0])]
     _, first = np.unique(timed[:, 0], return_index=True)
     track = in_sight(_track(timed[first, 0], timed[first, 1:]))
     if not track.seen.any():
         raise RecordingError(
-            f"{path}: no pose of {len(rows)} rows is one; positions [m] and unit quaternions "
+            f"{path}: no valid pose in {len(rows)} rows; positions [m] and unit quaternions "
             "qw, qx, qy, qz expected"
         )
     return track
 
 
-def _has(truth: Truth | None) -> str:
+def _contents(truth: Truth | None) -> str:
     if truth is None:
         return "no truth"
     names: Iterator[str] = chain(truth.hand, *truth.fingers.values())
     return f"{', '.join(sorted(set(names))) or 'nothing'} in its truth"
-
-
-def names_of(poses: Poses, fingers: Sequence[str]) -> dict[str, Track | None]:
-    """The fingers that the poses speak of, with the track of each; None for the frame itself.
-
-    Raises:
-        RecordingError: they have fingertips, but none that the recording has.
-    """
-    if not poses.tips:
-        return dict.fromkeys(fingers)
-    known: dict[str, Track | None] = {f: poses.tips[f] for f in fingers if f in poses.tips}
-    if not known:
-        raise RecordingError(
-            f"{poses.source} has poses of {', '.join(poses.tips)}; "
-            f"the recording's fingers are {', '.join(fingers)}"
-        )
-    return known

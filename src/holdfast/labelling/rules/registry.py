@@ -8,26 +8,26 @@ from holdfast.labelling.rules import command, signal, tracking
 from holdfast.recordings import Label, Recording
 
 RULES = {
-    "signal": "the force alone, as a person reads it off its plot",
-    "tracking": "the motion of the object against the fingertips, by their poses",
-    "command": "the protocol's markers: closing, locked, disturbance, released",
+    "signal": "the force alone, as a person reads it from its plot",
+    "tracking": "the motion of the object relative to the fingertips, from their poses",
+    "command": "the markers of the protocol: closing, locked, disturbance, released",
 }
-"""What each rule rests on, in one line."""
+"""The evidence of each rule, in one line."""
 
 
 class _Rule(NamedTuple):
-    """How a rule is asked, and the value that holds its limits, where it has some."""
+    """The function of a rule, and the dataclass of its thresholds, if it has one."""
 
     propose: Callable[..., dict[str, tuple[Label, ...]]]
-    limits: type | None = None
+    thresholds: type | None = None
 
     @property
     def arguments(self) -> list[str]:
         return [name for name in list(signature(self.propose).parameters)[1:] if name != "rule"]
 
     @property
-    def limit_names(self) -> list[str]:
-        return [] if self.limits is None else list(signature(self.limits).parameters)
+    def threshold_names(self) -> list[str]:
+        return [] if self.thresholds is None else list(signature(self.thresholds).parameters)
 
 
 _RULES = {
@@ -42,28 +42,29 @@ def propose(
     recording: Recording,
     **parameters: Any,  # noqa: ANN401 (each rule has its own)
 ) -> dict[str, tuple[Label, ...]]:
-    """Labels by finger that a rule proposes, with its evidence and confidence.
+    """Return the labels that a rule proposes, by finger, with evidence and confidence.
 
     Args:
         rule: one of `RULES`.
-        recording: whose labels are not looked at.
-        parameters: arguments of the rule's own `propose`, and its limits: the fields of
-            `SignalRule` or `TrackingRule`.
+        recording: the recording. Its labels are ignored.
+        parameters: arguments of the function `propose` of the rule, and fields of its `SignalRule`
+            or `TrackingRule`.
 
     Raises:
-        RecordingError: the recording has not what the rule rests on.
-        ValueError: an unknown rule or parameter, or a value that it does not take.
+        RecordingError: the recording lacks what the rule needs.
+        ValueError: the rule, a parameter or its value is invalid.
     """
     if rule not in _RULES:
         raise ValueError(f"unknown rule {rule!r}; there are {', '.join(RULES)}")
-    asked = _RULES[rule]
-    known = [*asked.arguments, *asked.limit_names]
+    chosen = _RULES[rule]
+    known = [*chosen.arguments, *chosen.threshold_names]
     if unknown := sorted(set(parameters) - set(known)):
         raise ValueError(
-            f"rule {rule!r} knows no {', '.join(unknown)}; its parameters are {', '.join(known)}"
+            f"rule {rule!r} has no parameter {', '.join(unknown)}; "
+            f"its parameters are {', '.join(known)}"
         )
-    arguments = {name: value for name, value in parameters.items() if name in asked.arguments}
-    if asked.limits is not None:
-        chosen = {name: value for name, value in parameters.items() if name in asked.limit_names}
-        arguments["rule"] = asked.limits(**chosen)
-    return asked.propose(recording, **arguments)
+    arguments = {name: value for name, value in parameters.items() if name in chosen.arguments}
+    if chosen.thresholds is not None:
+        given = {name: parameters[name] for name in chosen.threshold_names if name in parameters}
+        arguments["rule"] = chosen.thresholds(**given)
+    return chosen.propose(recording, **arguments)

@@ -1,7 +1,7 @@
-"""Labels from poses: does the object move against the fingertip that touches it?
+"""Labels from poses: whether the object moves relative to the fingertip that touches it.
 
-The paper's own proposal for what comes after labels drawn by hand: markers on the fingertips
-and on the object, and their relative movement.
+The paper proposes this as a successor of labels by hand: markers on the fingertips and on the
+object, and their relative motion.
 """
 
 from collections.abc import Mapping
@@ -24,17 +24,28 @@ from holdfast.contact import (
 from holdfast.errors import RecordingError
 from holdfast.features import Tare
 from holdfast.features.tare import TareArgument
-from holdfast.labelling.rules.base import Drawing, Pen, check_positive
-from holdfast.labelling.rules.forces import FingerForce, HandForce, hand_force, lost_at, pressed_at
-from holdfast.labelling.rules.motion import (
-    SMOOTHING,
-    Motion,
-    Offset,
-    motion_of,
-    offset_of,
-    relative,
+from holdfast.labelling.rules.base import (
+    EvidenceText,
+    LabelWriter,
+    StateTimeline,
+    check_positive,
 )
-from holdfast.labelling.rules.poses import Poses, Track, names_of, poses_of
+from holdfast.labelling.rules.forces import (
+    FingerForce,
+    HandForce,
+    centre_of_pressure,
+    final_drop,
+    hand_force,
+)
+from holdfast.labelling.rules.motion import (
+    SPEED_WINDOW,
+    ClockOffset,
+    RelativeMotion,
+    clock_offset,
+    motion_of,
+    relative_track,
+)
+from holdfast.labelling.rules.poses import Poses, PoseTrack, poses_of, tip_tracks_of
 from holdfast.metrics.masks import (
     Mask,
     drop_short_runs,
@@ -48,41 +59,44 @@ from holdfast.recordings import Label, Recording
 from holdfast.sensors.types import Array
 
 AUTHOR = "rule:tracking"
-NOISE_TIMES = 5.0
-"""Standard deviations of the speed of a body at rest that no threshold may be below."""
-GONE = 0.5
-"""An object that is out of sight for so long after the force has ended is lost [s]; and where it
-was out of sight before, it was being lost for so long at most."""
-LOST_TIMES = 2.0
-"""Times over a threshold that the end of the force without the object in sight counts as."""
-REST = 0.3
-"""For how long nothing moves before the pose counts as that of the grasp [s]."""
+NOISE_FACTOR = 5.0
+"""Least threshold of a speed, in standard deviations of the speed of a body at rest."""
+LOSS_TIME = 0.5
+"""An object that is out of sight for this time after the force has ended is lost. If it was out of
+sight before that, the loss began at most this time before the end of the force [s]."""
+LOSS_RATIO = 2.0
+"""Evidence ratio of a loss that is inferred from the end of the force."""
+GRASP_REST_TIME = 0.3
+"""Time without motion that defines the pose of the grasp [s]."""
+SPIN_LEVER = 0.01
+"""Distance from the centre of the contact at which spin counts as sliding: the edge of the contact
+patch of a fingertip [m]."""
+TINY_RATIO = 1e-9
 
 
 @dataclass(frozen=True)
 class TrackingRule:
-    """What counts as motion of the object against a fingertip.
+    """Thresholds of the motion of an object relative to a fingertip.
 
     Attributes:
-        measure: `speed`: it is moving; `displacement`: it has moved since it was grasped, and
-            has not come back.
-        speed: of the material at the contact from which on it slides [m/s].
-        spin: from which on it turns [rad/s]; by default the same speed 1 cm beside the centre of
-            the contact, the edge of a fingertip's patch.
-        distance: for `displacement` [m]: half the pitch of a fingertip's taxels.
-        angle: for `displacement` [rad].
+        measure: `speed`: the object is moving; `displacement`: it has moved since it was grasped,
+            and has not come back.
+        speed: least speed of the object's material at the contact [m/s].
+        spin: least angular speed [rad/s]; by default the same speed 1 cm beside the contact centre.
+        distance: least distance for `displacement` [m]: half the taxel pitch of a fingertip.
+        angle: least angle for `displacement` [rad].
         release: share of a threshold below which motion ends.
-        least: motion of a shorter time is not told [s].
-        merge: motions with a shorter rest between them are one [s].
-        margin: by which motion is drawn longer at both ends [s].
+        least: shorter motion is ignored [s].
+        merge: motions with a shorter gap between them are one [s].
+        margin: time by which motion is extended at both ends [s].
 
     Raises:
-        ValueError: an unknown measure, or a number that is not above 0.
+        ValueError: the measure is unknown, or a number is not above 0.
     """
 
     measure: Literal["speed", "displacement"] = "speed"
     speed: float = SLIP_SPEED
-    spin: float = SLIP_SPEED / 0.01
+    spin: float = SLIP_SPEED / SPIN_LEVER
     distance: float = 0.003
     angle: float = 0.1
     release: float = 0.5
@@ -103,57 +117,60 @@ def propose(
     offset: float | None = None,
     rule: TrackingRule | None = None,
 ) -> dict[str, tuple[Label, ...]]:
-    """Labels by finger from the motion of the object against the fingertips.
+    """Return labels by finger from the motion of the object relative to the fingertips.
 
-    Contact is told by the force; a finger in contact is unstable while the object moves against
-    it. Where the object is out of sight there is no label, but where the force drops with it:
-    it is lost.
+    The force decides on contact. A finger in contact is unstable while the object moves relative
+    to it. While the object is out of sight there is no label, unless the force ends as well: then
+    the object is lost.
 
     Args:
-        recording: with poses in its truth, unless `tracking` gives them; its labels are not
-            looked at.
+        recording: with poses in its truth, unless `tracking` is given. Its labels are ignored.
         tare: how the baseline is found; "first" or "none" for recordings that begin in contact.
         tracking: path of a CSV file of poses (`poses_from_csv`), or poses.
-        offset: added to the times of the poses [s]; by default 0 for poses of the recording's
-            own, and what makes motion seen and felt most alike for others.
-        rule: what counts as motion.
+        offset: added to the times of the poses [s]. By default 0 for poses of the recording, else
+            the offset with the highest correlation of motion and force.
+        rule: thresholds.
 
     Raises:
-        RecordingError: no poses, none of the recording's time or fingers, or no tare.
-        ValueError: an unknown tare.
+        RecordingError: there are no poses, none of the recording's time or fingers, or no tare.
+        ValueError: the tare is unknown.
     """
     rule = rule or TrackingRule()
     poses = poses_of(recording, tracking)
     hand = hand_force(recording, tare)
-    tracks = names_of(poses, list(hand.fingers))
-    relatives = {name: relative(poses.thing, tip) for name, tip in tracks.items()}
-    clock = Offset(offset, 1.0) if offset is not None else _clock(poses, relatives, hand)
+    tips = tip_tracks_of(poses, list(hand.fingers))
+    tracks = {name: relative_track(poses.object_track, tip) for name, tip in tips.items()}
+    clock = ClockOffset(offset, 1.0) if offset is not None else _clock_offset(poses, tracks, hand)
     _check_overlap(recording, poses, clock.seconds)
-    lost = lost_at(hand)
+    drop = final_drop(hand)
+    writer = _label_writer(poses, clock, rule)
     labels = {}
-    for name, track in relatives.items():
-        point = None if tracks[name] is None else pressed_at(recording.modules[name], tare, hand)
-        judge = _Judge(hand.fingers[name], hand.times, rule, lost)
-        drawing = judge.drawing(motion_of(track, hand.times, point, clock.seconds), point)
-        labels[name] = _pen(poses, clock, rule).labels(drawing, hand.fingers[name].span)
+    for name, track in tracks.items():
+        finger, module = hand.fingers[name], recording.modules[name]
+        point = None if tips[name] is None else centre_of_pressure(module, tare, hand)
+        motion = motion_of(track, hand.times, point, clock.seconds)
+        timeline = _FingerLabeller(finger, hand.times, rule, drop).timeline(motion, point)
+        labels[name] = writer.labels(timeline, finger.span)
     return labels
 
 
-def _clock(poses: Poses, relatives: Mapping[str, Track], hand: HandForce) -> Offset:
-    """How far the clock of the poses is behind, by what all fingers saw and felt."""
+def _clock_offset(poses: Poses, tracks: Mapping[str, PoseTrack], hand: HandForce) -> ClockOffset:
+    """Return the offset of the clock of the poses, from motion and force of all fingers."""
     if poses.same_clock:
-        return Offset(0.0, 1.0)
-    motions = [motion_of(track, hand.times) for track in relatives.values()]
+        return ClockOffset(0.0, 1.0)
+    motions = [motion_of(track, hand.times) for track in tracks.values()]
     seen = np.nanmax([np.where(each.known, each.speed, 0.0) for each in motions], axis=0)
     known = np.any([each.known for each in motions], axis=0)
-    felt = np.sum([hand.fingers[name].change(UNSTABLE_MARGIN) for name in relatives], axis=0)
-    return offset_of(seen, felt, known, hand.period)
+    felt = np.sum([hand.fingers[name].change(UNSTABLE_MARGIN) for name in tracks], axis=0)
+    return clock_offset(seen, felt, known, hand.period)
 
 
 def _check_overlap(recording: Recording, poses: Poses, offset: float) -> None:
-    times = poses.thing.times[poses.thing.seen] + offset
+    times = poses.object_track.times[poses.object_track.seen] + offset
     if len(times) < 2:
-        raise RecordingError(f"{poses.source}: the object is never in sight twice")
+        raise RecordingError(
+            f"{poses.source}: at least 2 poses of the object in sight expected, {len(times)} found"
+        )
     if times[-1] < recording.start or times[0] > recording.end:
         raise RecordingError(
             f"{poses.source} has poses from {times[0]:.10g} to {times[-1]:.10g} s; recording "
@@ -161,113 +178,119 @@ def _check_overlap(recording: Recording, poses: Poses, offset: float) -> None:
         )
 
 
-class _Judge:
-    """Draws the states of one finger."""
+class _FingerLabeller:
+    """States of one finger from its force and the motion of the object."""
 
     def __init__(
-        self, finger: FingerForce, times: Array, rule: TrackingRule, lost: int | None
+        self, finger: FingerForce, times: Array, rule: TrackingRule, drop: int | None
     ) -> None:
         self._finger, self._times, self._rule = finger, times, rule
         self._contact = finger.contact.copy()
-        self._lost = None if finger.threshold is not None else lost
-        if self._lost is not None:
-            self._contact[self._lost :] = False
+        self._drop = None if finger.threshold is not None else drop
+        if self._drop is not None:
+            self._contact[self._drop :] = False
 
-    def drawing(self, motion: Motion, point: Array | None) -> Drawing:
-        """States by motion within contact, none where neither is known."""
-        drawing = Drawing.blank(self._times)
-        ratio = self._ratio(motion, point)
-        moving = self._moving(ratio, motion.known)
+    def timeline(self, motion: RelativeMotion, point: Array | None) -> StateTimeline:
+        """Return states by motion in contact, and no contact; unknown elsewhere."""
+        timeline = StateTimeline.unknown(self._times)
+        ratio = self._motion_ratio(motion, point)
+        moving = self._moving(ratio)
         held = self._contact & motion.known
-        drawing.paint(held, STABLE, None, 1 / np.maximum(ratio, 1e-9))
-        drawing.paint(held & moving, UNSTABLE, Cause.SLIP, ratio)
-        self._paint_free(drawing)
+        timeline.set_state(held, STABLE, None, 1 / np.maximum(ratio, TINY_RATIO))
+        timeline.set_state(held & moving, UNSTABLE, Cause.SLIP, ratio)
+        self._label_no_contact(timeline)
         for start, end in runs(self._contact):
-            self._paint_ends(drawing, start, end)
-            self._paint_loss(drawing, motion.known, start, end)
-        return drawing
+            self._label_ends(timeline, start, end)
+            self._label_loss(timeline, motion.known, start, end)
+        return timeline
 
-    def _ratio(self, motion: Motion, point: Array | None) -> Array:
-        """(n,) motion in times of what counts as one; 0 where it is not seen."""
+    def _motion_ratio(self, motion: RelativeMotion, point: Array | None) -> Array:
+        """Return (n,) the motion over its threshold; 0 while the object is out of sight."""
         rule = self._rule
         if rule.measure == "speed":
-            speed = max(rule.speed, NOISE_TIMES * motion.speed_noise)
-            spin = max(rule.spin, NOISE_TIMES * motion.spin_noise)
+            speed = max(rule.speed, NOISE_FACTOR * motion.speed_noise)
+            spin = max(rule.spin, NOISE_FACTOR * motion.spin_noise)
             ratio = np.maximum(motion.speed / speed, motion.spin / spin)
         else:
-            ratio = self._away(motion, point)
+            ratio = self._displacement_ratio(motion, point)
         return np.where(motion.known, ratio, 0.0)
 
-    def _away(self, motion: Motion, point: Array | None) -> Array:
-        """(n,) the way from the pose of the grasp, in times of what counts: the first rest."""
+    def _displacement_ratio(self, motion: RelativeMotion, point: Array | None) -> Array:
+        """Return (n,) the displacement from the pose of the grasp over its threshold."""
         calm = self._contact & motion.known
-        calm &= motion.speed < max(self._rule.speed, NOISE_TIMES * motion.speed_noise)
-        rests = runs(drop_short_runs(calm, n_samples_of(REST, self._finger.period)))
+        calm &= motion.speed < max(self._rule.speed, NOISE_FACTOR * motion.speed_noise)
+        n = n_samples_of(GRASP_REST_TIME, self._finger.period)
+        rests = runs(drop_short_runs(calm, n))
         if not len(rests):
             return np.zeros(len(self._times))
-        first = slice(rests[0][0], rests[0][0] + n_samples_of(REST, self._finger.period))
-        place, turn = motion.position[first].mean(axis=0), motion.matrix[first].mean(axis=0)
-        far, turned = motion.away_from(
-            place, turn, None if point is None else point[first].mean(axis=0)
+        grasp = slice(rests[0][0], rests[0][0] + n)
+        distance, angle = motion.away_from(
+            motion.position[grasp].mean(axis=0),
+            motion.matrix[grasp].mean(axis=0),
+            None if point is None else point[grasp].mean(axis=0),
         )
-        return np.maximum(far / self._rule.distance, turned / self._rule.angle)
+        return np.maximum(distance / self._rule.distance, angle / self._rule.angle)
 
-    def _moving(self, ratio: Array, known: Mask) -> Mask:
+    def _moving(self, ratio: Array) -> Mask:
         rule, period = self._rule, self._finger.period
-        moving = drop_short_runs(
-            hysteresis(ratio, rule.release, 1.0), n_samples_of(rule.least, period)
-        )
+        motion = hysteresis(ratio, rule.release, 1.0)
+        motion = drop_short_runs(motion, n_samples_of(rule.least, period))
         if rule.measure == "displacement":
-            return moving
-        # The smoothing has drawn motion longer by half of itself at both ends already.
-        moving = fill_short_gaps(moving, n_samples_of(rule.merge - SMOOTHING, period))
-        margin = n_samples_of(rule.margin - SMOOTHING / 2, period)
-        return widen_runs(moving, np.arange(len(moving)), margin)
+            return motion
+        # The fit of the speed has extended motion by half of its window at both ends already.
+        motion = fill_short_gaps(motion, n_samples_of(rule.merge - SPEED_WINDOW, period))
+        margin = n_samples_of(rule.margin - SPEED_WINDOW / 2, period)
+        return widen_runs(motion, np.arange(len(motion)), margin)
 
-    def _paint_ends(self, drawing: Drawing, start: int, end: int) -> None:
-        """Motion at the beginning of a contact is closing, at its end release."""
+    def _label_ends(self, timeline: StateTimeline, start: int, end: int) -> None:
+        """Set the cause of motion at the start of a contact to closing, at its end to released."""
         if self._finger.threshold is None:
             return
-        unstable = drawing.codes[start:end] == UNSTABLE
-        still = np.flatnonzero(drawing.codes[start:end] == STABLE)
+        unstable = timeline.codes[start:end] == UNSTABLE
+        still = np.flatnonzero(timeline.codes[start:end] == STABLE)
         first, last = (still[0], still[-1] + 1) if len(still) else (end - start, end - start)
         inside = np.zeros(len(self._times), dtype=bool)
         inside[start : start + first] = unstable[:first]
-        drawing.recause(inside, Cause.CLOSING)
+        timeline.set_cause(inside, Cause.CLOSING)
         inside[:] = False
         inside[start + last : end] = unstable[last:]
-        drawing.recause(inside, Cause.RELEASED)
+        timeline.set_cause(inside, Cause.RELEASED)
 
-    def _paint_loss(self, drawing: Drawing, known: Mask, start: int, end: int) -> None:
-        """The object is lost where it is out of sight when the force ends, and stays so."""
-        n = n_samples_of(GONE, self._finger.period)
+    def _label_loss(self, timeline: StateTimeline, known: Mask, start: int, end: int) -> None:
+        """Label a loss if the object is out of sight when the force ends, and stays so."""
+        n = n_samples_of(LOSS_TIME, self._finger.period)
         seen = np.flatnonzero(known[start:end])
         if not len(seen) or end == len(known) or known[max(end - 1, start) : end + n].any():
             return
-        blind = np.zeros(len(known), dtype=bool)
-        blind[max(start + seen[-1] + 1, end - n) : end] = True
-        drawing.paint(blind & self._finger.known, UNSTABLE, Cause.LOST, LOST_TIMES)
-        after = drawing.codes[end:] != NO_CONTACT
-        blind[:] = False
-        blind[end : end + int(np.argmax(after)) if after.any() else len(known)] = True
-        drawing.recause(blind, Cause.LOST)
+        unseen = np.zeros(len(known), dtype=bool)
+        unseen[max(start + seen[-1] + 1, end - n) : end] = True
+        timeline.set_state(unseen & self._finger.known, UNSTABLE, Cause.LOST, LOSS_RATIO)
+        after = timeline.codes[end:] != NO_CONTACT
+        unseen[:] = False
+        unseen[end : end + int(np.argmax(after)) if after.any() else len(known)] = True
+        timeline.set_cause(unseen, Cause.LOST)
 
-    def _paint_free(self, drawing: Drawing) -> None:
+    def _label_no_contact(self, timeline: StateTimeline) -> None:
         finger = self._finger
         free = ~self._contact & finger.known
-        if self._lost is not None:
-            drawing.paint(free, NO_CONTACT, Cause.LOST, 2.0)
+        if self._drop is not None:
+            timeline.set_state(free, NO_CONTACT, Cause.LOST, LOSS_RATIO)
         elif finger.threshold is not None:
             amplitude = np.maximum(finger.amplitude, np.finfo(float).tiny)
-            drawing.paint(free, NO_CONTACT, None, finger.threshold / amplitude)
+            timeline.set_state(free, NO_CONTACT, None, finger.threshold / amplitude)
 
 
-def _pen(poses: Poses, clock: Offset, rule: TrackingRule) -> Pen:
+def _label_writer(poses: Poses, clock: ClockOffset, rule: TrackingRule) -> LabelWriter:
+    """Return the writer of labels; unreliable clocks halve every confidence."""
     note = f"poses: {poses.source}"
     if clock.seconds:
         note += f", later by {clock.seconds:.3f} s"
-    if not clock.believed:
+    if not clock.reliable:
         note += ", clocks not aligned: motion seen and felt are not alike"
+    return LabelWriter(AUTHOR, _evidence_text(rule), 1.0 if clock.reliable else 0.5, note)
+
+
+def _evidence_text(rule: TrackingRule) -> EvidenceText:
     what = "moves" if rule.measure == "speed" else "away from where it was grasped"
 
     def evidence(state: ContactState, cause: Cause | None, ratio: float) -> str:
@@ -279,4 +302,4 @@ def _pen(poses: Poses, clock: Offset, rule: TrackingRule) -> Pen:
         limit = "over" if state is ContactState.UNSTABLE else "under"
         return f"object {what} against the finger: {ratio:.3g} times {limit} the limit"
 
-    return Pen(AUTHOR, evidence, 1.0 if clock.believed else 0.5, note)
+    return evidence
