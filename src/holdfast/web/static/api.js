@@ -1,18 +1,18 @@
-// The service's REST calls, and the token that the page's own address may carry.
+// REST calls of the service, with the token from the address of the page.
 
 const token = new URLSearchParams(window.location.search).get("token");
 
-// Relative to the page, so that it works behind a proxy under another path too.
+// Relative to the page, so that it also works behind a proxy under another path.
 const address = (path) => new URL(path, document.baseURI);
 
-/** An address with the token inside, for what the browser asks for without our headers. */
+/** Return an address that contains the token, for requests without our headers. */
 export function addressWithToken(path) {
   const url = address(path);
   if (token !== null) url.searchParams.set("token", token);
   return url;
 }
 
-/** Calls the service; throws an Error with the service's own words where it refuses. */
+/** Call the service; throw an Error with the message of the service if it refuses. */
 export async function callService(method, path, body) {
   const headers = token === null ? {} : { Authorization: `Bearer ${token}` };
   if (body !== undefined) headers["Content-Type"] = "application/json";
@@ -27,6 +27,8 @@ export async function callService(method, path, body) {
   }
   const answer = await response.json().catch(() => null);
   if (response.ok && answer) return answer;
-  const why = answer?.error ?? (response.status === 401 ? "the service wants its token: ?token=… in the address" : `the service answered ${response.status}`);
-  throw Object.assign(new Error(why), { status: response.status, revision: answer?.revision });
+  const reason = answer?.error ?? (response.status === 401
+    ? "the service needs its token: add ?token=… to the address"
+    : `the service answered ${response.status}`);
+  throw Object.assign(new Error(reason), { status: response.status, revision: answer?.revision });
 }

@@ -1,23 +1,24 @@
-// Building elements. Texts go in as text, never as HTML: names and notices come from devices.
+// Create and change elements. Texts are set as text, never as HTML: names and notices come from
+// devices.
 
 const SVG = "http://www.w3.org/2000/svg";
 
 export const byId = (id) => document.getElementById(id);
 
-/** An element with a class, and children that are elements or texts. */
-export function make(tag, name = "", ...children) {
+/** Create an element with a class name, and children that are elements or texts. */
+export function make(tag, className = "", ...children) {
   const element = document.createElement(tag);
-  if (name) element.className = name;
+  if (className) element.className = className;
   element.append(...children);
   return element;
 }
 
-/** Sets a text where it differs, so that nothing is laid out anew for nothing. */
+/** Set the text of an element if it differs, which avoids needless layout. */
 export function setText(element, text) {
   if (element.textContent !== text) element.textContent = text;
 }
 
-/** The shape of a state; `key` as `stateKey` gives it. */
+/** Create the shape of a state; `key` as `stateKey` returns it. */
 export function shape(key) {
   const svg = document.createElementNS(SVG, "svg");
   svg.setAttribute("class", "shape");
@@ -28,7 +29,7 @@ export function shape(key) {
   return svg;
 }
 
-/** One button of a row of which exactly one is pressed. */
+/** Fill a row with buttons of which exactly one is pressed; a click calls `choose(value)`. */
 export function fillChoice(row, entries, chosen, choose) {
   row.replaceChildren(...entries.map(({ value, label, title, mark }) => {
     const button = make("button", "", ...(mark ? [mark] : []), make("span", "", label));
@@ -41,6 +42,7 @@ export function fillChoice(row, entries, chosen, choose) {
   }));
 }
 
+/** Mark the button with this value as the pressed one of its row. */
 export function setPressed(row, value) {
   for (const button of row.children) {
     button.setAttribute("aria-pressed", String(button.dataset.value === String(value)));

@@ -1,12 +1,12 @@
-// Words and numbers as people read them on every page. Pure functions.
+// Format numbers and names for people, on every page. Pure functions.
 
 export const MINUS = "\u2212";
 export const NO_VALUE = "\u2013";
 
-/** What nobody has named yet is shown as it came, underscores apart. */
+/** Return a name with spaces instead of underscores. */
 export const withSpaces = (word) => String(word).replaceAll("_", " ");
 
-/** A number to three or four digits, with a real minus; a dash for none. */
+/** Format a number with three or four digits and a real minus sign; a dash for no value. */
 export function number(value) {
   if (value === null || value === undefined || !Number.isFinite(value)) return NO_VALUE;
   const size = Math.abs(value);
@@ -20,4 +20,4 @@ export function number(value) {
 
 export const unitWord = (unit) => (unit === "count" ? "counts" : unit ?? "");
 
-export const percent = (share) => (Number.isFinite(share) ? `${Math.round(100 * share)}\u202f%` : NO_VALUE);
+export const percent = (fraction) => (Number.isFinite(fraction) ? `${Math.round(100 * fraction)}\u202f%` : NO_VALUE);

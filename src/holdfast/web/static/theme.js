@@ -1,4 +1,4 @@
-// Colours for the canvases, read from the style sheet, so that they are written down once.
+// Colours for canvases, read from the style sheet, which defines them.
 
 const NAMES = [
   "ground", "panel", "raised", "edge", "text", "muted", "grid", "base", "outline", "ink", "focus",
@@ -11,7 +11,7 @@ export const lightTheme = window.matchMedia("(prefers-color-scheme: light)");
 
 export const colours = {};
 
-/** The page's own font at a size [px], for canvases. */
+/** Return the font of the page at a size [px], for canvases. */
 export const font = (size, weight = 400) =>
   `${weight} ${size}px ${getComputedStyle(document.documentElement).fontFamily}`;
 
@@ -20,7 +20,7 @@ function read() {
   for (const name of NAMES) colours[name] = style.getPropertyValue(`--${name}`).trim();
 }
 
-/** Calls `changed` whenever the system turns from dark to light or back. */
+/** Call `changed` when the system switches between dark and light. */
 export function onTheme(changed) {
   lightTheme.addEventListener("change", () => { read(); changed(); });
 }

@@ -1,4 +1,4 @@
-"""format.js: numbers and states as people read them."""
+"""format.js: numbers, states and times for people."""
 
 import pytest
 
@@ -12,12 +12,12 @@ CALL = "async ([name, value]) => (await import('/page/format.js'))[name](value)"
         ("number", 12.345, "12.3"), ("number", -99.96, "−100"), ("number", 7452.4, "7452"),
         ("number", 123456, "123k"), ("number", -0.001, "0.00"),
         ("percent", 0.876, "88\u202f%"), ("percent", None, "–"),
-        ("span", 2.34, "2.3 s"), ("span", 64, "64 s"), ("span", 600, "10 min"),
-        ("span", -0.1, "0.0 s"), ("span", 7200, "2 h"),
-        ("delay", 0.00021, "0.21 ms"), ("delay", 0.0123, "12 ms"), ("delay", 2, "2.0 s"),
-        ("delay", None, "–"), ("clock", 7.9, "0:07"), ("clock", 3723, "1:02:03"),
-        ("bytes", 0, "0 B"), ("bytes", 1234, "1.2 kB"), ("bytes", 784000, "784 kB"),
-        ("bytes", 2.1e9, "2.1 GB"), ("stateKey", "NO_CONTACT", "no-contact"),
+        ("duration", 2.34, "2.3 s"), ("duration", 64, "64 s"), ("duration", 600, "10 min"),
+        ("duration", -0.1, "0.0 s"), ("duration", 7200, "2 h"),
+        ("latency", 0.00021, "0.21 ms"), ("latency", 0.0123, "12 ms"), ("latency", 2, "2.0 s"),
+        ("latency", None, "–"), ("clock", 7.9, "0:07"), ("clock", 3723, "1:02:03"),
+        ("fileSize", 0, "0 B"), ("fileSize", 1234, "1.2 kB"), ("fileSize", 784000, "784 kB"),
+        ("fileSize", 2.1e9, "2.1 GB"), ("stateKey", "NO_CONTACT", "no-contact"),
         ("stateKey", "<b>", "unknown"), ("stateWord", "NO_CONTACT", "NO CONTACT"),
         ("reasonWord", "warm_up", "warming up"), ("reasonWord", "", ""),
         ("faultWord", "packet_gap", "packets missing"), ("faultWord", "a_new_one", "a new one"),

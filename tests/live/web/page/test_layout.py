@@ -1,4 +1,4 @@
-"""layout.js: where taxels go on the map."""
+"""layout.js: positions of taxels on the map."""
 
 import numpy as np
 import pytest
@@ -6,7 +6,7 @@ import pytest
 from holdfast.sensors import sensor
 
 LAYOUT = "async (given) => (await import('/page/layout.js')).layout(...given)"
-TURNED = "async (given) => (await import('/page/layout.js')).turned(...given)"
+TURNED = "async (given) => (await import('/page/layout.js')).toMapFrame(...given)"
 HULL = "async (given) => (await import('/page/layout.js')).hull(given)"
 
 

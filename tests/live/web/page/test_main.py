@@ -1,4 +1,4 @@
-"""The page as a whole, in a browser, against a service that is made up."""
+"""The whole page, in a browser, with a fake service."""
 
 import json
 import re
@@ -12,7 +12,7 @@ HOSTILE = "<img src=x onerror=alert(1)>"
 
 
 def until(page, script, arg=None):
-    """Waits until a script is true. (Playwright's own way evals, which the policy forbids.)"""
+    """Wait until a script is true. (Playwright's own function uses eval, which is forbidden.)"""
     for _ in range(600):
         if page.evaluate(script, arg):
             return
@@ -21,7 +21,7 @@ def until(page, script, arg=None):
 
 
 def shows(page, selector, text):
-    """Waits until the text of the first such element matches a pattern."""
+    """Wait until the text of the first matching element matches a pattern."""
     for _ in range(600):
         found = page.evaluate("(at) => document.querySelector(at)?.innerText ?? ''", selector)
         if re.search(text, found):
@@ -34,12 +34,12 @@ def change(service, **fields):
     service.tape.change = dict.fromkeys(service.tape.tracks, fields)
 
 
-def told(service):
+def requests(service):
     return [(method, path) for method, path, _ in service.calls]
 
 
 def drawn(page):
-    """What the plots and maps show."""
+    """Return what the plots and maps show."""
     return page.evaluate(
         """() => [...holdfast.plots.rows.map((row) => JSON.stringify(row.plot.data)),
                   ...[...document.querySelectorAll(".map canvas")].map((c) => c.toDataURL())]"""
@@ -47,12 +47,12 @@ def drawn(page):
 
 
 def arrived(page):
-    return page.evaluate("(holdfast.store?.end ?? 0) + (holdfast.store?.moved ?? 0)")
+    return page.evaluate("(holdfast.store?.end ?? 0) + (holdfast.store?.removed ?? 0)")
 
 
 def wait_for_samples(page, n=30):
     wanted = arrived(page) + n
-    until(page, "(n) => holdfast.store && holdfast.store.end + holdfast.store.moved > n", wanted)
+    until(page, "(n) => holdfast.store && holdfast.store.end + holdfast.store.removed > n", wanted)
 
 
 @pytest.mark.parametrize(
@@ -76,7 +76,7 @@ def test_everything_fits_without_scrolling(visit, service, size, scheme, state, 
     assert page.evaluate(extent) == list(size)
     clipped = page.evaluate(
         """() => [...document.querySelectorAll(
-            ".figures, .figures *, .word, .name span, #hand-word, .entry, button")]
+            ".values, .values *, .word, .name span, #hand-word, .entry, button")]
           .filter((e) => e.scrollWidth > e.clientWidth + 1)
           .filter((e) => getComputedStyle(e).display !== "inline")
           .map((e) => `${e.className} ${e.textContent}`)"""
@@ -84,7 +84,7 @@ def test_everything_fits_without_scrolling(visit, service, size, scheme, state, 
     assert clipped == []
     hidden = page.evaluate(
         """() => [...document.querySelectorAll(".card")].filter((card) => {
-          const inside = card.querySelector(".figures .force").getBoundingClientRect();
+          const inside = card.querySelector(".values .force").getBoundingClientRect();
           return inside.bottom > card.getBoundingClientRect().bottom;
         }).length"""
     )
@@ -104,7 +104,7 @@ def test_cards_show_the_state_and_follow_it(visit, service):
     shows(page, '[aria-label="index"] .word', "^STABLE$")
     shows(
         page,
-        '[aria-label="index"] .figures',
+        '[aria-label="index"] .values',
         r"88\s%[\s\S]*3.30[\s\S]*13.0[\s\S]*3.00[\s\S]*4.00[\s\S]*12.0",
     )
     assert page.locator(".card").count() == 4
@@ -114,12 +114,12 @@ def test_cards_show_the_state_and_follow_it(visit, service):
     shows(page, "#hand-word", "^UNKNOWN$")
     shows(page, '[aria-label="ring"] .head', "taking tare")
     shows(page, '[aria-label="ring"] .faults', r"stuck\s*saturated\s*taxels 4, 12")
-    shows(page, '[aria-label="ring"] .figures', r"–[\s\S]*–[\s\S]*–")
+    shows(page, '[aria-label="ring"] .values', r"–[\s\S]*–[\s\S]*–")
     shape = page.locator('[aria-label="ring"] .head use').get_attribute("href")
     assert shape == "#shape-unknown"
 
 
-def test_a_screen_reader_is_told(visit, service):
+def test_changes_are_announced_to_screen_readers(visit, service):
     change(service, state="UNSTABLE")
     page = visit(service.url)
     shows(page, "#hand-word", "UNSTABLE")
@@ -135,7 +135,7 @@ def test_pause_freezes_what_is_drawn_and_nothing_else(visit, service):
     still = drawn(page)
     wait_for_samples(page)
     assert drawn(page) == still
-    change(service, state="UNSTABLE")  # states go on being told
+    change(service, state="UNSTABLE")  # states are still updated
     shows(page, "#hand-word", "UNSTABLE")
     page.click("#windows button:first-child")  # and what is frozen can be looked at
     assert page.evaluate("holdfast.plots.rows[0].plot.scales.x.min") == -5
@@ -186,7 +186,7 @@ def test_the_tare(visit, service):
     service.refusal = "the index is touched: <b>let go</b>"
     page.keyboard.press("t")
     shows(page, ".toast.bad", "^the index is touched: <b>let go</b>$")
-    assert told(service) == [("POST", "tare"), ("POST", "tare")]
+    assert requests(service) == [("POST", "tare"), ("POST", "tare")]
 
 
 def test_a_recording_starts_and_stops(visit, service):
@@ -199,10 +199,10 @@ def test_a_recording_starts_and_stops(visit, service):
     page.click("#record")
     shows(page, "#record", "^Record$")
     shows(page, "#toasts", "recorded: grasps/")
-    assert told(service) == [("POST", "recording"), ("DELETE", "recording")]
+    assert requests(service) == [("POST", "recording"), ("DELETE", "recording")]
 
 
-def test_what_cannot_record_offers_no_recording(visit, service):
+def test_a_service_that_cannot_record_offers_no_recording(visit, service):
     hello = service.tape.hello
     service.tape.hello = lambda: hello() | {"can_record": False}
     page = visit(service.url)
@@ -215,18 +215,18 @@ def test_what_cannot_record_offers_no_recording(visit, service):
 def test_markers(visit, service):
     page = visit(service.url)
     wait_for_samples(page)
-    page.fill("#marker-text", "m 1 pushed <i>")  # letters and digits are typed, not obeyed
+    page.fill("#marker-text", "m 1 pushed <i>")  # letters and digits are typed, not shortcuts
     page.press("#marker-text", "Enter")
     shows(page, "#events", "pushed <i>")
     page.keyboard.press("Escape")
     page.keyboard.press("m")
-    until(page, "holdfast.plots.marks.length === 2")
+    until(page, "holdfast.plots.markers.length === 2")
     assert [json.loads(body) for _, _, body in service.calls] == [{"text": "m 1 pushed <i>"}] * 2
     assert page.evaluate("holdfast.plots.chosen") is None
     service.refusal = "no recording runs"
     page.keyboard.press("m")
     shows(page, ".toast.bad", "no recording runs")
-    assert page.evaluate("holdfast.plots.marks.length") == 2
+    assert page.evaluate("holdfast.plots.markers.length") == 2
 
 
 def test_help(visit, service):
@@ -240,12 +240,12 @@ def test_help(visit, service):
     assert service.calls == []
 
 
-def test_it_comes_back_by_itself(visit):
+def test_the_page_reconnects(visit):
     with Service(Tape(*made_up())) as first:
         page = visit(first.url)
         wait_for_samples(page)
     shows(page, "#alert", "Connection lost, trying again")
-    shows(page, "#hand-word", "NO CONNECTION")  # no old STABLE stands there
+    shows(page, "#hand-word", "NO CONNECTION")  # no old STABLE is shown
     assert set(page.locator(".card .word").all_inner_texts()) == {"UNKNOWN"}
     assert page.locator("#tare").is_disabled()
     with Service(Tape(*made_up(("left", "right"))), port=first.port) as second:
@@ -257,7 +257,7 @@ def test_it_comes_back_by_itself(visit):
         assert page.locator("#tare").is_enabled()
 
 
-def test_the_end_of_the_source_is_told(visit, service):
+def test_the_end_of_the_source_is_shown(visit, service):
     page = visit(service.url)
     wait_for_samples(page)
     service.patch = {"ended": True}
@@ -266,7 +266,7 @@ def test_the_end_of_the_source_is_told(visit, service):
     shows(page, "#health", "^source ended")
 
 
-def test_a_silent_source_is_told(visit, service):
+def test_a_silent_source_is_shown(visit, service):
     page = visit(service.url)
     wait_for_samples(page)
     health = {"rate": None, "n_packets": 12, "n_lost": 3, "n_refused": 1, "n_dropped": 0,
@@ -280,7 +280,7 @@ def test_a_silent_source_is_told(visit, service):
 def test_a_token_is_passed_on(visit):
     with Service(Tape(*made_up()), token="a secret") as service:
         page = visit(service.url)
-        shows(page, "#alert", "wants its token")
+        shows(page, "#alert", "needs its token")
         page = visit(f"{service.url}?token=a%20secret")
         wait_for_samples(page)
         page.click("#tare")
@@ -291,10 +291,10 @@ def test_another_schema_is_refused(visit, service):
     hello = service.tape.hello
     service.tape.hello = lambda: hello() | {"schema": "holdfast.live/9"}
     page = visit(service.url)
-    shows(page, "#alert", r"speaks holdfast.live/9, this page holdfast.live/1")
+    shows(page, "#alert", r"uses holdfast.live/9, this page holdfast.live/1")
 
 
-def test_names_are_texts(visit):
+def test_names_are_shown_as_text(visit):
     with Service(Tape(*made_up((HOSTILE, "thumb")))) as service:
         service.at = 3.5
         page = visit(service.url)

@@ -1,11 +1,11 @@
-"""store.js: rings that never grow, and what is drawn of them."""
+"""store.js: storage of constant size, and downsampling for plots."""
 
 import pytest
 
 # A store of `capacity` samples that takes samples k = 0, 1, ... of value k at 100 Hz.
 STORE = """async ([capacity, chunks, bins, window]) => {
-  const { Store, reduce } = await import("/page/store.js");
-  const store = new Store(["a"], capacity), before = store.bytes;
+  const { SampleStore, downsample } = await import("/page/store.js");
+  const store = new SampleStore(["a"], capacity), before = store.bytes;
   let k = 0;
   for (const n of chunks) {
     const places = Array.from({ length: n }, () => k++);
@@ -15,19 +15,19 @@ STORE = """async ([capacity, chunks, bins, window]) => {
     store.append({ times: places.map((p) => p / 100), fingers: { a: own } }, 3, 0.05);
   }
   const a = store.fingers.get("a"), kept = (array) => [...array.subarray(store.start, store.end)];
-  const { x, columns, picks } = reduce(store, window, bins, [a.fx, a.sigma, a.probability]);
+  const { x, columns, indices } = downsample(store, window, bins, [a.fx, a.sigma, a.probability]);
   return { times: kept(store.times), fx: kept(a.fx), state: kept(a.state), hand: kept(store.hand),
-           same: before === store.bytes, x, columns, picks };
+           same: before === store.bytes, x, columns, indices };
 }"""
 FEED = """async ([parts, gap]) => {
-  const { Store, reduce } = await import("/page/store.js");
-  const store = new Store(["a"], 100);
+  const { SampleStore, downsample } = await import("/page/store.js");
+  const store = new SampleStore(["a"], 100);
   for (const times of parts) {
     const values = times.map(() => 1);
     const own = { force: [values, values, values], state: times.map(() => 3) };
     store.append({ times, fingers: { a: own } }, 3, gap);
   }
-  const { x, columns } = reduce(store, 100, 500, [store.fingers.get("a").fx]);
+  const { x, columns } = downsample(store, 100, 500, [store.fingers.get("a").fx]);
   return [x, columns[0]];
 }"""
 
@@ -82,13 +82,13 @@ def test_times_that_go_back_begin_anew(module):
 
 def test_a_frozen_copy_stays(module):
     same = module.evaluate("""async () => {
-      const { Store } = await import("/page/store.js");
-      const store = new Store(["a"], 10);
+      const { SampleStore } = await import("/page/store.js");
+      const store = new SampleStore(["a"], 10);
       const give = (t) => store.append({ times: [t], fingers: {} }, 1, 9);
       for (let t = 0; t < 15; t += 1) give(t);
-      const copy = store.frozen();
+      const copy = store.copy();
       for (let t = 15; t < 60; t += 1) give(t);
-      return [copy.latest, copy.times[copy.start], copy.find(7.5) - copy.start, store.latest];
+      return [copy.latest, copy.times[copy.start], copy.indexOf(7.5) - copy.start, store.latest];
     }""")
     assert same == [14, 5, 3, 59]
 
@@ -101,8 +101,8 @@ def test_it_is_sized_by_the_rate_within_bounds(module, rate, capacity):
 
 def test_fingers_that_take_turns_have_lines_without_holes(module):
     found = module.evaluate("""async () => {
-      const { Store } = await import("/page/store.js");
-      const store = new Store(["a", "b"], 100);
+      const { SampleStore } = await import("/page/store.js");
+      const store = new SampleStore(["a", "b"], 100);
       const track = (own) => ({ force: [own, own, own],
                                 state: own.map((v) => v === null ? null : 3) });
       const times = [0, 0.01, 0.02, 0.03, 0.04, 0.3];

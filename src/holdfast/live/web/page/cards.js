@@ -1,23 +1,24 @@
-// One card for each finger: its state, three figures, its faults and its map.
+// Cards of the fingers: state, values, faults and taxel map of each.
 
 import { make, shape, setText } from "../web/dom.js";
 import { fingerColour } from "../web/theme.js";
-import { Scale, TaxelMap } from "./taxelmap.js";
+import { Scale, TaxelMap } from "./taxel_map.js";
 import { faultWord, number, percent, reasonWord, stateKey, stateWord, unitWord } from "./format.js";
 
-// Decades that the bar of sigma spans, by unit: from noise to a violent slip.
-const SIGMA = { count: [1, 1000], N: [1e-3, 1] };
+// Range of the sigma bar by unit, from noise to a strong slip.
+const SIGMA_RANGES = { count: [1, 1000], N: [1e-3, 1] };
 
-/** Share of a logarithmic bar, from 0 to 1. */
-export function logShare(value, [low, high]) {
+/** Return the filled fraction of a logarithmic bar, from 0 to 1. */
+export function logFraction(value, [low, high]) {
   if (!(value > 0)) return 0;
   return Math.min(1, Math.max(0, Math.log(value / low) / Math.log(high / low)));
 }
 
 export class Cards {
-  constructor(section, choose) {
+  /** @param onChoose is called with the name of a finger whose card is clicked. */
+  constructor(section, onChoose) {
     this.section = section;
-    this.choose = choose;
+    this.onChoose = onChoose;
     this.cards = new Map();
     this.scales = new Map();
     this.frozen = false;
@@ -36,83 +37,83 @@ export class Cards {
     const entries = Object.entries(hello.fingers);
     this.cards = new Map(entries.map(([name, sensor], k) => {
       if (!this.scales.has(sensor.unit)) this.scales.set(sensor.unit, { disc: new Scale(sensor.unit), arrow: new Scale(sensor.unit) });
-      return [name, new Card(name, sensor, this.scales.get(sensor.unit), k, () => this.choose(name))];
+      return [name, new Card(name, sensor, this.scales.get(sensor.unit), k, () => this.onChoose(name))];
     }));
     this.section.replaceChildren(...[...this.cards.values()].map((card) => card.element));
     for (const card of this.cards.values()) this.observer.observe(card.map.canvas.parentElement);
     this.arrange();
   }
 
-  // As many columns as fit, and lines of equal length: six fingers are 3 + 3, not 5 + 1.
+  // Use as many columns as fit, in rows of equal length: 3 + 3 for six fingers, not 5 + 1.
   arrange() {
     const n = this.cards.size || 1, fit = Math.max(1, Math.floor((this.section.clientWidth + 8) / 208));
-    const lines = Math.ceil(n / fit);
-    this.section.parentElement.style.setProperty("--columns", Math.ceil(n / lines));
-    this.section.parentElement.style.setProperty("--lines", lines);
+    const rows = Math.ceil(n / fit);
+    this.section.parentElement.style.setProperty("--columns", Math.ceil(n / rows));
+    this.section.parentElement.style.setProperty("--rows", rows);
   }
 
   update(message) {
-    if (!this.frozen) this.decay(message.time);
+    if (!this.frozen) this.decayScales(message.time);
     for (const [name, card] of this.cards) {
       const finger = message.fingers[name];
       if (finger) card.update(finger, this.frozen);
     }
   }
 
-  decay(now) {
+  decayScales(now) {
     for (const { disc, arrow } of this.scales.values()) for (const scale of [disc, arrow]) scale.decay(now);
   }
 
-  /** Nothing is known while nobody tells: an old STABLE must not stand there. */
-  forget(reason) {
-    for (const card of this.cards.values()) card.tell("UNKNOWN", reason);
+  /** Show all fingers as UNKNOWN: an old STABLE must not look like a current one. */
+  clearStates(reason) {
+    for (const card of this.cards.values()) card.showState("UNKNOWN", reason);
   }
 
-  /** Whether what is shown is no longer so. */
-  stale(stale) { this.section.classList.toggle("stale", stale); }
+  /** Dim the values if they are not current. */
+  setOutdated(outdated) { this.section.classList.toggle("outdated", outdated); }
 
   draw() {
     for (const card of this.cards.values()) card.map.draw();
   }
 
-  select(name) {
+  choose(name) {
     for (const [own, card] of this.cards) card.element.classList.toggle("chosen", own === name);
   }
 
-  freeze(frozen) {
+  setFrozen(frozen) {
     this.frozen = frozen;
     this.section.classList.toggle("frozen", frozen);
   }
 }
 
 class Card {
-  constructor(name, sensor, scales, place, choose) {
+  constructor(name, sensor, scales, index, onChoose) {
     this.sensor = sensor;
     const swatch = make("i", "swatch");
-    swatch.style.background = fingerColour(place);
-    swatch.dataset.finger = place;
+    swatch.style.background = fingerColour(index);
+    swatch.dataset.finger = index;
     this.shape = shape("unknown");
     this.word = make("strong", "word", "UNKNOWN");
     this.reason = make("span", "reason");
     const title = make("span", "name", swatch, make("span", "", name));
     title.title = name;
-    this.head = make("button", "head", this.shape, make("span", "says", make("span", "top-line", title, this.reason), this.word));
+    this.head = make("button", "head", this.shape, make("span", "head-text", make("span", "top-line", title, this.reason), this.word));
     this.head.type = "button";
-    this.head.title = `Plots of ${name} (${place + 1})`;
-    this.head.addEventListener("click", choose);
+    this.head.title = `Plots of ${name} (${index + 1})`;
+    this.head.addEventListener("click", onChoose);
     const canvas = make("canvas");
     canvas.setAttribute("role", "img");
     canvas.setAttribute("aria-label", `Taxel map of ${name}`);
     this.map = new TaxelMap(canvas, sensor, scales);
     this.faults = make("ul", "faults");
     this.faults.hidden = true;
-    const body = make("div", "body", make("div", "map", canvas), this.figures());
+    const body = make("div", "body", make("div", "map", canvas), this.makeValues());
     this.element = make("article", "card", this.head, body, this.faults);
     this.element.setAttribute("aria-label", name);
-    this.tell("UNKNOWN", "");
+    this.showState("UNKNOWN", "");
   }
 
-  figures() {
+  makeValues() {
     this.probability = meter("stable", "");
     const threshold = this.sensor.probability_threshold;
     if (Number.isFinite(threshold)) {
@@ -128,23 +129,23 @@ class Card {
       return { shown, row: make("div", "axis", make("span", "", "F", make("sub", "", axis)), shown) };
     });
     const total = make("div", "total", make("span", "", "|F|"), this.force, make("small", "", unitWord(this.sensor.unit)));
-    return make("div", "figures", this.probability.box, this.sigma.box, make("div", "force", total, ...this.axes.map(({ row }) => row)));
+    return make("div", "values", this.probability.box, this.sigma.box, make("div", "force", total, ...this.axes.map(({ row }) => row)));
   }
 
   update(finger, frozen) {
-    this.tell(finger.state, reasonWord(finger.reason));
+    this.showState(finger.state, reasonWord(finger.reason));
     setText(this.probability.value, percent(finger.stable_probability));
     setBar(this.probability, finger.stable_probability ?? 0);
     setText(this.sigma.value, number(finger.instability));
-    setBar(this.sigma, logShare(finger.instability, SIGMA[this.sensor.unit] ?? SIGMA.count));
+    setBar(this.sigma, logFraction(finger.instability, SIGMA_RANGES[this.sensor.unit] ?? SIGMA_RANGES.count));
     const force = finger.force ?? [null, null, null], known = force.every((x) => x !== null);
     setText(this.force, number(known ? Math.hypot(...force) : null));
     this.axes.forEach(({ shown }, k) => setText(shown, number(force[k])));
-    this.tellFaults(finger.faults ?? [], finger.faulty_taxels ?? []);
+    this.showFaults(finger.faults ?? [], finger.faulty_taxels ?? []);
     if (!frozen) this.map.update(finger.taxels, finger.faulty_taxels ?? []);
   }
 
-  tell(state, reason) {
+  showState(state, reason) {
     const key = stateKey(state);
     setText(this.word, stateWord(state));
     setText(this.reason, reason);
@@ -153,16 +154,16 @@ class Card {
     this.shape.firstChild.setAttribute("href", `#shape-${key}`);
   }
 
-  tellFaults(faults, taxels) {
-    const told = JSON.stringify([faults, taxels]);
-    if (told === this.told) return;
-    this.told = told;
+  showFaults(faults, taxels) {
+    const key = JSON.stringify([faults, taxels]);
+    if (key === this.faultsKey) return;
+    this.faultsKey = key;
     const words = faults.map(faultWord);
     if (taxels.length) {
-      const few = taxels.slice(0, 4).map((k) => k + 1).join(", ");
-      words.push(`${taxels.length > 1 ? "taxels" : "taxel"} ${few}${taxels.length > 4 ? " …" : ""}`);
+      const first = taxels.slice(0, 4).map((k) => k + 1).join(", ");
+      words.push(`${taxels.length > 1 ? "taxels" : "taxel"} ${first}${taxels.length > 4 ? " …" : ""}`);
     }
-    // Three have room; the tooltip has them all.
+    // There is room for three; the tooltip has all.
     const shown = words.length > 3 ? [...words.slice(0, 2), `${words.length - 2} more`] : words;
     this.faults.replaceChildren(...shown.map((word) => make("li", "", word)));
     this.faults.title = words.join("; ");
@@ -176,6 +177,6 @@ function meter(label, unit) {
   return { box, value, bar, fill };
 }
 
-function setBar({ fill }, share) {
-  fill.style.transform = `scaleX(${share.toFixed(3)})`;
+function setBar({ fill }, fraction) {
+  fill.style.transform = `scaleX(${fraction.toFixed(3)})`;
 }

@@ -1,81 +1,81 @@
-// The connection to the service: it comes back by itself, and says how it is.
+// WebSocket connection to the service, with automatic reconnection.
 
 import { callService, addressWithToken } from "../web/api.js";
 
-const SHORTEST = 500, LONGEST = 4000; // [ms] between attempts
-const PATIENCE = 4000; // [ms] without a message: a cable that was pulled closes nothing
+const MIN_RETRY_DELAY = 500, MAX_RETRY_DELAY = 4000; // [ms]
+const MESSAGE_TIMEOUT = 4000; // [ms]; a WebSocket does not notice an unplugged cable
 const SCHEMA = "holdfast.live/1";
 
-// A browser cannot give a WebSocket headers, so the token is in its address.
+// A browser cannot add headers to a WebSocket, so the token is in its address.
 function liveAddress() {
   const url = addressWithToken("api/v1/live");
   url.protocol = url.protocol === "https:" ? "wss:" : "ws:";
   return url.href;
 }
 
-export class Feed {
+export class Connection {
   /**
-   * @param on {hello(message), live(message), link(state, text)}; the state of the link is
+   * @param handlers {hello(message), live(message), state(state, reason)}; the state is
    *   "connecting", "open", "lost" or "refused".
    */
-  constructor(on) {
-    this.on = on;
-    this.wait = SHORTEST;
-    this.ended = false;
-    this.heard = 0;
+  constructor(handlers) {
+    this.handlers = handlers;
+    this.retryDelay = MIN_RETRY_DELAY;
+    this.sourceEnded = false;
+    this.lastMessageAt = 0;
     this.connect();
-    setInterval(() => this.watch(), 1000);
+    setInterval(() => this.checkTimeout(), 1000);
   }
 
   connect() {
     this.socket = new WebSocket(liveAddress());
-    this.heard = performance.now();
-    this.socket.addEventListener("message", (event) => this.take(event.data));
-    this.socket.addEventListener("close", () => this.lost());
+    this.lastMessageAt = performance.now();
+    this.socket.addEventListener("message", (event) => this.receive(event.data));
+    this.socket.addEventListener("close", () => this.reconnect());
   }
 
-  take(text) {
-    this.heard = performance.now();
+  receive(text) {
+    this.lastMessageAt = performance.now();
     let message;
     try {
       message = JSON.parse(text);
     } catch {
-      return; // the next one comes in 50 ms
+      return; // the next message arrives in 50 ms
     }
-    if (message.type === "hello") this.greet(message);
+    if (message.type === "hello") this.receiveHello(message);
     else if (message.type === "live") {
-      this.ended = Boolean(message.ended);
-      this.on.live(message);
+      this.sourceEnded = Boolean(message.ended);
+      this.handlers.live(message);
     }
   }
 
-  greet(message) {
+  receiveHello(message) {
     if (message.schema !== SCHEMA) {
-      this.on.link("refused", `the service speaks ${message.schema}, this page ${SCHEMA}: reload it`);
+      this.handlers.state("refused", `the service uses ${message.schema}, this page ${SCHEMA}: reload the page`);
       return;
     }
-    this.wait = SHORTEST;
-    this.ended = false;
-    this.on.link("open", "");
-    this.on.hello(message);
+    this.retryDelay = MIN_RETRY_DELAY;
+    this.sourceEnded = false;
+    this.handlers.state("open", "");
+    this.handlers.hello(message);
   }
 
-  async lost() {
+  async reconnect() {
     const socket = this.socket;
-    this.on.link("lost", "");
-    // A WebSocket does not tell why it was refused; a plain request does.
-    const refused = await callService("GET", "info").then(() => null, (error) => error);
+    this.handlers.state("lost", "");
+    // A WebSocket does not report why it was refused; a plain request does.
+    const refusal = await callService("GET", "info").then(() => null, (error) => error);
     if (socket !== this.socket) return;
-    if (refused?.status === 401 || refused?.status === 403) {
-      this.on.link("refused", "the service wants its token: open the address that it printed");
+    if (refusal?.status === 401 || refusal?.status === 403) {
+      this.handlers.state("refused", "the service needs its token: open the address that it printed");
     }
-    setTimeout(() => this.connect(), this.wait);
-    this.wait = Math.min(LONGEST, 2 * this.wait);
+    setTimeout(() => this.connect(), this.retryDelay);
+    this.retryDelay = Math.min(MAX_RETRY_DELAY, 2 * this.retryDelay);
   }
 
-  watch() {
-    // After its end a source may well be silent.
-    if (this.ended || performance.now() - this.heard < PATIENCE) return;
+  checkTimeout() {
+    // A source that has ended may be silent.
+    if (this.sourceEnded || performance.now() - this.lastMessageAt < MESSAGE_TIMEOUT) return;
     if (this.socket.readyState === WebSocket.OPEN) this.socket.close();
   }
 }

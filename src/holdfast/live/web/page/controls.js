@@ -1,32 +1,33 @@
-// Tare, recording, markers, full screen; and the toasts that tell how it went.
+// Buttons for tare, recording, markers and full screen, and the messages about their results.
 
 import { callService } from "../web/api.js";
 import { byId, make, setText } from "../web/dom.js";
-import { bytes, clock } from "./format.js";
+import { clock, fileSize } from "./format.js";
 
-const STAYS = 6000; // [ms]
+const TOAST_TIME = 6000; // [ms]
+const MAX_TOASTS = 4;
 
-/** A short message; `kind` is "good" or "bad". */
+/** Show a short message; `kind` is "good" or "bad". */
 export function toast(text, kind) {
   const box = make("p", `toast ${kind}`, text), toasts = byId("toasts");
   toasts.append(box);
-  while (toasts.children.length > 4) toasts.firstElementChild.remove();
-  setTimeout(() => box.remove(), STAYS);
+  while (toasts.children.length > MAX_TOASTS) toasts.firstElementChild.remove();
+  setTimeout(() => box.remove(), TOAST_TIME);
 }
 
 export class Controls {
-  /** @param marked is called with the text of a marker that was put. */
-  constructor(marked) {
-    this.marked = marked;
+  /** @param onMarker is called with the text of each marker that the service accepted. */
+  constructor(onMarker) {
+    this.onMarker = onMarker;
     this.recording = null;
     this.canRecord = true;
-    this.open = false;
+    this.connected = false;
     byId("tare").addEventListener("click", () => this.tare());
     byId("record").addEventListener("click", () => this.record());
     byId("marker").addEventListener("submit", (event) => { event.preventDefault(); this.mark(); });
-    byId("full").addEventListener("click", () => this.full());
+    byId("full").addEventListener("click", () => this.toggleFullScreen());
     byId("help").addEventListener("click", () => byId("help-box").showModal());
-    // A click leaves no focus behind: the space bar then means "pause" again, not "tare" again.
+    // Remove the focus after a click: the space bar then means "pause", not this button again.
     document.addEventListener("click", (event) => {
       if (event.detail > 0) event.target.closest?.("button")?.blur();
     });
@@ -38,8 +39,8 @@ export class Controls {
     this.show();
   }
 
-  connection(open) {
-    this.open = open;
+  setConnected(connected) {
+    this.connected = connected;
     this.show();
   }
 
@@ -50,16 +51,16 @@ export class Controls {
 
   show() {
     const button = byId("record"), r = this.recording;
-    byId("tare").disabled = !this.open;
-    button.disabled = !this.open || !this.canRecord;
+    byId("tare").disabled = !this.connected;
+    button.disabled = !this.connected || !this.canRecord;
     button.title = this.canRecord ? (r ? r.path : "Start or stop a recording (R)") : "This service does not record";
     button.setAttribute("aria-pressed", String(r !== null));
-    setText(byId("record-text"), r ? `Stop ${clock(r.seconds)} · ${bytes(r.n_bytes)}${r.n_dropped > 0 ? ` · ${r.n_dropped} dropped` : ""}` : "Record");
-    byId("mark").disabled = byId("marker-text").disabled = !this.open || !this.canRecord;
+    setText(byId("record-text"), r ? `Stop ${clock(r.seconds)} · ${fileSize(r.n_bytes)}${r.n_dropped > 0 ? ` · ${r.n_dropped} dropped` : ""}` : "Record");
+    byId("mark").disabled = byId("marker-text").disabled = !this.connected || !this.canRecord;
   }
 
-  // One request at a time from each button: a double click is one wish.
-  async ask(button, work) {
+  // One request of a button at a time: a double click counts once.
+  async request(button, work) {
     if (button.disabled || button.classList.contains("busy")) return;
     button.classList.add("busy");
     try {
@@ -72,14 +73,14 @@ export class Controls {
   }
 
   tare() {
-    return this.ask(byId("tare"), async () => {
+    return this.request(byId("tare"), async () => {
       await callService("POST", "tare");
       toast("Taking the tare: nothing may touch the fingers", "good");
     });
   }
 
   record() {
-    return this.ask(byId("record"), async () => {
+    return this.request(byId("record"), async () => {
       if (this.recording) {
         const { path, seconds } = await callService("DELETE", "recording");
         this.update(null);
@@ -93,13 +94,13 @@ export class Controls {
 
   mark() {
     const field = byId("marker-text"), text = field.value.trim();
-    return this.ask(byId("mark"), async () => {
+    return this.request(byId("mark"), async () => {
       await callService("POST", "markers", { text: text || "marker" });
-      this.marked(text);
+      this.onMarker(text);
     });
   }
 
-  full() {
+  toggleFullScreen() {
     const done = document.fullscreenElement
       ? document.exitFullscreen() : document.documentElement.requestFullscreen();
     done.catch(() => toast("The browser does not allow full screen here", "bad"));

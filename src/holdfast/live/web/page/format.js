@@ -1,10 +1,10 @@
-// Words, numbers and names as people read them. Pure functions.
+// Format numbers, states and times for people. Pure functions.
 
 import { NO_VALUE, withSpaces } from "../web/text.js";
 
 export * from "../web/text.js";
 
-// By the code of a state in the series: its place in holdfast's list of states.
+// The code of a state in a series is its index in this list.
 export const STATES = ["UNKNOWN", "NO_CONTACT", "UNSTABLE", "STABLE"];
 export const UNKNOWN = 0, NO_CONTACT = 1, UNSTABLE = 2, STABLE = 3;
 
@@ -30,7 +30,7 @@ const FAULTS = {
   clock_jump: "clock jumped",
 };
 
-/** The key of a state in class names, shapes and colours: "no-contact". */
+/** Return the key of a state in class names, shapes and colours: "no-contact". */
 export const stateKey = (state) =>
   STATES.includes(state) ? state.toLowerCase().replace("_", "-") : "unknown";
 
@@ -38,35 +38,36 @@ export const stateWord = (state) => withSpaces(state ?? "UNKNOWN");
 export const reasonWord = (reason) => (reason ? REASONS[reason] ?? withSpaces(reason) : "");
 export const faultWord = (fault) => FAULTS[fault] ?? withSpaces(fault);
 
-/** A length of time in few characters: "0.8 s", "12 s", "3 min", "2 h". */
-export function span(seconds) {
+/** Format a duration in few characters: "0.8 s", "12 s", "3 min", "2 h". */
+export function duration(seconds) {
   if (seconds < 9.95) return `${Math.max(0, seconds).toFixed(1)} s`;
   if (seconds < 99.5) return `${seconds.toFixed(0)} s`;
   if (seconds < 5970) return `${Math.round(seconds / 60)} min`;
   return `${Math.round(seconds / 3600)} h`;
 }
 
-/** A latency: "0.21 ms", "12 ms", "1.3 s". */
-export function delay(seconds) {
+/** Format a latency: "0.21 ms", "12 ms", "1.3 s". */
+export function latency(seconds) {
   if (seconds === null || seconds === undefined) return NO_VALUE;
   if (seconds >= 1) return `${seconds.toFixed(1)} s`;
   const ms = 1000 * seconds;
   return `${ms < 0.995 ? ms.toFixed(2) : ms < 9.95 ? ms.toFixed(1) : ms.toFixed(0)} ms`;
 }
 
-/** Elapsed time as a clock: "0:07", "1:02:03". */
+/** Format an elapsed time as a clock: "0:07", "1:02:03". */
 export function clock(seconds) {
   const whole = Math.floor(seconds), two = (n) => String(n).padStart(2, "0");
   const [h, m, s] = [Math.floor(whole / 3600), Math.floor(whole / 60) % 60, whole % 60];
   return h ? `${h}:${two(m)}:${two(s)}` : `${m}:${two(s)}`;
 }
 
-export function bytes(n) {
+/** Format a file size: "784 kB", "2.1 GB". */
+export function fileSize(n) {
   const units = ["B", "kB", "MB", "GB", "TB"];
-  let place = 0;
-  while (n >= 999.5 && place < units.length - 1) { n /= 1000; place += 1; }
-  return `${place && n < 9.95 ? n.toFixed(1) : n.toFixed(0)} ${units[place]}`;
+  let k = 0;
+  while (n >= 999.5 && k < units.length - 1) { n /= 1000; k += 1; }
+  return `${k && n < 9.95 ? n.toFixed(1) : n.toFixed(0)} ${units[k]}`;
 }
 
-/** Wall-clock time of a notice. */
-export const wall = (epoch) => new Date(1000 * epoch).toLocaleTimeString("en-GB");
+/** Format the wall-clock time of a notice; `epoch` in seconds since 1970. */
+export const wallTime = (epoch) => new Date(1000 * epoch).toLocaleTimeString("en-GB");

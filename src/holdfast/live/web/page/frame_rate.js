@@ -1,26 +1,26 @@
-// How often to draw: as often as news come, but never for more than half of the browser's time.
+// Limit drawing to half of the browser's time.
 
-const LONGEST = 1000; // [ms] a tab that was hidden has not been slow
+const MAX_DRAW_TIME = 1000; // [ms]; a longer time means that the tab was hidden
 
-/** Measures from a drawing to the browser's next frame: scripts, layout and painting. */
-export class Pace {
+/** Measure the time from a drawing to the browser's next frame: scripts, layout and painting. */
+export class FrameLimiter {
   constructor() {
-    this.begun = null;
-    this.next = 0;
+    this.drawnAt = null;
+    this.nextAt = 0;
   }
 
-  /** Whether it is time to draw; asked once in every frame. */
-  may() {
+  /** Return whether it is time to draw; call it once in every frame. */
+  mayDraw() {
     const now = performance.now();
-    if (this.begun !== null) {
-      this.next = now + Math.min(LONGEST, now - this.begun);
-      this.begun = null;
+    if (this.drawnAt !== null) {
+      this.nextAt = now + Math.min(MAX_DRAW_TIME, now - this.drawnAt);
+      this.drawnAt = null;
     }
-    // Half a frame early rather than a whole one late.
-    return now >= this.next - 8;
+    // Half a frame too early is better than a whole frame too late.
+    return now >= this.nextAt - 8;
   }
 
-  drawn() {
-    this.begun = performance.now();
+  startDrawing() {
+    this.drawnAt = performance.now();
   }
 }

@@ -1,5 +1,5 @@
-// Where the taxels of a sensor go on a flat map, and which way "up" and "right" are there.
-// Pure functions of positions [m], rotations and the sensor's normal; any sensor, any unit.
+// Positions of the taxels on a flat map, and the directions "up" and "right" at each of them.
+// Pure functions of positions [m], rotations and the sensor's normal, for any sensor.
 
 const dot = (a, b) => a[0] * b[0] + a[1] * b[1] + a[2] * b[2];
 const cross = (a, b) => [
@@ -10,7 +10,7 @@ const unit = (a) => scaled(a, 1 / (Math.hypot(...a) || 1));
 const plus = (a, b) => a.map((x, k) => x + b[k]);
 const column = (rotation, c) => rotation.map((row) => row[c]);
 
-/** Right, up and out of the map: seen from outside, the distal axis (z, or y of a flat patch) up. */
+/** Return right, up and out of the map: seen from outside; the distal axis (z, or y of a flat patch) is up. */
 export function viewOf(normal) {
   const out = unit(normal);
   const axis = Math.abs(out[2]) < 0.9 ? [0, 0, 1] : [0, 1, 0];
@@ -18,7 +18,7 @@ export function viewOf(normal) {
   return { right: cross(up, out), up, out };
 }
 
-// Least squares radius of the circle that has these places and these directions of its normals.
+// Fit the radius of a circle to points and the directions of their normals, by least squares.
 function radius(sines, cosines, across, depth) {
   const centred = (values) => {
     const mean = values.reduce((sum, x) => sum + x, 0) / values.length;
@@ -32,10 +32,11 @@ function radius(sines, cosines, across, depth) {
 }
 
 /**
- * The map of a sensor: a curved one is unrolled, so that its walls lie beside its pad.
+ * Compute the map of a sensor. A curved sensor is unrolled: its side walls lie beside its pad.
  *
- * Around the up axis a taxel whose normal is turned by theta moves outwards by r (theta - sin
- * theta), r being the radius that fits the sensor; likewise over the tip. A flat patch stays.
+ * Around the up axis, a taxel whose normal is rotated by theta moves outwards by
+ * r (theta - sin theta), where r is the fitted radius; likewise over the tip. A flat patch does
+ * not change.
  *
  * @returns {{places: number[][], right: number[][], up: number[][], spacing: number}}
  *   places [m] as (right, up); the directions in the fingertip frame that are right and up on
@@ -47,7 +48,7 @@ export function layout(positions, rotations, normal) {
   const n = normals.map((v) => [dot(v, view.right), dot(v, view.up), dot(v, view.out)]);
   const p = positions.map((v) => [dot(v, view.right), dot(v, view.up), dot(v, view.out)]);
   const level = n.map(([a, , c]) => Math.hypot(a, c));
-  // A normal straight along the axis has no direction around it.
+  // A normal along the axis has no angle around it.
   const theta = n.map(([a, , c], k) => (level[k] > 0.1 ? Math.atan2(a, c) : 0));
   const psi = n.map(([, b], k) => Math.atan2(b, level[k]));
   const pick = (values, axis) => values.map((v) => v[axis]);
@@ -62,7 +63,7 @@ export function layout(positions, rotations, normal) {
   return { places, right, up, spacing: spacing(places) };
 }
 
-/** The smallest distance between two places; 1 mm for a single taxel. */
+/** Return the smallest distance between two places; 1 mm for a single taxel. */
 export function spacing(places) {
   let least = Infinity;
   places.forEach((a, k) => {
@@ -73,7 +74,7 @@ export function spacing(places) {
   return Number.isFinite(least) ? least : 1e-3;
 }
 
-// Sensors that do not say where their taxels are (all in one place) get a square grid.
+// Return a square grid for sensors without positions (all taxels in one place).
 function spreadOut(places) {
   const extent = Math.max(...[0, 1].map((axis) => {
     const values = places.map((place) => place[axis]);
@@ -84,13 +85,13 @@ function spreadOut(places) {
   return places.map((_, k) => [5e-3 * (k % side), -5e-3 * Math.floor(k / side)]);
 }
 
-/** A reading in the taxel frame as (right, up, normal) of the map. */
-export function turned(reading, rotation, right, up) {
+/** Rotate a reading from the taxel frame to (right, up, normal) of the map. */
+export function toMapFrame(reading, rotation, right, up) {
   const tangent = [0, 1, 2].map((k) => rotation[k][0] * reading[0] + rotation[k][1] * reading[1]);
   return [dot(tangent, right), dot(tangent, up), reading[2]];
 }
 
-/** The convex hull of the places, counter-clockwise: the outline of the sensor. */
+/** Return the convex hull of the places, counter-clockwise: the outline of the sensor. */
 export function hull(places) {
   const sorted = [...places].sort((a, b) => a[0] - b[0] || a[1] - b[1]);
   const turn = (o, a, b) => (a[0] - o[0]) * (b[1] - o[1]) - (a[1] - o[1]) * (b[0] - o[0]);

@@ -1,16 +1,16 @@
-// The latest events and notices, newest first, fifty of each.
+// Lists of the newest events and notices, newest first.
 
 import { make, shape, setText } from "../web/dom.js";
-import { span, stateKey, stateWord, wall } from "./format.js";
+import { duration, stateKey, stateWord, wallTime } from "./format.js";
 
-const MOST = 50;
+const MAX_ITEMS = 50;
 
-function putFirst(list, item) {
+function prepend(list, item) {
   list.prepend(item);
-  while (list.children.length > MOST) list.lastElementChild.remove();
+  while (list.children.length > MAX_ITEMS) list.lastElementChild.remove();
 }
 
-export class Events {
+export class EventLog {
   constructor(list) {
     this.list = list;
     this.times = new WeakMap(); // of each item: [s] on the source's clock
@@ -26,33 +26,33 @@ export class Events {
     };
     const name = make("b", "finger", event.finger);
     name.title = event.finger;
-    this.put(event.time, name, make("span", "change", chip(event.previous), "→", chip(event.state)));
+    this.addItem(event.time, name, make("span", "change", chip(event.previous), "→", chip(event.state)));
   }
 
   addMarker(time, text) {
-    const words = make("span", "change", text);
-    words.title = text;
-    this.put(time, make("b", "finger marked", "marker"), words);
+    const label = make("span", "change", text);
+    label.title = text;
+    this.addItem(time, make("b", "finger marked", "marker"), label);
   }
 
-  put(time, ...parts) {
-    const item = make("li", "", make("time", "", span(0)), ...parts);
+  addItem(time, ...parts) {
+    const item = make("li", "", make("time", "", duration(0)), ...parts);
     this.times.set(item, time);
-    putFirst(this.list, item);
+    prepend(this.list, item);
   }
 
-  /** Says how long ago each was, at `now` on the source's clock [s]. */
-  age(now) {
+  /** Update the ages of the items; `now` on the source's clock [s]. */
+  updateAges(now) {
     for (const item of this.list.children) {
-      setText(item.firstElementChild, span(now - this.times.get(item)));
+      setText(item.firstElementChild, duration(now - this.times.get(item)));
     }
   }
 }
 
-export class Notices {
+export class NoticeLog {
   constructor(list) { this.list = list; }
 
   add(notice) {
-    putFirst(this.list, make("li", "", make("time", "", wall(notice.time)), make("span", "", notice.text)));
+    prepend(this.list, make("li", "", make("time", "", wallTime(notice.time)), make("span", "", notice.text)));
   }
 }

@@ -1,159 +1,160 @@
-// Puts the parts together: messages in, pictures out, at the browser's own pace.
+// Connects the parts of the page: messages arrive at the service's pace, drawing follows the
+// browser's.
 
 import { byId, fillChoice, make, setPressed, setText } from "../web/dom.js";
 import { fingerColour, onTheme } from "../web/theme.js";
+import { HandBanner, HealthLine, showAlert } from "./banner.js";
 import { Cards } from "./cards.js";
+import { Connection } from "./connection.js";
 import { Controls } from "./controls.js";
-import { Feed } from "./connection.js";
-import { Hand, Health, alert } from "./banner.js";
-import { listen } from "./keys.js";
-import { Events, Notices } from "./logs.js";
-import { Pace } from "./frame_rate.js";
+import { STATES, duration } from "./format.js";
+import { FrameLimiter } from "./frame_rate.js";
+import { listenToKeys } from "./keys.js";
+import { EventLog, NoticeLog } from "./logs.js";
 import { Plots } from "./plots.js";
-import { Store, capacityFor } from "./store.js";
-import { STATES, span } from "./format.js";
+import { SampleStore, capacityFor } from "./store.js";
 
 const WINDOWS = [5, 10, 30, 60]; // [s]
+const AGE_INTERVAL = 250; // [ms] between two updates of the ages in the event log
 
 class Page {
   constructor() {
-    this.hand = new Hand();
-    this.health = new Health(byId("health"));
-    this.events = new Events(byId("events"));
-    this.notices = new Notices(byId("notices"));
+    this.banner = new HandBanner();
+    this.health = new HealthLine(byId("health"));
+    this.events = new EventLog(byId("events"));
+    this.notices = new NoticeLog(byId("notices"));
     this.plots = new Plots(byId("stack"));
-    this.cards = new Cards(byId("cards"), (name) => this.choose(this.plots.chosen === name ? null : name));
-    this.controls = new Controls((text) => this.mark(text));
-    this.state = { link: "connecting", why: "", ended: false, silent: false };
+    this.cards = new Cards(byId("cards"), (name) => this.chooseFinger(this.plots.chosen === name ? null : name));
+    this.controls = new Controls((text) => this.addMarker(text));
+    this.status = { link: "connecting", reason: "", ended: false, silent: false };
     this.store = null;
-    this.frozen = null; // what is looked at while paused
+    this.frozen = null; // a copy of the store while the plots are paused
     this.dirty = false;
-    this.pace = new Pace();
-    this.told = -Infinity; // when ages were last written
+    this.limiter = new FrameLimiter();
+    this.agesUpdatedAt = -Infinity;
     fillChoice(byId("windows"), WINDOWS.map((value) => ({ value, label: `${value} s`, title: `Show ${value} seconds` })),
-      this.plots.window, (value) => this.look(value));
-    byId("pause").addEventListener("click", () => this.pause());
-    listen({
-      " ": () => this.pause(), t: () => this.controls.tare(), r: () => this.controls.record(),
-      m: () => this.controls.mark(), f: () => this.controls.full(), "?": () => byId("help").click(),
-      digit: (n) => this.choose(n ? this.plots.names?.[n - 1] ?? this.plots.chosen : null),
+      this.plots.window, (value) => this.setWindow(value));
+    byId("pause").addEventListener("click", () => this.togglePause());
+    listenToKeys({
+      " ": () => this.togglePause(), t: () => this.controls.tare(), r: () => this.controls.record(),
+      m: () => this.controls.mark(), f: () => this.controls.toggleFullScreen(), "?": () => byId("help").click(),
+      digit: (n) => this.chooseFinger(n ? this.plots.names?.[n - 1] ?? this.plots.chosen : null),
     });
-    onTheme(() => this.recolour());
-    this.feed = new Feed({
-      hello: (message) => this.hello(message),
-      live: (message) => this.live(message),
-      link: (link, why) => this.link(link, why),
+    onTheme(() => this.updateColours());
+    this.connection = new Connection({
+      hello: (message) => this.start(message),
+      live: (message) => this.update(message),
+      state: (link, reason) => this.setLink(link, reason),
     });
     requestAnimationFrame(() => this.draw());
   }
 
-  hello(message) {
-    this.info = message;
-    if (this.frozen) this.pause();
-    const names = Object.keys(message.fingers);
-    this.store = new Store(names, capacityFor(message.rate));
-    this.gap = message.rate ? Math.max(0.1, 4 / message.rate) : 0.5;
+  start(hello) {
+    if (this.frozen) this.togglePause();
+    const names = Object.keys(hello.fingers);
+    this.store = new SampleStore(names, capacityFor(hello.rate));
+    this.maxGap = hello.rate ? Math.max(0.1, 4 / hello.rate) : 0.5;
     this.events.clear();
-    for (const part of [this.hand, this.cards, this.controls]) part.start(message);
-    this.plots.start(message, this.store);
-    this.choices();
-    this.tellStream(message);
+    for (const part of [this.banner, this.cards, this.controls]) part.start(hello);
+    this.plots.start(hello, this.store);
+    this.fillFingers();
+    this.showStream(hello);
   }
 
-  live(message) {
+  update(message) {
     if (!this.store) return;
-    this.state.ended = Boolean(message.ended);
-    this.state.silent = Boolean(message.health?.silent);
+    this.status.ended = Boolean(message.ended);
+    this.status.silent = Boolean(message.health?.silent);
     this.now = message.time;
-    this.store.append(message.series, Math.max(0, STATES.indexOf(message.hand)), this.gap);
-    const { ended, silent } = this.state;
-    // An old STABLE must not be read as one of now.
-    if (ended || silent) this.hand.tell("UNKNOWN", ended ? "SOURCE ENDED" : "NO SAMPLES");
-    else this.hand.tell(message.hand);
-    this.cards.stale(ended || silent);
+    this.store.append(message.series, Math.max(0, STATES.indexOf(message.hand)), this.maxGap);
+    const { ended, silent } = this.status;
+    // An old STABLE must not look like a current one.
+    if (ended || silent) this.banner.showState("UNKNOWN", ended ? "SOURCE ENDED" : "NO SAMPLES");
+    else this.banner.showState(message.hand);
+    this.cards.setOutdated(ended || silent);
     this.cards.update(message);
     for (const event of message.events ?? []) this.events.add(event);
     for (const notice of message.notices ?? []) this.notices.add(notice);
     if (message.health) this.health.update(message.health);
     this.controls.update(message.recording);
-    this.tellLink();
+    this.showLink();
     this.dirty = true;
   }
 
-  link(link, why) {
-    // Why it was refused stays while the attempts go on.
-    if (link === "lost" && this.state.link === "refused") return;
-    Object.assign(this.state, { link, why });
-    this.controls.connection(link === "open");
-    this.tellLink();
+  setLink(link, reason) {
+    // The reason of a refusal stays visible during further attempts.
+    if (link === "lost" && this.status.link === "refused") return;
+    Object.assign(this.status, { link, reason });
+    this.controls.setConnected(link === "open");
+    this.showLink();
     if (link === "open") return;
-    this.hand.tell("UNKNOWN", "NO CONNECTION");
-    this.cards.forget("no connection");
-    this.cards.stale(true);
+    this.banner.showState("UNKNOWN", "NO CONNECTION");
+    this.cards.clearStates("no connection");
+    this.cards.setOutdated(true);
   }
 
-  tellLink() {
-    const { link, why, ended, silent } = this.state, open = link === "open";
-    alert(
-      link === "refused" && `Not connected: ${why}`,
+  showLink() {
+    const { link, reason, ended, silent } = this.status, open = link === "open";
+    showAlert(
+      link === "refused" && `Not connected: ${reason}`,
       link === "lost" && "Connection lost, trying again …",
-      open && ended && "Source ended: what is shown is the last of it",
+      open && ended && "Source ended: these are its last values",
       open && silent && "No samples from the source",
     );
     const words = { connecting: "connecting", open: ended ? "source ended" : "connected", lost: "connection lost", refused: "not connected" };
-    this.health.connection(open && (ended || silent) ? "quiet" : link, words[link]);
+    this.health.showConnection(open && (ended || silent) ? "quiet" : link, words[link]);
   }
 
   draw() {
     requestAnimationFrame(() => this.draw());
-    if (!this.pace.may() || !this.store || !this.dirty) return;
+    if (!this.limiter.mayDraw() || !this.store || !this.dirty) return;
     this.dirty = false;
-    this.pace.drawn();
+    this.limiter.startDrawing();
     if (!this.frozen) {
       this.cards.draw();
       if (this.store.end) this.plots.draw(this.store);
     } else if (Number.isFinite(this.now)) {
-      setText(byId("paused"), `PAUSED · ${span(this.now - this.frozen.latest)} ago`);
+      setText(byId("paused"), `PAUSED · ${duration(this.now - this.frozen.latest)} ago`);
     }
-    if (performance.now() - this.told < 250) return;
-    this.told = performance.now();
-    this.events.age(this.now);
+    if (performance.now() - this.agesUpdatedAt < AGE_INTERVAL) return;
+    this.agesUpdatedAt = performance.now();
+    this.events.updateAges(this.now);
   }
 
-  pause() {
+  togglePause() {
     if (!this.store?.end) return;
-    this.frozen = this.frozen ? null : this.store.frozen();
+    this.frozen = this.frozen ? null : this.store.copy();
     const button = byId("pause"), paused = this.frozen !== null;
     button.setAttribute("aria-pressed", String(paused));
     setText(button, paused ? "Resume" : "Pause");
     byId("paused").hidden = !paused;
     document.body.classList.toggle("is-paused", paused);
-    this.cards.freeze(paused);
+    this.cards.setFrozen(paused);
     this.dirty = true;
   }
 
-  look(seconds) {
+  setWindow(seconds) {
     this.plots.window = seconds;
     if (this.store) this.plots.build();
     setPressed(byId("windows"), seconds);
-    this.redraw();
+    this.redrawPlots();
   }
 
-  choose(name) {
+  chooseFinger(name) {
     if (!this.store || name === this.plots.chosen) return;
     this.plots.chosen = name;
     setPressed(byId("fingers"), name ?? "");
-    this.cards.select(name);
+    this.cards.choose(name);
     this.plots.build();
-    this.redraw();
+    this.redrawPlots();
   }
 
-  redraw() {
+  redrawPlots() {
     const store = this.frozen ?? this.store;
     if (store?.end) this.plots.draw(store);
   }
 
-  choices() {
+  fillFingers() {
     const swatch = (k) => {
       const mark = make("i", "swatch");
       mark.style.background = fingerColour(k);
@@ -161,17 +162,17 @@ class Page {
     };
     const fingers = this.plots.names.map((name, k) => ({ value: name, label: name, title: `Plots of ${name} (${k + 1})`, mark: swatch(k) }));
     fillChoice(byId("fingers"), [{ value: "", label: "all", title: "Plots of all fingers (0)" }, ...fingers],
-      this.plots.chosen ?? "", (name) => this.choose(name || null));
-    this.cards.select(this.plots.chosen);
+      this.plots.chosen ?? "", (name) => this.chooseFinger(name || null));
+    this.cards.choose(this.plots.chosen);
   }
 
-  mark(text) {
+  addMarker(text) {
     if (!Number.isFinite(this.now)) return;
-    this.plots.mark(this.now);
+    this.plots.addMarker(this.now);
     this.events.addMarker(this.now, text);
   }
 
-  tellStream(hello) {
+  showStream(hello) {
     const modules = Object.entries(hello.modules ?? {}).map(([name, n]) => `${name} (${n})`).join(", ");
     const sensors = [...new Set(Object.values(hello.fingers).map(({ sensor }) => sensor))].join(", ");
     const rows = {
@@ -181,15 +182,15 @@ class Page {
     byId("stream").replaceChildren(...Object.entries(rows).flatMap(([name, value]) => [make("dt", "", name), make("dd", "", String(value))]));
   }
 
-  recolour() {
+  updateColours() {
     if (!this.store) return;
     document.querySelectorAll(".card .swatch").forEach((mark) => { mark.style.background = fingerColour(Number(mark.dataset.finger)); });
-    this.choices();
+    this.fillFingers();
     this.plots.build();
-    this.redraw();
+    this.redrawPlots();
     this.cards.draw();
   }
 }
 
-// For those who look at it in the browser's console, and for tests.
+// For the browser's console, and for tests.
 window.holdfast = new Page();

@@ -1,22 +1,24 @@
-// Force, instability and probability over a common time, drawn by uPlot.
+// Plots of force, instability and probability over time, drawn by uPlot.
 
 import { make, setText } from "../web/dom.js";
 import { colours, fingerColour, font } from "../web/theme.js";
 import uPlot from "./uplot/uPlot.esm.js";
-import { RIBBON, level, markers, ribbons, shade } from "./plot_layers.js";
-import { reduce } from "./store.js";
+import { RIBBON_HEIGHT, drawLevel, drawMarkers, drawRibbons, shadeStates } from "./plot_layers.js";
+import { downsample } from "./store.js";
 import { number, unitWord } from "./format.js";
 
 const FONT = font(11);
+const MAX_MARKERS = 50;
+const MAX_BINS = 600;
 const AXES = [["fx", "x"], ["fy", "y"], ["fz", "z"]];
 
-// Steps that leave the ends of an axis where they are while the data change a little.
-function rounded(low, high, least) {
-  const size = Math.max(high - low, least), step = 10 ** Math.floor(Math.log10(size)) / 4;
+// Round the ends of an axis, so that they do not change with every small change of the data.
+function roundedRange(low, high, minSize) {
+  const size = Math.max(high - low, minSize), step = 10 ** Math.floor(Math.log10(size)) / 4;
   return [Math.floor(low / step) * step, Math.ceil(high / step) * step];
 }
 
-const decades = (plot, low, high) => (low > 0 && high > 0
+const decadeRange = (plot, low, high) => (low > 0 && high > 0
   ? [10 ** Math.floor(Math.log10(low)), 10 ** Math.max(Math.ceil(Math.log10(high)), Math.floor(Math.log10(low)) + 1)]
   : [0.1, 10]);
 
@@ -25,61 +27,62 @@ export class Plots {
     this.stack = stack;
     this.window = 10;
     this.chosen = null; // a finger's name, or null for all
-    this.marks = []; // times of markers [s]
+    this.markers = []; // times [s]
     this.rows = [];
-    this.resize = new ResizeObserver(() => this.fit());
+    this.observer = new ResizeObserver(() => this.resizePlots());
   }
 
-  /** Begins anew for the fingers of a hello. */
+  /** Start with the fingers of a hello message. */
   start(hello, store) {
     this.fingers = hello.fingers;
     this.names = Object.keys(hello.fingers);
     this.store = store;
-    this.marks = [];
+    this.markers = [];
     if (!this.names.includes(this.chosen)) this.chosen = null;
     this.build();
   }
 
-  mark(time) {
-    this.marks = [...this.marks, time].slice(-50);
+  addMarker(time) {
+    this.markers = [...this.markers, time].slice(-MAX_MARKERS);
   }
 
+  /** Create the plots for the chosen finger and window. */
   build() {
     for (const row of this.rows) row.plot.destroy();
-    this.resize.disconnect();
+    this.observer.disconnect();
     this.stack.querySelectorAll(".plot").forEach((old) => old.remove());
-    this.rows = this.kinds().map((kind, k, all) => this.row(kind, k === all.length - 1));
-    this.fit();
-    for (const row of this.rows) this.resize.observe(row.holder);
+    this.rows = this.plotKinds().map((kind, k, all) => this.makeRow(kind, k === all.length - 1));
+    this.resizePlots();
+    for (const row of this.rows) this.observer.observe(row.holder);
   }
 
-  kinds() {
+  plotKinds() {
     const unit = unitWord((this.fingers[this.chosen ?? this.names[0]] ?? {}).unit);
-    const brief = this.chosen === null; // the names stand at the first plot, or on the buttons
-    const own = (column) => (this.chosen === null
+    const brief = this.chosen === null; // the first plot or the buttons show the names
+    const lines = (column) => (this.chosen === null
       ? this.names.map((name, k) => ({ finger: name, column, label: name, colour: fingerColour(k) }))
       : [{ finger: this.chosen, column, label: this.chosen, colour: fingerColour(this.names.indexOf(this.chosen)) }]);
     const force = this.chosen === null
-      ? { title: "Force |F|", lines: own("force"), range: (plot, low, high) => this.above(plot, high) }
+      ? { title: "Force |F|", lines: lines("force"), range: (plot, low, high) => this.rangeBelowRibbons(plot, high) }
       : {
-        title: "Force", range: (plot, low, high) => rounded(low ?? 0, high ?? 0, 10),
+        title: "Force", range: (plot, low, high) => roundedRange(low ?? 0, high ?? 0, 10),
         lines: AXES.map(([column, axis]) => ({ finger: this.chosen, column, label: `F${axis}`, colour: colours[`axis-${axis}`] })),
       };
     return [
       { ...force, key: "force", unit, brief: brief && this.names.length > 4 },
-      { key: "sigma", title: "Instability σ", brief, lines: own("sigma"), range: decades, log: true },
-      { key: "probability", title: "P(stable)", brief, lines: own("probability"), range: () => [-0.04, 1.04] },
+      { key: "sigma", title: "Instability σ", brief, lines: lines("sigma"), range: decadeRange, log: true },
+      { key: "probability", title: "P(stable)", brief, lines: lines("probability"), range: () => [-0.04, 1.04] },
     ];
   }
 
-  // From nought, with room for the ribbons above the lines.
-  above(plot, high) {
-    const tall = Math.max(40, plot.bbox.height / (window.devicePixelRatio || 1));
-    const share = (this.names.length * RIBBON + 6) / tall;
-    return [0, rounded(0, Math.max(high ?? 0, 0) / (1 - Math.min(0.5, share)), 10)[1]];
+  // Range from zero, with room for the ribbons above the lines.
+  rangeBelowRibbons(plot, high) {
+    const height = Math.max(40, plot.bbox.height / (window.devicePixelRatio || 1));
+    const share = (this.names.length * RIBBON_HEIGHT + 6) / height;
+    return [0, roundedRange(0, Math.max(high ?? 0, 0) / (1 - Math.min(0.5, share)), 10)[1]];
   }
 
-  row(kind, last) {
+  makeRow(kind, last) {
     const values = kind.lines.map(() => make("span", "value", number(null)));
     const legend = make("div", kind.brief ? "legend brief" : "legend", ...kind.lines.map((entry, k) => {
       const swatch = make("i", "swatch");
@@ -90,9 +93,9 @@ export class Plots {
     }));
     const title = make("h3", "", kind.title, make("small", "", kind.unit ?? ""));
     const holder = make("div", "holder");
-    const box = make("div", `plot ${kind.key}${last ? " last" : ""}`, make("div", "gutter", title, legend), holder);
+    const box = make("div", `plot ${kind.key}${last ? " last" : ""}`, make("div", "plot-legend", title, legend), holder);
     this.stack.append(box);
-    const row = { kind, holder, values, x: [0], picks: [] };
+    const row = { kind, holder, values, x: [0], indices: [] };
     row.plot = new uPlot(this.options(row, last), [[], ...kind.lines.map(() => [])], holder);
     return row;
   }
@@ -108,64 +111,64 @@ export class Plots {
         y: { range: kind.range, distr: kind.log ? 3 : 1 },
       },
       axes: [
-        { ...axis, size: last ? 22 : 4, gap: 3, values: (_, ticks) => ticks.map((t) => (last ? seconds(t) : "")) },
+        { ...axis, size: last ? 22 : 4, gap: 3, values: (_, ticks) => ticks.map((t) => (last ? timeLabel(t) : "")) },
         {
           ...axis, size: 50, gap: 5, space: kind.log ? 16 : 22,
           ...(kind.key === "probability" ? { splits: [0, 0.5, 1] } : {}),
-          ...(kind.log ? { splits: powers, filter: (_, ticks) => ticks } : {}),
-          values: (_, ticks) => ticks.map((v) => (v === null ? null : tick(v))),
+          ...(kind.log ? { splits: decadeTicks, filter: (_, ticks) => ticks } : {}),
+          values: (_, ticks) => ticks.map((v) => (v === null ? null : valueLabel(v))),
         },
       ],
       series: [{}, ...kind.lines.map((entry) => ({
-        // Jagged lines of more than a pixel are slow to paint without a graphics card.
+        // Without a graphics card, long jagged lines wider than a pixel are slow to draw.
         stroke: entry.colour, width: this.window > 10 ? 1 : 1.75, points: { show: false }, spanGaps: false,
       }))],
       hooks: {
-        drawClear: [(plot) => this.behind(plot, row)],
-        draw: [(plot) => this.over(plot, row)],
-        setCursor: [() => this.read(row)],
+        drawClear: [(plot) => this.drawBackground(plot, row)],
+        draw: [(plot) => this.drawOverlay(plot, row)],
+        setCursor: [() => this.showValues(row)],
       },
     };
   }
 
-  behind(plot, row) {
-    const of = (codes) => row.picks.map((place) => codes[place]);
+  drawBackground(plot, row) {
+    const shown = (codes) => row.indices.map((index) => codes[index]);
     const state = this.chosen === null ? this.store.hand : this.store.fingers.get(this.chosen).state;
-    shade(plot, row.x, of(state));
+    shadeStates(plot, row.x, shown(state));
     if (this.chosen !== null || row.kind.key !== "force") return;
-    ribbons(plot, row.x, this.names.map((name) => of(this.store.fingers.get(name).state)));
+    drawRibbons(plot, row.x, this.names.map((name) => shown(this.store.fingers.get(name).state)));
   }
 
-  over(plot, row) {
+  drawOverlay(plot, row) {
     const now = this.store.latest;
-    markers(plot, this.marks.map((time) => time - now));
+    drawMarkers(plot, this.markers.map((time) => time - now));
     if (row.kind.key !== "probability") return;
     const shown = this.chosen === null ? this.names : [this.chosen];
     for (const value of new Set(shown.map((name) => this.fingers[name].probability_threshold))) {
-      if (Number.isFinite(value)) level(plot, value);
+      if (Number.isFinite(value)) drawLevel(plot, value);
     }
   }
 
-  // Values beside the plot: under the cursor, or the newest.
-  read(row) {
-    const at = row.plot.cursor.idx ?? row.x.length - 1;
-    row.values.forEach((element, k) => setText(element, number(row.plot.data[k + 1]?.[at])));
+  // Show the values at the cursor, or the newest, beside the plot.
+  showValues(row) {
+    const index = row.plot.cursor.idx ?? row.x.length - 1;
+    row.values.forEach((element, k) => setText(element, number(row.plot.data[k + 1]?.[index])));
   }
 
   draw(store) {
     this.store = store;
     for (const row of this.rows) {
       const arrays = row.kind.lines.map(({ finger, column }) => store.fingers.get(finger)[column]);
-      const { x, columns, picks } = reduce(store, this.window, 600, arrays);
-      // A logarithm has no place for nought.
+      const { x, columns, indices } = downsample(store, this.window, MAX_BINS, arrays);
+      // A logarithmic axis cannot show zero.
       const shown = row.kind.log ? columns.map((values) => values.map((v) => (v > 0 ? v : null))) : columns;
-      Object.assign(row, { x, picks });
+      Object.assign(row, { x, indices });
       row.plot.setData([x, ...shown]);
-      this.read(row);
+      this.showValues(row);
     }
   }
 
-  fit() {
+  resizePlots() {
     for (const { plot, holder } of this.rows) {
       const { width, height } = holder.getBoundingClientRect();
       if (width > 50 && height > 20) plot.setSize({ width: Math.floor(width), height: Math.floor(height) });
@@ -173,12 +176,12 @@ export class Plots {
   }
 }
 
-// Whole decades, every second one where they stand close.
-function powers(plot, _, low, high) {
+// Return ticks at whole decades, fewer if they would be too close.
+function decadeTicks(plot, _, low, high) {
   const [from, to] = [low, high].map((value) => Math.round(Math.log10(value)));
   const step = Math.max(1, Math.ceil((15 * (to - from)) / Math.max(16, plot.height - 14)));
   return Array.from({ length: Math.floor((to - from) / step) + 1 }, (__, k) => 10 ** (from + k * step));
 }
 
-const seconds = (t) => (t === 0 ? "now" : `${String(t).replace("-", "−")} s`);
-const tick = (v) => (Math.abs(v) >= 10000 ? `${v / 1000}k` : String(Number(v.toPrecision(3))).replace("-", "−"));
+const timeLabel = (t) => (t === 0 ? "now" : `${String(t).replace("-", "−")} s`);
+const valueLabel = (v) => (Math.abs(v) >= 10000 ? `${v / 1000}k` : String(Number(v.toPrecision(3))).replace("-", "−"));

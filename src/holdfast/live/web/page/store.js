@@ -1,23 +1,25 @@
-// The last minute of every series, in memory that never grows.
+// Samples of the last minute, in memory of constant size.
 
 import { UNKNOWN } from "./format.js";
 
 export const SECONDS = 60;
 const COLUMNS = ["fx", "fy", "fz", "force", "sigma", "probability"];
 
-/** How many samples a minute has at a rate [Hz]; sensors at up to 1000 Hz are known. */
+/** Return the number of samples in a minute at a rate [Hz]; sensors reach up to 1000 Hz. */
 export const capacityFor = (rate) => Math.ceil(SECONDS * Math.min(1000, Math.max(200, 1.05 * (rate ?? 0))));
 
 /**
- * Columns of samples, twice as long as what is kept: the newest samples are always one piece of
- * an array, and only once in `capacity` samples they are moved to its beginning.
+ * Store of the newest `capacity` samples, as columns.
+ *
+ * The arrays have twice that length, so that the newest samples are always contiguous. They are
+ * moved to the beginning once in `capacity` samples only.
  */
-export class Store {
+export class SampleStore {
   constructor(fingers, capacity) {
     this.capacity = capacity;
-    this.end = 0; // one past the newest sample
-    this.moved = 0; // by how much places have been moved, so that bins stay where they are
-    this.seen = new Map(); // when each finger had its last sample [s]
+    this.end = 0; // index after the newest sample
+    this.removed = 0; // number of samples removed at the beginning; keeps bins aligned
+    this.lastTimes = new Map(); // time of each finger's last sample [s]
     this.times = new Float64Array(2 * capacity);
     this.hand = new Uint8Array(2 * capacity);
     this.fingers = new Map(fingers.map((name) => [name, {
@@ -29,57 +31,57 @@ export class Store {
   get start() { return Math.max(0, this.end - this.capacity); }
   get latest() { return this.end ? this.times[this.end - 1] : null; }
 
-  /** Memory that the series take [bytes]. */
+  /** Size of the arrays [bytes]. */
   get bytes() {
     return this.arrays().reduce((sum, array) => sum + array.byteLength, 0);
   }
 
   arrays() {
-    return [this.times, this.hand, ...[...this.fingers.values()].flatMap((own) => Object.values(own))];
+    return [this.times, this.hand, ...[...this.fingers.values()].flatMap((columns) => Object.values(columns))];
   }
 
-  /** Takes the samples of a message; `hand` is the code of the hand's state then. */
-  append(series, hand, gap) {
+  /** Append the samples of a message; `hand` is the code of the hand's state. */
+  append(series, hand, maxGap) {
     const times = series.times, last = this.latest;
     if (!times.length) return;
-    // A source that begins anew (a replay in a loop, another clock) has no common past.
-    if (last !== null && times[0] <= last) this.forget();
-    else if (last !== null && times[0] - last > gap) this.lift(0.5 * (last + times[0]), hand);
+    // Times that go back mean a restarted source: a replay in a loop, or another clock.
+    if (last !== null && times[0] <= last) this.clear();
+    else if (last !== null && times[0] - last > maxGap) this.appendGap(0.5 * (last + times[0]), hand);
     const skipped = Math.max(0, times.length - this.capacity);
-    this.moved += skipped;
+    this.removed += skipped;
     for (let k = skipped; k < times.length; k += 1) {
-      const place = this.next(times[k], hand);
-      for (const [name, own] of this.fingers) {
+      const index = this.appendTime(times[k], hand);
+      for (const [name, columns] of this.fingers) {
         const from = series.fingers[name];
-        if (from?.state?.[k] === null && this.holds(name, times[k], place, gap)) hold(own, place);
-        else fill(own, place, from, k);
-        if (typeof from?.state?.[k] === "number") this.seen.set(name, times[k]);
+        if (from?.state?.[k] === null && this.hasRecentSample(name, times[k], index, maxGap)) repeatPrevious(columns, index);
+        else writeSample(columns, index, from, k);
+        if (typeof from?.state?.[k] === "number") this.lastTimes.set(name, times[k]);
       }
     }
   }
 
-  // Fingers may come one by one: between its samples a finger is as it was.
-  holds(name, time, place, gap) {
-    return place > 0 && time - (this.seen.get(name) ?? -Infinity) < gap;
+  // Fingers may be sampled at different times: between its samples a finger keeps its values.
+  hasRecentSample(name, time, index, maxGap) {
+    return index > 0 && time - (this.lastTimes.get(name) ?? -Infinity) < maxGap;
   }
 
-  forget() {
+  clear() {
     this.end = 0;
-    this.seen.clear();
+    this.lastTimes.clear();
   }
 
-  // A sample without values: the lines break where samples are missing.
-  lift(time, hand) {
-    const place = this.next(time, hand);
-    for (const own of this.fingers.values()) fill(own, place, undefined, 0);
+  // Append a sample without values, which breaks the lines of the plots.
+  appendGap(time, hand) {
+    const index = this.appendTime(time, hand);
+    for (const columns of this.fingers.values()) writeSample(columns, index, undefined, 0);
   }
 
-  next(time, hand) {
+  appendTime(time, hand) {
     if (this.end === this.times.length) {
       const from = this.end - this.capacity;
       for (const array of this.arrays()) array.copyWithin(0, from);
       this.end = this.capacity;
-      this.moved += from;
+      this.removed += from;
     }
     this.times[this.end] = time;
     this.hand[this.end] = hand;
@@ -87,20 +89,20 @@ export class Store {
     return this.end - 1;
   }
 
-  /** A copy of what is kept now, for a view that stands still. */
-  frozen() {
-    const copy = new Store([], 0);
-    Object.assign(copy, { capacity: this.capacity, end: this.end, moved: this.moved });
+  /** Return a copy, for plots that are paused. */
+  copy() {
+    const copy = new SampleStore([], 0);
+    Object.assign(copy, { capacity: this.capacity, end: this.end, removed: this.removed });
     copy.times = this.times.slice();
     copy.hand = this.hand.slice();
-    copy.fingers = new Map([...this.fingers].map(([name, own]) => [
-      name, Object.fromEntries(Object.entries(own).map(([key, array]) => [key, array.slice()])),
+    copy.fingers = new Map([...this.fingers].map(([name, columns]) => [
+      name, Object.fromEntries(Object.entries(columns).map(([key, array]) => [key, array.slice()])),
     ]));
     return copy;
   }
 
-  /** Place of the first sample that is kept and not before `time`. */
-  find(time) {
+  /** Return the index of the first stored sample that is not before `time`. */
+  indexOf(time) {
     let low = this.start, high = this.end;
     while (low < high) {
       const middle = (low + high) >> 1;
@@ -111,55 +113,55 @@ export class Store {
   }
 }
 
-function hold(own, place) {
-  for (const array of Object.values(own)) array[place] = array[place - 1];
+function repeatPrevious(columns, index) {
+  for (const array of Object.values(columns)) array[index] = array[index - 1];
 }
 
 const value = (values, k) => values?.[k] ?? NaN;
 
-function fill(own, place, from, k) {
+function writeSample(columns, index, from, k) {
   const [x, y, z] = [0, 1, 2].map((axis) => value(from?.force?.[axis], k));
-  own.fx[place] = x;
-  own.fy[place] = y;
-  own.fz[place] = z;
-  own.force[place] = Math.sqrt(x * x + y * y + z * z);
-  own.sigma[place] = value(from?.instability, k);
-  own.probability[place] = value(from?.stable_probability, k);
-  own.state[place] = from?.state?.[k] ?? UNKNOWN;
+  columns.fx[index] = x;
+  columns.fy[index] = y;
+  columns.fz[index] = z;
+  columns.force[index] = Math.sqrt(x * x + y * y + z * z);
+  columns.sigma[index] = value(from?.instability, k);
+  columns.probability[index] = value(from?.stable_probability, k);
+  columns.state[index] = from?.state?.[k] ?? UNKNOWN;
 }
 
 /**
- * What a plot of `window` seconds shows in at most about `bins` bins, with the least and the
- * largest value of each, so that no short peak is lost.
+ * Reduce the last `window` seconds to about `bins` bins, with the smallest and the largest value
+ * of each bin, so that short peaks remain visible.
  *
- * Bins hold a power of two of samples and stay on the same samples while the plot moves: lines
- * slide and do not flicker.
+ * The number of samples in a bin is a power of two, and bins keep their samples while the plot
+ * moves: lines shift and do not flicker.
  *
  * @param arrays columns of the store.
- * @returns {{x: number[], columns: (number|null)[][], picks: number[]}} times before the
- *   newest sample [s], values, and the places of the samples in the store.
+ * @returns {{x: number[], columns: (number|null)[][], indices: number[]}} times relative to the
+ *   newest sample [s], values, and the indices of the samples in the store.
  */
-export function reduce(store, window, bins, arrays) {
+export function downsample(store, window, bins, arrays) {
   const now = store.latest ?? 0;
-  const first = Math.max(store.start, store.find(now - window) - 1);
+  const first = Math.max(store.start, store.indexOf(now - window) - 1);
   const stride = 2 ** Math.max(0, Math.ceil(Math.log2((store.end - first) / bins)));
-  const x = [], picks = [], columns = arrays.map(() => []);
-  let place = stride === 1 ? first : Math.ceil((first + store.moved) / stride) * stride - store.moved;
-  for (; place < store.end; place += stride) {
-    const stop = Math.min(place + stride, store.end), middle = place + (stride >> 1);
-    x.push(store.times[place] - now);
-    picks.push(place);
+  const x = [], indices = [], columns = arrays.map(() => []);
+  let start = stride === 1 ? first : Math.ceil((first + store.removed) / stride) * stride - store.removed;
+  for (; start < store.end; start += stride) {
+    const stop = Math.min(start + stride, store.end), middle = start + (stride >> 1);
+    x.push(store.times[start] - now);
+    indices.push(start);
     const two = stride > 1 && middle < stop;
-    if (two) { x.push(store.times[middle] - now); picks.push(middle); }
+    if (two) { x.push(store.times[middle] - now); indices.push(middle); }
     arrays.forEach((array, c) => {
-      if (two) columns[c].push(...extremes(array, place, stop));
-      else columns[c].push(Number.isNaN(array[place]) ? null : array[place]);
+      if (two) columns[c].push(...extremes(array, start, stop));
+      else columns[c].push(Number.isNaN(array[start]) ? null : array[start]);
     });
   }
-  return { x, columns, picks };
+  return { x, columns, indices };
 }
 
-// The least and the largest value in the order in which they came; a missing value breaks the line.
+// Return the smallest and the largest value in their order; a missing value breaks the line.
 function extremes(array, start, stop) {
   let low = -1, high = -1, broken = false;
   for (let k = start; k < stop; k += 1) {
