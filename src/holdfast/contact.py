@@ -172,6 +172,9 @@ class StateChanges:
     Args:
         names: of the fingers, in the order of the states.
 
+    Attributes:
+        states: the latest state of each name.
+
     Example:
         >>> changes = StateChanges(["thumb"])
         >>> changes.update([ContactState.UNKNOWN], time=0.0)
@@ -185,24 +188,32 @@ class StateChanges:
 
     def __init__(self, names: Sequence[str]) -> None:
         self._names = tuple(names)
-        self._states = [ContactState.UNKNOWN] * len(self._names)
+        self.states = [ContactState.UNKNOWN] * len(self._names)
 
-    def update(self, states: list[ContactState], time: float) -> list[ContactEvent]:
+    def update(self, states: Sequence[ContactState], time: float) -> list[ContactEvent]:
         """Return the changes from the previous states to `states` at one sample.
 
         Args:
             states: one for each name.
             time: of the sample [s].
         """
-        previous = self._states
-        if states == previous:
-            return []
-        self._states = states
         return [
-            ContactEvent(name, new, old, time)
-            for name, new, old in zip(self._names, states, previous, strict=True)
+            self.change(index, new, time)
+            for index, (new, old) in enumerate(zip(states, self.states, strict=True))
             if new is not old
         ]
+
+    def change(self, index: int, state: ContactState, time: float) -> ContactEvent:
+        """Set one state to another, and return the change.
+
+        Args:
+            index: of the state among the names.
+            state: that begins.
+            time: of the sample [s].
+        """
+        event = ContactEvent(self._names[index], state, self.states[index], time)
+        self.states[index] = state
+        return event
 
     def update_chunk(
         self, times: npt.NDArray[np.float64], codes: npt.NDArray[np.integer[Any]]
@@ -215,9 +226,9 @@ class StateChanges:
         """
         if not len(times):
             return []
-        codes = np.vstack([[state.code for state in self._states], codes])
+        codes = np.vstack([[state.code for state in self.states], codes])
         rows, columns = np.nonzero(codes[1:] != codes[:-1])
-        self._states = [_STATES[code] for code in codes[-1]]
+        self.states = [_STATES[code] for code in codes[-1]]
         return [
             ContactEvent(self._names[column], _STATES[new], _STATES[old], time)
             for column, new, old, time in zip(

@@ -4,6 +4,7 @@ Offline detection is the same detector, fed with a recording: one kernel compute
 and the probability, and one rule turns them into a state.
 """
 
+from collections import deque
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from math import inf
@@ -128,9 +129,10 @@ class Detector:
             self._readings, self._present, self._report,
         )  # fmt: skip
         self._table, self._arrays = arrays.table()
+        self._status = stream.output.status
         self._changes = StateChanges(self._names)
         self._last_time = -inf
-        self._events: list[ContactEvent] = []
+        self._events: deque[ContactEvent] = deque(maxlen=MAX_EVENTS)
 
     def __getstate__(self) -> object:
         # A copy would share memory with this one, by address.
@@ -173,7 +175,8 @@ class Detector:
 
     def events(self) -> list[ContactEvent]:
         """Return the changes of state since the last call, at most `MAX_EVENTS`, oldest first."""
-        events, self._events = self._events, []
+        events = list(self._events)
+        self._events.clear()
         return events
 
     def run(self, recording: Recording) -> Detection:
@@ -199,7 +202,7 @@ class Detector:
                 readings, present, times, rows,
             )  # fmt: skip
             codes = np.column_stack([rows.state, rows.hand])
-            self._keep_events(self._changes.update_chunk(times, codes))
+            self._events += self._changes.update_chunk(times, codes)
             self._last_time = float(times[-1])
             chunks.append((times, present, rows))
         return detection_of(recording.name, stream.plan.fingers, chunks)
@@ -246,25 +249,22 @@ class Detector:
 
     def _estimate(self, time: float, hand_code: int) -> HandEstimate:
         """Return the estimate that the kernel reported, and keep its changes as events."""
-        fingers, states = {}, []
-        status = self._stream.output.status
+        fingers = {}
+        changes, events = self._changes, self._events
+        previous = changes.states
         for place, row in enumerate(self._report.tolist()):
             sample_time, code, probability, sigma, x, y, z = row
             state, reason, faults = ESTIMATES[code]
-            taxels = taxels_of(int(status[place, TAXELS])) if faults else ()
-            states.append(state)
+            taxels = taxels_of(int(self._status[place, TAXELS])) if faults else ()
+            if state is not previous[place]:
+                events.append(changes.change(place, state, time))
             fingers[self._names[place]] = ContactEstimate(
                 sample_time, state, reason, probability, sigma, (x, y, z), faults, taxels
             )
         hand = STATES[hand_code]
-        states.append(hand)
-        if events := self._changes.update(states, time):
-            self._keep_events(events)
+        if hand is not previous[-1]:
+            events.append(changes.change(len(previous) - 1, hand, time))
         return HandEstimate(time, hand, fingers)
-
-    def _keep_events(self, events: list[ContactEvent]) -> None:
-        self._events += events
-        del self._events[:-MAX_EVENTS]
 
 
 def detect(model: Model, recording: Recording) -> Detection:
