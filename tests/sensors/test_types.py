@@ -71,7 +71,7 @@ def one_module(indices):
         ({"limits": (1, 2, 3)}, "limits of pair: shape (2,) expected, (3,) given"),
     ],
 )
-def test_refuses(fields, message):
+def test_invalid_fields(fields, message):
     with pytest.raises(ValueError) as refused:
         two_taxels(**fields)
     assert str(refused.value) == message
@@ -107,7 +107,7 @@ def test_equal_by_content():
 
 
 @pytest.mark.parametrize("name", built_in_sensors())
-def test_written_and_read_it_is_the_same(name, tmp_path):
+def test_reading_a_written_sensor_gives_the_same(name, tmp_path):
     path = tmp_path / "sensor.json"
     path.write_text(json.dumps(sensor(name).to_dict()))
     assert Sensor.from_json(path) == sensor(name)
@@ -137,7 +137,7 @@ class TestFromJson:
             ({"rotations": [[[1, 0, 0]] * 3] * 2}, "away from a proper rotation"),
         ],
     )
-    def test_refuses(self, tmp_path, fields, message):
+    def test_invalid_fields(self, tmp_path, fields, message):
         path = written(tmp_path, **fields)
         with pytest.raises(ValueError) as refused:
             Sensor.from_json(path)
@@ -148,7 +148,7 @@ class TestFromJson:
     def test_no_json_object(self, tmp_path, text):
         path = tmp_path / "pair.json"
         path.write_text(text, "latin-1")
-        with pytest.raises(ValueError, match="is no JSON object of a sensor"):
+        with pytest.raises(ValueError, match="is not a JSON object of a sensor"):
             Sensor.from_json(path)
 
     def test_no_file(self, tmp_path):
@@ -170,7 +170,7 @@ class TestHand:
     def test_every_flat_index_once(self):
         for indices in ([0, 0], [0, 2], [1, 2]):
             with pytest.raises(
-                ValueError, match=r"^odd: every flat index belongs to one module, once$"
+                ValueError, match=r"^odd: every flat index must belong to exactly one module$"
             ):
                 Hand("odd", {"a": one_module(indices)})
 
@@ -190,6 +190,6 @@ class TestHand:
             expected = np.tile(np.eye(3), (len(turns), 1, 1))
             np.testing.assert_allclose(turns @ turns.transpose(0, 2, 1), expected, atol=1e-12)
 
-    def test_a_module_refuses_what_is_no_rotation(self):
+    def test_rotations_of_modules_are_checked(self):
         with pytest.raises(ValueError, match=r"^pair on tip: the rotation of taxel 1 is"):
             replace(one_module([0, 1]), rotations=np.ones((2, 3, 3)))

@@ -71,6 +71,6 @@ def test_known_models(model):
         ("uSPa44", 0, "uSPa44 with 0 taxels given; at least 1 expected"),
     ],
 )
-def test_another_number_of_taxels_is_told(model, n_taxels, text):
+def test_another_number_of_taxels_than_the_model(model, n_taxels, text):
     with pytest.raises(ValueError, match=re.escape(text)):
         module_sensors(model, n_taxels)

@@ -1,6 +1,6 @@
-"""Sensors and hands as values: where each taxel sits and how it is turned."""
+"""Sensors and hands: the pose of each taxel, built-in layouts, and XELA's model names."""
 
-from holdfast.sensors.layouts import built_in_hands, built_in_sensors, hand, sensor
+from holdfast.sensors.built_in import built_in_hands, built_in_sensors, hand, sensor
 from holdfast.sensors.types import Hand, HandModule, Sensor
 
 __all__ = [

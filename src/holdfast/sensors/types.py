@@ -1,4 +1,4 @@
-"""A sensor is its taxels' poses; a hand is its sensors and their places in a flat packet."""
+"""Types of sensors and hands: taxel poses, and places in the flat packet of a hand."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass, fields
@@ -14,30 +14,31 @@ Array = npt.NDArray[np.float64]
 Unit = Literal["count", "N"]
 
 ROTATION_TOLERANCE = 1e-5
-"""How far a rotation may be from SO(3) as read: tables are rounded to six digits."""
+"""Maximum error of a rotation matrix as read; tables are rounded to six digits."""
 
-ROUNDING = 1e-14
-"""A rotation nearer to SO(3) than this is exact already: written and read, it stays the same."""
+EXACT_TOLERANCE = 1e-14
+"""A rotation matrix with a smaller error is kept unchanged, so that writing and reading a sensor
+does not change it."""
 
 
 @dataclass(frozen=True, eq=False)
 class Sensor:
     """A tactile sensor: the pose of each of its taxels in the fingertip frame.
 
-    Rotations are checked to be in SO(3) to 1e-5 as given and made exact from there.
+    Rotation matrices may have an error of 1e-5; the nearest exact ones are stored.
 
     Attributes:
-        name: what it is called.
-        positions: (n_taxels, 3) of the taxels in the fingertip frame [m].
-        rotations: (n_taxels, 3, 3) R_i, from taxel frame to fingertip frame; a taxel's z is
-            its outward normal, positive when pressed.
+        name: name of the sensor.
+        positions: (n_taxels, 3) positions of the taxels in the fingertip frame [m].
+        rotations: (n_taxels, 3, 3) R_i, from taxel frame to fingertip frame. The z axis of a
+            taxel is its outward normal, positive when pressed.
         normal: (3,) unit vector of the sensor's normal in the fingertip frame.
-        rate: nominal samples per second [Hz].
-        unit: of raw readings, `count` or `N`.
-        limits: smallest and largest reading that the device can send, where that is known.
+        rate: nominal sample rate [Hz].
+        unit: unit of raw readings, `count` or `N`.
+        limits: smallest and largest reading that the device can send; None if unknown.
 
     Raises:
-        ValueError: a shape is wrong, a number is not finite, or a rotation is none.
+        ValueError: a shape is wrong, a number is not finite, or a rotation is not valid.
     """
 
     name: str
@@ -72,7 +73,7 @@ class Sensor:
 
     @property
     def n_taxels(self) -> int:
-        """How many taxels it has."""
+        """Number of taxels."""
         return len(self.positions)
 
     def __eq__(self, other: object) -> bool:
@@ -82,7 +83,7 @@ class Sensor:
         return hash((self.name, self.n_taxels))
 
     def to_dict(self) -> dict[str, Any]:
-        """The sensor as plain data, as `from_json` reads it."""
+        """Return the sensor as plain data, in the form that `from_json` reads."""
         return {
             "name": self.name,
             "positions": self.positions.tolist(),
@@ -95,10 +96,10 @@ class Sensor:
 
     @classmethod
     def from_dict(cls, data: Mapping[str, Any]) -> Self:
-        """The sensor that `to_dict` wrote down.
+        """Make a sensor of the data that `to_dict` returns.
 
         Raises:
-            ValueError: a field is missing, unknown, or not what `Sensor` accepts.
+            ValueError: a field is missing, unknown, or not valid for `Sensor`.
         """
         known = {"name", "positions", "rotations", "normal", "rate", "unit", "limits"}
         needed = known - {"unit", "limits"}
@@ -118,16 +119,16 @@ class Sensor:
 
     @classmethod
     def from_json(cls, path: str | Path) -> Self:
-        """The sensor in a JSON file with the fields of `Sensor`.
+        """Read a sensor from a JSON file with the fields of `Sensor`.
 
         Raises:
-            ValueError: the file is no JSON object, or not what `Sensor` accepts.
-            OSError: it cannot be read.
+            ValueError: the file is not a JSON object, or its fields are not valid.
+            OSError: the file cannot be read.
         """
         try:
             data = msgspec.json.decode(Path(path).read_bytes(), type=dict[str, Any])
         except msgspec.DecodeError as cause:
-            raise ValueError(f"{path} is no JSON object of a sensor: {cause}") from cause
+            raise ValueError(f"{path} is not a JSON object of a sensor: {cause}") from cause
         try:
             return cls.from_dict(data)
         except (TypeError, ValueError) as cause:
@@ -143,17 +144,17 @@ class Sensor:
         rate: float = 150.0,
         normal: npt.ArrayLike = (0.0, 0.0, 1.0),
     ) -> Self:
-        """The sensor whose taxels are the joints of a URDF file whose names hold `match`.
+        """Read a sensor from a URDF file: its taxels are the joints with `match` in their name.
 
         Args:
-            path: an expanded URDF file (xacro must have been run).
-            base: the link whose frame is the fingertip frame.
-            match: text that the names of taxel joints have in common.
-            rate: nominal samples per second [Hz].
-            normal: of the sensor, in the frame of `base`.
+            path: path of a URDF file; a xacro file must be expanded first.
+            base: link whose frame is the fingertip frame.
+            match: text that the names of all taxel joints contain.
+            rate: nominal sample rate [Hz].
+            normal: normal of the sensor, in the frame of `base`.
 
         Raises:
-            ValueError: no such link, no such joint below it, or no URDF.
+            ValueError: the file is not a URDF file, or the link or the joints do not exist.
             OSError: the file cannot be read.
         """
         from holdfast.sensors.urdf import taxel_poses
@@ -165,18 +166,18 @@ class Sensor:
 
 @dataclass(frozen=True, eq=False)
 class HandModule:
-    """One sensor of a hand: which taxels of the flat packet are its own, and where they sit.
+    """One sensor of a hand: its taxels in the flat packet, and their poses on the hand.
 
     Attributes:
-        sensor: what it is.
+        sensor: type of the sensor.
         flat_indices: (n_taxels,) place of taxel 1, 2, ... in the flat packet of the hand.
-        link: of the hand, that carries it.
-        positions: (n_taxels, 3) in the frame of that link [m].
+        link: link of the hand that carries the sensor.
+        positions: (n_taxels, 3) positions in the frame of that link [m].
         rotations: (n_taxels, 3, 3) from taxel frame to the frame of that link.
         grid: (n_taxels, 2) row and column of each taxel on a flat map of the hand.
 
     Raises:
-        ValueError: a shape is wrong, a number is not finite, or a rotation is none.
+        ValueError: a shape is wrong, a number is not finite, or a rotation is not valid.
     """
 
     sensor: Sensor
@@ -205,14 +206,14 @@ class HandModule:
 
 @dataclass(frozen=True, eq=False)
 class Hand:
-    """A hand covered with sensors that report in one flat packet.
+    """A hand with sensors that report in one flat packet.
 
     Attributes:
-        name: what it is called.
+        name: name of the hand.
         modules: its sensors by name; fingertips are `thumb`, `index`, `middle`, `ring`.
 
     Raises:
-        ValueError: the modules' flat indices are not 0, 1, ..., n_taxels - 1, each once.
+        ValueError: the flat indices of the modules are not 0, 1, ..., n_taxels - 1, each once.
     """
 
     name: str
@@ -221,7 +222,7 @@ class Hand:
     def __post_init__(self) -> None:
         flat = np.sort(np.concatenate([m.flat_indices for m in self.modules.values()]))
         if not np.array_equal(flat, np.arange(len(flat))):
-            raise ValueError(f"{self.name}: every flat index belongs to one module, once")
+            raise ValueError(f"{self.name}: every flat index must belong to exactly one module")
         object.__setattr__(self, "modules", MappingProxyType(dict(self.modules)))
 
     def __reduce__(self) -> tuple[Any, ...]:
@@ -229,11 +230,11 @@ class Hand:
 
     @property
     def n_taxels(self) -> int:
-        """How many taxels all its modules have."""
+        """Number of taxels of all modules."""
         return sum(module.sensor.n_taxels for module in self.modules.values())
 
     def split(self, flat: npt.ArrayLike) -> dict[str, npt.NDArray[Any]]:
-        """The readings of each module out of flat packets.
+        """Split flat packets into the readings of each module.
 
         Args:
             flat: (..., n_taxels, 3) in the order of the packet.
@@ -242,7 +243,7 @@ class Hand:
             (..., n_taxels of the module, 3) by module.
 
         Raises:
-            ValueError: another number of taxels or axes.
+            ValueError: `flat` has another number of taxels or axes.
         """
         readings = np.asarray(flat)
         if readings.shape[-2:] != (self.n_taxels, 3):
@@ -254,9 +255,10 @@ class Hand:
 
 
 def rebuilt(value: Any) -> tuple[Any, ...]:  # noqa: ANN401 (any dataclass)
-    """How pickle and copy make a value anew: by its constructor, which locks its arrays.
+    """Return how pickle and copy make a value: by its constructor, which locks its arrays.
 
-    Values travel to worker processes; read-only mappings cannot, and become plain ones.
+    Read-only mappings cannot be pickled, for example for a worker process; they become
+    dictionaries.
     """
     return type(value), tuple(_plain(getattr(value, part.name)) for part in fields(value))
 
@@ -284,7 +286,7 @@ def _array(given: npt.ArrayLike, what: str, shape: tuple[int | None, ...]) -> Ar
 
 
 def _exact_rotations(rotations: Array, name: str) -> Array:
-    """The nearest members of SO(3), by polar decomposition."""
+    """Return the nearest rotation matrices, by polar decomposition."""
     left, _, right = np.linalg.svd(rotations)
     exact: Array = left @ right
     error = np.abs(exact - rotations).max(axis=(1, 2))
@@ -300,7 +302,7 @@ def _exact_rotations(rotations: Array, name: str) -> Array:
             f"{name}: the rotation of taxel {int(signs.argmin()) + 1} is a reflection "
             "(determinant -1); a rotation expected"
         )
-    return rotations if error[worst] < ROUNDING else exact
+    return rotations if error[worst] < EXACT_TOLERANCE else exact
 
 
 def _checked_limits(given: object, name: str) -> tuple[float, float] | None:

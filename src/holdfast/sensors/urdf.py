@@ -1,4 +1,4 @@
-"""Taxel poses out of a URDF file."""
+"""Taxel poses from a URDF file."""
 
 import xml.etree.ElementTree as ET
 from pathlib import Path
@@ -11,18 +11,18 @@ Array = npt.NDArray[np.float64]
 
 
 def taxel_poses(path: Path, base: str, match: str) -> tuple[Array, Array]:
-    """Positions [m] and rotations of the joints below `base` whose names hold `match`.
+    """Return positions [m] and rotations of the joints below `base` with `match` in their name.
 
     Args:
-        path: a URDF file.
-        base: the link whose frame the poses are in.
-        match: text in the names of the joints.
+        path: path of a URDF file.
+        base: link in whose frame the poses are expressed.
+        match: text that the names of the joints contain.
 
     Returns:
         (n, 3) positions and (n, 3, 3) rotations, in the order of the file.
 
     Raises:
-        ValueError: no URDF, no such link, or no such joint.
+        ValueError: the file is not a URDF file, or the link or the joints do not exist.
     """
     joints = _joints(path)
     parents = {joint.child: joint for joint in joints}
@@ -31,7 +31,7 @@ def taxel_poses(path: Path, base: str, match: str) -> tuple[Array, Array]:
         raise ValueError(f"{path} has no link {base!r}; it has {', '.join(sorted(links)[:10])}")
     poses = [pose for j in joints if match in j.name if (pose := _pose(j, base, parents))]
     if not poses:
-        raise ValueError(f"{path} has no joint below {base!r} whose name holds {match!r}")
+        raise ValueError(f"{path} has no joint below {base!r} whose name contains {match!r}")
     return np.array([p for p, _ in poses]), np.array([r for _, r in poses])
 
 
@@ -42,15 +42,15 @@ class _Joint:
         self.name = element.get("name", "")
         self.parent = _link(element, "parent")
         self.child = _link(element, "child")
-        self.position = _three(attributes.get("xyz", "0 0 0"))
-        angles = _three(attributes.get("rpy", "0 0 0"))
+        self.position = _three_numbers(attributes.get("xyz", "0 0 0"))
+        angles = _three_numbers(attributes.get("rpy", "0 0 0"))
         self.rotation: Array = Rotation.from_euler("xyz", angles).as_matrix()
 
 
 def _joints(path: Path) -> list[_Joint]:
     text = path.read_text("utf-8")
     if "<!DOCTYPE" in text or "<!ENTITY" in text:
-        raise ValueError(f"{path} declares a document type: a plain URDF file has none")
+        raise ValueError(f"{path} declares a document type, which a URDF file never needs")
     try:
         root = ET.fromstring(text)
         return [
@@ -58,11 +58,11 @@ def _joints(path: Path) -> list[_Joint]:
         ]
     except (ET.ParseError, ValueError) as cause:
         raise ValueError(
-            f"{path} is no URDF file (is it a xacro not yet expanded?): {cause}"
+            f"{path} is not a URDF file (a xacro file must be expanded first): {cause}"
         ) from cause
 
 
-def _three(text: str) -> Array:
+def _three_numbers(text: str) -> Array:
     numbers = np.array([float(word) for word in text.split()])
     if numbers.shape != (3,) or not np.isfinite(numbers).all():
         raise ValueError(f"three finite numbers expected, {text!r} given")
@@ -75,13 +75,13 @@ def _link(joint: ET.Element, end: str) -> str:
 
 
 def _pose(joint: _Joint, base: str, parents: dict[str, _Joint]) -> tuple[Array, Array] | None:
-    """The joint's pose in the frame of `base`; None where it does not hang below it."""
+    """Return the pose of a joint in the frame of `base`; None if it is not below `base`."""
     position, rotation = joint.position, joint.rotation
-    seen = set()
+    visited = set()
     while joint.parent != base:
-        if joint.parent not in parents or joint.parent in seen:
+        if joint.parent not in parents or joint.parent in visited:
             return None
-        seen.add(joint.parent)
+        visited.add(joint.parent)
         joint = parents[joint.parent]
         position = joint.position + joint.rotation @ position
         rotation = joint.rotation @ rotation

@@ -6,11 +6,11 @@ import numpy as np
 import numpy.typing as npt
 
 from holdfast.sensors import Hand, Sensor, hand, sensor
-from holdfast.sensors.layouts import UINT16
+from holdfast.sensors.built_in import UINT16
 
-HANDS = {"xr23ahlcpp": "allegro-uskin", "xr23ahrcpp": "allegro-uskin"}
+XELA_HANDS = {"xr23ahlcpp": "allegro-uskin", "xr23ahrcpp": "allegro-uskin"}
 """Built-in hand of each model that is a whole hand; names in lower case."""
-SENSORS = {
+XELA_SENSORS = {
     "uscuah": "uskin-curved",
     "uscualha": "uskin-curved",
     "usftah": "uskin-4x4",
@@ -56,7 +56,7 @@ def module_sensors(model: str, n_taxels: int) -> dict[str, Sensor]:
     if known is not None:
         _check(model, n_taxels, known.n_taxels, known.name)
         return {name: module.sensor for name, module in known.modules.items()}
-    if (name := SENSORS.get(model.lower())) is not None:
+    if (name := XELA_SENSORS.get(model.lower())) is not None:
         built_in = sensor(name)
         _check(model, n_taxels, built_in.n_taxels, name)
         return {"": built_in}
@@ -67,12 +67,12 @@ def module_sensors(model: str, n_taxels: int) -> dict[str, Sensor]:
 
 def is_known(model: str) -> bool:
     """Return whether the model is in the table of hands and sensors."""
-    return model.lower() in HANDS or model.lower() in SENSORS
+    return model.lower() in XELA_HANDS or model.lower() in XELA_SENSORS
 
 
 def whole_hand(model: str) -> Hand | None:
     """Return the hand that reports in one packet under this model name, or None."""
-    name = HANDS.get(model.lower())
+    name = XELA_HANDS.get(model.lower())
     return None if name is None else hand(name)
 
 

@@ -1,4 +1,4 @@
-"""The layouts that holdfast knows, built from the tables beside this file."""
+"""Built-in sensors and hands, made from the tables in the folder `tables`."""
 
 import csv
 from functools import cache
@@ -9,56 +9,56 @@ import numpy as np
 from holdfast.sensors.types import Array, Hand, HandModule, Sensor
 
 UINT16 = (0.0, 65535.0)
+"""Smallest and largest reading of XELA's sensors [count]."""
 
 MODULE_TO_FINGERTIP = np.array([[0.0, 0.0, 1.0], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0]])
-"""Turns the uSCuAH module (x lateral, y distal, z palmar) into the Allegro fingertip frame
-(x palmar, z distal): the mount of every finger, rpy (90, 0, 90) degrees."""
+"""Rotation from the frame of the uSCuAH module (x lateral, y distal, z palmar) to the Allegro
+fingertip frame (x palmar, z distal). Every finger has this mount: rpy (90, 0, 90) degrees."""
 
 
 def sensor(name: str) -> Sensor:
-    """The built-in sensor of that name.
+    """Return the built-in sensor of this name.
 
     Raises:
-        ValueError: there is none.
+        ValueError: there is no built-in sensor of this name.
 
     Example:
         >>> sensor("uskin-curved").n_taxels
         30
     """
-    if name not in _SENSORS:
-        raise ValueError(f"unknown sensor {name!r}; built in are {', '.join(_SENSORS)}")
-    return _SENSORS[name]()
+    if name not in SENSORS:
+        raise ValueError(f"unknown sensor {name!r}; built in are {', '.join(SENSORS)}")
+    return SENSORS[name]()
 
 
 def hand(name: str) -> Hand:
-    """The built-in hand of that name.
+    """Return the built-in hand of this name.
 
     Raises:
-        ValueError: there is none.
+        ValueError: there is no built-in hand of this name.
 
     Example:
         >>> len(hand("allegro-uskin").modules)
         18
     """
-    if name not in _HANDS:
-        raise ValueError(f"unknown hand {name!r}; built in are {', '.join(_HANDS)}")
-    return _HANDS[name]()
+    if name not in HANDS:
+        raise ValueError(f"unknown hand {name!r}; built in are {', '.join(HANDS)}")
+    return HANDS[name]()
 
 
 def built_in_sensors() -> tuple[str, ...]:
-    """Names of the built-in sensors."""
-    return tuple(_SENSORS)
+    """Return the names of the built-in sensors."""
+    return tuple(SENSORS)
 
 
 def built_in_hands() -> tuple[str, ...]:
-    """Names of the built-in hands."""
-    return tuple(_HANDS)
+    """Return the names of the built-in hands."""
+    return tuple(HANDS)
 
 
 @cache
 def _uskin_curved() -> Sensor:
-    rows = _table("uskin_curved.csv")
-    positions, rotations = _poses(rows)
+    positions, rotations = _poses(_table("uskin_curved.csv"))
     return Sensor(
         "uskin-curved",
         positions @ MODULE_TO_FINGERTIP.T,
@@ -81,30 +81,31 @@ def _uskin_4x6() -> Sensor:
 
 @cache
 def _gtac() -> Sensor:
-    """Fifteen finger sections, one 3-axis reading each; places nominal (three a finger)."""
+    """Return 15 finger sections with one 3-axis reading each; nominal places, 3 a finger."""
     return _flat("gtac", _grid(3, 5, 25e-3, 25e-3), 150.0)
 
 
 @cache
 def _anyskin() -> Sensor:
-    """Five magnetometers: centre, left, right, up, down, turned in their plane; nominal pitch."""
+    """Return 5 magnetometers: centre, left, right, up, down; rotated in plane, nominal pitch."""
     pitch = 7e-3
-    places = pitch * np.array([[0, 0, 0], [-1, 0, 0], [1, 0, 0], [0, 1, 0], [0, -1, 0]])
+    positions = pitch * np.array([[0, 0, 0], [-1, 0, 0], [1, 0, 0], [0, 1, 0], [0, -1, 0]])
     angles = np.array([-np.pi / 2, -np.pi / 2, np.pi, np.pi / 2, 0.0])
-    turns = np.zeros((5, 3, 3))
-    turns[:, 0, 0] = turns[:, 1, 1] = np.cos(angles)
-    turns[:, 1, 0] = np.sin(angles)
-    turns[:, 0, 1] = -np.sin(angles)
-    turns[:, 2, 2] = 1.0
-    return Sensor("anyskin", places, turns, np.array([0.0, 0.0, 1.0]), rate=100.0)
+    rotations = np.zeros((5, 3, 3))
+    rotations[:, 0, 0] = rotations[:, 1, 1] = np.cos(angles)
+    rotations[:, 1, 0] = np.sin(angles)
+    rotations[:, 0, 1] = -np.sin(angles)
+    rotations[:, 2, 2] = 1.0
+    return Sensor("anyskin", positions, rotations, np.array([0.0, 0.0, 1.0]), rate=100.0)
 
 
 @cache
 def _papillarray() -> Sensor:
-    """Nine pillars, three by three, in newtons; nominal pitch."""
-    grid = _grid(3, 3, 7e-3, 7e-3)
-    turns = np.tile(np.eye(3), (9, 1, 1))
-    return Sensor("papillarray", grid, turns, np.array([0.0, 0.0, 1.0]), rate=1000.0, unit="N")
+    """Return 3 x 3 pillars, in newtons; nominal pitch."""
+    positions = _grid(3, 3, 7e-3, 7e-3)
+    rotations = np.tile(np.eye(3), (9, 1, 1))
+    normal = np.array([0.0, 0.0, 1.0])
+    return Sensor("papillarray", positions, rotations, normal, rate=1000.0, unit="N")
 
 
 @cache
@@ -112,13 +113,11 @@ def _allegro_uskin() -> Hand:
     by_module: dict[str, list[dict[str, str]]] = {}
     for row in _table("allegro_uskin.csv"):
         by_module.setdefault(row["module"], []).append(row)
-    modules = {name: _hand_module(by_module[name]) for name in sorted(by_module, key=_place)}
-    return Hand("allegro-uskin", modules)
+    names = sorted(by_module, key=_module_order)
+    return Hand("allegro-uskin", {name: _hand_module(by_module[name]) for name in names})
 
 
-_MODELS = {"uSCuAH": _uskin_curved, "uSPa44": _uskin_4x4, "uSPa46": _uskin_4x6}
-
-_SENSORS = {
+SENSORS = {
     "uskin-curved": _uskin_curved,
     "uskin-4x4": _uskin_4x4,
     "uskin-4x6": _uskin_4x6,
@@ -126,11 +125,13 @@ _SENSORS = {
     "anyskin": _anyskin,
     "papillarray": _papillarray,
 }
-_HANDS = {"allegro-uskin": _allegro_uskin}
+"""Functions that make the built-in sensors, by name."""
+HANDS = {"allegro-uskin": _allegro_uskin}
+"""Functions that make the built-in hands, by name."""
 
 
-def _place(name: str) -> tuple[bool, int, str]:
-    """Fingertips first, then pads and palm, from the thumb on."""
+def _module_order(name: str) -> tuple[bool, int, str]:
+    """Return a key to sort modules: fingertips first, then pads and palm, from the thumb on."""
     parts = ("thumb", "index", "middle", "ring", "palm")
     return "/" in name, parts.index(name.split("/", maxsplit=1)[0]), name
 
@@ -139,7 +140,7 @@ def _hand_module(rows: list[dict[str, str]]) -> HandModule:
     rows = sorted(rows, key=lambda row: int(row["taxel"]))
     positions, rotations = _poses(rows)
     return HandModule(
-        sensor=_MODELS[rows[0]["model"]](),
+        sensor=sensor(rows[0]["sensor"]),
         flat_indices=np.array([int(row["flat_index"]) for row in rows]),
         link=rows[0]["link"],
         positions=positions,
@@ -161,14 +162,14 @@ def _poses(rows: list[dict[str, str]]) -> tuple[Array, Array]:
 
 
 def _grid(n_rows: int, n_columns: int, pitch_x: float, pitch_y: float) -> Array:
-    """Taxels of a flat patch about its middle, from the top left, line by line [m]."""
+    """Return positions on a flat grid around its centre [m], from the top left, row by row."""
     x = (np.arange(n_columns) - (n_columns - 1) / 2) * pitch_x
     y = ((n_rows - 1) / 2 - np.arange(n_rows)) * pitch_y
-    return np.array([[across, up, 0.0] for up in y for across in x])
+    return np.array([[column, row, 0.0] for row in y for column in x])
 
 
 def _flat(
     name: str, positions: Array, rate: float, limits: tuple[float, float] | None = None
 ) -> Sensor:
-    turns = np.tile(np.eye(3), (len(positions), 1, 1))
-    return Sensor(name, positions, turns, np.array([0.0, 0.0, 1.0]), rate, limits=limits)
+    rotations = np.tile(np.eye(3), (len(positions), 1, 1))
+    return Sensor(name, positions, rotations, np.array([0.0, 0.0, 1.0]), rate, limits=limits)

@@ -45,7 +45,7 @@ def test_rotations_are_exact(name):
     np.testing.assert_allclose(np.linalg.det(turns), 1, atol=1e-12)
 
 
-def test_unknown_names_tell_the_known():
+def test_unknown_names():
     known = "uskin-curved, uskin-4x4, uskin-4x6, gtac, anyskin, papillarray"
     with pytest.raises(ValueError, match=rf"^unknown sensor 'uskin'; built in are {known}$"):
         sensor("uskin")
@@ -54,7 +54,7 @@ def test_unknown_names_tell_the_known():
 
 
 class TestCurvedFingertip:
-    """What the data sheet and the drawings say of it."""
+    """Facts from the data sheet and the drawings."""
 
     def test_spacing_and_size(self):
         one = sensor("uskin-curved")
@@ -72,7 +72,7 @@ class TestCurvedFingertip:
         normals = one.rotations[:, :, 2]
         np.testing.assert_allclose(normals[:15] * mirror, normals[order], atol=1e-6)
 
-    def test_normals_look_outwards(self):
+    def test_normals_point_outwards(self):
         one = sensor("uskin-curved")
         axis = np.array([12.54e-3, 0, 0])
         outwards = one.positions - axis
@@ -152,7 +152,7 @@ class TestAllegro:
             assert part[1, :, 2].tolist() == one.modules[name].flat_indices.tolist()
 
     @pytest.mark.parametrize("shape", [(367, 3), (368, 2), (2, 3, 368)])
-    def test_split_refuses_another_packet(self, shape):
+    def test_split_of_a_packet_of_another_shape(self, shape):
         with pytest.raises(
             ValueError,
             match=r"^\(368, 3\) taxels and axes expected for allegro-uskin, \(\d+, \d+\) given$",
