@@ -9,7 +9,6 @@ pytest.importorskip("rosbags", reason="rosbags is not installed")
 
 from holdfast.errors import RecordingError
 from holdfast.io.bags import find_bags, open_bag, read_poses
-from holdfast.labelling.rules.poses import poses_from_bag
 from ros.pose_bags import PoseBagWriter
 
 
@@ -55,15 +54,6 @@ def test_poses_of_topics_and_of_frames(bag):
         expected[:, 3] = 0.5
         expected[:, 4] = 1.0
         np.testing.assert_array_equal(poses[body], expected)
-
-
-def test_poses_for_labels(bag):
-    poses = poses_from_bag(a_pose_and_a_frame(bag), "/marker", {"thumb": "thumb_tip"})
-    assert (poses.thing.times - 1e9).tolist() == [0, 0.25, 0.5, 0.75]
-    assert poses.thing.positions[:, 0].tolist() == [0, 1, 2, 3]
-    assert poses.tips["thumb"].positions[:, 0].tolist() == [0, 0.5, 1, 1.5]
-    assert poses.tips["thumb"].quaternions[0].tolist() == [1, 0, 0, 0]
-    assert not poses.same_clock
 
 
 def test_nothing_from_a_bag_is_compiled_or_executed(bag):
