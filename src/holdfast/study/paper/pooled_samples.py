@@ -115,7 +115,7 @@ def _without_readings(signal: FingerSignal) -> FingerSignal:
 def _columns(signal: FingerSignal, window: int) -> Array:
     """(n, 7) all `COLUMNS`; NaN without a full window."""
     table = np.full((len(signal.times), len(COLUMNS)), np.nan)
-    normal = signal.normal
+    normal = signal.normal_magnitude
     for rows in signal.stretches:
         table[rows, :-1] = haar_features(signal.force[rows], window)
         table[rows, -1] = detail_energy(normal[rows], window)
