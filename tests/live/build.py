@@ -1,4 +1,4 @@
-"""Sources and models for the tests of live detection."""
+"""Sources and models for the tests of what is live."""
 
 import time
 from collections import deque
@@ -7,8 +7,7 @@ import numpy as np
 
 from holdfast.io import save_recording
 from holdfast.model import Model
-from holdfast.sources.base import Arrival, Source
-from holdfast.sources.base import notice_arrival as make_notice
+from holdfast.sources.base import Arrival, Source, notice_arrival
 from holdfast.synthetic import synthetic_recording
 
 FINGERS = ("thumb", "index", "middle")
@@ -16,7 +15,7 @@ TWIN = "builtin:twin"
 
 
 def grasp(seed=1, name="grasp", fingers=FINGERS):
-    """A synthetic recording of a grasp that is shaken, with curved fingertips."""
+    """A recording of curved fingertips with a grasp that is shaken."""
     return synthetic_recording(name, seed, fingers)
 
 
@@ -28,7 +27,7 @@ def grasp_file(folder, **options):
 
 
 def arrivals_of(recording):
-    """One arrival for each instant of a recording whose modules share their times."""
+    """Every instant of a recording whose modules share their times."""
     first = next(iter(recording.modules.values()))
     return [
         Arrival(
@@ -45,7 +44,7 @@ def model():
 
 
 class Script(Source):
-    """Source of given arrivals, as fast as they are read; None stands for silence."""
+    """Gives what it is told to, as fast as it is taken: arrivals, None for silence."""
 
     paced = False
 
@@ -84,7 +83,7 @@ class Script(Source):
 
 
 class Lasting(Script):
-    """Source that repeats its last samples, with increasing times, after the given arrivals."""
+    """Goes on with its last samples, a moment later each time, where it is told no more."""
 
     last = None
 
@@ -98,13 +97,13 @@ class Lasting(Script):
         return self.last
 
 
-def notice_arrival(text, **faults):
-    """An arrival with a notice and with faults by module, without samples."""
-    return make_notice(time.monotonic(), text, faults={k: tuple(v) for k, v in faults.items()})
+def told(text, **faults):
+    """Word of faults by module, without samples."""
+    return notice_arrival(time.monotonic(), text, faults={k: tuple(v) for k, v in faults.items()})
 
 
 def same(one, two):
-    """Whether two estimates are equal; NaN equals NaN."""
+    """Whether two estimates are equal, NaN where NaN is expected."""
     return np.array_equal(
         [one.time, one.stable_probability, one.instability, *one.force],
         [two.time, two.stable_probability, two.instability, *two.force],

@@ -63,7 +63,7 @@ def source(uri, until, patience=5.0):
     from holdfast.sources import open_source
     from holdfast.sources.ros import topic
 
-    topic.PATIENCE = float(patience)
+    topic.OPEN_TIMEOUT = float(patience)
     told = {"numbers": [], "times": [], "n_lost": 0, "notices": []}
     try:
         with open_source(uri) as opened:

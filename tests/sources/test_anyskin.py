@@ -3,7 +3,7 @@ import pytest
 from hypothesis import example, given, settings
 from hypothesis import strategies as st
 
-from holdfast.sources.anyskin import Decoder
+from holdfast.sources.anyskin import AnySkinDecoder
 
 READING = st.floats(2**-9, 1e6, width=32) | st.floats(-1e6, -(2**-9), width=32) | st.just(0.0)
 CRLF_INSIDE = np.frombuffer(b"\x00\x0d\x0a\x42\x0d\x0a\x00\x42", "<f4")
@@ -25,12 +25,12 @@ def some(n, n_mags=5, seed=0):
 
 
 def decoded(data, n_mags=5, piece=None, start=b"\r\n"):
-    decoder = Decoder(n_mags)
+    decoder = AnySkinDecoder(n_mags)
     data = start + data
     step = piece or len(data)
     parts = [decoder.feed(data[k : k + step]) for k in range(0, len(data), step)]
     samples = [sample for part in parts for sample in part.samples]
-    return samples, sum(part.n_refused for part in parts), parts[-1].other
+    return samples, sum(part.n_refused for part in parts), parts[-1].other_n_mags
 
 
 @pytest.mark.parametrize("n_mags", [1, 2, 5, 16])
@@ -45,7 +45,7 @@ def test_packets_are_decoded_exactly(n_mags):
 def test_five_magnetometers_are_82_bytes():
     data = packet(some(1)[0])
     assert len(data) == 82
-    decoder = Decoder(5)
+    decoder = AnySkinDecoder(5)
     assert decoder.feed(b"\n" + data[:-1]).samples == []
     assert len(decoder.feed(data[-1:]).samples) == 1
 
@@ -181,14 +181,14 @@ def test_another_number_in_a_line_is_known():
 
 
 def test_what_is_expected_makes_another_number_forgotten():
-    decoder = Decoder(5)
-    assert decoder.feed(b"\n" + b"".join(map(packet, some(9, 4)))).other == 4
-    assert decoder.feed(b"".join(map(packet, some(9, 5)))).other == 0
+    decoder = AnySkinDecoder(5)
+    assert decoder.feed(b"\n" + b"".join(map(packet, some(9, 4)))).other_n_mags == 4
+    assert decoder.feed(b"".join(map(packet, some(9, 5)))).other_n_mags == 0
 
 
 def test_a_reset_forgets_half_a_packet():
     first, second = some(2)
-    decoder = Decoder(5)
+    decoder = AnySkinDecoder(5)
     decoder.feed(packet(first)[:50])
     decoder.reset()
     got = decoder.feed(b"\r\n" + packet(second))
@@ -197,9 +197,9 @@ def test_a_reset_forgets_half_a_packet():
 
 
 def test_garbage_for_ever_is_held_in_bounded_memory():
-    decoder = Decoder(5)
+    decoder = AnySkinDecoder(5)
     rng = np.random.default_rng(0)
     for piece in (rng.bytes(10_000), b"1.0\t" * 5000, b"\n" * 20_000, b"\r\n" * 9000):
         decoder.feed(piece)
-        assert len(decoder._held) < 5000
+        assert len(decoder._buffer) < 5000
         assert len(decoder._recent) < 5000

@@ -11,7 +11,7 @@ from holdfast.model import Model
 from holdfast.recordings import Recording, Tactile
 from holdfast.sensors import sensor
 from holdfast.sources import open_source
-from holdfast.sources import player as module
+from holdfast.sources import replay as module
 from holdfast.sources.replay import Replay
 from holdfast.synthetic import synthetic_recording
 
@@ -197,7 +197,7 @@ def test_again_and_again_time_goes_on(path, clock, speed):
     np.testing.assert_allclose(passes[1:, 0] - passes[:-1, -1], 1.0)
     told = [k for k, arrival in enumerate(got) if arrival.notices]
     assert told == [75, 150, 225]
-    assert got[75].notices == (f"{path} begins anew",)
+    assert got[75].notices == (f"{path} starts again",)
     if speed:
         waited = got[224].received - got[0].received
         assert waited == pytest.approx((got[224].time - got[0].time) / speed)
@@ -274,7 +274,7 @@ def test_samples_that_lie_back_in_time_are_told(monkeypatch):
     monkeypatch.setattr("holdfast.sources.replay.read_chunks", lambda *_, **__: iter([early, late]))
     with Replay("a.parquet", speed=0) as source:
         (refused,) = [arrival for arrival in source if arrival.n_refused]
-    assert refused.notices == (f"samples lie back in time: {refused.n_refused} were left out",)
+    assert refused.notices == (f"{refused.n_refused} samples are out of order and were left out",)
 
 
 @pytest.mark.parametrize("speed", [-1.0, np.nan, np.inf])

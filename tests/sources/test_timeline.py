@@ -5,7 +5,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from holdfast.contact import Fault
-from holdfast.sources.timeline import Delay, Timeline
+from holdfast.sources.timeline import Timeline, TransportDelay
 
 PERIOD = 1 / 150
 
@@ -123,9 +123,9 @@ def test_the_offset_is_what_jumps_add():
 
 
 def test_a_delay_begins_anew():
-    delay = Delay()
-    assert delay.of(0.0, 1.0) == 0.0
-    assert delay.of(1.0, 3.0) == pytest.approx(1.0, abs=1e-3)
-    delay.forget()
-    assert delay.of(2.0, 5.0) == 0.0
+    delay = TransportDelay()
+    assert delay.update(0.0, 1.0) == 0.0
+    assert delay.update(1.0, 3.0) == pytest.approx(1.0, abs=1e-3)
+    delay.reset()
+    assert delay.update(2.0, 5.0) == 0.0
     assert delay.lead(3.0, 5.5) == pytest.approx(0.5, abs=1e-3)

@@ -20,7 +20,7 @@ from holdfast.sources.twin import ATTEMPTS, Twin, grasp_of, write
 from holdfast.sources.uri import parse
 from holdfast.twin.simulation import Grasp, simulate
 
-RUN = module._Ahead._run
+RUN = module._Simulator._run
 BALL = "twin:?object=ball&case=1&seed=3"
 
 
@@ -41,7 +41,7 @@ def quick(monkeypatch):
         metadata = {"attempt": grasp.attempt, "case": "failed" if failed else str(grasp.case)}
         return Recording(name, {"thumb": Tactile(sensor("uskin-4x4"), times, readings)}, metadata)
 
-    class Here(module._Ahead):
+    class Here(module._Simulator):
         """As it is, but for the process."""
 
         def _run(self, grasp):
@@ -50,7 +50,7 @@ def quick(monkeypatch):
 
     def install(failing=()):
         monkeypatch.setattr(module, "simulate", lambda grasp: make(grasp, failing))
-        monkeypatch.setattr(module, "_Ahead", Here)
+        monkeypatch.setattr(module, "_Simulator", Here)
 
     install()
     return install
@@ -89,7 +89,7 @@ def test_a_grasp_that_fails_is_tried_again(quick):
     quick(failing={(1, 0), (1, 1)})
     with open_source("twin:", speed=0) as source:
         arrivals = list(source)
-    assert arrivals[0].notices == ("the twin grasps: can-case2-1, after 2 that failed",)
+    assert arrivals[0].notices == ("the twin grasps: can-case2-1, after 2 failed attempts",)
     assert {int(a.samples["thumb"][0, 0]) for a in arrivals} == {12}
 
 
@@ -97,7 +97,7 @@ def test_one_that_always_fails_is_played_as_it_is(quick):
     quick(failing={(1, attempt) for attempt in range(ATTEMPTS)})
     with open_source("twin:", speed=0) as source:
         arrivals = list(source)
-    assert arrivals[0].notices == ("the twin grasps: can-case2-1-failed4, after 3 that failed",)
+    assert arrivals[0].notices == ("the twin grasps: can-case2-1-failed4, after 3 failed attempts",)
 
 
 def test_it_is_tried_as_often_as_simulate_does():
@@ -108,7 +108,7 @@ def test_the_next_repeats_follow(quick):
     with open_source("twin:?repeat=4", speed=0, loop=True) as source:
         arrivals = list(itertools.islice(source, 35))
         assert not source.ended
-        folder = Path(source._ahead._folder.name)
+        folder = Path(source._simulator._folder.name)
         assert len(list(folder.iterdir())) == 2  # what is played and what comes next
     assert not folder.exists()
     assert [int(a.samples["thumb"][0, 0]) for a in arrivals[::10]] == [40, 50, 60, 70]
@@ -138,29 +138,29 @@ def short(recording):
 def test_until_the_next_grasp_is_there_it_is_waited_for(quick, monkeypatch):
     with open_source("twin:", speed=0, loop=True) as source:
         list(itertools.islice(source, 10))
-        source._ahead._process.wait()
-        source._ahead._process = subprocess.Popen(["sleep", "60"])
+        source._simulator._process.wait()
+        source._simulator._process = subprocess.Popen(["sleep", "60"])
         began = time.monotonic()
         assert source.read(0.05) is None
         assert source.read(0.0) is None
         assert time.monotonic() - began >= 0.05
         assert not source.ended
-        process = source._ahead._process
+        process = source._simulator._process
     assert process.returncode is not None  # closing ended it
 
 
 def test_a_process_that_dies_costs_only_time(quick):
     with open_source("twin:", speed=0, loop=True) as source:
         list(itertools.islice(source, 10))
-        source._ahead._process.wait()
-        source._ahead._path.unlink()
+        source._simulator._process.wait()
+        source._simulator._path.unlink()
         arrivals = list(itertools.islice(source, 10))
     assert {int(a.samples["thumb"][0, 0]) for a in arrivals} == {20}
 
 
 def test_without_another_process_it_is_simulated_here(quick, monkeypatch):
     monkeypatch.setattr(module.sys, "executable", "/nowhere/python")
-    monkeypatch.setattr(module._Ahead, "_run", RUN)
+    monkeypatch.setattr(module._Simulator, "_run", RUN)
     with open_source("twin:", speed=0, loop=True) as source:
         arrivals = list(itertools.islice(source, 20))
     assert [int(a.samples["thumb"][0, 0]) for a in arrivals[::10]] == [10, 20]
@@ -169,7 +169,7 @@ def test_without_another_process_it_is_simulated_here(quick, monkeypatch):
 def test_a_process_is_ended_with_the_source(monkeypatch):
     monkeypatch.setattr(module, "simulate", lambda _: ball())
     with open_source(BALL, loop=True) as source:
-        process = source._ahead._process
+        process = source._simulator._process
     assert process.returncode is not None
 
 

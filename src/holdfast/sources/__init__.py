@@ -1,4 +1,4 @@
-"""Where samples come from: a recording, the twin, or a device, all with one contract."""
+"""Sources of samples: recordings, the twin and devices, all with one contract."""
 
 from holdfast.sources.base import Arrival, Source
 from holdfast.sources.uri import SCHEMES, open_source

@@ -1,11 +1,11 @@
-"""What AnySkin and ReSkin boards send, decoded. No I/O, no clock.
+"""Decoding of the packets of AnySkin and ReSkin boards. No I/O and no clock.
 
 A board sends one packet a sample, binary or text, by its firmware (the sketches of ReSkin's
-authors). Binary: of each magnetometer four float32, little endian: temperature, x, y, z; then
-CR LF. Text: of each x, y, z and temperature, apart by tabs; then CR LF. x, y, z are in
-microtesla. Nothing but the end of the last one marks where a packet begins, and CR LF may be in
-a number: what begins after CR LF is a packet where it ends where it should, and every number is
-plausible.
+authors). Binary: four little-endian float32 of each magnetometer (temperature, x, y, z), then CR
+LF. Text: x, y, z and temperature of each magnetometer, separated by tabs, then CR LF. x, y, z are
+in microtesla. Only the end of a packet marks the beginning of the next one, and a number may
+contain CR LF. Therefore the bytes after CR LF are a packet if it ends at the expected place and
+every number is plausible.
 """
 
 import math
@@ -16,49 +16,50 @@ import numpy as np
 import numpy.typing as npt
 
 END = b"\r\n"
-FLOATS = 4
+N_FLOATS = 4
 """Numbers of a magnetometer."""
-SMALLEST, LARGEST = 1e-3, 1e6
-"""Of a reading that is not 0 [uT]; the chip resolves 0.15 and ends at 50 000."""
-HOTTEST = 200.0
-"""Largest temperature, up or down [degrees Celsius]."""
-LONGEST_LINE = 4096
-MOST = 32
-"""Packets of up to so many magnetometers are known as such where others are expected."""
+MIN_READING, MAX_READING = 1e-3, 1e6
+"""Magnitude of a plausible reading that is not 0 [uT]; the chip resolves 0.15 up to 50,000."""
+MAX_TEMPERATURE = 200.0
+"""Largest magnitude of a plausible temperature [degrees Celsius]."""
+MAX_LINE_LENGTH = 4096
+"""Longest line of text [bytes]."""
+MAX_OTHER_MAGS = 32
+"""Packets with another number of magnetometers than expected are recognized up to this number."""
 
-_LINE = re.compile(rb"[-+.0-9eE \t]{7,%d}\r?\n" % LONGEST_LINE)
+_LINE = re.compile(rb"[-+.0-9eE \t]{7,%d}\r?\n" % MAX_LINE_LENGTH)
 _IN_LINE = re.compile(rb"[-+.0-9eE \t]*\r?")
 
 Sample = npt.NDArray[np.float32]
 
 
-class Decoded(NamedTuple):
-    """What was in some bytes.
+class DecodedBytes(NamedTuple):
+    """Content of some bytes.
 
     Attributes:
-        samples: (n_mags, 3) x, y, z of each magnetometer [uT], one after the other.
-        n_refused: how many packets were dropped; where none can be told from another, one for
-            as many bytes as a packet has.
-        other: number of magnetometers of the packets that come, where that is not the one
-            expected; 0 where it is, or nobody knows.
+        samples: (n_mags, 3) x, y, z of each magnetometer [uT], in order.
+        n_refused: number of dropped packets; if they cannot be separated, one for the length of
+            a packet.
+        other_n_mags: number of magnetometers in the packets, if it is recognized and not the
+            expected one; 0 otherwise.
     """
 
     samples: list[Sample]
     n_refused: int
-    other: int
+    other_n_mags: int
 
 
-class Decoder:
-    r"""Finds packets in bytes that come in pieces of any size.
+class AnySkinDecoder:
+    r"""Decoder of packets in chunks of bytes of any size.
 
-    What comes first may be half a packet: it is dropped, and not counted as refused.
+    The first bytes may be half a packet. They are dropped, and not counted as refused.
 
     Args:
-        n_mags: magnetometers of the board.
+        n_mags: number of magnetometers of the board.
 
     Example:
         >>> packet = np.arange(1, 9, dtype="<f4").tobytes() + b"\r\n"
-        >>> Decoder(2).feed(b"...\r\n" + packet).samples[0].tolist()
+        >>> AnySkinDecoder(2).feed(b"...\r\n" + packet).samples[0].tolist()
         [[2.0, 3.0, 4.0], [6.0, 7.0, 8.0]]
     """
 
@@ -68,57 +69,57 @@ class Decoder:
         self.reset()
 
     def reset(self) -> None:
-        """Forgets everything, as after the board was connected anew."""
-        self._held = b""
+        """Drop all bytes, because the board was connected again."""
+        self._buffer = b""
         self._after_line = False
         self._recent = b""
-        self._other = 0
-        self._skipped = -self._length
+        self._other_n_mags = 0
+        self._n_skipped = -self._length
         self._n_refused = 0
 
-    def feed(self, data: bytes) -> Decoded:
-        """Takes what came next."""
+    def feed(self, data: bytes) -> DecodedBytes:
+        """Decode the next bytes."""
         before = self._n_refused
         samples: list[Sample] = []
-        self._held += data
-        self._recent = (self._recent + data)[-3 * _length(MOST) :]
+        self._buffer += data
+        self._recent = (self._recent + data)[-3 * _length(MAX_OTHER_MAGS) :]
         at = 0
         while (end := self._step(at, samples)) is not None:
             at = end
         if at:
-            self._after_line = self._held[at - 1 : at] == b"\n"
-            self._held = self._held[at:]
+            self._after_line = self._buffer[at - 1 : at] == b"\n"
+            self._buffer = self._buffer[at:]
         if self._n_refused > before and not samples:
-            self._other = _other(self._recent, self._n_mags) or self._other
-        return Decoded(samples, self._n_refused - before, self._other)
+            self._other_n_mags = _other_n_mags(self._recent, self._n_mags) or self._other_n_mags
+        return DecodedBytes(samples, self._n_refused - before, self._other_n_mags)
 
     def _step(self, at: int, samples: list[Sample]) -> int | None:
-        """Where what is at a place ends; None where more has to come to tell."""
-        begins = self._held[at - 1 : at] == b"\n" if at else self._after_line
-        if begins and (line := _LINE.match(self._held, at)):
+        """Decode or skip the bytes at a place; return where they end, None if more are needed."""
+        begins = self._buffer[at - 1 : at] == b"\n" if at else self._after_line
+        if begins and (line := _LINE.match(self._buffer, at)):
             numbers = _numbers(line[0])
             if numbers is not None:
                 self._take_line(numbers, samples)
                 return line.end()
-        n_left = len(self._held) - at
+        n_left = len(self._buffer) - at
         if not n_left or (begins and (n_left < self._length or self._is_half_line(at))):
             return None
-        sample = _packet(self._held, at, self._n_mags) if begins else None
+        sample = _packet(self._buffer, at, self._n_mags) if begins else None
         if sample is not None:
             self._take(sample, samples)
             return at + self._length
-        end = self._held.find(b"\n", at) + 1 or len(self._held)
+        end = self._buffer.find(b"\n", at) + 1 or len(self._buffer)
         self._skip(end - at)
         return end
 
     def _take(self, sample: Sample, samples: list[Sample]) -> None:
         samples.append(sample)
-        self._skipped = self._other = 0
+        self._n_skipped = self._other_n_mags = 0
 
     def _take_line(self, numbers: Sample, samples: list[Sample]) -> None:
-        """Of a line, x, y, z and temperature of each magnetometer."""
+        """Take (n_mags, 4) x, y, z and temperature of a line."""
         if len(numbers) != self._n_mags:
-            self._other = len(numbers)
+            self._other_n_mags = len(numbers)
             self._n_refused += 1
         elif _is_plausible(numbers[:, 3], numbers[:, :3]):
             self._take(numbers[:, :3].copy(), samples)
@@ -126,55 +127,55 @@ class Decoder:
             self._n_refused += 1
 
     def _is_half_line(self, at: int) -> bool:
-        match = _IN_LINE.match(self._held, at)
+        match = _IN_LINE.match(self._buffer, at)
         end = match.end() if match else at
-        return end == len(self._held) and end - at <= LONGEST_LINE
+        return end == len(self._buffer) and end - at <= MAX_LINE_LENGTH
 
     def _skip(self, n_bytes: int) -> None:
-        """Counts as refused what begins another packet's length."""
-        counted = math.ceil(max(self._skipped, 0) / self._length)
-        self._skipped += n_bytes
-        self._n_refused += math.ceil(max(self._skipped, 0) / self._length) - counted
+        """Count a packet as refused for each length of a packet that begins in these bytes."""
+        counted = math.ceil(max(self._n_skipped, 0) / self._length)
+        self._n_skipped += n_bytes
+        self._n_refused += math.ceil(max(self._n_skipped, 0) / self._length) - counted
 
 
 def _length(n_mags: int) -> int:
-    return 4 * FLOATS * n_mags + len(END)
+    return 4 * N_FLOATS * n_mags + len(END)
 
 
 def _packet(data: bytes, at: int, n_mags: int) -> Sample | None:
-    """The sample of a binary packet at a place, where there is one."""
+    """Return the sample of a binary packet at a place, or None if there is none."""
     end = at + _length(n_mags)
     if data[end - len(END) : end] != END:
         return None
-    numbers = np.frombuffer(data, "<f4", FLOATS * n_mags, at).reshape(n_mags, FLOATS)
+    numbers = np.frombuffer(data, "<f4", N_FLOATS * n_mags, at).reshape(n_mags, N_FLOATS)
     if not _is_plausible(numbers[:, 0], numbers[:, 1:]):
         return None
     return numbers[:, 1:].astype(np.float32)
 
 
 def _numbers(line: bytes) -> Sample | None:
-    """(n_mags, 4) of a line, where it has four numbers a magnetometer."""
-    words = line.split()
-    if not words or len(words) % FLOATS:
+    """Return (n_mags, 4) numbers of a line, or None if it has not four for each magnetometer."""
+    fields = line.split()
+    if not fields or len(fields) % N_FLOATS:
         return None
     try:
-        numbers = np.array([float(word) for word in words])
+        numbers = np.array([float(field) for field in fields])
     except ValueError:
         return None
     with np.errstate(over="ignore"):
-        return numbers.astype(np.float32).reshape(-1, FLOATS)
+        return numbers.astype(np.float32).reshape(-1, N_FLOATS)
 
 
 def _is_plausible(temperatures: npt.NDArray[np.float32], readings: Sample) -> bool:
     with np.errstate(invalid="ignore"):  # any bytes may be here
         sizes = np.abs(readings)
-        sound = (sizes <= LARGEST) & ((sizes >= SMALLEST) | (sizes == 0))
-        return bool(sound.all() and (np.abs(temperatures) <= HOTTEST).all())
+        plausible = (sizes <= MAX_READING) & ((sizes >= MIN_READING) | (sizes == 0))
+        return bool(plausible.all() and (np.abs(temperatures) <= MAX_TEMPERATURE).all())
 
 
-def _other(data: bytes, n_mags: int) -> int:
-    """Of how many magnetometers two packets in a row are, other than expected; 0 for none."""
-    for count in range(1, MOST + 1):
+def _other_n_mags(data: bytes, n_mags: int) -> int:
+    """Return the unexpected number of magnetometers of two successive packets, 0 for none."""
+    for count in range(1, MAX_OTHER_MAGS + 1):
         place = data.find(END)
         while count != n_mags and place >= 0:
             at = place + len(END)

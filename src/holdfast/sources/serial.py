@@ -1,16 +1,15 @@
-"""Sensors at a serial port: AnySkin and ReSkin boards."""
+"""Source of a sensor at a serial port: AnySkin and ReSkin boards."""
 
+import math
 import time
-from collections import deque
 from errno import EACCES, ENOENT
 from importlib.metadata import version
 
-from holdfast.contact import Fault
 from holdfast.errors import MissingExtra, SourceError
 from holdfast.sensors import Sensor, sensor
-from holdfast.sources.anyskin import Decoded, Decoder
-from holdfast.sources.base import Arrival, Source, notice_arrival
-from holdfast.sources.timeline import Timeline
+from holdfast.sources.anyskin import AnySkinDecoder, DecodedBytes
+from holdfast.sources.assembler import Assembler, Device
+from holdfast.sources.base import DeviceSource, Source
 from holdfast.sources.uri import Address
 
 try:
@@ -19,208 +18,166 @@ try:
 except ImportError as missing:
     raise MissingExtra("pyserial", "serial") from missing
 
-PATIENCE = 3.0
-"""A sample must come so soon after opening [s]: boards start anew when they are opened."""
-BACKOFF = (0.5, 2.0)
-"""A lost board is tried again after the first, then twice as long, up to the second [s]."""
-QUIET = 1.0
-"""The same is not told again within this [s]."""
-BAUD = 115200
-MOST_BYTES = 1 << 16
-"""Read at a time."""
+OPEN_TIMEOUT = 3.0
+"""Longest wait for the first sample [s]; boards restart when their port is opened."""
+DEFAULT_BAUD = 115200
+MAX_READ_SIZE = 1 << 16
+"""Largest number of bytes to read at a time."""
+_BOARD = 1
+"""Number of the board as a device."""
 
 
-class Board(Source):
-    """A board of magnetometers at a serial port.
+class SerialSource(DeviceSource):
+    """Source of a board of magnetometers at a serial port.
 
-    It has no clock: a sample has the time at which it was received, on the host's monotonic
-    clock. Samples that were received together are apart by the sensor's period, or by less
-    where that is longer than the time since the last.
+    The board has no clock: the time of a sample is its time of arrival, on the host's monotonic
+    clock. Samples that arrive together are a period of the sensor apart, or less if they would
+    begin before the last sample.
 
     Args:
         address: `serial:///dev/ttyACM0?sensor=anyskin&fingers=1:index&baud=115200&mags=5`.
 
     Raises:
-        ValueError: a parameter is not as expected.
+        ValueError: a parameter is not valid.
     """
 
     def __init__(self, address: Address) -> None:
+        super().__init__()
         address.only("sensor", "fingers", "baud", "mags")
         self.name = address.text
         self._path = address.host + address.path
         if not self._path:
             raise ValueError(f"{address.text}: a port expected, as in serial:///dev/ttyACM0")
-        self._baud = _count(address, "baud", BAUD)
+        self._baud = _positive(address, "baud", DEFAULT_BAUD)
         self._sensor = address.sensor() or sensor("anyskin")
-        self._n_mags = _count(address, "mags", self._sensor.n_taxels)
-        self._modules = _modules(address, self._n_mags, self._sensor)
-        self._decoder = Decoder(self._n_mags)
+        self._n_mags = _positive(address, "mags", self._sensor.n_taxels)
+        modules = dict.fromkeys(_modules(address, self._n_mags, self._sensor), self._sensor)
+        self._board = Device(_BOARD, self._sensor.name, modules)
+        self._decoder = AnySkinDecoder(self._n_mags)
+        self._assembler = Assembler()
         self._port: Serial | None = None
-        self._forget()
 
     def open(self) -> None:
-        """Opens the port, and waits for the first sample.
+        """Open the port, and wait for the first sample.
 
         Raises:
-            SourceError: there is no such port, it is not ours to open, or no sample comes.
+            SourceError: there is no such port, it cannot be opened, or no sample comes.
         """
         self.close()
+        self._assembler = Assembler()
+        self._assembler.devices = {_BOARD: self._board}
+        self._newest = -math.inf
         try:
             self._connect()
-            self._wait()
-        except (OSError, ValueError) as cause:  # a ValueError: the port cannot go so fast
+            self._wait_for_sample()
+        except (OSError, ValueError) as cause:  # ValueError: the port does not support the speed
             ports = ", ".join(sorted(port.device for port in comports())) or "none"
             raise SourceError(f"{self.name}: {_reason(cause)}; serial ports: {ports}") from cause
-        self.sensors = dict.fromkeys(self._modules, self._sensor)
+        self.sensors = self._board.modules
         self.metadata = {
             "source": self.name,
             "sensor": self._sensor.name,
             "n_mags": self._n_mags,
             "pyserial": version("pyserial"),
         }
-
-    def read(self, timeout: float) -> Arrival | None:
-        """What arrived next, or None where nothing did within `timeout` [s]."""
-        deadline = time.monotonic() + timeout
-        while not self._arrivals:
-            left = max(deadline - time.monotonic(), 0.0)
-            if self._port is None:
-                self._try_again(left)
-            else:
-                self._receive_or_lose(left)
-            if not left:
-                break
-        return self._arrivals.popleft() if self._arrivals else None
-
-    def close(self) -> None:
-        """Lets go of the port; what was not read is gone."""
-        self._disconnect()
-        self._forget()
-
-    def _forget(self) -> None:
-        self._arrivals = deque[Arrival]()
-        self._timeline = Timeline()
-        self._last = -1.0
-        self._told: dict[str, float] = {}
-        self._retry = BACKOFF[0]
-        self._retry_at = 0.0
+        self._start(time.monotonic())
 
     def _connect(self) -> None:
         self._decoder.reset()
         self._port = Serial(self._path, self._baud, exclusive=True)
+
+    def _wait_for_sample(self) -> None:
+        deadline = time.monotonic() + OPEN_TIMEOUT
+        n_refused = 0
+        while (left := deadline - time.monotonic()) > 0:
+            decoded = self._read_port(left)
+            if decoded.samples:
+                return
+            if decoded.other_n_mags:
+                raise SourceError(f"{self.name}: {self._wrong_count(decoded)}")
+            n_refused += decoded.n_refused
+        came = f"{n_refused} invalid packets came" if n_refused else "nothing came"
+        raise SourceError(
+            f"{self.name}: {came} within {OPEN_TIMEOUT:g} s; packets of {self._n_mags} "
+            f"magnetometers at {self._baud} baud expected"
+        )
+
+    def _receive(self, timeout: float) -> bool:
+        try:
+            decoded = self._read_port(timeout)
+        except OSError as cause:
+            self._disconnect()
+            self._lose(_reason(cause))
+            return False
+        return bool(decoded.samples)
+
+    def _reconnect(self) -> bool:
+        try:
+            self._connect()
+        except OSError:
+            return False
+        return True
 
     def _disconnect(self) -> None:
         if self._port is not None:
             self._port.close()
             self._port = None
 
-    def _wait(self) -> None:
-        """Waits for the first sample."""
-        deadline = time.monotonic() + PATIENCE
-        while (left := deadline - time.monotonic()) > 0:
-            decoded = self._receive(left)
-            if decoded.samples:
-                return
-            if decoded.other:
-                raise SourceError(f"{self.name}: {self._miscount(decoded)}")
-        n_refused = sum(arrival.n_refused for arrival in self._arrivals)
-        came = f"{n_refused} packets came that make no sense" if n_refused else "nothing came"
-        raise SourceError(
-            f"{self.name}: {came} within {PATIENCE:g} s; packets of {self._n_mags} "
-            f"magnetometers at {self._baud} baud expected"
-        )
-
-    def _try_again(self, timeout: float) -> None:
-        """Waits until the port may be tried again, and tries."""
-        wait = self._retry_at - time.monotonic()
-        if wait > 0:
-            time.sleep(min(wait, timeout))
-        if wait > timeout:
-            return
-        try:
-            self._connect()
-        except OSError:
-            self._retry = min(2 * self._retry, BACKOFF[1])
-            self._retry_at = time.monotonic() + self._retry
-        else:
-            self._retry = BACKOFF[0]
-            self._arrivals.append(notice_arrival(time.monotonic(), f"{self.name}: connected again"))
-
-    def _receive_or_lose(self, timeout: float) -> None:
-        try:
-            self._receive(timeout)
-        except OSError as cause:
-            self._disconnect()
-            now = time.monotonic()
-            self._retry_at = now + self._retry
-            self._arrivals.append(
-                notice_arrival(
-                    now, f"{self.name}: the connection is lost ({_reason(cause)}); trying again"
-                )
-            )
-
-    def _receive(self, timeout: float) -> Decoded:
-        """Queues what comes within `timeout` [s].
+    def _read_port(self, timeout: float) -> DecodedBytes:
+        """Queue the samples that come within `timeout` [s], and return them.
 
         Raises:
-            OSError: the port is gone.
+            OSError: the port was disconnected.
         """
-        port = self._port
-        if port is None:
-            return Decoded([], 0, 0)
-        port.timeout = timeout
-        data = port.read(1)
+        if self._port is None:
+            return DecodedBytes([], 0, 0)
+        self._port.timeout = timeout
+        data = self._port.read(1)
         if data:
-            data += port.read(min(port.in_waiting, MOST_BYTES))
+            data += self._port.read(min(self._port.in_waiting, MAX_READ_SIZE))
         decoded = self._decoder.feed(data)
-        self._queue(decoded, time.monotonic())
+        self._assemble(decoded, time.monotonic())
         return decoded
 
-    def _queue(self, decoded: Decoded, received: float) -> None:
+    def _assemble(self, decoded: DecodedBytes, received: float) -> None:
         if decoded.n_refused:
             self._refuse(decoded, received)
         n = len(decoded.samples)
         period = 1 / self._sensor.rate
-        step = period if self._last < 0 else min(period, (received - self._last) / max(n, 1))
+        step = min(period, (received - self._newest) / max(n, 1))
         for k, sample in enumerate(decoded.samples):
-            stamp = self._timeline.stamp(received - (n - 1 - k) * step, received)
-            parts = sample.reshape(len(self._modules), -1, 3)
-            faults = dict.fromkeys(self._modules, stamp.faults) if stamp.faults else {}
-            samples = dict(zip(self._modules, parts, strict=True))
-            self._arrivals.append(Arrival(stamp.time, samples, received, faults))
-            self._last = stamp.time
+            self._assembler.stamp(received - (n - 1 - k) * step, received)
+            self._assembler.add(_BOARD, sample)
+            arrivals = self._assembler.finish(received)
+            self._newest = arrivals[-1].time
+            self._queue(arrivals, received)
 
-    def _refuse(self, decoded: Decoded, received: float) -> None:
-        """Tells of packets that were dropped, and of modules with another number of taxels."""
-        wrong = bool(decoded.other)
-        text = self._miscount(decoded) if wrong else "packets that make no sense are dropped"
-        told = self._told.get(text)
-        notices = []
-        if told is None or received - told >= QUIET:
-            self._told = {text: received}
-            notices.append(f"{self.name}: {text}")
-        faults = dict.fromkeys(self._modules, (Fault.TAXEL_COUNT,)) if wrong else {}
-        self._arrivals.append(
-            notice_arrival(received, *notices, faults=faults, n_refused=decoded.n_refused)
-        )
+    def _refuse(self, decoded: DecodedBytes, received: float) -> None:
+        """Report dropped packets, and a wrong number of magnetometers as a fault."""
+        self._assembler.n_refused += decoded.n_refused
+        if decoded.other_n_mags:
+            self._assembler.report_taxel_count(_BOARD, self._wrong_count(decoded), received)
+        else:
+            self._assembler.notify("packet", "invalid packets are dropped", received)
+        self._queue(self._assembler.finish(received), received)
 
-    def _miscount(self, decoded: Decoded) -> str:
+    def _wrong_count(self, decoded: DecodedBytes) -> str:
         return (
-            f"packets of {decoded.other} magnetometers come, {self._n_mags} expected "
-            f"({self._sensor.name}; mags= says how many)"
+            f"packets of {decoded.other_n_mags} magnetometers come, {self._n_mags} expected "
+            f"({self._sensor.name}; mags= gives their number)"
         )
 
 
-def source(address: Address) -> Board:
-    """The board at the port of a URI.
+def source(address: Address) -> Source:
+    """Return the source of a URI; entering it opens the port.
 
     Raises:
-        ValueError: a parameter is not as expected.
+        ValueError: a parameter is not valid.
     """
-    return Board(address)
+    return SerialSource(address)
 
 
-def _count(address: Address, name: str, default: int) -> int:
+def _positive(address: Address, name: str, default: int) -> int:
     text = address.parameters.get(name, str(default))
     if not (text.isascii() and text.isdecimal() and int(text)):
         raise ValueError(f"{address.text}: {name}={default}, at least 1, expected, {text!r} given")
@@ -228,10 +185,10 @@ def _count(address: Address, name: str, default: int) -> int:
 
 
 def _modules(address: Address, n_mags: int, kind: Sensor) -> tuple[str, ...]:
-    """Names of the modules that the magnetometers make, in the order of the packet.
+    """Return the names of the modules of the magnetometers, in the order of the packet.
 
     Raises:
-        ValueError: they make no whole number of sensors, or other ones are named.
+        ValueError: the magnetometers are no whole number of sensors, or a name does not fit.
     """
     n_modules, left = divmod(n_mags, kind.n_taxels)
     if left:
@@ -246,13 +203,13 @@ def _modules(address: Address, n_mags: int, kind: Sensor) -> tuple[str, ...]:
             f"of {kind.name} there are {n_modules}"
         )
     names = tuple(given.get(k, f"finger{k}") for k in range(1, n_modules + 1))
-    if twice := sorted({name for name in names if names.count(name) > 1}):
-        raise ValueError(f"{address.text}: two fingers would be called {twice[0]}")
+    if repeated := sorted({name for name in names if names.count(name) > 1}):
+        raise ValueError(f"{address.text}: two fingers would be called {repeated[0]}")
     return names
 
 
 def _reason(cause: Exception) -> str:
-    """Why a port failed, in a few words where they are known."""
+    """Return the reason why a port failed, in a few words if it is a common one."""
     known = {
         ENOENT: "there is no such port",
         EACCES: "it may not be opened; is the user in the group dialout?",

@@ -1,75 +1,81 @@
-"""From a device's clock, which may jump, to times that go forward. No clock of its own."""
+"""Conversion of a device's stamps to increasing times. No clock: times are arguments."""
 
 import math
 from typing import NamedTuple
 
 from holdfast.contact import Fault
 
-JITTER = 0.05
-"""A stamp that goes back by no more than this is taken as just after the last [s]."""
-JUMP = 0.5
-"""A stamp so far ahead of the host's clock, by the quickest sample so far, is a jump [s]."""
-LATE = 0.1
-"""A sample that arrives so much later than others did is late [s]."""
-DRIFT = 1e-4
-"""How fast two clocks may drift apart [s/s]."""
+MAX_BACKWARD_STEP = 0.05
+"""A stamp that goes back by less than this is moved just after the last one [s]."""
+MIN_CLOCK_JUMP = 0.5
+"""A stamp that is ahead of the host's clock by more than this is a jump [s]."""
+MIN_LATE_DELAY = 0.1
+"""A sample is late if it arrives later than the quickest one by more than this [s]."""
+MAX_CLOCK_DRIFT = 1e-4
+"""Largest drift between two clocks [s/s]."""
 
 
 class Stamp(NamedTuple):
-    """When a sample was taken.
+    """Time of a sample.
 
     Attributes:
-        time: on the clock of the source, without its jumps [s].
-        faults: CLOCK_JUMP where the device's clock jumped, LATE where the sample is old.
+        time: time on the clock of the source, without its jumps [s].
+        faults: CLOCK_JUMP if the device's clock jumped, LATE if the sample is old.
     """
 
     time: float
     faults: tuple[Fault, ...] = ()
 
 
-class Delay:
-    """How much later samples arrive than the quickest did; clocks may drift by 1e-4.
+class TransportDelay:
+    """Delay of samples relative to the quickest one, for clocks that drift by at most 1e-4.
 
     Example:
-        >>> delay = Delay()
-        >>> [round(delay.of(t, at), 2) for t, at in ((0.0, 5.0), (1.0, 6.25), (2.0, 7.0))]
+        >>> delay = TransportDelay()
+        >>> [round(delay.update(t, at), 2) for t, at in ((0.0, 5.0), (1.0, 6.25), (2.0, 7.0))]
         [0.0, 0.25, 0.0]
     """
 
     def __init__(self) -> None:
-        self.forget()
+        self.reset()
 
-    def forget(self) -> None:
-        """Begins anew: the clock is another now."""
+    def reset(self) -> None:
+        """Start again, because the device's clock changed."""
         self._least = math.inf
         self._received = math.nan
 
-    def of(self, time: float, received: float) -> float:
-        """How much later than the quickest this sample is [s]; it may be the quickest now."""
+    def update(self, time: float, received: float) -> float:
+        """Return the delay of a sample relative to the quickest, this one included [s]."""
         age = received - time
         self._least = min(self._least + self._drift(received), age)
         self._received = received
         return age - self._least
 
+    def is_late(self, time: float, received: float) -> bool:
+        """Update the delay, and return whether the sample is late."""
+        return self.update(time, received) > MIN_LATE_DELAY
+
     def lead(self, time: float, received: float) -> float:
-        """How much quicker than the quickest this sample is, drift aside; mostly below 0 [s]."""
+        """Return by how much a sample is quicker than the quickest; mostly below 0 [s]."""
         return self._least - (received - time) - self._drift(received)
 
     def _drift(self, received: float) -> float:
-        """By how much the clocks may have drifted apart since the last sample [s]."""
-        return DRIFT * max(received - self._received, 0.0) if math.isfinite(self._least) else 0.0
+        """Return the largest drift of the clocks since the last sample [s]."""
+        if not math.isfinite(self._least):
+            return 0.0
+        return MAX_CLOCK_DRIFT * max(received - self._received, 0.0)
 
 
 class Timeline:
-    """Turns the stamps of a device into strictly increasing times.
+    """Converter of the stamps of a device to strictly increasing times.
 
-    Where the device's clock jumps, time goes on by as much as passed on the host's. A jump is
-    a stamp that goes back, or one that would be from the future: a burst after a stall, or a
-    stretch that is missing, is neither. A sample is late where it came later after its stamp
-    than the quickest did; clocks may differ, and drift by 1e-4.
+    If the device's clock jumps, time continues by as much as passed on the host's clock. A jump
+    is a stamp that goes back, or a stamp from the future. A burst of samples after a stall, and
+    a gap in the samples, are no jumps. A sample is late if the delay from its stamp to its
+    arrival is longer than that of the quickest sample; the clocks may differ, and drift by 1e-4.
 
     Attributes:
-        offset: what is added to the device's stamps, since its clock jumped [s].
+        offset: sum of the device's clock jumps, added to its stamps [s].
 
     Example:
         >>> timeline = Timeline()
@@ -80,17 +86,17 @@ class Timeline:
     def __init__(self) -> None:
         self.offset = 0.0
         self._last = self._received = math.nan
-        self._delay = Delay()
+        self._delay = TransportDelay()
 
     def stamp(self, device_time: float, received: float) -> Stamp:
-        """The time of a sample.
+        """Return the time of a sample.
 
         Args:
-            device_time: as the device stamped it [s].
-            received: when it arrived, by the host's monotonic clock [s].
+            device_time: stamp of the device [s].
+            received: time of arrival, on the host's monotonic clock [s].
 
         Raises:
-            ValueError: a stamp that is not finite.
+            ValueError: the stamp is not finite.
         """
         if not math.isfinite(device_time):
             raise ValueError(f"a time in seconds expected, {device_time} given")
@@ -99,16 +105,15 @@ class Timeline:
         if jumped:
             time = self._last + max(received - self._received, 0.0)
             self.offset = time - device_time
-            self._delay.forget()
+            self._delay.reset()
         if time <= self._last:  # False before the first
             time = math.nextafter(self._last, math.inf)
-        late = self._delay.of(time, received) > LATE
+        late = self._delay.is_late(time, received)
         self._last, self._received = time, received
-        faults = (Fault.CLOCK_JUMP,) * jumped + (Fault.LATE,) * late
-        return Stamp(time, faults)
+        return Stamp(time, (Fault.CLOCK_JUMP,) * jumped + (Fault.LATE,) * late)
 
     def _jumped(self, time: float, received: float) -> bool:
         if math.isnan(self._last):
             return False
-        from_future = self._delay.lead(time, received) > JUMP
-        return time <= self._last - JITTER or from_future
+        from_future = self._delay.lead(time, received) > MIN_CLOCK_JUMP
+        return time <= self._last - MAX_BACKWARD_STEP or from_future

@@ -10,8 +10,8 @@ from holdfast.io import import_recordings, load_recording, save_recording
 from holdfast.io.recording_files import is_recording
 from holdfast.ros.sensor_messages import DeviceSample
 from holdfast.sensors import hand
-from holdfast.sources.ros.translator import Translator
-from holdfast.sources.xela.decoder import Decoder
+from holdfast.sources.ros.message_assembler import MessageAssembler
+from holdfast.sources.xela.decoder import XelaDecoder
 from holdfast.synthetic import synthetic_recording
 
 pytest.importorskip("rosbags", reason="rosbags is not installed")
@@ -124,12 +124,12 @@ def test_a_device_is_the_same_sensor_in_a_bag_and_live(tmp_path, model, n_taxels
     with Bag(tmp_path / "grasp", "mcap", "xela_server_ros2", XELA) as given:
         for k in range(4):
             given.xela(EPOCH + k, (1, model, k, EPOCH + k, counts(n_taxels, k), []))
-    translator = Translator()
-    translator.learn([DeviceSample(1, model, EPOCH, None, 0, counts(n_taxels), np.empty((0, 3)))])
-    decoder = Decoder()
-    decoder.learn(xela_packets.text(0, [xela_packets.sensor(counts(n_taxels), model)]))
+    assembler = MessageAssembler()
+    assembler.identify([DeviceSample(1, model, EPOCH, None, 0, counts(n_taxels), np.empty((0, 3)))])
+    decoder = XelaDecoder()
+    decoder.identify(xela_packets.text(0, [xela_packets.sensor(counts(n_taxels), model)]))
     imported = {name: module.sensor for name, module in read(given.path).modules.items()}
-    assert imported == translator.sensors
+    assert imported == assembler.sensors
     assert imported == decoder.sensors
 
 

@@ -7,27 +7,37 @@ import pytest
 from holdfast.errors import SourceError
 from holdfast.ros.sensor_messages import DeviceSample
 from holdfast.sensors import sensor
+from holdfast.sources import base
 from holdfast.sources.ros import topic
-from holdfast.sources.ros.topic import Link, Packet, Stranger, TopicSource, topic_of
+from holdfast.sources.ros.topic import (
+    ReceivedMessage,
+    Subscription,
+    TopicSource,
+    UnsupportedMessage,
+    topic_of,
+)
 from holdfast.sources.uri import parse
 
+SILENCE_TIMEOUT = 0.1
 
-class Script(Link):
-    """A link that says what a test tells it to."""
+
+class Script(Subscription):
+    """A subscription with the messages of a test."""
 
     def __init__(self):
+        super().__init__("/xServTopic", "in a test")
         self.packets = deque()
         self.publishers = 1
         self.dropped = 0
-        self.n_mended = self.n_closed = 0
+        self.n_renewed = self.n_closed = 0
 
     def put(self, *messages, why=None, received=None):
-        def unpack(_):
+        def decode(_):
             if why is not None:
                 raise why
             return list(messages)
 
-        self.packets.append(Packet(b"", received or time.monotonic(), unpack))
+        self.packets.append(ReceivedMessage(b"", received or time.monotonic(), decode))
 
     def samples(self, k, *numbers, model="uSPa44"):
         counts = np.full((16, 3), k, np.uint16)
@@ -41,7 +51,7 @@ class Script(Link):
 
     def take(self, timeout):
         if not self.packets:
-            time.sleep(min(timeout, 0.02))
+            time.sleep(timeout)
             return None
         return self.packets.popleft()
 
@@ -52,11 +62,11 @@ class Script(Link):
         dropped, self.dropped = self.dropped, 0
         return dropped
 
-    def missing(self):
-        return "nobody publishes"
+    def published_topics(self):
+        return {}
 
-    def mend(self):
-        self.n_mended += 1
+    def renew(self):
+        self.n_renewed += 1
 
     def close(self):
         self.n_closed += 1
@@ -64,8 +74,11 @@ class Script(Link):
 
 @pytest.fixture
 def link(monkeypatch):
-    for name in ("PATIENCE", "GATHERING", "SILENCE", "BACKOFF", "LONGEST_BACKOFF"):
+    for name in ("OPEN_TIMEOUT", "DEVICES_TIMEOUT", "PUBLISHER_CHECK_INTERVAL"):
         monkeypatch.setattr(topic, name, getattr(topic, name) / 10)
+    for name in ("MIN_RETRY_DELAY", "MAX_RETRY_DELAY"):
+        monkeypatch.setattr(base, name, getattr(base, name) / 10)
+    monkeypatch.setattr(TopicSource, "silence_timeout", SILENCE_TIMEOUT)
     return Script()
 
 
@@ -106,30 +119,33 @@ def test_a_message_before_devices_are_there(link):
         assert list(one.sensors) == ["finger1"]
 
 
-def test_nobody_publishes(link):
-    with pytest.raises(SourceError, match=r"^nobody publishes$"), source(link):
+def test_a_topic_without_publishers(link):
+    with pytest.raises(SourceError) as caught, source(link):
         pass
+    assert str(caught.value) == ("no node publishes /xServTopic in a test; published topics: none")
     assert link.n_closed == 2
 
 
-def test_messages_that_make_no_sense_or_are_strangers(link):
+def test_messages_that_are_invalid_or_unsupported(link):
     link.put(why=ValueError("it is cut"))
-    with pytest.raises(SourceError, match=r"^what ros2:///xServTopic sends makes no sense: it is"):
+    with pytest.raises(
+        SourceError, match=r"^ros2:///xServTopic sends invalid messages: it is cut$"
+    ):
         source(link).open()
-    link.put(why=Stranger("/a has b"))
+    link.put(why=UnsupportedMessage("/a has b"))
     with pytest.raises(SourceError, match=r"^/a has b$"):
         source(link).open()
 
 
-def test_garbage_later_is_counted(link):
+def test_invalid_messages_later_are_counted(link):
     for k in range(2):
         link.samples(k, 1)
     with source(link) as one:
         drained(one, 2)
-        link.put(why=Stranger("/a has b"))
+        link.put(why=UnsupportedMessage("/a has b"))
         link.samples(2, 1)
         refused, sample = drained(one, 2)
-    assert (refused.n_refused, refused.notices) == (1, ("a message makes no sense: /a has b",))
+    assert (refused.n_refused, refused.notices) == (1, ("invalid message: /a has b",))
     assert sample.samples
 
 
@@ -143,13 +159,13 @@ def test_a_timeout_gives_nothing(link):
         assert not one.ended
 
 
-def test_silence_is_told_once_and_its_end(link):
+def test_silence_and_its_end_are_reported_once(link):
     for k in range(2):
         link.samples(k, 1)
     with source(link) as one:
         drained(one, 2)
         (silent,) = drained(one)
-        assert silent.notices == (f"no new sample for {topic.SILENCE:g} s",)
+        assert silent.notices == (f"no new sample for {SILENCE_TIMEOUT:g} s",)
         assert one.read(0.2) is None
         link.samples(2, 1)
         again, sample = drained(one, 2)
@@ -157,44 +173,59 @@ def test_silence_is_told_once_and_its_end(link):
     assert sample.samples
 
 
-def test_a_reader_that_was_busy_is_not_told_of_silence(link):
+def test_a_busy_reader_causes_no_silence(link):
     for k in range(2):
         link.samples(k, 1)
     with source(link) as one:
         drained(one, 2)
         for k in range(2, 4):
             link.samples(k, 1)
-        time.sleep(2 * topic.SILENCE)
+        time.sleep(2 * SILENCE_TIMEOUT)
         assert [a.notices for a in drained(one, 2)] == [(), ()]
 
 
-def test_publishers_that_go_and_come(link):
+def test_a_publisher_ends_and_another_begins(link):
     for k in range(2):
         link.samples(k, 1)
     with source(link) as one:
         drained(one, 2)
         link.publishers = 0
-        notices = [n for a in drained(one, 2) for n in a.notices]
-        assert sorted(notices) == ["no new sample for 0.1 s", "nobody publishes any more"]
+        (lost,) = drained(one)
+        assert lost.notices == ("connection lost (the topic has no publisher)",)
         for _ in range(100):
             assert one.read(0.02) is None
-            if link.n_mended >= 2:
+            if link.n_renewed >= 2:
                 break
-        assert link.n_mended >= 2
+        assert link.n_renewed >= 2
         link.publishers = 1
-        link.samples(0, 1, model="uSPa44")  # its counter begins anew
-        notices = [n for a in drained(one, 3) for n in a.notices]
-        assert "somebody publishes again" in notices
+        link.samples(90, 1)  # its counter differs
+        again, sample = drained(one, 2)
+        assert again.notices[0].startswith("connected again after ")
+        assert (len(sample.samples), sample.n_lost) == (1, 0)
 
 
-def test_dropped_messages_are_told(link):
+def test_a_publisher_without_messages_is_found_again(link):
+    for k in range(2):
+        link.samples(k, 1)
+    with source(link) as one:
+        drained(one, 2)
+        link.publishers = 0
+        drained(one)
+        link.publishers = 1
+        (again,) = drained(one)
+        assert again.notices[0].startswith("connected again after ")
+        (silent,) = drained(one)
+        assert silent.notices == (f"no new sample for {SILENCE_TIMEOUT:g} s",)
+
+
+def test_dropped_messages_are_reported(link):
     for k in range(2):
         link.samples(k, 1)
     with source(link) as one:
         drained(one, 2)
         link.dropped = 5
         (arrival,) = drained(one)
-    assert arrival.notices == ("5 messages dropped: they were taken too slowly",)
+    assert arrival.notices == ("5 messages dropped: they were read too slowly",)
 
 
 @pytest.mark.parametrize(

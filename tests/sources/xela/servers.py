@@ -9,7 +9,7 @@ from websockets.exceptions import ConnectionClosed
 from websockets.protocol import State
 from websockets.sync.server import serve
 
-from holdfast.sources.xela.client import _QUIET
+from holdfast.sources.xela.client import _LOGGER
 
 HANG_UP = object()
 """What makes a server end a connection."""
@@ -38,7 +38,7 @@ def server(first=(), *, port=0, broken=False):
         except ConnectionClosed:
             pass
 
-    with serve(greet, "127.0.0.1", port, compression=None, close_timeout=1, logger=_QUIET) as one:
+    with serve(greet, "127.0.0.1", port, compression=None, close_timeout=1, logger=_LOGGER) as one:
         thread = Thread(target=one.serve_forever)
         thread.start()
         try:

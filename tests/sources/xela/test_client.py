@@ -8,7 +8,7 @@ import pytest
 
 from holdfast.contact import Fault
 from holdfast.errors import SourceError
-from holdfast.sources import open_source
+from holdfast.sources import base, open_source
 from holdfast.sources.xela import client as module
 
 from .build import NEW, PERIOD, START, WELCOME, counts, patch, sensor, text
@@ -32,9 +32,9 @@ def tidy():
 @pytest.fixture
 def quick(monkeypatch):
     """Connects again soon, and finds silence soon."""
-    monkeypatch.setattr(module, "BACKOFF", 0.01)
-    monkeypatch.setattr(module, "LONGEST_BACKOFF", 0.02)
-    monkeypatch.setattr(module, "SILENCE", 0.05)
+    monkeypatch.setattr(base, "MIN_RETRY_DELAY", 0.01)
+    monkeypatch.setattr(base, "MAX_RETRY_DELAY", 0.02)
+    monkeypatch.setattr(module.XelaSource, "silence_timeout", 0.05)
 
 
 def until(source, wanted):
@@ -97,8 +97,8 @@ class TestOpening:
         with pytest.raises(SourceError) as refusal:
             open_source(f"xela://127.0.0.1:{port}").open()
         assert str(refusal.value) == (
-            f"nothing listens at 127.0.0.1:{port}; xela_server binds the address of the network "
-            "card: try xela://auto; without a hand, `holdfast play` stands in for it"
+            f"no server listens at 127.0.0.1:{port}; xela_server binds the address of the network "
+            "card: try xela://auto; without a hand, use `holdfast play`"
         )
 
     def test_another_server_listens(self):
@@ -117,7 +117,7 @@ class TestOpening:
                 open_source(f"xela://127.0.0.1:{port}").open()
             thread.join()
         assert str(refusal.value) == (
-            f"what listens at 127.0.0.1:{port} is no XELA server: "
+            f"the server at 127.0.0.1:{port} is no XELA server: "
             "server rejected WebSocket connection: HTTP 404"
         )
 
@@ -132,7 +132,7 @@ class TestOpening:
 
     @pytest.mark.parametrize("first", [[], [WELCOME]])
     def test_no_samples_come(self, first, monkeypatch):
-        monkeypatch.setattr(module, "PATIENCE", 0.3)
+        monkeypatch.setattr(module, "OPEN_TIMEOUT", 0.3)
         with server(first) as (port, _), pytest.raises(SourceError) as refusal:
             open_source(f"xela://127.0.0.1:{port}").__enter__()
         assert str(refusal.value) == (
@@ -141,12 +141,12 @@ class TestOpening:
         )
 
     def test_what_comes_makes_no_sense(self, monkeypatch):
-        monkeypatch.setattr(module, "PATIENCE", 0.3)
+        monkeypatch.setattr(module, "OPEN_TIMEOUT", 0.3)
         broken = text(1, [sensor(counts(16), data="?")])
         with server([WELCOME, broken]) as (port, _), pytest.raises(SourceError) as refusal:
             open_source(f"xela://127.0.0.1:{port}").__enter__()
         assert str(refusal.value) == (
-            f"what 127.0.0.1:{port} sends makes no sense: sensor 1: four hexadecimal digits a "
+            f"127.0.0.1:{port} sends invalid packets: sensor 1: four hexadecimal digits a "
             "number expected in data, with commas between"
         )
 
@@ -180,7 +180,7 @@ class TestReading:
         assert sum(a.n_refused for a in arrivals) == 3
         notices = [notice for a in arrivals for notice in a.notices]
         assert len(notices) == 1
-        assert notices[0].startswith("a packet makes no sense: ")
+        assert notices[0].startswith("invalid packet: ")
 
     def test_another_number_of_taxels(self):
         with server([patch(1)]) as (port, said), open_source(f"xela://127.0.0.1:{port}") as source:
@@ -236,7 +236,7 @@ class TestReconnecting:
             said.put(HANG_UP)
             arrivals = until(source, says("connected again after "))
             (lost,) = [a for a in arrivals if says("connection lost")(a)]
-            assert lost.notices == ("connection lost (the server ended it)",)
+            assert lost.notices == ("connection lost (the server closed it)",)
             again = until(source, lambda a: a.samples or says("no new")(a))
             assert not again[-1].samples  # the packet that was there before is no new sample
             said.put(patch(5))
@@ -261,7 +261,7 @@ class TestReconnecting:
 
     def test_garbage_that_ends_a_connection(self, quick):
         with server([patch(1)]) as (port, said), open_source(f"xela://127.0.0.1:{port}") as source:
-            said.put("x" * (module.LARGEST + 1))
+            said.put("x" * (module.MAX_PACKET_SIZE + 1))
             until(source, says("connection lost"))
             until(source, says("connected again"))
             said.put(patch(7))
@@ -281,10 +281,10 @@ class TestReconnecting:
             source.open()
             said.put(HANG_UP)
             until(source, says("connection lost"))
-        monkeypatch.setattr(module.time, "sleep", sleep)
-        monkeypatch.setattr(module.time, "monotonic", lambda: now[0])
+        monkeypatch.setattr(base.time, "sleep", sleep)
+        monkeypatch.setattr(base.time, "monotonic", lambda: now[0])
         monkeypatch.setattr(module, "_connect", refuse)
-        source._again_at = now[0] + module.BACKOFF
+        source._retry_at = now[0] + base.MIN_RETRY_DELAY
         assert source.read(7.6) is None
         source.close()
         assert waits[:5] == pytest.approx([0.5, 1.0, 2.0, 2.0, 2.0], abs=1e-6)

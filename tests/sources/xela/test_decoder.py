@@ -11,21 +11,21 @@ from hypothesis import strategies as st
 from holdfast.contact import Fault
 from holdfast.errors import SourceError
 from holdfast.sensors import hand
-from holdfast.sources.xela.decoder import Decoder
-from holdfast.sources.xela.packet import Refusal
+from holdfast.sources.xela.decoder import XelaDecoder
+from holdfast.sources.xela.packet import InvalidPacket
 
 from .build import NEW, OLD, PERIOD, START, WELCOME, counts, patch, sensor, text
 
 
 def taught(first, **options):
-    decoder = Decoder(**options)
-    assert decoder.learn(first)
+    decoder = XelaDecoder(**options)
+    assert decoder.identify(first)
     return decoder
 
 
 def fed(decoder, packets, received=100.0):
     """What comes of packets that arrive every 10 ms."""
-    return [a for k, p in enumerate(packets) for a in decoder.take(p, received + k * PERIOD)]
+    return [a for k, p in enumerate(packets) for a in decoder.decode(p, received + k * PERIOD)]
 
 
 def own(k, lag=0.0, **fields):
@@ -46,7 +46,7 @@ class TestSamples:
 
     @pytest.mark.parametrize("first", [OLD, NEW])
     def test_both_versions(self, first):
-        (arrival,) = taught(first).take(first, 5.0)
+        (arrival,) = taught(first).decode(first, 5.0)
         told = json.loads(first)
         assert arrival.time == told["1"].get("time", told["time"])
         assert arrival.received == 5.0
@@ -54,20 +54,20 @@ class TestSamples:
     def test_real_packets(self, real_packets):
         for whole in real_packets.values():
             decoder = taught(whole)
-            arrivals = decoder.take(whole, 0.0)
+            arrivals = decoder.decode(whole, 0.0)
             told = json.loads(whole)
-            n_values = sum(len(told[str(n)]["integer"]) for n in decoder.skins)
+            n_values = sum(len(told[str(n)]["integer"]) for n in decoder.devices)
             assert sum(s.size for a in arrivals for s in a.samples.values()) == n_values
             samples = {name: s for a in arrivals for name, s in a.samples.items()}
             assert samples.keys() == decoder.sensors.keys()
-            for number, skin in decoder.skins.items():
+            for number, skin in decoder.devices.items():
                 flat = np.array(told[str(number)]["integer"]).reshape(-1, 3)
                 for name, expected in skin.split(flat).items():
                     np.testing.assert_array_equal(samples[name], expected)
 
     def test_real_newtons(self, real_packets):
         decoder = taught(real_packets["uSPa46"], calibrated=True)
-        arrivals = decoder.take(real_packets["uSPa46"], 0.0)
+        arrivals = decoder.decode(real_packets["uSPa46"], 0.0)
         told = json.loads(real_packets["uSPa46"])
         samples = {name: s for a in arrivals for name, s in a.samples.items()}
         for number in (1, 2):
@@ -78,7 +78,7 @@ class TestSamples:
         allegro, readings = hand("allegro-uskin"), counts(368)
         packet = text(1, [sensor(readings, "XR23AHRCPP")])
         decoder = taught(packet)
-        (arrival,) = decoder.take(packet, 0.0)
+        (arrival,) = decoder.decode(packet, 0.0)
         for name, expected in allegro.split(readings).items():
             np.testing.assert_array_equal(arrival.samples[name], expected)
         assert decoder.metadata == {"models": {"1": "XR23AHRCPP"}, "hand": "allegro-uskin"}
@@ -86,8 +86,8 @@ class TestSamples:
     def test_samples_are_fresh(self):
         packet = text(1, [sensor(counts(368), "XR23AHRCPP")])
         decoder = taught(packet)
-        (first,) = decoder.take(packet, 0.0)
-        (second,) = decoder.take(text(2, [sensor(counts(368), "XR23AHRCPP")]), 0.0)
+        (first,) = decoder.decode(packet, 0.0)
+        (second,) = decoder.decode(text(2, [sensor(counts(368), "XR23AHRCPP")]), 0.0)
         for name in first.samples:
             assert not np.shares_memory(first.samples[name], second.samples[name])
 
@@ -95,7 +95,7 @@ class TestSamples:
         newtons = [[0.5, -0.25, 1.0]]
         packet = text(1, [sensor([[1, 2, 3]], "odd", calibrated=newtons[0])])
         decoder = taught(packet, calibrated=True)
-        (arrival,) = decoder.take(packet, 0.0)
+        (arrival,) = decoder.decode(packet, 0.0)
         assert arrival.samples["finger1"].tolist() == newtons
         assert decoder.sensors["finger1"].unit == "N"
 
@@ -103,8 +103,8 @@ class TestSamples:
 class TestLearning:
     @pytest.mark.parametrize("packet", [WELCOME, '{"message": "error", "data": []}'])
     def test_nothing_is_learnt_from_what_has_no_samples(self, packet):
-        decoder = Decoder()
-        assert not decoder.learn(packet)
+        decoder = XelaDecoder()
+        assert not decoder.identify(packet)
         assert decoder.sensors == {}
 
     def test_what_the_server_tells(self):
@@ -121,13 +121,13 @@ class TestLearning:
             ("?", "malformed"),
             (text(1, []), "it has no sensors"),
             (text(1, [{"model": "uSPa44"}]), "sensor 1: it has no readings"),
-            (text(1, [sensor(counts(16), taxels=15)]), "tells of 15 taxels and sends 16"),
+            (text(1, [sensor(counts(16), taxels=15)]), "announces 15 taxels and sends 16"),
             (text(1, [sensor(counts(16)), sensor(counts(16), data="?")]), "sensor 2: "),
         ],
     )
     def test_packets_that_make_no_sense(self, packet, told):
-        with pytest.raises(Refusal, match=told):
-            Decoder().learn(packet)
+        with pytest.raises(InvalidPacket, match=told):
+            XelaDecoder().identify(packet)
 
     def test_damaged_packets_are_refused_or_do_not_fit(self):
         dice = random.Random(0)
@@ -135,8 +135,8 @@ class TestLearning:
         n_learnt = 0
         for _ in range(2000):
             try:
-                n_learnt += Decoder().learn(mutated(good, dice))
-            except (Refusal, SourceError) as why:
+                n_learnt += XelaDecoder().identify(mutated(good, dice))
+            except (InvalidPacket, SourceError) as why:
                 assert len(str(why)) < 300
         assert 100 < n_learnt < 1900
 
@@ -144,10 +144,10 @@ class TestLearning:
     def test_without_newtons(self, calibrated):
         packet = text(1, {3: sensor(counts(16), calibrated=calibrated)})
         with pytest.raises(SourceError) as refusal:
-            Decoder(calibrated=True).learn(packet)
+            XelaDecoder(calibrated=True).identify(packet)
         assert str(refusal.value) == (
             "sensor 3 (uSPa44) has no calibrated values: set calibration=on for it in xServ.ini "
-            "and start xela_server anew, or take ?values=counts"
+            "and restart xela_server, or use ?values=counts"
         )
 
 
@@ -223,7 +223,7 @@ class TestTimes:
 
     def test_equal_stamps_are_one_instant(self):
         packet = text(1, [own(1), own(1)])
-        (arrival,) = taught(packet).take(packet, 0.0)
+        (arrival,) = taught(packet).decode(packet, 0.0)
         assert list(arrival.samples) == ["finger1", "finger2"]
 
     def test_a_sensor_that_lags_is_timed_after_the_others(self):
@@ -265,7 +265,7 @@ class TestTimes:
 
         decoder = taught(packet(0))
         fed(decoder, [packet(k) for k in range(10)])
-        (late,) = decoder.take(packet(10), 100.4)
+        (late,) = decoder.decode(packet(10), 100.4)
         assert late.faults == {"finger1": (Fault.LATE,)}
         after = fed(decoder, [packet(k, 3600.0) for k in range(41, 100)], 100.41)
         assert after[0].faults == {"finger1": (Fault.CLOCK_JUMP,)}
@@ -282,7 +282,7 @@ class TestTimes:
     def test_a_burst_after_a_stall_is_late(self):
         decoder = taught(patch(0))
         fed(decoder, [patch(k) for k in range(10)])
-        stalled = [a for k in range(10, 40) for a in decoder.take(patch(k), 100.4)]
+        stalled = [a for k in range(10, 40) for a in decoder.decode(patch(k), 100.4)]
         assert [a.time for a in stalled] == [START + k * PERIOD for k in range(10, 40)]
         assert stalled[0].faults == {"finger1": (Fault.LATE,)}
         assert stalled[-1].faults == {}
@@ -300,11 +300,11 @@ class TestRefusals:
     def test_a_sensor_that_makes_no_sense_does_not_spoil_the_others(self):
         good = [sensor(counts(16, k)) for k in (1, 2)]
         decoder = taught(text(1, good))
-        (arrival,) = decoder.take(text(2, [good[0], sensor(counts(16), data="ZZ")]), 0.0)
+        (arrival,) = decoder.decode(text(2, [good[0], sensor(counts(16), data="ZZ")]), 0.0)
         assert list(arrival.samples) == ["finger1"]
         assert arrival.n_refused == 1
         assert arrival.notices == (
-            "sensor 2 makes no sense: four hexadecimal digits a number expected in data, with "
+            "sensor 2 is invalid: four hexadecimal digits a number expected in data, with "
             "commas between",
         )
 
@@ -312,15 +312,15 @@ class TestRefusals:
         decoder = taught(patch(0))
         arrivals = fed(decoder, ["garbage"] * 250)
         assert len(arrivals) == 3
-        assert all(a.notices[0].startswith("a packet makes no sense: ") for a in arrivals)
+        assert all(a.notices[0].startswith("invalid packet: ") for a in arrivals)
         assert all(math.isnan(a.time) and not a.samples for a in arrivals)
-        (good,) = decoder.take(patch(1), 103.0)
+        (good,) = decoder.decode(patch(1), 103.0)
         assert sum(a.n_refused for a in arrivals) + good.n_refused == 250
         assert good.notices == ()
 
     def test_a_packet_with_two_bad_sensors_is_refused_once(self):
         decoder = taught(text(0, [sensor(counts(16)), sensor(counts(16))]))
-        (told,) = decoder.take(text(1, [{"data": "?"}, {"data": "?"}]), 0.0)
+        (told,) = decoder.decode(text(1, [{"data": "?"}, {"data": "?"}]), 0.0)
         assert told.n_refused == 1
         assert len(told.notices) == 2
 
@@ -328,21 +328,21 @@ class TestRefusals:
         decoder = taught(patch(0))
         wrong = counts(16)
         integer = [*wrong.ravel().tolist()[:-1], 5]
-        (told,) = decoder.take(text(1, [sensor(wrong, integer=integer)]), 0.0)
-        assert told.notices == ("sensor 1 makes no sense: data and integer differ",)
+        (told,) = decoder.decode(text(1, [sensor(wrong, integer=integer)]), 0.0)
+        assert told.notices == ("sensor 1 is invalid: data and integer differ",)
         assert told.samples == {}
 
     def test_newtons_that_are_gone(self):
         packet = text(1, [sensor([[1, 2, 3]], "odd", calibrated=[1, 2, 3])])
         decoder = taught(packet, calibrated=True)
-        (told,) = decoder.take(text(2, [sensor([[1, 2, 3]], "odd", calibrated=None)]), 0.0)
-        assert told.notices == ("sensor 1 makes no sense: it has no readings",)
+        (told,) = decoder.decode(text(2, [sensor([[1, 2, 3]], "odd", calibrated=None)]), 0.0)
+        assert told.notices == ("sensor 1 is invalid: it has no readings",)
         assert (told.n_refused, told.samples) == (1, {})
 
     def test_another_number_of_taxels(self):
         decoder = taught(text(0, [sensor(counts(16)), sensor(counts(16))]))
         changed = [sensor(counts(16)), sensor(counts(15), taxels=15)]
-        first, second = (decoder.take(text(k, changed), k * PERIOD)[0] for k in (1, 2))
+        first, second = (decoder.decode(text(k, changed), k * PERIOD)[0] for k in (1, 2))
         for arrival in (first, second):
             assert list(arrival.samples) == ["finger1"]
             assert arrival.faults == {"finger2": (Fault.TAXEL_COUNT,)}
@@ -352,7 +352,7 @@ class TestRefusals:
 
     def test_another_number_of_taxels_of_a_whole_hand(self):
         decoder = taught(text(0, [sensor(counts(368), "XR23AHRCPP")]))
-        (told,) = decoder.take(text(1, [sensor(counts(240), "XR23AHRCPP", taxels=240)]), 0.0)
+        (told,) = decoder.decode(text(1, [sensor(counts(240), "XR23AHRCPP", taxels=240)]), 0.0)
         assert told.faults == dict.fromkeys(hand("allegro-uskin").modules, (Fault.TAXEL_COUNT,))
 
     def test_a_sensor_that_comes_later_is_left_out(self):
@@ -361,17 +361,33 @@ class TestRefusals:
         arrivals = fed(decoder, later)
         assert all(list(a.samples) == ["finger1"] for a in arrivals)
         notices = [notice for a in arrivals for notice in a.notices]
-        assert notices == ["sensor 2 was not there at the beginning: open the source anew"]
+        assert notices == [
+            "sensor 2 was not there when the source was opened: open the source again"
+        ]
+
+    def test_each_sensor_that_comes_later_is_reported(self):
+        decoder = taught(patch(0))
+        (arrival,) = decoder.decode(text(1, [sensor(counts(16))] * 3), 0.0)
+        assert [notice.split(" was")[0] for notice in arrival.notices] == ["sensor 2", "sensor 3"]
+
+    def test_a_fault_is_reported_also_after_another_notice(self):
+        """Notices about one sensor once delayed the fault of a wrong number of taxels."""
+        decoder = taught(patch(0))
+        decoder.decode(text(1, [sensor(counts(16), data="?")]), 0.0)
+        wrong = [text(k, [sensor(counts(15), taxels=15)]) for k in (2, 3)]
+        arrivals = [arrival for packet in wrong for arrival in decoder.decode(packet, 0.1)]
+        assert [a.faults for a in arrivals] == [{"finger1": (Fault.TAXEL_COUNT,)}] * 2
+        assert [len(a.notices) for a in arrivals] == [1, 0]
 
     def test_a_sensor_that_goes_is_missing(self):
         decoder = taught(text(0, [sensor(counts(16)), sensor(counts(16))]))
-        (arrival,) = decoder.take(patch(1), 0.0)
+        (arrival,) = decoder.decode(patch(1), 0.0)
         assert list(arrival.samples) == ["finger1"]
 
     @given(st.binary(max_size=200))
     def test_any_bytes(self, garbage):
         decoder = taught(NEW)
-        for arrival in decoder.take(garbage, 0.0):
+        for arrival in decoder.decode(garbage, 0.0):
             assert arrival.n_refused == 1
 
 
@@ -414,7 +430,7 @@ def test_damaged_packets_do_no_harm(seed):
     tracemalloc.start()
     try:
         for k in range(2500):
-            for arrival in decoder.take(mutated(dice.choice(good), dice), k * PERIOD):
+            for arrival in decoder.decode(mutated(dice.choice(good), dice), k * PERIOD):
                 n_refused += arrival.n_refused
                 n_taken += bool(arrival.samples)
                 if arrival.samples:
@@ -429,7 +445,7 @@ def test_damaged_packets_do_no_harm(seed):
     assert n_taken > 100
     for k in (5000, 5001):
         fresh = text(k, [own(k), sensor(counts(16, k + 1))])
-        arrivals = decoder.take(fresh, k * PERIOD)
+        arrivals = decoder.decode(fresh, k * PERIOD)
         samples = {name: s for a in arrivals for name, s in a.samples.items()}
         np.testing.assert_array_equal(samples["finger1"], counts(16, k))
         np.testing.assert_array_equal(samples["finger2"], counts(16, k + 1))

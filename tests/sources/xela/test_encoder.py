@@ -9,7 +9,7 @@ from hypothesis.extra.numpy import arrays
 
 from holdfast.sensors import Sensor, hand, sensor
 from holdfast.sensors.xela_models import flat_grid
-from holdfast.sources.xela.decoder import Decoder
+from holdfast.sources.xela.decoder import XelaDecoder
 from holdfast.sources.xela.encoder import (
     MAX_MODULE_WAIT,
     NEWTONS_PER_COUNT,
@@ -43,9 +43,9 @@ def told(encoder, samples, time=START, sent=START + 1):
 def decoded(encoder, packets, **options):
     """What a client that names the sensors as they are makes of packets."""
     names = {n: names[0] for n, names in encoder.modules.items() if len(names) == 1}
-    decoder = Decoder(names, **options)
-    assert decoder.learn(packets[0])
-    return [a for k, p in enumerate(packets) for a in decoder.take(p, 0.01 * k)]
+    decoder = XelaDecoder(names, **options)
+    assert decoder.identify(packets[0])
+    return [a for k, p in enumerate(packets) for a in decoder.decode(p, 0.01 * k)]
 
 
 @pytest.mark.parametrize("version", ["1.7", "1.8"])

@@ -5,7 +5,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from holdfast.sources.xela.packet import Refusal, read_packet, read_sensor
+from holdfast.sources.xela.packet import InvalidPacket, read_packet, read_sensor
 
 from .build import NEW, OLD, WELCOME, sensor, text
 
@@ -132,7 +132,7 @@ def test_what_is_not_finite_is_missing():
     ],
 )
 def test_packets_that_make_no_sense(given, why):
-    with pytest.raises(Refusal, match=f"(?i).*{why}") as refusal:
+    with pytest.raises(InvalidPacket, match=f"(?i).*{why}") as refusal:
         read_packet(given)
     assert len(str(refusal.value)) <= 160
 
@@ -149,8 +149,8 @@ def test_packets_that_make_no_sense(given, why):
         ({"data": "FA00,F,00,FC00"}, "no hexadecimal digit"),
         ({"data": "FA00,FB00,FC0é"}, "no hexadecimal digit"),
         ({"data": 7}, "Expected `str | null`, got `int` - at `$.data`"),
-        ({"integer": [1, 2, 65536]}, "integer holds what is no uint16"),
-        ({"integer": [1, 2, -1]}, "integer holds what is no uint16"),
+        ({"integer": [1, 2, 65536]}, "integer contains a number that is no uint16"),
+        ({"integer": [1, 2, -1]}, "integer contains a number that is no uint16"),
         ({"integer": [1, 2, 10**40]}, "integer"),
         ({"integer": [1, 2, 0.5]}, "Expected `int`, got `float`"),
         ({"integer": [1, 2]}, "2 values given, three a taxel expected"),
@@ -165,7 +165,7 @@ def test_packets_that_make_no_sense(given, why):
     ],
 )
 def test_sensors_that_make_no_sense(part, why):
-    with pytest.raises(Refusal) as refusal:
+    with pytest.raises(InvalidPacket) as refusal:
         readings(part)
     assert why in str(refusal.value)
 
@@ -179,7 +179,7 @@ def test_sensors_that_make_no_sense(part, why):
     ],
 )
 def test_newtons_that_make_no_sense(part, why):
-    with pytest.raises(Refusal) as refusal:
+    with pytest.raises(InvalidPacket) as refusal:
         readings(part, calibrated=True)
     assert why in str(refusal.value)
 

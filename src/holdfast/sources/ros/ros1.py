@@ -1,8 +1,8 @@
-"""A ROS 1 topic as a source: by rospy, whatever the definition of its messages."""
+"""Source of a ROS 1 topic, by rospy. Any definition of a supported message is accepted."""
 
 import time
 from collections import deque
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from threading import Condition
 from types import ModuleType
 from typing import Any
@@ -12,89 +12,89 @@ from holdfast.ros import rospy_node
 from holdfast.ros.definitions import parse_definition
 from holdfast.ros.sensor_messages import SUPPORTED_MESSAGES, DeviceSample, SampleDecoder
 from holdfast.sources.base import Source
-from holdfast.sources.ros.topic import PATIENCE, Link, Packet, Stranger, TopicSource, topic_of
+from holdfast.sources.ros.topic import (
+    ReceivedMessage,
+    Subscription,
+    TopicSource,
+    UnsupportedMessage,
+    topic_of,
+)
 from holdfast.sources.uri import Address
 
-N_QUEUED = 256
-"""Messages that wait for a reader that is busy; then it misses the oldest."""
-LARGEST = 1 << 20
-"""Bytes that are read from a socket at a time; less than a message makes rospy lag behind."""
+MAX_QUEUED_MESSAGES = 256
+"""Messages that wait for a busy reader; after that, the oldest ones are dropped."""
+SOCKET_READ_SIZE = 1 << 20
+"""Bytes to read from a socket at a time. If a message is longer, rospy lags behind."""
+
+Decode = Callable[[bytes], list[DeviceSample]]
 
 
 def source(address: Address) -> Source:
-    """The source at a URI; entering it subscribes.
+    """Return the source of a URI; entering it subscribes.
 
     `ros1:///TOPIC`. Parameters: `master=http://127.0.0.1:11311` (by default that of
     `ROS_MASTER_URI`), `values=counts` or `values=calibrated`, `fingers=1:thumb,2:index`,
     `sensor=FILE.json`.
 
     Raises:
-        ValueError: the address or a parameter is not of that form.
-        OSError: the sensor's file cannot be read.
+        ValueError: the address or a parameter is not valid.
     """
     address.only("master", "values", "fingers", "sensor")
     master = rospy_node.master_uri(address.parameters.get("master"))
-    return TopicSource(address, Ros1Link(topic_of(address), master))
+    return TopicSource(address, Ros1Subscription(topic_of(address), master))
 
 
-class Ros1Link(Link):
-    """A subscription to a ROS 1 topic.
+class Ros1Subscription(Subscription):
+    """Subscription to a ROS 1 topic.
 
     Args:
-        topic: its name, `/xServTopic`.
+        topic: name of the topic, `/xServTopic`.
         master: URI of the ROS master.
     """
 
     def __init__(self, topic: str, master: str) -> None:
-        self._topic = topic
+        super().__init__(topic, f"at the ROS master {master}")
         self._master = master
         self._rospy: ModuleType | None = None
         self._subscriber: Any = None
-        self._waiting: deque[tuple[Any, float]] = deque()
-        self._came = Condition()
+        self._queue: deque[tuple[Any, float]] = deque()
+        self._queue_changed = Condition()
         self._n_dropped = 0
-        self._unpackers: dict[tuple[str, str], Callable[[bytes], list[DeviceSample]]] = {}
+        self._decoders: dict[tuple[str, str], Decode] = {}
 
     def open(self, deadline: float) -> None:
-        """Subscribes.
+        """Subscribe.
 
         Raises:
-            SourceError: there is no rospy, or no master.
+            SourceError: rospy is not installed, or there is no master.
         """
         self._rospy = rospy_node.start_node(self._master)
         self._subscribe()
 
-    def take(self, timeout: float) -> Packet | None:
-        """The next message, or None where none came within `timeout` [s]."""
-        with self._came:
-            if not self._came.wait_for(lambda: self._waiting, timeout):
+    def take(self, timeout: float) -> ReceivedMessage | None:
+        """Return the next message, or None after `timeout` [s]."""
+        with self._queue_changed:
+            if not self._queue_changed.wait_for(lambda: self._queue, timeout):
                 return None
-            message, received = self._waiting.popleft()
-        return Packet(message._buff, received, self._unpacker(message._connection_header))
+            message, received = self._queue.popleft()
+        return ReceivedMessage(message._buff, received, self._decoder(message._connection_header))
 
     def n_publishers(self) -> int:
-        """How many publish on the topic now."""
+        """Return the current number of publishers."""
         return 0 if self._subscriber is None else self._subscriber.get_num_connections()
 
     def n_dropped(self) -> int:
-        """Messages that were not taken in time, since the last call."""
-        with self._came:
+        """Return the number of messages dropped since the last call, due to a slow reader."""
+        with self._queue_changed:
             n_dropped, self._n_dropped = self._n_dropped, 0
         return n_dropped
 
-    def missing(self) -> str:
-        """What to tell where no message comes: who publishes, which topics there are."""
-        there = rospy_node.published_topics(self._master)
-        if self._topic in there:
-            return f"{self._topic} has a publisher, but no samples came in {PATIENCE:g} s"
-        others = ", ".join(f"{topic} ({kind})" for topic, kind in sorted(there.items()))
-        return (
-            f"nobody publishes {self._topic} at the ROS master {self._master}; there are "
-            f"{others or 'no topics at all'}"
-        )
+    def published_topics(self) -> Mapping[str, str]:
+        """Return the types of all topics with a publisher, by name."""
+        return rospy_node.published_topics(self._master)
 
-    def mend(self) -> None:
-        """Subscribes anew: a master that was started again does not know us."""
+    def renew(self) -> None:
+        """Subscribe again: a restarted master does not have the subscription."""
         try:
             rospy_node.check_master(self._master)
         except SourceError:
@@ -103,16 +103,16 @@ class Ros1Link(Link):
         self._subscribe()
 
     def close(self) -> None:
-        """Ends the subscription; again, it does nothing."""
+        """End the subscription. It has no effect on one that is closed."""
         self._unsubscribe()
-        with self._came:
-            self._waiting.clear()
+        with self._queue_changed:
+            self._queue.clear()
 
     def _subscribe(self) -> None:
         rospy = self._rospy
         if rospy is not None:
             self._subscriber = rospy.Subscriber(
-                self._topic, rospy.AnyMsg, self._put, buff_size=LARGEST, tcp_nodelay=True
+                self._topic, rospy.AnyMsg, self._put, buff_size=SOCKET_READ_SIZE, tcp_nodelay=True
             )
 
     def _unsubscribe(self) -> None:
@@ -122,30 +122,27 @@ class Ros1Link(Link):
 
     def _put(self, message: Any) -> None:  # noqa: ANN401 (rospy.AnyMsg), in a thread of rospy
         received = time.monotonic()
-        with self._came:
-            if len(self._waiting) == N_QUEUED:
-                self._waiting.popleft()
+        with self._queue_changed:
+            if len(self._queue) == MAX_QUEUED_MESSAGES:
+                self._queue.popleft()
                 self._n_dropped += 1
-            self._waiting.append((message, received))
-            self._came.notify()
+            self._queue.append((message, received))
+            self._queue_changed.notify()
 
-    def _unpacker(self, header: dict[str, str]) -> Callable[[bytes], list[DeviceSample]]:
-        """By the definition that the publisher sent ahead."""
+    def _decoder(self, header: dict[str, str]) -> Decode:
+        """Return the decoder of the definition that the publisher sent in its header."""
         kind, text = header.get("type", ""), header.get("message_definition", "")
-        if (kind, text) not in self._unpackers:
-            self._unpackers[kind, text] = self._new_unpacker(kind, text)
-        return self._unpackers[kind, text]
+        if (kind, text) not in self._decoders:
+            self._decoders[kind, text] = self._new_decoder(kind, text)
+        return self._decoders[kind, text]
 
-    def _new_unpacker(self, kind: str, text: str) -> Callable[[bytes], list[DeviceSample]]:
+    def _new_decoder(self, kind: str, text: str) -> Decode:
         try:
             return SampleDecoder(parse_definition(kind, text), ros2=False)
         except ValueError:
-            what = (
-                f"{self._topic} has {kind}, in which holdfast knows no samples; it takes "
-                f"{SUPPORTED_MESSAGES}"
-            )
+            message = self.unsupported(kind, SUPPORTED_MESSAGES)
 
             def refuse(_: bytes) -> list[DeviceSample]:
-                raise Stranger(what)
+                raise UnsupportedMessage(message)
 
             return refuse

@@ -1,231 +1,224 @@
-"""A topic of ROS as a source, whichever ROS: the watch on it, and what is told of it."""
+"""Source of a ROS topic, the same for ROS 1 and ROS 2."""
 
 import time
 from abc import ABC, abstractmethod
-from collections import deque
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from typing import NamedTuple
 
 from holdfast.errors import SourceError
 from holdfast.ros.sensor_messages import DeviceSample
 from holdfast.sensors.types import Unit
-from holdfast.sources.base import Arrival, Source, notice_arrival
-from holdfast.sources.ros.translator import Translator
+from holdfast.sources.base import DeviceSource
+from holdfast.sources.ros.message_assembler import MessageAssembler, has_taxels
 from holdfast.sources.uri import Address
 
-PATIENCE = 5.0
-"""How long entering waits for a message with samples [s]."""
-GATHERING = 1.0
-"""How long the devices of a topic are waited for, where a message is of one of them [s]."""
-SILENCE = 1.0
-"""Without a new sample for so long, a topic is silent [s]."""
-BACKOFF, LONGEST_BACKOFF = 0.5, 2.0
-"""Before the first and before later attempts to mend a link [s]; it doubles."""
+OPEN_TIMEOUT = 5.0
+"""Longest wait for the first message with samples [s]."""
+DEVICES_TIMEOUT = 1.0
+"""Longest wait for the other devices of a topic, if each message has one device [s]."""
+SILENCE_TIMEOUT = 1.0
+"""A topic without a new sample for this time is silent [s]."""
+PUBLISHER_CHECK_INTERVAL = 0.5
+"""Time between two checks for publishers while no message arrives [s]."""
 
 
-class Stranger(ValueError):  # noqa: N818 (it names what came, not what broke)
-    """A message is of a type that nobody knows; its text says so."""
+class UnsupportedMessage(ValueError):  # noqa: N818 (it is not an error of the program)
+    """A message has a type without known samples. The text names the type."""
 
 
-class Packet(NamedTuple):
-    """A message as it came.
+class ReceivedMessage(NamedTuple):
+    """Message of a topic.
 
     Attributes:
         data: its bytes.
-        received: when it was in hand, by `time.monotonic` [s].
-        unpack: takes readings out of it; raises a `ValueError` where there are none.
+        received: time of arrival, by `time.monotonic` [s].
+        decode: returns the samples in the bytes; raises a `ValueError` if they are not valid.
     """
 
     data: bytes
     received: float
-    unpack: Callable[[bytes], list[DeviceSample]]
+    decode: Callable[[bytes], list[DeviceSample]]
 
 
-class Link(ABC):
-    """A subscription to one topic."""
+class Subscription(ABC):
+    """Subscription to one topic.
+
+    Args:
+        topic: name of the topic, `/xServTopic`.
+        network: where the topic is, for messages: "in ROS domain 0".
+    """
+
+    def __init__(self, topic: str, network: str) -> None:
+        self._topic = topic
+        self._network = network
 
     @abstractmethod
     def open(self, deadline: float) -> None:
-        """Subscribes.
+        """Subscribe, with waits only until `deadline`, by `time.monotonic` [s].
 
         Raises:
-            SourceError: ROS cannot be reached, or the topic has messages of another type.
+            SourceError: ROS cannot be reached, or the messages have an unsupported type.
         """
 
     @abstractmethod
-    def take(self, timeout: float) -> Packet | None:
-        """The next message, or None where none came within `timeout` [s]."""
+    def take(self, timeout: float) -> ReceivedMessage | None:
+        """Return the next message, or None after `timeout` [s]."""
 
     @abstractmethod
     def n_publishers(self) -> int:
-        """How many publish on the topic now."""
+        """Return the current number of publishers."""
 
     @abstractmethod
-    def missing(self) -> str:
-        """What to tell where no message comes: who publishes, which topics there are."""
+    def published_topics(self) -> Mapping[str, str]:
+        """Return the types of all topics with a publisher, by name."""
 
     @abstractmethod
     def close(self) -> None:
-        """Ends the subscription; again, it does nothing."""
+        """End the subscription. It has no effect on one that is closed."""
 
-    def mend(self) -> None:  # noqa: B027 (some links mend themselves)
-        """Subscribes again where nobody publishes and that would help."""
+    def renew(self) -> None:  # noqa: B027 (some subscriptions renew themselves)
+        """Subscribe again, if that can help when there is no publisher."""
 
     def n_dropped(self) -> int:
-        """Messages that were not taken in time, since the last call."""
+        """Return the number of messages dropped since the last call, due to a slow reader."""
         return 0
 
+    def why_no_message(self) -> str:
+        """Return a message about a topic without samples, with the topics that exist."""
+        topics = self.published_topics()
+        if self._topic in topics:
+            return f"{self._topic} has a publisher, but no samples came in {OPEN_TIMEOUT:g} s"
+        others = ", ".join(f"{topic} ({kind})" for topic, kind in sorted(topics.items()))
+        return (
+            f"no node publishes {self._topic} {self._network}; published topics: {others or 'none'}"
+        )
 
-class TopicSource(Source):
-    """The sensors of one topic.
+    def unsupported(self, kind: str, supported: str) -> str:
+        """Return a message about a topic of an unsupported type."""
+        return f"{self._topic} has messages of type {kind}; supported types: {supported}"
+
+
+class TopicSource(DeviceSource):
+    """Source of the sensors of one topic. A topic without publishers is a lost connection.
 
     Args:
-        address: `ros2:///TOPIC`, with `values`, `fingers` and `sensor` as of XELA's server.
-        link: to the topic.
+        address: `ros2:///TOPIC`, with `values`, `fingers` and `sensor` as for XELA's server.
+        subscription: subscription to the topic.
     """
 
-    def __init__(self, address: Address, link: Link) -> None:
+    silence_timeout = SILENCE_TIMEOUT
+
+    def __init__(self, address: Address, subscription: Subscription) -> None:
+        super().__init__()
         self.name = address.text
-        self._link = link
+        self._subscription = subscription
         unit: Unit = "N" if address.calibrated() else "count"
         self._options = (address.names(), unit, address.sensor())
-        self._translator = Translator(*self._options)
-        self._forget()
+        self._assembler = MessageAssembler(*self._options)
+        self._checked_at = 0.0
 
     def open(self) -> None:
-        """Subscribes, and waits until the modules are known.
+        """Subscribe, and wait until the modules are known.
 
         Raises:
-            SourceError: ROS cannot be reached, nobody publishes, or not what is expected.
+            SourceError: ROS cannot be reached, no node publishes, or other data than expected.
         """
         self.close()
-        self._translator = Translator(*self._options)
-        deadline = time.monotonic() + PATIENCE
-        self._link.open(deadline)
-        packets, messages = self._first(deadline)
-        self._translator.learn(messages)
-        self.sensors = self._translator.sensors
-        self.metadata = {"source": self.name, **self._translator.metadata}
-        notices = [notice for skin in self._translator.skins.values() for notice in skin.notices]
+        self._assembler = MessageAssembler(*self._options)
+        deadline = time.monotonic() + OPEN_TIMEOUT
+        self._subscription.open(deadline)
+        messages, samples = self._first_messages(deadline)
+        self._assembler.identify(samples)
+        self.sensors = self._assembler.sensors
+        self.metadata = {"source": self.name, **self._assembler.metadata}
+        now = self._checked_at = time.monotonic()
+        self._start(now)
+        notices = [text for device in self._assembler.devices.values() for text in device.notices]
         if notices:
-            self._pending.append(notice_arrival(time.monotonic(), *notices))
-        self._heard_at = self._seen_at = time.monotonic()
-        for packet in packets:
-            self._take(packet)
+            self._notify(now, *notices)
+        for message in messages:
+            self._assemble(message)
 
-    def read(self, timeout: float) -> Arrival | None:
-        """What arrived next, or None where nothing did within `timeout` [s]."""
-        deadline = time.monotonic() + timeout
-        while not self._pending:
-            left = deadline - time.monotonic()
-            packet = self._link.take(max(min(left, self._until_word()), 0.0))
-            if packet is not None:
-                self._end_loneliness()
-                self._take(packet)
-            self._watch(idle=packet is None)
-            if left <= 0:
-                break
-        return self._pending.popleft() if self._pending else None
-
-    def close(self) -> None:
-        """Ends the subscription; again, it does nothing."""
-        self._link.close()
-        self._forget()
-
-    def _forget(self) -> None:
-        self._pending: deque[Arrival] = deque()
-        self._heard_at = self._seen_at = time.monotonic()
-        self._silent = self._alone = False
-        self._backoff, self._mend_at = BACKOFF, 0.0
-
-    def _first(self, deadline: float) -> tuple[list[Packet], list[DeviceSample]]:
-        """The first packets, until one tells of a device anew."""
-        packets: list[Packet] = []
+    def _first_messages(self, deadline: float) -> tuple[list[ReceivedMessage], list[DeviceSample]]:
+        """Return the first messages, until a device repeats, and the first sample of each."""
+        messages: list[ReceivedMessage] = []
         found: dict[int | None, DeviceSample] = {}
-        refusal: ValueError | None = None
+        invalid: ValueError | None = None
         while (left := deadline - time.monotonic()) > 0:
-            packet = self._link.take(left)
-            if packet is None:
+            message = self._subscription.take(left)
+            if message is None:
                 continue
             try:
-                messages = [m for m in packet.unpack(packet.data) if _has_taxels(m)]
-            except Stranger as why:
+                samples = [one for one in message.decode(message.data) if has_taxels(one)]
+            except UnsupportedMessage as why:
                 raise SourceError(str(why)) from why
             except ValueError as why:
-                refusal = why
+                invalid = why
                 continue
-            packets.append(packet)
-            if any(m.number in found for m in messages):
+            messages.append(message)
+            if any(one.number in found for one in samples):
                 break
-            if messages and not found:
-                deadline = min(deadline, time.monotonic() + GATHERING)
-            found.update((m.number, m) for m in messages)
+            if samples and not found:
+                deadline = min(deadline, time.monotonic() + DEVICES_TIMEOUT)
+            found.update((one.number, one) for one in samples)
         if found:
-            return packets, list(found.values())
-        if refusal is not None:
-            raise SourceError(f"what {self.name} sends makes no sense: {refusal}") from refusal
-        raise SourceError(self._link.missing())
+            return messages, list(found.values())
+        if invalid is not None:
+            raise SourceError(f"{self.name} sends invalid messages: {invalid}") from invalid
+        raise SourceError(self._subscription.why_no_message())
 
-    def _take(self, packet: Packet) -> None:
+    def _receive(self, timeout: float) -> bool:
+        message = self._subscription.take(min(timeout, PUBLISHER_CHECK_INTERVAL))
+        if n_dropped := self._subscription.n_dropped():
+            text = f"{n_dropped} messages dropped: they were read too slowly"
+            self._notify(time.monotonic(), text)
+        if message is None:
+            self._check_publishers()
+            return False
+        self._assemble(message)
+        return True
+
+    def _assemble(self, message: ReceivedMessage) -> None:
+        received = message.received
         try:
-            messages = packet.unpack(packet.data)
-            arrivals = self._translator.take(messages, packet.received)
+            arrivals = self._assembler.assemble(message.decode(message.data), received)
         except ValueError as why:
-            arrivals = self._translator.refuse(str(why), packet.received)
-        if any(arrival.samples for arrival in arrivals):
-            if self._silent:
-                silence = packet.received - self._heard_at
-                self._tell(f"samples again after {silence:.1f} s")
-            self._silent = False
-            self._heard_at = packet.received
-        self._pending.extend(arrivals)
+            arrivals = self._assembler.refuse(str(why), received)
+        self._queue(arrivals, received)
 
-    def _until_word(self) -> float:
-        """How long nothing has to be told or done, where no message comes [s]."""
-        if self._alone:
-            return max(self._mend_at - time.monotonic(), 0.01)
-        return BACKOFF if self._silent else max(self._heard_at + SILENCE - time.monotonic(), 0.01)
-
-    def _watch(self, *, idle: bool) -> None:
-        """Looks after silence, publishers and the link."""
+    def _check_publishers(self) -> None:
         now = time.monotonic()
-        if n_dropped := self._link.n_dropped():
-            self._tell(f"{n_dropped} messages dropped: they were taken too slowly")
-        if idle and not self._silent and now - self._heard_at >= SILENCE:
-            self._silent = True
-            self._tell(f"no new sample for {SILENCE:g} s")
-        if idle and (self._alone or now - self._seen_at >= BACKOFF):
-            self._seen_at = now
-            self._look_for_publishers(now)
-
-    def _look_for_publishers(self, now: float) -> None:
-        if self._link.n_publishers() > 0:
-            self._end_loneliness()
+        if now - self._checked_at < PUBLISHER_CHECK_INTERVAL:
             return
-        if not self._alone:
-            self._alone = True
-            self._backoff, self._mend_at = BACKOFF, now + BACKOFF
-            self._tell("nobody publishes any more")
-        if now >= self._mend_at:
-            self._backoff = min(2 * self._backoff, LONGEST_BACKOFF)
-            self._link.mend()
-            self._mend_at = time.monotonic() + self._backoff
+        self._checked_at = now
+        if not self._subscription.n_publishers():
+            self._lose("the topic has no publisher")
 
-    def _end_loneliness(self) -> None:
-        if self._alone:
-            self._alone = False
-            self._translator.reconnected()
-            self._tell("somebody publishes again")
+    def _pause(self, seconds: float) -> None:
+        """Wait for a message of a new publisher."""
+        message = self._subscription.take(seconds)
+        if message is not None or self._subscription.n_publishers():
+            self._resume()
+        if message is not None:
+            self._assemble(message)
 
-    def _tell(self, notice: str) -> None:
-        self._pending.append(notice_arrival(time.monotonic(), notice))
+    def _reconnect(self) -> bool:
+        self._subscription.renew()
+        return self._subscription.n_publishers() > 0
+
+    def _resume(self) -> None:
+        self._assembler.reconnected()
+        super()._resume()
+
+    def _disconnect(self) -> None:
+        self._subscription.close()
 
 
 def topic_of(address: Address) -> str:
-    """The topic that a URI names: `/xServTopic` for `ros2:///xServTopic`.
+    """Return the topic of a URI: `/xServTopic` for `ros2:///xServTopic`.
 
     Raises:
-        ValueError: it names none.
+        ValueError: the URI has a host, or no topic.
     """
     topic = address.path.rstrip("/")
     if address.host or not topic.startswith("/") or len(topic) < 2:
@@ -234,7 +227,3 @@ def topic_of(address: Address) -> str:
             f"{address.text}: {scheme}:///TOPIC expected, as in {scheme}:///xServTopic"
         )
     return topic
-
-
-def _has_taxels(message: DeviceSample) -> bool:
-    return len(message.forces if message.counts is None else message.counts) > 0

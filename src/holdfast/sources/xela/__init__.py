@@ -1,19 +1,19 @@
-"""XELA's server as a source: `xela://HOST:PORT` or `xela://auto`."""
+"""Source of XELA's server: `xela://HOST:PORT` or `xela://auto`."""
 
 from holdfast.sources.base import Source
 from holdfast.sources.uri import Address
 
 
 def source(address: Address) -> Source:
-    """The source at a URI; entering it connects.
+    """Return the source of a URI; entering it connects.
 
     `xela://HOST:PORT`, by default `xela://127.0.0.1:5000`; `xela://auto` tries this machine's
-    own addresses. Parameters: `values=counts` or `values=calibrated`, `fingers=1:thumb,2:index`
-    names the server's sensors, `sensor=FILE.json` (or a built-in name) tells where the taxels
-    of a sensor sit that is not known.
+    own addresses. Parameters: `values=counts` or `values=calibrated`; `fingers=1:thumb,2:index`
+    names the server's sensors; `sensor=FILE.json` (or a built-in name) is the layout of sensors
+    whose model is not known.
 
     Raises:
-        ValueError: the address or a parameter is not of that form.
+        ValueError: the address or a parameter is not valid.
     """
     from holdfast.sources.xela.client import XelaSource
     from holdfast.sources.xela.places import places

@@ -8,7 +8,7 @@ import numpy as np
 import numpy.typing as npt
 
 from holdfast.sensors import Hand, Sensor, hand
-from holdfast.sources.xela.packet import COUNTER
+from holdfast.sources.assembler import SEQUENCE_PERIOD
 
 REST_READING = np.array([32768, 32768, 36000])
 """Reading of a taxel without contact [count]."""
@@ -126,7 +126,7 @@ class XelaEncoder:
                 own = time if times is None or self.is_hand else times[part.names[0]]
                 sensors[str(number)] = self._sensor(number, part, *readings, constant, own)
         top: dict[str, Any] = {"message": self._counter, "time": time, "sensors": len(sensors)}
-        self._counter = (self._counter + 1) % COUNTER
+        self._counter = (self._counter + 1) % SEQUENCE_PERIOD
         if self._version == OLD_VERSION:
             return msgspec.json.encode(top | sensors)
         top |= {"type": "routine", "version": VERSION_TEXT}

@@ -1,4 +1,4 @@
-"""Where XELA's server may be, by the address that a user gives."""
+"""Network addresses at which XELA's server may be."""
 
 import socket
 from typing import NamedTuple
@@ -7,10 +7,10 @@ from urllib.parse import urlsplit
 from holdfast.sources.uri import Address
 
 HOST, PORT = "127.0.0.1", 5000
-AUTO = "auto"
-"""The host that stands for this machine's own addresses."""
-_ANYWHERE = ("192.0.2.1", 9)
-"""An address kept for documentation: nothing is sent to it."""
+AUTO_HOST = "auto"
+"""Host that stands for this machine's own addresses."""
+_OUTSIDE_ADDRESS = ("192.0.2.1", 9)
+"""Address reserved for documentation; nothing is sent to it."""
 
 
 class Place(NamedTuple):
@@ -24,20 +24,20 @@ class Place(NamedTuple):
 
 
 def places(address: Address) -> tuple[Place, ...]:
-    """The places to try, in order.
+    """Return the places to try, in order.
 
-    xela_server binds the address of the network card, even where it is told otherwise: `auto`
-    tries 127.0.0.1, then the address that this machine has on the way out.
+    xela_server binds the address of the network card, even if it is configured otherwise.
+    Therefore `auto` tries 127.0.0.1, then the address of the default route.
 
     Raises:
-        ValueError: no host and port.
+        ValueError: the URI has no valid host and port.
 
     Example:
         >>> from holdfast.sources.uri import parse
         >>> [str(place) for place in places(parse("xela://hand.local")[1])]
         ['hand.local:5000']
     """
-    expected = f"{address.text}: xela://HOST:PORT or xela://{AUTO} expected"
+    expected = f"{address.text}: xela://HOST:PORT or xela://{AUTO_HOST} expected"
     try:
         parts = urlsplit(f"//{address.host}")
         host, port = parts.hostname or HOST, PORT if parts.port is None else parts.port
@@ -45,17 +45,17 @@ def places(address: Address) -> tuple[Place, ...]:
         raise ValueError(f"{expected} ({cause})") from cause
     if address.path not in ("", "/") or "@" in address.host or not port:
         raise ValueError(expected)
-    if host != AUTO:
+    if host != AUTO_HOST:
         return (Place(host, port),)
     hosts = dict.fromkeys((HOST, own_address()))
     return tuple(Place(one, port) for one in hosts if one)
 
 
 def own_address() -> str | None:
-    """This machine's address on the way out; None without a way. Sends nothing."""
+    """Return this machine's address on the default route, or None. Send nothing."""
     with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as probe:
         try:
-            probe.connect(_ANYWHERE)
+            probe.connect(_OUTSIDE_ADDRESS)
         except OSError:
             return None
         host: str = probe.getsockname()[0]

@@ -1,1 +1,1 @@
-"""Tables, the HTML report and the folder of a study."""
+"""What a reader gets: tables, figures, the page and the folder."""

@@ -32,7 +32,7 @@ PERIOD = 0.05
 
 
 class Track:
-    """Values of one finger at each sample."""
+    """What is known of one finger, sample by sample."""
 
     def __init__(self, layout, taxels, force, sigma, probability, state, reason, faults):
         self.layout = layout
@@ -42,7 +42,7 @@ class Track:
 
 
 def made_up(names=("thumb", "index", "middle", "ring"), layout="uskin-curved", rate=150.0):
-    """Twelve seconds of a hand that grasps an object, holds it, and is disturbed twice."""
+    """Twelve seconds of a hand that takes a thing, holds it, and is disturbed twice."""
     n = int(12 * rate)
     times = np.arange(n) / rate
     layout = sensor(layout)
@@ -71,7 +71,7 @@ def made_up(names=("thumb", "index", "middle", "ring"), layout="uskin-curved", r
 
 
 def played(path, model="builtin:twin"):
-    """Detect a recording with a model."""
+    """A recording as a model sees it."""
     recording = load_recording(path)
     found = detect(Model.load(model), recording)
     tracks = {}
@@ -79,16 +79,16 @@ def played(path, model="builtin:twin"):
         module = recording.modules[name]
         taxels = module.readings.astype(float)
         taxels -= taxels[:75].mean(axis=0)
-        faults = [tuple(f for bit, f in enumerate(FAULTS) if m >> bit & 1) for m in trace.faults]
+        told = [tuple(f for bit, f in enumerate(FAULTS) if m >> bit & 1) for m in trace.faults]
         tracks[name] = Track(
             module.sensor, taxels, trace.force, trace.instability, trace.stable_probability,
-            trace.state, trace.reason, faults,
+            trace.state, trace.reason, told,
         )  # fmt: skip
     return found.times, tracks
 
 
 def plain(value):
-    """Replace NaN by None, because JSON has no NaN."""
+    """JSON has no NaN."""
     if isinstance(value, np.ndarray):
         return plain(value.tolist())
     if isinstance(value, list):
@@ -104,12 +104,12 @@ def hand_word(states):
 
 
 class Tape:
-    """Make messages from tracks, repeated without end, with increasing times."""
+    """Messages out of tracks, over and over, on a clock that goes on."""
 
     def __init__(self, times, tracks, unit=None):
         self.times, self.tracks, self.unit = times, tracks, unit
         self.length = float(times[-1] - times[0] + times[1] - times[0])
-        self.states = dict.fromkeys((*tracks, "hand"), "UNKNOWN")
+        self.told = dict.fromkeys((*tracks, "hand"), "UNKNOWN")
         self.n_packets = 0
         self.change = {}  # finger -> fields to write over its part of a message
 
@@ -135,7 +135,7 @@ class Tape:
         }  # fmt: skip
 
     def message(self, start, stop):
-        """Message with the samples in [start, stop) [s]."""
+        """The samples in [start, stop) [s] of a time without end."""
         n = len(self.times)
         clock = (self.times - self.times[0])[None, :] + self.length * np.arange(
             start // self.length, stop // self.length + 1
@@ -160,11 +160,11 @@ class Tape:
         }
         states = {name: finger["state"] for name, finger in fingers.items()} | {"hand": hand}
         events = [
-            {"finger": name, "state": state, "previous": self.states[name], "time": now}
+            {"finger": name, "state": state, "previous": self.told[name], "time": now}
             for name, state in states.items()
-            if state != self.states[name]
+            if state != self.told[name]
         ]
-        self.states = states
+        self.told = states
         latency = {"p50": 0.00021, "p99": 0.0013, "max": 0.011}
         return {
             "type": "live", "time": now, "hand": hand, "fingers": fingers,
@@ -191,14 +191,14 @@ class Tape:
 
 
 class Service:
-    """Fake service with its own port and thread."""
+    """The service on a port of its own, in a thread of its own."""
 
     def __init__(self, tape, token=None, speed=1.0, port=0):
         self.tape, self.token, self.speed, self.port = tape, token, speed, port
-        self.refusal = None  # error of every REST call
+        self.refusal = None  # what every REST call is answered with
         self.calls = []
         self.recording = None
-        self.patch = {}  # fields that replace those of every message
+        self.patch = {}  # fields to write over every message
         self.notices = []
         self.muted = False
         self.at = 0.0

@@ -8,7 +8,7 @@ from hypothesis import strategies as st
 from holdfast.io import read_chunks, save_recording
 from holdfast.recordings import Recording, Tactile
 from holdfast.sensors import Sensor
-from holdfast.sources.moments import moments
+from holdfast.sources.replay import timed_samples
 
 TINY = Sensor("tiny", np.eye(3)[:2], np.tile(np.eye(3), (2, 1, 1)), np.array([0, 0, 1.0]), 100.0)
 
@@ -36,13 +36,13 @@ def slowly(recording):
 
 
 def assert_same(got, recording):
-    got, want = [moment for moment in got if moment.samples], list(slowly(recording))
-    assert [moment.time for moment in got] == [time for time, _ in want]
-    for moment, (_, samples) in zip(got, want, strict=True):
-        assert list(moment.samples) == list(samples)
+    got, want = [item for item in got if item.samples], list(slowly(recording))
+    assert [item.time for item in got] == [time for time, _ in want]
+    for item, (_, samples) in zip(got, want, strict=True):
+        assert list(item.samples) == list(samples)
         for name, sample in samples.items():
-            assert moment.samples[name].dtype == sample.dtype
-            np.testing.assert_array_equal(moment.samples[name], sample)
+            assert item.samples[name].dtype == sample.dtype
+            np.testing.assert_array_equal(item.samples[name], sample)
 
 
 @pytest.mark.parametrize("suffix", ["parquet", "mcap"])
@@ -51,7 +51,7 @@ def test_a_file_in_pieces_of_any_size_is_the_recording(tmp_path, suffix, n_sampl
     recording = hand(200 if n_samples == 1 else 500)
     path = tmp_path / f"grasp.{suffix}"
     save_recording(recording, path)
-    assert_same(moments(read_chunks(path, n_samples)), recording)
+    assert_same(timed_samples(read_chunks(path, n_samples)), recording)
 
 
 @settings(max_examples=50, deadline=None)
@@ -62,7 +62,7 @@ def test_modules_with_any_times(data):
         steps = data.draw(st.lists(st.sampled_from([0.01, 0.02, 0.5, 3.0]), min_size=1, max_size=9))
         modules[name] = module(data.draw(st.sampled_from([0.0, 0.01, 4.0])) + np.cumsum(steps))
     recording = Recording("made", modules)
-    assert_same(moments([recording]), recording)
+    assert_same(timed_samples([recording]), recording)
 
 
 def test_a_module_that_stops_and_one_that_never_comes():
@@ -70,19 +70,19 @@ def test_a_module_that_stops_and_one_that_never_comes():
     thumb, index = recording.modules["thumb"], recording.modules["index"]
     modules = {"thumb": thumb, "index": index.slice(0, 30), "ring": index.slice(0, 0)}
     recording = replace(recording, modules=modules)
-    assert_same(moments([recording]), recording)
+    assert_same(timed_samples([recording]), recording)
 
 
 def test_samples_are_in_native_byte_order():
     recording = Recording("made", {"thumb": module(np.arange(5.0), dtype=">u2")})
-    for moment in moments([recording]):
-        assert moment.samples["thumb"].dtype == np.dtype("=u2")
+    for item in timed_samples([recording]):
+        assert item.samples["thumb"].dtype == np.dtype("=u2")
 
 
 def test_markers_come_after_the_samples_of_their_time():
     markers = ((0.05, "closed"), (0.055, "two\nlines"), (0.05, "and held"))
-    got = list(moments([hand(20, markers=markers)]))
-    place = [k for k, moment in enumerate(got) if moment.notice]
+    got = list(timed_samples([hand(20, markers=markers)]))
+    place = [k for k, item in enumerate(got) if item.notice]
     assert [got[k].notice for k in place] == [
         "marker: closed",
         "marker: and held",
@@ -91,14 +91,14 @@ def test_markers_come_after_the_samples_of_their_time():
     assert [got[k].time for k in place] == [0.05, 0.05, 0.055]
     assert got[place[0] - 1].time == 0.05
     assert all(not got[k].samples for k in place)
-    assert [moment.time for moment in got] == sorted(moment.time for moment in got)
+    assert [item.time for item in got] == sorted(item.time for item in got)
 
 
 def test_markers_outside_are_at_the_ends():
     markers = ((-1e9, "before"), (1e9, "after"))
-    got = list(moments([hand(20, markers=markers)]))
-    told = {moment.notice: moment.time for moment in got if moment.notice}
-    times = [moment.time for moment in got if moment.samples]
+    got = list(timed_samples([hand(20, markers=markers)]))
+    told = {item.notice: item.time for item in got if item.notice}
+    times = [item.time for item in got if item.samples]
     assert told == {"marker: before": times[0], "marker: after": times[-1]}
 
 
@@ -106,9 +106,9 @@ def test_markers_outside_are_at_the_ends():
 def test_markers_of_a_file_are_told_once_and_in_place(tmp_path, suffix):
     markers = tuple((0.1 * k + 0.003, f"m{k}") for k in range(45))
     save_recording(hand(markers=markers), tmp_path / f"a.{suffix}")
-    got = list(moments(read_chunks(tmp_path / f"a.{suffix}", 20)))
+    got = list(timed_samples(read_chunks(tmp_path / f"a.{suffix}", 20)))
     assert [m.notice for m in got if m.notice] == [f"marker: m{k}" for k in range(45)]
-    assert [moment.time for moment in got] == sorted(moment.time for moment in got)
+    assert [item.time for item in got] == sorted(item.time for item in got)
 
 
 def test_samples_that_lie_far_back_are_refused_and_counted():
@@ -118,11 +118,11 @@ def test_samples_that_lie_far_back_are_refused_and_counted():
         for cut in ((0, 400), (400, 1000))
     )
     behind = {"thumb": late.modules["thumb"], "index": whole.modules["index"].slice(0, 600)}
-    got = list(moments([early, replace(late, modules=behind)]))
-    times = [moment.time for moment in got]
+    got = list(timed_samples([early, replace(late, modules=behind)]))
+    times = [item.time for item in got]
     assert times == sorted(set(times))
-    n_refused = sum(moment.n_refused for moment in got)
-    n_given = sum(len(moment.samples) for moment in got)
+    n_refused = sum(item.n_refused for item in got)
+    n_given = sum(len(item.samples) for item in got)
     n_there = sum(m.n_samples for part in (early.modules, behind) for m in part.values())
     assert n_refused > 0
     assert n_given + n_refused == n_there
@@ -137,8 +137,8 @@ def test_memory_is_bounded():
             seen.append(k)
             yield Recording("made", {"thumb": module(10.0 * k + np.arange(1000) / 100)})
 
-    stream = moments(pieces())
+    stream = timed_samples(pieces())
     next(stream)
     assert len(seen) <= 2
-    for moment in stream:
-        assert len(seen) <= moment.time // 10 + 3
+    for item in stream:
+        assert len(seen) <= item.time // 10 + 3
