@@ -7,7 +7,7 @@ import pytest
 
 from holdfast.cli import app, main
 from holdfast.cli.terminal.console import print_json, print_table
-from holdfast.cli.terminal.progress import Bar, progress
+from holdfast.cli.terminal.progress import ProgressBar, progress
 from holdfast.errors import RecordingError
 
 
@@ -180,7 +180,7 @@ class TestConsole:
         }
 
     def test_json_refuses_the_rest(self):
-        with pytest.raises(TypeError, match=r"^object is no JSON value$"):
+        with pytest.raises(TypeError, match=r"^object cannot be written as JSON$"):
             print_json({"a": object()})
 
     def test_table(self, capsys):
@@ -197,8 +197,8 @@ class TestConsole:
 
     def test_progress_appears_on_a_terminal_after_a_while(self, capsys, monkeypatch):
         monkeypatch.setattr("sys.stderr.isatty", lambda: True, raising=False)
-        monkeypatch.setattr("holdfast.cli.terminal.progress.PATIENCE", -1.0)
-        with Bar("counting", 3) as bar:
+        monkeypatch.setattr("holdfast.cli.terminal.progress.DISPLAY_DELAY", -1.0)
+        with ProgressBar("counting", 3) as bar:
             bar.advance(3)
         assert "counting" in capsys.readouterr().err
 

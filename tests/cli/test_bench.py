@@ -5,9 +5,9 @@ import pytest
 
 from holdfast.cli import bench as verb
 from holdfast.cli import main
-from holdfast.cli.bench import WINDOW, _pywt_loop, _scipy, _tsflex, benchmark
+from holdfast.cli.bench import _pywt_loop, _scipy, _tsflex, benchmark
 from holdfast.cli.terminal.console import print_json
-from holdfast.features import haar_features
+from holdfast.features import DEFAULT_WINDOW, haar_features
 
 
 def test_json(capsys):
@@ -48,14 +48,14 @@ def force():
 
 def test_the_pywt_loop_computes_the_same(force):
     pytest.importorskip("pywt")
-    expected = haar_features(force, WINDOW)
+    expected = haar_features(force, DEFAULT_WINDOW)
     np.testing.assert_allclose(_pywt_loop(force), expected, rtol=0, atol=1e-9 * 300)
-    assert np.isnan(expected[: WINDOW - 1, 5]).all()
+    assert np.isnan(expected[: DEFAULT_WINDOW - 1, 5]).all()
 
 
 def test_scipy_computes_the_same(force):
-    full = slice(WINDOW - 1, None)
-    expected = haar_features(force, WINDOW)[full]
+    full = slice(DEFAULT_WINDOW - 1, None)
+    expected = haar_features(force, DEFAULT_WINDOW)[full]
     np.testing.assert_allclose(_scipy(force)[full], expected, rtol=0, atol=1e-9 * 300)
 
 
@@ -63,7 +63,7 @@ def test_tsflex_computes_the_same(force):
     pytest.importorskip("tsflex")
     (frame,) = _tsflex(force)()
     table = {name.split("__")[1]: column for name, column in frame.items()}
-    expected = haar_features(force, WINDOW)[WINDOW - 1 :]
+    expected = haar_features(force, DEFAULT_WINDOW)[DEFAULT_WINDOW - 1 :]
     for name, column in (("m", 4), ("sigma", 5)):
         values = table[name].to_numpy()
         # Its windows end before the instant that they are stamped with: the last one is missing.

@@ -23,12 +23,14 @@ SHORT = msgspec.structs.replace(profile("reference"), idle=(0.7, 0.8), hold=6.0)
 @pytest.fixture(autouse=True)
 def small(monkeypatch):
     """A flask, once in each case, in this process."""
-    whole = simulate_verb.make_all
+    whole = simulate_verb.simulate_grasps
     monkeypatch.setattr(verb, "OBJECTS", "flask")
-    monkeypatch.setattr(verb, "REPEATS", 1)
+    monkeypatch.setattr(verb, "N_REPEATS", 1)
     monkeypatch.setattr(simulation, "profile", lambda name: SHORT)
     monkeypatch.setattr(
-        simulate_verb, "make_all", lambda *given, **named: whole(*given, **{**named, "jobs": 1})
+        simulate_verb,
+        "simulate_grasps",
+        lambda *given, **named: whole(*given, **{**named, "jobs": 1}),
     )
 
 
@@ -88,11 +90,11 @@ def test_the_replay_is_shown_on_a_page_that_ends_with_it(capsys, tmp_path, monke
             pages.append(json.load(answer))
         return False
 
-    monkeypatch.setattr("holdfast.cli.serve.open_page", lambda url: _in_a_thread(look, url))
+    monkeypatch.setattr("holdfast.cli.serve.open_browser", lambda url: _in_a_thread(look, url))
     code, out, err = run(capsys, tmp_path / "demo", "--speed", 8)
     assert code == 0
-    assert "shows it: open it in a browser" in err
-    assert "it ends with the recording" in err
+    assert "(open it in a browser)" in err
+    assert "it stops at the end of the recording" in err
     assert "what to try next" in out
     assert [set(page["fingers"]) for page in pages] == [{"thumb", "index", "middle", "ring"}]
 
@@ -142,5 +144,5 @@ def test_on_a_terminal_a_table_follows(capsys, model, recording, path, monkeypat
 
 def test_for_the_eye_states_are_held_back(model):
     before = model.debounce
-    assert verb.calmer(model).debounce == Debounce(*verb.DEBOUNCE)
+    assert verb.with_debouncing(model).debounce == Debounce(verb.MIN_DURATION, verb.HYSTERESIS)
     assert model.debounce == before

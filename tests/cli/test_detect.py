@@ -11,8 +11,8 @@ import pytest
 
 from holdfast.classifiers import LinearClassifier
 from holdfast.cli import main
-from holdfast.cli.detect import PIECE
-from holdfast.cli.detect_output import json_lines
+from holdfast.cli.detect import CHUNK_SIZE
+from holdfast.cli.detect_output import chunk_from_detection, json_lines
 from holdfast.contact import UNSTABLE, Fault
 from holdfast.detector import detect
 from holdfast.features import FeatureSpec
@@ -57,9 +57,9 @@ def model(tmp_path_factory):
 def grasp(tmp_path_factory):
     """A long grasp, whose index begins late and stands still at other times."""
     one = synthetic_recording("grasp", 1, ("thumb", "index"))
-    n = 2 * PIECE // one.modules["thumb"].n_samples + 1
+    n = 2 * CHUNK_SIZE // one.modules["thumb"].n_samples + 1
     modules = {}
-    for name, skipped in (("thumb", 0), ("index", PIECE + 300)):
+    for name, skipped in (("thumb", 0), ("index", CHUNK_SIZE + 300)):
         m = one.modules[name]
         readings = np.concatenate([m.readings] * n)
         times = np.arange(len(readings)) / 150 + (0.002 if skipped else 0)
@@ -154,15 +154,15 @@ def test_a_cut_file_is_judged(capsys, save):
     path.write_bytes(path.read_bytes()[:60_000])
     got, err = lines(capsys, NOISE_FLOOR, path)
     assert got
-    assert err == f"{path} was cut: what could be recovered is judged\n"
+    assert err == f"{path} is cut off: only its readable part is used\n"
 
 
 def test_lines_keep_no_memory(grasp):
-    detection = detect(Model.load(NOISE_FLOOR), load_recording(grasp))
-    sum(len(block) for block in json_lines(detection))
+    chunk = chunk_from_detection(detect(Model.load(NOISE_FLOOR), load_recording(grasp)))
+    sum(len(block) for block in json_lines(chunk))
     tracemalloc.start()
     for _ in range(3):
-        sum(len(block) for block in json_lines(detection))
+        sum(len(block) for block in json_lines(chunk))
     left, _ = tracemalloc.get_traced_memory()
     tracemalloc.stop()
     assert left < 100_000
@@ -192,7 +192,7 @@ class TestSummary:
         out = capsys.readouterr().out
         assert re.search(r"^thumb +\d+( +\d+\.\d){4} +tare 75, warm_up 13 +-$", out, re.MULTILINE)
         assert re.search(r"^ +\d+\.\d{3} +hand +\w+ +UNKNOWN$", out, re.MULTILINE)
-        assert re.search(r"^and \d+ more events \(--json has them all\)$", out, re.MULTILINE)
+        assert re.search(r"^and \d+ more events \(--json prints all\)$", out, re.MULTILINE)
 
     def test_debouncing_thins_events_out(self, capsys, model, grasp):
         raw = summary(capsys, model, grasp)["events"]
@@ -222,7 +222,7 @@ class TestRate:
     def test_strict_refuses(self, capsys, model, slow):
         assert refusal(capsys, model, slow, "--rate", "strict") == (
             f"{slow}: 75 Hz given, the model expects 150 Hz within 20 % "
-            "(--rate resample takes it all the same)"
+            "(--rate resample accepts it)"
         )
 
     def test_strict_takes_what_fits(self, capsys, model, grasp):
@@ -254,7 +254,7 @@ def test_missing_fingers_are_told(capsys, model, save):
     path = save(synthetic_recording("one", 1, ("index",)))
     got, err = lines(capsys, model, path)
     assert {line["finger"] for line in got} == {"index"}
-    assert err == "the model also judges thumb; one has index\n"
+    assert err == "one has index; the model also has thumb, which get no estimates\n"
 
 
 def test_refusals(capsys, model, grasp, save, tmp_path):
@@ -300,7 +300,7 @@ def test_refusals(capsys, model, grasp, save, tmp_path):
         "--seconds: more than 0 s expected, 0 given"
     )
     assert refusal(capsys, model, grasp, "--seconds", "2") == (
-        f"--seconds is for live sources; {grasp} is judged to its end"
+        f"--seconds is for live sources; {grasp} is a recording"
     )
     assert "'slow' is not one of 'resample', 'strict'" in refusal(
         capsys, model, grasp, "--rate", "slow"

@@ -7,7 +7,7 @@ import pytest
 
 from holdfast.cli import doctor as verb
 from holdfast.cli import main
-from holdfast.cli.doctor import PURPOSES
+from holdfast.cli.doctor import EXTRA_PURPOSES
 from holdfast.sources.xela import places
 
 
@@ -31,7 +31,7 @@ def test_the_kernels_work(capsys):
 
 def test_every_extra_has_a_purpose_and_a_way_to_get_it(capsys):
     extras = report(capsys)["extras"]
-    assert set(extras) == set(PURPOSES)
+    assert set(extras) == set(EXTRA_PURPOSES)
     assert extras["hdf5"]["install"] == 'pip install "holdfast[hdf5]"'
 
 
@@ -82,12 +82,12 @@ def test_what_can_be_reached(capsys, monkeypatch):
 def test_a_server_that_listens_is_told(monkeypatch):
     with socket.create_server(("127.0.0.1", 0)) as server:
         monkeypatch.setattr(places, "PORT", server.getsockname()[1])
-        assert verb.reachable()["xela"].startswith("something listens at 127.0.0.1:")
+        assert verb.check_sources()["xela"].startswith("a server listens at 127.0.0.1:")
 
 
 def test_missing_extras_are_told(monkeypatch):
     monkeypatch.setattr(verb, "find_spec", lambda name: None)
-    told = verb.reachable()
+    told = verb.check_sources()
     assert told["ros2"] == 'not installed: pip install "holdfast[ros2]"'
     assert told["serial"] == 'not installed: pip install "holdfast[serial]"'
 

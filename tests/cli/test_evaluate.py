@@ -74,8 +74,8 @@ def test_recordings_seen_in_training_are_told_whatever_they_are_called(capsys, f
     code, out, err = run(capsys, folder / "model.json", tmp_path, "--json")
     assert code == 0
     assert json.loads(out)["trained_on"] == [load_dataset(tmp_path)[1].name]
-    assert err.startswith("the model has seen 1 of these 2 recordings in training (")
-    assert err.endswith("figures on them flatter\n")
+    assert err.startswith("the model was trained on 1 of these 2 recordings (")
+    assert err.endswith("their metrics are optimistic\n")
 
 
 def test_labels_do_not_hide_what_was_seen(capsys, folder, tmp_path):
@@ -139,7 +139,7 @@ def test_refusals(capsys, folder, tmp_path):
     bare = tmp_path / "bare"
     bare.mkdir()
     save_recording(load_dataset(new)[0].with_labels({}), bare / "a.parquet")
-    assert refusal(capsys, model, bare) == f"{bare}: 1 recordings without a label to judge by"
+    assert refusal(capsys, model, bare) == f"{bare}: 1 recordings without labels; labels expected"
     other = tmp_path / "other"
     other.mkdir()
     save_recording(synthetic_recording("ring", 9, ("ring",)), other / "a.parquet")

@@ -105,7 +105,7 @@ def test_a_cut_file_is_recovered(capsys, grasp, tmp_path):
     cut.write_bytes(data[: len(data) // 2])
     assert main(["import", str(cut), str(tmp_path / "out"), "--json"]) == 0
     out, err = capsys.readouterr()
-    assert re.fullmatch(rf"{re.escape(str(cut))} was cut: \d+\.\d\d s recovered\n", err)
+    assert re.fullmatch(rf"{re.escape(str(cut))} is cut off: \d+\.\d\d s recovered\n", err)
     (told,) = json.loads(out)["recordings"]
     assert (told["name"], told["complete"]) == ("cut", False)
     got = load_recording(tmp_path / "out" / "cut.parquet")
@@ -165,7 +165,7 @@ class TestOutputs:
     def test_a_name_that_leads_elsewhere(self, capsys, grasp, tmp_path):
         save_recording(replace(grasp, name="../up"), tmp_path / "a.parquet")
         assert refusal(capsys, tmp_path / "a.parquet", tmp_path / "out") == (
-            "'../up' is a recording's name that no file can have"
+            "'../up' cannot be the name of a file"
         )
         assert [path.name for path in tmp_path.iterdir()] == ["a.parquet"]
 
@@ -173,7 +173,7 @@ class TestOutputs:
         for stem in "ab":
             save_recording(grasp, tmp_path / f"{stem}.parquet")
         assert refusal(capsys, tmp_path, tmp_path / "out") == (
-            "two recordings are called 'grasp': import one by one"
+            "two recordings have the name 'grasp': import them one by one"
         )
 
 

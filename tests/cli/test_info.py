@@ -119,7 +119,7 @@ def test_a_cut_file_is_shown(capsys, grasp, tmp_path):
     data = (tmp_path / "a.mcap").read_bytes()
     (tmp_path / "a.mcap").write_bytes(data[: len(data) // 2])
     assert main(["info", str(tmp_path / "a.mcap")]) == 0
-    assert "no: the end of the file was cut off" in capsys.readouterr().out
+    assert "no: the end of the file is cut off" in capsys.readouterr().out
     assert told(capsys, tmp_path / "a.mcap")["complete"] is False
 
 
@@ -131,7 +131,7 @@ class TestFolder:
         assert [one["name"] for one in documents] == ["b", "grasp"]
         assert documents[1] == told(capsys, path)
         assert main(["info", str(path.parent)]) == 0
-        assert re.search(r"^grasp +2 +\d+ +150\.0 .* sound$", capsys.readouterr().out, re.M)
+        assert re.search(r"^grasp +2 +\d+ +150\.0 .* ok$", capsys.readouterr().out, re.M)
 
     def test_damaged_ones_are_named_and_the_rest_shown(self, capsys, path):
         broken = path.with_name("broken.parquet")

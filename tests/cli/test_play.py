@@ -99,7 +99,7 @@ def test_a_client_decides_as_on_the_recording(capsys, path, recording, options):
     told = err.splitlines()
     version = "1.7" if "1.7" in options else "1.8"
     uri = f"xela://127.0.0.1:{port}{names}"
-    assert told[0] == f"{uri} plays {path} as a XELA server {version}; Ctrl-C ends it"
+    assert told[0] == f"{uri} sends {path} as a XELA server {version}; Ctrl-C stops it"
     assert told[-1] == f"{n} packets sent"
 
     arrivals = listener.arrivals
@@ -173,7 +173,7 @@ def test_it_plays_again_and_again_until_it_is_interrupted(path, ending):
 
 
 def test_who_listens_is_told(capsys, path, monkeypatch):
-    monkeypatch.setattr(verb, "LOOK_EVERY", 0.02)
+    monkeypatch.setattr(verb, "POLL_INTERVAL", 0.02)
     port = free_port()
     listener = Listener(f"xela://127.0.0.1:{port}", 900)
     _, _, err = play(capsys, path, "--port", port, "--once", "--speed", FAST)
@@ -183,8 +183,8 @@ def test_who_listens_is_told(capsys, path, monkeypatch):
 
 def test_a_terminal_shows_the_rate(capsys, path, monkeypatch):
     monkeypatch.setattr(verb.sys.stderr, "isatty", lambda: True, raising=False)
-    monkeypatch.setattr(verb, "REFRESH", 0.1)
-    monkeypatch.setattr(verb, "LOOK_EVERY", 0.02)
+    monkeypatch.setattr(verb, "REFRESH_INTERVAL", 0.1)
+    monkeypatch.setattr(verb, "POLL_INTERVAL", 0.02)
     port = free_port()
     listener = Listener(f"xela://127.0.0.1:{port}", 900)
     _, _, err = play(capsys, path, "--port", port, "--once", "--speed", FAST)
@@ -205,7 +205,7 @@ class TestRefusals:
         assert told == "--speed: a speed above 0 expected, 0 given"
         assert refusal(capsys, path, "--speed=-1") == "--speed: at least 0 expected, -1 given"
         assert refusal(capsys, "xela://127.0.0.1:1", "--speed", "2") == (
-            "--speed is for recordings and the twin; xela://127.0.0.1:1 has its own"
+            "--speed is for recordings and the twin; xela://127.0.0.1:1 is a device"
         )
 
     def test_a_version_that_there_is_not(self, capsys, path):

@@ -129,7 +129,7 @@ def test_records_a_recording_as_it_is(capsys, grasp, tmp_path):
     assert told.splitlines() == [
         f"recording {grasp} to {out}",
         "Ctrl-C stops",
-        f"go on with: holdfast info {out}",
+        f"next: holdfast info {out}",
     ]
 
 
@@ -192,7 +192,7 @@ def test_it_stops_by_itself(capsys, device, tmp_path):
 
 
 def test_it_stops_by_itself_though_the_source_is_silent(capsys, device, tmp_path, monkeypatch):
-    monkeypatch.setattr(verb, "GRACE", 0.1)
+    monkeypatch.setattr(verb, "EXTRA_TIME", 0.1)
     device(arrival(0), notice_arrival(0.0, "connection\x1b lost"), ends=False)
     code, _, told = run(capsys, "xela://fake", tmp_path / "a.mcap", "--seconds", "0.3")
     assert code == 0
@@ -241,7 +241,7 @@ def test_bad_words_are_refused(capsys, device, grasp, tmp_path):
         (("twin:", out, "--speed", "-1"), "--speed: at least 0 expected, -1 given"),
         (
             ("xela://fake", out, "--speed", "2"),
-            "--speed is for recordings and the twin; xela://fake has its own",
+            "--speed is for recordings and the twin; xela://fake is a device",
         ),
         (("xela://fake", out, "--set", "a"), "--set KEY=VALUE expected, 'a' given"),
         (("xela://fake", out, "--set", "=a"), "--set KEY=VALUE expected, '=a' given"),
@@ -251,15 +251,15 @@ def test_bad_words_are_refused(capsys, device, grasp, tmp_path):
         ),
         (
             ("xela://fake", tmp_path / "a.parquet"),
-            f"{tmp_path}/a.parquet: a recording is captured to NAME.mcap; "
-            "holdfast import makes others of it",
+            f"{tmp_path}/a.parquet: NAME.mcap expected "
+            "(holdfast import converts it to other formats)",
         ),
         (
             ("xela://fake", tmp_path / "no" / "a.mcap"),
             f"cannot write {tmp_path}/no/a.mcap: the folder {tmp_path}/no does not exist",
         ),
-        ((copy, copy, "--force"), f"{copy} is the source itself: choose another name"),
-        ((copy, tmp_path, "--force"), f"{copy} is the source itself: choose another name"),
+        ((copy, copy, "--force"), f"{copy} is the source: choose another name"),
+        ((copy, tmp_path, "--force"), f"{copy} is the source: choose another name"),
     ]:
         assert refusal(capsys, *words) == message
     assert list(tmp_path.iterdir()) == [copy]
@@ -368,7 +368,7 @@ def test_a_signal_ends_it_well(number, grasp, tmp_path):
     code, printed = child.finish()
     assert code == 0
     assert f" samples of 2 modules in {out}" in printed
-    assert f"go on with: holdfast info {out}" in child.told.decode().replace("\r\n", "\n")
+    assert f"next: holdfast info {out}" in child.told.decode().replace("\r\n", "\n")
     assert load_recording(out).complete
 
 
@@ -405,7 +405,8 @@ def test_of_a_full_disk_what_went_before_stays(grasp, tmp_path):
     )
     assert (done.returncode, done.stdout) == (2, "")
     assert done.stderr.splitlines()[-1] == (
-        f"holdfast: cannot write {out}: File too large; for what was kept: holdfast info {out}"
+        f"holdfast: cannot write {out}: File too large; "
+        f"see the recorded part with: holdfast info {out}"
     )
     recording, want = load_recording(out), load_recording(grasp)
     n = recording.modules["thumb"].n_samples

@@ -10,7 +10,7 @@ import pytest
 
 from holdfast.cli import main
 from holdfast.cli import serve as verb
-from holdfast.cli.serve import open_page
+from holdfast.cli.serve import open_browser
 from holdfast.io import load_recording, save_recording
 from holdfast.synthetic import synthetic_recording
 
@@ -108,7 +108,7 @@ def test_the_token_is_needed(capsys, grasp, when_served):
 def test_once_ends_with_the_recording(capsys, grasp):
     code, out, err = run(capsys, MODEL, grasp, "--once", "--speed", 20, "--port", 0)
     assert (code, out) == (0, "")
-    assert "Ctrl-C ends it" in err
+    assert "Ctrl-C stops it" in err
 
 
 def test_refusals(capsys, grasp, tmp_path):
@@ -121,7 +121,7 @@ def test_refusals(capsys, grasp, tmp_path):
     assert refusal(capsys, "builtin:best", grasp).startswith("unknown model 'builtin:best'")
     assert refusal(capsys, MODEL, grasp, "--speed=-1") == "--speed: at least 0 expected, -1 given"
     assert refusal(capsys, MODEL, "xela://127.0.0.1:1", "--speed", 2) == (
-        "--speed is for recordings and the twin; xela://127.0.0.1:1 has its own"
+        "--speed is for recordings and the twin; xela://127.0.0.1:1 is a device"
     )
     assert "port" in refusal(capsys, MODEL, grasp, "--port", 99999)
     assert refusal(capsys, MODEL, grasp, "--ignore", "index").startswith("--ignore: FINGER:TAXEL")
@@ -131,7 +131,7 @@ def test_no_text_browser_is_opened(monkeypatch):
     for name in ("DISPLAY", "WAYLAND_DISPLAY"):
         monkeypatch.delenv(name, raising=False)
     monkeypatch.setattr("holdfast.cli.serve.sys.platform", "linux")
-    assert open_page("http://127.0.0.1:1/") is False
+    assert open_browser("http://127.0.0.1:1/") is False
 
 
 def test_what_ros_does_not_take_is_told(capsys, monkeypatch, grasp):
@@ -147,7 +147,9 @@ def test_what_ros_does_not_take_is_told(capsys, monkeypatch, grasp):
         def put(self, said):
             pass
 
-    monkeypatch.setattr(verb, "_publishers", lambda judge, **_: [Refuser()])
+    monkeypatch.setattr(verb, "_create_publishers", lambda stream, **_: [Refuser()])
     code, _, err = run(capsys, MODEL, grasp, "--once", "--speed", 50, "--port", 0, "--ros2")
     assert code == 0
-    assert err.endswith("Refuser: ROS refused 7 estimates, and was too slow for 2\n")
+    assert err.endswith(
+        "Refuser: ROS refused 7 estimates, 2 were dropped because it was too slow\n"
+    )

@@ -63,7 +63,7 @@ def test_json_tells_what_was_made(capsys, out):
 
 def test_text_tells_how_many(capsys, out):
     code, printed, _ = run(capsys, out, *ONE)
-    assert (code, printed) == (0, f"1 recordings in {out}, 0 of them of grasps that failed\n")
+    assert (code, printed) == (0, f"1 recordings in {out}, 0 of them of failed grasps\n")
 
 
 def test_what_is_finished_is_not_made_again(capsys, out):
@@ -73,7 +73,7 @@ def test_what_is_finished_is_not_made_again(capsys, out):
     code, printed, told = run(capsys, out, *ONE[:-4], "--repeats", 2, "--jobs", 1, "--json")
     assert code == 0
     assert json.loads(printed)["recordings"] == ["flask-case1-2"]
-    assert "1 of 2 recordings are there already" in told
+    assert "1 of 2 recordings exist already" in told
     assert (path.stat().st_mtime_ns, path.stat().st_ino) == before
     assert json.loads(run(capsys, out, *ONE, "--json")[1])["recordings"] == []
 
@@ -100,7 +100,7 @@ def test_how_many_at_a_time_changes_nothing(capsys, out, tmp_path, monkeypatch):
 def test_one_folder_holds_what_was_made_alike(capsys, out, words, told):
     run(capsys, out, *ONE)
     line = refusal(capsys, out, *ONE, *words)
-    assert f"{out}/flask-case1-1.parquet was made with" in line
+    assert f"{out}/flask-case1-1.parquet has profile" in line
     assert told in line
     assert "--force" in line
 
@@ -154,7 +154,7 @@ class TestFailures:
     def test_of_another_seed_are_not_mixed_in(self, capsys, out, weak, monkeypatch):
         run(capsys, out, *ONE)
         (out / self.FAILED[3]).unlink()
-        assert "was made with" in refusal(capsys, out, *ONE, "--seed", 1)
+        assert "parquet has profile" in refusal(capsys, out, *ONE, "--seed", 1)
 
     def test_of_before_go_when_all_is_made_anew(self, capsys, out, weak, monkeypatch):
         run(capsys, out, *ONE)
@@ -231,11 +231,11 @@ MUG = """mug = {shape = "cylinder", size = [0.036, 0.05, 0.003], mass = 0.2, fri
 
 
 def test_an_object_of_ones_own(tmp_path):
-    from holdfast.cli.simulate import grasps
+    from holdfast.cli.simulate import plan_grasps
 
     table = tmp_path / "mine.toml"
     table.write_text(MUG)
-    (grasp,) = grasps("", "1", 1, "reference", 0, table=table)
+    (grasp,) = plan_grasps("", "1", 1, "reference", 0, table=table)
     assert (grasp.name, grasp.thing.mass) == ("mug-case1-1", 0.2)
 
 

@@ -61,7 +61,7 @@ def test_own_recordings(capsys, data, tmp_path):
         "report.html", "study.json", "tables", "figures", "work",
     }  # fmt: skip
     assert json.loads((out / "study.json").read_text())["left_out"][0].startswith(
-        "real recordings, for none are here. Get them from github.com/"
+        "real recordings, because none were found. Download them from github.com/"
     )
     assert "holds a study already" in refusal(capsys, data, "--out", out, "--quick")
     code, printed, _ = run(capsys, data, "--out", out, "--quick", "--force", "--json")
@@ -72,10 +72,10 @@ def test_own_recordings(capsys, data, tmp_path):
 def test_the_twin_makes_the_recordings_first(capsys, monkeypatch, tmp_path):
     brief = msgspec.structs.replace(profile("reference"), idle=(0.7, 0.8), hold=1.5)
     monkeypatch.setattr(simulation, "profile", lambda name: brief)
-    monkeypatch.setattr(verb, "QUICK", {"main": verb.Kind()})
-    monkeypatch.setattr(verb, "FEW", {"main": 1})
-    known = verb.grasps
-    monkeypatch.setattr(verb, "grasps", lambda _, *rest, **more: known("can", *rest, **more))
+    monkeypatch.setattr(verb, "QUICK_CORPORA", {"main": verb.TwinCorpus()})
+    monkeypatch.setattr(verb, "QUICK_REPEATS", {"main": 1})
+    known = verb.plan_grasps
+    monkeypatch.setattr(verb, "plan_grasps", lambda _, *rest, **more: known("can", *rest, **more))
     out = tmp_path / "out"
     words = ("--twin", "--quick", "--jobs", 1, "--out", out, "--json")
     code, printed, told = run(capsys, *words)
@@ -86,8 +86,8 @@ def test_the_twin_makes_the_recordings_first(capsys, monkeypatch, tmp_path):
     assert json.loads(printed)["data"]["main"]["recordings"] == len(names)
     assert "What the twin cannot show" in (out / "report.html").read_text()
     assert refusal_after(capsys, *words, "--force", "--seed", 3).endswith(
-        "can-case1-1.parquet was made with profile reference, seed 0, server False; profile "
-        "reference, seed 3, server False asked for: choose another OUT, or delete its data"
+        "can-case1-1.parquet has profile reference, seed 0, server False; profile "
+        "reference, seed 3, server False given: choose another OUT, or delete its data"
     )
 
 
@@ -99,11 +99,13 @@ def refusal_after(capsys, *words):
 
 
 def test_real_recordings_that_cannot_be_used_are_left_out(capsys, monkeypatch, tmp_path):
-    (tmp_path / "here" / verb.REAL).mkdir(parents=True)
+    (tmp_path / "here" / verb.REAL_DATA).mkdir(parents=True)
     monkeypatch.setenv("HOLDFAST_DATA", str(tmp_path / "here"))
     corpus, left_out = verb.real_corpus(tmp_path / "real")
     assert corpus is None
-    assert left_out[0].startswith("real recordings, for those of HOLDFAST_DATA cannot be used (")
+    assert left_out[0].startswith(
+        "real recordings, because those in HOLDFAST_DATA cannot be used ("
+    )
     assert "the real recordings are left out: " in capsys.readouterr().err
 
 
@@ -185,7 +187,7 @@ def test_what_is_printed_is_short(capsys):
         Row({"on": "by recording", "method": "d", "threshold": "for 1/min", "figure": "AUC"}, 1.0)
     ]
     table = ResultTable("methods", "Methods", "", rows, ("on", "method"), digits_of={"AUC": 3})
-    verb._show(table)
+    verb._print_result_table(table)
     assert capsys.readouterr().out.splitlines() == [
         "Methods (in parentheses: the paper)",
         "on            method  AUC            accuracy [%]",

@@ -1,4 +1,4 @@
-"""The command `holdfast`: one file for each verb, one line in `app.py` to add one."""
+"""The command line `holdfast`: one file for each verb, listed in `app.py`."""
 
 from holdfast.cli.app import main
 

@@ -1,7 +1,7 @@
-"""Which verbs there are, and what becomes of their failures: one line, never a traceback.
+"""Run a verb of the command line, and report its failure in one line.
 
-A verb is one function in the file of its name (`train.py`: `train`; `import_.py`: `import_`),
-loaded only when it is asked for. To add one, write the file and add its line to `VERBS`.
+A verb is a function in the file of its name (`train.py`: `train`; `import_.py`: `import_`). It
+is imported only when it is used. To add a verb, write the file and add a line to `VERBS`.
 """
 
 import inspect
@@ -15,52 +15,52 @@ from importlib import import_module
 import typer
 from typer.main import get_command
 
-from holdfast.cli.terminal.console import complain
+from holdfast.cli.terminal.console import print_error
 from holdfast.errors import HoldfastError
 
 VERBS = {
-    "demo": "Does the main job in one go, on data of its own.",
-    "simulate": "Makes recordings of grasps by the physical twin.",
-    "record": "Records a source, and loses at most half a second whatever happens.",
-    "import": "Brings in other people's data, whatever its format.",
-    "info": "Shows what is in a recording, or in a folder of them.",
-    "label": "Labels recordings on a page, by a rule, or checks labels that are there.",
-    "train": "Trains a model from labelled recordings.",
-    "evaluate": "Measures a model on labelled recordings.",
-    "detect": "Tells the contact state of every finger at every sample.",
-    "serve": "Shows what a model says of a source on a page, and tells other programs.",
-    "play": "Acts as a XELA server for a recording or the twin.",
-    "study": "Repeats the paper, and asks what it did not.",
-    "bench": "Measures speed, against peers and against the machine.",
-    "sensors": "Shows the sensors and hands that are known.",
-    "doctor": "Shows what is installed and what works.",
+    "demo": "Simulate grasps, train a model on them, and replay one of them.",
+    "simulate": "Simulate recordings of grasps with the physical twin.",
+    "record": "Record a source; a crash loses at most the last half second.",
+    "import": "Import recordings from other formats.",
+    "info": "Show the content of a recording, or of a folder of recordings.",
+    "label": "Label recordings on a page or by a rule, and check labels.",
+    "train": "Train a model from labelled recordings.",
+    "evaluate": "Evaluate a model on labelled recordings.",
+    "detect": "Detect the contact state of every finger at every sample.",
+    "serve": "Show the estimates of a source on a web page, and publish them.",
+    "play": "Send a recording or the twin as a XELA server does.",
+    "study": "Repeat the experiments of the paper, and run further ones.",
+    "bench": "Measure the speed of the features and of the detector.",
+    "sensors": "List the known sensors and hands, or show one of them.",
+    "doctor": "Check the installation and the reachable sources.",
 }
-"""Every verb, in the order of the help, with the first line of its docstring."""
+"""All verbs in the order of the help, with the first line of their docstrings."""
 
-BAD_INPUT = 2
-INTERRUPTED = 130
+EXIT_BAD_INPUT = 2
+EXIT_INTERRUPTED = 130
 
 _UsageError = typer.BadParameter.__mro__[2]
-"""The base of the errors in usage: click's class, or that of typer's own copy of click."""
+"""Base class of usage errors, from click or from the copy of click within typer."""
 
-_FORESEEN = (HoldfastError, ValueError, TypeError, OSError, MemoryError)
+_EXPECTED_ERRORS = (HoldfastError, ValueError, TypeError, OSError, MemoryError)
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
-    """Runs one verb and returns the exit code of the process.
+    """Run a verb, and return the exit code of the process.
 
     Args:
-        arguments: words after `holdfast`; those of the process where not given.
+        arguments: words after `holdfast`; by default those of the process.
 
     Returns:
-        0 where all went well, 2 after bad input, 130 after an interrupt, 1 after a bug.
+        0 after success, 2 after bad input, 130 after an interrupt, 1 after an internal error.
     """
     words = list(sys.argv[1:] if arguments is None else arguments)
     try:
         code = _run(words)
         sys.stdout.flush()
     except BrokenPipeError:
-        return _reader_left()
+        return _close_stdout()
     except BaseException as failure:
         return _report(failure)
     return code
@@ -77,9 +77,9 @@ def _run(words: list[str]) -> int:
 
 
 def _app(words: list[str]) -> typer.Typer:
-    """All verbs by name; only those among `words` are loaded."""
+    """Create the app with all verbs; import only those among `words`."""
     app = typer.Typer(
-        help="Tells whether the contacts of a robot hand are stable, from its tactile sensors.",
+        help="Detect whether the contacts of a robot hand are stable, from its tactile sensors.",
         epilog="Start with: holdfast sensors",
         rich_markup_mode=None,
         add_completion=False,
@@ -96,23 +96,23 @@ def _app(words: list[str]) -> typer.Typer:
 
 
 def load_verb(name: str) -> Callable[..., None]:
-    """The function of that verb."""
-    home = f"{name}_" if keyword.iskeyword(name) else name
-    verb: Callable[..., None] = getattr(import_module(f"holdfast.cli.{home}"), home)
+    """Import the function of a verb."""
+    module = f"{name}_" if keyword.iskeyword(name) else name
+    verb: Callable[..., None] = getattr(import_module(f"holdfast.cli.{module}"), module)
     return verb
 
 
 def _root() -> None:
-    """Stands in for a verb that is not loaded."""
+    """Do nothing; a placeholder for verbs that are not imported."""
 
 
 def _help(verb: Callable[..., None]) -> str:
-    r"""The docstring, with `\b` where click must not fill the lines of an example."""
+    r"""Return the docstring; `\b` keeps click from wrapping the lines of the example."""
     return (inspect.getdoc(verb) or "").replace("\nExample", "\n\b\nExample")
 
 
-def _reader_left() -> int:
-    """Whoever read our output has had enough (`| head`): nothing to complain about."""
+def _close_stdout() -> int:
+    """Handle a reader that has closed the pipe, as `| head` does; this is no error."""
     os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
     return 0
 
@@ -124,25 +124,25 @@ def _report(failure: BaseException) -> int:
         case SystemExit() | GeneratorExit():
             raise failure
         case KeyboardInterrupt() | typer.Abort():
-            complain("interrupted")
-            return INTERRUPTED
+            print_error("interrupted")
+            return EXIT_INTERRUPTED
         case _ if isinstance(failure, _UsageError):
-            complain(_usage(failure))
-            return BAD_INPUT
-        case _ if isinstance(failure, _FORESEEN):
-            complain(_text(failure))
-            return BAD_INPUT
-    complain(f"internal error ({type(failure).__name__}: {failure}): please report it")
+            print_error(_usage_text(failure))
+            return EXIT_BAD_INPUT
+        case _ if isinstance(failure, _EXPECTED_ERRORS):
+            print_error(_error_text(failure))
+            return EXIT_BAD_INPUT
+    print_error(f"internal error ({type(failure).__name__}: {failure}): please report it")
     return 1
 
 
-def _usage(failure: BaseException) -> str:
+def _usage_text(failure: BaseException) -> str:
     text: str = failure.format_message()  # type: ignore[attr-defined]
     path = getattr(getattr(failure, "ctx", None), "command_path", "holdfast")
     return f"{text.rstrip('.')} (see {path} --help)"
 
 
-def _text(failure: BaseException) -> str:
+def _error_text(failure: BaseException) -> str:
     if isinstance(failure, OSError) and failure.filename and failure.strerror:
         return f"{failure.filename}: {failure.strerror}"
     return str(failure) or type(failure).__name__

@@ -1,4 +1,4 @@
-"""`holdfast bench`: speed against peers and against the limit of the machine."""
+"""`holdfast bench`: speed, compared with other libraries and with copying memory."""
 
 import os
 import platform
@@ -6,30 +6,46 @@ import time
 from collections.abc import Callable, Mapping
 from importlib.metadata import PackageNotFoundError, version
 from importlib.util import find_spec
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import Annotated, Any
 
 import numpy as np
 import typer
 
-from holdfast.cli.terminal.console import print_json, say, show
+from holdfast.classifiers import LinearClassifier
+from holdfast.cli.options import JsonOption
+from holdfast.cli.terminal.console import print_json, print_line, print_message
+from holdfast.detector import Detector
+from holdfast.features import DEFAULT_WINDOW as WINDOW
+from holdfast.features import DEPLOYED_FEATURES, haar_features, parse_features
+from holdfast.features.haar import fill_features
+from holdfast.model import FingerModel, Model
+from holdfast.sensors import sensor
+from holdfast.sensors.types import Array
 
-if TYPE_CHECKING:
-    from holdfast.model import Model
-    from holdfast.sensors.types import Array
+FINGERS = ("thumb", "index", "middle", "ring")
+N_ROUNDS = 5
+"""Number of rounds; each time is the median over them."""
+N_PEER_SAMPLES = 2_000
+"""Number of samples for libraries that need microseconds for each."""
+N_PEER_UPDATES = 100
+
+Task = Callable[[], object]
 
 
 def bench(
     samples: Annotated[
-        int, typer.Option(help="Of one finger, for the batch features.")
+        int, typer.Option(help="Samples of one finger for the batch features.")
     ] = 10_000_000,
-    updates: Annotated[int, typer.Option(help="Of a hand, for the latency.")] = 20_000,
-    as_json: Annotated[bool, typer.Option("--json", help="Print JSON on stdout.")] = False,
+    updates: Annotated[
+        int, typer.Option(help="Updates of a hand for the time per update.")
+    ] = 20_000,
+    as_json: JsonOption = False,
 ) -> None:
-    """Measures speed, against peers and against the machine.
+    """Measure the speed of the features and of the detector.
 
-    All in one run, as ratios: batch features beside a copy of the same bytes, PyWavelets, SciPy
-    and tsflex; the update of a hand beside PyWavelets with scikit-learn. Peers that are not
-    installed are left out.
+    Everything is measured in one run and given as ratios. The batch features are compared with a
+    copy of the same number of bytes, with PyWavelets, SciPy and tsflex; the update of a hand with
+    PyWavelets and scikit-learn. Libraries that are not installed are left out.
 
     Example:
       holdfast bench
@@ -37,43 +53,39 @@ def bench(
     """
     if samples < 1000 or updates < 1000:
         raise ValueError(f"at least 1000 samples and updates expected, {samples}, {updates} given")
-    say("measuring: about half a minute")
-    found = benchmark(samples, updates)
+    print_message("measuring: about half a minute")
+    report = benchmark(samples, updates)
     if as_json:
-        print_json(found)
+        print_json(report)
         return
-    _show(found["batch"], found["hand_update"])
+    _print_batch(report["batch"])
+    _print_update(report["hand_update"])
 
 
-def _show(batch: dict[str, Any], update: dict[str, Any]) -> None:
-    show(f"batch features of {batch['n_samples']:,} samples, window {batch['window']}")
-    show(f"  {1e9 * batch['seconds_per_sample']:.1f} ns a sample")
-    show(f"  {batch['ratio_to_copy']:.2f} times as long as copying the same bytes")
+def _print_batch(batch: dict[str, Any]) -> None:
+    print_line(f"batch features of {batch['n_samples']:,} samples, window {batch['window']}")
+    print_line(f"  {1e9 * batch['seconds_per_sample']:.1f} ns a sample")
+    print_line(f"  {batch['ratio_to_copy']:.2f} times as long as copying the same bytes")
     for peer in ("pywt", "scipy", "tsflex"):
-        ratio = batch[f"speedup_over_{peer}"]
-        show(f"  {ratio:,.0f} times faster than {peer}" if ratio else f"  {peer}: not installed")
-    show(f"\nupdate of a hand, {update['n_fingers']} fingers of {update['n_taxels']} taxels")
-    show("  " + ", ".join(f"{p} {1e6 * update[p]:.1f} us" for p in ("p50", "p99", "p999")))
-    ratio = update["speedup_over_pywt_sklearn"]
-    show(f"  {ratio:,.0f} times faster than pywt + scikit-learn" if ratio else "  pywt: missing")
+        print_line(_speedup(peer, batch[f"speedup_over_{peer}"]))
 
 
-FINGERS = ("thumb", "index", "middle", "ring")
-WINDOW = 14
-ROUNDS = 5
-"""Every figure is the median of so many rounds, in which peers take turns."""
-SLOW_SAMPLES = 2_000
-"""Samples that peers work on that need microseconds for each."""
+def _print_update(update: dict[str, Any]) -> None:
+    print_line(f"\nupdate of a hand, {update['n_fingers']} fingers of {update['n_taxels']} taxels")
+    print_line("  " + ", ".join(f"{p} {1e6 * update[p]:.1f} us" for p in ("p50", "p99", "p999")))
+    print_line(_speedup("pywt + scikit-learn", update["speedup_over_pywt_sklearn"]))
 
-Task = Callable[[], object]
+
+def _speedup(peer: str, ratio: float | None) -> str:
+    return f"  {ratio:,.0f} times faster than {peer}" if ratio else f"  {peer}: not installed"
 
 
 def benchmark(n_samples: int = 10_000_000, n_updates: int = 20_000) -> dict[str, Any]:
-    """What `holdfast bench` reports.
+    """Measure everything that `holdfast bench` reports.
 
     Args:
-        n_samples: of one finger, for the batch features.
-        n_updates: of a hand of four fingers with 30 taxels each.
+        n_samples: samples of one finger for the batch features.
+        n_updates: updates of a hand of four fingers with 30 taxels each.
 
     Returns:
         `machine`, `batch` and `hand_update`: seconds, and ratios of seconds.
@@ -82,7 +94,7 @@ def benchmark(n_samples: int = 10_000_000, n_updates: int = 20_000) -> dict[str,
 
 
 def machine() -> dict[str, Any]:
-    """What the figures depend on."""
+    """Return the machine and the versions that the times depend on."""
     packages = ("holdfast", "numpy", "numba", "scikit-learn", "PyWavelets", "tsflex")
     return {
         "processor": platform.processor() or platform.machine(),
@@ -94,14 +106,11 @@ def machine() -> dict[str, Any]:
 
 
 def batch(n_samples: int) -> dict[str, Any]:
-    """Features of many samples, beside a copy of the same bytes and beside peers.
+    """Measure the features of many samples, a copy of the same bytes, and other libraries.
 
-    The copy moves as many bytes as the features read and write (24 and 48 a sample), by one
-    thread, half of them read and half written.
+    The copy moves as many bytes as the features read and write (24 and 48 per sample) in one
+    thread; it reads half of them and writes half.
     """
-    from holdfast.features import haar_features
-    from holdfast.features.haar import fill_features
-
     force = np.random.default_rng(0).normal(size=(n_samples, 3))
     out = np.empty((n_samples, 6))
     source = np.ones(n_samples * 9 // 2)
@@ -114,9 +123,8 @@ def batch(n_samples: int) -> dict[str, Any]:
         }
     )
     per_sample = {name: value / n_samples for name, value in seconds.items()}
-    peers = {
-        name: value / SLOW_SAMPLES for name, value in _measure(_peers(force[:SLOW_SAMPLES])).items()
-    }
+    peer_seconds = _measure(_peers(force[:N_PEER_SAMPLES]))
+    peers = {name: value / N_PEER_SAMPLES for name, value in peer_seconds.items()}
     per_sample |= {"scipy": _measure({"scipy": lambda: _scipy(force)})["scipy"] / n_samples}
     return {
         "n_samples": n_samples,
@@ -134,22 +142,20 @@ def batch(n_samples: int) -> dict[str, Any]:
 
 
 def hand_update(n_updates: int) -> dict[str, Any]:
-    """One sample of a hand to its estimate: percentiles of single updates, and a peer."""
-    from holdfast.detector import Detector
-
-    detector = Detector(_model())
-    samples = _samples(1024)
+    """Measure the time from a sample of a hand to its estimate [s]."""
+    detector = Detector(_create_model())
+    samples = _random_samples(1024)
     for k in range(200):
         detector.update(samples[k], k / 150)
     nanoseconds = np.empty(n_updates, dtype=np.int64)
     for k in range(n_updates):
-        given = samples[k % len(samples)]
-        moment = (200 + k) / 150
+        sample = samples[k % len(samples)]
+        instant = (200 + k) / 150
         start = time.perf_counter_ns()
-        detector.update(given, moment)
+        detector.update(sample, instant)
         nanoseconds[k] = time.perf_counter_ns() - start
     p50, p99, p999 = (np.percentile(nanoseconds, [50, 99, 99.9]) * 1e-9).tolist()
-    peer = _measure({"peer": lambda: _peer_updates(samples)})["peer"] / PEER_UPDATES
+    peer = _measure({"peer": lambda: _peer_updates(samples)})["peer"] / N_PEER_UPDATES
     return {
         "n_updates": n_updates,
         "n_fingers": len(FINGERS),
@@ -163,15 +169,12 @@ def hand_update(n_updates: int) -> dict[str, Any]:
     }
 
 
-PEER_UPDATES = 100
-
-
 def _measure(tasks: Mapping[str, Task]) -> dict[str, float]:
-    """Median seconds of each task; they take turns, so that a drifting machine is fair."""
+    """Return the median time of each task [s]; the tasks run in turns."""
     seconds: dict[str, list[float]] = {name: [] for name in tasks}
     for task in tasks.values():
         task()
-    for _ in range(ROUNDS):
+    for _ in range(N_ROUNDS):
         for name, task in tasks.items():
             start = time.perf_counter()
             task()
@@ -179,7 +182,7 @@ def _measure(tasks: Mapping[str, Task]) -> dict[str, float]:
     return {name: float(np.median(values)) for name, values in seconds.items()}
 
 
-def _peers(force: "Array") -> dict[str, Task]:
+def _peers(force: Array) -> dict[str, Task]:
     peers: dict[str, Task] = {}
     if find_spec("pywt"):
         peers["pywt"] = lambda: _pywt_loop(force)
@@ -188,8 +191,8 @@ def _peers(force: "Array") -> dict[str, Task]:
     return peers
 
 
-def _pywt_loop(force: "Array") -> "Array":
-    """What a script does: amplitude, then `pywt.dwt` on every window."""
+def _pywt_loop(force: Array) -> Array:
+    """Compute the features as a script does: `pywt.dwt` on every window."""
     import pywt
 
     amplitude = np.linalg.norm(force, axis=1)
@@ -201,12 +204,12 @@ def _pywt_loop(force: "Array") -> "Array":
     return out
 
 
-def _tsflex(force: "Array") -> Task:
-    """The same through a library for features of time series."""
+def _tsflex(force: Array) -> Task:
+    """Return a task that computes m and sigma with tsflex."""
     import pandas as pd
     from tsflex.features import FeatureCollection, FeatureDescriptor, FuncWrapper
 
-    def moments(x: "Array") -> tuple[float, float]:
+    def moments(x: Array) -> tuple[float, float]:
         d = (x[::2] - x[1::2]) / np.sqrt(2)
         return x.sum() / np.sqrt(2) / WINDOW, np.sqrt(((d - d.mean()) ** 2).sum() / WINDOW)
 
@@ -220,8 +223,8 @@ def _tsflex(force: "Array") -> Task:
     return run
 
 
-def _scipy(force: "Array") -> "Array":
-    """The same by filters of scipy.ndimage over whole arrays."""
+def _scipy(force: Array) -> Array:
+    """Compute the features with filters of scipy.ndimage over whole arrays."""
     from scipy.ndimage import correlate1d
 
     amplitude = np.linalg.norm(force, axis=1)
@@ -239,42 +242,37 @@ def _scipy(force: "Array") -> "Array":
     return np.column_stack([amplitude, force, m, sigma])
 
 
-def _model() -> "Model":
-    """A model of the deployed shape; its numbers do not matter here."""
-    from holdfast.classifiers import LinearClassifier
-    from holdfast.features import DEPLOYED_FEATURES, parse_features
-    from holdfast.model import FingerModel, Model
-    from holdfast.sensors import sensor
-
+def _create_model() -> Model:
+    """Return a model of the usual shape; its numbers have no effect on the speed."""
     features = parse_features(DEPLOYED_FEATURES, WINDOW)
     ones = (1.0,) * len(features)
-    rule = LinearClassifier(mean=ones, scale=ones, coefficients=(0.01,) * len(ones), intercept=0.1)
+    classifier = LinearClassifier(
+        mean=ones, scale=ones, coefficients=(0.01,) * len(ones), intercept=0.1
+    )
     tip = sensor("uskin-curved")
     finger = FingerModel(
-        features=features, classifier=rule, sensor=tip.name, contact_threshold=20.0
+        features=features, classifier=classifier, sensor=tip.name, contact_threshold=20.0
     )
     return Model(fingers=dict.fromkeys(FINGERS, finger), sensors={tip.name: tip}, rate=150.0)
 
 
-def _samples(n: int) -> list[dict[str, Any]]:
+def _random_samples(n: int) -> list[dict[str, Any]]:
     generator = np.random.default_rng(0)
     readings = generator.integers(32000, 34000, size=(n, len(FINGERS), 30, 3)).astype(np.uint16)
     return [dict(zip(FINGERS, hand, strict=True)) for hand in readings]
 
 
 def _peer_updates(samples: list[dict[str, Any]]) -> float:
-    """A hundred updates as a script does them: NumPy, `pywt.dwt` and `predict_proba`."""
+    """Update a hand as a script does, with NumPy, `pywt.dwt` and `predict_proba`."""
     if not find_spec("pywt"):
         return 0.0
     import pywt
 
-    from holdfast.sensors import sensor
-
-    pipeline = _pipeline()
+    pipeline = _create_pipeline()
     rotations = sensor("uskin-curved").rotations
     amplitudes = {finger: np.ones(WINDOW) for finger in FINGERS}
     total = 0.0
-    for k in range(PEER_UPDATES):
+    for k in range(N_PEER_UPDATES):
         for finger, sample in samples[k].items():
             force = np.einsum("tij,tj->i", rotations, sample.astype(np.float64))
             window = amplitudes[finger]
@@ -287,7 +285,7 @@ def _peer_updates(samples: list[dict[str, Any]]) -> float:
     return total
 
 
-def _pipeline() -> Any:  # noqa: ANN401 (scikit-learn has no types)
+def _create_pipeline() -> Any:  # noqa: ANN401 (scikit-learn has no types)
     from sklearn.linear_model import LogisticRegression
     from sklearn.pipeline import make_pipeline
     from sklearn.preprocessing import StandardScaler

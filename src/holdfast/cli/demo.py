@@ -1,4 +1,4 @@
-"""`holdfast demo`: the main job in one go, on data of its own."""
+"""`holdfast demo`: the whole chain, from simulation to replay, on simulated data."""
 
 import math
 import sys
@@ -9,7 +9,8 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from holdfast.cli.terminal.console import print_json, say, show
+from holdfast.cli.options import JsonOption
+from holdfast.cli.terminal.console import print_json, print_line, print_message
 
 if TYPE_CHECKING:
     from rich.table import Table
@@ -17,30 +18,36 @@ if TYPE_CHECKING:
     from holdfast.contact import ContactEstimate, HandEstimate
     from holdfast.model import Model
 
-OBJECTS, REPEATS = "can,box", 2
-"""What is grasped in the demo, and how often in each case."""
+OBJECTS, N_REPEATS = "can,box", 2
+"""Objects of the demo, and grasps of each object and case."""
+REFRESH_INTERVAL = 0.1
+"""Time between two updates of the table on the terminal [s]."""
+MIN_DURATION, HYSTERESIS = 0.1, 0.1
+"""Debouncing of the states that a person watches: duration [s] and distance in probability."""
+BAR_WIDTH = 20
+COLOURS = {"UNKNOWN": "dim", "NO_CONTACT": "white", "UNSTABLE": "bold red", "STABLE": "green"}
 
 
 def demo(
     out: Annotated[
-        Path, typer.Argument(help="A folder for what is made; it is made if missing.")
+        Path, typer.Argument(help="Folder for the results; it is created if missing.")
     ] = Path("holdfast-demo"),
     speed: Annotated[
-        float, typer.Option(help="Of the replay: 1 is real time, 0 as fast as it goes.")
+        float, typer.Option(help="Speed of the replay: 1 is real time, 0 as fast as possible.")
     ] = 1.0,
-    seed: Annotated[int, typer.Option(help="Of the recordings.")] = 0,
+    seed: Annotated[int, typer.Option(help="Seed of the recordings.")] = 0,
     browser: Annotated[
         bool,
-        typer.Option("--browser/--no-browser", help="Replay on a page, or in the terminal."),
+        typer.Option("--browser/--no-browser", help="Replay on a web page, or in the terminal."),
     ] = True,
     force: Annotated[bool, typer.Option("--force", help="Overwrite an earlier demo.")] = False,
-    as_json: Annotated[bool, typer.Option("--json", help="Print JSON on stdout.")] = False,
+    as_json: JsonOption = False,
 ) -> None:
-    """Does the main job in one go, on data of its own.
+    """Simulate grasps, train a model on them, and replay one of them.
 
-    Simulates grasps of a can and a box with the physical twin, trains a model on them, tells how
-    good it is on recordings that it has not seen, and replays one of those sample by sample, as
-    a hand would send it: on a page of its own, or in the terminal.
+    Simulate grasps of a can and a box with the physical twin. Train a model on them, and print
+    its cross-validated accuracy. Replay one recording sample by sample, as a hand would send it,
+    on a web page or in the terminal.
 
     Example:
       holdfast demo
@@ -58,20 +65,21 @@ def demo(
     folder.mkdir(parents=True, exist_ok=True)
     refuse_overwrite(model, force=force)
     names = _simulate(folder, seed, force)
-    say("2/4  training, one recording left out at a time (compiles kernels the first time)")
+    print_message("2/4  training and cross-validation (the first run also compiles the kernels)")
     recordings = load_dataset(folder)
     trained = train(recordings, Setting(trials=0, seed=seed))
     trained.model.save(model, force=force)
     accuracy = trained.cross_validation.pooled.accuracy
-    say(f"3/4  on recordings that it has not seen: {accuracy:.1f} % of samples right")
-    name = [name for name in names if name in recordings.names][-1]  # one may have failed
-    say(f"4/4  replaying {name} sample by sample" + (f" at speed {speed:g}" if speed else ""))
-    shown, judged = folder / f"{name}.parquet", calmer(trained.model)
+    print_message(f"3/4  accuracy on recordings left out of training: {accuracy:.1f} % of samples")
+    name = [name for name in names if name in recordings.names][-1]  # a grasp may have failed
+    at_speed = f" at speed {speed:g}" if speed else ""
+    print_message(f"4/4  replaying {name} sample by sample{at_speed}")
+    path, steady_model = folder / f"{name}.parquet", with_debouncing(trained.model)
     n_updates = 0
     if browser and speed and not as_json:
-        _show_page(judged, shown, out, speed)
+        _replay_on_page(steady_model, path, out, speed)
     else:
-        n_updates = replay(judged, shown, speed)
+        n_updates = replay(steady_model, path, speed)
     if as_json:
         print_json(
             {
@@ -83,77 +91,58 @@ def demo(
             }
         )
         return
-    _farewell(out, folder, model, name, time.monotonic() - start)
+    _print_next_steps(out, folder, model, name, time.monotonic() - start)
 
 
 def _simulate(folder: Path, seed: int, force: bool) -> list[str]:
-    """A few grasps of the twin, with and without disturbances; names of those that held."""
-    from holdfast.cli.simulate import grasps, make_all
+    """Simulate grasps with and without disturbances; return their names."""
+    from holdfast.cli.simulate import plan_grasps, simulate_grasps
 
-    wanted = grasps(OBJECTS, "1,2", REPEATS, "reference", seed)
-    say(f"1/4  simulating {len(wanted)} grasps: an Allegro hand with uSkin fingertips")
-    make_all(wanted, folder, jobs=-1, force=force)
-    return [grasp.name for grasp in wanted]
+    grasps = plan_grasps(OBJECTS, "1,2", N_REPEATS, "reference", seed)
+    print_message(f"1/4  simulating {len(grasps)} grasps: an Allegro hand with uSkin fingertips")
+    simulate_grasps(grasps, folder, jobs=-1, force=force)
+    return [grasp.name for grasp in grasps]
 
 
-def _show_page(model: "Model", path: Path, out: Path, speed: float) -> None:
-    """The replay on a page; it stays until Ctrl-C where somebody sits before a terminal."""
-    from holdfast.cli.serve import open_page, show_page
+def with_debouncing(model: "Model") -> "Model":
+    """Return the model with debouncing, so that a person can follow its states."""
+    from msgspec.structs import replace
+
+    from holdfast.model import Debounce
+
+    return replace(model, debounce=Debounce(MIN_DURATION, HYSTERESIS))
+
+
+def _replay_on_page(model: "Model", path: Path, out: Path, speed: float) -> None:
+    """Replay on a web page; at a terminal the page stays open until Ctrl-C."""
+    from holdfast.cli.serve import open_browser, run_page
     from holdfast.sources import open_source
 
     stay = sys.stdin.isatty()
     with open_source(str(path), speed=speed, loop=stay) as source:
 
-        def tell(url: str) -> None:
-            opened = open_page(url)
-            say(f"     {url} {'has opened' if opened else 'shows it: open it in a browser'}")
-            say("     Ctrl-C ends it" if stay else "     it ends with the recording")
+        def announce(url: str) -> None:
+            opened = open_browser(url)
+            print_message(f"     {url} {'has opened' if opened else '(open it in a browser)'}")
+            print_message(
+                "     Ctrl-C stops it" if stay else "     it stops at the end of the recording"
+            )
 
-        show_page(model, source, tell, port=0, folder=out / "recorded", stay=stay)
-
-
-def _farewell(out: Path, folder: Path, model: Path, name: str, seconds: float) -> None:
-    show(f"made in {seconds:.0f} s, in {out}:")
-    show(f"  {folder}: recordings of the twin, {model}: the model")
-    show("what to try next:")
-    show(f"  holdfast info {folder}/{name}.parquet --plot grasp.png")
-    show(f"  holdfast evaluate {model} {folder}")
-    show(f"  holdfast detect {model} {folder}/{name}.parquet | head")
-    show(f"  holdfast serve {model} twin:?object=ball    (the page, live)")
-    show("  holdfast serve builtin:twin xela://auto    (your own hand)")
-    show("  holdfast simulate twin/      (the whole protocol: six objects, 60 grasps)")
-    show("  holdfast import YOUR-DATA recordings/    (holdfast import --help lists the formats)")
-
-
-REFRESH = 0.1
-"""How often the terminal is redrawn [s]."""
-DEBOUNCE = (0.1, 0.1)
-"""For the eye, a state is told when it has lasted so long [s], past its threshold by so much."""
-BAR_WIDTH = 20
-COLOURS = {"UNKNOWN": "dim", "NO_CONTACT": "white", "UNSTABLE": "bold red", "STABLE": "green"}
-
-
-def calmer(model: "Model") -> "Model":
-    """The model with its states held back for the eye."""
-    from msgspec.structs import replace
-
-    from holdfast.model import Debounce
-
-    return replace(model, debounce=Debounce(*DEBOUNCE))
+        run_page(model, source, announce, port=0, folder=out / "recorded", stay=stay)
 
 
 def replay(model: "Model", path: Path, speed: float) -> int:
-    """Feeds a recording, sample by sample, to a detector, and shows what it says.
+    """Play a recording sample by sample through a detector, and print the states.
 
-    On a terminal a table follows the states; elsewhere every change of the hand is one line.
+    On a terminal a table follows all states; elsewhere each change of the hand is one line.
 
     Args:
-        model: that judges.
-        path: of the recording.
-        speed: 1 is real time, 0 as fast as it goes.
+        model: the model to use.
+        path: path of the recording.
+        speed: 1 is real time, 0 as fast as possible.
 
     Returns:
-        How many updates there were.
+        Number of estimates.
     """
     from holdfast.live.stream_detector import StreamDetector
     from holdfast.sources import open_source
@@ -161,31 +150,31 @@ def replay(model: "Model", path: Path, speed: float) -> int:
     with open_source(str(path), speed=speed) as source:
         estimates = iter(StreamDetector(model, source))
         if speed and sys.stderr.isatty():
-            return _follow(estimates)
-        return _tell_changes(estimates)
+            return _show_table(estimates)
+        return _print_changes(estimates)
 
 
-def _tell_changes(estimates: "Iterator[HandEstimate]") -> int:
-    told: str = "UNKNOWN"
+def _print_changes(estimates: "Iterator[HandEstimate]") -> int:
+    previous: str = "UNKNOWN"
     n_updates = 0
     for estimate in estimates:
         n_updates += 1
-        if estimate.state != told:
-            say(f"  {estimate.time:7.3f} s  hand {told} -> {estimate.state}")
-            told = estimate.state
+        if estimate.state != previous:
+            print_message(f"  {estimate.time:7.3f} s  hand {previous} -> {estimate.state}")
+            previous = estimate.state
     return n_updates
 
 
-def _follow(estimates: "Iterator[HandEstimate]") -> int:
+def _show_table(estimates: "Iterator[HandEstimate]") -> int:
     from rich.console import Console
     from rich.live import Live
 
-    drawn, n_updates = 0.0, 0
+    updated_at, n_updates = 0.0, 0
     with Live(console=Console(stderr=True), auto_refresh=False) as screen:
         for estimate in estimates:
             n_updates += 1
-            if time.monotonic() - drawn > REFRESH:
-                drawn = time.monotonic()
+            if time.monotonic() - updated_at > REFRESH_INTERVAL:
+                updated_at = time.monotonic()
                 screen.update(_table(estimate), refresh=True)
     return n_updates
 
@@ -217,3 +206,16 @@ def _cells(finger: "ContactEstimate") -> tuple[str, ...]:
 
 def _coloured(state: str) -> str:
     return f"[{COLOURS[state]}]{state:10}[/]"
+
+
+def _print_next_steps(out: Path, folder: Path, model: Path, name: str, seconds: float) -> None:
+    print_line(f"finished in {seconds:.0f} s; results in {out}:")
+    print_line(f"  {folder}: simulated recordings, {model}: the model")
+    print_line("what to try next:")
+    print_line(f"  holdfast info {folder}/{name}.parquet --plot grasp.png")
+    print_line(f"  holdfast evaluate {model} {folder}")
+    print_line(f"  holdfast detect {model} {folder}/{name}.parquet | head")
+    print_line(f"  holdfast serve {model} twin:?object=ball    (live page of the twin)")
+    print_line("  holdfast serve builtin:twin xela://auto    (live page of your own hand)")
+    print_line("  holdfast simulate twin/    (the whole protocol: six objects, 60 grasps)")
+    print_line("  holdfast import YOUR-DATA recordings/    (formats: holdfast import --help)")

@@ -1,4 +1,4 @@
-"""`holdfast detect`: what a model says of every finger at every sample."""
+"""`holdfast detect`: the contact state of every finger at every sample."""
 
 import math
 import sys
@@ -16,55 +16,53 @@ from holdfast.cli.options import (
     IgnoreOption,
     ModelArgument,
     RateOption,
-    RateRule,
+    RatePolicy,
     SourceArgument,
-    debounced,
-    stream_detector_of,
-    taxels_of,
-    tell_missing,
+    create_stream_detector,
+    load_model,
+    parse_taxels,
+    report_missing_fingers,
 )
-from holdfast.cli.terminal.console import print_json, say
-from holdfast.cli.terminal.progress import Bar
-from holdfast.cli.terminal.stopping import Stop, stopping
+from holdfast.cli.terminal.console import print_json, print_message
+from holdfast.cli.terminal.progress import ProgressBar
+from holdfast.cli.terminal.stopping import StopRequest, handle_stop_signals
 
 if TYPE_CHECKING:
-    from holdfast.detector import Detection
-    from holdfast.live.stream_detector import StreamDetector, StreamEstimate
+    from holdfast.cli.detect_output import EstimateChunk
+    from holdfast.live.stream_detector import StreamDetector, StreamUpdate
     from holdfast.model import Model
     from holdfast.recordings import Recording
-    from holdfast.sources import Arrival
 
-PIECE = 4096
-"""Samples that are taken at a time: bounds the memory."""
+CHUNK_SIZE = 4096
+"""Number of samples that are read and processed at a time; it bounds the memory."""
 
 
 def detect(
     model: ModelArgument,
     source: SourceArgument,
     summary: Annotated[
-        bool, typer.Option("--summary", help="Print shares of states and the events instead.")
+        bool,
+        typer.Option("--summary", help="Print the share of each state, and the contact events."),
     ] = False,
-    rate: RateOption = RateRule.RESAMPLE,
+    rate: RateOption = RatePolicy.RESAMPLE,
     debounce: DebounceOption = None,
     hysteresis: HysteresisOption = None,
     seconds: Annotated[
-        float | None, typer.Option(help="Of a live source: stop after so long [s].")
+        float | None, typer.Option(help="Stop a live source after this time [s].")
     ] = None,
     ignore: IgnoreOption = "",
-    as_json: Annotated[
-        bool, typer.Option("--json", help="Print JSON: as always, and for --summary too.")
-    ] = False,
+    as_json: Annotated[bool, typer.Option("--json", help="Print the summary as JSON too.")] = False,
 ) -> None:
-    """Tells the contact state of every finger at every sample.
+    """Detect the contact state of every finger at every sample.
 
-    Prints a line of JSON for each finger and sample, in the order of time: time [s], finger,
-    state, reason (why it is UNKNOWN), stable_probability, instability (sigma) and force in the
-    unit of the readings, faults; null where nothing is known. Memory stays bounded, however long
-    the recording.
+    Print one line of JSON per finger and sample, in the order of time, with these fields:
+    time [s], finger, state, reason (why the state is UNKNOWN), stable_probability, instability
+    (sigma) and force (both in the unit of the readings), faults, and faulty_taxels. Values that
+    are not known are null. The memory does not grow with the length of the recording.
 
-    SOURCE is the path of a recording, judged as fast as it goes, or a live source, judged as
-    it comes until Ctrl-C: xela://HOST:PORT (or xela://auto), twin:?object=can,
-    ros2:///xServTopic, ros1:///xServTopic or serial:///dev/ttyACM0?sensor=anyskin.
+    SOURCE is the path of a recording, or the URI of a live source, which is read until Ctrl-C:
+    xela://HOST:PORT (or xela://auto), twin:?object=can, ros2:///xServTopic, ros1:///xServTopic
+    or serial:///dev/ttyACM0?sensor=anyskin.
 
     Example:
       holdfast detect model.json grasp.parquet > states.jsonl
@@ -76,19 +74,19 @@ def detect(
 
     live = is_uri(source)
     _check_seconds(seconds, source, live=live)
-    wanted = debounced(model, debounce, hysteresis)
+    loaded = load_model(model, debounce, hysteresis)
     if live:
-        detections = detections_live(wanted, source, rate, ignore, seconds)
+        chunks = _detect_live(loaded, source, rate, ignore, seconds)
     else:
-        detections = _detections(wanted, Path(source), rate, ignore)
+        chunks = _detect_recording(loaded, Path(source), rate, ignore)
     if summary:
-        _summarise(detections, model, as_json=as_json)
+        _print_summary(chunks, model, as_json=as_json)
         return
     from holdfast.cli.detect_output import json_lines
 
-    for detection in detections:
-        for block in json_lines(detection):
-            sys.stdout.write(block)
+    for chunk in chunks:
+        for text in json_lines(chunk):
+            sys.stdout.write(text)
         if live:
             sys.stdout.flush()
 
@@ -97,91 +95,90 @@ def _check_seconds(seconds: float | None, source: str, *, live: bool) -> None:
     if seconds is None:
         return
     if not live:
-        raise ValueError(f"--seconds is for live sources; {source} is judged to its end")
+        raise ValueError(f"--seconds is for live sources; {source} is a recording")
     if not seconds > 0:
         raise ValueError(f"--seconds: more than 0 s expected, {seconds:g} given")
 
 
-def _summarise(detections: Iterator["Detection"], model: str, *, as_json: bool) -> None:
-    from holdfast.cli.detect_output import Tally
+def _print_summary(chunks: Iterator["EstimateChunk"], model: str, *, as_json: bool) -> None:
+    from holdfast.cli.detect_output import DetectionSummary
 
-    tally = Tally()
-    for detection in detections:
-        tally.add(detection)
+    summary = DetectionSummary()
+    for chunk in chunks:
+        summary.add(chunk)
     if as_json:
-        print_json({"model": model, **tally.document()})
+        print_json({"model": model, **summary.to_dict()})
     else:
-        tally.print()
+        summary.print()
 
 
-def _detections(model: "Model", path: Path, rate: RateRule, ignore: str) -> Iterator["Detection"]:
-    """What the model says, piece by piece."""
+def _detect_recording(
+    model: "Model", path: Path, rate: RatePolicy, ignore: str
+) -> Iterator["EstimateChunk"]:
+    from holdfast.cli.detect_output import chunk_from_detection
     from holdfast.detector import Detector
 
     detector = None
-    with Bar("detecting") as bar:
-        for piece in _pieces(model, path, rate):
+    with ProgressBar("detecting") as bar:
+        for part in _read_parts(model, path, rate):
             if detector is None:
-                detector = Detector.for_recording(model, piece, ignore=taxels_of(ignore))
-                tell_missing(model, piece.name, piece.modules)
-            yield detector.run(piece)
-            bar.advance(max(module.n_samples for module in piece.modules.values()))
+                detector = Detector.for_recording(model, part, ignore=parse_taxels(ignore))
+                report_missing_fingers(model, part.name, part.modules)
+            yield chunk_from_detection(detector.run(part))
+            bar.advance(max(module.n_samples for module in part.modules.values()))
 
 
-def _pieces(model: "Model", path: Path, rate: RateRule) -> Iterator["Recording"]:
-    """The recording at the model's rate: in pieces, unless it must be known as a whole."""
+def _read_parts(model: "Model", path: Path, rate: RatePolicy) -> Iterator["Recording"]:
+    """Yield the recording at the model's rate.
+
+    It comes in parts, or as a whole if it is resampled or its tare is an interval.
+    """
     from holdfast.errors import ModelError, RecordingError
     from holdfast.features import Tare
     from holdfast.io import load_recording, read_chunks
     from holdfast.resampling import resample
 
-    pieces = read_chunks(path, PIECE, labels=False)
-    first = next(pieces, None)
+    parts = read_chunks(path, CHUNK_SIZE, labels=False)
+    first = next(parts, None)
     if first is None:
         raise RecordingError(f"{path} has no samples; at least one expected")
     model.fingers_of({name: module.sensor for name, module in first.modules.items()})
     if not first.complete:
-        say(f"{path} was cut: what could be recovered is judged")
+        print_message(f"{path} is cut off: only its readable part is used")
     if model.rate is None or model.rate_fits(first.rate):
         if Tare.parse(model.tare).kind == "interval":
             return iter([load_recording(path, labels=False)])
-        return chain([first], pieces)
+        return chain([first], parts)
     given = f"{path}: {first.rate:.4g} Hz given, the model expects {model.rate:g} Hz"
-    if rate is RateRule.STRICT:
-        raise ModelError(f"{given} within 20 % (--rate resample takes it all the same)")
-    say(f"{given}: resampled")
+    if rate is RatePolicy.STRICT:
+        raise ModelError(f"{given} within 20 % (--rate resample accepts it)")
+    print_message(f"{given}: resampled")
     return iter([resample(load_recording(path, labels=False), model.rate)])
 
 
-def detections_live(
-    model: "Model", uri: str, rate: RateRule, ignore: str, seconds: float | None
-) -> Iterator["Detection"]:
-    """What the model says of a live source, arrival by arrival, until a signal or `seconds`."""
+def _detect_live(
+    model: "Model", uri: str, rate: RatePolicy, ignore: str, seconds: float | None
+) -> Iterator["EstimateChunk"]:
+    """Yield the estimates of each arrival, until a signal or for `seconds`."""
+    from holdfast.cli.detect_output import chunk_from_stream
     from holdfast.live.stream_detector import compile_kernels
-    from holdfast.live.tracing import detection_of
     from holdfast.sources import open_source
 
     compile_kernels()
-    with stopping() as stop, open_source(uri) as source:
-        stream = stream_detector_of(model, source, rate, ignore)
-        stop.gently = True
-        for estimates in _estimates(stream, seconds, stop):
-            yield detection_of(source.name, estimates)
+    with handle_stop_signals() as stop, open_source(uri) as source:
+        stream = create_stream_detector(model, source, rate, ignore)
+        stop.graceful = True
+        for update in _read_updates(stream, seconds, stop):
+            yield chunk_from_stream(source.name, update.estimates)
 
 
-def _estimates(
-    stream: "StreamDetector", seconds: float | None, stop: Stop
-) -> Iterator[list["StreamEstimate"]]:
+def _read_updates(
+    stream: "StreamDetector", seconds: float | None, stop: StopRequest
+) -> Iterator["StreamUpdate"]:
     end = math.inf if seconds is None else time.monotonic() + seconds
-    while not (stream.source.ended or stop.asked) and time.monotonic() < end:
-        arrival, estimates, _ = stream.read()
-        if arrival is not None:
-            tell(arrival)
-        yield estimates
-    yield stream.finish().estimates
-
-
-def tell(arrival: "Arrival") -> None:
-    """Tells on stderr what a person should know."""
-    for notice in arrival.notices:
-        say(notice)
+    while not (stream.source.ended or stop.requested) and time.monotonic() < end:
+        update = stream.read()
+        for notice in update.arrival.notices if update.arrival else ():
+            print_message(notice)
+        yield update
+    yield stream.finish()

@@ -1,180 +1,193 @@
-"""Shares of states, reasons and faults, and the events, over a stream of detections."""
+"""Output of `holdfast detect`: JSON lines, or a summary, from chunks of estimates."""
 
-from collections.abc import Iterator
-from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any
+from collections import Counter
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from itertools import chain
+from operator import attrgetter
+from typing import TYPE_CHECKING, Any, NamedTuple
 
-import numpy as np
-import numpy.typing as npt
 from msgspec import Struct
 from msgspec.json import Encoder
 
-from holdfast.cli.terminal.console import print_table, show
+from holdfast.cli.terminal.console import print_line, print_table
 from holdfast.contact import (
+    ContactEstimate,
     ContactEvent,
     ContactState,
     Fault,
     Reason,
     StateChanges,
-    faults_of,
-    taxels_of,
 )
 from holdfast.detector import HAND
 
 if TYPE_CHECKING:
     from holdfast.detector import Detection
-    from holdfast.sensors.types import Array
+    from holdfast.live.stream_detector import StreamEstimate
 
-STATES, REASONS, FAULTS = tuple(ContactState), tuple(Reason), tuple(Fault)
-MOST_EVENTS = 40
-"""Events that are shown to a person."""
-
-_Codes = npt.NDArray[np.int8 | np.int16]
-_Numbers = npt.NDArray[np.int64]
+LINES_PER_BLOCK = 8192
+MAX_EVENTS_SHOWN = 40
+"""Maximum number of events in the table; JSON has all of them."""
 
 
-class Tally:
-    """What a model says of a recording, in short; it grows by the events only."""
+class EstimateChunk(NamedTuple):
+    """Estimates of consecutive samples, oldest first.
+
+    Attributes:
+        name: of the recording or source.
+        fingers: estimates of each finger.
+        hand: time [s] and state of the hand at each instant.
+    """
+
+    name: str
+    fingers: Mapping[str, Sequence[ContactEstimate]]
+    hand: Sequence[tuple[float, ContactState]]
+
+
+def chunk_from_detection(detection: "Detection") -> EstimateChunk:
+    """Convert the arrays of a detection."""
+    states = tuple(ContactState)
+    hand = zip(detection.times.tolist(), detection.hand.tolist(), strict=True)
+    return EstimateChunk(
+        detection.name,
+        {finger: trace.estimates() for finger, trace in detection.fingers.items()},
+        [(time, states[code]) for time, code in hand],
+    )
+
+
+def chunk_from_stream(name: str, estimates: Iterable["StreamEstimate"]) -> EstimateChunk:
+    """Collect the new estimates of a live source."""
+    fingers: dict[str, list[ContactEstimate]] = {}
+    hand = []
+    for estimate, updated_fingers in estimates:
+        hand.append((estimate.time, estimate.state))
+        for finger in updated_fingers:
+            fingers.setdefault(finger, []).append(estimate.fingers[finger])
+    return EstimateChunk(name, fingers, hand)
+
+
+class EstimateLine(Struct, gc=False):
+    """One JSON line: the estimate of a finger at a sample; NaN becomes null."""
+
+    time: float
+    finger: str
+    state: ContactState
+    reason: Reason
+    stable_probability: float
+    instability: float
+    force: tuple[float, float, float]
+    faults: tuple[Fault, ...]
+    faulty_taxels: tuple[int, ...]
+
+
+def json_lines(chunk: EstimateChunk) -> Iterator[str]:
+    """Yield blocks of JSON lines, sorted by time and then in the order of the fingers."""
+    lines = [
+        EstimateLine(
+            one.time, finger, one.state, one.reason, one.stable_probability, one.instability,
+            one.force, one.faults, one.faulty_taxels,
+        )
+        for finger, estimates in chunk.fingers.items()
+        for one in estimates
+    ]  # fmt: skip
+    lines.sort(key=attrgetter("time"))
+    encoder = Encoder()
+    for start in range(0, len(lines), LINES_PER_BLOCK):
+        # A list, because msgspec 0.22 leaks the items of an iterator.
+        yield encoder.encode_lines(lines[start : start + LINES_PER_BLOCK]).decode()
+
+
+class DetectionSummary:
+    """Shares of states, counts of reasons and faults, and the contact events.
+
+    Its memory grows only with the number of events.
+    """
 
     def __init__(self) -> None:
         self._name = ""
-        self._counts: dict[str, _Counts] = {}
+        self._counts: dict[str, _StateCounts] = {}
         self._changes: dict[str, StateChanges] = {}
-        self._found: dict[str, list[ContactEvent]] = {}
+        self._events: dict[str, list[ContactEvent]] = {}
 
-    def add(self, detection: "Detection") -> None:
-        """Takes the next piece."""
-        self._name = detection.name
-        for name, trace in detection.fingers.items():
-            self._count(name, trace.state, trace.reason, trace.faults)
-            self._change(name, trace.times, trace.state)
-        self._count(HAND, detection.hand)
-        self._change(HAND, detection.times, detection.hand)
+    def add(self, chunk: EstimateChunk) -> None:
+        """Add the next chunk of the same recording or source."""
+        self._name = chunk.name
+        for finger, estimates in chunk.fingers.items():
+            self._add_changes(finger, map(attrgetter("time", "state"), estimates))
+            counts = self._counts.setdefault(finger, _StateCounts())
+            counts.states.update(one.state for one in estimates)
+            counts.reasons.update(one.reason for one in estimates if one.reason)
+            counts.faults.update(chain.from_iterable(one.faults for one in estimates))
+        self._add_changes(HAND, chunk.hand)
+        self._counts.setdefault(HAND, _StateCounts()).states.update(
+            state for _, state in chunk.hand
+        )
 
-    def document(self) -> dict[str, Any]:
-        """All of it, as JSON has it: shares are of samples, or of instants for the hand."""
-        shares = {name: counts.document() for name, counts in self._counts.items()}
+    def to_dict(self) -> dict[str, Any]:
+        """Return the summary as JSON values; shares are of samples, or of instants (hand)."""
+        shares = {name: counts.to_dict() for name, counts in self._counts.items()}
         hand = shares.pop(HAND)
         return {
             "name": self._name,
             "fingers": shares,
             "hand": {key: hand[key] for key in ("n_samples", "states")},
-            "events": [event._asdict() for event in self._events()],
+            "events": [event._asdict() for event in self._sorted_events()],
         }
 
     def print(self) -> None:
-        """All of it for a person; of many events the first."""
+        """Print two tables: shares and counts, and the first events."""
         names = [name for name in self._counts if name != HAND] + [HAND]
+        states = (f"{state} %" for state in ContactState)
         print_table(
-            (self._name, "samples", *(f"{state} %" for state in STATES), "unknown for", "faults"),
+            (self._name, "samples", *states, "unknown for", "faults"),
             [(name, *self._counts[name].row()) for name in names],
         )
-        events = self._events()
-        show()
+        events = self._sorted_events()
+        print_line()
         print_table(
             ("time [s]", "finger", "state", "before"),
-            [(f"{e.time:.3f}", e.finger, e.state, e.previous) for e in events[:MOST_EVENTS]],
+            [(f"{e.time:.3f}", e.finger, e.state, e.previous) for e in events[:MAX_EVENTS_SHOWN]],
         )
-        if len(events) > MOST_EVENTS:
-            show(f"and {len(events) - MOST_EVENTS} more events (--json has them all)")
+        if len(events) > MAX_EVENTS_SHOWN:
+            print_line(f"and {len(events) - MAX_EVENTS_SHOWN} more events (--json prints all)")
 
-    def _count(self, name: str, states: _Codes, *causes: _Codes) -> None:
-        counts = self._counts.setdefault(name, _Counts.none())
-        counts.states += np.bincount(states, minlength=len(STATES))
-        if causes:
-            reasons, faults = causes
-            counts.reasons += np.bincount(reasons, minlength=len(REASONS))
-            counts.faults += (faults[:, None] >> np.arange(len(FAULTS)) & 1).sum(axis=0)
-
-    def _change(self, name: str, times: "Array", states: _Codes) -> None:
+    def _add_changes(self, name: str, states: Iterable[tuple[float, ContactState]]) -> None:
         changes = self._changes.setdefault(name, StateChanges((name,)))
-        self._found.setdefault(name, []).extend(changes.update_chunk(times, states[:, None]))
+        events = self._events.setdefault(name, [])
+        for time, state in states:
+            events += changes.update([state], time)
 
-    def _events(self) -> list[ContactEvent]:
-        events = [event for found in self._found.values() for event in found]
-        return sorted(events, key=lambda event: event.time)
+    def _sorted_events(self) -> list[ContactEvent]:
+        return sorted(chain.from_iterable(self._events.values()), key=attrgetter("time"))
 
 
-@dataclass
-class _Counts:
-    """How many samples had which state, reason and fault."""
+class _StateCounts:
+    """Number of samples with each state, reason and fault."""
 
-    states: _Numbers
-    reasons: _Numbers
-    faults: _Numbers
+    def __init__(self) -> None:
+        self.states: Counter[ContactState] = Counter()
+        self.reasons: Counter[Reason] = Counter()
+        self.faults: Counter[Fault] = Counter()
 
-    @classmethod
-    def none(cls) -> "_Counts":
-        return cls(*(np.zeros(len(all_), dtype=np.int64) for all_ in (STATES, REASONS, FAULTS)))
-
-    def document(self) -> dict[str, Any]:
-        n = int(self.states.sum())
+    def to_dict(self) -> dict[str, Any]:
+        n = self.states.total()
         return {
             "n_samples": n,
-            "states": {s.value: k / n for s, k in zip(STATES, self.states.tolist(), strict=True)},
-            "reasons": _some(REASONS[1:], self.reasons[1:]),
-            "faults": _some(FAULTS, self.faults),
+            "states": {state.value: self.states[state] / n if n else 0.0 for state in ContactState},
+            "reasons": _ordered(self.reasons, Reason),
+            "faults": _ordered(self.faults, Fault),
         }
 
     def row(self) -> tuple[object, ...]:
-        n = int(self.states.sum())
-        shares = (f"{100 * k / n:.1f}" for k in self.states.tolist())
-        return n, *shares, _text(REASONS[1:], self.reasons[1:]), _text(FAULTS, self.faults)
+        """Return the cells of a table row."""
+        counts = self.to_dict()
+        shares = (f"{100 * share:.1f}" for share in counts["states"].values())
+        return counts["n_samples"], *shares, _text(counts["reasons"]), _text(counts["faults"])
 
 
-def _some(names: "tuple[Reason, ...] | tuple[Fault, ...]", counts: _Numbers) -> dict[str, int]:
-    return {name.value: k for name, k in zip(names, counts.tolist(), strict=True) if k}
+def _ordered(counts: Counter[Any], members: Iterable[Any]) -> dict[str, int]:
+    """Return the counts that are not zero, in the order of the members."""
+    return {member.value: counts[member] for member in members if counts[member]}
 
 
-def _text(names: "tuple[Reason, ...] | tuple[Fault, ...]", counts: _Numbers) -> str:
-    return ", ".join(f"{name} {k}" for name, k in _some(names, counts).items()) or "-"
-
-
-BLOCK = 8192
-"""Lines that are made at a time."""
-
-_STATES = [state.value for state in ContactState]
-_REASONS = [reason.value for reason in Reason]
-
-
-class Line(Struct, gc=False):
-    """What is printed of one finger at one sample; what is NaN becomes null."""
-
-    time: float
-    finger: str
-    state: str
-    reason: str
-    stable_probability: float
-    instability: float
-    force: list[float]
-    faults: tuple[str, ...]
-    faulty_taxels: tuple[int, ...]
-
-
-def json_lines(detection: "Detection") -> Iterator[str]:
-    """Blocks of lines, one a finger and sample, in the order of time and then of fingers."""
-    names = list(detection.fingers)
-    traces = list(detection.fingers.values())
-    if not traces:
-        return
-    which = np.repeat(np.arange(len(names)), [len(trace) for trace in traces])
-    times, state, reason, probability, sigma, force, faults, taxels = (
-        np.concatenate(column) for column in zip(*traces, strict=True)
-    )
-    order = np.argsort(times, kind="stable")
-    encoder = Encoder()
-    for start in range(0, len(order), BLOCK):
-        rows = order[start : start + BLOCK]
-        lines = map(  # a list, since msgspec 0.22 leaks what an iterator gives it
-            Line,
-            times[rows].tolist(),
-            [names[k] for k in which[rows].tolist()],
-            [_STATES[k] for k in state[rows].tolist()],
-            [_REASONS[k] for k in reason[rows].tolist()],
-            probability[rows].tolist(),
-            sigma[rows].tolist(),
-            force[rows].tolist(),
-            [faults_of(mask) for mask in faults[rows].tolist()],
-            [taxels_of(mask) for mask in taxels[rows].tolist()],
-        )
-        yield encoder.encode_lines(list(lines)).decode()
+def _text(counts: Mapping[str, int]) -> str:
+    return ", ".join(f"{name} {n}" for name, n in counts.items()) or "-"

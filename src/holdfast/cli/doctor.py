@@ -9,33 +9,32 @@ from contextlib import suppress
 from importlib import metadata
 from importlib.util import find_spec
 from pathlib import Path
-from typing import Annotated, Any
+from typing import Any
 
-import typer
+from holdfast.cli.options import JsonOption
+from holdfast.cli.terminal.console import print_json, print_line, print_table
 
-from holdfast.cli.terminal.console import print_json, print_table, show
-
-PURPOSES = {
-    "bags": "importing bags of ROS 1 and ROS 2",
-    "bench": "peers to compare speed with in holdfast bench",
-    "cluster": "work on a Dask cluster, --engine dask:ADDRESS",
-    "deep": "the network among the methods of holdfast study",
-    "ros2": "ROS 2 topics, without a ROS installation",
-    "serial": "sensors at a serial port",
-    "hdf5": "importing recordings kept in HDF5",
+EXTRA_PURPOSES = {
+    "bags": "import of ROS 1 and ROS 2 bags",
+    "bench": "other libraries that holdfast bench compares with",
+    "cluster": "a Dask cluster, --engine dask:ADDRESS",
+    "deep": "the neural network of holdfast study",
+    "ros2": "ROS 2 topics without a ROS installation",
+    "serial": "sensors on a serial port",
+    "hdf5": "import of HDF5 recordings",
 }
-"""What each extra is for."""
+"""Purpose of each extra."""
+CONNECT_TIMEOUT = 0.3
+"""Time in which a server must accept a connection [s]."""
 
 _REQUIREMENT = re.compile(r"(?P<package>[\w.-]+)(?:.*extra\s*==\s*['\"](?P<extra>[\w-]+)['\"])?")
 
 
-def doctor(
-    as_json: Annotated[bool, typer.Option("--json", help="Print JSON on stdout.")] = False,
-) -> None:
-    """Shows what is installed and what works.
+def doctor(as_json: JsonOption = False) -> None:
+    """Check the installation and the reachable sources.
 
-    Python, packages, extras and how to get them, the compiled kernels, which live sources can be
-    reached, and where HOLDFAST_DATA points. It reports, and always exits with 0.
+    Report Python, the packages, the extras and how to install them, the compiled kernels, the
+    live sources that can be reached, and the folder in HOLDFAST_DATA. The exit code is always 0.
 
     Example:
       holdfast doctor
@@ -61,12 +60,12 @@ def _report() -> dict[str, Any]:
         "extras": {extra: _extra(extra, found) for extra, found in sorted(packages.items())},
         "kernels": _kernels(),
         "data": _data(),
-        "sources": reachable(),
+        "sources": check_sources(),
     }
 
 
 def _packages() -> dict[str, dict[str, str | None]]:
-    """Version of each required package, None where it is missing, by extra ("" is the core)."""
+    """Return the version of each required package, by extra ("" without one); None if missing."""
     found: dict[str, dict[str, str | None]] = {}
     for requirement in metadata.requires("holdfast") or []:
         match = _REQUIREMENT.match(requirement)
@@ -85,7 +84,7 @@ def _version(package: str) -> str | None:
 
 def _extra(extra: str, packages: dict[str, str | None]) -> dict[str, Any]:
     return {
-        "purpose": PURPOSES.get(extra, ""),
+        "purpose": EXTRA_PURPOSES.get(extra, ""),
         "installed": None not in packages.values(),
         "packages": packages,
         "install": f'pip install "holdfast[{extra}]"',
@@ -93,7 +92,7 @@ def _extra(extra: str, packages: dict[str, str | None]) -> dict[str, Any]:
 
 
 def _kernels() -> dict[str, Any]:
-    """Compiles the feature kernel, or loads it from its cache, and runs it once."""
+    """Compile the feature kernel or load it from its cache, and run it once."""
     begin = time.perf_counter()
     error = None
     try:
@@ -102,7 +101,7 @@ def _kernels() -> dict[str, Any]:
         from holdfast.features import haar_features
 
         haar_features(np.ones((16, 3)))
-    except Exception as cause:  # the doctor tells what is broken, whatever it is
+    except Exception as cause:  # any failure is reported
         error = f"{type(cause).__name__}: {cause}"
     return {
         "ok": error is None,
@@ -119,44 +118,40 @@ def _data() -> dict[str, Any]:
 
 def _print(report: dict[str, Any]) -> None:
     kernels, data = report["kernels"], report["data"]
-    works = f"work ({kernels['seconds']:.1f} s to load)" if kernels["ok"] else kernels["error"]
+    loaded = f"work ({kernels['seconds']:.1f} s to load)"
     rows = [(key, report[key]) for key in ("python", "platform", "cpus")]
     rows += [
-        ("kernels", works),
+        ("kernels", loaded if kernels["ok"] else kernels["error"]),
         ("kernel cache", kernels["cache"]),
-        ("HOLDFAST_DATA", _where(data)),
+        ("HOLDFAST_DATA", _data_text(data)),
     ]
     print_table(("holdfast", report["holdfast"]), rows)
-    show()
+    print_line()
     print_table(("source", "state"), list(report["sources"].items()))
-    show()
+    print_line()
     print_table(
         ("package", "version"),
         [(name, version or "MISSING") for name, version in report["packages"].items()],
     )
-    show()
+    print_line()
     print_table(
-        ("extra", "for", "state"),
-        [(name, x["purpose"], _state(x)) for name, x in report["extras"].items()],
+        ("extra", "purpose", "state"),
+        [(name, x["purpose"], _extra_text(x)) for name, x in report["extras"].items()],
     )
 
 
-def _where(data: dict[str, Any]) -> str:
+def _data_text(data: dict[str, Any]) -> str:
     if data["path"] is None:
         return "not set"
     return f"{data['path']} ({'found' if data['found'] else 'NOT FOUND'})"
 
 
-def _state(extra: dict[str, Any]) -> str:
+def _extra_text(extra: dict[str, Any]) -> str:
     return "installed" if extra["installed"] else extra["install"]
 
 
-KNOCK = 0.3
-"""How long a server has to answer [s]."""
-
-
-def reachable() -> dict[str, str]:
-    """How each kind of live source stands, in a few words."""
+def check_sources() -> dict[str, str]:
+    """Return a short description of the state of each kind of live source."""
     return {"xela": _xela(), "ros1": _ros1(), "ros2": _ros2(), "serial": _serial()}
 
 
@@ -164,11 +159,11 @@ def _xela() -> str:
     from holdfast.sources.uri import parse
     from holdfast.sources.xela.places import places
 
-    tried = places(parse("xela://auto")[1])
-    for place in tried:
-        with suppress(OSError), socket.create_connection(place, KNOCK):
-            return f"something listens at {place}"
-    return f"nothing listens at {' or '.join(map(str, tried))}"
+    addresses = places(parse("xela://auto")[1])
+    for address in addresses:
+        with suppress(OSError), socket.create_connection(address, CONNECT_TIMEOUT):
+            return f"a server listens at {address}"
+    return f"no server listens at {' or '.join(map(str, addresses))}"
 
 
 def _ros1() -> str:
@@ -178,9 +173,9 @@ def _ros1() -> str:
     try:
         rospy_module()
         check_master(master := master_uri(None))
-    except (HoldfastError, ValueError) as missing:  # a ValueError: ROS_MASTER_URI is none
-        return str(missing)
-    return f"rospy, and a master at {master}"
+    except (HoldfastError, ValueError) as error:  # ValueError: ROS_MASTER_URI is invalid
+        return str(error)
+    return f"rospy is installed; ROS master at {master}"
 
 
 def _ros2() -> str:
@@ -194,4 +189,4 @@ def _serial() -> str:
         return 'not installed: pip install "holdfast[serial]"'
     from serial.tools.list_ports import comports
 
-    return ", ".join(port.device for port in comports()) or "no port"
+    return ", ".join(port.device for port in comports()) or "no serial port"

@@ -1,4 +1,4 @@
-"""`holdfast import`: other people's data, and recordings that were cut, as whole recordings."""
+"""`holdfast import`: recordings from other formats, and from files that were cut off."""
 
 import tempfile
 from collections.abc import Iterator
@@ -10,15 +10,16 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from holdfast.cli.terminal.console import print_json, print_table, say, show
+from holdfast.cli.options import JsonOption
+from holdfast.cli.terminal.console import print_json, print_line, print_message, print_table
 from holdfast.cli.terminal.progress import progress
 
 if TYPE_CHECKING:
     from holdfast.recordings import Recording
 
 
-class Suffix(StrEnum):
-    """Formats that a recording can be written in."""
+class RecordingFormat(StrEnum):
+    """File formats in which recordings are written."""
 
     PARQUET = "parquet"
     MCAP = "mcap"
@@ -26,7 +27,7 @@ class Suffix(StrEnum):
 
 @dataclass(frozen=True)
 class _Imported:
-    """What is told of a recording that came in."""
+    """Summary of an imported recording."""
 
     name: str
     path: Path
@@ -41,27 +42,31 @@ class _Imported:
 
 
 def import_(
-    path: Annotated[Path, typer.Argument(help="The file or folder to bring in.")],
-    out: Annotated[Path, typer.Argument(help="The folder for the recordings; made if missing.")],
+    path: Annotated[Path, typer.Argument(help="File or folder to import.")],
+    out: Annotated[
+        Path, typer.Argument(help="Folder for the recordings; it is created if missing.")
+    ],
     data_format: Annotated[
         str | None,
-        typer.Option("--format", help="Its format; found out from the content if not given."),
+        typer.Option("--format", help="Format of the input; detected from the content by default."),
     ] = None,
     no_labels: Annotated[
-        bool, typer.Option("--no-labels", help="Leave the labels that it comes with behind.")
+        bool, typer.Option("--no-labels", help="Do not import the labels of the input.")
     ] = False,
-    suffix: Annotated[Suffix, typer.Option(help="What to write.")] = Suffix.PARQUET,
+    suffix: Annotated[
+        RecordingFormat, typer.Option(help="Format of the recordings to write.")
+    ] = RecordingFormat.PARQUET,
     force: Annotated[
-        bool, typer.Option("--force", help="Overwrite recordings of the same names.")
+        bool, typer.Option("--force", help="Overwrite recordings of the same name.")
     ] = False,
-    as_json: Annotated[bool, typer.Option("--json", help="Print JSON on stdout.")] = False,
+    as_json: JsonOption = False,
 ) -> None:
-    """Brings in other people's data, whatever its format.
+    """Import recordings from other formats.
 
-    Formats: uskin-pick-move, xela-log, gtac, arq-crisp, rosbag, csv (see docs/formats.md).
-    Recordings of holdfast itself come in too: an .mcap file that was cut is recovered as far as
-    it goes. Writes OUT/NAME.parquet for each recording: all of them, or none where anything
-    goes wrong.
+    Formats: uskin-pick-move, xela-log, gtac, arq-crisp, rosbag, csv (see docs/formats.md), and
+    recordings of holdfast itself. From an .mcap file that was cut off, everything up to the cut
+    is recovered. Write OUT/NAME.parquet for each recording. If one of them fails, none is
+    written.
 
     Example:
       holdfast import data/uskin_pick_move real/
@@ -71,26 +76,26 @@ def import_(
     if out.exists() and not out.is_dir():
         raise NotADirectoryError(20, "is a file; a folder expected", str(out))
     recordings = _recordings(path, data_format, labels=not no_labels)
-    with _staged(out) as folder:
+    with _staging_folder(out) as folder:
         imported = [
             _write(recording, folder, out, suffix, force)
             for recording in progress(recordings, "importing")
         ]
         for one in imported:
             (folder / one.path.name).replace(one.path)
-    _tell(imported, out, as_json)
+    _print(imported, out, as_json)
 
 
 def _recordings(path: Path, data_format: str | None, *, labels: bool) -> Iterator["Recording"]:
     from holdfast.io import import_recordings
 
-    if data_format is None and (own := _own(path)):
-        return (_loaded(file, labels=labels) for file in own)
+    if data_format is None and (files := _own_files(path)):
+        return (_load(file, labels=labels) for file in files)
     return import_recordings(path, data_format, labels=labels)
 
 
-def _own(path: Path) -> list[Path]:
-    """Files of holdfast itself: the file at `path`, or those in that folder."""
+def _own_files(path: Path) -> list[Path]:
+    """Return the recordings of holdfast at this path: the file, or the files in the folder."""
     from holdfast.errors import RecordingError
     from holdfast.io.dataset import load_dataset
     from holdfast.io.recording_files import is_recording
@@ -102,21 +107,21 @@ def _own(path: Path) -> list[Path]:
     return [path] if is_recording(path) else []
 
 
-def _loaded(file: Path, *, labels: bool) -> "Recording":
+def _load(file: Path, *, labels: bool) -> "Recording":
     from holdfast.io import load_recording
 
     recording = load_recording(file, labels=labels)
     if not recording.complete:
-        say(f"{file} was cut: {recording.duration:.2f} s recovered")
+        print_message(f"{file} is cut off: {recording.duration:.2f} s recovered")
     return recording if labels else recording.with_labels({})
 
 
 @contextmanager
-def _staged(out: Path) -> Iterator[Path]:
-    """A folder inside `out` for what is not whole yet; `out` is made, and unmade if empty."""
+def _staging_folder(out: Path) -> Iterator[Path]:
+    """Create a temporary folder inside `out`; remove `out` at the end if it is new and empty."""
     from holdfast.errors import OutputError
 
-    made = [folder for folder in (out, *out.parents) if not folder.exists()]
+    created = [folder for folder in (out, *out.parents) if not folder.exists()]
     try:
         out.mkdir(parents=True, exist_ok=True)
         staging = tempfile.TemporaryDirectory(prefix=".import.", dir=out)
@@ -128,13 +133,13 @@ def _staged(out: Path) -> Iterator[Path]:
     except OutputError as cause:
         raise OutputError(str(cause).replace(staging.name, str(out))) from cause
     finally:
-        for folder in made:
+        for folder in created:
             with suppress(OSError):
                 folder.rmdir()
 
 
 def _write(
-    recording: "Recording", folder: Path, out: Path, suffix: Suffix, force: bool
+    recording: "Recording", folder: Path, out: Path, suffix: RecordingFormat, force: bool
 ) -> _Imported:
     from holdfast.errors import RecordingError
     from holdfast.files import refuse_overwrite
@@ -142,10 +147,12 @@ def _write(
 
     file_name = f"{recording.name}.{suffix}"
     if Path(file_name).name != file_name or "\\" in file_name or file_name.startswith("."):
-        raise RecordingError(f"{recording.name!r} is a recording's name that no file can have")
+        raise RecordingError(f"{recording.name!r} cannot be the name of a file")
     refuse_overwrite(out / file_name, force=force)
     if (folder / file_name).exists():
-        raise RecordingError(f"two recordings are called {recording.name!r}: import one by one")
+        raise RecordingError(
+            f"two recordings have the name {recording.name!r}: import them one by one"
+        )
     save_recording(recording, folder / file_name)
     return _Imported(
         recording.name,
@@ -157,7 +164,7 @@ def _write(
     )
 
 
-def _tell(imported: list[_Imported], out: Path, as_json: bool) -> None:
+def _print(imported: list[_Imported], out: Path, as_json: bool) -> None:
     n_modules = sum(len(one.modules) for one in imported)
     n_samples = sum(one.n_samples for one in imported)
     if as_json:
@@ -178,9 +185,9 @@ def _tell(imported: list[_Imported], out: Path, as_json: bool) -> None:
             for one in imported
         ],
     )
-    show()
+    print_line()
     counts = [_count(len(imported), "recording"), _count(n_modules, "module")]
-    show(f"{' with '.join(counts)} and {_count(n_samples, 'sample')} in {out}")
+    print_line(f"{' with '.join(counts)} and {_count(n_samples, 'sample')} in {out}")
 
 
 def _count(n: int, what: str) -> str:

@@ -1,40 +1,44 @@
-"""`holdfast info`: what is in a recording, or in a folder of them."""
+"""`holdfast info`: the content of a recording, or of a folder of recordings."""
 
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from holdfast.cli.terminal.console import complain, print_json, print_table, show
+from holdfast.cli.options import (
+    ForcePlotOption,
+    JsonOption,
+    PlotOption,
+    TareOption,
+    check_plot,
+    save_plot,
+)
+from holdfast.cli.terminal.console import print_error, print_json, print_line, print_table
 from holdfast.cli.terminal.progress import progress
 
 if TYPE_CHECKING:
     from holdfast.features import Tare
-    from holdfast.recordings import Recording, Tactile
+    from holdfast.recordings import Label, Recording, Tactile
 
-LABEL_STATES = ("stable", "unstable", "no_contact")
-MOST_TEXT = 90
-"""Characters of a value of the metadata that are shown to a person."""
+MAX_VALUE_LENGTH = 90
+"""Maximum number of characters of a metadata value in the table."""
 
 
 def info(
-    path: Annotated[Path, typer.Argument(help="A recording, or a folder of them.")],
-    plot: Annotated[
-        Path | None, typer.Option(help="Draw the recording to this .svg, .png or .pdf file.")
-    ] = None,
-    tare: Annotated[
-        str, typer.Option(help="Of plot and faults: seconds, first, none or START:END.")
-    ] = "0.5",
-    force: Annotated[bool, typer.Option("--force", help="Overwrite the plot.")] = False,
-    as_json: Annotated[bool, typer.Option("--json", help="Print JSON on stdout.")] = False,
+    path: Annotated[Path, typer.Argument(help="A recording, or a folder of recordings.")],
+    plot: PlotOption = None,
+    tare: TareOption = "0.5",
+    force: ForcePlotOption = False,
+    as_json: JsonOption = False,
 ) -> None:
-    """Shows what is in a recording, or in a folder of them.
+    """Show the content of a recording, or of a folder of recordings.
 
-    Modules, sensors, samples, rates, gaps, repeated samples, seconds of each label, samples with
-    faults, and what is known besides. The plot shows each finger's forces, sigma, labels, markers
-    and slip (where truth has it) over time; start the tare where nothing is touched.
+    Print modules, sensors, number of samples, rates, gaps, repeated samples, seconds of each
+    label, number of samples with faults, and metadata. The figure shows forces, sigma, labels,
+    markers and slip (if the recording has truth) of each finger over time. The tare is used for
+    the figure and the faults; choose a time without contact.
 
     Example:
       holdfast info real/
@@ -47,17 +51,16 @@ def info(
     if path.is_dir():
         if plot is not None:
             raise ValueError(f"--plot draws one recording; the folder {path} given")
-        _tell_all(path, chosen, as_json)
+        _print_folder(path, chosen, as_json)
     else:
-        _tell_one(path, plot, chosen, force, as_json)
+        _print_file(path, plot, chosen, force, as_json)
 
 
-def _tell_one(path: Path, plot: Path | None, tare: "Tare", force: bool, as_json: bool) -> None:
-    from holdfast.cli.options import refuse_plot, save_plot
+def _print_file(path: Path, plot: Path | None, tare: "Tare", force: bool, as_json: bool) -> None:
     from holdfast.io import load_recording
 
     if plot is not None:
-        refuse_plot(plot, force)
+        check_plot(plot, force)
     recording = load_recording(path)
     document = _document(recording, tare)
     if plot is not None:
@@ -70,7 +73,7 @@ def _tell_one(path: Path, plot: Path | None, tare: "Tare", force: bool, as_json:
         _print_one(document)
 
 
-def _tell_all(folder: Path, tare: "Tare", as_json: bool) -> None:
+def _print_folder(folder: Path, tare: "Tare", as_json: bool) -> None:
     from holdfast.errors import RecordingError
     from holdfast.io import load_dataset, load_recording
 
@@ -87,7 +90,7 @@ def _tell_all(folder: Path, tare: "Tare", as_json: bool) -> None:
         _print_all(documents)
     failures = [document["error"] for document in documents if "error" in document]
     for failure in failures[:-1]:
-        complain(failure)
+        print_error(failure)
     if failures:
         raise RecordingError(failures[-1])
 
@@ -125,23 +128,29 @@ def _module(recording: "Recording", name: str, module: "Tactile", tare: "Tare") 
         "rate": module.rate,
         "gaps": module.n_gaps,
         "repeats": module.n_repeats,
-        "labels": _labelled(module),
+        "labels": label_seconds(module.labels),
         "faults": _faults(recording, name, module, tare) if module.n_samples else {},
     }
 
 
-def _labelled(module: "Tactile") -> Mapping[str, float]:
-    """Seconds of each state."""
-    seconds = dict.fromkeys(LABEL_STATES, 0.0)
-    for label in module.labels:
+def label_seconds(labels: "Iterable[Label]") -> dict[str, float]:
+    """Return the total duration of the labels of each state [s]."""
+    seconds = dict.fromkeys(_label_states(), 0.0)
+    for label in labels:
         seconds[label.state.value.lower()] += label.end - label.start
     return seconds
+
+
+def _label_states() -> list[str]:
+    from holdfast.contact import LABEL_STATES
+
+    return [state.value.lower() for state in LABEL_STATES]
 
 
 def _faults(
     recording: "Recording", name: str, module: "Tactile", tare: "Tare"
 ) -> Mapping[str, int]:
-    """How many samples show which fault, as a detector would tell them."""
+    """Return the number of samples with each fault that a detector finds."""
     import msgspec
 
     from holdfast.contact import SIGNAL_FAULTS
@@ -156,23 +165,23 @@ def _faults(
 
 
 def _print_one(document: Mapping[str, Any]) -> None:
-    complete = "yes" if document["complete"] else "no: the end of the file was cut off"
+    complete = "yes" if document["complete"] else "no: the end of the file is cut off"
     rows = [
         ("duration", f"{document['duration']:.3f} s from {document['start']:.3f} s"),
         ("complete", complete),
         ("digest", document["digest"]),
-        *((key, _short(value)) for key, value in document["metadata"].items()),
+        *((key, _shorten(value)) for key, value in document["metadata"].items()),
         *((f"media at {x['offset']:g} s", x["path"]) for x in document["media"]),
     ]
     if document["truth"]:
-        rows.append(("truth", _short(", ".join(_channels(document["truth"])))))
+        rows.append(("truth", _shorten(", ".join(_channels(document["truth"])))))
     print_table(("recording", document["name"]), rows)
-    show()
+    print_line()
     header = ("module", "sensor", "taxels", "unit", "samples", "rate [Hz]", "gaps", "repeats")
-    labels = tuple(f"{state} [s]" for state in LABEL_STATES)
+    labels = tuple(f"{state} [s]" for state in _label_states())
     print_table((*header, *labels, "faults"), _module_rows(document["modules"]))
     if document["markers"]:
-        show()
+        print_line()
         print_table(
             ("marker [s]", "text"), [(f"{m['time']:.3f}", m["text"]) for m in document["markers"]]
         )
@@ -194,7 +203,7 @@ def _module_rows(modules: Mapping[str, Mapping[str, Any]]) -> list[tuple[object,
             f"{m['rate']:.1f}",
             m["gaps"],
             m["repeats"],
-            *(f"{m['labels'][state]:.2f}" for state in LABEL_STATES),
+            *(f"{m['labels'][state]:.2f}" for state in _label_states()),
             ", ".join(f"{fault} {n}" for fault, n in m["faults"].items()) or "none",
         )
         for name, m in modules.items()
@@ -202,7 +211,7 @@ def _module_rows(modules: Mapping[str, Mapping[str, Any]]) -> list[tuple[object,
 
 
 def _print_all(documents: list[dict[str, Any]]) -> None:
-    labels = tuple(f"{state} [s]" for state in LABEL_STATES)
+    labels = tuple(f"{state} [s]" for state in _label_states())
     print_table(
         ("recording", "modules", "samples", "rate [Hz]", "duration [s]", "gaps", *labels, "state"),
         [_summary(document) for document in documents],
@@ -210,7 +219,7 @@ def _print_all(documents: list[dict[str, Any]]) -> None:
 
 
 def _summary(document: Mapping[str, Any]) -> tuple[object, ...]:
-    """A line of the table; labels are the mean over the modules, who share them as a rule."""
+    """Return a row of the table; the seconds of labels are the mean over the modules."""
     if "error" in document:
         return (document["name"], *8 * ("-",), "unreadable")
     modules = list(document["modules"].values())
@@ -223,11 +232,11 @@ def _summary(document: Mapping[str, Any]) -> tuple[object, ...]:
         f"{rates[len(rates) // 2]:.1f}",
         f"{document['duration']:.2f}",
         sum(m["gaps"] for m in modules),
-        *(f"{sum(m['labels'][s] for m in modules) / len(modules):.2f}" for s in LABEL_STATES),
-        ", ".join(([] if document["complete"] else ["cut"]) + faults) or "sound",
+        *(f"{sum(m['labels'][s] for m in modules) / len(modules):.2f}" for s in _label_states()),
+        ", ".join(([] if document["complete"] else ["cut off"]) + faults) or "ok",
     )
 
 
-def _short(value: object) -> str:
+def _shorten(value: object) -> str:
     text = " ".join(str(value).split())
-    return text if len(text) <= MOST_TEXT else f"{text[: MOST_TEXT - 3]}..."
+    return text if len(text) <= MAX_VALUE_LENGTH else f"{text[: MAX_VALUE_LENGTH - 3]}..."

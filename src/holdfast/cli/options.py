@@ -1,4 +1,4 @@
-"""What verbs that judge samples have in common: the model as it is wanted, and what to tell."""
+"""Options that several verbs share, with the checks and conversions of their values."""
 
 import math
 from collections.abc import Mapping
@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from holdfast.cli.terminal.console import say
+from holdfast.cli.terminal.console import print_message
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -17,121 +17,173 @@ if TYPE_CHECKING:
     from holdfast.model import Model
     from holdfast.sources import Source
 
+PLOT_SUFFIXES = (".pdf", ".png", ".svg")
 
-class RateRule(StrEnum):
-    """What becomes of a source at another rate than the model's."""
+
+class RatePolicy(StrEnum):
+    """What to do with a source whose rate is not within 20 % of the model's."""
 
     RESAMPLE = "resample"
     STRICT = "strict"
 
 
 ModelArgument = Annotated[
-    str, typer.Argument(help="A model's file, builtin:twin or builtin:noise-floor.")
+    str, typer.Argument(help="A model file, builtin:twin or builtin:noise-floor.")
 ]
-SourceArgument = Annotated[str, typer.Argument(help="A recording's path, or a URI: see above.")]
+SourceArgument = Annotated[
+    str, typer.Argument(help="Path of a recording, or URI of a source (see above).")
+]
+JsonOption = Annotated[bool, typer.Option("--json", help="Print JSON on stdout.")]
+SeedOption = Annotated[int, typer.Option("--seed", help="Seed of all random numbers.")]
+JobsOption = Annotated[
+    int, typer.Option("--jobs", help="Number of parallel processes; -1: one per processor.")
+]
+TareOption = Annotated[
+    str,
+    typer.Option("--tare", help="Tare: seconds from the start, first, none, or START:END [s]."),
+]
+
 RateOption = Annotated[
-    RateRule, typer.Option("--rate", help="Of a source not within 20 % of the model's rate.")
+    RatePolicy,
+    typer.Option(
+        "--rate",
+        help="If the rate is not within 20 % of the model's: resample the source, or refuse it.",
+    ),
 ]
 DebounceOption = Annotated[
-    float | None, typer.Option("--debounce", help="Tell a state once it has lasted so long [s].")
+    float | None,
+    typer.Option(
+        "--debounce",
+        help="Minimum time a new state must last before it is reported [s].",
+        show_default="as in the model",
+    ),
 ]
 HysteresisOption = Annotated[
     float | None,
-    typer.Option("--hysteresis", help="How far past its threshold a probability must go."),
+    typer.Option(
+        "--hysteresis",
+        help="Distance from the threshold that the probability must exceed to change the state.",
+        show_default="as in the model",
+    ),
 ]
 IgnoreOption = Annotated[
-    str, typer.Option("--ignore", help="Taxels that count for nothing: index:7,index:12.")
+    str,
+    typer.Option("--ignore", help="Taxels to ignore, counted from 0: index:7,index:12."),
+]
+SpeedOption = Annotated[
+    float,
+    typer.Option(
+        "--speed", help="Speed of a recording or the twin: 1 is real time, 0 as fast as possible."
+    ),
+]
+
+HostOption = Annotated[str, typer.Option("--host", help="Address to listen on.")]
+PortOption = Annotated[
+    int, typer.Option("--port", help="Port to listen on; 0 selects a free port.")
+]
+TokenOption = Annotated[
+    str | None,
+    typer.Option("--token", help="Secret that clients must send; required for other hosts."),
+]
+PlotOption = Annotated[
+    Path | None, typer.Option("--plot", help="Write a figure to this .svg, .png or .pdf file.")
+]
+ForcePlotOption = Annotated[
+    bool, typer.Option("--force", help="Overwrite the figure if it exists.")
 ]
 
 
-def debounced(name: str, debounce: float | None, hysteresis: float | None) -> "Model":
-    """The model of that name, held back as asked for where it is asked for."""
+def load_model(name: str, debounce: float | None, hysteresis: float | None) -> "Model":
+    """Load a model and apply `--debounce` and `--hysteresis`, if given."""
     from msgspec.structs import replace
 
     from holdfast.model import Debounce, Model
 
     model = Model.load(name)
-    known = model.debounce
-    held = Debounce(
-        known.min_duration if debounce is None else debounce,
-        known.hysteresis if hysteresis is None else hysteresis,
-        known.hold,
+    own = model.debounce
+    chosen = Debounce(
+        own.min_duration if debounce is None else debounce,
+        own.hysteresis if hysteresis is None else hysteresis,
+        own.hold,
     )
-    return replace(model, name=model.name or name, debounce=held)
+    return replace(model, name=model.name or name, debounce=chosen)
 
 
-def stream_detector_of(
-    model: "Model", source: "Source", rate: RateRule, ignore: str
+def create_stream_detector(
+    model: "Model", source: "Source", rate: RatePolicy, ignore: str
 ) -> "StreamDetector":
-    """Return the stream detector of an open source; report on stderr what the source lacks."""
+    """Create the detector of an open source, and report fingers that the source lacks."""
     from holdfast.live.stream_detector import StreamDetector
 
-    stream = StreamDetector(model, source, strict=rate is RateRule.STRICT, ignore=taxels_of(ignore))
-    tell_missing(model, source.name, source.sensors)
+    stream = StreamDetector(
+        model, source, strict=rate is RatePolicy.STRICT, ignore=parse_taxels(ignore)
+    )
+    report_missing_fingers(model, source.name, source.sensors)
     return stream
 
 
-def tell_missing(model: "Model", name: str, modules: Mapping[str, object]) -> None:
-    """Tells on stderr which fingers of the model a source or recording lacks."""
+def report_missing_fingers(model: "Model", name: str, modules: Mapping[str, object]) -> None:
+    """Print the fingers of the model that a source or recording lacks."""
     missing = [finger for finger in model.fingers if finger not in ("*", *modules)]
     if missing:
-        say(f"the model also judges {', '.join(missing)}; {name} has {', '.join(modules)}")
+        print_message(
+            f"{name} has {', '.join(modules)}; the model also has {', '.join(missing)}, "
+            "which get no estimates"
+        )
 
 
-def taxels_of(text: str) -> dict[str, tuple[int, ...]]:
-    """Taxels by finger, as `--ignore` gives them.
+def parse_taxels(text: str) -> dict[str, tuple[int, ...]]:
+    """Return the taxels of each finger from the text of `--ignore`.
 
     Raises:
-        ValueError: it is not of that form.
+        ValueError: the text is not FINGER:TAXEL,...
 
     Example:
-        >>> taxels_of("index:7,index:12,thumb:0")
+        >>> parse_taxels("index:7,index:12,thumb:0")
         {'index': (7, 12), 'thumb': (0,)}
     """
-    found: dict[str, tuple[int, ...]] = {}
+    taxels: dict[str, tuple[int, ...]] = {}
     for part in filter(None, text.split(",")):
         finger, _, number = part.strip().rpartition(":")
         if not (finger and number.isdecimal()):
             raise ValueError(f"--ignore: FINGER:TAXEL,... expected, {text!r} given")
-        found[finger] = (*found.get(finger, ()), int(number))
-    return found
-
-
-SUFFIXES = (".pdf", ".png", ".svg")
-
-
-def refuse_plot(plot: Path, force: bool) -> None:
-    """Does nothing where a figure may be written there.
-
-    Raises:
-        ValueError: another suffix.
-        OutputError: it exists and `force` is not given, or its folder does not exist.
-    """
-    from holdfast.files import refuse_overwrite
-
-    if plot.suffix.lower() not in SUFFIXES:
-        raise ValueError(f"a plot ends in {', '.join(SUFFIXES)}; {plot.name!r} given")
-    refuse_overwrite(plot, force=force)
-
-
-def save_plot(figure: "Figure", plot: Path, force: bool) -> None:
-    """Writes the figure, and says so."""
-    from holdfast.files import whole_file
-
-    with whole_file(plot, force=force) as part:
-        figure.savefig(part)
-    say(f"{plot} written")
+        taxels[finger] = (*taxels.get(finger, ()), int(number))
+    return taxels
 
 
 def check_speed(source: str, speed: float) -> None:
-    """Refuses a speed that no source has, or that is not that of this one.
+    """Check that the source can be played at this speed.
 
     Raises:
-        ValueError: it is negative or not finite, or a device is given another than its own.
+        ValueError: the speed is negative or not finite, or the source is a device and the
+            speed is not 1.
     """
     from holdfast.sources.uri import is_uri
 
     if not (math.isfinite(speed) and speed >= 0):
         raise ValueError(f"--speed: at least 0 expected, {speed:g} given")
     if speed != 1 and is_uri(source) and not source.startswith("twin:"):
-        raise ValueError(f"--speed is for recordings and the twin; {source} has its own")
+        raise ValueError(f"--speed is for recordings and the twin; {source} is a device")
+
+
+def check_plot(plot: Path, force: bool) -> None:
+    """Check that a figure can be written to this path.
+
+    Raises:
+        ValueError: the suffix is not one of `PLOT_SUFFIXES`.
+        OutputError: the file exists and `force` is not given, or its folder does not exist.
+    """
+    from holdfast.files import refuse_overwrite
+
+    if plot.suffix.lower() not in PLOT_SUFFIXES:
+        raise ValueError(f"a plot ends in {', '.join(PLOT_SUFFIXES)}; {plot.name!r} given")
+    refuse_overwrite(plot, force=force)
+
+
+def save_plot(figure: "Figure", plot: Path, force: bool) -> None:
+    """Write a figure, and print its path on stderr."""
+    from holdfast.files import whole_file
+
+    with whole_file(plot, force=force) as part:
+        figure.savefig(part)
+    print_message(f"{plot} written")

@@ -1,60 +1,60 @@
-"""`holdfast play`: a stand-in for XELA's server, fed from a recording or the twin."""
+"""`holdfast play`: a simulated XELA server that sends a recording or the twin."""
 
-import signal
 import sys
 import time
-from collections.abc import Iterator
-from contextlib import contextmanager, suppress
+from contextlib import suppress
 from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from holdfast.cli.options import check_speed
-from holdfast.cli.terminal.console import print_json, say
+from holdfast.cli.options import HostOption, PortOption, SourceArgument, check_speed
+from holdfast.cli.terminal.console import print_json, print_message
+from holdfast.cli.terminal.stopping import handle_stop_signals
 
 if TYPE_CHECKING:
     from holdfast.live.xela_server import XelaServer
 
-LOOK_EVERY = 0.2
-"""How often it is looked whether it has ended [s]."""
-REFRESH = 1.0
-"""How often the line with the rate is written anew on a terminal [s]."""
+POLL_INTERVAL = 0.2
+"""Time between two checks whether the server has ended [s]."""
+REFRESH_INTERVAL = 1.0
+"""Time between two updates of the rate on a terminal [s]."""
 
 
 def play(
-    source: Annotated[str, typer.Argument(help="A recording's path, or a URI: see above.")],
-    version: Annotated[str, typer.Option(help="Of the server: 1.7 or 1.8.")] = "1.8",
-    host: Annotated[str, typer.Option(help="Address to listen at.")] = "127.0.0.1",
-    port: Annotated[int, typer.Option(help="Port; 0 finds a free one.")] = 5000,
+    source: SourceArgument,
+    version: Annotated[str, typer.Option(help="Version of the server: 1.7 or 1.8.")] = "1.8",
+    host: HostOption = "127.0.0.1",
+    port: PortOption = 5000,
     speed: Annotated[
-        float, typer.Option(help="1 is real time; slower, clients take the samples as late.")
+        float,
+        typer.Option(help="1 is real time; at a lower speed, clients report late samples."),
     ] = 1.0,
     once: Annotated[
-        bool, typer.Option("--once", help="Wait for a client, play once, and end.")
+        bool, typer.Option("--once", help="Wait for a client, play once, and stop.")
     ] = False,
     whole_hand: Annotated[
         bool | None,
         typer.Option(
             "--whole-hand/--separate",
-            help="Fingertips inside the packet of a hand, or as sensors 1, 2, ...; by default "
-            "the former where they are called as an Allegro hand's.",
+            help="Send the fingertips within the packet of a whole hand, or as sensors 1, 2, ...",
+            show_default="whole hand if the modules have the names of an Allegro hand",
         ),
     ] = None,
     as_json: Annotated[
         bool,
-        typer.Option("--json", help="Print where it listens, and at the end how much it sent."),
+        typer.Option("--json", help="Print the address, and at the end the number of packets."),
     ] = False,
 ) -> None:
-    """Acts as a XELA server for a recording or the twin.
+    """Send a recording or the twin as a XELA server does.
 
-    Programs that read xela_server read this instead: the same packets over a WebSocket, at the
-    pace of the recording, whose times they carry, shifted to now. Modules of an Allegro hand
-    become one sensor of 368 taxels, with those that are missing at rest; others, or all with
-    --separate, the server's sensors 1, 2, ... Readings in newtons are sent as calibrated
-    values, with counts made up from a data sheet. Ctrl-C ends it.
+    A program for xela_server receives the same packets over a WebSocket, in real time. Their
+    times are those of the recording, shifted to now. The modules of an Allegro hand are sent as
+    one sensor of 368 taxels, in which missing modules are at rest. Other modules, or all with
+    --separate, are sent as sensors 1, 2, ... Readings in newtons are sent as calibrated values,
+    with counts computed from a data sheet. Stop it with Ctrl-C.
 
-    SOURCE is the path of a recording, or twin:?object=can&seed=1; it begins anew when it is
-    over, unless --once is given.
+    SOURCE is the path of a recording, or twin:?object=can&seed=1. It is repeated, unless --once
+    is given.
 
     Example:
       holdfast play twin:?object=can
@@ -73,49 +73,38 @@ def play(
         server = XelaServer(
             opened, version=version, host=host, port=port, whole_hand=whole, wait=once
         )
-        with _interruptible(), server:
-            _tell_begin(server, source, version, as_json=as_json)
-            _follow(server)
+        with suppress(KeyboardInterrupt), handle_stop_signals(), server:
+            _print_address(server, source, version, as_json=as_json)
+            _print_status(server)
     if server.failure is not None:
         raise server.failure
     if as_json:
         print_json({"packets": server.n_packets})
-    say(f"{server.n_packets} packets sent")
+    print_message(f"{server.n_packets} packets sent")
 
 
-@contextmanager
-def _interruptible() -> Iterator[None]:
-    """Ctrl-C and SIGTERM end what is inside, in order."""
-    before = signal.signal(signal.SIGTERM, signal.default_int_handler)
-    try:
-        with suppress(KeyboardInterrupt):
-            yield
-    finally:
-        signal.signal(signal.SIGTERM, before)
-
-
-def _tell_begin(server: "XelaServer", source: str, version: str, *, as_json: bool) -> None:
+def _print_address(server: "XelaServer", source: str, version: str, *, as_json: bool) -> None:
     if as_json:
         modules = {str(number): list(names) for number, names in server.encoder.modules.items()}
         print_json({"uri": server.uri, "version": version, "sensors": modules, "source": source})
         sys.stdout.flush()
-    say(f"{server.uri} plays {source} as a XELA server {version}; Ctrl-C ends it")
+    print_message(f"{server.uri} sends {source} as a XELA server {version}; Ctrl-C stops it")
 
 
-def _follow(server: "XelaServer") -> None:
-    """Tells who listens until it has ended: on a terminal all the time, else where it changes."""
-    began, sent, told = time.monotonic(), 0, -1
-    while not server.wait(LOOK_EVERY):
+def _print_status(server: "XelaServer") -> None:
+    """Print the number of clients until the server ends; without a terminal only its changes."""
+    updated_at, n_sent, n_clients = time.monotonic(), 0, -1
+    while not server.wait(POLL_INTERVAL):
         now = time.monotonic()
-        if sys.stderr.isatty() and now - began >= REFRESH:
-            rate = (server.n_packets - sent) / (now - began)
+        if sys.stderr.isatty() and now - updated_at >= REFRESH_INTERVAL:
+            rate = (server.n_packets - n_sent) / (now - updated_at)
             sys.stderr.write(f"\r{_clients(server.n_clients)}, {rate:.1f} packets/s \033[K")
-            began, sent = now, server.n_packets
-        elif not sys.stderr.isatty() and server.n_clients != told:
-            told = server.n_clients
-            say(_clients(told))
+            updated_at, n_sent = now, server.n_packets
+        elif not sys.stderr.isatty() and server.n_clients != n_clients:
+            n_clients = server.n_clients
+            print_message(_clients(n_clients))
     if sys.stderr.isatty():
-        say("")
+        print_message("")
 
 
 def _clients(number: int) -> str:

@@ -1,11 +1,12 @@
-"""`holdfast sensors`: which sensors and hands are known, and what they look like."""
+"""`holdfast sensors`: the built-in sensors and hands."""
 
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from holdfast.cli.terminal.console import print_json, print_table, show
+from holdfast.cli.options import ForcePlotOption, JsonOption, PlotOption, check_plot, save_plot
+from holdfast.cli.terminal.console import print_json, print_line, print_table
 
 if TYPE_CHECKING:
     from holdfast.sensors import Hand, Sensor
@@ -14,21 +15,19 @@ if TYPE_CHECKING:
 def sensors(
     name: Annotated[
         str | None,
-        typer.Argument(help="A built-in sensor or hand, a .json sensor file, or a .urdf file."),
+        typer.Argument(help="Name of a built-in sensor or hand, or a .json or .urdf file."),
     ] = None,
     base: Annotated[
-        str | None, typer.Option(help="The link of the .urdf file that is the fingertip frame.")
+        str | None, typer.Option(help="Link of the .urdf file that is the fingertip frame.")
     ] = None,
-    plot: Annotated[
-        Path | None, typer.Option(help="Draw its taxels to this .svg, .png or .pdf file.")
-    ] = None,
-    force: Annotated[bool, typer.Option("--force", help="Overwrite the plot.")] = False,
-    as_json: Annotated[bool, typer.Option("--json", help="Print JSON on stdout.")] = False,
+    plot: PlotOption = None,
+    force: ForcePlotOption = False,
+    as_json: JsonOption = False,
 ) -> None:
-    """Shows the sensors and hands that are known.
+    """List the known sensors and hands, or show one of them.
 
-    Without a name it lists them; with one it shows that sensor or hand: its taxels, unit, rate,
-    limits and normal, or the modules of a hand and their places in the flat packet.
+    For a sensor: its taxels, unit, rate, limits and normal. For a hand: its modules and their
+    indices in the flat packet. The figure shows the taxels.
 
     Example:
       holdfast sensors
@@ -36,7 +35,7 @@ def sensors(
       holdfast sensors fingertip.urdf --base tip_link --json
     """
     if name is None:
-        _refuse(plot, base)
+        _refuse_options(plot, base)
         _show_all(as_json)
         return
     found = _find(name, base)
@@ -45,7 +44,7 @@ def sensors(
     _show_one(found, as_json)
 
 
-def _refuse(plot: Path | None, base: str | None) -> None:
+def _refuse_options(plot: Path | None, base: str | None) -> None:
     if plot is not None or base is not None:
         raise ValueError("--plot and --base need the name of a sensor; holdfast sensors lists them")
 
@@ -88,7 +87,7 @@ def _show_all(as_json: bool) -> None:
         return
     rows = [(s.name, s.n_taxels, s.unit, f"{s.rate:g} Hz") for s in all_sensors]
     print_table(("sensor", "taxels", "unit", "rate"), rows)
-    show()
+    print_line()
     print_table(
         ("hand", "taxels", "modules"), [(h.name, h.n_taxels, len(h.modules)) for h in all_hands]
     )
@@ -145,7 +144,7 @@ def _print_sensor(sensor: "Sensor") -> None:
             ("normal", f"({normal}) in the fingertip frame"),
         ],
     )
-    show()
+    print_line()
     rows = [
         (k + 1, *(f"{1e3 * p:.1f}" for p in position), *(f"{z:.2f}" for z in rotation[:, 2]))
         for k, (position, rotation) in enumerate(
@@ -164,7 +163,7 @@ def _print_hand(hand: "Hand") -> None:
 
 
 def _ranges(indices: list[int]) -> str:
-    """Indices as ranges: "0-8, 18-26"."""
+    """Return indices as ranges: "0-8, 18-26"."""
     runs: list[list[int]] = []
     for index in sorted(indices):
         if runs and index == runs[-1][1] + 1:
@@ -175,9 +174,7 @@ def _ranges(indices: list[int]) -> str:
 
 
 def _draw(found: "Sensor | Hand", plot: Path, force: bool) -> None:
-    from holdfast.cli.options import refuse_plot, save_plot
-
-    refuse_plot(plot, force)
+    check_plot(plot, force)
     from holdfast.plots.sensors import plot_hand, plot_sensor
     from holdfast.sensors import Sensor
 

@@ -1,4 +1,4 @@
-"""`holdfast serve`: what a model says of a source, on a page and for other programs."""
+"""`holdfast serve`: the estimates of a source on a web page and for other programs."""
 
 import os
 import sys
@@ -13,17 +13,21 @@ import typer
 
 from holdfast.cli.options import (
     DebounceOption,
+    HostOption,
     HysteresisOption,
     IgnoreOption,
     ModelArgument,
+    PortOption,
     RateOption,
-    RateRule,
+    RatePolicy,
     SourceArgument,
+    SpeedOption,
+    TokenOption,
     check_speed,
-    debounced,
-    stream_detector_of,
+    create_stream_detector,
+    load_model,
 )
-from holdfast.cli.terminal.console import print_json, say
+from holdfast.cli.terminal.console import print_json, print_message
 
 if TYPE_CHECKING:
     from holdfast.live.ros_publisher import RosPublisher
@@ -33,40 +37,38 @@ if TYPE_CHECKING:
     from holdfast.sources import Source
     from holdfast.web.guard import Guard
 
-HOST, PORT = "127.0.0.1", 8080
+DEFAULT_HOST, DEFAULT_PORT = "127.0.0.1", 8080
 
 
 def serve(
     model: ModelArgument,
     source: SourceArgument,
-    host: Annotated[str, typer.Option(help="Address to listen at.")] = HOST,
-    port: Annotated[int, typer.Option(help="Port; 0 finds a free one.")] = PORT,
-    token: Annotated[
-        str | None, typer.Option(help="Secret that readers must know; needed with --host.")
-    ] = None,
+    host: HostOption = DEFAULT_HOST,
+    port: PortOption = DEFAULT_PORT,
+    token: TokenOption = None,
     record_to: Annotated[
-        Path, typer.Option(help="Folder for the recordings that the page makes.")
+        Path, typer.Option(help="Folder for recordings that are started on the page.")
     ] = Path("recordings"),
-    speed: Annotated[float, typer.Option(help="Of a recording or the twin: 1 is real time.")] = 1.0,
+    speed: SpeedOption = 1.0,
     once: Annotated[
-        bool, typer.Option("--once", help="Play a recording once, and end with it.")
+        bool, typer.Option("--once", help="Play a recording once, and stop at its end.")
     ] = False,
-    rate: RateOption = RateRule.RESAMPLE,
+    rate: RateOption = RatePolicy.RESAMPLE,
     debounce: DebounceOption = None,
     hysteresis: HysteresisOption = None,
     ignore: IgnoreOption = "",
-    ros2: Annotated[bool, typer.Option("--ros2", help="Publish on ROS 2 topics too.")] = False,
-    ros1: Annotated[bool, typer.Option("--ros1", help="Publish on ROS 1 topics too.")] = False,
+    ros2: Annotated[bool, typer.Option("--ros2", help="Also publish on ROS 2 topics.")] = False,
+    ros1: Annotated[bool, typer.Option("--ros1", help="Also publish on ROS 1 topics.")] = False,
     as_json: Annotated[
-        bool, typer.Option("--json", help="Print where the page is as JSON.")
+        bool, typer.Option("--json", help="Print the address of the page as JSON.")
     ] = False,
 ) -> None:
-    """Shows what a model says of a source on a page, and tells other programs.
+    """Show the estimates of a source on a web page, and publish them.
 
-    The page shows every finger's state, force, sigma, probability, taxels and faults; it takes
-    the tare and records. Programs read the WebSocket /api/v1/estimates (every sample) or
-    /api/v1/live (twenty times a second): docs/live.md. Only this machine reaches it, unless
-    --host says otherwise. Ctrl-C ends it.
+    The page shows the state, force, sigma, probability, taxels and faults of every finger. It
+    can also take the tare and record. Other programs read the WebSocket /api/v1/estimates (every
+    sample) or /api/v1/live (twenty times per second), see docs/live.md. Without --host, only
+    this machine can connect. Stop it with Ctrl-C.
 
     SOURCE is the path of a recording, xela://HOST:PORT (or xela://auto), twin:?object=can,
     ros2:///xServTopic, ros1:///xServTopic or serial:///dev/ttyACM0?sensor=anyskin.
@@ -82,40 +84,42 @@ def serve(
 
     guard = Guard(host, token)
     check_speed(source, speed)
-    wanted = debounced(model, debounce, hysteresis)
+    loaded = load_model(model, debounce, hysteresis)
     compile_kernels()
 
-    def tell(url: str) -> None:
+    def announce(url: str) -> None:
         page = url if token is None else f"{url}?token={quote(token, safe='')}"
         if as_json:
-            print_json({"url": page, "model": wanted.name, "source": source})
+            print_json({"url": page, "model": loaded.name, "source": source})
             sys.stdout.flush()
-        say(f"{page} shows what {wanted.name} says of {source}; Ctrl-C ends it")
+        print_message(f"{page} shows the estimates of {loaded.name} for {source}; Ctrl-C stops it")
 
     with ExitStack() as stack:
         opened = stack.enter_context(open_source(source, speed=speed, loop=not once))
-        stream = stream_detector_of(wanted, opened, rate, ignore)
-        publishers = [stack.enter_context(one) for one in _publishers(stream, ros2=ros2, ros1=ros1)]
-        show_page(
-            wanted, opened, tell,
+        stream = create_stream_detector(loaded, opened, rate, ignore)
+        created = _create_publishers(stream, ros2=ros2, ros1=ros1)
+        publishers = [stack.enter_context(publisher) for publisher in created]
+        run_page(
+            loaded, opened, announce,
             stream=stream, host=host, port=port, guard=guard, folder=record_to,
             listeners=[publisher.put for publisher in publishers], stay=not once,
         )  # fmt: skip
-        _tell_unpublished(publishers)
+        _report_unpublished(publishers)
 
 
-def _tell_unpublished(publishers: "Sequence[RosPublisher]") -> None:
-    """Tells what ROS did not take: nobody sees it on the topics."""
+def _report_unpublished(publishers: "Sequence[RosPublisher]") -> None:
+    """Print how many estimates are missing on the ROS topics."""
     for publisher in publishers:
         if publisher.n_failed or publisher.n_dropped:
-            say(
-                f"{type(publisher).__name__}: ROS refused {publisher.n_failed} estimates, and was "
-                f"too slow for {publisher.n_dropped}"
+            print_message(
+                f"{type(publisher).__name__}: ROS refused {publisher.n_failed} estimates, "
+                f"{publisher.n_dropped} were dropped because it was too slow"
             )
 
 
-def _publishers(stream: "StreamDetector", *, ros2: bool, ros1: bool) -> "Iterator[RosPublisher]":
-    """Those of the estimates on ROS topics that are asked for."""
+def _create_publishers(
+    stream: "StreamDetector", *, ros2: bool, ros1: bool
+) -> "Iterator[RosPublisher]":
     units = {name: sensor.unit for name, sensor in stream.fingers.items()}
     if ros2:
         from holdfast.live.ros2_publisher import Ros2Publisher
@@ -127,36 +131,36 @@ def _publishers(stream: "StreamDetector", *, ros2: bool, ros1: bool) -> "Iterato
         yield Ros1Publisher(units)
 
 
-def show_page(
+def run_page(
     model: "Model",
     source: "Source",
-    tell: Callable[[str], None],
+    announce: Callable[[str], None],
     *,
     stream: "StreamDetector | None" = None,
-    host: str = HOST,
-    port: int = PORT,
+    host: str = DEFAULT_HOST,
+    port: int = DEFAULT_PORT,
     guard: "Guard | None" = None,
     folder: Path | None = None,
     listeners: Sequence["Listener"] = (),
     stay: bool = True,
 ) -> None:
-    """Serves the page of a source until Ctrl-C, or until the source ends where not `stay`.
+    """Run the live page of a source until Ctrl-C, or until the source ends if not `stay`.
 
     Args:
-        model: that judges.
-        source: that is open.
-        tell: is given the address once the page can be opened.
-        stream: detector of the source; one without options by default.
-        host: address to listen at.
-        port: 0 for any that is free.
-        guard: who may come in; this machine by default.
-        folder: where recordings go.
-        listeners: what else hears what is said.
-        stay: go on when the source has ended.
+        model: the model to use.
+        source: an open source.
+        announce: function that is called with the URL when the page can be opened.
+        stream: detector of the source; by default one without options.
+        host: address to listen on.
+        port: port to listen on; 0 selects a free one.
+        guard: access control; by default only this machine can connect.
+        folder: folder for recordings.
+        listeners: functions that are called with every update.
+        stay: continue when the source has ended.
 
     Raises:
-        OutputError: the address cannot be listened at.
-        Exception: that which made the session fail.
+        OutputError: the address is not available.
+        Exception: the failure of the session.
     """
     from holdfast.live.session import Session
     from holdfast.live.stream_detector import StreamDetector
@@ -171,7 +175,7 @@ def show_page(
     session.start()
     try:
         run_server(
-            service.app, host, port, tell,
+            service.app, host, port, announce,
             lambda: session.ended and not (stay and session.failure is None),
         )  # fmt: skip
     finally:
@@ -180,10 +184,10 @@ def show_page(
         raise session.failure
 
 
-def open_page(url: str) -> bool:
-    """Whether a browser with windows has been told to open a page; text browsers are not."""
-    windows = sys.platform in ("win32", "darwin")
-    if not (windows or os.environ.get("DISPLAY") or os.environ.get("WAYLAND_DISPLAY")):
+def open_browser(url: str) -> bool:
+    """Open a page in a graphical browser; return False if there is none."""
+    desktop = sys.platform in ("win32", "darwin")
+    if not (desktop or os.environ.get("DISPLAY") or os.environ.get("WAYLAND_DISPLAY")):
         return False
     try:
         return webbrowser.open(url)

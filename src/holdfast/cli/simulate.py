@@ -1,4 +1,4 @@
-"""`holdfast simulate`: recordings of the twin, with exact truth."""
+"""`holdfast simulate`: recordings of the physical twin, with exact truth."""
 
 from collections.abc import Sequence
 from itertools import product
@@ -7,8 +7,9 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from holdfast.cli.terminal.console import print_json, say, show
-from holdfast.cli.terminal.progress import Bar
+from holdfast.cli.options import JobsOption, JsonOption
+from holdfast.cli.terminal.console import print_json, print_line, print_message
+from holdfast.cli.terminal.progress import ProgressBar
 from holdfast.twin.profile import ATTEMPTS
 
 if TYPE_CHECKING:
@@ -16,36 +17,46 @@ if TYPE_CHECKING:
 
 
 def simulate(
-    out: Annotated[Path, typer.Argument(help="A folder; it is made if missing.")],
+    out: Annotated[
+        Path, typer.Argument(help="Folder for the recordings; it is created if missing.")
+    ],
     objects: Annotated[
-        str, typer.Option(help="Names, separated by commas; by default all of the table.")
+        str, typer.Option(help="Names of objects, separated by commas; by default all objects.")
     ] = "",
     table: Annotated[
-        Path | None, typer.Option(help="Objects of your own: a .toml file like the twin's.")
+        Path | None, typer.Option(help="Your own objects: a .toml file like that of the twin.")
     ] = None,
     cases: Annotated[str, typer.Option(help="1: hold; 2: hold and disturb; or 1,2.")] = "1,2",
-    repeats: Annotated[int, typer.Option(help="Of every object and case.")] = 5,
-    profile: Annotated[str, typer.Option(help="gentle, reference or vigorous.")] = "reference",
-    seed: Annotated[int, typer.Option(help="The same seed gives the same bytes.")] = 0,
+    repeats: Annotated[int, typer.Option(help="Number of grasps of each object and case.")] = 5,
+    profile: Annotated[
+        str, typer.Option(help="Profile of grip and disturbances: gentle, reference, vigorous.")
+    ] = "reference",
+    seed: Annotated[int, typer.Option(help="Seed; the same seed gives the same bytes.")] = 0,
     server: Annotated[
         bool,
-        typer.Option("--server", help="Unsteady stamps and repeated packets, as servers send."),
+        typer.Option(
+            "--server", help="Add irregular times and repeated packets, as a XELA server has."
+        ),
     ] = False,
-    jobs: Annotated[int, typer.Option(help="Grasps at a time; -1: one a processor.")] = -1,
+    jobs: JobsOption = -1,
     video: Annotated[
         Path | None,
-        typer.Option(help="Render the first grasp to this .gif, .png, .webp or .mp4 file."),
+        typer.Option(
+            help="Write a video of the first grasp to this .gif, .png, .webp or .mp4 file."
+        ),
     ] = None,
-    force: Annotated[bool, typer.Option("--force", help="Make all anew.")] = False,
-    as_json: Annotated[bool, typer.Option("--json", help="Print JSON on stdout.")] = False,
+    force: Annotated[
+        bool, typer.Option("--force", help="Simulate all grasps again, and overwrite them.")
+    ] = False,
+    as_json: JsonOption = False,
 ) -> None:
-    """Makes recordings of grasps by the physical twin.
+    """Simulate recordings of grasps with the physical twin.
 
-    The paper's protocol: an Allegro hand with uSkin fingertips closes on an object, holds it
-    (case 1) or holds it while a person disturbs it (case 2), and lets go. Every recording
-    carries the truth: forces, sliding, poses, phases. What was finished before is kept, so a
-    run that was stopped goes on where it was. A grasp that fails is kept as "...-failed1" and
-    tried again, a little calmer.
+    It follows the protocol of the paper: an Allegro hand with uSkin fingertips closes on an
+    object, holds it (case 1) or holds it while a person disturbs it (case 2), and releases it.
+    Every recording contains the truth: forces, slip, poses and phases. Existing recordings are
+    kept, so the same command continues a run that was stopped. If the object is dropped, the
+    recording is named "...-failed1" and the grasp is repeated with weaker disturbances.
 
     Example:
       holdfast simulate twin/
@@ -58,35 +69,39 @@ def simulate(
 
         check_film(video)
         refuse_overwrite(video, force=force)
-    wanted = grasps(objects, cases, repeats, profile, seed, server=server, table=table)
+    grasps = plan_grasps(objects, cases, repeats, profile, seed, server=server, table=table)
     out.mkdir(parents=True, exist_ok=True)
-    made = make_all(wanted, out, jobs=jobs, force=force)
+    names = simulate_grasps(grasps, out, jobs=jobs, force=force)
     if video is not None:
-        _film(wanted[0], video, force)
-    failed = [name for name in made if "-failed" in name]
+        _write_video(grasps[0], video, force)
+    failed = [name for name in names if "-failed" in name]
     if as_json:
-        print_json({"out": out, "recordings": made, "failed": failed, "profile": profile})
+        print_json({"out": out, "recordings": names, "failed": failed, "profile": profile})
         return
-    show(f"{len(made)} recordings in {out}, {len(failed)} of them of grasps that failed")
+    print_line(f"{len(names)} recordings in {out}, {len(failed)} of them of failed grasps")
 
 
-def make_all(wanted: "Sequence[Grasp]", out: Path, *, jobs: int, force: bool) -> list[str]:
-    """Simulates what is not there yet; the names of what was written."""
+def simulate_grasps(grasps: "Sequence[Grasp]", out: Path, *, jobs: int, force: bool) -> list[str]:
+    """Simulate the grasps whose recordings do not exist; return the names of new recordings.
+
+    Raises:
+        OutputError: an existing recording has another seed or profile.
+    """
     from holdfast.parallel import map_ordered
 
-    tasks = [(grasp, out, force) for grasp in wanted if force or not _done(grasp, out)]
-    if len(tasks) < len(wanted):
-        say(f"{len(wanted) - len(tasks)} of {len(wanted)} recordings are there already")
-    made = []
-    with Bar("simulating", len(tasks)) as bar:
-        for names in map_ordered(make, tasks, 1 if len(tasks) == 1 else jobs):
-            made += names
+    tasks = [(grasp, out, force) for grasp in grasps if force or not _is_finished(grasp, out)]
+    if len(tasks) < len(grasps):
+        print_message(f"{len(grasps) - len(tasks)} of {len(grasps)} recordings exist already")
+    written = []
+    with ProgressBar("simulating", len(tasks)) as bar:
+        for names in map_ordered(simulate_grasp, tasks, 1 if len(tasks) == 1 else jobs):
+            written += names
             bar.advance()
-    return made
+    return written
 
 
-def make(grasp: "Grasp", out: Path, force: bool) -> list[str]:
-    """Simulates a grasp, again and calmer as long as it fails; the names of what was written."""
+def simulate_grasp(grasp: "Grasp", out: Path, force: bool) -> list[str]:
+    """Simulate a grasp until it succeeds; return the names of the recordings."""
     from dataclasses import replace
 
     from holdfast.io import save_recording
@@ -94,21 +109,21 @@ def make(grasp: "Grasp", out: Path, force: bool) -> list[str]:
 
     names = []
     for attempt in range(ATTEMPTS):
-        tried = replace(grasp, attempt=attempt)
-        if not force and _failed_before(tried, out):
+        this = replace(grasp, attempt=attempt)
+        if not force and _has_failed(this, out):
             continue
-        recording = run(tried)
+        recording = run(this)
         path = out / f"{recording.name}.parquet"
         save_recording(recording, path, force=force)
         names.append(recording.name)
         if recording.metadata["case"] != "failed":
             break
     if force:
-        _clear(grasp, out, names)
+        _remove_others(grasp, out, names)
     return names
 
 
-def grasps(
+def plan_grasps(
     objects: str,
     cases: str,
     repeats: int,
@@ -118,17 +133,17 @@ def grasps(
     server: bool = False,
     table: Path | None = None,
 ) -> "list[Grasp]":
-    """The grasps that a user asks for.
+    """Return the grasps of all objects, cases and repeats.
 
     Raises:
         ValueError: an unknown object, case or profile, or a number out of range.
     """
     from holdfast.twin.objects import load_things
-    from holdfast.twin.profile import profile as known_profile
+    from holdfast.twin.profile import profile as check_profile
     from holdfast.twin.simulation import CASES, Grasp
 
     names = [name.strip() for name in objects.split(",")] if objects else list(load_things(table))
-    known_profile(profile)
+    check_profile(profile)
     if not {case.strip() for case in cases.split(",")} <= {str(case) for case in CASES}:
         raise ValueError(f"--cases 1, 2 or 1,2 expected, {cases!r} given")
     if repeats < 1 or seed < 0:
@@ -137,67 +152,64 @@ def grasps(
         )
     chosen = sorted({int(case) for case in cases.split(",")})
     source = None if table is None else str(table)
-    wanted = [
+    grasps = [
         Grasp(name, case, repeat, profile, seed, server=server, table=source)
         for name, case, repeat in product(names, chosen, range(1, repeats + 1))
     ]
-    for grasp in wanted:
-        grasp.thing  # noqa: B018 (refuses an unknown object before any work is done)
-    return wanted
+    for grasp in grasps:
+        grasp.thing  # noqa: B018 (raises for an unknown object before the simulation starts)
+    return grasps
 
 
-def _done(grasp: "Grasp", out: Path) -> bool:
-    """Whether it was finished before, from the same seed and profile.
+def _is_finished(grasp: "Grasp", out: Path) -> bool:
+    """Return whether the recording exists, or that of the last failed attempt."""
+    last_failed = f"{grasp.name}-failed{ATTEMPTS}"
+    return any(_exists(grasp, out / f"{name}.parquet") for name in (grasp.name, last_failed))
+
+
+def _has_failed(grasp: "Grasp", out: Path) -> bool:
+    """Return whether the recording of this failed attempt exists."""
+    return _exists(grasp, out / f"{grasp.failed_name}.parquet")
+
+
+def _exists(grasp: "Grasp", path: Path) -> bool:
+    """Return whether a recording exists, and check that it has the settings of the grasp.
 
     Raises:
-        OutputError: what is there was made otherwise.
+        OutputError: the recording has another profile or seed.
     """
-    path = out / f"{grasp.name}.parquet"
-    last_failed = out / f"{grasp.name}-failed{ATTEMPTS}.parquet"
-    for existing in (path, last_failed):
-        if existing.exists():
-            _check_origin(grasp, existing)
-            return True
-    return False
+    from holdfast.errors import OutputError
+    from holdfast.io import load_recording
+
+    if not path.exists():
+        return False
+    metadata = load_recording(path, labels=False).metadata
+    found = {name: metadata.get(name) for name in ("profile", "seed", "server")}
+    expected = {"profile": grasp.profile, "seed": grasp.seed, "server": grasp.server}
+    if found != expected:
+        raise OutputError(
+            f"{path} has {_list(found)}; {_list(expected)} given: choose another folder, "
+            "or overwrite it with --force"
+        )
+    return True
 
 
-def _clear(grasp: "Grasp", out: Path, names: "Sequence[str]") -> None:
-    """Removes what is left of the grasp from before: another seed fails at other times."""
+def _list(settings: "dict[str, object]") -> str:
+    return ", ".join(f"{name} {value}" for name, value in settings.items())
+
+
+def _remove_others(grasp: "Grasp", out: Path, names: "Sequence[str]") -> None:
+    """Remove older recordings of the grasp: another seed fails at other attempts."""
     failed = [f"{grasp.name}-failed{attempt + 1}" for attempt in range(ATTEMPTS)]
     for name in (grasp.name, *failed):
         if name not in names:
             (out / f"{name}.parquet").unlink(missing_ok=True)
 
 
-def _failed_before(grasp: "Grasp", out: Path) -> bool:
-    path = out / f"{grasp.failed_name}.parquet"
-    if path.exists():
-        _check_origin(grasp, path)
-    return path.exists()
-
-
-def _check_origin(grasp: "Grasp", path: Path) -> None:
-    from holdfast.errors import OutputError
-    from holdfast.io import load_recording
-
-    metadata = load_recording(path, labels=False).metadata
-    made = {name: metadata.get(name) for name in ("profile", "seed", "server")}
-    wanted = {"profile": grasp.profile, "seed": grasp.seed, "server": grasp.server}
-    if made != wanted:
-        raise OutputError(
-            f"{path} was made with {_listed(made)}; {_listed(wanted)} asked for: choose another "
-            "folder, or give --force"
-        )
-
-
-def _listed(origin: "dict[str, object]") -> str:
-    return ", ".join(f"{name} {value}" for name, value in origin.items())
-
-
-def _film(grasp: "Grasp", video: Path, force: bool) -> None:
+def _write_video(grasp: "Grasp", video: Path, force: bool) -> None:
     from holdfast.files import whole_file
     from holdfast.twin.film import film
 
-    say(f"rendering {grasp.name}: about a minute")
+    print_message(f"rendering {grasp.name}: about a minute")
     with whole_file(video, force=force) as part:
         film(grasp, part)

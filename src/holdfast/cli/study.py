@@ -1,4 +1,4 @@
-"""`holdfast study`: every table and figure of the paper, and those it should have had."""
+"""`holdfast study`: the tables and figures of the paper, and further experiments."""
 
 import os
 import time
@@ -7,8 +7,9 @@ from typing import TYPE_CHECKING, Annotated, NamedTuple
 
 import typer
 
-from holdfast.cli.simulate import grasps, make_all
-from holdfast.cli.terminal.console import print_json, print_table, say, show
+from holdfast.cli.options import JobsOption, JsonOption, SeedOption, TareOption
+from holdfast.cli.simulate import plan_grasps, simulate_grasps
+from holdfast.cli.terminal.console import print_json, print_line, print_message, print_table
 from holdfast.cli.terminal.progress import progress
 
 if TYPE_CHECKING:
@@ -16,48 +17,80 @@ if TYPE_CHECKING:
     from holdfast.study.plan import Corpus, StudyPlan
     from holdfast.study.report.result_tables import ResultTable, Row, TableLine
 
-HEADLINES: dict[str, tuple[str, ...]] = {
+PRINTED_COLUMNS: dict[str, tuple[str, ...]] = {
     "confusion": (),
     "methods": ("accuracy [%]", "FDR [%]", "FNR [%]", "AUC"),
     "events": ("missed at 50 ms [%]", "missed at 200 ms [%]", "in vain per minute"),
 }
-"""Tables that are printed at the end, and their columns; all where none are named."""
-HARDEST = ("by object", "by recording")
-"""Of the splits of main; the first that most methods have is printed."""
+"""Tables that are printed at the end, with their columns; an empty tuple means all columns."""
+PRINTED_SPLITS = ("by object", "by recording")
+"""Splits that can be printed; the first of those with the most methods is printed."""
+REAL_DATA = "uskin_pick_move"
+"""Folder of the real recordings, within `HOLDFAST_DATA`."""
+REAL_DATA_URL = "https://github.com/imanlab/proactive-slip-control"
+REAL_TARE = "first"
+"""The real recordings begin in contact."""
+
+
+class TwinCorpus(NamedTuple):
+    """Settings of a corpus that the twin simulates.
+
+    Attributes:
+        profile: profile of the twin.
+        seed_offset: number that is added to the seed.
+        other_objects: use another set of objects.
+    """
+
+    profile: str = "reference"
+    seed_offset: int = 0
+    other_objects: bool = False
+
+
+TWIN_CORPORA = {
+    "main": TwinCorpus(),
+    "fresh": TwinCorpus(seed_offset=1),
+    "others": TwinCorpus(other_objects=True),
+    "gentle": TwinCorpus("gentle"),
+    "vigorous": TwinCorpus("vigorous"),
+}
+QUICK_CORPORA = {name: TWIN_CORPORA[name] for name in ("main", "others")}
+N_REPEATS = 5
+"""Grasps of each object and case, as in the protocol of the paper."""
+QUICK_REPEATS = {"main": 2, "others": 1}
+"""Grasps of each object and case in each corpus of a quick study."""
 
 
 def study(
     data: Annotated[
-        Path | None, typer.Argument(help="A folder of labelled recordings; or --twin.")
+        Path | None, typer.Argument(help="A folder of labelled recordings; or give --twin.")
     ] = None,
     out: Annotated[
-        Path, typer.Option("--out", "-o", help="The folder that the study is written to.")
+        Path, typer.Option("--out", "-o", help="Folder for the results of the study.")
     ] = Path("study"),
     twin: Annotated[
-        bool, typer.Option("--twin", help="Make the recordings first, by the physical twin.")
+        bool, typer.Option("--twin", help="First simulate recordings with the physical twin.")
     ] = False,
     quick: Annotated[
-        bool, typer.Option("--quick", help="A few minutes: less of everything.")
+        bool, typer.Option("--quick", help="Run a smaller study that takes a few minutes.")
     ] = False,
     engine: Annotated[
-        str, typer.Option(help="loky: processes here; dask:ADDRESS: a cluster.")
+        str, typer.Option(help="loky: local processes; dask:ADDRESS: a Dask cluster.")
     ] = "loky",
-    jobs: Annotated[int, typer.Option(help="Processes here; -1: one a processor.")] = -1,
-    seed: Annotated[int, typer.Option(help="Of everything random, the twin too.")] = 0,
-    tare: Annotated[
-        str, typer.Option(help="Seconds from the start, first, none, or START:END.")
-    ] = "0.5",
+    jobs: JobsOption = -1,
+    seed: SeedOption = 0,
+    tare: TareOption = "0.5",
     force: Annotated[
-        bool, typer.Option("--force", help="Replace a study; its data and work are kept.")
+        bool,
+        typer.Option("--force", help="Overwrite a study; recordings and finished tasks are kept."),
     ] = False,
-    as_json: Annotated[bool, typer.Option("--json", help="Print study.json on stdout.")] = False,
+    as_json: JsonOption = False,
 ) -> None:
-    """Repeats the paper, and asks what it did not.
+    """Repeat the experiments of the paper, and run further ones.
 
-    Writes OUT/report.html, every table as CSV, JSON and LaTeX, every figure as SVG and PNG, and
-    study.json. What is computed is kept in OUT/work and what the twin makes in OUT/data: the same
-    command goes on where it was stopped. Real recordings are taken from HOLDFAST_DATA or
-    ../shared/data where there are any.
+    Write OUT/report.html, every table as CSV, JSON and LaTeX, every figure as SVG and PNG, and
+    study.json. Finished tasks are kept in OUT/work and simulated recordings in OUT/data, so the
+    same command continues a study that was stopped. Real recordings are read from HOLDFAST_DATA,
+    or from ../shared/data, if they exist.
 
     Example:
       holdfast study --twin --quick --out quick/
@@ -66,17 +99,23 @@ def study(
     """
     from holdfast.study.run import run_study
 
-    engines = _checked(data, out, engine, jobs, seed, tare, twin=twin, force=force)
-    begun = time.perf_counter()
+    engine_used = _check_arguments(data, out, engine, jobs, seed, tare, twin=twin, force=force)
+    started_at = time.perf_counter()
     try:
         plan, left_out = _plan(data, out, seed, tare, jobs, quick=quick)
-        made_in = time.perf_counter() - begun
+        made_in = time.perf_counter() - started_at
         tables = run_study(
-            plan, out, engines, progress=progress, notify=say, force=force, made_in=made_in,
+            plan,
+            out,
+            engine_used,
+            progress=progress,
+            notify=print_message,
+            force=force,
+            made_in=made_in,
             left_out=left_out,
-        )  # fmt: skip
+        )
     except KeyboardInterrupt:
-        say(f"what was done so far is in {out}: the same command goes on with it")
+        print_message(f"the finished part is in {out}: the same command continues it")
         raise
     if as_json:
         from msgspec import json
@@ -84,12 +123,12 @@ def study(
         print_json(json.decode((out / "study.json").read_bytes()))
         return
     for table in tables:
-        if table.name in HEADLINES:
-            _show(table)
-    show(f"{out / 'report.html'}: all {len(tables)} tables, with figures")
+        if table.name in PRINTED_COLUMNS:
+            _print_result_table(table)
+    print_line(f"{out / 'report.html'}: all {len(tables)} tables and the figures")
 
 
-def _checked(
+def _check_arguments(
     data: Path | None,
     out: Path,
     engine: str,
@@ -100,12 +139,12 @@ def _checked(
     twin: bool,
     force: bool,
 ) -> "Engine":
-    """Refuses bad input before any work is done; the engine.
+    """Check the arguments before the work begins; return the engine.
 
     Raises:
         ValueError: an argument is wrong.
-        OutputError: `out` holds something.
-        EngineError: no cluster answers there.
+        OutputError: `out` is not empty.
+        EngineError: no cluster answers at the address.
     """
     from holdfast.features import Tare
     from holdfast.parallel import Engine
@@ -129,13 +168,13 @@ def _checked(
 def _plan(
     data: Path | None, out: Path, seed: int, tare: str, jobs: int, *, quick: bool
 ) -> "tuple[StudyPlan, list[str]]":
-    """What is studied, and what is left out; makes the twin's recordings where it is asked to."""
+    """Return the plan and what is left out; simulate the recordings if there is no `data`."""
     from holdfast.study.plan import StudyPlan, scan_corpus
     from holdfast.study.run import check_plan
 
     if data is None:
-        made = out / "data" / "quick" if quick else out / "data"
-        corpora = twin_corpora(made, seed, quick=quick, jobs=jobs, tare=tare)
+        folder = out / "data" / "quick" if quick else out / "data"
+        corpora = twin_corpora(folder, seed, quick=quick, jobs=jobs, tare=tare)
     else:
         corpora = {"main": scan_corpus("main", data, tare)}
     check_plan(StudyPlan(corpora))
@@ -143,28 +182,28 @@ def _plan(
     return StudyPlan(corpora, real, quick, seed), left_out
 
 
-def _show(table: "ResultTable") -> None:
-    """A table for a terminal: ours, and the paper's in parentheses."""
+def _print_result_table(table: "ResultTable") -> None:
+    """Print a table on the terminal, with the values of the paper in parentheses."""
     from holdfast.study.report.result_tables import digits_of, pivot
 
-    grid = pivot(_headline(table))
+    grid = pivot(_printed_rows(table))
     paper = (
         " (in parentheses: the paper)" if any(row.paper is not None for row in table.rows) else ""
     )
-    show(f"{table.title}{paper}")
+    print_line(f"{table.title}{paper}")
     digits = [digits_of(table, name) for name in grid.columns]
     lines = [_texts(line, digits) for line in grid.lines]
     print_table((*table.lines, *grid.columns), lines)
-    show()
+    print_line()
 
 
-def _headline(table: "ResultTable") -> "ResultTable":
-    """The rows that are printed: of one split, at each method's own threshold."""
+def _printed_rows(table: "ResultTable") -> "ResultTable":
+    """Return the table with the rows to print: one split, and each method's own threshold."""
     from msgspec.structs import replace
 
-    columns = HEADLINES[table.name]
-    n_rows = {on: sum(row.keys.get("on") == on for row in table.rows) for on in HARDEST}
-    chosen = max(HARDEST, key=lambda on: n_rows[on])
+    columns = PRINTED_COLUMNS[table.name]
+    n_rows = {on: sum(row.keys.get("on") == on for row in table.rows) for on in PRINTED_SPLITS}
+    chosen = max(PRINTED_SPLITS, key=lambda on: n_rows[on])
     rows = [
         row
         for row in table.rows
@@ -189,92 +228,59 @@ def _text(row: "Row | None", digits: int) -> str:
     return number_text(row.ours, digits) + paper
 
 
-REAL = "uskin_pick_move"
-"""Folder of the real recordings, within `HOLDFAST_DATA`."""
-SOURCE = "https://github.com/imanlab/proactive-slip-control"
-REAL_TARE = "first"
-"""They begin in contact."""
-
-
-class Kind(NamedTuple):
-    """How the recordings of a corpus are made.
-
-    Attributes:
-        profile: of the twin.
-        later: added to the seed.
-        others: other objects than the twin's own.
-    """
-
-    profile: str = "reference"
-    later: int = 0
-    others: bool = False
-
-
-FULL = {
-    "main": Kind(),
-    "fresh": Kind(later=1),
-    "others": Kind(others=True),
-    "gentle": Kind("gentle"),
-    "vigorous": Kind("vigorous"),
-}
-QUICK = {name: FULL[name] for name in ("main", "others")}
-REPEATS = 5
-"""Of every object and case, as in the paper's protocol."""
-FEW = {"main": 2, "others": 1}
-"""The same in a quick study."""
-
-
 def twin_corpora(out: Path, seed: int, *, quick: bool, jobs: int, tare: str) -> "dict[str, Corpus]":
-    """Makes what is not there yet in `out`, a folder for each corpus.
+    """Simulate the missing recordings in `out`, in one folder for each corpus.
 
     Raises:
-        OutputError: what is there was made from another seed.
+        OutputError: existing recordings have another seed.
     """
     from holdfast.study.plan import scan_corpus
 
     corpora = {}
-    kinds = QUICK if quick else FULL
-    for number, (name, kind) in enumerate(kinds.items(), 1):
-        say(f"recordings of the twin, {number} of {len(kinds)}: {name}")
-        repeats = FEW[name] if quick else REPEATS
-        _simulate(out / name, kind, seed, repeats, jobs)
+    settings = QUICK_CORPORA if quick else TWIN_CORPORA
+    for number, (name, corpus) in enumerate(settings.items(), 1):
+        print_message(f"recordings of the twin, {number} of {len(settings)}: {name}")
+        repeats = QUICK_REPEATS[name] if quick else N_REPEATS
+        _simulate(out / name, corpus, seed, repeats, jobs)
         corpora[name] = scan_corpus(name, out / name, tare)
     return corpora
 
 
-def _simulate(folder: Path, kind: Kind, seed: int, repeats: int, jobs: int) -> None:
+def _simulate(folder: Path, corpus: TwinCorpus, seed: int, repeats: int, jobs: int) -> None:
     from holdfast.errors import OutputError
     from holdfast.twin.objects import OTHER_OBJECTS
 
-    table = OTHER_OBJECTS if kind.others else None
-    wanted = grasps("", "1,2", repeats, kind.profile, seed + kind.later, table=table)
+    table = OTHER_OBJECTS if corpus.other_objects else None
+    seed += corpus.seed_offset
+    grasps = plan_grasps("", "1,2", repeats, corpus.profile, seed, table=table)
     folder.mkdir(parents=True, exist_ok=True)
     try:
-        make_all(wanted, folder, jobs=jobs, force=False)
+        simulate_grasps(grasps, folder, jobs=jobs, force=False)
     except OutputError as cause:
-        made, _, advice = str(cause).rpartition(": ")
+        problem, _, advice = str(cause).rpartition(": ")
         if "--force" not in advice:
             raise
-        raise OutputError(f"{made}: choose another OUT, or delete its data") from cause
+        raise OutputError(f"{problem}: choose another OUT, or delete its data") from cause
 
 
 def real_corpus(out: Path) -> "tuple[Corpus | None, list[str]]":
-    """The real recordings, imported into `out`; and in a sentence why they are left out."""
+    """Import the real recordings into `out`; otherwise return why they are left out."""
     from holdfast.errors import HoldfastError
     from holdfast.study.plan import scan_corpus
 
-    source = Path(os.environ.get("HOLDFAST_DATA", "../shared/data"), REAL)
+    source = Path(os.environ.get("HOLDFAST_DATA", "../shared/data"), REAL_DATA)
     if not source.is_dir():
         return None, [
-            f"real recordings, for none are here. Get them from {SOURCE.removeprefix('https://')} "
-            f"into a folder {REAL}, and let HOLDFAST_DATA name the folder that holds it."
+            "real recordings, because none were found. Download them from "
+            f"{REAL_DATA_URL.removeprefix('https://')} into a folder {REAL_DATA}, and set "
+            "HOLDFAST_DATA to the folder that contains it."
         ]
     try:
         _import(source, out)
         return scan_corpus("real", out, REAL_TARE), []
     except (HoldfastError, ValueError) as cause:
-        say(f"the real recordings are left out: {cause}")
-        return None, [f"real recordings, for those of HOLDFAST_DATA cannot be used ({cause})."]
+        print_message(f"the real recordings are left out: {cause}")
+        return None, [f"real recordings, because those in HOLDFAST_DATA cannot be used ({cause})."]
 
 
 def _import(source: Path, out: Path) -> None:

@@ -1,11 +1,12 @@
-"""`holdfast train`: a model out of labelled recordings, with figures out of fold."""
+"""`holdfast train`: a model from labelled recordings, with cross-validated metrics."""
 
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from holdfast.cli.terminal.console import print_json, say, show
+from holdfast.cli.options import JsonOption, SeedOption
+from holdfast.cli.terminal.console import print_json, print_line, print_message
 from holdfast.cli.terminal.progress import progress
 
 if TYPE_CHECKING:
@@ -15,67 +16,81 @@ if TYPE_CHECKING:
 
 def train(
     data: Annotated[Path, typer.Argument(help="A folder of labelled recordings.")],
-    model: Annotated[Path, typer.Option("--output", "-o", help="Where the model goes (JSON).")],
+    model: Annotated[Path, typer.Option("--output", "-o", help="The model file to write (JSON).")],
     classifier: Annotated[
-        str | None, typer.Option(help="logreg or svm.", show_default="logreg")
+        str | None,
+        typer.Option(
+            help="logreg (logistic regression) or svm (linear SVM).", show_default="logreg"
+        ),
     ] = None,
     window: Annotated[
         int | None,
-        typer.Option(help="N_w, samples in the Haar window; even.", show_default="14"),
+        typer.Option(help="N_w: even number of samples in the Haar window.", show_default="14"),
     ] = None,
     features: Annotated[
         str | None,
         typer.Option(
-            help="Out of F_a, F_x, F_y, F_z, m, sigma; or holdfast: our own.",
+            help="Names from F_a, F_x, F_y, F_z, m, sigma; or holdfast for the extended set.",
             show_default="F_a,F_x,F_y,F_z,sigma",
         ),
     ] = None,
     tare: Annotated[
         str | None,
         typer.Option(
-            help="Seconds from the start, first, none, or START:END.",
+            help="Tare: seconds from the start, first, none, or START:END [s].",
             show_default="0.5, or as --init",
         ),
     ] = None,
     split: Annotated[
-        str, typer.Option(help="What is held out: recording, object, or random samples.")
+        str,
+        typer.Option(help="Unit to leave out in cross-validation: recording, object or random."),
     ] = "recording",
     trials: Annotated[
-        int, typer.Option(help="Of the search for parameters; 0: the reference setting.")
+        int,
+        typer.Option(help="Trials of the parameter search; 0 uses the reference parameters."),
     ] = 30,
-    seed: Annotated[int, typer.Option(help="Of everything random.")] = 0,
+    seed: SeedOption = 0,
     shared: Annotated[
-        bool, typer.Option("--shared", help="One classifier for all fingers.")
+        bool, typer.Option("--shared", help="Train one classifier for all fingers.")
     ] = False,
     contact_threshold: Annotated[
-        float | None, typer.Option(help="F_a below it is no contact; by default from the tare.")
+        float | None,
+        typer.Option(
+            help="F_a below this value is no contact, in the unit of the readings.",
+            show_default="from the tare",
+        ),
     ] = None,
     hold: Annotated[
         float | None,
         typer.Option(
-            help="UNSTABLE is told so long after the last sign of it [s].",
+            help="Time for which UNSTABLE is kept after the last unstable sample [s].",
             show_default="0, or as --init",
         ),
     ] = None,
     init: Annotated[
         str | None,
-        typer.Option(help="A model to adapt, with its features: a file, or builtin:twin."),
+        typer.Option(help="Model to adapt, with its features: a file, or builtin:twin."),
     ] = None,
     resume: Annotated[
-        bool, typer.Option("--resume", help="Go on with a search that was stopped.")
+        bool, typer.Option("--resume", help="Continue a search that was stopped.")
     ] = False,
     max_samples: Annotated[
-        int, typer.Option(help="A finger that are kept in memory; of more, every n-th.")
+        int,
+        typer.Option(
+            help="Maximum number of samples per finger; of more, every n-th sample is used."
+        ),
     ] = 200_000,
-    jobs: Annotated[int, typer.Option(help="Searches or fits at a time; -1: one a processor.")] = 1,
+    jobs: Annotated[
+        int, typer.Option(help="Number of parallel searches or fits; -1: one per processor.")
+    ] = 1,
     force: Annotated[bool, typer.Option("--force", help="Overwrite the model.")] = False,
-    as_json: Annotated[bool, typer.Option("--json", help="Print JSON on stdout.")] = False,
+    as_json: JsonOption = False,
 ) -> None:
-    """Trains a model from labelled recordings.
+    """Train a model from labelled recordings.
 
-    Prints figures of predictions out of fold: each recording (or object) is judged by a model
-    that has not seen it. The random split repeats the paper's protocol; neighbouring samples
-    are nearly copies, so it flatters.
+    Print cross-validated metrics: each recording (or object) is evaluated by a model that was
+    trained without it. The random split repeats the protocol of the paper. Its metrics are
+    optimistic, because neighbouring samples are nearly equal.
 
     Example:
       holdfast train recordings/ -o model.json
@@ -83,6 +98,7 @@ def train(
       holdfast train recordings/ -o model.json --features holdfast --hold 0.1
       holdfast train recordings/ -o model.json --init builtin:twin
     """
+    from holdfast.cli.evaluate import print_metrics
     from holdfast.files import refuse_overwrite
     from holdfast.io import load_dataset
     from holdfast.training import train as fit
@@ -101,67 +117,72 @@ def train(
     )
     refuse_overwrite(model, force=force)
     recordings = load_dataset(data)
-    journal = _journal(model, resume=resume, force=force)
+    journal = _search_journal(model, resume=resume, force=force)
     try:
-        trained = fit(recordings, setting, journal=journal, tell=say, follow=progress, n_jobs=jobs)
+        trained = fit(
+            recordings, setting, journal=journal, tell=print_message, follow=progress, n_jobs=jobs
+        )
     except KeyboardInterrupt:
         if journal.exists():
-            say(f"what the search found so far is in {journal}: go on with --resume")
+            print_message(f"the trials so far are in {journal}: continue with --resume")
         raise
     trained.model.save(model, force=force)
     journal.unlink(missing_ok=True)
     if as_json:
         print_json({"model": model, "split": split, "cross_validation": trained.cross_validation})
         return
-    from holdfast.cli.evaluate import show_metrics
-
-    show_metrics(trained.cross_validation)
-    show(
-        f"\n{model}: trained on {len(recordings)} recordings, judged by leaving out "
-        f"{'random samples' if split == 'random' else f'one {split} at a time'}"
+    print_metrics(trained.cross_validation)
+    left_out = "random samples" if split == "random" else f"one {split} at a time"
+    print_line(
+        f"\n{model}: trained on {len(recordings)} recordings; "
+        f"cross-validation leaves out {left_out}"
     )
 
 
-def _setting(init: str | None, rule: dict[str, Any], **options: Any) -> "Setting":  # noqa: ANN401
-    """How to train; options that are None were not given.
+def _setting(
+    init: str | None,
+    features: dict[str, Any],
+    **options: Any,  # noqa: ANN401
+) -> "Setting":
+    """Return the training setting; options that are None were not given.
 
     Args:
-        init: a model to adapt, which brings a rule of its own.
-        rule: classifier, window and features.
-        options: all else that `Setting` takes.
+        init: model to adapt, which has its own classifier, window and features.
+        features: classifier, window and features.
+        options: all other fields of `Setting`.
     """
     from holdfast.features import DEPLOYED_FEATURES, Tare, parse_features
     from holdfast.training import Setting
 
-    rule, chosen = (
-        {name: value for name, value in given.items() if value is not None}
-        for given in (rule, options)
+    given, chosen = (
+        {name: value for name, value in group.items() if value is not None}
+        for group in (features, options)
     )
     if "tare" in chosen:
         chosen["tare"] = Tare.parse(chosen["tare"])
     if init is not None:
-        return Setting.adapting(_model(init, rule), **chosen)
-    names = rule.get("features", ",".join(DEPLOYED_FEATURES))
-    rule["features"] = parse_features(names, rule.get("window", Setting.window))
-    return Setting(**rule, **chosen)
+        return Setting.adapting(_model_to_adapt(init, given), **chosen)
+    names = given.get("features", ",".join(DEPLOYED_FEATURES))
+    given["features"] = parse_features(names, given.get("window", Setting.window))
+    return Setting(**given, **chosen)
 
 
-def _model(init: str, rule: dict[str, Any]) -> "Model":
-    """The model to adapt, called as the user calls it."""
+def _model_to_adapt(init: str, given: dict[str, Any]) -> "Model":
+    """Load the model of `--init`; its name is the text of the option."""
     from msgspec.structs import replace
 
     from holdfast.model import Model
 
-    if rule:
+    if given:
         raise ValueError(
-            "--init brings the classifier, window and features of its model; leave out "
-            + " and ".join(f"--{name}" for name in rule)
+            "--init uses the classifier, window and features of its model; leave out "
+            + " and ".join(f"--{name}" for name in given)
         )
     return replace(Model.load(init), name=init)
 
 
-def _journal(model: Path, *, resume: bool, force: bool) -> Path:
-    """Where the search is kept until the model is written."""
+def _search_journal(model: Path, *, resume: bool, force: bool) -> Path:
+    """Return the file that keeps the trials of the search until the model is written."""
     from holdfast.errors import OutputError
 
     journal = model.with_name(f"{model.name}.search")
@@ -169,9 +190,9 @@ def _journal(model: Path, *, resume: bool, force: bool) -> Path:
         journal.unlink()
     if journal.exists() and not resume:
         raise OutputError(
-            f"{journal} holds a search that was stopped: go on with --resume, or start anew "
-            "with --force"
+            f"{journal} holds a search that was stopped: continue it with --resume, or start "
+            "again with --force"
         )
     if resume and not journal.exists():
-        raise OutputError(f"nothing to resume: there is no {journal}")
+        raise OutputError(f"nothing to resume: {journal} does not exist")
     return journal

@@ -59,15 +59,22 @@ class FingerTrace(NamedTuple):
 
     def estimate(self, k: int) -> ContactEstimate:
         """Return the estimate of sample k."""
-        return ContactEstimate(
-            float(self.times[k]),
-            STATES[self.state[k]],
-            REASONS[self.reason[k]],
-            float(self.stable_probability[k]),
-            float(self.instability[k]),
-            tuple(self.force[k].tolist()),
-            faults_of(int(self.faults[k])),
-            taxels_of(int(self.faulty_taxels[k])),
+        return self.estimates(slice(k, k + 1 or None))[0]
+
+    def estimates(self, rows: slice = slice(None)) -> list[ContactEstimate]:
+        """Return the estimates of these samples."""
+        return list(
+            map(
+                ContactEstimate,
+                self.times[rows].tolist(),
+                [STATES[code] for code in self.state[rows].tolist()],
+                [REASONS[code] for code in self.reason[rows].tolist()],
+                self.stable_probability[rows].tolist(),
+                self.instability[rows].tolist(),
+                map(tuple, self.force[rows].tolist()),
+                map(faults_of, self.faults[rows].tolist()),
+                map(taxels_of, self.faulty_taxels[rows].tolist()),
+            )
         )
 
 

@@ -5,7 +5,7 @@ import sys
 
 import pytest
 
-from holdfast.cli.terminal.keys import LABELS, LEGEND, STOP, Keys
+from holdfast.cli.terminal.keys import KEY_HELP, MARKER_KEYS, STOP_KEY, MarkerKeys
 
 
 class Stdin:
@@ -27,7 +27,7 @@ def pipe(monkeypatch):
 
 
 def test_each_line_of_a_pipe_is_a_marker(pipe):
-    with Keys() as keys:
+    with MarkerKeys() as keys:
         assert keys.poll() == []
         pipe.write(b"one\ntwo thr")
         assert keys.poll() == ["one"]
@@ -36,11 +36,11 @@ def test_each_line_of_a_pipe_is_a_marker(pipe):
         pipe.close()
         assert keys.poll() == ["end"]
         assert keys.poll() == []
-        assert (keys.live, keys.stopped) == (False, False)
+        assert (keys.interactive, keys.stop_pressed) == (False, False)
 
 
 def test_a_line_without_end_does_not_fill_the_memory(pipe):
-    with Keys() as keys:
+    with MarkerKeys() as keys:
         pipe.write(b"x" * 10_000)
         texts = [text for _ in range(5) for text in keys.poll()]
     assert [set(text) for text in texts] == [{"x"}]
@@ -50,7 +50,7 @@ def test_a_line_without_end_does_not_fill_the_memory(pipe):
 @pytest.mark.parametrize("stdin", [None, io.StringIO("a\n"), Stdin(-1), Stdin(10**6)])
 def test_without_stdin_nothing_comes(stdin, monkeypatch):
     monkeypatch.setattr(sys, "stdin", stdin)
-    with Keys() as keys:
+    with MarkerKeys() as keys:
         assert keys.poll() == []
 
 
@@ -58,15 +58,15 @@ def test_in_the_background_a_terminal_is_left_alone(monkeypatch):
     master, terminal = pty.openpty()
     monkeypatch.setattr(sys, "stdin", Stdin(terminal))
     os.write(master, b"mark\n")
-    with Keys() as keys:
+    with MarkerKeys() as keys:
         assert keys.poll() == []
-        assert not keys.live
+        assert not keys.interactive
     os.close(master)
     os.close(terminal)
 
 
 def test_the_legend_tells_the_keys():
-    for key, label in LABELS.items():
-        assert key in "123456789 " or f"{key} {label}" in LEGEND
-    assert f"{STOP} stops" in LEGEND
-    assert STOP not in LABELS
+    for key, label in MARKER_KEYS.items():
+        assert key in "123456789 " or f"{key} {label}" in KEY_HELP
+    assert f"{STOP_KEY} stops" in KEY_HELP
+    assert STOP_KEY not in MARKER_KEYS

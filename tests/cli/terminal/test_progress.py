@@ -4,7 +4,7 @@ import time
 import pytest
 
 from holdfast.cli.terminal import progress as module
-from holdfast.cli.terminal.progress import Bar, progress
+from holdfast.cli.terminal.progress import ProgressBar, progress
 
 
 @pytest.fixture
@@ -24,7 +24,7 @@ def on_terminal(monkeypatch):
 
 
 def test_where_nobody_looks_a_line_a_minute(capsys, clock):
-    with Bar("working", 100.0) as bar:
+    with ProgressBar("working", 100.0) as bar:
         for _ in range(4):
             clock(50.0)
             bar.advance(10.0)
@@ -35,7 +35,7 @@ def test_where_nobody_looks_a_line_a_minute(capsys, clock):
 
 
 def test_without_a_total_nothing_is_foretold(capsys, clock):
-    with Bar("working") as bar:
+    with ProgressBar("working") as bar:
         clock(100.0)
         bar.advance()
     assert capsys.readouterr() == ("", "")
@@ -52,10 +52,10 @@ def test_what_is_costly_weighs_more(capsys, clock):
 
 def test_a_bar_appears_before_the_first_step_is_done(capsys, monkeypatch):
     on_terminal(monkeypatch)
-    monkeypatch.setattr(module, "PATIENCE", 0.01)
-    with Bar("working", 3) as bar:
+    monkeypatch.setattr(module, "DISPLAY_DELAY", 0.01)
+    with ProgressBar("working", 3) as bar:
         ends = time.monotonic() + 20
-        while bar._shown is None and time.monotonic() < ends:
+        while bar._bar is None and time.monotonic() < ends:
             time.sleep(0.01)
     err = capsys.readouterr().err
     assert "working" in err
@@ -64,9 +64,9 @@ def test_a_bar_appears_before_the_first_step_is_done(capsys, monkeypatch):
 
 def test_a_bar_tells_the_time_left(capsys, monkeypatch, clock):
     on_terminal(monkeypatch)
-    with Bar("working", 10) as bar:
+    with ProgressBar("working", 10) as bar:
         clock(60.0)
         bar.advance()
-        assert bar._lasts() == pytest.approx(600.0)
-    assert math.isnan(Bar("working", 10)._lasts())
+        assert bar._expected_duration() == pytest.approx(600.0)
+    assert math.isnan(ProgressBar("working", 10)._expected_duration())
     assert "10%" in capsys.readouterr().err

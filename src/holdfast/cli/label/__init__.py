@@ -1,4 +1,4 @@
-"""`holdfast label`: one file for each mode."""
+"""The verb `holdfast label`; one file for each of its modes."""
 
 from holdfast.cli.label.verb import label
 

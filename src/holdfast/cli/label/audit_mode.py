@@ -1,26 +1,26 @@
-"""`holdfast label --audit`: labels that a cross-validated classifier contradicts."""
+"""`holdfast label --audit`: print labels that a cross-validated classifier contradicts."""
 
 from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 from holdfast.cli.label.inputs import recordings_at
-from holdfast.cli.terminal.console import print_json, print_table, say, show
+from holdfast.cli.terminal.console import print_json, print_line, print_message, print_table
 
 if TYPE_CHECKING:
     from holdfast.labelling.review.audit import Audit, Suspect
 
 
 def audit_labels(paths: Sequence[Path], jobs: int, *, as_json: bool) -> "Sequence[Suspect]":
-    """Tells which labels are suspect, and gives them.
+    """Print the labels that a classifier contradicts, and return them.
 
     Args:
-        paths: of recordings, or folders of them.
-        jobs: fits at a time; -1 for as many as there are processors.
+        paths: recordings, or folders of recordings.
+        jobs: number of parallel fits; -1: one per processor.
         as_json: print JSON.
 
     Raises:
-        TrainingError: there are too few labels to learn from.
+        TrainingError: there are too few labels to train a classifier.
         RecordingError: a recording cannot be read.
     """
     from msgspec import to_builtins
@@ -29,16 +29,16 @@ def audit_labels(paths: Sequence[Path], jobs: int, *, as_json: bool) -> "Sequenc
     from holdfast.labelling.review.audit import audit
 
     files = recordings_at(paths)
-    say(f"training on the labels of {len(files)} recordings, to judge each by the others")
+    print_message(f"cross-validating the labels of {len(files)} recordings")
     found = audit(Dataset(files), n_jobs=jobs)
     if as_json:
         print_json(to_builtins(found))
     else:
-        _tell(found)
+        _print(found)
     return found.suspects
 
 
-def _tell(found: "Audit") -> None:
+def _print(found: "Audit") -> None:
     rows = [
         (
             each.recording, each.finger, each.kind, f"{each.start:.2f}", f"{each.end:.2f}",
@@ -53,7 +53,7 @@ def _tell(found: "Audit") -> None:
             "label", "expected", "confidence", "shift [s]",
         )  # fmt: skip
         print_table(header, rows)
-        show()
-    show(
+        print_line()
+    print_line(
         f"{len(rows)} suspects in {found.judged:.1f} s of labels of {found.n_recordings} recordings"
     )

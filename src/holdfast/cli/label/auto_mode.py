@@ -1,113 +1,119 @@
-"""`holdfast label --auto RULE`: what a rule proposes, as label files."""
+"""`holdfast label --auto RULE`: write the labels that a rule proposes."""
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
+from itertools import chain
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from holdfast.cli.label.inputs import (
-    MOST_DOUBTFUL,
-    Asking,
+    RuleOptions,
     check_rule,
-    doubtful_of,
-    labels_json,
-    now,
+    current_time,
     recordings_at,
-    seconds_of,
 )
-from holdfast.cli.terminal.console import complain, print_json, print_table, say, show
+from holdfast.cli.terminal.console import (
+    print_error,
+    print_json,
+    print_line,
+    print_message,
+    print_table,
+)
 from holdfast.cli.terminal.progress import progress
 
 if TYPE_CHECKING:
     from holdfast.labelling.server.store import Labels
     from holdfast.recordings import Recording
 
+MAX_DOUBTFUL_SHOWN = 20
+"""Maximum number of doubtful labels in the table; JSON has all of them."""
+
 
 def label_by_rule(
     paths: Sequence[Path],
     rule: str,
-    asking: Asking,
+    options: RuleOptions,
     *,
     author: str | None,
     dry_run: bool,
     force: bool,
     as_json: bool,
 ) -> None:
-    """Writes what a rule proposes for recordings, and tells what a person should look at.
+    """Write the labels that a rule proposes, and print those with low confidence.
 
     Args:
-        paths: of recordings, or folders of them.
-        rule: that labels.
-        asking: what it is given.
-        author: who signs the label files; the rule by default.
+        paths: recordings, or folders of recordings.
+        rule: name of the rule.
+        options: options of the rule.
+        author: author of the label files; by default the rule.
         dry_run: write nothing.
-        force: replace a person's labels.
+        force: overwrite labels of a person.
         as_json: print JSON.
 
     Raises:
-        OutputError: a person labelled one of the recordings, or a file cannot be written.
-        HoldfastError: a recording cannot be labelled; the others are.
+        OutputError: a recording has labels of a person, or a file cannot be written.
+        HoldfastError: a recording cannot be labelled; all others are labelled.
         ValueError: an unknown rule or parameter.
     """
     check_rule(rule)
-    asking.arguments(rule)
+    options.arguments(rule)
     files = recordings_at(paths)
     if not (dry_run or force):
-        refuse_persons(files)
+        check_no_manual_labels(files)
 
     def label(path: Path, recording: "Recording") -> "Labels":
-        labels = asking.propose(rule, recording)
+        labels = options.propose(rule, recording)
         if not dry_run:
-            write(path, recording, labels, author or f"rule:{rule}")
+            write_labels(path, recording, labels, author or f"rule:{rule}")
         return labels
 
     documents = label_all(files, label)
     if as_json:
         print_json({"rule": rule, "written": not dry_run, "recordings": documents})
     else:
-        tell(documents)
-    finish(documents, written=not dry_run)
+        print_documents(documents)
+    report_failures(documents, written=not dry_run)
 
 
-def refuse_persons(files: Sequence[Path]) -> None:
-    """Does nothing where no person has labelled any of the recordings.
+def check_no_manual_labels(files: Sequence[Path]) -> None:
+    """Check that no recording has labels of a person.
 
     Raises:
-        OutputError: a person has.
+        OutputError: a recording has labels of a person.
     """
     from holdfast.errors import OutputError
     from holdfast.io.label_files import labels_path
 
-    theirs = [(path, who) for path in files if (who := _person(path)) is not None]
-    if theirs:
-        path, who = theirs[0]
-        more = f" (and {len(theirs) - 1} more)" if len(theirs) > 1 else ""
+    manual = [(path, name) for path in files if (name := _manual_author(path)) is not None]
+    if manual:
+        path, name = manual[0]
+        more = f" (and {len(manual) - 1} more)" if len(manual) > 1 else ""
         raise OutputError(
-            f"{labels_path(path)}{more}: labels of {who or 'a person'} are there already; "
-            "nothing was written: --force replaces them"
+            f"{labels_path(path)}{more}: labels of {name or 'a person'} exist already; "
+            "nothing was written: overwrite them with --force"
         )
 
 
-def _person(path: Path) -> str | None:
-    """Who saved the labels of a recording by hand; None where nobody did."""
+def _manual_author(path: Path) -> str | None:
+    """Return the person who saved the labels of a recording; None if there is none."""
     from holdfast.errors import RecordingError
     from holdfast.io.label_files import labels_for, labels_path, load_labels
     from holdfast.labelling.server.workspace import summary_of
 
     try:
         labels = labels_for(path, summary_of(path).digest)
-    except RecordingError:  # `label_all` tells, and writes nothing there
+    except RecordingError:  # `label_all` reports it
         return None
     if labels is None:
         return None
-    every = [label.author for own in labels.values() for label in own]
-    authors = [load_labels(labels_path(path)).author, *every]
+    authors = [load_labels(labels_path(path)).author]
+    authors += [label.author for label in chain.from_iterable(labels.values())]
     return next((name for name in authors if not name.startswith("rule:")), None)
 
 
 def label_all(
     files: Sequence[Path], label: "Callable[[Path, Recording], Labels]"
 ) -> list[dict[str, Any]]:
-    """What becomes of each recording: its labels and its doubts, or an error."""
+    """Label recordings; return a JSON document of each: its labels, or an error."""
     from holdfast.errors import HoldfastError
     from holdfast.io import load_recording
 
@@ -121,25 +127,31 @@ def label_all(
     return documents
 
 
-def write(path: Path, recording: "Recording", labels: "Labels", author: str) -> None:
-    """Writes labels into the label file of a recording; its note is kept.
+def write_labels(path: Path, recording: "Recording", labels: "Labels", author: str) -> None:
+    """Write the label file of a recording; keep its note.
 
     Raises:
-        OutputError: it cannot be written.
-        RecordingError: the file there is of another recording, or none.
+        OutputError: the file cannot be written.
+        RecordingError: the existing file is damaged or belongs to another recording.
     """
     from holdfast.io.label_files import labels_for, labels_path, load_labels
     from holdfast.labelling.server.store import revision_of, save_stored
 
-    there = labels_for(path, recording.digest)
-    note = "" if there is None else load_labels(labels_path(path)).notes
+    existing = labels_for(path, recording.digest)
+    note = "" if existing is None else load_labels(labels_path(path)).notes
     save_stored(
-        path, recording, labels, revision=revision_of(path), author=author, time=now(), note=note
+        path,
+        recording,
+        labels,
+        revision=revision_of(path),
+        author=author,
+        time=current_time(),
+        note=note,
     )
 
 
-def tell(documents: Sequence[dict[str, Any]]) -> None:
-    """Prints seconds per state of each recording, and what is doubtful."""
+def print_documents(documents: Sequence[dict[str, Any]]) -> None:
+    """Print seconds per state of each recording, and labels with low confidence."""
     good = [each for each in documents if "error" not in each]
     if not good:
         return
@@ -152,16 +164,16 @@ def tell(documents: Sequence[dict[str, Any]]) -> None:
         for each in good
     ]
     print_table(("recording", "stable [s]", "unstable [s]", "no contact [s]", "doubtful"), rows)
-    doubts = sorted(
-        ((each["name"], one) for each in good for one in each["doubtful"]),
-        key=lambda found: found[1]["confidence"],
+    doubtful = sorted(
+        ((each["name"], label) for each in good for label in each["doubtful"]),
+        key=lambda item: item[1]["confidence"],
     )
-    if doubts:
-        show("\nlook at these first:")
-        _tell_doubts(doubts)
+    if doubtful:
+        print_line("\ncheck these first:")
+        _print_doubtful(doubtful)
 
 
-def _tell_doubts(doubts: Sequence[tuple[str, dict[str, Any]]]) -> None:
+def _print_doubtful(doubtful: Sequence[tuple[str, dict[str, Any]]]) -> None:
     rows = [
         (
             name,
@@ -172,35 +184,35 @@ def _tell_doubts(doubts: Sequence[tuple[str, dict[str, Any]]]) -> None:
             f"{one['confidence']:.2f}",
             one["evidence"],
         )
-        for name, one in doubts[:MOST_DOUBTFUL]
+        for name, one in doubtful[:MAX_DOUBTFUL_SHOWN]
     ]
     header = ("recording", "finger", "start [s]", "end [s]", "state", "confidence", "evidence")
     print_table(header, rows)
-    if len(doubts) > MOST_DOUBTFUL:
-        show(f"and {len(doubts) - MOST_DOUBTFUL} more: --json tells all of them")
+    if len(doubtful) > MAX_DOUBTFUL_SHOWN:
+        print_line(f"and {len(doubtful) - MAX_DOUBTFUL_SHOWN} more: --json prints all")
 
 
-def finish(documents: Sequence[dict[str, Any]], *, written: bool) -> None:
-    """Tells which labels are hidden now, and which recordings failed.
+def report_failures(documents: Sequence[dict[str, Any]], *, written: bool) -> None:
+    """Report labels that are hidden by the label files, and recordings that failed.
 
     Args:
         documents: from `label_all`.
-        written: whether label files were.
+        written: True if label files were written.
 
     Raises:
-        RecordingError: one failed.
+        RecordingError: a recording failed.
     """
     from holdfast.errors import RecordingError
 
     n_hidden = sum(bool(each.get("n_inside")) for each in documents)
     if written and n_hidden:
-        say(
-            f"{n_hidden} of {len(documents)} recordings have labels inside as well: the label "
-            "files count while they are there"
+        print_message(
+            f"{n_hidden} of {len(documents)} recordings also contain labels; the label files "
+            "replace them as long as they exist"
         )
     errors = [each["error"] for each in documents if "error" in each]
     for error in errors[:-1]:
-        complain(error)
+        print_error(error)
     if errors:
         raise RecordingError(errors[-1])
 
@@ -212,8 +224,43 @@ def _document(path: Path, recording: "Recording", labels: "Labels") -> dict[str,
         "name": recording.name,
         "path": str(path),
         "file": str(labels_path(path)),
-        "seconds": seconds_of(labels),
-        "labels": labels_json(labels),
-        "doubtful": doubtful_of(labels),
+        "seconds": _label_seconds(labels),
+        "labels": _labels_json(labels),
+        "doubtful": _doubtful_labels(labels),
         "n_inside": sum(len(module.labels) for module in recording.modules.values()),
     }
+
+
+def _label_seconds(labels: "Labels") -> dict[str, float]:
+    """Return the duration of each state over all fingers [s], rounded to microseconds."""
+    from holdfast.cli.info import label_seconds
+
+    total = label_seconds(chain.from_iterable(labels.values()))
+    return {state: round(seconds, 6) for state, seconds in total.items()}
+
+
+def _doubtful_labels(labels: "Labels") -> list[dict[str, Any]]:
+    """Return the labels with low confidence as JSON values, the lowest first."""
+    from holdfast.labelling.review.spans import doubtful
+
+    return [
+        {
+            "finger": finger,
+            "start": label.start,
+            "end": label.end,
+            "state": label.state.value.lower(),
+            "confidence": label.confidence,
+            "evidence": label.evidence,
+        }
+        for finger, label in doubtful(labels)
+    ]
+
+
+def _labels_json(labels: "Labels") -> Mapping[str, Any]:
+    """Return labels by finger as JSON values."""
+    from msgspec import to_builtins
+
+    from holdfast.labelling.server.api import labels_data
+
+    found: Mapping[str, Any] = to_builtins(labels_data(labels))
+    return found

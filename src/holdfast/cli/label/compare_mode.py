@@ -1,11 +1,11 @@
-"""`holdfast label --compare A B`: how far two labellings agree."""
+"""`holdfast label --compare A B`: print the agreement of two sets of labels."""
 
 from collections.abc import Callable, Iterator, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from holdfast.cli.label.inputs import Asking
-from holdfast.cli.terminal.console import print_json, print_table, say, show
+from holdfast.cli.label.inputs import RuleOptions
+from holdfast.cli.terminal.console import print_json, print_line, print_message, print_table
 from holdfast.cli.terminal.progress import progress
 
 if TYPE_CHECKING:
@@ -21,21 +21,21 @@ LabelsOf = Callable[["Recording"], "dict[str, tuple[Label, ...]]"]
 
 
 def compare_labels(
-    paths: Sequence[Path], asking: Asking, annotator: str | None, *, as_json: bool
+    paths: Sequence[Path], options: RuleOptions, annotator: str | None, *, as_json: bool
 ) -> None:
-    """Tells how far A and B agree, per recording and finger.
+    """Print the agreement of A and B for each recording and finger.
 
-    Recordings that A or B does not label are left out, and named.
+    Recordings without labels in A or B are left out, and named.
 
     Args:
-        paths: A and B: each a file or folder of labels or labelled recordings, or a rule's name.
-        asking: what a rule is given.
-        annotator: whose labels of an export of Label Studio.
+        paths: A and B: each a file or folder of labels or labelled recordings, or a rule.
+        options: options of a rule.
+        annotator: annotator whose labels are read from an export of Label Studio.
         as_json: print JSON.
 
     Raises:
-        ValueError: not two paths, or two rules.
-        RecordingError: no recording is labelled by both.
+        ValueError: the number of paths is not two, or both are rules.
+        RecordingError: no recording has labels in both.
     """
     from msgspec import to_builtins
 
@@ -45,23 +45,23 @@ def compare_labels(
         raise ValueError(f"--compare A B: two paths expected, {len(paths)} given")
     a, b = paths
     files = _recordings(a, b)
-    both = (_labels_of(a, asking, annotator), _labels_of(b, asking, annotator))
-    every = dict(_each(files, both))
-    found = [each for each in every.values() if not isinstance(each, str)]
-    left_out = {name: each for name, each in every.items() if isinstance(each, str)}
-    if not found:
-        raise _nothing(left_out)
-    agreement = pool(found)
+    both = (_labels_of(a, options, annotator), _labels_of(b, options, annotator))
+    results = dict(_compare_each(files, both))
+    compared = [each for each in results.values() if not isinstance(each, str)]
+    left_out = {name: each for name, each in results.items() if isinstance(each, str)}
+    if not compared:
+        raise _nothing_to_compare(left_out)
+    agreement = pool(compared)
     if as_json:
-        told = to_builtins(agreement)
-        print_json({"a": str(a), "b": str(b), **told, "left_out": left_out})
+        document = to_builtins(agreement)
+        print_json({"a": str(a), "b": str(b), **document, "left_out": left_out})
         return
-    _tell(agreement)
+    _print(agreement)
     for name, text in left_out.items():
-        say(f"{name} is left out: {text}")
+        print_message(f"{name} is left out: {text}")
 
 
-def _nothing(left_out: dict[str, str]) -> Exception:
+def _nothing_to_compare(left_out: dict[str, str]) -> Exception:
     from holdfast.errors import RecordingError
 
     name, text = next(iter(left_out.items()))
@@ -69,10 +69,10 @@ def _nothing(left_out: dict[str, str]) -> Exception:
     return RecordingError(f"nothing to compare: {name}: {text}{more}")
 
 
-def _each(
+def _compare_each(
     files: Sequence[Path], both: tuple[LabelsOf, LabelsOf]
 ) -> "Iterator[tuple[str, RecordingAgreement | str]]":
-    """The name of each recording with its agreement, or with why there is none."""
+    """Yield the name of each recording with its agreement, or with why it is left out."""
     from holdfast.errors import RecordingError
     from holdfast.io import load_recording
     from holdfast.labelling.review.compare import compare
@@ -82,8 +82,8 @@ def _each(
             recording = load_recording(path, labels=False)
             one, other = (labels_of(recording) for labels_of in both)
             if not (any(one.values()) and any(other.values())):
-                who = "B" if any(one.values()) else "A"
-                yield recording.name, f"{who} has no label of it"
+                side = "B" if any(one.values()) else "A"
+                yield recording.name, f"{side} has no labels of it"
                 continue
             times = {name: module.times for name, module in recording.modules.items()}
             yield recording.name, compare(one, other, times, recording.name)
@@ -91,11 +91,11 @@ def _each(
             yield path.stem, str(cause)
 
 
-def _labels_of(place: Path, asking: Asking, annotator: str | None) -> LabelsOf:
+def _labels_of(place: Path, options: RuleOptions, annotator: str | None) -> LabelsOf:
     from holdfast.labelling.exchange.read_labels import labels_of
 
     if _is_rule(place):
-        return lambda recording: asking.propose(str(place), recording)
+        return lambda recording: options.propose(str(place), recording)
     return lambda recording: labels_of(place, recording, annotator)
 
 
@@ -106,29 +106,29 @@ def _is_rule(place: Path) -> bool:
 
 
 def _recordings(a: Path, b: Path) -> list[Path]:
-    """The recordings that labels are compared of: those in A, else those in B.
+    """Return the recordings to compare: those in A, otherwise those in B.
 
     Raises:
-        RecordingError: there are none in either.
+        RecordingError: there are none.
         ValueError: both are rules.
     """
     from holdfast.errors import RecordingError
 
     if _is_rule(a) and _is_rule(b):
-        raise ValueError(f"rules {a} and {b} given; one of A and B says which recordings")
+        raise ValueError(f"rules {a} and {b} given; A or B must be recordings or labels")
     for place in (a, b):
         if not _is_rule(place) and not place.exists():
             raise RecordingError(f"{place} does not exist; labels, recordings or a rule expected")
     for place in (a, b):
-        if not _is_rule(place) and (found := _found(place)):
+        if not _is_rule(place) and (found := _recordings_at(place)):
             return found
     raise RecordingError(
-        f"no recording beside the labels in {a} or {b}; what is compared needs its samples"
+        f"no recordings beside the labels in {a} or {b}; their sample times are needed"
     )
 
 
-def _found(place: Path) -> list[Path]:
-    """The recordings in a folder, at a path, or beside a label file."""
+def _recordings_at(place: Path) -> list[Path]:
+    """Return the recordings in a folder, at a path, or beside a label file."""
     from holdfast.errors import RecordingError
     from holdfast.io import load_dataset
     from holdfast.io.label_files import SUFFIX, load_labels
@@ -148,7 +148,7 @@ def _found(place: Path) -> list[Path]:
     return [path for path in beside if path.is_file()][:1]
 
 
-def _tell(agreement: "Agreement") -> None:
+def _print(agreement: "Agreement") -> None:
     header = (
         "recording", "finger", "kappa", "kappa stable", "onsets", "median [ms]", "p95 [ms]",
         "only A [%]", "only B [%]", "not in A", "not in B",
@@ -165,9 +165,9 @@ def _tell(agreement: "Agreement") -> None:
             for finger, each in pooled.items()
         ]
     print_table(header, rows)
-    show(
-        "\nonsets of not-stable that both have, B minus A; intervals that A or B has no "
-        "counterpart of"
+    print_line(
+        "\nonset differences: B minus A, for onsets of instability in both; "
+        "not in A, not in B: number of intervals that only the other has"
     )
 
 

@@ -1,12 +1,18 @@
-"""`holdfast label --export` and `--import`: labels from and for other programs."""
+"""`holdfast label --export` and `--import`: exchange labels with other programs."""
 
 from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from holdfast.cli.label.auto_mode import finish, label_all, refuse_persons, tell, write
+from holdfast.cli.label.auto_mode import (
+    check_no_manual_labels,
+    label_all,
+    print_documents,
+    report_failures,
+    write_labels,
+)
 from holdfast.cli.label.inputs import login_name, recordings_at
-from holdfast.cli.terminal.console import print_json, show
+from holdfast.cli.terminal.console import print_json, print_line
 from holdfast.cli.terminal.progress import progress
 
 if TYPE_CHECKING:
@@ -19,13 +25,13 @@ FORMATS = ("label-studio", "csv")
 def export_labels(
     paths: Sequence[Path], kind: str, out: Path, *, force: bool, as_json: bool
 ) -> None:
-    """Writes labels for Label Studio, or as CSV, one file a recording.
+    """Write labels for Label Studio, or as one CSV file per recording.
 
     Args:
-        paths: of recordings, or folders of them.
+        paths: recordings, or folders of recordings.
         kind: one of `FORMATS`.
-        out: folder that is written to.
-        force: replace what is there.
+        out: folder for the files.
+        force: overwrite existing files.
         as_json: print JSON.
 
     Raises:
@@ -49,7 +55,7 @@ def export_labels(
         print_json({"format": kind, "written": [str(path) for path in written]})
     else:
         for path in written:
-            show(str(path))
+            print_line(str(path))
 
 
 def _export_csv(recordings: "Sequence[Recording]", out: Path, force: bool) -> list[Path]:
@@ -77,20 +83,20 @@ def import_labels(
     force: bool,
     as_json: bool,
 ) -> None:
-    """Takes the labels of recordings out of an export of Label Studio, a CSV file or a folder.
+    """Import labels from an export of Label Studio, a CSV file or a folder.
 
     Args:
-        paths: of recordings, or folders of them.
+        paths: recordings, or folders of recordings.
         source: the file or folder.
-        annotator: whose labels, of an export of Label Studio.
-        author: who signs the label files.
+        annotator: annotator whose labels are read from an export of Label Studio.
+        author: author of the label files.
         dry_run: write nothing.
-        force: replace a person's labels.
+        force: overwrite labels of a person.
         as_json: print JSON.
 
     Raises:
-        ValueError: one CSV file for many recordings.
-        OutputError: a person labelled one of the recordings, or a file cannot be written.
+        ValueError: one CSV file is given for several recordings.
+        OutputError: a recording has labels of a person, or a file cannot be written.
         RecordingError: the labels cannot be read or do not fit.
     """
     from holdfast.errors import RecordingError
@@ -100,19 +106,19 @@ def import_labels(
     if not source.exists():
         raise RecordingError(f"{source} does not exist; labels of Label Studio or CSV expected")
     if source.is_file() and source.suffix == ".csv" and len(files) > 1:
-        raise ValueError(f"{source} holds labels of one recording; {len(files)} recordings given")
+        raise ValueError(f"{source} has the labels of one recording; {len(files)} recordings given")
     if not (dry_run or force):
-        refuse_persons(files)
+        check_no_manual_labels(files)
 
     def label(path: Path, recording: "Recording") -> "Labels":
         labels = labels_of(source, recording, annotator)
         if not dry_run:
-            write(path, recording, labels, author or annotator or login_name())
+            write_labels(path, recording, labels, author or annotator or login_name())
         return labels
 
     documents = label_all(files, label)
     if as_json:
         print_json({"source": str(source), "written": not dry_run, "recordings": documents})
     else:
-        tell(documents)
-    finish(documents, written=not dry_run)
+        print_documents(documents)
+    report_failures(documents, written=not dry_run)

@@ -1,7 +1,7 @@
-"""What the modes of `holdfast label` have in common."""
+"""Inputs of the modes of `holdfast label`: recordings, options of rules, options of the page."""
 
 import getpass
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from datetime import datetime
 from functools import cached_property
@@ -10,23 +10,18 @@ from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
     from holdfast.labelling.rules.poses import Poses
-    from holdfast.labelling.server.store import Labels
     from holdfast.recordings import Label, Recording
-
-STATES = ("stable", "unstable", "no_contact")
-MOST_DOUBTFUL = 20
-"""Doubtful stretches that are shown to a person; JSON has all."""
 
 
 @dataclass(frozen=True)
-class Asking:
-    """What a rule is given.
+class RuleOptions:
+    """Options of a rule.
 
     Attributes:
-        tare: how the baseline is found.
-        poses: path of a CSV file of poses, or of a bag, for `tracking`.
+        tare: tare of the recordings.
+        poses: path of a CSV file of poses, or of a bag, for the rule `tracking`.
         tracks: topics or frames of a bag, as BODY=NAME.
-        parameters: others, as NAME=VALUE.
+        parameters: other parameters, as NAME=VALUE.
     """
 
     tare: str = "0.5"
@@ -36,12 +31,12 @@ class Asking:
 
     @cached_property
     def tracking(self) -> "Poses | None":
-        """The poses that are given; None where none are.
+        """Return the poses of the file; None without a file.
 
         Raises:
-            ValueError: tracks without a bag, or a bag without the object's.
+            ValueError: tracks are given without a bag, or a bag without the track of the object.
             RecordingError: the file cannot be read.
-            MissingExtra: it is a bag, and rosbags is not installed.
+            MissingExtra: the file is a bag, and rosbags is not installed.
         """
         from holdfast.labelling.rules.poses import OBJECT, poses_from_bag, poses_from_csv
 
@@ -52,29 +47,29 @@ class Asking:
         names = dict(_pair(text, "--track BODY=NAME") for text in self.tracks)
         if OBJECT not in names:
             raise ValueError(
-                f"{self.poses} is no .csv, so taken for a bag: --track {OBJECT}=NAME expected, "
-                "a topic or frame"
+                f"{self.poses} is not a .csv file, so it is read as a bag: --track {OBJECT}=NAME "
+                "expected, a topic or frame"
             )
         return poses_from_bag(self.poses, names.pop(OBJECT), names)
 
     def arguments(self, rule: str) -> dict[str, Any]:
-        """The arguments of a rule.
+        """Return the arguments of a rule.
 
         Raises:
-            ValueError: a parameter is not NAME=VALUE, or poses are given to a rule without.
+            ValueError: a parameter is not NAME=VALUE, or the rule does not use poses.
         """
-        given: dict[str, Any] = {"tare": self.tare, **dict(map(_parameter, self.parameters))}
+        arguments: dict[str, Any] = {"tare": self.tare, **dict(map(_parameter, self.parameters))}
         if self.tracking is not None:
             if rule != "tracking":
                 raise ValueError(f"--poses are for the rule tracking; rule {rule!r} given")
-            given["tracking"] = self.tracking
-        return given
+            arguments["tracking"] = self.tracking
+        return arguments
 
     def propose(self, rule: str, recording: "Recording") -> dict[str, tuple["Label", ...]]:
-        """What a rule proposes for a recording.
+        """Return the labels that a rule proposes for a recording.
 
         Raises:
-            RecordingError: the recording has not what the rule rests on.
+            RecordingError: the recording lacks the data that the rule needs.
             ValueError: an unknown rule or parameter.
         """
         from holdfast.labelling.rules import propose
@@ -83,8 +78,16 @@ class Asking:
 
 
 @dataclass(frozen=True)
-class Serving:
-    """Where a page is served, and to whom."""
+class PageOptions:
+    """Options of the labelling page.
+
+    Attributes:
+        host: address to listen on.
+        port: port to listen on; 0 selects a free one.
+        token: secret that clients must send; None without one.
+        browser: open the page in a browser.
+        as_json: print the address as JSON.
+    """
 
     host: str
     port: int
@@ -94,36 +97,36 @@ class Serving:
 
 
 def recordings_at(paths: Sequence[Path]) -> list[Path]:
-    """The files of recordings at these paths, each once; a folder gives all that lie in it.
+    """Return the recordings at these paths, without duplicates; of a folder all recordings.
 
     Raises:
-        RecordingError: there is no such file or folder, or no recording in it.
+        RecordingError: a path does not exist or is no recording, or a folder has none.
     """
     from holdfast.errors import RecordingError
     from holdfast.io import load_dataset
     from holdfast.io.recording_files import SUFFIXES
 
-    found: list[Path] = []
+    files: list[Path] = []
     for path in paths:
         if path.is_dir():
-            found.extend(load_dataset(path).paths)
+            files.extend(load_dataset(path).paths)
         elif not path.exists():
             raise RecordingError(f"{path} does not exist; a recording or a folder expected")
         elif path.suffix not in SUFFIXES:
             raise RecordingError(
-                f"{path} is no recording: {' or '.join(SUFFIXES)} expected "
-                "(`holdfast import` brings other formats in)"
+                f"{path} is not a recording: {' or '.join(SUFFIXES)} expected "
+                "(`holdfast import` reads other formats)"
             )
         else:
-            found.append(path)
-    return list(dict.fromkeys(found))
+            files.append(path)
+    return list(dict.fromkeys(files))
 
 
 def check_rule(rule: str) -> None:
-    """Does nothing where there is such a rule.
+    """Check that a rule exists.
 
     Raises:
-        ValueError: there is none.
+        ValueError: the rule is unknown.
     """
     from holdfast.labelling.rules import RULES
 
@@ -132,52 +135,16 @@ def check_rule(rule: str) -> None:
 
 
 def login_name() -> str:
-    """Who sits at this machine, as far as it knows."""
+    """Return the name of the user; empty if it is not known."""
     try:
         return getpass.getuser()
-    except (OSError, KeyError, ImportError):  # nobody is logged in, as in a container
+    except (OSError, KeyError, ImportError):  # there is no login, as in a container
         return ""
 
 
-def now() -> str:
-    """The time, as ISO 8601 text."""
+def current_time() -> str:
+    """Return the time in ISO 8601 format."""
     return datetime.now().astimezone().isoformat(timespec="seconds")
-
-
-def seconds_of(labels: "Labels") -> dict[str, float]:
-    """How long each state lasts, over all fingers [s]."""
-    total = dict.fromkeys(STATES, 0.0)
-    for own in labels.values():
-        for label in own:
-            total[label.state.value.lower()] += label.end - label.start
-    return {state: round(value, 6) for state, value in total.items()}
-
-
-def doubtful_of(labels: "Labels") -> list[dict[str, Any]]:
-    """The labels of little confidence, the most doubtful first, as plain JSON values."""
-    from holdfast.labelling.review.spans import doubtful
-
-    return [
-        {
-            "finger": finger,
-            "start": label.start,
-            "end": label.end,
-            "state": label.state.value.lower(),
-            "confidence": label.confidence,
-            "evidence": label.evidence,
-        }
-        for finger, label in doubtful(labels)
-    ]
-
-
-def labels_json(labels: "Labels") -> Mapping[str, Any]:
-    """Labels by finger as plain JSON values."""
-    from msgspec import to_builtins
-
-    from holdfast.labelling.server.api import labels_data
-
-    found: Mapping[str, Any] = to_builtins(labels_data(labels))
-    return found
 
 
 def _parameter(text: str) -> tuple[str, Any]:

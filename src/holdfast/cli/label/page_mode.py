@@ -1,4 +1,4 @@
-"""`holdfast label`: the page on which labels are drawn."""
+"""`holdfast label`: run the labelling page."""
 
 import sys
 from collections.abc import Sequence
@@ -7,9 +7,15 @@ from pathlib import Path
 from threading import Thread
 from typing import TYPE_CHECKING
 
-from holdfast.cli.label.inputs import Asking, Serving, login_name, now, recordings_at
-from holdfast.cli.serve import open_page
-from holdfast.cli.terminal.console import print_json, say
+from holdfast.cli.label.inputs import (
+    PageOptions,
+    RuleOptions,
+    current_time,
+    login_name,
+    recordings_at,
+)
+from holdfast.cli.serve import open_browser
+from holdfast.cli.terminal.console import print_json, print_message
 
 if TYPE_CHECKING:
     from holdfast.labelling.review.audit import Suspect
@@ -18,24 +24,24 @@ if TYPE_CHECKING:
 
 def show_label_page(
     paths: Sequence[Path],
-    asking: Asking,
-    serving: Serving,
+    options: RuleOptions,
+    page_options: PageOptions,
     author: str | None,
     suspects: "Sequence[Suspect]" = (),
 ) -> None:
-    """Serves the label page of recordings until Ctrl-C.
+    """Run the labelling page until Ctrl-C.
 
     Args:
-        paths: of recordings, or folders of them.
-        asking: what rules are given.
-        serving: where, and to whom.
-        author: who labels; the login name by default.
+        paths: recordings, or folders of recordings.
+        options: options of rules.
+        page_options: address and access.
+        author: author of the labels; by default the login name.
         suspects: labels that an audit contradicts.
 
     Raises:
-        RecordingError: there is no recording.
-        ValueError: the network may not be served without a token.
-        OutputError: the address cannot be listened at.
+        RecordingError: there are no recordings.
+        ValueError: other hosts may connect, but there is no token.
+        OutputError: the address is not available.
     """
     from holdfast.features import Tare
     from holdfast.labelling.server.service import LabellingService
@@ -43,38 +49,38 @@ def show_label_page(
     from holdfast.web.guard import Guard
     from holdfast.web.server import run_server
 
-    guard = Guard(serving.host, serving.token)
+    guard = Guard(page_options.host, page_options.token)
     files = recordings_at(paths)
     shelf = Workspace(
         files,
         author=login_name() if author is None else author,
-        clock=now,
-        tare=Tare.parse(asking.tare),
-        poses=asking.tracking,
+        clock=current_time,
+        tare=Tare.parse(options.tare),
+        poses=options.tracking,
         suspects=suspects,
     )
 
-    def tell(url: str) -> None:
-        page = url if serving.token is None else f"{url}?token={serving.token}"
-        if serving.as_json:
+    def announce(url: str) -> None:
+        page = url if page_options.token is None else f"{url}?token={page_options.token}"
+        if page_options.as_json:
             print_json({"url": page, "recordings": len(files)})
             sys.stdout.flush()
-        opened = serving.browser and open_page(page)
+        opened = page_options.browser and open_browser(page)
         where = "is open in the browser" if opened else "is the page"
-        say(f"{page} {where} for {_what(files)}; Ctrl-C ends it")
+        print_message(f"{page} {where} for {_describe(files)}; Ctrl-C stops it")
 
     for work in (_prepare, Workspace.warm_up):
         Thread(target=work, args=(shelf,), daemon=True).start()
-    run_server(LabellingService(shelf, guard).app, serving.host, serving.port, tell)
+    run_server(LabellingService(shelf, guard).app, page_options.host, page_options.port, announce)
 
 
-def _what(files: Sequence[Path]) -> str:
+def _describe(files: Sequence[Path]) -> str:
     return f"{len(files)} recordings" if len(files) > 1 else str(files[0])
 
 
 def _prepare(shelf: "Workspace") -> None:
-    """Reads the first recording while the browser starts."""
+    """Read the first recording while the browser starts."""
     from holdfast.errors import HoldfastError
 
-    with suppress(HoldfastError, ValueError, OSError):  # the page tells
+    with suppress(HoldfastError, ValueError, OSError):  # the page reports it
         shelf.changes(0)

@@ -1,4 +1,4 @@
-"""`holdfast label`: labels drawn on a page, proposed by rules, compared and audited."""
+"""`holdfast label`: label recordings on a page or by a rule, compare and audit labels."""
 
 from collections.abc import Sequence
 from pathlib import Path
@@ -6,80 +6,91 @@ from typing import Annotated
 
 import typer
 
-from holdfast.cli.serve import HOST
+from holdfast.cli.options import (
+    HostOption,
+    JobsOption,
+    JsonOption,
+    PortOption,
+    TareOption,
+    TokenOption,
+)
+from holdfast.cli.serve import DEFAULT_HOST
 
-PORT = 8081
+DEFAULT_PORT = 8081
 
 
 def label(
     paths: Annotated[
-        list[Path], typer.Argument(help="Recordings, or folders of them; A and B to compare.")
+        list[Path], typer.Argument(help="Recordings or folders; for --compare: A and B.")
     ],
     auto: Annotated[
-        str | None, typer.Option(help="Let a rule label: signal, tracking or command.")
+        str | None, typer.Option(help="Label by a rule: signal, tracking or command.")
     ] = None,
     compare: Annotated[
-        bool, typer.Option("--compare", help="How far A and B agree; B may be a rule.")
+        bool, typer.Option("--compare", help="Print the agreement of A and B; B may be a rule.")
     ] = False,
     audit: Annotated[
         bool, typer.Option("--audit", help="Find labels that a classifier contradicts.")
     ] = False,
     export: Annotated[
         tuple[str, Path] | None,
-        typer.Option(metavar="FORMAT FOLDER", help="Write labels: label-studio or csv."),
+        typer.Option(metavar="FORMAT FOLDER", help="Export labels: label-studio or csv."),
     ] = None,
-    take: Annotated[
-        Path | None, typer.Option("--import", help="Take labels: Label Studio's JSON, CSV.")
+    import_from: Annotated[
+        Path | None,
+        typer.Option("--import", help="Import labels: JSON of Label Studio, or CSV."),
     ] = None,
     page: Annotated[
-        bool, typer.Option("--page", help="After --audit: show what it found on the page.")
+        bool, typer.Option("--page", help="With --audit: show the contradicted labels on the page.")
     ] = False,
     poses: Annotated[
-        Path | None, typer.Option(help="Poses for the rule tracking: a CSV file, or a bag.")
+        Path | None, typer.Option(help="Poses for the rule tracking: a CSV file or a bag.")
     ] = None,
     tracks: Annotated[
         list[str] | None,
         typer.Option(
-            "--track", metavar="BODY=NAME", help="Topic or frame of a bag; BODY: object, thumb, ..."
+            "--track",
+            metavar="BODY=NAME",
+            help="Topic or frame of a body in the bag; BODY: object, thumb, ...",
         ),
     ] = None,
     parameters: Annotated[
-        list[str] | None, typer.Option("--set", metavar="NAME=VALUE", help="A rule's parameter.")
+        list[str] | None,
+        typer.Option("--set", metavar="NAME=VALUE", help="Parameter of the rule."),
     ] = None,
-    tare: Annotated[
-        str, typer.Option(help="Seconds from the start, first, none, or START:END.")
-    ] = "0.5",
+    tare: TareOption = "0.5",
     author: Annotated[
-        str | None, typer.Option(help="Who labels; the login name, or rule:RULE.")
+        str | None,
+        typer.Option(help="Author of the labels.", show_default="login name, or rule:RULE"),
     ] = None,
     annotator: Annotated[
-        str | None, typer.Option(help="Whose labels of an export of Label Studio.")
+        str | None, typer.Option(help="Annotator whose labels are read from Label Studio.")
     ] = None,
-    jobs: Annotated[int, typer.Option(help="Fits at a time of --audit; -1: all there are.")] = -1,
+    jobs: JobsOption = -1,
     dry_run: Annotated[
         bool, typer.Option("--dry-run", help="With --auto or --import: write nothing.")
     ] = False,
     force: Annotated[
-        bool, typer.Option("--force", help="Replace a person's labels, or what was exported.")
+        bool, typer.Option("--force", help="Overwrite labels of a person, or exported files.")
     ] = False,
-    host: Annotated[str, typer.Option(help="Address to listen at.")] = HOST,
-    port: Annotated[int, typer.Option(help="Port; 0 finds a free one.")] = PORT,
-    token: Annotated[
-        str | None, typer.Option(help="Secret that readers must know; needed with --host.")
-    ] = None,
+    host: HostOption = DEFAULT_HOST,
+    port: PortOption = DEFAULT_PORT,
+    token: TokenOption = None,
     no_browser: Annotated[
         bool, typer.Option("--no-browser", help="Do not open the page in a browser.")
     ] = False,
-    as_json: Annotated[bool, typer.Option("--json", help="Print JSON on stdout.")] = False,
+    as_json: JsonOption = False,
 ) -> None:
-    """Labels recordings on a page, by a rule, or checks labels that are there.
+    """Label recordings on a page or by a rule, and check labels.
 
-    Without a mode, a page opens: drag to label, keys for states, undo, proposals of a rule that
-    one key accepts; every change is saved at once. Labels are kept in NAME.labels.json beside the
-    recording, which itself is never changed. --auto writes what a rule proposes, and lists what a
-    person should look at first; labels that a person saved are not replaced without --force.
-    --compare tells Cohen's kappa and onset differences of two labellings: files, folders, or a
-    rule. --audit finds labels that a cross-validated classifier contradicts. docs/labels.md.
+    Without a mode, open the labelling page: draw labels with the mouse, set states with keys,
+    undo changes, and accept the proposals of a rule. Every change is saved at once. Labels are
+    stored in NAME.labels.json beside the recording, which is never changed.
+
+    --auto writes the labels that a rule proposes, and prints those with low confidence. Labels
+    of a person are overwritten only with --force. --compare prints Cohen's kappa and onset
+    differences of two sets of labels: files, folders, or a rule. --audit prints labels that a
+    cross-validated classifier contradicts. See docs/labels.md.
 
     Example:
       holdfast label recordings/
@@ -92,33 +103,33 @@ def label(
       holdfast label --export label-studio studio/ recordings/
       holdfast label --import export.json recordings/
     """
-    from holdfast.cli.label.inputs import Asking, Serving
+    from holdfast.cli.label.inputs import PageOptions, RuleOptions
 
-    asking = Asking(tare, poses, tuple(tracks or ()), tuple(parameters or ()))
-    serving = Serving(host, port, token, not no_browser, as_json)
-    mode = _mode(auto, compare, audit, export, take)
+    options = RuleOptions(tare, poses, tuple(tracks or ()), tuple(parameters or ()))
+    page_options = PageOptions(host, port, token, not no_browser, as_json)
+    mode = _mode(auto, compare, audit, export, import_from)
     if page and mode != "audit":
-        raise ValueError("--page shows what --audit found: give --audit as well")
+        raise ValueError("--page shows the result of --audit: give --audit as well")
     if mode == "auto":
         from holdfast.cli.label.auto_mode import label_by_rule
 
         label_by_rule(
-            paths, auto or "", asking,
+            paths, auto or "", options,
             author=author, dry_run=dry_run, force=force, as_json=as_json,
         )  # fmt: skip
     elif mode == "compare":
         from holdfast.cli.label.compare_mode import compare_labels
 
-        compare_labels(paths, asking, annotator, as_json=as_json)
+        compare_labels(paths, options, annotator, as_json=as_json)
     elif mode == "export" and export is not None:
         from holdfast.cli.label.exchange_mode import export_labels
 
         export_labels(paths, *export, force=force, as_json=as_json)
-    elif mode == "import" and take is not None:
+    elif mode == "import" and import_from is not None:
         from holdfast.cli.label.exchange_mode import import_labels
 
         import_labels(
-            paths, take,
+            paths, import_from,
             annotator=annotator, author=author, dry_run=dry_run, force=force, as_json=as_json,
         )  # fmt: skip
     else:
@@ -127,7 +138,7 @@ def label(
 
         suspects = audit_labels(paths, jobs, as_json=as_json and not page) if audit else ()
         if page or not audit:
-            show_label_page(paths, asking, serving, author, suspects)
+            show_label_page(paths, options, page_options, author, suspects)
 
 
 def _mode(
@@ -135,21 +146,21 @@ def _mode(
     compare: bool,
     audit: bool,
     export: tuple[str, Path] | None,
-    take: Path | None,
+    import_from: Path | None,
 ) -> str:
-    """The one mode that is asked for; empty for the page.
+    """Return the name of the mode; empty for the page.
 
     Raises:
-        ValueError: there are two.
+        ValueError: two modes are given.
     """
-    asked: Sequence[tuple[str, bool]] = (
+    modes: Sequence[tuple[str, bool]] = (
         ("auto", auto is not None),
         ("compare", compare),
         ("audit", audit),
         ("export", export is not None),
-        ("import", take is not None),
+        ("import", import_from is not None),
     )
-    chosen = [name for name, given in asked if given]
+    chosen = [name for name, given in modes if given]
     if len(chosen) > 1:
-        raise ValueError(f"--{chosen[0]} and --{chosen[1]} given; one of them at a time expected")
+        raise ValueError(f"--{chosen[0]} and --{chosen[1]} given; only one of them expected")
     return chosen[0] if chosen else ""

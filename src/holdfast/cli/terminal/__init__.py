@@ -1,1 +1,1 @@
-"""Output to the terminal, and keys and signals from it."""
+"""The terminal: printing, progress, keys and signals."""

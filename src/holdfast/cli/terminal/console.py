@@ -1,34 +1,28 @@
-"""What verbs say and print: results to stdout, all talk to stderr."""
+"""Print results on stdout, and messages on stderr."""
 
 import sys
 from collections.abc import Iterable, Mapping, Sequence
-from typing import TYPE_CHECKING, TypeVar
-
-if TYPE_CHECKING:
-    pass
-
-T = TypeVar("T")
 
 
-def say(text: str) -> None:
-    """Tells a person something, on stderr."""
+def print_message(text: str) -> None:
+    """Print a message for a person on stderr."""
     sys.stderr.write(f"{text}\n")
 
 
-def complain(text: str) -> None:
-    """Tells on stderr, in one line, why there is no result."""
-    say(f"holdfast: {' '.join(text.split())}")
+def print_error(text: str) -> None:
+    """Print on stderr, in one line, why there is no result."""
+    print_message(f"holdfast: {' '.join(text.split())}")
 
 
-def show(text: str = "") -> None:
-    """Prints a line of a result for a person, on stdout."""
+def print_line(text: str = "") -> None:
+    """Print a line of a result on stdout."""
     sys.stdout.write(f"{text}\n")
 
 
 def print_json(value: object) -> None:
-    """Prints `value` as one line of JSON on stdout; what is not finite becomes null.
+    """Print a value as one line of JSON on stdout; numbers that are not finite become null.
 
-    NumPy values, mappings and paths are taken as what they hold.
+    NumPy values, mappings and paths are converted.
 
     Example:
         >>> print_json({"rate": 150.0, "delay": float("nan")})
@@ -36,11 +30,11 @@ def print_json(value: object) -> None:
     """
     from msgspec import json
 
-    sys.stdout.write(json.encode(value, enc_hook=_plain).decode() + "\n")
+    sys.stdout.write(json.encode(value, enc_hook=_to_json_value).decode() + "\n")
 
 
 def print_table(header: Sequence[str], rows: Iterable[Sequence[object]]) -> None:
-    """Prints rows in aligned columns on stdout; numbers stand to the right.
+    """Print rows in aligned columns on stdout; columns of numbers are aligned right.
 
     Example:
         >>> print_table(("sensor", "taxels"), [("gtac", 15), ("anyskin", 5)])
@@ -49,12 +43,12 @@ def print_table(header: Sequence[str], rows: Iterable[Sequence[object]]) -> None
         anyskin       5
     """
     lines = [[str(cell) for cell in row] for row in (header, *rows)]
-    columns = [_aligned(column) for column in zip(*lines, strict=True)]
+    columns = [_align(column) for column in zip(*lines, strict=True)]
     for cells in zip(*columns, strict=True):
-        show("  ".join(cells).rstrip())
+        print_line("  ".join(cells).rstrip())
 
 
-def _aligned(column: Sequence[str]) -> list[str]:
+def _align(column: Sequence[str]) -> list[str]:
     width = max(len(cell) for cell in column)
     if all(_is_number(cell) for cell in column[1:]):
         return [cell.rjust(width) for cell in column]
@@ -69,11 +63,11 @@ def _is_number(text: str) -> bool:
     return True
 
 
-def _plain(value: object) -> object:
+def _to_json_value(value: object) -> object:
     if hasattr(value, "tolist"):
         return value.tolist()
     if isinstance(value, Mapping):
         return dict(value)
     if hasattr(value, "__fspath__"):
         return str(value)
-    raise TypeError(f"{type(value).__name__} is no JSON value")
+    raise TypeError(f"{type(value).__name__} cannot be written as JSON")

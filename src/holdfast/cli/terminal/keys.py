@@ -1,4 +1,4 @@
-"""What a person types, or a script writes, while something runs: one key or line at a time."""
+"""Read markers from stdin while a command runs: keys of a terminal, or lines of a pipe."""
 
 import os
 import select
@@ -8,8 +8,8 @@ from contextlib import suppress
 from types import TracebackType
 from typing import Self
 
-STOP = "q"
-LABELS = {
+STOP_KEY = "q"
+MARKER_KEYS = {
     " ": "mark",
     "c": "closing",
     "l": "locked",
@@ -17,34 +17,34 @@ LABELS = {
     "r": "released",
     **{digit: f"mark {digit}" for digit in "123456789"},
 }
-"""What each key marks."""
-LEGEND = "keys: c closing, l locked, d disturbance, r released, space or 1-9 a mark, q stops"
+"""Marker text of each key."""
+KEY_HELP = "keys: c closing, l locked, d disturbance, r released, space or 1-9 a mark, q stops"
 
-_MOST_LINE = 4096
+_MAX_LINE_LENGTH = 4096
 
 
-class Keys:
-    """Markers from stdin: keys of a terminal, lines of a pipe; never waits.
+class MarkerKeys:
+    """Reader of markers from stdin that never blocks.
 
-    A terminal is set to give single keys, and set back at the end whatever happens. Where this
-    process is in the background, or stdin is closed, nothing comes.
+    A terminal is switched to single keys, and restored at the end. If this process is in the
+    background, or stdin is closed, there are no markers.
 
     Attributes:
-        live: whether a person can press keys.
-        stopped: whether the key for it was pressed.
+        interactive: True if stdin is a terminal whose keys can be read.
+        stop_pressed: True after the stop key.
     """
 
     def __init__(self) -> None:
-        self.live = self.stopped = False
+        self.interactive = self.stop_pressed = False
         self._stdin: int | None = None
         self._restore: Callable[[], None] | None = None
-        self._rest = b""
+        self._unfinished_line = b""
 
     def __enter__(self) -> Self:
         with suppress(OSError, ValueError, AttributeError):
             self._stdin = sys.stdin.fileno()
             if os.isatty(self._stdin):
-                self._take_terminal(self._stdin)
+                self._open_terminal(self._stdin)
         return self
 
     def __exit__(
@@ -58,31 +58,31 @@ class Keys:
         self._stdin = self._restore = None
 
     def poll(self) -> list[str]:
-        """The markers since the last time."""
+        """Return the markers since the last call."""
         data = self._read()
-        if not self.live:
-            return self._lines(data)
+        if not self.interactive:
+            return self._split_lines(data)
         keys = data.decode(errors="replace").lower()
-        self.stopped |= STOP in keys
-        return [LABELS[key] for key in keys if key in LABELS]
+        self.stop_pressed |= STOP_KEY in keys
+        return [MARKER_KEYS[key] for key in keys if key in MARKER_KEYS]
 
-    def _take_terminal(self, stdin: int) -> None:
-        """Gets single keys of a terminal, unless that would stop a process in the background."""
+    def _open_terminal(self, stdin: int) -> None:
+        """Switch the terminal to single keys; this would stop a process in the background."""
         self._stdin = None
         try:
             import termios
             import tty
-        except ImportError:  # no POSIX
+        except ImportError:  # not a POSIX system
             return
         if os.tcgetpgrp(stdin) != os.getpgrp():
             return
         before = termios.tcgetattr(stdin)
 
         def restore() -> None:
-            with suppress(termios.error):  # the terminal has gone
+            with suppress(termios.error):  # the terminal is closed
                 termios.tcsetattr(stdin, termios.TCSADRAIN, before)
 
-        self._stdin, self._restore, self.live = stdin, restore, True
+        self._stdin, self._restore, self.interactive = stdin, restore, True
         tty.setcbreak(stdin)
 
     def _read(self) -> bytes:
@@ -91,17 +91,17 @@ class Keys:
         try:
             if not select.select([self._stdin], [], [], 0)[0]:
                 return b""
-            data = os.read(self._stdin, _MOST_LINE)
-        except (OSError, ValueError):  # it is closed, or nothing that can be waited for
+            data = os.read(self._stdin, _MAX_LINE_LENGTH)
+        except (OSError, ValueError):  # stdin is closed, or cannot be polled
             data = b""
-        if not data:  # nothing will come any more
+        if not data:  # end of file
             self._stdin = None
             return b"\n"
         return data
 
-    def _lines(self, data: bytes) -> list[str]:
-        *lines, self._rest = (self._rest + data).split(b"\n")
-        if len(self._rest) > _MOST_LINE:
-            lines, self._rest = [*lines, self._rest], b""
+    def _split_lines(self, data: bytes) -> list[str]:
+        *lines, self._unfinished_line = (self._unfinished_line + data).split(b"\n")
+        if len(self._unfinished_line) > _MAX_LINE_LENGTH:
+            lines, self._unfinished_line = [*lines, self._unfinished_line], b""
         texts = (line.decode(errors="replace").strip() for line in lines)
         return [text for text in texts if text]

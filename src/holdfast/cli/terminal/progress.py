@@ -8,18 +8,18 @@ from datetime import timedelta
 from threading import Lock, Timer
 from typing import TYPE_CHECKING, Self, TypeVar
 
-from holdfast.cli.terminal.console import say
+from holdfast.cli.terminal.console import print_message
 
 if TYPE_CHECKING:
     from rich.progress import Progress
 
 T = TypeVar("T")
 
-PATIENCE = 2.0
-"""A progress bar appears when something takes longer than this [s]."""
+DISPLAY_DELAY = 2.0
+"""Time after which a progress bar appears [s]."""
 
-NOW_AND_THEN = 60.0
-"""Where stderr is no terminal, progress is told in a line after so long [s]."""
+MESSAGE_INTERVAL = 60.0
+"""Minimum time between two progress messages where stderr is no terminal [s]."""
 
 
 def progress(
@@ -28,93 +28,95 @@ def progress(
     total: float | None = None,
     cost: Callable[[T], float] = lambda _: 1.0,
 ) -> Iterator[T]:
-    """Yields `items`, with a `Bar` that follows them.
+    """Yield the items, and show the progress.
 
     Args:
-        items: to go through.
-        what: a word or two beside the bar.
-        total: of the costs of all of them; how many there are, where `items` has a length.
-        cost: of an item, in any unit.
+        items: any items.
+        what: one or two words for the bar.
+        total: sum of the costs of all items; by default the length of `items`, if it has one.
+        cost: function that returns the cost of an item, in any unit.
     """
     known = total if total is not None else getattr(items, "__len__", lambda: None)()
-    with Bar(what, known) as bar:
+    with ProgressBar(what, known) as bar:
         for item in items:
             yield item
             bar.advance(cost(item))
 
 
-class Bar:
-    """Progress on stderr with the time left: on a terminal a bar, elsewhere a line a minute.
+class ProgressBar:
+    """Progress on stderr with the remaining time.
 
-    It appears when something takes longer than two seconds.
+    On a terminal it is a bar, elsewhere one message per minute. It appears after two seconds.
 
     Args:
-        what: a word or two beside the bar.
-        total: number of steps, or sum of their costs, where it is known.
+        description: one or two words for the bar.
+        total: number of steps, or sum of their costs; None if it is not known.
     """
 
-    def __init__(self, what: str, total: float | None = None) -> None:
-        self._what = what
+    def __init__(self, description: str, total: float | None = None) -> None:
+        self._description = description
         self._total = total
         self._done = 0.0
-        self._begun = self._told = time.monotonic()
-        self._shown: Progress | None = None
+        self._started_at = self._last_message_at = time.monotonic()
+        self._bar: Progress | None = None
         self._lock = Lock()
-        self._soon = Timer(PATIENCE, self._show)
-        self._soon.daemon = True
+        self._timer = Timer(DISPLAY_DELAY, self._display)
+        self._timer.daemon = True
 
     def advance(self, cost: float = 1.0) -> None:
-        """Moves on by `cost`."""
+        """Add the cost of a finished step."""
         self._done += cost
         if not sys.stderr.isatty():
-            self._tell()
-        elif time.monotonic() - self._begun > PATIENCE:
-            self._show()
+            self._print_sometimes()
+        elif time.monotonic() - self._started_at > DISPLAY_DELAY:
+            self._display()
 
     def __enter__(self) -> Self:
         if sys.stderr.isatty():
-            self._soon.start()
+            self._timer.start()
         return self
 
     def __exit__(self, *_: object) -> None:
-        self._soon.cancel()
+        self._timer.cancel()
         with self._lock:
-            if self._shown is not None:
-                self._shown.stop()
+            if self._bar is not None:
+                self._bar.stop()
 
-    def _show(self) -> None:
+    def _display(self) -> None:
         with self._lock:
-            self._shown = self._shown or _shown(self._what, self._total)
-            self._shown.update(
-                self._shown.task_ids[0], completed=self._done, ends=self._begun + self._lasts()
+            self._bar = self._bar or _start_bar(self._description, self._total)
+            self._bar.update(
+                self._bar.task_ids[0],
+                completed=self._done,
+                ends=self._started_at + self._expected_duration(),
             )
 
-    def _tell(self) -> None:
-        """Now and then a line for the log of a job that nobody watches."""
+    def _print_sometimes(self) -> None:
         now = time.monotonic()
-        if self._total and now - self._told > NOW_AND_THEN:
-            self._told = now
-            left = self._lasts() - (now - self._begun)
-            say(f"{self._what}: {self._done / self._total:.0%}, about {left / 60:.0f} min left")
+        if self._total and now - self._last_message_at > MESSAGE_INTERVAL:
+            self._last_message_at = now
+            left = self._expected_duration() - (now - self._started_at)
+            share = self._done / self._total
+            print_message(f"{self._description}: {share:.0%}, about {left / 60:.0f} min left")
 
-    def _lasts(self) -> float:
-        """How long all will have taken, should it go on as it went [s]; NaN where unknown."""
+    def _expected_duration(self) -> float:
+        """Return the expected time from start to end [s]; NaN if it is not known."""
         if not self._done or not self._total:
             return math.nan
-        return (time.monotonic() - self._begun) * self._total / self._done
+        return (time.monotonic() - self._started_at) * self._total / self._done
 
 
-def _shown(what: str, total: float | None) -> "Progress":
+def _start_bar(description: str, total: float | None) -> "Progress":
     from rich.console import Console
     from rich.progress import BarColumn, Progress, ProgressColumn, Task, TaskProgressColumn
     from rich.text import Text
 
     class TimeLeft(ProgressColumn):
-        """Counts down to the end as the costs foretell it; rich looks at the last 30 s only."""
+        """Remaining time by the costs of all steps; rich uses only the last 30 s."""
 
         def render(self, task: Task) -> Text:
             left = task.fields["ends"] - task.get_time()
-            return Text(_clock(left), style="progress.remaining")
+            return Text(_format_time(left), style="progress.remaining")
 
     bar = Progress(
         "{task.description}",
@@ -124,16 +126,16 @@ def _shown(what: str, total: float | None) -> "Progress":
         console=Console(stderr=True),
         transient=True,
     )
-    bar.add_task(what, total=total, ends=math.nan)
+    bar.add_task(description, total=total, ends=math.nan)
     bar.start()
     return bar
 
 
-def _clock(seconds: float) -> str:
-    """A time as people read it.
+def _format_time(seconds: float) -> str:
+    """Return a time as hours, minutes and seconds.
 
     Example:
-        >>> _clock(3725.4), _clock(-1.0), _clock(float("nan"))
+        >>> _format_time(3725.4), _format_time(-1.0), _format_time(float("nan"))
         ('1:02:05', '0:00:00', '-:--:--')
     """
     return "-:--:--" if math.isnan(seconds) else str(timedelta(seconds=max(0, round(seconds))))

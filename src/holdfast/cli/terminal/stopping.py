@@ -1,4 +1,4 @@
-"""The end of what goes on until somebody has enough: Ctrl-C, SIGTERM, a terminal that is gone."""
+"""Stop a running command by Ctrl-C, SIGTERM, or SIGHUP of a closed terminal."""
 
 import signal
 import threading
@@ -9,39 +9,40 @@ from types import FrameType
 
 
 @dataclass
-class Stop:
-    """Whether a signal asked for the end.
+class StopRequest:
+    """Handler of the signals that stop a command.
 
     Attributes:
-        asked: whether one did.
-        gently: whether the first one only asks; else, and from the second on, it interrupts.
+        requested: True after the first signal.
+        graceful: True if the first signal only sets `requested`. Otherwise every signal raises
+            KeyboardInterrupt, and the second one always does.
     """
 
-    asked: bool = False
-    gently: bool = False
+    requested: bool = False
+    graceful: bool = False
 
     def __call__(self, number: int, frame: FrameType | None) -> None:
-        """Takes a signal."""
-        if self.asked or not self.gently:
+        """Handle a signal."""
+        if self.requested or not self.graceful:
             raise KeyboardInterrupt
-        self.asked = True
+        self.requested = True
 
 
 @contextmanager
-def stopping() -> Iterator[Stop]:
-    """Takes the signals that ask for the end; in the main thread, where signals are."""
-    stop = Stop()
-    numbers = ending_signals() if threading.current_thread() is threading.main_thread() else []
-    before = [(number, signal.signal(number, stop)) for number in numbers]
+def handle_stop_signals() -> Iterator[StopRequest]:
+    """Handle the stop signals inside a `with` block; only in the main thread."""
+    stop = StopRequest()
+    numbers = _stop_signals() if threading.current_thread() is threading.main_thread() else []
+    previous = [(number, signal.signal(number, stop)) for number in numbers]
     try:
         yield stop
     finally:
-        for number, handler in before:
+        for number, handler in previous:
             signal.signal(number, handler)
 
 
-def ending_signals() -> list[signal.Signals]:
-    """Those that ask for the end; not that of a terminal that goes, where nohup ignores it."""
+def _stop_signals() -> list[signal.Signals]:
+    """Return the stop signals; without SIGHUP if it is ignored, as under nohup."""
     numbers = [signal.SIGINT, signal.SIGTERM]
     hang_up = getattr(signal, "SIGHUP", None)
     if hang_up is not None and signal.getsignal(hang_up) is not signal.SIG_IGN:

@@ -2,8 +2,8 @@ import io
 
 import pytest
 
-from holdfast.cli.terminal import record_line
-from holdfast.cli.terminal.record_line import RecordLine, line
+from holdfast.cli.terminal import status_line
+from holdfast.cli.terminal.status_line import StatusLine, status_parts
 from holdfast.contact import Fault
 from holdfast.live.recorder import RecorderStatus
 
@@ -44,7 +44,7 @@ class Still:
 
 
 def words(status):
-    return "   ".join(text for text, _ in line(status))
+    return "   ".join(text for text, _ in status_parts(status))
 
 
 def test_it_says_how_far_it_is_and_what_is_wrong():
@@ -53,17 +53,17 @@ def test_it_says_how_far_it_is_and_what_is_wrong():
         "12.3 s   no samples   gaps 1   lost 3   dropped 4   2.5 MB   markers 2   "
         "index late packet_gap"
     )
-    assert [text for text, bad in line(WELL) if bad] == []
-    assert [text for text, bad in line(BAD) if bad] == [
+    assert [text for text, bad in status_parts(WELL) if bad] == []
+    assert [text for text, bad in status_parts(BAD) if bad] == [
         *("no samples", "gaps 1", "lost 3", "dropped 4", "index late packet_gap")
     ]
 
 
 def test_elsewhere_than_on_a_terminal_it_tells_a_line_now_and_then(monkeypatch, capsys):
     now = [100.0]
-    monkeypatch.setattr(record_line.time, "monotonic", lambda: now[0])
-    with RecordLine(Still(WELL)) as shown:
-        shown.say("begun")
+    monkeypatch.setattr(status_line.time, "monotonic", lambda: now[0])
+    with StatusLine(Still(WELL)) as shown:
+        shown.print("begun")
         for second in range(25):
             now[0] = 100.0 + second
             shown.update()
@@ -77,8 +77,8 @@ def test_on_a_terminal_it_is_rewritten_in_place(colours, red, monkeypatch):
     monkeypatch.delenv("NO_COLOR", raising=False)
     for name, value in ({"TERM": "xterm", "COLUMNS": "200"} | colours).items():
         monkeypatch.setenv(name, value)
-    with RecordLine(Still(BAD)) as shown:
-        shown.say("[bold]begun")
+    with StatusLine(Still(BAD)) as shown:
+        shown.print("[bold]begun")
         shown.update()
         drawn = terminal.getvalue()
         shown.update()  # too soon
@@ -95,7 +95,7 @@ def test_a_narrow_terminal_cuts_it(monkeypatch):
     monkeypatch.setattr("sys.stderr", terminal)
     monkeypatch.setenv("TERM", "xterm")
     monkeypatch.setenv("COLUMNS", "30")
-    with RecordLine(Still(BAD)) as shown:
+    with StatusLine(Still(BAD)) as shown:
         shown.update()
     assert "no samples" in terminal.getvalue()
     assert "markers" not in terminal.getvalue()

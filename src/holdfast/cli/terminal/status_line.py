@@ -1,37 +1,37 @@
-"""The line that follows a recording while it is made."""
+"""The status line of a recording in progress, on stderr."""
 
 import sys
 import time
 from types import TracebackType
 from typing import TYPE_CHECKING, Self
 
-from holdfast.cli.terminal.console import say
+from holdfast.cli.terminal.console import print_message
 
 if TYPE_CHECKING:
     from rich.live import Live
 
     from holdfast.live.recorder import Recorder, RecorderStatus
 
-REFRESH = 0.25
-"""How often the line is written anew on a terminal [s]."""
-NOW_AND_THEN = 10.0
-"""Where stderr is no terminal, a line is told after so long [s]."""
+REFRESH_INTERVAL = 0.25
+"""Time between two updates of the line on a terminal [s]."""
+MESSAGE_INTERVAL = 10.0
+"""Time between two lines where stderr is no terminal [s]."""
 
 
-class RecordLine:
-    """How far a recorder is, on stderr: a line in its place, or one now and then.
+class StatusLine:
+    """Status of a recorder: one line that is updated on a terminal, elsewhere a line at times.
 
     Args:
-        recorder: that is followed.
+        recorder: a recorder that is open.
     """
 
     def __init__(self, recorder: "Recorder") -> None:
         self._recorder = recorder
         self._live: Live | None = None
-        self._next = 0.0
+        self._next_update = 0.0
 
     def __enter__(self) -> Self:
-        self._next = time.monotonic()
+        self._next_update = time.monotonic()
         if sys.stderr.isatty():
             from rich.console import Console
             from rich.live import Live
@@ -39,7 +39,7 @@ class RecordLine:
             self._live = Live(console=Console(stderr=True), auto_refresh=False, transient=True)
             self._live.start()
         else:
-            self._next += NOW_AND_THEN
+            self._next_update += MESSAGE_INTERVAL
         return self
 
     def __exit__(
@@ -51,33 +51,33 @@ class RecordLine:
         if self._live:
             self._live.stop()
 
-    def say(self, *texts: str) -> None:
-        """Tells something above the line."""
+    def print(self, *texts: str) -> None:
+        """Print messages above the line."""
         for text in texts:
             if self._live:
                 self._live.console.print(text, markup=False, highlight=False)
             else:
-                say(text)
+                print_message(text)
 
     def update(self) -> None:
-        """Writes the line anew, where it is time to."""
+        """Print the status if its interval is over."""
         now = time.monotonic()
-        if now < self._next:
+        if now < self._next_update:
             return
-        self._next = now + (REFRESH if self._live else NOW_AND_THEN)
-        words = line(self._recorder.status)
+        self._next_update = now + (REFRESH_INTERVAL if self._live else MESSAGE_INTERVAL)
+        parts = status_parts(self._recorder.status)
         if self._live is None:
-            say("   ".join(text for text, _ in words))
+            print_message("   ".join(text for text, _ in parts))
             return
         from rich.text import Text
 
-        drawn = Text("   ").join(Text(text, "bold red" if bad else "") for text, bad in words)
-        drawn.no_wrap, drawn.overflow = True, "ellipsis"
-        self._live.update(drawn, refresh=True)
+        line = Text("   ").join(Text(text, "bold red" if bad else "") for text, bad in parts)
+        line.no_wrap, line.overflow = True, "ellipsis"
+        self._live.update(line, refresh=True)
 
 
-def line(status: "RecorderStatus") -> list[tuple[str, bool]]:
-    """What is told of a recording, piece by piece, and whether it is bad news."""
+def status_parts(status: "RecorderStatus") -> list[tuple[str, bool]]:
+    """Return the parts of the status line; each with True if it reports a problem."""
     faults = [f"{name} {' '.join(here)}" for name, here in status.recent_faults.items()]
     return [
         (f"{status.seconds:.1f} s", False),
@@ -85,17 +85,17 @@ def line(status: "RecorderStatus") -> list[tuple[str, bool]]:
         (f"gaps {status.n_gaps}", status.n_gaps > 0),
         (f"lost {status.n_lost}", status.n_lost > 0),
         *([(f"dropped {status.n_dropped}", True)] if status.n_dropped else []),
-        (size(status.n_bytes), False),
+        (format_size(status.n_bytes), False),
         (f"markers {status.n_markers}", False),
         *((text, True) for text in faults),
     ]
 
 
-def size(n_bytes: int) -> str:
-    """A number of bytes as people read it.
+def format_size(n_bytes: int) -> str:
+    """Return a number of bytes in kB or MB.
 
     Example:
-        >>> size(900), size(2_500_000)
+        >>> format_size(900), format_size(2_500_000)
         ('0.9 kB', '2.5 MB')
     """
     return f"{n_bytes / 1e3:.1f} kB" if n_bytes < 1e6 else f"{n_bytes / 1e6:.1f} MB"
