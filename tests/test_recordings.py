@@ -48,7 +48,7 @@ class TestLabel:
     @pytest.mark.parametrize("state", [ContactState.UNKNOWN, "UNKNOWN"])
     def test_unknown_is_no_label(self, state):
         with pytest.raises(
-            ValueError, match=r"^a label is STABLE, UNSTABLE or NO_CONTACT; UNKNOWN is no label$"
+            ValueError, match=r"^a label is STABLE, UNSTABLE or NO_CONTACT; UNKNOWN given$"
         ):
             Label(0, 1, state)
 
@@ -86,8 +86,11 @@ class TestTactile:
             ),
             ({"readings": np.zeros((10, 4, 3))}, "4 taxels given, 5 expected (anyskin)"),
             ({"readings": np.zeros((9, 5, 3))}, "9 samples given with 10 times"),
-            ({"readings": np.zeros((10, 5, 3), bool)}, "readings are numbers; bool given"),
-            ({"readings": np.zeros((10, 5, 3), complex)}, "readings are numbers; complex128 given"),
+            ({"readings": np.zeros((10, 5, 3), bool)}, "readings must be numbers; bool given"),
+            (
+                {"readings": np.zeros((10, 5, 3), complex)},
+                "readings must be numbers; complex128 given",
+            ),
             (
                 {"times": np.array([0, 1, 2, 3, np.nan, 5, 6, 7, 8, 9])},
                 "a time is not finite; seconds expected",

@@ -1,23 +1,23 @@
-"""What can go wrong, one family for each thing that a caller would do about it.
+"""Exceptions of the package: one class for each different reaction of a caller.
 
     HoldfastError
     ├── RecordingError   a recording or dataset cannot be read, or contradicts itself
-    ├── ModelError       a model file is refused, or does not fit the data it is given
+    ├── ModelError       a model file is invalid, or does not fit the data
     ├── TrainingError    the data cannot train or test a classifier (one class, one group)
-    ├── StreamError      samples came that a detector cannot take
-    ├── SourceError      a source cannot be reached, says nothing, or is another than expected
-    ├── EngineError      the processes or the cluster that do the work fail, not the work
+    ├── StreamError      a detector cannot process the samples
+    ├── SourceError      a source cannot be reached, sends nothing, or is not the expected one
+    ├── EngineError      the processes or the cluster that make parallel calls fail
     ├── OutputError      an output exists already or cannot be written
-    └── MissingExtra     a part needs a package that is not installed
+    └── MissingExtra     an optional package is not installed
 
-Wrong arguments are ``ValueError`` or ``TypeError``, as everywhere in Python. Every message
+Wrong arguments raise ``ValueError`` or ``TypeError``, as everywhere in Python. Every message
 says what was given, what was expected and what exists. The command line prints it as one
 line and exits with 2.
 """
 
 
 class HoldfastError(Exception):
-    """Any failure that holdfast foresees; its text is one line for a person."""
+    """Base class of all exceptions of holdfast; the text is one line."""
 
 
 class RecordingError(HoldfastError):
@@ -25,31 +25,31 @@ class RecordingError(HoldfastError):
 
 
 class ModelError(HoldfastError):
-    """A model is refused, or does not fit the data: use another model or sensor."""
+    """A model is invalid, or does not fit the data: use another model or sensor."""
 
 
 class TrainingError(HoldfastError):
-    """The data cannot train or test a classifier: bring more or other recordings."""
+    """The data cannot train or test a classifier: use more or other recordings."""
 
 
 class StreamError(HoldfastError):
-    """Samples came that a detector cannot take: mend the source, then reset."""
+    """A detector cannot process the samples: repair the source, then reset the detector."""
 
 
 class SourceError(HoldfastError):
-    """A source cannot be reached, says nothing or not what is expected: mend it, try again."""
+    """A source cannot be reached, or sends nothing or other data: repair it, then try again."""
 
 
 class EngineError(HoldfastError):
-    """The processes or the cluster that do the work fail: mend them, then start again."""
+    """The processes or the cluster of parallel calls fail: repair them, then start again."""
 
 
 class OutputError(HoldfastError):
-    """An output exists already or cannot be written: nothing was left half-written."""
+    """An output exists already or cannot be written; no incomplete file is left."""
 
 
 class MissingExtra(HoldfastError):  # noqa: N818 (it names what to install, not what broke)
-    """A part needs an optional package: install the extra that the text names."""
+    """An optional package is not installed: install the extra that the text names."""
 
     def __init__(self, package: str, extra: str) -> None:
         super().__init__(package, extra)

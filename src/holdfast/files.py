@@ -1,4 +1,4 @@
-"""Outputs that are written whole or not at all."""
+"""Output files that are written whole or not at all."""
 
 import os
 import tempfile
@@ -11,18 +11,18 @@ from holdfast.errors import OutputError
 
 @contextmanager
 def whole_file(path: str | Path, *, force: bool = False) -> Iterator[Path]:
-    """Yields a path beside `path` that takes its place when the block ends well.
+    """Yield a temporary path that replaces `path` when the block ends without an exception.
 
     Args:
-        path: where the output is to be.
-        force: replace what is there.
+        path: of the output.
+        force: replace an existing file.
 
     Yields:
-        A temporary path in the same folder, with the same suffix, to write to.
+        A path in the same folder, with the same suffix, to write to.
 
     Raises:
-        OutputError: something is there already and `force` is not given, the folder does not
-            exist, or the disk refuses (full, read-only). The temporary file is removed.
+        OutputError: the file exists and `force` is not given, the folder does not exist, or the
+            disk is full or read-only. The temporary file is removed.
     """
     target = Path(path)
     refuse_overwrite(target, force=force)
@@ -45,7 +45,7 @@ def whole_file(path: str | Path, *, force: bool = False) -> Iterator[Path]:
 
 
 def write_whole(path: str | Path, data: bytes, *, force: bool = False) -> None:
-    """Writes `data` to `path`, whole or not at all.
+    """Write `data` to `path`, whole or not at all.
 
     Raises:
         OutputError: as `whole_file`.
@@ -55,7 +55,7 @@ def write_whole(path: str | Path, data: bytes, *, force: bool = False) -> None:
 
 
 def refuse_overwrite(path: str | Path, *, force: bool = False) -> None:
-    """Does nothing where `path` may be written.
+    """Raise an error if `path` must not be written.
 
     Raises:
         OutputError: `path` exists and `force` is not given, or its folder does not exist.

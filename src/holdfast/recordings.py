@@ -1,4 +1,4 @@
-"""A recording is one continuous capture of a hand: values only, no files and no clock."""
+"""Recordings: continuous captures of a hand. Values only, no files and no clock."""
 
 import hashlib
 from collections.abc import Mapping, Sequence
@@ -17,24 +17,28 @@ from holdfast.sensors import Sensor
 from holdfast.sensors.types import Array, Unit, rebuilt
 
 GAP_PERIODS = 3.0
-"""A step in time longer than this many sample periods is a gap."""
+"""A step in time of more sample periods is a gap."""
 
 
 @dataclass(frozen=True)
 class Label:
-    """A state over the interval [start, end), with what it rests on.
+    """Contact state over the interval [start, end), with its evidence.
 
     Attributes:
-        start: first instant [s], on the clock of the recording.
-        end: first instant after it [s].
+        start: first instant, on the clock of the recording [s].
+        end: first instant after the interval [s].
         state: STABLE, UNSTABLE or NO_CONTACT.
-        cause: why the contact is not stable, where that is known.
-        evidence: what the label rests on ("hand", "slip measured by marker", ...).
+        cause: cause of a contact that is not stable; None if unknown.
+        evidence: evidence for the label ("hand", "slip measured by marker", ...).
         confidence: from 0 to 1.
-        author: a person, or the name of a rule.
+        author: name of a person or of a rule.
 
     Raises:
-        ValueError: it does not end after its start, or a field is out of range.
+        ValueError: the interval does not end after its start, or a field is out of range.
+
+    Example:
+        >>> Label(0.5, 1.0, "UNSTABLE", "slip").cause
+        <Cause.SLIP: 'slip'>
     """
 
     start: float
@@ -51,26 +55,33 @@ class Label:
         object.__setattr__(self, "state", ContactState(self.state))
         object.__setattr__(self, "cause", None if self.cause is None else Cause(self.cause))
         if self.state is ContactState.UNKNOWN:
-            raise ValueError("a label is STABLE, UNSTABLE or NO_CONTACT; UNKNOWN is no label")
+            raise ValueError("a label is STABLE, UNSTABLE or NO_CONTACT; UNKNOWN given")
         if not 0 <= self.confidence <= 1:
             raise ValueError(f"confidence from 0 to 1 expected, {self.confidence} given")
 
 
 @dataclass(frozen=True, eq=False)
 class Tactile:
-    """What one sensor reported: readings over time, and their labels.
+    """Readings of one sensor over time, and their labels.
 
-    Arrays become read-only. Readings keep the number type that they come in.
+    The arrays are read-only. Readings keep their number type.
 
     Attributes:
-        sensor: whose readings they are.
+        sensor: the sensor that gave the readings.
         times: (n,) strictly increasing, on the clock of the recording [s].
         readings: (n, n_taxels, 3) in taxel frames [unit]; NaN where a value is missing.
-        unit: `count` or `N`; that of the sensor, unless the readings are calibrated.
+        unit: `count` or `N`; by default the unit of the sensor. Another unit means that the
+            readings are calibrated.
         labels: intervals in order of time, without overlap, within the recording.
 
     Raises:
         RecordingError: shapes, times or labels contradict each other.
+
+    Example:
+        >>> from holdfast.sensors import sensor
+        >>> module = Tactile(sensor("uskin-4x4"), np.arange(3) / 100, np.zeros((3, 16, 3)))
+        >>> module.n_samples, round(module.rate), module.unit
+        (3, 100, 'count')
     """
 
     sensor: Sensor
@@ -87,7 +98,7 @@ class Tactile:
         object.__setattr__(self, "times", times)
         object.__setattr__(self, "readings", readings)
         unit = self.unit or self.sensor.unit
-        if unit != self.sensor.unit:  # calibrated: the limits of the raw readings are not theirs
+        if unit != self.sensor.unit:  # calibrated: the limits are those of raw readings
             object.__setattr__(self, "sensor", replace(self.sensor, unit=unit, limits=None))
         object.__setattr__(self, "unit", unit)
         object.__setattr__(self, "labels", labels)
@@ -99,16 +110,16 @@ class Tactile:
 
     @property
     def n_samples(self) -> int:
-        """How many samples it has."""
+        """Number of samples."""
         return len(self.times)
 
     @cached_property
     def period(self) -> float:
-        """The mean step in time [s]; that of the sensor where there is no step.
+        """Mean step in time [s]; the period of the sensor if there is no step.
 
-        Steps over three times the median are gaps and left out. The mean of the others is what
-        counts: stamps in whole milliseconds make the median of a 149.5 Hz stream read 143 or
-        167 Hz.
+        Steps over three times the median are gaps and are left out. The mean is more exact than
+        the median: with times in whole milliseconds, the median of a 149.5 Hz stream gives 143
+        or 167 Hz.
         """
         steps = np.diff(self.times)
         if not len(steps):
@@ -117,27 +128,27 @@ class Tactile:
 
     @property
     def rate(self) -> float:
-        """Samples per second, by the mean step in time [Hz]."""
+        """Samples per second, from the mean step in time [Hz]."""
         return 1 / self.period
 
     @property
     def n_gaps(self) -> int:
-        """How many steps in time are longer than three periods."""
+        """Number of steps in time that are longer than three periods."""
         return int((np.diff(self.times) > GAP_PERIODS * self.period).sum())
 
     @property
     def n_repeats(self) -> int:
-        """How many samples repeat the readings of the sample before."""
+        """Number of samples that repeat the readings of the sample before."""
         same = (self.readings[1:] == self.readings[:-1]).all(axis=(1, 2))
         return int(same.sum())
 
     @property
     def label_states(self) -> npt.NDArray[np.int8]:
-        """(n,) code of the label's state at each sample; UNKNOWN where there is none."""
+        """(n,) code of the labelled state at each sample; UNKNOWN without a label."""
         return label_states(self.labels, self.times)
 
     def slice(self, start: int, stop: int) -> Self:
-        """The samples from `start` up to `stop`, with the labels cut to them."""
+        """Return the samples from index `start` up to `stop`, with the labels cut to them."""
         part = replace(
             self, times=self.times[start:stop], readings=self.readings[start:stop], labels=()
         )
@@ -154,19 +165,25 @@ class Tactile:
 
 @dataclass(frozen=True, eq=False)
 class Truth:
-    """What is known for certain about a recording, on the clock of its modules.
+    """Ground truth of a recording, on the clock of its modules.
 
     Attributes:
         times: (n,) [s].
-        hand: arrays of first axis n: `phase`, `outside_force` (n, 3) [N] world, `object_pose`
-            (n, 7) position [m] and quaternion w x y z in the world, `joints` (n, n_joints)
-            [rad], and what else a source knows (the twin: `set_point_error` (n,), the largest
-            of a joint in that sample [rad], other than 0 in a glitch of the controller).
-        fingers: per finger, the same: `contact_force` (n, 3) on the object [N] world,
-            `slip_speed` (n,) [m/s], `slipping_share` (n,), `tip_pose` (n, 7).
+        hand: arrays with first axis n: `phase`, `outside_force` (n, 3) in the world [N],
+            `object_pose` (n, 7) position [m] and quaternion w x y z in the world, `joints`
+            (n, n_joints) [rad], and further arrays of a source. The twin adds
+            `set_point_error` (n,), the largest error of a joint's set point [rad], which is not
+            0 in a glitch of the controller.
+        fingers: such arrays of each finger: `contact_force` (n, 3) on the object in the world
+            [N], `slip_speed` (n,) [m/s], `slipping_share` (n,), `tip_pose` (n, 7).
 
     Raises:
-        RecordingError: an array has another first axis than the times.
+        RecordingError: an array does not have n rows.
+
+    Example:
+        >>> truth = Truth(np.arange(2) / 100, {"phase": ["free", "closing"]})
+        >>> truth.hand["phase"].tolist()
+        ['free', 'closing']
     """
 
     times: Array
@@ -189,19 +206,26 @@ class Recording:
     """One continuous capture of a hand.
 
     Attributes:
-        name: what it is called; its file's name without the suffix.
-        modules: the readings of each sensor. Fingertips are `thumb`, `index`, `middle`,
-            `ring`; pads `index/1`, the palm `palm/1`; who knows no names calls them
+        name: name of its file without the suffix.
+        modules: readings of each sensor. Fingertips are named `thumb`, `index`, `middle`,
+            `ring`; pads `index/1`, the palm `palm/1`. Modules without known names are
             `finger1`, `finger2`, ... in the order of the device.
         metadata: `object`, `object_mass` [kg], `case`, `repeat`, `profile`, `seed`, `hand`,
-            `source` and what else is known; plain JSON values.
-        truth: what is known for certain, or None.
-        markers: (time [s], text) that somebody set while recording.
+            `source` and further plain JSON values.
+        truth: ground truth, or None.
+        markers: (time [s], text) of each marker that was set while recording.
         media: (path of a video, offset [s] of its start on the clock of the recording).
-        complete: False where the end of the file was cut off and the rest recovered.
+        complete: False if the end of the file was cut off and the rest was recovered.
 
     Raises:
-        RecordingError: it has no module, or no module has a sample.
+        RecordingError: there is no module, or no module has a sample.
+
+    Example:
+        >>> from holdfast.sensors import sensor
+        >>> module = Tactile(sensor("uskin-4x4"), np.arange(3) / 100, np.zeros((3, 16, 3)))
+        >>> recording = Recording("made", {"index": module})
+        >>> recording.start, recording.end, recording.duration
+        (0.0, 0.02, 0.02)
     """
 
     name: str
@@ -235,19 +259,20 @@ class Recording:
 
     @property
     def duration(self) -> float:
-        """From the first sample to the last [s]."""
+        """Time from the first sample to the last [s]."""
         return self.end - self.start
 
     @property
     def rate(self) -> float:
-        """Samples per second: the median over its modules [Hz]."""
+        """Samples per second, the median of its modules [Hz]."""
         return float(np.median([m.rate for m in self.modules.values() if m.n_samples]))
 
     @cached_property
     def digest(self) -> str:
-        """A hash of the samples: their times, readings and sensors, whatever the file format.
+        """Hash of the times, readings and sensors, the same in every file format.
 
-        Names, labels and metadata are no part of it: relabelling keeps a recording's identity.
+        The name, labels and metadata do not count, so a recording with other labels keeps its
+        digest.
         """
         state = hashlib.blake2b(digest_size=16)
         for name in sorted(self.modules):
@@ -260,10 +285,13 @@ class Recording:
         return state.hexdigest()
 
     def with_labels(self, labels: Mapping[str, Sequence[Label]]) -> Self:
-        """The same recording with these labels in place of its own.
+        """Return the same recording with these labels in place of its own.
+
+        Args:
+            labels: by module; a module that is not named gets none.
 
         Raises:
-            RecordingError: labels for a module that it does not have, or out of its time.
+            RecordingError: the recording lacks a module, or a label lies outside its time.
         """
         if unknown := sorted(set(labels) - set(self.modules)):
             raise RecordingError(
@@ -278,7 +306,7 @@ class Recording:
 
 
 def label_states(labels: Sequence[Label], times: Array) -> npt.NDArray[np.int8]:
-    """The code of the label's state at each time; UNKNOWN where there is none.
+    """Return the code of the labelled state at each time; UNKNOWN without a label.
 
     Args:
         labels: in order of time, without overlap.
@@ -302,17 +330,17 @@ def labels_from_samples(
     evidence: str = "",
     author: str = "",
 ) -> tuple[Label, ...]:
-    """Intervals of equal state out of one state (or None) a sample.
+    """Return labels over the runs of equal state in a state for each sample.
 
     Args:
         times: (n,) [s].
-        states: n pairs of state and cause; None where there is no label.
-        period: how long the last sample lasts [s].
-        evidence: for every label.
-        author: for every label.
+        states: n pairs of state and cause; None for a sample without a label.
+        period: duration of the last sample [s].
+        evidence: of every label.
+        author: of every label.
 
     Raises:
-        ValueError: another number of states than of times.
+        ValueError: the number of states differs from the number of times.
     """
     if len(states) != len(times):
         raise ValueError(f"{len(states)} states given for {len(times)} times")
@@ -346,7 +374,7 @@ def _check_samples(times: Array, readings: npt.NDArray[Any], sensor: Sensor) -> 
     if not (
         np.issubdtype(readings.dtype, np.integer) or np.issubdtype(readings.dtype, np.floating)
     ):
-        raise RecordingError(f"readings are numbers; {readings.dtype} given")
+        raise RecordingError(f"readings must be numbers; {readings.dtype} given")
     if not np.isfinite(times).all():
         raise RecordingError("a time is not finite; seconds expected")
     steps = np.diff(times)

@@ -1,4 +1,4 @@
-"""Recordings and streams at another rate."""
+"""Resample recordings and streams to another rate."""
 
 from dataclasses import replace
 from itertools import pairwise
@@ -11,24 +11,26 @@ from holdfast.recordings import GAP_PERIODS, Recording, Tactile
 from holdfast.sensors.types import Array
 
 Integers = npt.NDArray[np.int64]
-TOLERANCE = 1e-3
-"""Of a period of the wanted rate: rounding of times, 1e-7 s since 1970, moves no sample."""
+TOLERANCE_PERIODS = 1e-3
+"""Tolerance of times in periods of the new rate. The rounding of times, 1e-7 s since 1970, then
+moves no sample."""
 
 
 def resample(recording: Recording, rate: float) -> Recording:
-    """The recording with every module at another rate.
+    """Return the recording with every module at another rate.
 
-    Linear between samples; where the source is faster, each new sample is the mean of those
-    since the one before, so that noise and vibration do not fold. Each stretch between gaps
-    begins at its own first sample; labels stay as they are, up to the last sample. Every value
-    rests on samples up to the first one at or after its time: `Resampler` has it live.
+    From a slower source, samples are interpolated linearly. From a faster source, each new
+    sample is the mean of the samples since the new sample before, so that noise and vibration
+    are not aliased. Each stretch between gaps begins at its own first sample. Labels stay as they
+    are, up to the last sample. Every new sample depends only on samples up to the first one at
+    or after its time, so `Resampler` gives the same result live.
 
     Args:
         recording: at any rate.
-        rate: wanted [Hz].
+        rate: new rate [Hz].
 
     Raises:
-        ValueError: a rate that is not above 0.
+        ValueError: the rate is not above 0.
     """
     _check_rate(rate)
     modules = {name: _resample(module, rate) for name, module in recording.modules.items()}
@@ -52,7 +54,7 @@ def _resample(module: Tactile, rate: float) -> Tactile:
 def _resample_stretch(module: Tactile, first: int, last: int, rate: float) -> tuple[Array, Array]:
     times = module.times[first:last]
     readings = np.asarray(module.readings[first:last], dtype=np.float64)
-    reached = ((times - times[0] + TOLERANCE / rate) * rate).astype(np.int64)
+    reached = ((times - times[0] + TOLERANCE_PERIODS / rate) * rate).astype(np.int64)
     if rate * module.period >= 1:
         return _interpolated(times, readings, reached, rate)
     return _averaged(times, readings, reached, rate)
@@ -61,7 +63,7 @@ def _resample_stretch(module: Tactile, first: int, last: int, rate: float) -> tu
 def _interpolated(
     times: Array, readings: Array, reached: Integers, rate: float
 ) -> tuple[Array, Array]:
-    """Of a slower source: each new sample between the first that reaches it and the one before."""
+    """Interpolate a slower source between the samples before and after each new sample."""
     steps = np.arange(1, reached[-1] + 1)
     after = np.searchsorted(reached, steps)
     wanted = times[0] + steps / rate
@@ -72,28 +74,28 @@ def _interpolated(
 
 
 def _averaged(times: Array, readings: Array, reached: Integers, rate: float) -> tuple[Array, Array]:
-    """Of a faster source: each new sample the mean since the one before, where there are any."""
+    """Average a faster source since the new sample before, where there are any samples."""
     closing = np.diff(reached, prepend=-1) > 0
-    at_it = times <= times[0] + reached / rate + TOLERANCE / rate
-    steps = np.where(closing & at_it, reached, reached + 1)  # the new sample it is a part of
+    on_time = times <= times[0] + reached / rate + TOLERANCE_PERIODS / rate
+    steps = np.where(closing & on_time, reached, reached + 1)  # new sample of each old one
     steps = steps[steps <= reached[-1]]
     kept, starts, counts = np.unique(steps, return_index=True, return_counts=True)
     sums = readings[starts]
-    for k in range(1, int(counts.max())):  # one after the other, as live: the rounding is the same
+    for k in range(1, int(counts.max())):  # one after the other, with the same rounding as live
         more = counts > k
         sums[more] += readings[starts[more] + k]
     return times[0] + kept / rate, sums / counts[:, None, None]
 
 
 class Resampler:
-    """The same as `resample`, sample by sample, for one module.
+    """Resampler of one module, sample by sample, with the same result as `resample`.
 
     Args:
-        source_rate: of the module [Hz], as it was measured.
-        rate: wanted [Hz].
+        source_rate: measured rate of the module [Hz].
+        rate: new rate [Hz].
 
     Raises:
-        ValueError: a rate that is not above 0.
+        ValueError: a rate is not above 0.
 
     Example:
         >>> resampler = Resampler(source_rate=200.0, rate=100.0)
@@ -109,21 +111,21 @@ class Resampler:
         self._push = self._interpolate if rate / source_rate >= 1 else self._average
         self._start = self._last = -np.inf
         self._step = 0  # the next new sample
-        self._reading: Array = np.empty(0)  # the last one; where they are averaged, their sum
+        self._reading: Array = np.empty(0)  # the last one; the sum, where samples are averaged
         self._n_summed = 0
 
     def push(self, time: float, reading: npt.ArrayLike) -> list[tuple[float, Array]]:
-        """Takes a sample.
+        """Process a sample.
 
         Args:
-            time: later than the last [s].
-            reading: (n_taxels, 3).
+            time: of the sample, later than the last [s].
+            reading: (n_taxels, 3) [count or N].
 
         Returns:
-            The new samples that are known now, oldest first, each with its time [s].
+            Time [s] and reading of each new sample that is complete now, oldest first.
 
         Raises:
-            StreamError: a time that does not go forward.
+            StreamError: the time does not go forward.
         """
         time = float(time)
         if not self._last < time < np.inf:
@@ -136,7 +138,7 @@ class Resampler:
             self._start, self._step, self._n_summed = time, 1, 0
             self._last, self._reading = time, values
             return [(time, values.copy())]
-        reached = int((time - self._start + TOLERANCE / self._rate) * self._rate)
+        reached = int((time - self._start + TOLERANCE_PERIODS / self._rate) * self._rate)
         found = self._push(time, values, reached)
         self._last = time
         return found
@@ -153,12 +155,12 @@ class Resampler:
 
     def _average(self, time: float, values: Array, reached: int) -> list[tuple[float, Array]]:
         found = []
-        at_it = time <= self._start + reached / self._rate + TOLERANCE / self._rate
+        on_time = time <= self._start + reached / self._rate + TOLERANCE_PERIODS / self._rate
         if reached >= self._step:
-            if self._n_summed and (reached > self._step or not at_it):
+            if self._n_summed and (reached > self._step or not on_time):
                 found.append(self._mean(self._step))
             self._step = reached + 1
-            if at_it:
+            if on_time:
                 self._add(values)
                 return [*found, self._mean(reached)]
         self._add(values)

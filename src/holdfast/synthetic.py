@@ -1,8 +1,8 @@
-"""Recordings made from an analytic signal, for a first look and for tests: no physics.
+"""Synthetic recordings from an analytic signal, for examples and tests. There is no physics.
 
 A fingertip of 30 taxels is pressed by a smooth grip that closes, holds, is shaken, holds again
-and lets go. The pressure has the shape of a bell over the taxels; shaking is a band of
-sinusoids. Labels follow from the schedule, so they are exact.
+and opens. The pressure is bell-shaped over the taxels. The shaking is a sum of sinusoids. Labels
+follow from the schedule, so they are exact.
 """
 
 from collections.abc import Sequence
@@ -16,26 +16,31 @@ from holdfast.sensors.types import Array
 
 RATE = 150.0
 NOISE = 0.9
-"""Standard deviation of a reading [counts], as in the data sheet of the uSkin."""
+"""Standard deviation of a reading, from the data sheet of the uSkin [count]."""
 BASELINE = (32768.0, 32768.0, 36000.0)
-"""Readings at rest [counts]."""
+"""Readings without contact [count]."""
 
 FREE, CLOSING, HOLD, SHAKE, RELEASE = 1.5, 0.8, 3.0, 1.2, 0.5
-"""How long each part lasts [s]."""
+"""Duration of each part of the schedule [s]."""
 
 
 def synthetic_recording(
     name: str, seed: int, fingers: Sequence[str] = ("thumb", "index", "middle")
 ) -> Recording:
-    """One grasp: free, closing, held, shaken, held, let go, free.
+    """Return a recording of one grasp: free, closing, held, shaken, held, released, free.
 
     Args:
         name: of the recording.
-        seed: of grip, shaking and noise; the same seed gives the same bytes.
-        fingers: that take part.
+        seed: of grip, shaking and noise. The same seed gives the same bytes.
+        fingers: names of the fingers.
 
     Returns:
-        Counts of curved uSkin fingertips at 150 Hz, with labels.
+        Readings of curved uSkin fingertips at 150 Hz [count], with labels.
+
+    Example:
+        >>> recording = synthetic_recording("made", seed=0, fingers=("thumb",))
+        >>> recording.modules["thumb"].readings.shape, round(recording.rate)
+        ((1725, 30, 3), 150)
     """
     generator = np.random.default_rng(seed)
     grip = generator.uniform(400.0, 1200.0)
@@ -54,7 +59,7 @@ def _finger(generator: np.random.Generator, grip: float) -> Tactile:
 
 
 def _force(generator: np.random.Generator, times: Array, ends: Array, grip: float) -> Array:
-    """(n, 3) force on the fingertip [counts]: grip, a steady shear, and the shaking."""
+    """Return (n, 3) force on the fingertip [count]: grip, constant shear and shaking."""
     closing = _ramp((times - ends[0]) / CLOSING)
     release = _ramp((times - ends[4]) / RELEASE)
     level = grip * (closing - release)
@@ -68,7 +73,7 @@ def _force(generator: np.random.Generator, times: Array, ends: Array, grip: floa
 
 
 def _readings(generator: np.random.Generator, tip: Sensor, force: Array) -> Array:
-    """(n, n_taxels, 3) counts: the force spread over the taxels near the middle, and noise."""
+    """Return (n, n_taxels, 3) readings [count]: the force over the middle taxels, and noise."""
     middle = tip.positions[np.abs(tip.positions @ [0.0, 1.0, 0.0]).argmin()]
     distance = np.linalg.norm(tip.positions - middle, axis=1)
     share = np.exp(-0.5 * (distance / 6e-3) ** 2)
@@ -98,6 +103,6 @@ def _labels(ends: Array) -> tuple[Label, ...]:
 
 
 def _ramp(x: Array) -> Array:
-    """From 0 to 1 and smooth."""
+    """Return a smooth step from 0 to 1."""
     inside: Array = np.clip(x, 0.0, 1.0)
     return inside * inside * (3 - 2 * inside)

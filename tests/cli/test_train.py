@@ -128,8 +128,8 @@ def test_a_model_is_not_overwritten(capsys, data, model):
         (["--split", "half"], "unknown split 'half'; there are recording, object, random"),
         (
             ["--features", "F_a,magic"],
-            "unknown feature 'magic'; there are F_a, F_x, F_y, F_z, m, sigma, F_tip for three, "
-            "and holdfast alone for a list of our own",
+            "unknown feature 'magic'; there are F_a, F_x, F_y, F_z, m, sigma, F_tip for F_x, F_y "
+            "and F_z, and holdfast alone for the project's own features",
         ),
         (
             ["--tare", "soon"],

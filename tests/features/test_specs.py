@@ -23,15 +23,18 @@ def test_names(names, expected):
     assert " ".join(map(str, parse_features(names))) == expected
 
 
+KNOWN = (
+    "there are F_a, F_x, F_y, F_z, m, sigma, F_tip for F_x, F_y and F_z, and holdfast alone for "
+    "the project's own features"
+)
+
+
 @pytest.mark.parametrize(
     ("names", "window", "message"),
     [
-        ("F_a,F_q", 14, "unknown feature 'F_q'; there are F_a, F_x, F_y, F_z, m, sigma, F_tip for"
-                        " three, and holdfast alone for a list of our own"),
-        ("", 14, "unknown feature ''; there are F_a, F_x, F_y, F_z, m, sigma, F_tip for three, and"
-                 " holdfast alone for a list of our own"),
-        ("holdfast,F_a", 14, "unknown feature 'holdfast'; there are F_a, F_x, F_y, F_z, m, sigma,"
-                             " F_tip for three, and holdfast alone for a list of our own"),
+        ("F_a,F_q", 14, f"unknown feature 'F_q'; {KNOWN}"),
+        ("", 14, f"unknown feature ''; {KNOWN}"),
+        ("holdfast,F_a", 14, f"unknown feature 'holdfast'; {KNOWN}"),
         ("F_a,F_a", 14, "a feature is given twice in F_a,F_a"),
         ("F_tip,F_x", 14, "a feature is given twice in F_x,F_y,F_z,F_x"),
         ("F_a", 13, "an even window of at least 2 samples expected, 13 given"),
@@ -43,7 +46,7 @@ def test_refuses_names(names, window, message):
     assert str(raised.value) == message
 
 
-def test_our_own_list_has_a_name():
+def test_the_projects_own_features_have_a_name():
     own = parse_features("holdfast", 8)
     assert len(own) == 15
     assert str(own[0]) == "log(F_a)"
@@ -56,11 +59,11 @@ def test_our_own_list_has_a_name():
         (("m", 3), "an even window of at least 2 samples expected, 3 given"),
         (("F_x", 14), "F_x has no window; 14 given"),
         (("m", 14, "noise"),
-         "the transform 'noise' is of sigma over 4 or more; noise(m[14]) given"),
+         "the transform 'noise' expects sigma over 4 samples or more; noise(m[14]) given"),
         (("sigma", 2, "noise"),
-         "the transform 'noise' is of sigma over 4 or more; noise(sigma[2]) given"),
+         "the transform 'noise' expects sigma over 4 samples or more; noise(sigma[2]) given"),
         (("F_a", 0, "log"),
-         "log(F_a): a floor above 0 expected, which keeps it finite; 0 given"),
+         "log(F_a): a floor above 0 expected, which keeps the logarithm finite; 0 given"),
         (("F_a", 0, "log", "finger", -1.0), "a floor of at least 0 expected, -1.0 given"),
         (("F_a", 0, "log", "finger", np.nan), "a floor of at least 0 expected, nan given"),
     ],

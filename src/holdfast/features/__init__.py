@@ -1,4 +1,4 @@
-"""From readings to features: tare, fingertip force, the Haar window."""
+"""From readings to features: tare, fingertip force, Haar window, feature stream."""
 
 from holdfast.features.force import fingertip_force
 from holdfast.features.haar import DEFAULT_WINDOW, FEATURE_NAMES, haar_features

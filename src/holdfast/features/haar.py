@@ -1,4 +1,4 @@
-"""The Haar window: the one definition that batch and stream both use."""
+"""The Haar window: one definition of m and sigma for whole arrays and for streams."""
 
 import math
 
@@ -11,34 +11,35 @@ from holdfast.compiled import compiled, compiled_parallel
 Array = npt.NDArray[np.float64]
 
 DEFAULT_WINDOW = 14
-"""N_w, samples in the window, as in most of the paper."""
+"""N_w, the number of samples in the window, as in most of the paper."""
 
 FEATURE_NAMES = ("F_a", "F_x", "F_y", "F_z", "m", "sigma")
 """The paper's features, in the order of the columns of `haar_features`."""
 
-_BLOCK = 512
-"""Samples that one thread takes at a time: small enough for the cache."""
+_BLOCK_SAMPLES = 512
+"""Samples that one thread computes at a time: they fit into the cache."""
 
 
 def haar_features(force: npt.ArrayLike, window: int = DEFAULT_WINDOW) -> npt.NDArray[np.float64]:
-    r"""The paper's six features of a fingertip force, at every sample.
+    r"""Return the paper's six features of a fingertip force, at every sample.
 
-    Amplitude F_a = |F_tip|, the three components, and from the Haar transform of F_a over the
-    window that ends at the sample, the moving average m of the approximations (equation 1) and
-    the standard deviation sigma of the details (equation 2):
+    They are the amplitude F_a = |F_tip|, the three components, and two values from the Haar
+    transform of F_a over the window that ends at the sample: the moving average m of the
+    approximations (equation 1) and the standard deviation sigma of the details (equation 2).
 
         a = (x_0 + x_1) / sqrt(2),        d = (x_0 - x_1) / sqrt(2)
         m = sum(a) / N_w,                 sigma = sqrt(sum((d - mean(d))^2) / N_w)
 
     Args:
-        force: (n, 3) fingertip force, in count or N; a row that is not finite starts anew.
-        window: N_w, samples in the window; even, at least 2.
+        force: (n, 3) fingertip force [count or N]. Windows with a row that is not finite have
+            no features.
+        window: N_w, number of samples in the window; even, at least 2.
 
     Returns:
         (n, 6) float64 in the order of `FEATURE_NAMES`; rows without a full window are NaN.
 
     Raises:
-        ValueError: an odd window, one under 2, or another shape of force.
+        ValueError: the window is odd or under 2, or the force has another shape.
 
     Example:
         >>> force = np.array([[3.0, 4.0, 0.0], [6.0, 8.0, 0.0], [3.0, 4.0, 0.0], [3.0, 4.0, 0.0]])
@@ -55,10 +56,10 @@ def haar_features(force: npt.ArrayLike, window: int = DEFAULT_WINDOW) -> npt.NDA
 
 
 def check_window(window: int) -> int:
-    """The window, if it can be cut into pairs.
+    """Return the window as an integer, if it can be cut into pairs.
 
     Raises:
-        ValueError: it is odd or under 2.
+        ValueError: the window is odd or under 2.
     """
     if window != int(window) or window < 2 or window % 2:
         raise ValueError(f"an even window of at least 2 samples expected, {window} given")
@@ -67,11 +68,12 @@ def check_window(window: int) -> int:
 
 @compiled
 def haar_windows(x: Array, window: int, m: Array, sigma: Array, scratch: Array) -> None:
-    """Fills m and sigma of every window in x, the first ending at x[window - 1] (eq. 1 and 2).
+    """Compute m and sigma of every window in x (equations 1 and 2).
 
-    Two passes over each window: nothing is carried from one sample to the next, so nothing
-    drifts, any chunking gives the same bits, and a value that is not finite makes exactly the
-    windows that hold it NaN. The inner loops run over windows, which a compiler vectorises.
+    The first window ends at x[window - 1]. Each window takes two passes. No value is carried
+    from one sample to the next: so there is no drift, any chunking gives the same bits, and a
+    value that is not finite makes exactly the windows with it NaN. The inner loops run over
+    windows, so that the compiler can vectorise them.
 
     Args:
         x: (n + window - 1,) values, contiguous.
@@ -103,7 +105,7 @@ def haar_windows(x: Array, window: int, m: Array, sigma: Array, scratch: Array) 
 
 @compiled
 def haar_window(x: Array, window: int) -> tuple[float, float]:
-    """The m and sigma of one window, by the same sums in the same order as `haar_windows`.
+    """Return m and sigma of one window, by the same sums in the same order as `haar_windows`.
 
     Args:
         x: (window,) values.
@@ -122,12 +124,12 @@ def haar_window(x: Array, window: int) -> tuple[float, float]:
 
 @compiled_parallel
 def fill_features(force: Array, window: int, out: Array) -> None:
-    """The same as `haar_features`, into (n, 6) that the caller keeps; nothing is checked."""
+    """Fill (n, 6) `out` with the result of `haar_features`. The arguments are not checked."""
     n = len(force)
     out[: min(window - 1, n)] = math.nan
-    for block in numba.prange(max(n - window + _BLOCK, 0) // _BLOCK):
-        start = window - 1 + block * _BLOCK
-        stop = min(start + _BLOCK, n)
+    for block in numba.prange(max(n - window + _BLOCK_SAMPLES, 0) // _BLOCK_SAMPLES):
+        start = window - 1 + block * _BLOCK_SAMPLES
+        stop = min(start + _BLOCK_SAMPLES, n)
         origin = start - window + 1
         amplitude = np.empty(stop - origin)
         for k in range(origin, stop):

@@ -1,4 +1,4 @@
-"""Features as data: what a classifier sees is a list that a model file can hold."""
+"""Feature specifications: the input of a classifier as data that a model file can hold."""
 
 from collections.abc import Sequence
 from typing import Literal
@@ -14,10 +14,10 @@ TRANSFORMS = ("none", "log", "noise")
 SCOPES = ("finger", "hand")
 
 WINDOWED = ("m", "sigma", "sigma_xyz", "change")
-"""Kinds that look at a window; the others look at one sample."""
+"""Kinds that are computed over a window; the others need one sample."""
 
 DEPLOYED_FEATURES = ("F_a", "F_x", "F_y", "F_z", "sigma")
-"""The features of the paper's deployed model, which drops m."""
+"""Features of the paper's deployed model, which leaves out m."""
 
 
 class FeatureSpec(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
@@ -25,13 +25,16 @@ class FeatureSpec(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
 
     Attributes:
         kind: `F_a`, `F_x`, `F_y`, `F_z`, `m` or `sigma`, as in the paper; `sigma_xyz`, the root
-            of the sum of squares of sigma of the three components; or `change`, the size of
-            the difference of F_tip between the last sample of the window and the first.
-        window: samples in its window, for the last four; 0 for the others.
-        transform: `none`; `log`, the logarithm of its root sum of squares with `floor`; or
-            `noise`, the logarithm of sigma over the sigma that the sensor's noise alone gives.
-        scope: `finger`; or `hand`, the largest value among all fingers of the hand.
-        floor: for `log`: keeps the logarithm finite, in the unit of the readings.
+            of the sum of squares of the sigmas of the three components; or `change`, the norm
+            of the difference of F_tip between the last and the first sample of the window.
+        window: number of samples in the window, for the last four kinds; 0 for the others.
+        transform: `none`; `log`, log(sqrt(value^2 + floor^2)); or `noise`, the logarithm of the
+            ratio of sigma to the sigma of the sensor's noise alone.
+        scope: `finger`; or `hand`, the largest value of all fingers of the hand.
+        floor: value that keeps the logarithm of `log` finite [unit of the readings].
+
+    Raises:
+        ValueError: the fields contradict each other.
     """
 
     kind: Literal["F_a", "F_x", "F_y", "F_z", "m", "sigma", "sigma_xyz", "change"]
@@ -46,9 +49,13 @@ class FeatureSpec(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
         elif self.window != 0:
             raise ValueError(f"{self.kind} has no window; {self.window} given")
         if self.transform == "noise" and (self.kind != "sigma" or self.window < 4):
-            raise ValueError(f"the transform 'noise' is of sigma over 4 or more; {self} given")
+            raise ValueError(
+                f"the transform 'noise' expects sigma over 4 samples or more; {self} given"
+            )
         if self.transform == "log" and self.floor == 0:
-            raise ValueError(f"{self}: a floor above 0 expected, which keeps it finite; 0 given")
+            raise ValueError(
+                f"{self}: a floor above 0 expected, which keeps the logarithm finite; 0 given"
+            )
         if not (np.isfinite(self.floor) and self.floor >= 0):
             raise ValueError(f"a floor of at least 0 expected, {self.floor} given")
 
@@ -59,7 +66,7 @@ class FeatureSpec(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
 
 
 FORCE_FLOOR, SIGMA_FLOOR, CHANGE_FLOOR = 20.0, 3.0, 5.0
-"""About the noise of each on a uSkin fingertip: 30 taxels of 0.9 counts rms [count]."""
+"""Approximate noise of the values on a uSkin fingertip: 30 taxels of 0.9 counts rms [count]."""
 
 
 def _rich(scope: Literal["finger", "hand"]) -> tuple[FeatureSpec, ...]:
@@ -74,21 +81,22 @@ HOLDFAST_FEATURES = (
     *_rich("finger"),
     *_rich("hand"),
 )
-"""Our own features, `holdfast` by name: see `holdfast.study.methods.holdfast`."""
+"""The project's own features, named `holdfast`: see `holdfast.study.methods.holdfast`."""
 
 
 def parse_features(
     names: str | Sequence[str], window: int = DEFAULT_WINDOW
 ) -> tuple[FeatureSpec, ...]:
-    """The features of that list of names, with that window.
+    """Return the specifications of named features.
 
     Args:
-        names: separated by commas, out of `FEATURE_NAMES`; `F_tip` stands for F_x, F_y, F_z;
-            `holdfast` alone for our own features, which have windows of their own.
-        window: N_w, samples.
+        names: names from `FEATURE_NAMES`, as a list or separated by commas. `F_tip` stands for
+            F_x, F_y, F_z. `holdfast` alone stands for the project's own features, which have
+            their own windows.
+        window: N_w, number of samples.
 
     Raises:
-        ValueError: an unknown name, the same twice, none at all, or an odd window.
+        ValueError: a name is unknown or given twice, there is no name, or the window is odd.
 
     Example:
         >>> [str(feature) for feature in parse_features("F_a,sigma")]
@@ -103,8 +111,8 @@ def parse_features(
     if unknown := [name for name in wanted if name not in FEATURE_NAMES]:
         known = ", ".join(FEATURE_NAMES)
         raise ValueError(
-            f"unknown feature {unknown[0]!r}; there are {known}, F_tip for three, and holdfast "
-            "alone for a list of our own"
+            f"unknown feature {unknown[0]!r}; there are {known}, F_tip for F_x, F_y and F_z, and "
+            "holdfast alone for the project's own features"
         )
     if len(set(wanted)) < len(wanted):
         raise ValueError(f"a feature is given twice in {','.join(wanted)}")
@@ -113,14 +121,14 @@ def parse_features(
 
 
 def spec_codes(specs: Sequence[FeatureSpec], width: int) -> npt.NDArray[np.int64]:
-    """The features as numbers, for the kernel.
+    """Return the features as numbers, for the kernel.
 
     Args:
-        specs: of a finger.
-        width: at least as many.
+        specs: features of a finger.
+        width: number of rows, at least the number of features.
 
     Returns:
-        (width, 5) kind, window, transform and scope, and the first place that is the same but
+        (width, 5) kind, window, transform, scope, and the first feature that is the same except
         for its scope; -1 is padding.
     """
     codes = np.full((width, 5), -1, dtype=np.int64)
