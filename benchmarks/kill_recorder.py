@@ -1,9 +1,9 @@
-"""Kills a recorder of a whole hand at 150 Hz again and again: what is lost, what is read back?
+"""Kill a recorder of a whole hand at 150 Hz many times, and check what can be read back.
 
 python benchmarks/kill_recorder.py [--kills 20] [--flips 150] [--seed 0]
 
-Every value is a function of the number of its sample, so that a wrong one is seen. Exits with
-1 where a kill lost more than 0.5 s, a value came back wrong, or a flipped bit was not found.
+Every value is a function of the number of its sample, so that a wrong value is found. The exit
+code is 1 if a kill lost more than 0.5 s, a value was wrong, or a flipped bit was not found.
 """
 
 import argparse
@@ -30,7 +30,7 @@ from holdfast.sensors import hand
 from holdfast.sources import Arrival
 
 RATE = 150.0
-MOST_LOST = 0.5
+MAX_LOST_TIME = 0.5
 HAND = hand("allegro-uskin")
 SENSORS = {name: module.sensor for name, module in HAND.modules.items()}
 N_VALUES = HAND.n_taxels * 3
@@ -38,26 +38,26 @@ FACTORS = np.arange(1, N_VALUES + 1, dtype=np.uint64) * np.uint64(40503)
 
 
 def values(k: int) -> dict[str, np.ndarray]:
-    """The readings of sample k, by module."""
+    """Return the readings of sample k, by module."""
     flat = (FACTORS * np.uint64(k + 1) >> np.uint64(3)).astype(np.uint16)
     return HAND.split(flat.reshape(-1, 3))
 
 
 def record(path: str, progress: str) -> None:
-    """Records until it is killed; `progress` holds the number of samples that were given."""
+    """Record until the process is killed; `progress` holds the number of recorded samples."""
     with Path(progress).open("r+b") as file:
-        told = mmap.mmap(file.fileno(), 8)
+        counter = mmap.mmap(file.fileno(), 8)
     recorder = Recorder(path, SENSORS)
     due = time.monotonic()
     for k in range(10**9):
         recorder.put(Arrival(k / RATE, values(k), received=time.monotonic()))
-        told[:8] = struct.pack("<Q", k + 1)
-        due = max(due + 1 / RATE, time.monotonic())  # after a stall it goes on, not faster
+        counter[:8] = struct.pack("<Q", k + 1)
+        due = max(due + 1 / RATE, time.monotonic())  # after a delay, continue at the same rate
         time.sleep(max(due - time.monotonic(), 0.0))
 
 
 def kill_one(path: Path, seconds: float) -> int:
-    """Kills a recorder that has run so long; how many samples it had been given."""
+    """Kill a recorder after `seconds`, and return how many samples it had recorded."""
     progress = path.with_suffix(".progress")
     progress.write_bytes(bytes(8))
     words = [sys.executable, __file__, "--record", str(path), str(progress)]
@@ -72,7 +72,7 @@ def kill_one(path: Path, seconds: float) -> int:
 
 
 def check(recording: Recording, n_given: int) -> float:
-    """How much is missing at the end [s]; nothing that is there is wrong."""
+    """Check the values, and return how much is missing at the end [s]."""
     lengths = {name: module.n_samples for name, module in recording.modules.items()}
     for k in range(max(lengths.values())):
         for name, want in values(k).items():
@@ -82,29 +82,29 @@ def check(recording: Recording, n_given: int) -> float:
             ):
                 sys.exit(f"sample {k} of {name} came back wrong")
     if recording.complete:
-        sys.exit("a recording that was cut says that it is complete")
+        sys.exit("a recording that was cut is marked as complete")
     return (n_given - min(lengths.values())) / RATE
 
 
 def recovered(path: Path, n_given: int) -> float:
-    """How much of a file that was cut is missing [s], as read and as imported."""
+    """Return how much of a cut file is missing [s], after reading and after importing it."""
     try:
         lost = check(load_recording(path), n_given)
     except RecordingError as refusal:
         if not str(refusal).endswith("nothing can be recovered: it has no samples"):
             raise
         return n_given / RATE
-    with redirect_stdout(StringIO()), redirect_stderr(StringIO()) as told:
+    with redirect_stdout(StringIO()), redirect_stderr(StringIO()) as errors:
         code = holdfast(["import", str(path), str(path.parent / "out")])
     if code != 0:
-        sys.exit(f"a file that was cut could not be imported: {told.getvalue()}")
+        sys.exit(f"a file that was cut could not be imported: {errors.getvalue()}")
     if check(load_recording(path.parent / "out" / f"{path.stem}.parquet"), n_given) != lost:
-        sys.exit("a file that was cut was not imported as far as it goes")
+        sys.exit("a file that was cut was not imported completely")
     return lost
 
 
 def kills(folder: Path, n: int, chance: random.Random) -> list[float]:
-    """Seconds that each of so many kills lost, at random moments of the first three seconds."""
+    """Return the seconds lost by each of `n` kills, at random times in the first three seconds."""
     lost = []
     for number in range(n):
         path = folder / f"cut{number}.mcap"
@@ -114,7 +114,7 @@ def kills(folder: Path, n: int, chance: random.Random) -> list[float]:
 
 
 def flips(folder: Path, n: int, chance: random.Random) -> int:
-    """How many of so many flipped bits in a whole file are found."""
+    """Return how many of `n` flipped bits in a complete file are found."""
     path, damaged = folder / "whole.mcap", folder / "damaged.mcap"
     with Recorder(path, SENSORS) as recorder:
         for k in range(int(2 * RATE)):
@@ -126,7 +126,7 @@ def flips(folder: Path, n: int, chance: random.Random) -> int:
 
 
 def is_refused(path: Path, raw: bytes, bit: int) -> bool:
-    """Whether these bytes with that bit flipped are no recording."""
+    """Return whether the file is refused when one bit is flipped."""
     copy = bytearray(raw)
     copy[bit // 8] ^= 1 << bit % 8
     path.write_bytes(copy)
@@ -144,10 +144,10 @@ def main(n_kills: int, n_flips: int, seed: int) -> None:
         n_found = flips(Path(name), n_flips, chance)
     print(
         f"{n_kills} kills lost {min(lost):.3f} to {max(lost):.3f} s, "
-        f"median {statistics.median(lost):.3f} s; nothing wrong came back"
+        f"median {statistics.median(lost):.3f} s; no value was wrong"
     )
     print(f"{n_found} of {n_flips} flipped bits found")
-    sys.exit(int(max(lost) > MOST_LOST or n_found < n_flips))
+    sys.exit(int(max(lost) > MAX_LOST_TIME or n_found < n_flips))
 
 
 if __name__ == "__main__":

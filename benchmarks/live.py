@@ -1,8 +1,8 @@
-"""From packet to decision: 368 taxels at 150 Hz over a socket, for as long as you like.
+"""Latency from packet to estimate: 368 taxels at 150 Hz over a socket.
 
-`holdfast play` sends the whole hand from one process; this one judges it, with a slow and a
-quick reader on its WebSocket if asked. It tells the latency from the last byte of a packet in
-hand to the decision, packets lost, and how the memory grew.
+`holdfast play` sends the whole hand from another process; this process detects the states. With
+`--page` it also serves two WebSocket clients, one of which never reads. It reports the latency
+from the last byte of a packet to the estimate, the lost packets, and the growth of the memory.
 
     uv run python benchmarks/live.py --minutes 10
     uv run python benchmarks/live.py --minutes 1 --page
@@ -51,7 +51,7 @@ def _options() -> argparse.Namespace:
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--minutes", type=float, default=1.0)
     parser.add_argument("--port", type=int, default=5055)
-    parser.add_argument("--page", action="store_true", help="serve, with two readers")
+    parser.add_argument("--page", action="store_true", help="serve the page, with two clients")
     return parser.parse_args()
 
 
@@ -65,8 +65,8 @@ def _measure(options: argparse.Namespace) -> dict[str, object]:
     model = Model.load("builtin:twin")
     with _connected(options.port) as source:
         session = Session(StreamDetector(model, source))
-        notes = np.zeros((int(60 * options.minutes * 400) + 10_000, 2))  # so that it never grows
-        session.add_listener(lambda said: _note(said, notes, session.n_packets))
+        log = np.zeros((int(60 * options.minutes * 400) + 10_000, 2))  # of constant size
+        session.add_listener(lambda update: _log(update, log, session.n_packets))
         if options.page:
             threading.Thread(target=_serve, args=(session, model), daemon=True).start()
         session.start()
@@ -79,19 +79,19 @@ def _measure(options: argparse.Namespace) -> dict[str, object]:
             if not half and end - time.monotonic() < 30 * options.minutes:
                 half = _resident()
         session.stop()
-    seen, times = notes[n_begin : session.n_packets].T
+    latencies, times = log[n_begin : session.n_packets].T
     steps = np.diff(times)
     return {
         "taxels": sum(sensor.n_taxels for sensor in source.sensors.values()),
         "minutes": options.minutes,
         "page": options.page,
-        "packets": len(seen),
+        "packets": len(latencies),
         "rate": round(1 / float(np.median(steps)), 2),
         "lost": session.n_lost,
         "refused": session.n_refused,
         "failure": repr(session.failure),
         "latency": {
-            name: float(np.percentile(seen, share))
+            name: float(np.percentile(latencies, share))
             for name, share in (("p50", 50), ("p99", 99), ("p99.9", 99.9), ("max", 100))
         },
         "resident_megabytes": {"begin": begin, "half": half, "end": _resident()},
@@ -110,14 +110,15 @@ def _connected(port: int):
     raise SystemExit("the player did not start")
 
 
-def _note(said, notes, n_packets: int) -> None:
-    """Writes down the latency and the time of packet `n_packets`."""
-    if said.arrival is not None and said.arrival.samples:
-        notes[n_packets - 1] = time.monotonic() - said.arrival.received, said.arrival.time
+def _log(update, log, n_packets: int) -> None:
+    """Store the latency and the time of packet `n_packets`."""
+    arrival = update.arrival
+    if arrival is not None and arrival.samples:
+        log[n_packets - 1] = time.monotonic() - arrival.received, arrival.time
 
 
 def _serve(session: Session, model: Model) -> None:
-    """The web service with a reader that reads and one that never does."""
+    """Run the web service with a client that reads and one that never reads."""
 
     async def run() -> None:
         from aiohttp import ClientSession, web
@@ -129,17 +130,17 @@ def _serve(session: Session, model: Model) -> None:
         url = f"http://127.0.0.1:{runner.addresses[0][1]}/api/v1/live"
         async with (
             ClientSession() as client,
-            client.ws_connect(url) as quick,
+            client.ws_connect(url) as reader,
             client.ws_connect(url.replace("live", "estimates")),  # never reads
         ):
-            async for _ in quick:
+            async for _ in reader:
                 pass
 
     asyncio.run(run())
 
 
 def _resident() -> float:
-    """Resident memory of this process [MB]."""
+    """Return the resident memory of this process [MB]."""
     pages = int(Path("/proc/self/statm").read_text().split()[1])
     return round(pages * resource.getpagesize() / 1e6, 1)
 

@@ -63,7 +63,7 @@ def test_own_recordings(capsys, data, tmp_path):
     assert json.loads((out / "study.json").read_text())["left_out"][0].startswith(
         "real recordings, because none were found. Download them from github.com/"
     )
-    assert "holds a study already" in refusal(capsys, data, "--out", out, "--quick")
+    assert "already holds a study" in refusal(capsys, data, "--out", out, "--quick")
     code, printed, _ = run(capsys, data, "--out", out, "--quick", "--force", "--json")
     assert code == 0
     assert json.loads(printed) == json.loads((out / "study.json").read_text())
@@ -161,8 +161,8 @@ class TestBadInput:
 
     def test_out(self, capsys, data, tmp_path):
         file = data / "grasp-0.parquet"
-        assert "is a file; the study is written to a folder" in refusal(capsys, data, "-o", file)
-        assert "holds other things" in refusal(capsys, data, "-o", data)
+        assert "is a file; a study is written to a folder" in refusal(capsys, data, "-o", file)
+        assert "holds other files" in refusal(capsys, data, "-o", data)
         assert "does not exist" in refusal(capsys, data, "-o", tmp_path / "no" / "out")
 
 

@@ -1,4 +1,4 @@
-"""Sources and models for the tests of what is live."""
+"""Sources and models for the tests of live detection."""
 
 import time
 from collections import deque
@@ -7,7 +7,8 @@ import numpy as np
 
 from holdfast.io import save_recording
 from holdfast.model import Model
-from holdfast.sources.base import Arrival, Source, notice_arrival
+from holdfast.sources.base import Arrival, Source
+from holdfast.sources.base import notice_arrival as make_notice
 from holdfast.synthetic import synthetic_recording
 
 FINGERS = ("thumb", "index", "middle")
@@ -15,7 +16,7 @@ TWIN = "builtin:twin"
 
 
 def grasp(seed=1, name="grasp", fingers=FINGERS):
-    """A recording of curved fingertips with a grasp that is shaken."""
+    """A synthetic recording of a grasp that is shaken, with curved fingertips."""
     return synthetic_recording(name, seed, fingers)
 
 
@@ -27,7 +28,7 @@ def grasp_file(folder, **options):
 
 
 def arrivals_of(recording):
-    """Every instant of a recording whose modules share their times."""
+    """One arrival for each instant of a recording whose modules share their times."""
     first = next(iter(recording.modules.values()))
     return [
         Arrival(
@@ -44,7 +45,7 @@ def model():
 
 
 class Script(Source):
-    """Gives what it is told to, as fast as it is taken: arrivals, None for silence."""
+    """Source of given arrivals, as fast as they are read; None stands for silence."""
 
     paced = False
 
@@ -83,7 +84,7 @@ class Script(Source):
 
 
 class Lasting(Script):
-    """Goes on with its last samples, a moment later each time, where it is told no more."""
+    """Source that repeats its last samples, with increasing times, after the given arrivals."""
 
     last = None
 
@@ -97,13 +98,13 @@ class Lasting(Script):
         return self.last
 
 
-def told(text, **faults):
-    """Word of faults by module, without samples."""
-    return notice_arrival(time.monotonic(), text, faults={k: tuple(v) for k, v in faults.items()})
+def notice_arrival(text, **faults):
+    """An arrival with a notice and with faults by module, without samples."""
+    return make_notice(time.monotonic(), text, faults={k: tuple(v) for k, v in faults.items()})
 
 
 def same(one, two):
-    """Whether two estimates are equal, NaN where NaN is expected."""
+    """Whether two estimates are equal; NaN equals NaN."""
     return np.array_equal(
         [one.time, one.stable_probability, one.instability, *one.force],
         [two.time, two.stable_probability, two.instability, *two.force],

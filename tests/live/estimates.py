@@ -1,4 +1,4 @@
-"""Estimates for whoever publishes them."""
+"""Estimates for the tests of the publishers."""
 
 import msgspec
 
@@ -16,7 +16,7 @@ def finger(state=ContactState.STABLE, **given):
 
 
 def estimate(time=7.0, **fingers):
-    """Of a thumb in newtons with a dead taxel, and a pad of the index in counts."""
+    """Estimate of a thumb in newtons with a dead taxel, and a pad of the index in counts."""
     thumb = finger(faults=(Fault.DEAD,), faulty_taxels=(3, 7))
     pad = finger(ContactState.UNSTABLE, force=(100.0, 0.0, -5.5))
     both = {"thumb": thumb, "index/1": pad} | fingers
@@ -24,16 +24,16 @@ def estimate(time=7.0, **fingers):
     return HandEstimate(time, ContactState.UNSTABLE, both)
 
 
-def check_what_is_told(told):
-    """What another program reads of that estimate."""
-    assert told["state"] == "STABLE"
-    assert told["hand"] == "UNSTABLE"
-    assert (told["probability"], told["instability"]) == (0.75, 0.5)
-    assert (told["force"], told["frame"]) == ([1.0, -2.0, 3.0], "thumb")
-    assert told["vector"] == [100.0, 0.0, -5.5]
-    assert 0 <= told["age"] < 30
-    assert told["level"] == 1
-    assert told["values"] == {
+def check_received(received):
+    """Check what another program received of that estimate."""
+    assert received["state"] == "STABLE"
+    assert received["hand"] == "UNSTABLE"
+    assert (received["probability"], received["instability"]) == (0.75, 0.5)
+    assert (received["force"], received["frame"]) == ([1.0, -2.0, 3.0], "thumb")
+    assert received["vector"] == [100.0, 0.0, -5.5]
+    assert 0 <= received["age"] < 30
+    assert received["level"] == 1
+    assert received["values"] == {
         "state": "STABLE",
         "reason": "",
         "faults": "dead",

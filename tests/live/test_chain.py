@@ -1,4 +1,4 @@
-"""The whole chain on loopback: a recording played as a XELA server, judged, shown."""
+"""The whole chain on this machine: a recording is sent as by a XELA server, detected, shown."""
 
 import json
 import math
@@ -25,7 +25,7 @@ PATIENCE = 120.0
 
 @contextmanager
 def verb(*words):
-    """A verb in a process of its own, ended as Ctrl-C does; gives what it says in JSON first."""
+    """Run a command in a separate process, and yield its first JSON line; end it with Ctrl-C."""
     process = subprocess.Popen(
         [HOLDFAST, *map(str, words), "--json"],
         stdout=subprocess.PIPE,
@@ -37,7 +37,7 @@ def verb(*words):
     try:
         line = process.stdout.readline()
         if not line:
-            pytest.fail(f"holdfast {words[0]} said nothing: {process.stderr.read()}")
+            pytest.fail(f"holdfast {words[0]} printed nothing: {process.stderr.read()}")
         yield json.loads(line)
     finally:
         process.send_signal(signal.SIGINT)
@@ -49,14 +49,14 @@ FINGERS = ("thumb", "index", "middle", "ring")
 
 
 @pytest.mark.parametrize("words", [("--separate",), ("--whole-hand", "--version", "1.7")])
-def test_decisions_over_the_wire_are_those_of_the_recording(tmp_path, monkeypatch, words):
+def test_estimates_over_the_network_are_those_of_the_recording(tmp_path, monkeypatch, words):
     for name in ("MIN_LATE_DELAY", "MIN_CLOCK_JUMP"):  # a busy machine is late
         monkeypatch.setattr(f"holdfast.sources.timeline.{name}", math.inf)
     path, recording = build.grasp_file(tmp_path, fingers=FINGERS)
     model = build.model()
     with (
-        verb("play", path, "--once", "--speed", 3, "--port", 0, *words) as told,
-        open_source(told["uri"]) as source,
+        verb("play", path, "--once", "--speed", 3, "--port", 0, *words) as printed,
+        open_source(printed["uri"]) as source,
     ):
         detector = StreamDetector(model, source)
         estimates, n_lost = [], 0
@@ -68,15 +68,15 @@ def test_decisions_over_the_wire_are_those_of_the_recording(tmp_path, monkeypatc
     expected = detect(model, recording)
     assert tuple(detector.fingers) == FINGERS
     for name, trace in expected.fingers.items():
-        mine = [decision.estimate.fingers[name] for decision in estimates]
+        mine = [one.estimate.fingers[name] for one in estimates]
         assert [one.time - mine[0].time for one in mine] == pytest.approx(
             (trace.times - trace.times[0]).tolist(), abs=1e-6
         )
         on_time = [k for k, one in enumerate(mine) if not one.faults]  # a busy machine is late
         assert len(on_time) > 0.3 * len(mine)
         for k in on_time:
-            told, offline = mine[k], trace.estimate(k)
-            assert build.same(told, msgspec.structs.replace(offline, time=told.time))
+            live, offline = mine[k], trace.estimate(k)
+            assert build.same(live, msgspec.structs.replace(offline, time=live.time))
 
 
 def test_the_page_shows_what_a_server_sends(tmp_path):

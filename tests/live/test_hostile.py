@@ -1,4 +1,4 @@
-"""A server that sends nonsense, hangs up and comes back: the session goes on and tells of it."""
+"""A server that sends invalid packets, disconnects and returns: the session continues."""
 
 import math
 import random
@@ -24,13 +24,13 @@ NAMES = "fingers=1:thumb,2:index,3:middle"
 
 @pytest.fixture(autouse=True)
 def any_pace(monkeypatch):
-    """Seconds of packets come at once here: the clock of a burst is no fault."""
+    """Accept bursts: these tests send seconds of packets at once."""
     for name in ("MIN_LATE_DELAY", "MIN_CLOCK_JUMP"):  # a busy machine is late
         monkeypatch.setattr(f"holdfast.sources.timeline.{name}", math.inf)
 
 
 def packets_of(recording, epoch=EPOCH):
-    """Every instant of a recording as a packet of XELA's server."""
+    """One packet of XELA's server for each instant of a recording."""
     sensors = {name: module.sensor for name, module in recording.modules.items()}
     encoder = XelaEncoder(sensors)
     return [
@@ -40,7 +40,7 @@ def packets_of(recording, epoch=EPOCH):
 
 
 def garbage(packet, generator):
-    """A packet that went wrong: cut, torn, of another number of taxels, or no packet at all."""
+    """An invalid packet: cut, corrupted, with another number of taxels, or random bytes."""
     text = bytearray(packet)
     kind = generator.randrange(6)
     if kind == 0:
@@ -58,53 +58,57 @@ def garbage(packet, generator):
     return generator.randbytes(generator.randrange(300))
 
 
-def test_ten_thousand_packets_of_nonsense_do_no_harm():
+def test_ten_thousand_invalid_packets_do_no_harm():
     recording = build.grasp()
     packets = packets_of(recording)
     generator = random.Random(0)
     with (
-        server(packets[:1]) as (port, said),
+        server(packets[:1]) as (port, outbox),
         open_source(f"xela://127.0.0.1:{port}?{NAMES}") as source,
     ):
         session = Session(StreamDetector(build.model(), source))
         session.start()
         try:
             for packet in packets[1:]:
-                said.put(packet)
+                outbox.put(packet)
                 for _ in range(6):
-                    said.put(garbage(packet, generator))
-            wait_for(lambda: said.empty() and session.n_packets >= 0.9 * len(packets))
+                    outbox.put(garbage(packet, generator))
+            wait_for(lambda: outbox.empty() and session.n_packets >= 0.9 * len(packets))
         finally:
             session.stop()
     assert session.failure is None
     assert session.n_refused > 5000
 
 
-def test_a_server_that_is_started_anew_keeps_the_tare_and_the_clock():
+def test_a_restarted_server_keeps_the_tare_and_the_clock():
     recording = build.grasp()
     packets = packets_of(recording)
     port = free_port()
-    heard = []
-    with server(packets[:300], port=port) as (_, said):
+    updates = []
+    with server(packets[:300], port=port) as (_, outbox):
         source = open_source(f"xela://127.0.0.1:{port}?{NAMES}")
         source.open()
         session = Session(StreamDetector(build.model(), source))
-        session.add_listener(heard.append)
+        session.add_listener(updates.append)
         session.start()
         wait_for(lambda: session.n_packets == 300)
-        said.put(HANG_UP)
+        outbox.put(HANG_UP)
     try:
         wait_for(lambda: session.stream.silent)
-        later = packets_of(recording, EPOCH + 2.0)  # its counter begins anew
+        later = packets_of(recording, EPOCH + 2.0)  # its counter restarts
         with server(later[300:900], port=port):
             wait_for(lambda: session.n_packets == 900)
     finally:
         session.stop()
     assert session.failure is None
-    estimates = [d.estimate for said in heard for d in said.estimates if said.arrival is not None]
+    estimates = [
+        d.estimate for update in updates for d in update.estimates if update.arrival is not None
+    ]
     times = [one.time for one in estimates]
     assert (np.diff(times) > 0).all()
-    notices = [n for said in heard if said.arrival is not None for n in said.arrival.notices]
+    notices = [
+        n for update in updates if update.arrival is not None for n in update.arrival.notices
+    ]
     assert any("connection lost" in notice for notice in notices)
     # The tare was kept: the force is that of the recording, and no finger waits for a new one.
     expected = detect(build.model(), recording).fingers["thumb"].force[899]
@@ -112,7 +116,7 @@ def test_a_server_that_is_started_anew_keeps_the_tare_and_the_clock():
     assert any(one.fingers["thumb"].state is not ContactState.UNKNOWN for one in estimates[-100:])
 
 
-def test_a_module_of_another_size_is_unknown_until_it_is_well_again():
+def test_a_module_of_another_size_is_unknown_until_its_size_is_right():
     recording = build.grasp()
     packets = packets_of(recording)
     one = build.arrivals_of(recording)[500]
@@ -120,25 +124,25 @@ def test_a_module_of_another_size_is_unknown_until_it_is_well_again():
     smaller = XelaEncoder({**sensors, "thumb": sensor("uskin-4x6")})
     samples = {**one.samples, "thumb": one.samples["thumb"][:24]}
     odd = smaller.packet(samples, EPOCH + one.time, EPOCH + one.time)
-    heard = []
+    updates = []
     with (
         server([*packets[:500], odd, *packets[501:600]]) as (port, _),
         open_source(f"xela://127.0.0.1:{port}?{NAMES}") as source,
     ):
         session = Session(StreamDetector(build.model(), source))
-        session.add_listener(heard.append)
+        session.add_listener(updates.append)
         session.start()
         wait_for(lambda: session.n_packets == 600)
         session.stop()
-    decisions = [d for said in heard if said.arrival for d in said.estimates]
+    estimates = [d for update in updates if update.arrival for d in update.estimates]
     odd_ones = [  # a busy machine may add LATE, of any finger
-        k for k, d in enumerate(decisions)
+        k for k, d in enumerate(estimates)
         if Fault.TAXEL_COUNT in d.estimate.fingers["thumb"].faults
     ]  # fmt: skip
     assert odd_ones
     for k in odd_ones:
-        fingers = decisions[k].estimate.fingers
+        fingers = estimates[k].estimate.fingers
         assert fingers["thumb"].state is ContactState.UNKNOWN
         assert Fault.TAXEL_COUNT not in fingers["index"].faults
-    later = [d.estimate.fingers["thumb"] for d in decisions[odd_ones[-1] + 1 :]]
+    later = [d.estimate.fingers["thumb"] for d in estimates[odd_ones[-1] + 1 :]]
     assert any(thumb.state is not ContactState.UNKNOWN for thumb in later)

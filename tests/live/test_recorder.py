@@ -37,10 +37,10 @@ def arrival(k, *names, time=None, **fields):
 
 
 def until(condition):
-    """Waits for the thread; a failure where nothing comes of it."""
+    """Wait until the thread has done its work, and fail if it does not."""
     end = time.monotonic() + PATIENCE
     while not condition():
-        assert time.monotonic() < end, "waited in vain"
+        assert time.monotonic() < end, "the condition never became true"
         time.sleep(0.01)
 
 
@@ -51,7 +51,7 @@ def path(tmp_path):
 
 @pytest.fixture
 def stuck(monkeypatch):
-    """A disk that does not go on until it is told to."""
+    """A disk that writes nothing until the event is set."""
     go, entered = threading.Event(), threading.Event()
     append = RecordingWriter.append
 
@@ -66,7 +66,7 @@ def stuck(monkeypatch):
     go.set()
 
 
-def test_what_arrives_is_recorded_with_the_times_of_each_module(path):
+def test_arrivals_are_recorded_with_the_times_of_each_module(path):
     with Recorder(path, TWO, name="grasp", metadata={"object": "can"}) as recorder:
         for k in range(300):
             recorder.put(arrival(k, *("thumb", "index")[: 1 + (k % 3 == 0)]))
@@ -80,7 +80,7 @@ def test_what_arrives_is_recorded_with_the_times_of_each_module(path):
         assert module.readings.dtype == np.uint16
 
 
-def test_it_tells_how_far_it_is(path):
+def test_the_status_shows_the_progress(path):
     with Recorder(path, TWO) as recorder:
         assert recorder.status.seconds == 0.0
         for k in [*range(100), *range(150, 200)]:
@@ -96,14 +96,14 @@ def test_it_tells_how_far_it_is(path):
     assert (status.failure, recorder.failed) == ("", False)
 
 
-def test_gaps_are_judged_by_the_rate_that_is_there(path):
+def test_gaps_are_found_from_the_measured_rate(path):
     with Recorder(path, TWO) as recorder:  # 10 Hz, where the sensor promises 100 Hz
         for k in range(50):
             recorder.put(arrival(k, time=k / 10 + (k > 30)))
     assert recorder.status.n_gaps == load_recording(path).modules["thumb"].n_gaps == 1
 
 
-def test_all_is_on_disk_soon_though_the_source_falls_silent(path):
+def test_everything_is_on_disk_soon_although_the_source_is_silent(path):
     with Recorder(path, TWO) as recorder:
         recorder.put(arrival(0))
         recorder.put(arrival(1))
@@ -116,7 +116,7 @@ def test_all_is_on_disk_soon_though_the_source_falls_silent(path):
     assert recording.markers == ((0.01, "silence"),)
 
 
-def test_markers_stand_where_they_were_set(path):
+def test_markers_have_the_times_at_which_they_were_set(path):
     with Recorder(path, TWO) as recorder:
         recorder.add_marker("early")
         recorder.add_marker("before", 0.5)
@@ -153,7 +153,7 @@ def test_faults_and_notices_become_markers(path):
     assert recorder.status.faults == {Fault.PACKET_GAP: 3, Fault.LATE: 1}
 
 
-def test_markers_of_a_recording_stay_markers_when_it_is_recorded_again(path):
+def test_markers_of_a_replayed_recording_are_recorded_as_markers(path):
     first = path.with_name("first.mcap")
     with Recorder(first, TWO) as recorder:
         for k in range(100):
@@ -168,7 +168,7 @@ def test_markers_of_a_recording_stay_markers_when_it_is_recorded_again(path):
     np.testing.assert_allclose([t for t, _ in got], [t for t, _ in want], atol=0.011)
 
 
-def test_the_faults_of_the_last_second_are_there_now(path):
+def test_recent_faults_are_those_of_the_last_second(path):
     now = time.monotonic()
     old = {"thumb": (Fault.LATE,), "elsewhere": (Fault.LATE,)}
     new = {"index": (Fault.PACKET_GAP, Fault.LATE)}
@@ -178,17 +178,17 @@ def test_the_faults_of_the_last_second_are_there_now(path):
     assert recorder.status.recent_faults == {"index": (Fault.PACKET_GAP, Fault.LATE)}
 
 
-def test_the_same_words_are_a_marker_once_a_second(path):
+def test_the_same_notice_is_a_marker_once_a_second(path):
     with Recorder(path, TWO) as recorder:
         for k in range(250):
             recorder.put(arrival(k, notices=("noise",)))
-            recorder.put(notice_arrival(k / 100, f"babble {k}", f"babble {-k}"))
+            recorder.put(notice_arrival(k / 100, f"notice {k}", f"notice {-k}"))
     markers = load_recording(path).markers
     assert [time for time, text in markers if text == "note: noise"] == [0.0, 1.0, 2.0]
     assert len(markers) <= 303
 
 
-def test_what_no_file_can_hold_is_dropped_and_told(path):
+def test_samples_that_cannot_be_stored_are_dropped_and_reported(path):
     wrong = [
         (0.0, readings(1)),
         (-1.0, readings(1)),
@@ -218,7 +218,7 @@ def test_what_no_file_can_hold_is_dropped_and_told(path):
     ).markers
 
 
-def test_half_precision_is_no_number_type_of_a_file(path):
+def test_half_precision_cannot_be_stored(path):
     with Recorder(path, TWO) as recorder:
         recorder.put(Arrival(0.0, {"thumb": readings(1, np.float16)}, received=0.0))
         recorder.put(Arrival(1.0, {"thumb": readings(1, np.float32)}, received=1.0))
@@ -226,13 +226,13 @@ def test_half_precision_is_no_number_type_of_a_file(path):
     assert load_recording(path).modules["thumb"].readings.dtype == np.float32
 
 
-def test_a_slow_disk_holds_nobody_up_and_fills_no_memory(path, stuck, monkeypatch):
+def test_a_slow_disk_delays_no_caller_and_fills_no_memory(path, stuck, monkeypatch):
     monkeypatch.setattr(module, "MAX_QUEUED_ARRIVALS", 50)
     with Recorder(path, TWO) as recorder:
         recorder.put(arrival(0))
         assert stuck.entered.wait(PATIENCE)
         for k in range(1, 201):
-            recorder.put(arrival(k))  # would wait for ever, if it did wait
+            recorder.put(arrival(k))  # would block for ever if it waited
         assert recorder.status.n_dropped == 150
         stuck.set()
         until(lambda: recorder.status.n_samples == 51)
@@ -242,7 +242,7 @@ def test_a_slow_disk_holds_nobody_up_and_fills_no_memory(path, stuck, monkeypatc
     assert (0.5, "note: 150 samples dropped: the disk is too slow") in recording.markers
 
 
-def test_markers_find_room_where_samples_do_not_but_not_without_end(path, stuck, monkeypatch):
+def test_more_markers_than_samples_are_queued_but_a_limited_number(path, stuck, monkeypatch):
     monkeypatch.setattr(module, "MAX_QUEUED_ARRIVALS", 5)
     monkeypatch.setattr(module, "_MAX_QUEUED_MARKERS", 3)
     with Recorder(path, TWO) as recorder:
@@ -257,7 +257,7 @@ def test_markers_find_room_where_samples_do_not_but_not_without_end(path, stuck,
     assert texts == ["mark 0", "mark 1", "mark 2"]
 
 
-def test_who_is_patient_loses_nothing(path, monkeypatch):
+def test_with_wait_no_sample_is_dropped(path, monkeypatch):
     monkeypatch.setattr(module, "MAX_QUEUED_ARRIVALS", 5)
     with Recorder(path, TWO) as recorder:
         for k in range(100):
@@ -265,7 +265,7 @@ def test_who_is_patient_loses_nothing(path, monkeypatch):
     assert (recorder.status.n_dropped, recorder.status.n_samples) == (0, 100)
 
 
-def test_after_the_end_nothing_is_taken(path):
+def test_a_closed_recorder_drops_arrivals(path):
     recorder = Recorder(path, TWO)
     recorder.put(arrival(0))
     recorder.close()
@@ -276,7 +276,7 @@ def test_after_the_end_nothing_is_taken(path):
     assert load_recording(path).modules["thumb"].n_samples == 1
 
 
-def test_what_is_there_is_kept_unless_forced(path):
+def test_an_existing_file_is_kept_unless_forced(path):
     path.write_text("mine")
     with pytest.raises(OutputError, match=r"a\.mcap exists already"):
         Recorder(path, TWO)
@@ -286,25 +286,25 @@ def test_what_is_there_is_kept_unless_forced(path):
     assert load_recording(path).complete
 
 
-def test_metadata_that_no_file_can_hold_are_refused(path):
+def test_metadata_that_cannot_be_stored_are_refused(path):
     with pytest.raises(RecordingError, match="plain JSON values"):
         Recorder(path, TWO, metadata={"a": object()})
     assert not path.exists()
 
 
-def test_a_file_that_is_taken_away_is_told(path):
+def test_a_removed_file_is_reported(path):
     recorder = Recorder(path, TWO)
     path.unlink()
     until(lambda: recorder.failed)
     recorder.put(arrival(0))
-    told = f"cannot write {path}: it was removed while it was recorded"
-    assert recorder.status.failure == told
-    with pytest.raises(OutputError, match=re.escape(told)):
+    message = f"cannot write {path}: it was removed while it was recorded"
+    assert recorder.status.failure == message
+    with pytest.raises(OutputError, match=re.escape(message)):
         recorder.close()
     assert recorder.status.n_dropped == 1
 
 
-def test_a_bug_in_the_thread_comes_out_at_the_end(path, monkeypatch):
+def test_an_error_in_the_thread_is_raised_by_close(path, monkeypatch):
     monkeypatch.setattr(RecordingWriter, "append", lambda *_: 1 / 0)
     recorder = Recorder(path, TWO)
     recorder.put(arrival(0))
@@ -340,8 +340,8 @@ except OutputError as error:
 
 
 @pytest.mark.skipif(not hasattr(os, "fork"), reason="needs limits of POSIX")
-def test_of_a_full_disk_what_went_before_stays(path):
-    """Also where there is room again by the end: an end would make the file damaged."""
+def test_a_full_disk_keeps_what_was_written(path):
+    """Even if there is space again at the end: closing would make the file look damaged."""
     done = subprocess.run(
         [sys.executable, "-c", FULL, str(path)], capture_output=True, text=True, check=True
     )
@@ -353,8 +353,8 @@ def test_of_a_full_disk_what_went_before_stays(path):
     assert 10_000 < path.stat().st_size <= 30_000
 
 
-def test_a_kill_loses_half_a_second_at_most_and_no_flipped_bit_is_missed():
-    """The benchmark does it more often: a whole hand at 150 Hz."""
+def test_a_kill_loses_at_most_half_a_second_and_every_flipped_bit_is_found():
+    """A short run of the benchmark, which uses a whole hand at 150 Hz."""
     killer = Path(__file__).parents[2] / "benchmarks" / "kill_recorder.py"
     words = [sys.executable, str(killer), "--kills", "3", "--flips", "30"]
     done = subprocess.run(words, capture_output=True, text=True, check=False)

@@ -6,7 +6,7 @@ from holdfast.errors import SourceError
 from holdfast.live.ros1_publisher import Ros1Publisher
 from sources.ros1_master import lines, running_master
 
-from .estimates import UNITS, check_what_is_told
+from .estimates import UNITS, check_received
 
 
 def test_another_program_reads_what_is_published(tmp_path):
@@ -14,7 +14,7 @@ def test_another_program_reads_what_is_published(tmp_path):
         reader = lines(master.peer("read"))
         assert next(reader) == "ready"
         publisher = master.peer("estimates")
-        check_what_is_told(next(reader))
+        check_received(next(reader))
         publisher.terminate()
         assert list(lines(publisher)) == ["open"]  # and nothing else on stdout
 

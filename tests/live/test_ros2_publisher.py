@@ -15,14 +15,14 @@ from rosbags.typesys import Stores, get_typestore
 from holdfast.live.ros2_publisher import DEFINITIONS, Ros2Publisher
 from holdfast.ros.definitions import parse_definition
 
-from .estimates import UNITS, check_what_is_told, estimate
+from .estimates import UNITS, check_received, estimate
 
 PEER = Path(__file__).parents[1] / "sources" / "ros2_peer.py"
 
 
 @pytest.fixture
 def domain(monkeypatch):
-    """A domain of this test alone, on this machine alone."""
+    """A ROS domain for this test process only, on this machine only."""
     monkeypatch.setenv("ROS_LOCALHOST_ONLY", "1")
     number = 201 + os.getpid() % 30
     monkeypatch.setenv("ROS_DOMAIN_ID", str(number))
@@ -49,7 +49,7 @@ def test_another_program_reads_what_is_published(domain):
         with Ros2Publisher(UNITS) as publisher:
             end = time.monotonic() + 60
             while reader.poll() is None:
-                assert time.monotonic() < end, "not all topics were heard"
+                assert time.monotonic() < end, "not all topics were received"
                 publisher.publish(estimate())
                 time.sleep(0.02)
         found = dict(json.loads(line) for line in reader.stdout)
@@ -61,7 +61,7 @@ def test_another_program_reads_what_is_published(domain):
     force = found["/holdfast/thumb/force"]
     stamp = force["header"]["stamp"]
     thumb = {one["name"]: one for one in found["/diagnostics"]["status"]}["holdfast: thumb"]
-    check_what_is_told(
+    check_received(
         {
             "state": found["/holdfast/thumb/state"]["data"],
             "hand": found["/holdfast/hand/state"]["data"],

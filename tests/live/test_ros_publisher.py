@@ -11,12 +11,12 @@ from holdfast.live.stream_detector import StreamEstimate, StreamUpdate
 from .estimates import UNITS, estimate, finger
 
 
-class Noted(RosPublisher):
-    """Notes what it is to publish."""
+class FakePublisher(RosPublisher):
+    """Publisher that stores its messages."""
 
     def __init__(self, **given):
         super().__init__(UNITS, **given)
-        self.said = []
+        self.published = []
         self.log = []
         self.gate = threading.Event()
         self.gate.set()
@@ -28,32 +28,32 @@ class Noted(RosPublisher):
     def _disconnect(self):
         self.log.append("ended")
 
-    def _note(self, topic, what):
+    def _store(self, topic, what):
         assert self.gate.wait(60)
         if self.broken:
             raise RuntimeError("no network")
-        self.said.append((topic, what))
+        self.published.append((topic, what))
 
     def _publish_text(self, topic, text):
-        self._note(topic, text)
+        self._store(topic, text)
 
     def _publish_number(self, topic, number):
-        self._note(topic, number)
+        self._store(topic, number)
 
     def _publish_force(self, topic, stamp, finger, force, *, newtons):
-        self._note(topic, (finger, force, newtons))
+        self._store(topic, (finger, force, newtons))
         self.stamp = stamp
 
     def _publish_diagnostics(self, stamp, statuses):
-        self._note("/diagnostics", [(one.name, one.level) for one in statuses])
+        self._store("/diagnostics", [(one.name, one.level) for one in statuses])
 
     def of(self, topic):
-        return [what for name, what in self.said if name == topic]
+        return [what for name, what in self.published if name == topic]
 
 
-def test_what_is_published_and_where():
+def test_topics_and_their_messages():
     before = time.time()
-    with Noted(namespace="/robot/hand_1/") as publisher:
+    with FakePublisher(namespace="/robot/hand_1/") as publisher:
         publisher.publish(estimate())
     assert [topic.removeprefix("/robot/hand_1") for topic in publisher.kinds] == [
         "/hand/state", "/diagnostics",
@@ -63,8 +63,8 @@ def test_what_is_published_and_where():
     ]  # fmt: skip
     assert publisher.kinds["/robot/hand_1/thumb/force"] == "geometry_msgs/WrenchStamped"
     assert publisher.kinds["/robot/hand_1/index_1/force"] == "geometry_msgs/Vector3Stamped"
-    said = {topic: what for topic, what in publisher.said if topic != "/diagnostics"}
-    assert said == {
+    published = {topic: what for topic, what in publisher.published if topic != "/diagnostics"}
+    assert published == {
         "/robot/hand_1/hand/state": "UNSTABLE",
         "/robot/hand_1/thumb/state": "STABLE",
         "/robot/hand_1/thumb/stable_probability": 0.75,
@@ -79,32 +79,32 @@ def test_what_is_published_and_where():
     assert publisher.log == ["ended"]
 
 
-def test_a_listener_of_a_session_publishes_what_is_new():
-    with Noted() as publisher:
-        decisions = [
+def test_a_listener_of_a_session_publishes_updated_fingers():
+    with FakePublisher() as publisher:
+        estimates = [
             StreamEstimate(estimate(7.0), ("thumb",)),
             StreamEstimate(estimate(8.0), ("index/1",)),
         ]
-        publisher.put(StreamUpdate(None, decisions, []))
+        publisher.put(StreamUpdate(None, estimates, []))
     assert len(publisher.of("/holdfast/thumb/state")) == 1
     assert len(publisher.of("/holdfast/index_1/state")) == 1
     assert len(publisher.of("/holdfast/hand/state")) == 2
 
 
-def test_it_never_holds_up_and_drops_the_oldest(monkeypatch):
+def test_a_full_queue_drops_the_oldest_estimate(monkeypatch):
     monkeypatch.setattr(ros_publisher, "MAX_QUEUED_ESTIMATES", 4)
-    with Noted() as publisher:
+    with FakePublisher() as publisher:
         publisher.gate.clear()
         for k in range(20):
             publisher.publish(estimate(thumb=finger(instability=k)), ("thumb",))
         publisher.gate.set()
-    told = publisher.of("/holdfast/thumb/instability")
-    assert told[-4:] == [16, 17, 18, 19]
-    assert len(told) + publisher.n_dropped == 20
+    published = publisher.of("/holdfast/thumb/instability")
+    assert published[-4:] == [16, 17, 18, 19]
+    assert len(published) + publisher.n_dropped == 20
 
 
-def test_a_middleware_that_fails_ends_nothing():
-    with Noted() as publisher:
+def test_publishing_continues_after_a_failure():
+    with FakePublisher() as publisher:
         publisher.broken = True
         publisher.publish(estimate())
         while not publisher.n_failed:
@@ -114,24 +114,24 @@ def test_a_middleware_that_fails_ends_nothing():
     assert publisher.of("/holdfast/thumb/state") == ["STABLE"]
 
 
-def test_diagnostics_when_faults_change_and_now_and_then(monkeypatch):
+def test_diagnostics_are_published_on_changes_and_periodically(monkeypatch):
     monkeypatch.setattr(ros_publisher, "DIAGNOSTICS_PERIOD", 1000.0)
     well = estimate(thumb=finger())
-    with Noted() as publisher:
+    with FakePublisher() as publisher:
         for one in (well, well, estimate(), estimate(), well):
             publisher.publish(one)
-    told = [[level for _, level in statuses] for statuses in publisher.of("/diagnostics")]
-    assert told[-3:] == [[OK, OK, OK], [WARN, WARN, OK], [OK, OK, OK]]
-    assert len(told) <= 4  # the first may say that there is no estimate yet
+    published = [[level for _, level in statuses] for statuses in publisher.of("/diagnostics")]
+    assert published[-3:] == [[OK, OK, OK], [WARN, WARN, OK], [OK, OK, OK]]
+    assert len(published) <= 4  # the first may report that there is no estimate yet
     monkeypatch.setattr(ros_publisher, "DIAGNOSTICS_PERIOD", 0.01)
-    with Noted() as publisher:
+    with FakePublisher() as publisher:
         publisher.publish(well)
         while len(publisher.of("/diagnostics")) < 5:
             time.sleep(0.005)
 
 
 def test_opened_again_and_closed_twice():
-    publisher = Noted()
+    publisher = FakePublisher()
     publisher.close()
     for _ in range(2):
         with publisher:
@@ -140,35 +140,35 @@ def test_opened_again_and_closed_twice():
     assert publisher.log == ["ended", "ended"]
 
 
-class TestStatuses:
+class TestDiagnostics:
     def of(self, **fingers):
         return {s.name: s for s in diagnostics_of((estimate(**fingers), 100.0), 100.5)}
 
-    def test_of_a_hand_that_is_well(self):
+    def test_a_healthy_hand(self):
         found = self.of(thumb=finger())
         assert [s.level for s in found.values()] == [OK, OK, OK]
         assert found["hand"].message == "all fingers are well"
         assert found["thumb"].message == "well"
 
-    def test_of_a_finger_that_is_judged_in_spite_of_a_fault(self):
+    def test_a_finger_with_a_fault_but_with_a_state(self):
         found = self.of()
         assert (found["thumb"].level, found["thumb"].message) == (WARN, "dead")
         assert (found["hand"].level, found["hand"].message) == (WARN, "look at thumb")
 
     @pytest.mark.parametrize(
-        ("reason", "faults", "told"),
+        ("reason", "faults", "published"),
         [
             (Reason.FAULT, (Fault.STUCK, Fault.LATE), "stuck, late"),
             (Reason.GAP, (), "gap"),
         ],
     )
-    def test_of_a_finger_of_which_nothing_is_known(self, reason, faults, told):
+    def test_a_finger_without_a_state(self, reason, faults, published):
         blind = finger(ContactState.UNKNOWN, reason=reason, faults=faults)
         found = self.of(**{"index/1": blind})
-        assert (found["index/1"].level, found["index/1"].message) == (ERROR, told)
+        assert (found["index/1"].level, found["index/1"].message) == (ERROR, published)
         assert (found["hand"].level, found["hand"].message) == (ERROR, "look at index/1")
 
-    def test_of_a_finger_that_is_tared(self):
+    def test_a_finger_during_the_tare(self):
         found = self.of(thumb=finger(ContactState.UNKNOWN, reason=Reason.TARE))
         assert found["thumb"].level == OK
 
@@ -180,7 +180,7 @@ class TestStatuses:
         assert after.values == (("seconds_since_estimate", "3"),)
 
 
-def test_names_that_ros_allows():
+def test_topic_names_are_valid_in_ros():
     names = topic_names(["thumb", "index/1", "palm/2", "left/thumb", "1st", "a b-ä", "_x"], "")
     assert names == {
         "thumb": "/thumb",
@@ -193,7 +193,7 @@ def test_names_that_ros_allows():
     }
 
 
-def test_names_that_are_refused():
+def test_invalid_names_are_refused():
     with pytest.raises(ValueError, match="fingers index/1, index_1 would share topics: rename one"):
         topic_names(["index/1", "index_1"], "/holdfast")
     with pytest.raises(ValueError, match="fingers hand would share topics"):

@@ -23,7 +23,7 @@ def wait_for(condition):
     end = time.monotonic() + PATIENCE
     while not condition():
         if time.monotonic() > end:
-            pytest.fail("what was waited for did not happen")
+            pytest.fail("the condition never became true")
         time.sleep(0.005)
 
 
@@ -44,44 +44,44 @@ def start():
         session.stop()
 
 
-def test_listeners_hear_everything_in_order(start):
+def test_listeners_receive_all_updates_in_order(start):
     recording = build.grasp()
-    heard = []
-    session = start(build.Script.of(recording), heard.append)
+    updates = []
+    session = start(build.Script.of(recording), updates.append)
     wait_for(lambda: session.ended)
-    decisions = [decision for said in heard for decision in said.estimates]
+    estimates = [estimate for update in updates for estimate in update.estimates]
     expected = detect(build.model(), recording)
-    assert [d.estimate.state.code for d in decisions] == expected.hand.tolist()
+    assert [d.estimate.state.code for d in estimates] == expected.hand.tolist()
     assert session.n_packets == len(expected.hand)
     assert session.failure is None
 
 
 def test_events_are_the_changes_of_state(start):
-    heard = []
-    session = start(build.Script.of(build.grasp()), heard.append)
+    updates = []
+    session = start(build.Script.of(build.grasp()), updates.append)
     wait_for(lambda: session.ended)
-    events = [event for said in heard for event in said.events if event.finger == "hand"]
+    events = [event for update in updates for event in update.events if event.finger == "hand"]
     assert {event.state for event in events} == set(ContactState) - {ContactState.UNKNOWN}
     assert all(one.state is two.previous for one, two in itertools.pairwise(events))
 
 
-def test_a_silent_source_is_told_once_and_its_return_ends_it(start):
+def test_silence_is_reported_once_and_ends_with_the_next_sample(start):
     recording = build.grasp()
     arrivals = build.arrivals_of(recording)
     steps = [*arrivals[:400], None, None, None, *arrivals[400:]]
-    heard = []
-    session = start(build.Script.of(recording, steps), heard.append)
+    updates = []
+    session = start(build.Script.of(recording, steps), updates.append)
     wait_for(lambda: session.ended)
-    gaps = [s for s in heard if s.arrival is None and s.estimates]
+    gaps = [s for s in updates if s.arrival is None and s.estimates]
     assert len(gaps) == 1
     estimate = gaps[0].estimates[0].estimate
     assert all(f.faults == (Fault.PACKET_GAP,) for f in estimate.fingers.values())
     assert not session.stream.silent
-    after = heard[heard.index(gaps[0]) + 1].estimates[0].estimate
+    after = updates[updates.index(gaps[0]) + 1].estimates[0].estimate
     assert after.fingers["thumb"].state is not ContactState.UNKNOWN
 
 
-def test_packets_are_those_of_the_module_that_has_most(start):
+def test_the_module_with_most_samples_gives_the_number_of_packets(start):
     recording = build.grasp()
     steps = [
         one._replace(time=one.time + 1e-4 * k, samples={name: sample})
@@ -93,7 +93,7 @@ def test_packets_are_those_of_the_module_that_has_most(start):
     assert session.n_packets == 60
 
 
-def test_a_tare_that_was_given_up_is_not_taken_later(monkeypatch):
+def test_a_tare_that_timed_out_is_not_taken_later(monkeypatch):
     monkeypatch.setattr("holdfast.live.session.TARE_TIMEOUT", 0.01)
     recording = build.grasp()
     session = session_of(build.Script.of(recording))
@@ -120,7 +120,7 @@ def test_the_tare_is_taken_in_the_session_and_refused_in_contact(start):
         session.restart_tare()
 
 
-def test_no_tare_while_nothing_arrives(start):
+def test_no_tare_while_no_samples_arrive(start):
     recording = build.grasp()
     steps = [*build.arrivals_of(recording)[:200], None]
     session = start(build.Script.of(recording, steps, patient=True))
@@ -157,7 +157,7 @@ def test_stopping_closes_the_source_and_leaves_no_thread():
     assert not [t for t in threading.enumerate() if t.name == "holdfast-detector"]
 
 
-def test_latencies_are_of_the_decisions(start):
+def test_latencies_are_those_of_the_estimates(start):
     session = session_of(build.Script.of(build.grasp(), []))
     assert session.latency().p99 != session.latency().p99
     session = start(build.Script.of(build.grasp()))
@@ -166,14 +166,14 @@ def test_latencies_are_of_the_decisions(start):
     assert 0 < latency.p50 <= latency.p99 <= latency.largest
 
 
-def test_who_leaves_hears_no_more(start):
+def test_a_removed_listener_is_not_called(start):
     recording = build.grasp()
     source = build.Script.of(recording, build.arrivals_of(recording)[:100], patient=True)
-    heard = []
-    session = start(source, heard.append)
+    updates = []
+    session = start(source, updates.append)
     wait_for(lambda: session.n_packets == 100)
-    session.remove_listener(heard.append)
-    n_heard = len(heard)
+    session.remove_listener(updates.append)
+    n_updates = len(updates)
     source.steps.extend(build.arrivals_of(recording)[100:200])
     wait_for(lambda: session.n_packets == 200)
-    assert len(heard) == n_heard
+    assert len(updates) == n_updates

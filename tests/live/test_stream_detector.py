@@ -16,10 +16,10 @@ from holdfast.resampling import resample
 from . import build
 
 
-def judged(recording, model=None, steps=None, **options):
+def detected(recording, model=None, steps=None, **options):
     source = build.Script.of(recording, steps)
     detector = ArrivalDetector(model or build.model(), source.sensors, **options)
-    estimates = [said for arrival in source for said in detector.update(arrival)]
+    estimates = [one for arrival in source for one in detector.update(arrival)]
     return detector, estimates + detector.finish()
 
 
@@ -31,9 +31,9 @@ def check_equal(estimates, expected):
     assert [d.estimate.state.code for d in estimates] == expected.hand.tolist()
 
 
-def test_decisions_are_those_of_the_recording_sample_by_sample():
+def test_estimates_are_those_of_the_recording_sample_by_sample():
     recording = build.grasp()
-    _, estimates = judged(recording)
+    _, estimates = detected(recording)
     check_equal(estimates, detect(build.model(), recording))
     assert {d.estimate.state for d in estimates} == set(ContactState)
 
@@ -43,7 +43,7 @@ def test_a_source_of_another_rate_is_resampled_as_the_recording_is():
     slow = Recording(
         "slow", {name: replace(m, times=m.times * 2.5) for name, m in recording.modules.items()}
     )
-    detector, estimates = judged(slow)
+    detector, estimates = detected(slow)
     assert detector.resampled
     expected = detect(build.model(), resample(slow, 150.0))
     for name, trace in expected.fingers.items():
@@ -56,101 +56,101 @@ def test_a_source_of_another_rate_is_resampled_as_the_recording_is():
         np.testing.assert_allclose(forces, trace.force[:n], rtol=1e-6, atol=1e-6)
 
 
-def test_a_source_of_another_rate_is_refused_where_that_is_asked_for():
+def test_strict_refuses_a_source_of_another_rate():
     recording = build.grasp()
     slow = Recording(
         "slow", {name: replace(m, times=m.times * 2) for name, m in recording.modules.items()}
     )
     text = r"^75 Hz given, the model expects 150 Hz within 20 % \(--rate resample accepts it\)$"
     with pytest.raises(ModelError, match=text):
-        judged(slow, strict=True)
+        detected(slow, strict=True)
 
 
-def test_nothing_is_said_before_the_rate_is_known_and_then_everything():
+def test_arrivals_are_buffered_until_the_rate_is_known():
     arrivals = build.arrivals_of(build.grasp())
     detector = ArrivalDetector(build.model(), build.Script.of(build.grasp()).sensors)
-    said = [detector.update(arrival) for arrival in arrivals[:80]]
-    first = next(k for k, estimates in enumerate(said) if estimates)
+    found = [detector.update(arrival) for arrival in arrivals[:80]]
+    first = next(k for k, estimates in enumerate(found) if estimates)
     assert 70 <= first <= 76
-    assert len(said[first]) == first + 1
+    assert len(found[first]) == first + 1
     assert detector.rate == pytest.approx(150.0)
 
 
-def test_a_source_that_ends_early_is_judged_all_the_same():
+def test_a_source_that_ends_early_has_estimates_too():
     recording = build.grasp()
-    _, estimates = judged(recording, steps=build.arrivals_of(recording)[:20])
+    _, estimates = detected(recording, steps=build.arrivals_of(recording)[:20])
     assert len(estimates) == 20
     assert estimates[-1].estimate.fingers["thumb"].reason is Reason.TARE
 
 
-def test_a_fault_on_the_way_makes_its_finger_unknown_until_the_next_good_sample():
+def test_a_fault_of_the_transport_makes_its_finger_unknown_until_the_next_sample():
     recording = build.grasp()
     steps = build.arrivals_of(recording)
     k = 500
     thumbless = {n: s for n, s in steps[k].samples.items() if n != "thumb"}
     steps[k] = steps[k]._replace(samples=thumbless, faults={"thumb": (Fault.TAXEL_COUNT,)})
-    steps.insert(k + 1, build.told("odd", index=[Fault.LATE]))
-    _, estimates = judged(recording, steps=steps)
-    before, at, told, after = (estimates[i].estimate for i in (k - 1, k, k + 1, k + 2))
+    steps.insert(k + 1, build.notice_arrival("odd", index=[Fault.LATE]))
+    _, estimates = detected(recording, steps=steps)
+    before, at, reported, after = (estimates[i].estimate for i in (k - 1, k, k + 1, k + 2))
     assert before.fingers["thumb"].state is not ContactState.UNKNOWN
     assert at.fingers["thumb"].state is ContactState.UNKNOWN
     assert at.fingers["thumb"].faults == (Fault.TAXEL_COUNT,)
     assert at.fingers["index"].faults == ()
-    assert told.fingers["index"].state is ContactState.UNKNOWN
-    assert told.fingers["index"].reason is Reason.FAULT
-    assert np.isnan(told.fingers["index"].stable_probability)
+    assert reported.fingers["index"].state is ContactState.UNKNOWN
+    assert reported.fingers["index"].reason is Reason.FAULT
+    assert np.isnan(reported.fingers["index"].stable_probability)
     assert estimates[k + 1].updated_fingers == ("index",)
     assert all(finger.faults == () for finger in after.fingers.values())
 
 
-def test_while_nothing_comes_no_finger_is_stable():
+def test_in_silence_every_finger_is_unknown():
     recording = build.grasp()
     detector = ArrivalDetector(build.model(), build.Script.of(recording).sensors)
     assert detector.mark_silent() == []
     for arrival in build.arrivals_of(recording)[:500]:
         detector.update(arrival)
-    (said,) = detector.mark_silent()
-    assert said.updated_fingers == build.FINGERS
-    assert said.estimate.state is ContactState.UNKNOWN
-    for finger in said.estimate.fingers.values():
+    (one,) = detector.mark_silent()
+    assert one.updated_fingers == build.FINGERS
+    assert one.estimate.state is ContactState.UNKNOWN
+    for finger in one.estimate.fingers.values():
         assert (finger.state, finger.reason) == (ContactState.UNKNOWN, Reason.GAP)
         assert finger.faults == (Fault.PACKET_GAP,)
 
 
-def test_word_after_silence_brings_no_finger_back():
+def test_a_notice_does_not_end_the_silence():
     recording = build.grasp()
     arrivals = build.arrivals_of(recording)
     detector = ArrivalDetector(build.model(), build.Script.of(recording).sensors)
     for arrival in arrivals[:500]:
         detector.update(arrival)
     detector.mark_silent()
-    (said,) = detector.update(build.told("odd", thumb=[Fault.TAXEL_COUNT]))
-    assert {finger.state for finger in said.estimate.fingers.values()} == {ContactState.UNKNOWN}
-    assert said.estimate.state is ContactState.UNKNOWN
+    (one,) = detector.update(build.notice_arrival("odd", thumb=[Fault.TAXEL_COUNT]))
+    assert {finger.state for finger in one.estimate.fingers.values()} == {ContactState.UNKNOWN}
+    assert one.estimate.state is ContactState.UNKNOWN
     (back,) = detector.update(arrivals[500])
     assert all(finger.faults == () for finger in back.estimate.fingers.values())
 
 
-def test_a_finger_that_stays_away_is_told_of_while_the_others_go_on():
+def test_a_missing_finger_becomes_unknown_once_while_the_others_go_on():
     recording = build.grasp()
     detector = ArrivalDetector(build.model(), build.Script.of(recording).sensors)
     estimates = []
     for k, arrival in enumerate(build.arrivals_of(recording)[:600]):
         there = {n: s for n, s in arrival.samples.items() if k < 500 or n != "thumb"}
         estimates += detector.update(arrival._replace(samples=there))
-    told = [d for d in estimates[500:] if "thumb" in d.updated_fingers]
-    assert len(told) == 1
-    thumb = told[0].estimate.fingers["thumb"]
+    lost = [d for d in estimates[500:] if "thumb" in d.updated_fingers]
+    assert len(lost) == 1
+    thumb = lost[0].estimate.fingers["thumb"]
     assert (thumb.state, thumb.reason) == (ContactState.UNKNOWN, Reason.GAP)
 
 
-def test_what_is_kept_before_the_rate_is_known_is_bounded():
+def test_the_buffer_before_the_rate_is_known_is_bounded():
     recording = build.grasp()
     detector = ArrivalDetector(build.model(), build.Script.of(recording).sensors)
     first, *_ = build.arrivals_of(recording)
     for k in range(3):
         for _ in range(MAX_BUFFERED_ARRIVALS):
-            assert detector.update(build.told("odd", thumb=[Fault.TAXEL_COUNT])) == []
+            assert detector.update(build.notice_arrival("odd", thumb=[Fault.TAXEL_COUNT])) == []
         detector.update(first._replace(time=0.01 * k))
     assert len(detector._buffer) == 6
     stuck = build.arrivals_of(recording)[: MAX_BUFFERED_ARRIVALS // 8]
@@ -169,7 +169,7 @@ def test_silence_is_longer_for_slow_sources():
     assert detector.silence_timeout == pytest.approx(0.4, rel=0.01)
 
 
-def test_a_tare_in_contact_is_refused_and_one_without_is_taken_anew():
+def test_a_tare_in_contact_is_refused_and_one_without_contact_restarts():
     recording = build.grasp()
     detector = ArrivalDetector(build.model(), build.Script.of(recording).sensors)
     detector.restart_tare()
@@ -177,8 +177,8 @@ def test_a_tare_in_contact_is_refused_and_one_without_is_taken_anew():
     for arrival in arrivals[:200]:
         detector.update(arrival)
     detector.restart_tare()
-    said = detector.update(arrivals[200])[-1].estimate.fingers["thumb"]
-    assert (said.state, said.reason) == (ContactState.UNKNOWN, Reason.TARE)
+    thumb = detector.update(arrivals[200])[-1].estimate.fingers["thumb"]
+    assert (thumb.state, thumb.reason) == (ContactState.UNKNOWN, Reason.TARE)
     for arrival in arrivals[201:600]:
         detector.update(arrival)
     with pytest.raises(StreamError, match=r"^thumb, index, middle in contact: open the hand, the"):
@@ -197,12 +197,12 @@ def test_tared_readings_begin_at_zero():
     assert all(np.abs(values).max() < 10 for values in tared.values())
 
 
-def test_modules_that_the_model_does_not_judge_are_passed_over():
+def test_modules_that_the_model_does_not_use_are_ignored():
     recording = build.grasp()
     steps = build.arrivals_of(recording)
     palm = np.zeros((4, 3))
     more = [one._replace(samples={**one.samples, "palm/1": palm}) for one in steps]
-    _, estimates = judged(recording, steps=more)
+    _, estimates = detected(recording, steps=more)
     check_equal(estimates, detect(build.model(), recording))
 
 
@@ -212,21 +212,21 @@ def test_a_tare_by_interval_is_refused():
         ArrivalDetector(model, build.Script.of(build.grasp()).sensors)
 
 
-def test_ignored_taxels_count_for_nothing():
+def test_ignored_taxels_cause_no_fault():
     recording = build.grasp()
     steps = build.arrivals_of(recording)
     for k, arrival in enumerate(steps):
         spoilt = arrival.samples["thumb"].copy()
         spoilt[3] = 65535 if k > 300 else spoilt[3]
         steps[k] = arrival._replace(samples={**arrival.samples, "thumb": spoilt})
-    _, spoilt = judged(recording, steps=list(steps))
+    _, spoilt = detected(recording, steps=list(steps))
     assert spoilt[-1].estimate.fingers["thumb"].faults == (Fault.SATURATED,)
     assert spoilt[-1].estimate.fingers["thumb"].faulty_taxels == (3,)
-    _, healthy = judged(recording, steps=list(steps), ignore={"thumb": (3,)})
+    _, healthy = detected(recording, steps=list(steps), ignore={"thumb": (3,)})
     assert healthy[-1].estimate.fingers["thumb"].faults == ()
 
 
-class Babbler(build.Script):
+class NoticesOnly(build.Script):
     """Sends arrivals without samples, without end and without a pause."""
 
     paced = True
@@ -235,7 +235,7 @@ class Babbler(build.Script):
         if self.steps:
             return super().read(timeout)
         time.sleep(0.001)
-        return build.told("nonsense")
+        return build.notice_arrival("invalid packet")
 
 
 def read_times(source, n):
@@ -245,7 +245,7 @@ def read_times(source, n):
 
 def test_a_source_without_samples_is_silent():
     recording = build.grasp()
-    source = Babbler.of(recording, build.arrivals_of(recording)[:500], patient=True)
+    source = NoticesOnly.of(recording, build.arrivals_of(recording)[:500], patient=True)
     stream, _ = read_times(source, 500)
     assert not stream.silent
     found = []
@@ -273,7 +273,7 @@ def test_samples_of_unused_modules_do_not_end_the_silence():
 def test_a_source_that_is_not_paced_is_not_silent_because_its_reader_is_slow():
     recording = build.grasp()
     arrivals = build.arrivals_of(recording)
-    steps = [*arrivals[:500], build.told("a marker"), arrivals[500]]
+    steps = [*arrivals[:500], build.notice_arrival("a marker"), arrivals[500]]
     stream, _ = read_times(build.Script.of(recording, steps), 500)
     time.sleep(0.15)
     assert stream.read().estimates == []

@@ -20,11 +20,11 @@ TIPS = dict.fromkeys(("thumb", "index", "middle", "ring"), sensor("uskin-curved"
 WHOLE = {name: one.sensor for name, one in hand("allegro-uskin").modules.items()}
 PERIOD = 1 / 500
 PATIENCE = 20.0
-"""So long a test waits before it fails [s]."""
+"""Time after which a waiting test fails [s]."""
 
 
 class Made(Source):
-    """Samples out of a random generator, every 2 ms; so many, or without end."""
+    """Source of random samples every 2 ms; `n` of them, or without end."""
 
     def __init__(self, sensors=TIPS, n=None, first=0):
         self.sensors = sensors
@@ -63,7 +63,7 @@ def samples_of(sensors, k):
 
 @pytest.fixture(autouse=True)
 def tidy():
-    """No thread is left behind."""
+    """Check that no thread is left."""
     before = set(threading.enumerate())
     yield
     left = [thread for thread in threading.enumerate() if thread not in before]
@@ -127,7 +127,7 @@ def test_fingertips_inside_a_hand():
 
 
 class InTurn(Made):
-    """Modules have their samples one after the other, half a millisecond apart."""
+    """Source whose modules have their samples one after the other, half a millisecond apart."""
 
     def read(self, timeout):
         if self.ended:
@@ -145,8 +145,8 @@ class InTurn(Made):
     ("version", "sensors", "whole_hand"),
     [("1.8", TIPS, False), ("1.7", TIPS, False), ("1.8", TIPS, True), ("1.8", WHOLE, False)],
 )
-def test_modules_with_instants_of_their_own(version, sensors, whole_hand):
-    """Whoever comes learns of all modules, and has every sample of each once."""
+def test_modules_with_separate_times(version, sensors, whole_hand):
+    """A client receives the list of all modules, and every sample of each once."""
     n = 50
     made = InTurn(sensors, n * len(sensors))
     seen = {name: [] for name in sensors}
@@ -183,14 +183,14 @@ def test_several_clients_receive_the_same():
             np.testing.assert_array_equal(one[when], seen[0][when])
 
 
-def test_who_leaves_is_forgotten():
+def test_a_client_that_disconnects_is_removed():
     with played(Made()) as server:
         with open_source(server.uri):
             assert eventually(lambda: server.n_clients == 1)
         assert eventually(lambda: server.n_clients == 0)
 
 
-def test_the_first_word_is_welcome_and_commands_do_nothing():
+def test_the_first_message_is_welcome_and_commands_are_ignored():
     with played(Made()) as server:
         with connect(server.uri.replace("xela", "ws").split("?")[0], compression=None) as one:
             assert json.loads(one.recv())["message"] == "Welcome"
@@ -209,14 +209,14 @@ def test_waiting_for_the_first_client():
         assert server.wait(PATIENCE)
 
 
-def test_without_waiting_it_ends_alone():
+def test_without_waiting_it_ends_without_clients():
     with played(Made(n=5)) as server:
         assert server.wait(PATIENCE)
     assert server.ended
     assert server.n_packets == 5
 
 
-def test_word_without_samples_is_no_packet():
+def test_an_arrival_without_samples_is_not_sent():
     class Talks(Made):
         def read(self, timeout):
             self.k += 1
@@ -227,7 +227,7 @@ def test_word_without_samples_is_no_packet():
     assert 0 < server.n_packets < 20
 
 
-def test_a_client_that_does_not_read_is_dropped_and_holds_up_nobody(monkeypatch):
+def test_a_client_that_does_not_read_is_disconnected_and_delays_no_other(monkeypatch):
     monkeypatch.setattr(module, "MAX_BACKLOG", 100_000)
     with played(Made(WHOLE)) as server, socket.socket() as lazy:
         lazy.setsockopt(socket.SOL_SOCKET, socket.SO_RCVBUF, 4096)
@@ -260,7 +260,7 @@ def test_a_client_goes_on_after_a_restart(monkeypatch):
     assert any((samples_of(TIPS, k)["ring"] == newest).all() for k in range(1000, 1600))
 
 
-def test_a_port_that_is_taken():
+def test_a_port_in_use():
     with socket.create_server(("127.0.0.1", 0)) as other:
         port = other.getsockname()[1]
         with pytest.raises(OutputError) as refusal, played(Made(), port=port):
@@ -271,13 +271,13 @@ def test_a_port_that_is_taken():
 
 
 @pytest.mark.parametrize(("host", "port"), [("127.0.0.1", 70000), ("203.0.113.1", 0)])
-def test_an_address_that_there_is_not(host, port):
-    told = f"cannot listen at {host}:{port} "
-    with pytest.raises(OutputError, match=told), played(Made(), host=host, port=port):
+def test_an_address_that_does_not_exist(host, port):
+    message = f"cannot listen at {host}:{port} "
+    with pytest.raises(OutputError, match=message), played(Made(), host=host, port=port):
         pass
 
 
-def test_readings_that_are_no_counts_end_it():
+def test_readings_that_are_not_counts_end_the_server():
     class Newtons(Made):
         def read(self, timeout):
             arrival = super().read(timeout)
@@ -293,14 +293,14 @@ def test_readings_that_are_no_counts_end_it():
     ("host", "expected"),
     [("127.0.0.1", "127.0.0.1"), ("0.0.0.0", "127.0.0.1"), ("::1", "[::1]"), ("::", "127.0.0.1")],
 )
-def test_by_which_it_is_found(host, expected):
+def test_the_uri_of_the_server(host, expected):
     with Made({"thumb": TIPS["thumb"]}) as source:
         server = XelaServer(source, host=host, port=5001)
         assert server.uri == f"xela://{expected}:5001?fingers=1:thumb"
         assert not server.ended
 
 
-def test_the_end_waits_for_clients_that_are_behind(monkeypatch):
+def test_the_end_waits_for_slow_clients(monkeypatch):
     behind = [1]
     monkeypatch.setattr(module, "_unsent_bytes", lambda client: behind[0])
     with played(Made(n=5), wait=True) as server, open_source(server.uri):
@@ -310,14 +310,14 @@ def test_the_end_waits_for_clients_that_are_behind(monkeypatch):
         assert server.wait(PATIENCE)
 
 
-def test_the_end_does_not_wait_for_ever(monkeypatch):
+def test_the_end_waits_for_a_limited_time(monkeypatch):
     monkeypatch.setattr(module, "_unsent_bytes", lambda client: 1)
     monkeypatch.setattr(module, "DRAIN_TIMEOUT", 0.1)
     with played(Made(n=5), wait=True) as server, open_source(server.uri):
         assert server.wait(PATIENCE)
 
 
-def test_who_closes_it_waits_for_nobody(monkeypatch):
+def test_closing_does_not_wait_for_clients(monkeypatch):
     monkeypatch.setattr(module, "_unsent_bytes", lambda client: 1)
     monkeypatch.setattr(module, "DRAIN_TIMEOUT", 1e6)
     with ExitStack() as stack:
@@ -328,7 +328,7 @@ def test_who_closes_it_waits_for_nobody(monkeypatch):
         assert server.ended
 
 
-def test_nothing_is_left_of_the_loop():
+def test_the_event_loop_is_closed():
     with played(Made()) as server:
         loop = server._loop
         assert isinstance(loop, asyncio.AbstractEventLoop)

@@ -180,7 +180,7 @@ def test_nothing_tells_where_it_was_made(done, plan):
 
 def test_what_is_kept_is_not_computed_again(done, plan, tmp_path):
     out = shutil.copytree(done[0], tmp_path / "out")
-    with pytest.raises(OutputError, match="holds a study already: choose another name, or give"):
+    with pytest.raises(OutputError, match="already holds a study: choose another name, or give"):
         run_study(plan, out)
     kept = {path.name: path.read_bytes() for path in (out / "work").iterdir()}
     (out / "data").mkdir()

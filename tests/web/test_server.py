@@ -20,30 +20,30 @@ def app():
     return made
 
 
-def test_serves_until_all_is_over():
+def test_the_server_runs_until_is_over_returns_true():
     found = []
 
-    def tell(url):
+    def announce(url):
         def ask():
             with urllib.request.urlopen(url) as answer:
                 found.append(answer.read())
 
         threading.Thread(target=ask).start()
 
-    run_server(app(), "127.0.0.1", 0, tell, lambda: bool(found))
+    run_server(app(), "127.0.0.1", 0, announce, lambda: bool(found))
     assert found == [b"hello"]
 
 
 @pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM, signal.SIGHUP])
-def test_ends_in_order_when_told_to(number):
-    told = []
+def test_signals_end_the_server_in_order(number):
+    urls = []
 
-    def tell(url):
-        told.append(url)
+    def announce(url):
+        urls.append(url)
         threading.Timer(0.1, os.kill, (os.getpid(), number)).start()
 
-    run_server(app(), "127.0.0.1", 0, tell)
-    assert told[0].startswith("http://127.0.0.1:")
+    run_server(app(), "127.0.0.1", 0, announce)
+    assert urls[0].startswith("http://127.0.0.1:")
 
 
 def test_a_port_in_use():
@@ -57,6 +57,6 @@ def test_a_port_in_use():
 
 
 @pytest.mark.parametrize("port", [70000, -1])
-def test_a_port_that_is_none(port):
+def test_an_invalid_port(port):
     with pytest.raises(OutputError, match=r"^cannot listen at 127\.0\.0\.1:"):
         run_server(app(), "127.0.0.1", port, print)

@@ -1,4 +1,4 @@
-"""The files of the pages: each is there that another one names, and once only."""
+"""Files of the pages: every file that another one names exists, and only once."""
 
 import re
 from importlib import resources
@@ -14,14 +14,14 @@ NAMED = re.compile(r'(?:src|href)="([^"#]+)"|^(?:import|export)\b.* from "([^"]+
 
 
 def place(page, file, name):
-    """Where a file is that another one names: /page and /web are neighbours under the root."""
+    """Path of a file that another file names; /page and /web are siblings in the URL."""
     folder = "." if file.suffix == ".html" else "web" if file.parent == SHARED else "page"
     top, *rest = Path(normpath(f"{folder}/{name}")).parts
     return {"page": page, "web": SHARED}[top].joinpath(*rest)
 
 
 @pytest.mark.parametrize("page", PAGES, ids=["live", "labelling"])
-def test_what_a_page_names_is_there(page):
+def test_every_file_that_a_page_names_exists(page):
     waiting, seen = [page / "index.html"], set()
     while waiting:
         file = waiting.pop()
@@ -33,11 +33,11 @@ def test_what_a_page_names_is_there(page):
             waiting += [place(page, file, name) for name in names]
     assert [str(file) for file in seen if not file.is_file()] == []
     shared = set(SHARED.iterdir())
-    assert shared <= seen  # what only one page uses is that page's own
+    assert shared <= seen  # a file that only one page uses belongs to that page
     own = {file for file in page.iterdir() if file.suffix in (".js", ".css", ".svg")}
     assert own <= seen
 
 
-def test_no_page_has_a_copy_of_its_own():
+def test_no_file_exists_twice():
     texts = [file.read_text() for folder in (*PAGES, SHARED) for file in folder.glob("*.*")]
     assert len(set(texts)) == len(texts)

@@ -176,10 +176,10 @@ def _hand_series(estimates: list[StreamEstimate], fingers: list[str]) -> schema.
     )
 
 
-def _finger_series(estimates: list[StreamEstimate], name: str) -> schema.FingerSeries:
+def _finger_series(estimates: list[StreamEstimate], name: str) -> schema.EstimateSeries:
     rows = [estimate.fingers[name] if name in updated else None for estimate, updated in estimates]
     forces = [_NO_FORCE if row is None else row.force for row in rows]
-    return schema.FingerSeries(
+    return schema.EstimateSeries(
         force=([f[0] for f in forces], [f[1] for f in forces], [f[2] for f in forces]),
         instability=[np.nan if row is None else row.instability for row in rows],
         stable_probability=[np.nan if row is None else row.stable_probability for row in rows],

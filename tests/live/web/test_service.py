@@ -22,7 +22,7 @@ PATIENCE = 30.0
 
 @asynccontextmanager
 async def served(source, token=None, host="127.0.0.1", folder=None, start=True):
-    """A client of the service of a source, its address, and the session."""
+    """Yield a client of the service of a source, and the session."""
     session = Session(StreamDetector(build.model(), source))
     service = LiveService(session, build.model(), Guard(host, token), folder)
     runner = web.AppRunner(service.app, shutdown_timeout=0.5)
@@ -44,7 +44,7 @@ async def wait_for(condition):
     end = time.monotonic() + PATIENCE
     while not condition():
         if time.monotonic() > end:
-            pytest.fail("what was waited for did not happen")
+            pytest.fail("the condition never became true")
         await asyncio.sleep(0.01)
 
 
@@ -57,7 +57,7 @@ def run(work):
     return asyncio.run(asyncio.wait_for(work, PATIENCE))
 
 
-def test_the_first_document_says_what_there_is(tmp_path):
+def test_the_first_document_describes_model_and_source(tmp_path):
     async def work():
         async with served(patient(10), folder=tmp_path) as (client, _):
             async with client.ws_connect("/api/v1/live") as socket:
@@ -78,7 +78,7 @@ def test_the_first_document_says_what_there_is(tmp_path):
     msgspec.convert(hello, schema.HelloDocument)
 
 
-def test_documents_hold_every_sample_once_and_what_is_newest():
+def test_documents_have_every_sample_once_and_the_newest_values():
     recording = build.grasp()
 
     async def work():
@@ -115,7 +115,7 @@ def test_documents_hold_every_sample_once_and_what_is_newest():
     assert np.shape(last["fingers"]["index"]["taxels"]) == (30, 3)
 
 
-def test_estimates_are_told_one_by_one():
+def test_every_estimate_is_sent():
     recording = build.grasp()
     n = 600
 
@@ -139,7 +139,7 @@ def test_estimates_are_told_one_by_one():
         assert set(one["fingers"]) == set(build.FINGERS)
 
 
-def test_a_reader_that_does_not_read_holds_nobody_up():
+def test_a_client_that_does_not_read_delays_no_other():
     recording = build.grasp()
 
     async def work():
@@ -154,7 +154,7 @@ def test_a_reader_that_does_not_read_holds_nobody_up():
             return session.latency()
 
     latency = run(work())
-    assert latency.p50 < 1.0  # a decision does not wait for a socket
+    assert latency.p50 < 1.0  # an estimate does not wait for a socket
 
 
 def test_the_tare(tmp_path):
@@ -177,7 +177,7 @@ def test_the_tare(tmp_path):
     assert touching[1]["error"].startswith("thumb, index, middle in contact")
 
 
-def test_a_recording_is_made_marked_and_ended(tmp_path):
+def test_a_recording_with_a_marker(tmp_path):
     recording = build.grasp()
 
     async def work():
@@ -198,13 +198,13 @@ def test_a_recording_is_made_marked_and_ended(tmp_path):
             async with client.post("/api/v1/markers", json={"text": "closing"}) as answer:
                 assert answer.status == 200
             async with client.get("/api/v1/state") as answer:
-                told = await answer.json()
+                document = await answer.json()
             async with client.delete("/api/v1/recording") as answer:
                 ended = await answer.json()
             async with client.post("/api/v1/recording", json={"name": "mine"}) as answer:
                 assert answer.status == 409
                 assert "exists already" in (await answer.json())["error"]
-            return told, ended
+            return document, ended
 
     _, ended = run(work())
     assert ended["path"] == str(tmp_path / "mine.mcap")
@@ -230,7 +230,7 @@ def test_a_recording_without_samples_is_not_kept(tmp_path):
 
 
 @pytest.mark.parametrize("name", ["../up", "a/b", "", ".hidden", "x" * 200])
-def test_names_that_no_recording_has(tmp_path, name):
+def test_invalid_recording_names_are_refused(tmp_path, name):
     async def work():
         async with (
             served(patient(10), folder=tmp_path) as (client, _),
@@ -261,7 +261,7 @@ def test_a_folder_that_cannot_be_made(tmp_path):
     assert run(work()) == (409, text)
 
 
-def test_a_recording_that_the_disk_refuses_is_ended_and_told(tmp_path):
+def test_a_recording_that_cannot_be_written_ends_with_a_notice(tmp_path):
     async def work():
         async with served(patient(100), folder=tmp_path) as (client, session):
             await wait_for(lambda: session.n_packets == 100)
@@ -271,10 +271,10 @@ def test_a_recording_that_the_disk_refuses_is_ended_and_told(tmp_path):
                     (tmp_path / "mine.mcap").unlink()
                 notices = []
                 while not notices:
-                    told = await socket.receive_json()
-                    notices = [one["text"] for one in told["notices"]]
-                while told["recording"] is not None:
-                    told = await socket.receive_json()
+                    document = await socket.receive_json()
+                    notices = [one["text"] for one in document["notices"]]
+                while document["recording"] is not None:
+                    document = await socket.receive_json()
             return notices
 
     (notice,) = run(work())
@@ -282,7 +282,7 @@ def test_a_recording_that_the_disk_refuses_is_ended_and_told(tmp_path):
     assert notice.endswith("it was removed while it was recorded")
 
 
-def test_no_folder_no_recordings():
+def test_without_a_folder_there_are_no_recordings():
     async def work():
         async with (
             served(patient(10)) as (client, _),
@@ -294,7 +294,7 @@ def test_no_folder_no_recordings():
 
 
 @pytest.mark.parametrize("body", [b"{", b"[]", b'{"name": 3}', b'{"nam": "a"}'])
-def test_bodies_that_make_no_sense(tmp_path, body):
+def test_invalid_request_bodies_are_refused(tmp_path, body):
     async def work():
         async with (
             served(patient(10), folder=tmp_path) as (client, _),
@@ -317,7 +317,7 @@ def test_bodies_that_make_no_sense(tmp_path, body):
         ({"Origin": "null"}, 403),
     ],
 )
-def test_other_origins_and_names_are_refused(headers, status):
+def test_other_origins_and_host_names_are_refused(headers, status):
     async def work():
         recording = build.grasp()
         source = build.Lasting.of(recording, build.arrivals_of(recording)[:10], patient=True)
@@ -334,7 +334,7 @@ def test_other_origins_and_names_are_refused(headers, status):
     assert run(work()) == (status, status)
 
 
-def test_the_token_is_needed_and_taken_in_either_way():
+def test_the_token_is_needed_and_accepted_in_both_forms():
     async def work():
         found = []
         async with served(patient(10), token="secret") as (client, _):
@@ -356,7 +356,7 @@ def test_the_token_is_needed_and_taken_in_either_way():
     assert run(work()) == [401, 401, 200, 200, 401]
 
 
-def test_the_page_may_load_nothing_from_elsewhere():
+def test_the_page_loads_nothing_from_other_servers():
     async def work():
         async with served(patient(10)) as (client, _), client.get("/") as answer:
             return answer.status, dict(answer.headers), await answer.text()
@@ -388,9 +388,9 @@ def test_the_schema_is_that_of_the_documents():
         ):
             return await answer.json()
 
-    told = run(work())
-    assert {"HelloDocument", "LiveDocument", "EstimateDocument"} <= set(told["$defs"])
-    assert json.dumps(told)
+    document = run(work())
+    assert {"HelloDocument", "LiveDocument", "EstimateDocument"} <= set(document["$defs"])
+    assert json.dumps(document)
 
 
 def test_listening_to_the_network_needs_a_token():

@@ -6,14 +6,14 @@ import pytest
 
 from holdfast.contact import ContactState
 from holdfast.recordings import Label
-from holdfast.study.comparison import real_recordings
+from holdfast.study.comparison import jobs, real_recordings
 from holdfast.study.methods import METHODS
 from holdfast.study.plan import StudyPlan, scan_corpus
 from holdfast.study.report.table_layouts import to_html
 from holdfast.synthetic import synthetic_recording
 from study.example_recordings import save_all
 
-SHAKEN = [
+DISTURBED = [
     Label(3.0, 5.3, ContactState.STABLE),
     Label(5.3, 6.5, ContactState.UNSTABLE),
     Label(6.5, 8.0, ContactState.STABLE),
@@ -31,11 +31,11 @@ def run(plan):
 
 @pytest.fixture(scope="module")
 def corpus(tmp_path_factory):
-    """Held from the first sample on; in two of four recordings nothing happens."""
+    """Recordings that begin while the object is held; two of four have no disturbance."""
     recordings = []
     for seed in range(4):
         recording = held_part(synthetic_recording(f"pick-{seed}", seed, ("finger1", "finger2")))
-        recording = recording.with_labels(dict.fromkeys(recording.modules, SHAKEN))
+        recording = recording.with_labels(dict.fromkeys(recording.modules, DISTURBED))
         if seed > 1:
             recording = recording.with_labels(dict.fromkeys(recording.modules, CALM))
         recordings.append(recording)
@@ -44,7 +44,7 @@ def corpus(tmp_path_factory):
 
 
 def held_part(recording):
-    """From 3 s to 8 s, about the shaking, without what tells the object."""
+    """Return the recording from 3 s to 8 s, around the disturbance, without metadata."""
     modules = {}
     for name, module in recording.modules.items():
         rows = slice(450, 1200)
@@ -54,9 +54,9 @@ def held_part(recording):
     return replace(recording, modules=modules, metadata={})
 
 
-def test_each_recording_is_judged_by_the_others(corpus, monkeypatch):
+def test_each_recording_is_evaluated_by_a_fit_to_the_others(corpus, monkeypatch):
     names = ("logreg", "zhang", "jl_global_logreg")
-    monkeypatch.setattr(real_recordings, "METHODS", {name: METHODS[name] for name in names})
+    monkeypatch.setattr(jobs, "METHODS", {name: METHODS[name] for name in names})
     plan = StudyPlan({"main": corpus}, real=corpus)
     (job,) = (
         task.arguments[0] for task in real_recordings.tasks(plan) if task.name == "real/logreg"
@@ -65,9 +65,9 @@ def test_each_recording_is_judged_by_the_others(corpus, monkeypatch):
     (table,) = run(plan)
     assert table.name == "real"
     assert to_html(table)
-    seen = {(row.keys["recording"], row.keys["finger"]) for row in table.rows}
+    found = {(row.keys["recording"], row.keys["finger"]) for row in table.rows}
     fingers = ("finger1", "finger2", "hand")
-    assert seen == {(f"pick-{k}", finger) for k in (0, 1) for finger in fingers}
+    assert found == {(f"pick-{k}", finger) for k in (0, 1) for finger in fingers}
     areas = [row.ours for row in table.rows if row.keys["figure"] == "AUC contact"]
     assert all(0 <= area <= 1 for area in areas)
     sigma = [r for r in table.rows if r.keys["method"] == METHODS["zhang"].title]

@@ -6,11 +6,11 @@ import pytest
 from holdfast.metrics import Decisions, FingerDecisions, summarise
 from holdfast.study.comparison.rows import (
     calibration_row,
+    correct_and_all,
     count_row,
     difference_row,
     quantile_row,
     ratio_row,
-    right_and_all,
     sample_rows,
 )
 from holdfast.study.evaluation.evaluate_method import MethodEvaluation
@@ -36,7 +36,7 @@ def test_the_difference_is_that_of_the_accuracies():
     assert row.ours == pytest.approx(first.pooled.accuracy - second.pooled.accuracy)
     assert row.ours == pytest.approx(100 / 6)
     assert row.n == 3
-    assert right_and_all(first) == {"r0": (8, 8), "r1": (4, 8), "r2": (8, 8)}
+    assert correct_and_all(first) == {"r0": (8, 8), "r1": (4, 8), "r2": (8, 8)}
 
 
 def test_its_interval_draws_the_same_recordings_for_both():
@@ -50,7 +50,7 @@ def test_its_interval_draws_the_same_recordings_for_both():
     assert difference_row({}, first, first, seed=0).interval == (0.0, 0.0)
 
 
-def test_only_recordings_that_both_judged_are_compared():
+def test_only_recordings_of_both_are_compared():
     first, second = metrics_of(RIGHT, HALF), metrics_of(HALF)
     row = difference_row({}, first, second, seed=0)
     assert (row.ours, row.n, row.interval) == (50.0, 1, None)
@@ -76,7 +76,7 @@ def test_counts_are_added():
     assert count_row({}, [2, 3]).ours == 5
 
 
-def test_figures_by_sample_with_what_the_paper_prints():
+def test_sample_rows_with_the_values_of_the_paper():
     rows = sample_rows({"on": "x"}, metrics_of(RIGHT, HALF), paper={"accuracy [%]": 95.0})
     assert [row.keys["figure"] for row in rows][:2] == ["accuracy [%]", "FDR [%]"]
     assert (rows[0].ours, rows[0].paper, rows[0].n) == (75.0, 95.0, 2)
@@ -88,7 +88,7 @@ def test_the_calibration_error_by_hand():
     """One bin is off by 0.1 on 30 samples, one by 0.2 on 10."""
     table = [[0.0, 0.0, 0.0]] * 8 + [[24.0, 21.0, 30.0], [9.0, 7.0, 10.0]]
     metrics = metrics_of(RIGHT)
-    judged = MethodEvaluation(["a"], None, metrics, [], [], [], [], [], [table])
-    assert calibration_row({}, judged, seed=0).ours == pytest.approx((3 + 2) / 40)
+    evaluation = MethodEvaluation(["a"], None, metrics, [], [], [], [], [], [table])
+    assert calibration_row({}, evaluation, seed=0).ours == pytest.approx((3 + 2) / 40)
     both = MethodEvaluation(["a", "b"], None, metrics, [], [], [], [], [], [table, table])
     assert calibration_row({}, both, seed=0).interval == pytest.approx((0.125, 0.125))

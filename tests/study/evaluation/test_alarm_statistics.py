@@ -9,7 +9,7 @@ from holdfast.study.evaluation.alarm_statistics import (
     SlipInterval,
     alarm_statistics,
     find_slips,
-    follows_jump,
+    is_after_jump,
 )
 from study.example_recordings import GLITCH, truth_of
 
@@ -34,39 +34,43 @@ def test_a_slip_begins_after_half_a_second_of_rest():
     assert find_slips(None) == []
 
 
-def test_latency_of_a_slip_counts_from_its_onset():
+def test_the_delay_of_a_slip_counts_from_its_onset():
     slip = SlipInterval(5.6, 5.9)
     labels = where((5.3, 6.5))
     cases = {(5.65, 5.7): 0.05, (5.0, 5.61): 0.0, (5.95, 6.5): math.inf, (5.88, 6.0): 0.28}
-    for span, latency in cases.items():
-        heard = alarm_statistics(hand(labels, where(span)), TRUTH, [slip])
-        assert heard.slips == [pytest.approx(latency, abs=0.007)]
-    assert alarm_statistics(hand(labels, where((5.64, 5.7))), TRUTH, [slip]).n_found(0.05) == 1
-    assert alarm_statistics(hand(labels, where((5.66, 5.7))), TRUTH, [slip]).n_found(0.05) == 0
+    for span, delay in cases.items():
+        found = alarm_statistics(hand(labels, where(span)), TRUTH, [slip])
+        assert found.slip_delays == [pytest.approx(delay, abs=0.007)]
+    assert (
+        alarm_statistics(hand(labels, where((5.64, 5.7))), TRUTH, [slip]).n_slips_found(0.05) == 1
+    )
+    assert (
+        alarm_statistics(hand(labels, where((5.66, 5.7))), TRUTH, [slip]).n_slips_found(0.05) == 0
+    )
 
 
-def test_a_short_slip_may_be_told_until_a_fifth_of_a_second():
-    heard = alarm_statistics(
+def test_a_short_slip_can_be_found_for_a_fifth_of_a_second():
+    found = alarm_statistics(
         hand(where((5.3, 6.5)), where((5.78, 6.0))), TRUTH, [SlipInterval(5.6, 5.62)]
     )
-    assert heard.n_found(0.2) == 1
-    assert heard.n_found(0.1) == 0
+    assert found.n_slips_found(0.2) == 1
+    assert found.n_slips_found(0.1) == 0
 
 
-def test_alarms_in_vain_are_told_apart():
-    """One in a calm hold, one just after the glitch, one while nothing is known of stability."""
+def test_kinds_of_false_alarms_are_counted():
+    """One in a stable hold, one just after the jump, one without a label."""
     labels = where((0.0, 2.0), (5.3, 6.5))
     states = where((0.5, 0.6), (3.0, 3.1), (5.32, 6.5), (GLITCH + 0.05, GLITCH + 0.1))
-    heard = alarm_statistics(hand(labels, states), TRUTH, [])
-    assert heard.delays == [pytest.approx(0.02)]
-    assert (heard.false_alarms, heard.under_stable, heard.follows_jump) == (3, 2, 1)
-    assert heard.stable_seconds == pytest.approx(1725 / 150 - 3.2)
-    assert heard.n_missed(0.05) == 0
-    assert heard.n_doubted == 15 + 7
-    assert heard.n_stable == 1725 - 480
+    found = alarm_statistics(hand(labels, states), TRUTH, [])
+    assert found.delays == [pytest.approx(0.02)]
+    assert (found.n_false_alarms, found.n_under_stable, found.n_after_jump) == (3, 2, 1)
+    assert found.stable_seconds == pytest.approx(1725 / 150 - 3.2)
+    assert found.n_missed(0.05) == 0
+    assert found.n_not_called_stable == 15 + 7
+    assert found.n_stable == 1725 - 480
 
 
-def test_a_glitch_is_felt_for_a_tenth_of_a_second():
+def test_a_jump_has_effect_for_a_tenth_of_a_second():
     times = np.array([GLITCH - 0.01, GLITCH, GLITCH + 0.1, GLITCH + 0.11])
-    assert follows_jump(times, TRUTH).tolist() == [False, True, True, False]
-    assert not follows_jump(times, None).any()
+    assert is_after_jump(times, TRUTH).tolist() == [False, True, True, False]
+    assert not is_after_jump(times, None).any()

@@ -7,7 +7,6 @@ from holdfast.contact import STABLE, UNKNOWN, UNSTABLE
 from holdfast.metrics import Decisions, FingerDecisions
 from holdfast.recordings import Truth
 from holdfast.study.evaluation.error_breakdown import break_down_errors, calibration_counts
-from holdfast.study.evaluation.recording_features import RecordingFeatures
 from study.example_recordings import PUSH, truth_of
 
 TIMES = np.arange(1725) / 150
@@ -15,37 +14,33 @@ LABELS = np.where((TIMES >= 2.3) & (TIMES < 9.5), STABLE, UNSTABLE)
 LABELS = np.where((TIMES >= 5.3 - 1e-9) & (TIMES < 6.5), UNSTABLE, LABELS).astype(np.int8)
 
 
-def seen_with(truth):
-    return RecordingFeatures("one", None, truth, {}, {}, {}, {}, {}, {})
-
-
 def decided(states, names=("thumb", "index")):
     finger = FingerDecisions(TIMES, LABELS, states, np.full(len(TIMES), 0.5))
     return Decisions("one", dict.fromkeys(names, finger), finger)
 
 
-def told(states, truth=None, names=("thumb", "index")):
+def breakdown_of(states, truth=None, names=("thumb", "index")):
     truth = truth or truth_of(TIMES, ("thumb", "index"))
-    return break_down_errors(seen_with(truth), decided(states, names))
+    return break_down_errors(truth, decided(states, names))
 
 
 def test_everything_called_stable():
-    found = told(np.full(1725, STABLE, dtype=np.int8))
+    found = breakdown_of(np.full(1725, STABLE, dtype=np.int8))
     assert found.phases["disturbed"] == (360, 360)
     assert found.phases["locked"] == (1800, 0)
     assert found.phases["free"][0] == found.phases["free"][1] == 2 * (225 + 225)
-    (push,) = found.pushes
-    assert (push.direction, push.n, push.wrong) == ("down", 358, 358)
-    assert [grip.counts for grip in found.grips] == [(900, 0, 180, 180)] * 2
+    (push,) = found.disturbances
+    assert (push.direction, push.n, push.n_wrong) == ("down", 358, 358)
+    assert [(grip.stable, grip.not_stable) for grip in found.grips] == [((900, 0), (180, 180))] * 2
     assert [grip.force for grip in found.grips] == pytest.approx([2.0, 2.0])
 
 
 def test_samples_without_a_decision_do_not_count():
     states = np.where(TIMES < 6.0 - 1e-9, UNKNOWN, UNSTABLE).astype(np.int8)
-    found = told(states)
+    found = breakdown_of(states)
     assert found.phases["disturbed"] == (2 * 75, 0)
     assert found.phases["locked"] == (2 * 450, 2 * 450)
-    assert found.grips[0].counts == (450, 450, 75, 0)
+    assert (found.grips[0].stable, found.grips[0].not_stable) == ((450, 450), (75, 0))
 
 
 @pytest.mark.parametrize(
@@ -57,19 +52,21 @@ def test_directions(force, direction):
     outside = np.outer(np.linalg.norm(truth.hand["outside_force"], axis=1), force)
     turned = Truth(TIMES, {**truth.hand, "outside_force": outside}, truth.fingers)
     assert force != PUSH
-    assert [p.direction for p in told(np.full(1725, STABLE), turned).pushes] == [direction]
+    assert [p.direction for p in breakdown_of(np.full(1725, STABLE), turned).disturbances] == [
+        direction
+    ]
 
 
-def test_a_judge_of_hands_has_phases_and_pushes_but_no_grips():
-    found = told(np.full(1725, STABLE, dtype=np.int8), names=())
+def test_a_whole_hand_method_has_phases_and_disturbances_but_no_grips():
+    found = breakdown_of(np.full(1725, STABLE, dtype=np.int8), names=())
     assert found.phases["disturbed"] == (180, 180)
-    assert found.pushes[0].n == 179
+    assert found.disturbances[0].n == 179
     assert found.grips == []
 
 
-def test_nothing_is_counted_where_the_truth_is_not_known():
-    found = break_down_errors(seen_with(None), decided(np.full(1725, STABLE)))
-    assert (found.phases, found.grips, found.pushes) == ({}, [], [])
+def test_the_breakdown_is_empty_without_a_truth():
+    found = break_down_errors(None, decided(np.full(1725, STABLE)))
+    assert (found.phases, found.grips, found.disturbances) == ({}, [], [])
 
 
 def test_calibration_counts_by_hand():

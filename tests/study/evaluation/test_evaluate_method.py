@@ -7,23 +7,23 @@ import pytest
 from holdfast.contact import STABLE, ContactState
 from holdfast.metrics import event_metrics
 from holdfast.recordings import Label
-from holdfast.study.comparison.pooled_split import judge_pooled
 from holdfast.study.evaluation.evaluate_method import (
     FALSE_ALARM_RATES,
     EvaluationEffort,
     EvaluationJob,
     MethodEvaluation,
+    balanced_groups,
     evaluate_method,
+    evaluate_pooled,
     find_method,
-    groups_of,
-    held_out,
-    scored_recordings,
+    held_out_folds,
+    score_splits,
 )
 from holdfast.study.evaluation.variation import Variation
 from holdfast.study.plan import scan_corpus
 from study.example_recordings import recording_with_truth, save_all, save_synthetic
 
-EFFORT = EvaluationEffort(folds=3, inner=2, max_rows=1000)
+EFFORT = EvaluationEffort(folds=3, inner=2, max_samples=1000)
 
 
 @pytest.fixture(scope="module")
@@ -33,14 +33,14 @@ def recordings():
 
 @pytest.fixture(scope="module")
 def corpus(tmp_path_factory, recordings):
-    return scan_corpus("main", save_all(tmp_path_factory.mktemp("judging") / "main", recordings))
+    return scan_corpus("main", save_all(tmp_path_factory.mktemp("evaluation") / "main", recordings))
 
 
 @pytest.mark.parametrize("n", [2, 5, 12, 13])
 @pytest.mark.parametrize("split", ["recording", "object"])
 def test_every_recording_is_held_out_once(n, split):
     objects = [f"object {k % 3}" for k in range(n)]
-    folds = list(held_out(objects, split, 5, seed=1))
+    folds = list(held_out_folds(objects, split, 5, seed=1))
     assert sorted(place for fold in folds for place in fold) == list(range(n))
     if split == "object":
         assert all(len({objects[place] for place in fold}) == 1 for fold in folds)
@@ -49,33 +49,33 @@ def test_every_recording_is_held_out_once(n, split):
 
 def test_recordings_of_an_object_are_spread_over_the_folds():
     objects = ["ball"] * 10 + ["box"] * 10
-    groups = groups_of(objects, 5, seed=3)
+    groups = balanced_groups(objects, 5, seed=3)
     for half in (groups[:10], groups[10:]):
         assert np.bincount(half, minlength=5).tolist() == [2] * 5
 
 
 @pytest.mark.parametrize("objects", [["ball", "ball"], ["ball", None], [None, None]])
-def test_no_split_by_object_where_objects_are_not_known(objects):
-    assert list(held_out(objects, "object", 5, 0)) == []
+def test_no_split_by_object_without_two_known_objects(objects):
+    assert list(held_out_folds(objects, "object", 5, 0)) == []
 
 
 @pytest.mark.parametrize("method", ["logreg", "jl_global_logreg"])
-def test_what_is_judged_has_no_say_in_its_judge(tmp_path, recordings, corpus, method):
-    """Labels and truth of the recordings of a fold turned round: the same decisions on them."""
-    held = next(held_out([r.metadata["object"] for r in recordings], "recording", 3, 0))
-    other = [turned(r) if k in held else r for k, r in enumerate(recordings)]
-    turned_corpus = scan_corpus("main", save_all(tmp_path / "main", other))
+def test_an_evaluated_recording_does_not_influence_its_scores(tmp_path, recordings, corpus, method):
+    """Inverting labels of the recordings of a fold changes no score of them, but of the others."""
+    held = next(held_out_folds([r.metadata["object"] for r in recordings], "recording", 3, 0))
+    other = [inverted(r) if k in held else r for k, r in enumerate(recordings)]
+    inverted_corpus = scan_corpus("main", save_all(tmp_path / "main", other))
     job = EvaluationJob(method, corpus, effort=EFFORT)
-    (_, cases), (_, turned_cases) = (
-        next(scored_recordings(each))
-        for each in (job, msgspec.structs.replace(job, train=turned_corpus))
+    (_, scored), (_, inverted_scored) = (
+        next(score_splits(each))
+        for each in (job, msgspec.structs.replace(job, train=inverted_corpus))
     )
-    for place, (case, twin) in enumerate(zip(cases, turned_cases, strict=True)):
+    for place, (case, twin) in enumerate(zip(scored, inverted_scored, strict=True)):
         assert same(case, twin) == (place in held)
 
 
-def turned(recording):
-    """Stable where it was not, everywhere."""
+def inverted(recording):
+    """Return the recording with all labels inverted, without truth."""
     labels = {
         name: [Label(each.start, each.end, _other(each.state)) for each in module.labels]
         for name, module in recording.modules.items()
@@ -92,16 +92,16 @@ def same(case, twin):
         np.array_equal(margin, twin.scores.margins[unit], equal_nan=True)
         for unit, margin in case.scores.margins.items()
     ]
-    touching = [
-        np.array_equal(touch, twin.scores.touching[finger])
-        for finger, touch in case.scores.touching.items()
+    in_contact = [
+        np.array_equal(mask, twin.scores.in_contact[finger])
+        for finger, mask in case.scores.in_contact.items()
     ]
-    return all(margins) and all(touching) and case.shifts == twin.shifts
+    return all(margins) and all(in_contact) and case.shifts == twin.shifts
 
 
 @pytest.fixture(scope="module")
-def judged(corpus, tmp_path_factory):
-    other = save_synthetic(tmp_path_factory.mktemp("judging-other") / "others", range(20, 23))
+def evaluations(corpus, tmp_path_factory):
+    other = save_synthetic(tmp_path_factory.mktemp("evaluation-other") / "others", range(20, 23))
     job = EvaluationJob(
         "logreg", corpus, ("recording", "object"), (scan_corpus("others", other),), effort=EFFORT
     )
@@ -109,57 +109,57 @@ def judged(corpus, tmp_path_factory):
     return msgspec.msgpack.decode(data, type=dict[str, MethodEvaluation])
 
 
-def test_a_job_has_a_result_for_each_split_and_each_corpus(judged, corpus):
-    assert set(judged) == {"recording", "object", "others"}
-    assert judged["object"].names == judged["recording"].names == list(corpus.recordings)
-    assert len(judged["others"].names) == 3
-    assert judged["recording"].fingers.pooled.accuracy > 75
+def test_a_job_has_a_result_for_each_split_and_each_corpus(evaluations, corpus):
+    assert set(evaluations) == {"recording", "object", "others"}
+    assert evaluations["object"].names == evaluations["recording"].names == list(corpus.recordings)
+    assert len(evaluations["others"].names) == 3
+    assert evaluations["recording"].fingers.pooled.accuracy > 75
 
 
-def test_without_a_truth_there_are_no_slips_and_no_phases(judged):
-    others = judged["others"]
-    assert all(heard.slips == [] for heard in others.own)
+def test_without_a_truth_there_are_no_slips_and_no_phases(evaluations):
+    others = evaluations["others"]
+    assert all(alarms.slip_delays == [] for alarms in others.alarms)
     assert all(not each.phases for each in others.breakdown)
-    assert all(len(heard.slips) == 1 for heard in judged["recording"].own)
+    assert all(len(alarms.slip_delays) == 1 for alarms in evaluations["recording"].alarms)
 
 
-def test_events_are_counted_by_exact_labels(judged, corpus):
-    """As `event_metrics` has them, of the hand by labels without margin."""
-    _, cases = next(scored_recordings(EvaluationJob("logreg", corpus, effort=EFFORT)))
-    for case, heard in zip(cases, judged["recording"].own, strict=True):
-        labels = case.seen.hand(case.seen.exact).labels
-        score = case.scores.hand(case.seen)
+def test_events_are_counted_by_exact_labels(evaluations, corpus):
+    """Equal to `event_metrics` of the hand, by labels without margin."""
+    _, scored = next(score_splits(EvaluationJob("logreg", corpus, effort=EFFORT)))
+    for case, alarms in zip(scored, evaluations["recording"].alarms, strict=True):
+        labels = case.recording.hand_labels(case.recording.exact_labels).labels
+        score = case.scores.hand(case.recording)
         known = event_metrics(score.times, labels, score.states())
-        assert len(heard.delays) == known.n_events
-        assert heard.under_stable == known.false_alarms["STABLE"]
-        assert heard.false_alarms == sum(known.false_alarms.values())
+        assert len(alarms.delays) == known.n_events
+        assert alarms.n_under_stable == known.false_alarms["STABLE"]
+        assert alarms.n_false_alarms == sum(known.false_alarms.values())
         assert (
-            heard.n_stable
+            alarms.n_stable
             == (labels == STABLE).sum() - (score.states()[labels == STABLE] == 0).sum()
         )
 
 
-def test_every_rate_has_its_threshold_and_more_alarms_find_more_slips(judged):
-    curve = judged["recording"].curve
+def test_more_false_alarms_find_more_slips(evaluations):
+    curve = evaluations["recording"].alarms_by_rate
     assert len(curve) == len(FALSE_ALARM_RATES)
-    found = [sum(heard.n_found(0.2) for heard in point) for point in curve]
+    found = [sum(alarms.n_slips_found(0.2) for alarms in point) for point in curve]
     assert found == sorted(found)
 
 
-def test_a_hand_that_is_held_gives_fewer_alarms(judged):
-    bare, held = judged["recording"].own, judged["recording"].held
-    assert sum(h.false_alarms for h in held) <= sum(h.false_alarms for h in bare)
-    assert sum(h.n_doubted for h in held) >= sum(h.n_doubted for h in bare)
+def test_held_states_give_fewer_alarms(evaluations):
+    bare, held = evaluations["recording"].alarms, evaluations["recording"].held_alarms
+    assert sum(h.n_false_alarms for h in held) <= sum(h.n_false_alarms for h in bare)
+    assert sum(h.n_not_called_stable for h in held) >= sum(h.n_not_called_stable for h in bare)
 
 
-def test_a_judge_of_hands_has_no_fingers(corpus):
+def test_a_whole_hand_method_has_no_fingers(corpus):
     found = evaluate_method(EvaluationJob("jl_global_svm", corpus, effort=EFFORT))["recording"]
     assert found.fingers is None
     assert found.metrics is found.hand
     assert found.hand.pooled.brier is not None
 
 
-def test_recordings_of_one_class_are_judged_too(tmp_path, recordings):
+def test_recordings_of_one_class_are_evaluated_too(tmp_path, recordings):
     one = recordings[0].with_labels(
         {f: [Label(2.0, 9.0, ContactState.STABLE)] for f in recordings[0].modules}
     )
@@ -171,7 +171,7 @@ def test_recordings_of_one_class_are_judged_too(tmp_path, recordings):
 
 
 def test_two_recordings_of_which_one_has_one_class(tmp_path, recordings):
-    """Half of the folds have nothing to learn from: nothing is decided there, nothing fails."""
+    """Half of the folds cannot be fitted: nothing is decided there, nothing fails."""
     one = replace(recordings[0], truth=None).with_labels(
         {f: [Label(2.0, 9.0, ContactState.STABLE)] for f in recordings[0].modules}
     )
@@ -182,7 +182,7 @@ def test_two_recordings_of_which_one_has_one_class(tmp_path, recordings):
     assert second.fingers["thumb"].n == 0
 
 
-def test_a_stride_looks_at_fewer_decisions(corpus):
+def test_a_stride_evaluates_fewer_samples(corpus):
     every, some = (
         evaluate_method(
             EvaluationJob("logreg", corpus, effort=msgspec.structs.replace(EFFORT, stride=stride))
@@ -193,22 +193,22 @@ def test_a_stride_looks_at_fewer_decisions(corpus):
     assert n[1] == pytest.approx(n[0] / 3, rel=0.01)
 
 
-def test_a_change_is_made_to_all_recordings(corpus):
+def test_a_variation_is_applied_to_all_recordings(corpus):
     slow = evaluate_method(
-        EvaluationJob("zhang", corpus, change=Variation(every=5), effort=EFFORT)
+        EvaluationJob("zhang", corpus, variation=Variation(every=5), effort=EFFORT)
     )["recording"]
     assert slow.fingers.pooled.n < 6 * 2 * 1725 / 5
 
 
-def test_methods_of_one_question_are_found_too():
+def test_methods_of_one_feature_are_found_too():
     assert find_method("sigma_cut").title == "sigma of F_a"
     assert find_method("svm").name == "svm"
 
 
-def test_a_random_split_judges_every_sample_once(corpus):
+def test_a_random_split_evaluates_every_sample_once(corpus):
     job = EvaluationJob("logreg", corpus, effort=EFFORT)
-    counts = np.array(judge_pooled(job))
+    counts = np.array(evaluate_pooled(job))
     honest = evaluate_method(job)["recording"].fingers
     assert counts.shape == (6, 4)
     assert counts.sum() == honest.pooled.n
-    assert judge_pooled(job) == counts.tolist()
+    assert evaluate_pooled(job) == counts.tolist()

@@ -14,34 +14,34 @@ from holdfast.study.plan import scan_corpus
 from study.example_recordings import save_synthetic
 
 
-def seen_of(times):
+def recording_at(times):
     empty = {name: np.zeros(len(own), dtype=np.int8) for name, own in times.items()}
     return RecordingFeatures("one", None, None, times, {}, empty, empty, {}, {})
 
 
-def slow_state(margin, touching, shift):
+def state_of_finger(margin, in_contact, shift):
     if np.isnan(margin):
         return UNKNOWN
-    if not touching:
+    if not in_contact:
         return NO_CONTACT
     return STABLE if margin >= shift else UNSTABLE
 
 
 @pytest.mark.parametrize("seed", range(6))
-def test_a_hand_is_what_its_fingers_make_it_at_any_threshold(seed):
+def test_the_state_of_a_hand_follows_from_its_fingers_at_any_threshold(seed):
     generator = np.random.default_rng(seed)
     times = {f"f{k}": np.sort(generator.random(60)) for k in range(1 + seed % 4)}
     margins = {f: np.round(generator.normal(size=60), 1) for f in times}
     for each in margins.values():
         each[generator.random(60) < 0.1] = np.nan
-    touching = {f: generator.random(60) < 0.7 for f in times}
-    scores = RecordingScores(margins, dict.fromkeys(times, 0.3), touching)
-    score = scores.hand(seen_of(times))
+    in_contact = {f: generator.random(60) < 0.7 for f in times}
+    scores = RecordingScores(margins, dict.fromkeys(times, 0.3), in_contact)
+    score = scores.hand(recording_at(times))
     for shift in (-np.inf, -1.0, 0.0, 0.4, np.inf):
         fingers = {}
         for f, own in times.items():
-            pairs = zip(margins[f], touching[f], strict=True)
-            states = [slow_state(m, t, shift) for m, t in pairs]
+            pairs = zip(margins[f], in_contact[f], strict=True)
+            states = [state_of_finger(m, t, shift) for m, t in pairs]
             fingers[f] = FingerDecisions(own, states, states, np.full(60, np.nan))
         expected = hand_decisions(fingers, len(fingers))
         assert score.times.tolist() == expected.times.tolist()
@@ -49,23 +49,23 @@ def test_a_hand_is_what_its_fingers_make_it_at_any_threshold(seed):
         assert not np.isnan(score.probability[score.states(shift) != UNKNOWN]).any()
 
 
-def test_the_probability_of_a_hand_is_the_least_of_the_fingers_in_contact():
+def test_the_probability_of_a_hand_is_the_smallest_of_the_fingers_in_contact():
     times = {f: np.array([0.0, 1.0, 2.0]) for f in ("a", "b", "c")}
     margins = {"a": np.array([0.0, 0.0, 0.0]), "b": np.array([1.0, 1.0, np.nan]),
                "c": np.array([-5.0, 2.0, 2.0])}  # fmt: skip
-    touching = {"a": np.ones(3, bool), "b": np.ones(3, bool), "c": np.array([False, True, True])}
-    scores = RecordingScores(margins, {"a": 2.0, "b": 0.0, "c": 0.0}, touching)
-    found = scores.hand(seen_of(times)).probability
+    in_contact = {"a": np.ones(3, bool), "b": np.ones(3, bool), "c": np.array([False, True, True])}
+    scores = RecordingScores(margins, {"a": 2.0, "b": 0.0, "c": 0.0}, in_contact)
+    found = scores.hand(recording_at(times)).probability
     odds = np.exp([1.0, 1.0, 2.0])
     assert found == pytest.approx(odds / (1 + odds))
 
 
-def test_a_hand_judged_as_a_whole_has_no_fingers():
+def test_a_whole_hand_method_decides_for_no_finger():
     times = {f: np.array([0.0, 1.0, 2.0]) for f in ("a", "b")}
-    touching = {"a": np.ones(3, bool), "b": np.array([True, True, False])}
-    scores = RecordingScores({HAND: np.array([np.nan, 1.0, 1.0])}, {HAND: 0.0}, touching)
-    seen = seen_of(times)
-    decided = scores.decide(seen, seen.labels)
+    in_contact = {"a": np.ones(3, bool), "b": np.array([True, True, False])}
+    scores = RecordingScores({HAND: np.array([np.nan, 1.0, 1.0])}, {HAND: 0.0}, in_contact)
+    recording = recording_at(times)
+    decided = scores.decide(recording, recording.labels)
     assert not decided.fingers
     assert decided.hand.states.tolist() == [UNKNOWN, STABLE, NO_CONTACT]
 
@@ -75,17 +75,17 @@ def corpus(tmp_path_factory):
     return scan_corpus("main", save_synthetic(tmp_path_factory.mktemp("fitted") / "main", range(4)))
 
 
-def test_what_is_learned_is_bounded_and_spread_over_all_recordings(corpus):
-    material = gather_training_samples(
-        corpus_features(METHODS["logreg"], corpus, Variation()), max_rows=100
+def test_training_samples_are_bounded_and_spread_over_all_recordings(corpus):
+    training = gather_training_samples(
+        corpus_features(METHODS["logreg"], corpus, Variation()), max_samples=100
     )
-    for samples in material.samples.values():
+    for samples in training.samples.values():
         assert len(samples.stable) <= 100
         assert np.bincount(samples.groups).min() >= 20
         assert np.isfinite(samples.features).all()
 
 
-def test_an_expert_knows_nothing_of_the_recordings_that_it_was_not_fitted_to(corpus):
+def test_a_fit_does_not_depend_on_other_recordings(corpus):
     method = METHODS["logreg"]
     recordings = corpus_features(method, corpus, Variation())
     other = [*recordings[:3], scrambled(recordings[3])]
@@ -94,21 +94,23 @@ def test_an_expert_knows_nothing_of_the_recordings_that_it_was_not_fitted_to(cor
         for each in (recordings, other)
     ]
     assert fitted_methods[0].classifiers == fitted_methods[1].classifiers
-    assert fitted_methods[0].contact == fitted_methods[1].contact
+    assert fitted_methods[0].contact_thresholds == fitted_methods[1].contact_thresholds
     assert FittedMethod.fit(method, gather_training_samples(other), {1, 2, 3}, 0).classifiers != (
         FittedMethod.fit(method, gather_training_samples(recordings), {1, 2, 3}, 0).classifiers
     )
 
 
-def scrambled(seen):
+def scrambled(recording):
     generator = np.random.default_rng(9)
-    labels = {f: generator.permutation(codes) for f, codes in seen.labels.items()}
-    features = {u: 7 * generator.permutation(rows) for u, rows in seen.features.items()}
-    at_rest = {f: (n, 3 * a, 9 * b) for f, (n, a, b) in seen.at_rest.items()}
-    return replace(seen, labels=labels, exact=labels, features=features, at_rest=at_rest)
+    labels = {f: generator.permutation(codes) for f, codes in recording.labels.items()}
+    features = {u: 7 * generator.permutation(rows) for u, rows in recording.features.items()}
+    at_rest = {f: (n, 3 * a, 9 * b) for f, (n, a, b) in recording.at_rest.items()}
+    return replace(
+        recording, labels=labels, exact_labels=labels, features=features, at_rest=at_rest
+    )
 
 
-def test_a_finger_that_a_recording_lacks_is_not_judged_there(corpus):
+def test_a_missing_finger_is_not_evaluated(corpus):
     method = METHODS["logreg"]
     recordings = corpus_features(method, corpus, Variation())
     lacking = without(recordings[3], "index")
@@ -120,7 +122,7 @@ def test_a_finger_that_a_recording_lacks_is_not_judged_there(corpus):
     assert (decided.hand.states == STABLE).any()
 
 
-def test_a_hand_that_lacks_a_finger_is_unknown_to_a_judge_of_hands(corpus):
+def test_a_hand_without_a_finger_is_unknown_to_a_whole_hand_method(corpus):
     method = METHODS["jl_global_logreg"]
     recordings = corpus_features(method, corpus, Variation())
     lacking = without(recordings[3], "index")
@@ -134,17 +136,22 @@ def test_a_hand_that_lacks_a_finger_is_unknown_to_a_judge_of_hands(corpus):
     assert (known.states == STABLE).any()
 
 
-def without(seen, finger):
+def without(recording, finger):
     def rest(each):
         return {name: value for name, value in each.items() if name != finger}
 
     return replace(
-        seen, times=rest(seen.times), amplitude=rest(seen.amplitude), labels=rest(seen.labels),
-        exact=rest(seen.exact), at_rest=rest(seen.at_rest), features=rest(seen.features),
-    )  # fmt: skip
+        recording,
+        times=rest(recording.times),
+        amplitude=rest(recording.amplitude),
+        labels=rest(recording.labels),
+        exact_labels=rest(recording.exact_labels),
+        at_rest=rest(recording.at_rest),
+        features=rest(recording.features),
+    )
 
 
-def test_one_class_makes_no_classifier_and_so_no_opinion(corpus):
+def test_one_class_gives_no_classifier_and_no_scores(corpus):
     method = METHODS["logreg"]
     recordings = corpus_features(method, corpus, Variation())
     stable = {f: np.full(len(t), STABLE, dtype=np.int8) for f, t in recordings[0].times.items()}

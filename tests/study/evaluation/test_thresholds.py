@@ -8,13 +8,13 @@ from holdfast.study.evaluation.thresholds import FalseAlarmRanges, threshold_shi
 
 
 def random_score(generator, n=3000):
-    """Scores that wander over a few levels, with gaps and losses of contact."""
+    """Return scores that change between a few levels, with gaps and losses of contact."""
     steps = generator.normal(size=n) * (generator.random(n) < 0.3)
-    least = np.round(3 * np.sin(np.cumsum(steps)), 1)
+    margin = np.round(3 * np.sin(np.cumsum(steps)), 1)
     known = generator.random(n) > 0.02
-    alone = np.repeat(generator.random(n // 50 + 1) < 0.1, 50)[:n]
-    least[generator.random(n) < 0.01] = np.inf
-    return HandScores(np.arange(n) / 150, least, known, alone, np.full(n, 0.5))
+    held = ~np.repeat(generator.random(n // 50 + 1) < 0.1, 50)[:n]
+    margin[generator.random(n) < 0.01] = np.inf
+    return HandScores(np.arange(n) / 150, margin, known, held, np.full(n, 0.5))
 
 
 def random_labels(generator, n=3000):
@@ -29,7 +29,7 @@ def cases(seed):
 
 
 def n_false(score, labels, shift):
-    """False alarms under a stable label, by deciding at that threshold."""
+    """Return the false alarms under a stable label, from the decisions at that threshold."""
     found = match_alarms(score.times, labels, score.states(shift))
     return sum(alarm.label.code == STABLE for alarm in found.false_alarms)
 
@@ -46,47 +46,47 @@ def brute_shift(pairs, per_minute, tried):
 
 
 @pytest.mark.parametrize("seed", range(5))
-def test_false_alarms_at_every_threshold_as_if_it_had_decided(seed):
+def test_false_alarms_at_every_threshold_equal_those_of_the_decisions(seed):
     for score, labels in cases(seed):
-        calm = FalseAlarmRanges.of(score, labels)
+        ranges = FalseAlarmRanges.of(score, labels)
         for shift in (-np.inf, *np.arange(-3.2, 3.3, 0.1)):
-            counted = int(((calm.after < shift) & (shift <= calm.before)).sum())
+            counted = int(((ranges.lower < shift) & (shift <= ranges.upper)).sum())
             if np.isneginf(shift):
-                counted = int(np.isneginf(calm.after).sum())
+                counted = int(np.isneginf(ranges.lower).sum())
             assert counted == n_false(score, labels, shift)
 
 
 @pytest.mark.parametrize("seed", range(5))
 @pytest.mark.parametrize("per_minute", [0.0, 5.0, 40.0, 200.0])
-def test_the_most_watchful_threshold_that_is_quiet_enough(seed, per_minute):
+def test_the_highest_threshold_with_few_enough_false_alarms(seed, per_minute):
     pairs = cases(seed)
-    tried = np.unique(np.concatenate([s.least[np.isfinite(s.least)] for s, _ in pairs]))
-    quiet, loudest = brute_shift(pairs, per_minute, tried)
+    tried = np.unique(np.concatenate([s.margin[np.isfinite(s.margin)] for s, _ in pairs]))
+    quiet, most_alarms = brute_shift(pairs, per_minute, tried)
     chosen = threshold_shift([FalseAlarmRanges.of(*pair) for pair in pairs], per_minute)
-    assert max(chosen, tried[0]) == max(min(quiet, loudest), tried[0])
+    assert max(chosen, tried[0]) == max(min(quiet, most_alarms), tried[0])
 
 
-def test_it_never_goes_beyond_the_loudest_threshold():
+def test_the_shift_stays_below_the_threshold_with_the_most_alarms():
     """At 2 there are two alarms; at 3 the hand is never stable and there would be none."""
-    least = np.array([3.0, 1.0, 2.0, 1.0, 2.5, 2.5])
-    known, alone = np.ones(6, dtype=bool), np.zeros(6, dtype=bool)
-    calm = FalseAlarmRanges.of(
-        HandScores(np.arange(6.0), least, known, alone, least), np.full(6, STABLE)
+    margin = np.array([3.0, 1.0, 2.0, 1.0, 2.5, 2.5])
+    known = held = np.ones(6, dtype=bool)
+    ranges = FalseAlarmRanges.of(
+        HandScores(np.arange(6.0), margin, known, held, margin), np.full(6, STABLE)
     )
-    assert threshold_shift([calm], 1e9) == 2.0
+    assert threshold_shift([ranges], 1e9) == 2.0
 
 
-def test_without_any_alarm_the_own_threshold_stays():
+def test_without_alarms_the_threshold_is_not_shifted():
     nothing = FalseAlarmRanges(np.empty(0), np.empty(0), 1.0)
     assert threshold_shift([nothing], 1.0) == 0.0
 
 
-def test_alarms_that_are_spared_do_not_count():
-    least = np.array([1.0, 1.0, -1.0, 1.0, -2.0, 1.0])
+def test_ignored_alarms_do_not_count():
+    margin = np.array([1.0, 1.0, -1.0, 1.0, -2.0, 1.0])
     score = HandScores(
-        np.arange(6.0), least, np.ones(6, dtype=bool), np.zeros(6, dtype=bool), np.zeros(6)
+        np.arange(6.0), margin, np.ones(6, dtype=bool), np.ones(6, dtype=bool), np.zeros(6)
     )
     labels = np.full(6, STABLE, dtype=np.int8)
-    spared = np.arange(6) == 4
+    ignored = np.arange(6) == 4
     assert threshold_shift([FalseAlarmRanges.of(score, labels)], 0.0) == -2.0
-    assert threshold_shift([FalseAlarmRanges.of(score, labels, spared)], 0.0) == -1.0
+    assert threshold_shift([FalseAlarmRanges.of(score, labels, ignored)], 0.0) == -1.0

@@ -3,7 +3,7 @@ import pytest
 
 from holdfast.contact import UNSTABLE
 from holdfast.recordings import label_states
-from holdfast.study.evaluation.variation import Variation, relabelled
+from holdfast.study.evaluation.variation import Variation, relabel
 from holdfast.synthetic import synthetic_recording
 from study.example_recordings import recording_with_truth
 
@@ -14,11 +14,11 @@ def readings(recording, finger="thumb"):
     return np.asarray(recording.modules[finger].readings, dtype=float)
 
 
-def test_no_change_is_no_change():
+def test_the_default_changes_nothing():
     assert Variation().apply(RECORDING) is RECORDING
 
 
-def test_noise_has_its_size_stays_whole_and_is_the_same_every_time():
+def test_noise_has_its_size_keeps_counts_integers_and_is_reproducible():
     added = readings(Variation(noise=4.0).apply(RECORDING)) - readings(RECORDING)
     assert added.std() == pytest.approx(np.sqrt(4.0**2 + 1 / 12), rel=0.01)
     assert abs(added.mean()) < 0.05
@@ -26,7 +26,7 @@ def test_noise_has_its_size_stays_whole_and_is_the_same_every_time():
     assert (added == readings(Variation(noise=4.0).apply(RECORDING)) - readings(RECORDING)).all()
 
 
-def test_noise_of_one_module_tells_nothing_of_another():
+def test_noise_of_two_modules_is_uncorrelated():
     changed = Variation(noise=4.0).apply(RECORDING)
     first, second = (readings(changed, f) - readings(RECORDING, f) for f in ("thumb", "index"))
     assert abs(np.corrcoef(first.ravel(), second.ravel())[0, 1]) < 0.02
@@ -41,7 +41,7 @@ def test_every_third_sample_is_a_slower_sensor():
     assert thumb.sensor.rate == pytest.approx(RECORDING.modules["thumb"].sensor.rate / 3)
 
 
-def test_a_margin_draws_disturbances_longer_where_the_truth_is_known():
+def test_a_margin_extends_disturbances_if_the_truth_is_known():
     told = recording_with_truth("grasp", 3)
     n = {}
     for margin in (0.0, 0.1, 0.2):
@@ -50,4 +50,4 @@ def test_a_margin_draws_disturbances_longer_where_the_truth_is_known():
         shaken = (states == UNSTABLE) & (module.times > 4) & (module.times < 8)
         n[margin] = int(shaken.sum())
     assert n == pytest.approx({0.0: 180, 0.1: 210, 0.2: 240}, abs=1)
-    assert relabelled(RECORDING, 0.1) is RECORDING
+    assert relabel(RECORDING, 0.1) is RECORDING

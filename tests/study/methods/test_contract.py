@@ -1,4 +1,4 @@
-"""What every method has to fulfil, whatever it looks at."""
+"""Requirements on every method."""
 
 from dataclasses import replace
 
@@ -14,10 +14,10 @@ from holdfast.study.methods import HAND, METHODS, hand_signal
 from holdfast.synthetic import synthetic_recording
 
 TARE = Tare.parse(0.5)
-TARED = 75
-"""Samples that the tare takes."""
-LONGEST = 160
-"""Samples of which every window is full."""
+N_TARE = 75
+"""Samples in the tare interval."""
+N_FULL = 160
+"""Samples that fill the longest window."""
 FINGERS = ("thumb", "index")
 
 
@@ -35,21 +35,21 @@ def features_of(method, recording):
     return method.features(hand_signal(recording, TARE, FINGERS))
 
 
-def changed(recording, change):
-    """The recording with every module changed."""
+def map_modules(recording, change):
+    """Return the recording with every module changed."""
     modules = {name: change(module) for name, module in recording.modules.items()}
     return Recording(recording.name, modules, recording.metadata)
 
 
 def with_other_readings(recording, rows):
-    """The same with the readings of some samples shuffled and shifted."""
+    """Return the recording with the readings of some samples shuffled and shifted."""
 
     def change(module):
         readings = module.readings.astype(float)
         readings[rows] = readings[rows][::-1] * 0.9 + 40
         return replace(module, readings=readings)
 
-    return changed(recording, change)
+    return map_modules(recording, change)
 
 
 def without_samples(recording, rows):
@@ -57,14 +57,14 @@ def without_samples(recording, rows):
         kept = np.delete(np.arange(module.n_samples), rows)
         return replace(module, times=module.times[kept], readings=module.readings[kept], labels=())
 
-    return changed(recording, change)
+    return map_modules(recording, change)
 
 
 def same(one, two, rows):
     return all(np.allclose(one[k][rows], two[k][rows], equal_nan=True) for k in one)
 
 
-def test_its_name_is_its_key(method):
+def test_the_name_of_a_method_is_its_key(method):
     assert METHODS[method.name] is method
     assert method.title
     assert method.source
@@ -79,15 +79,15 @@ def test_one_row_for_each_sample(method, recordings):
     assert shapes.pop()[0] == n_samples
 
 
-def test_nothing_before_the_tare_and_everything_once_windows_are_full(method, recordings):
+def test_features_exist_once_the_tare_is_complete_and_windows_are_full(method, recordings):
     for rows in features_of(method, recordings[0]).values():
-        assert np.isnan(rows[:TARED]).any(axis=1).all()
+        assert np.isnan(rows[:N_TARE]).any(axis=1).all()
         known = np.isfinite(rows).all(axis=1)
-        assert known[TARED + LONGEST :].all()
+        assert known[N_TARE + N_FULL :].all()
         assert (np.diff(known.astype(int)) >= 0).all()
 
 
-def test_what_comes_later_changes_nothing(method, recordings):
+def test_features_are_causal(method, recordings):
     k = 700
     other = with_other_readings(recordings[0], slice(k, None))
     one, two = features_of(method, recordings[0]), features_of(method, other)
@@ -95,27 +95,27 @@ def test_what_comes_later_changes_nothing(method, recordings):
     assert not same(one, two, slice(k, None))
 
 
-def test_a_gap_starts_anew(method, recordings):
-    """After it, nothing depends on what was before it (but after the tare)."""
+def test_features_restart_after_a_gap(method, recordings):
+    """After a gap, features depend on no sample before it but those of the tare."""
     gap = slice(600, 610)
     broken = without_samples(recordings[0], gap)
     one = features_of(method, broken)
-    two = features_of(method, with_other_readings(broken, slice(TARED, gap.start)))
-    assert not same(one, two, slice(TARED, gap.start))
+    two = features_of(method, with_other_readings(broken, slice(N_TARE, gap.start)))
+    assert not same(one, two, slice(N_TARE, gap.start))
     assert same(one, two, slice(gap.start, None))
     for rows in one.values():
-        assert np.isfinite(rows[gap.start + LONGEST :]).all()
+        assert np.isfinite(rows[gap.start + N_FULL :]).all()
 
 
-def test_no_stretch_has_the_width_of_any_other(method, recordings):
-    short = changed(recordings[0], lambda module: module.slice(0, TARED - 5))
+def test_a_recording_without_a_stretch_has_the_same_number_of_features(method, recordings):
+    short = map_modules(recordings[0], lambda module: module.slice(0, N_TARE - 5))
     found = features_of(method, recordings[0])
     for key, rows in features_of(method, short).items():
-        assert rows.shape == (TARED - 5, found[key].shape[1])
+        assert rows.shape == (N_TARE - 5, found[key].shape[1])
         assert np.isnan(rows).any(axis=1).all()
 
 
-def test_it_is_fitted_and_gives_probabilities(method, recordings):
+def test_the_classifier_is_fitted_and_gives_probabilities(method, recordings):
     key = HAND if method.whole_hand else "index"
     rows, stable, groups = [], [], []
     for group, recording in enumerate(recordings):

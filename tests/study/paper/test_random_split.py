@@ -16,7 +16,6 @@ from holdfast.study.paper.random_split import (
     Cell,
     FitBudget,
     judge,
-    spread,
 )
 from holdfast.study.plan import scan_corpus
 from study.example_recordings import save_synthetic
@@ -138,9 +137,3 @@ def test_a_threshold_has_nothing_to_search_and_calls_little_energy_stable(corpor
 def test_cells_go_over_the_wire(alone):
     data = msgspec.msgpack.encode(alone)
     assert msgspec.msgpack.decode(data, type=list[Cell]) == alone
-
-
-def test_spread_is_even():
-    samples = Samples(np.arange(10.0)[:, None], np.zeros(10, bool), np.arange(10))
-    assert spread(samples, 10).groups.tolist() == list(range(10))
-    assert spread(samples, 4).groups.tolist() == [0, 3, 6, 9]

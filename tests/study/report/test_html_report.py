@@ -9,7 +9,7 @@ from matplotlib.figure import Figure
 from holdfast.errors import OutputError
 from holdfast.study.report import images
 from holdfast.study.report.folder import check_output_folder, write_study
-from holdfast.study.report.html_report import ReportFigure, Section, report
+from holdfast.study.report.html_report import ReportFigure, Section, html_report
 from holdfast.study.report.result_tables import ResultTable, Row
 
 VOID = {"meta", "br", "img", "link", "hr", "input"}
@@ -75,7 +75,7 @@ def sections():
 
 
 def page(**facts):
-    return report("Study <1>", facts, sections())
+    return html_report("Study <1>", facts, sections())
 
 
 def test_it_is_html_that_needs_nothing_else():
@@ -113,7 +113,7 @@ def test_tables_and_figures_are_numbered_through_and_listed():
             f'<a href="#table-{name}"><span>Table {k}</span> Some &amp; &lt;table&gt;</a>' in text
         )
         assert f'<span class="number">Table {k}.</span>' in text
-    assert '<a href="#figure-curve"><span>Figure 1</span> What &quot;it&quot; is</a>' in text
+    assert '<a href="#figure-curve"><span>Figure 1</span> What &#34;it&#34; is</a>' in text
     assert '<span class="number">Figure 2.</span> Other' in text
 
 
@@ -122,7 +122,7 @@ def test_it_is_the_same_every_time():
 
 
 def test_a_large_figure_comes_as_png(monkeypatch):
-    monkeypatch.setattr(images, "LARGEST_SVG", 1000)
+    monkeypatch.setattr(images, "MAX_INLINE_SVG", 1000)
     read = Page(page())
     assert [source[:22] for source in read.sources] == ["data:image/png;base64,"] * 2
 
@@ -130,13 +130,13 @@ def test_a_large_figure_comes_as_png(monkeypatch):
 def test_names_are_used_once():
     one, two = sections()
     with pytest.raises(ValueError, match=r"^two tables of the report are called 'first'$"):
-        report("x", {}, [one, one._replace(figures=[])])
+        html_report("x", {}, [one, one._replace(figures=[])])
     with pytest.raises(ValueError, match=r"^two figures of the report are called 'curve-2'$"):
-        report("x", {}, [two._replace(tables=[]), two])
+        html_report("x", {}, [two._replace(tables=[]), two])
     with pytest.raises(
         ValueError, match=r"^a figure's name is letters, digits, - and _; 'a b' given$"
     ):
-        report("x", {}, [Section("x", "", [], [ReportFigure("a b", "", drawn())])])
+        html_report("x", {}, [Section("x", "", [], [ReportFigure("a b", "", drawn())])])
 
 
 def write(out, **options):
@@ -188,7 +188,7 @@ def test_a_study_is_replaced_by_force_alone(tmp_path):
     (out / "tables/old.csv").touch()
     (out / "notes.txt").write_text("mine")
     with pytest.raises(
-        OutputError, match=r"holds a study already: choose another name, or give --force$"
+        OutputError, match=r"already holds a study: choose another name, or give --force$"
     ):
         write(out)
     write(out, force=True)
@@ -197,10 +197,13 @@ def test_a_study_is_replaced_by_force_alone(tmp_path):
 
 def test_a_folder_of_other_things_is_left_alone(tmp_path):
     (tmp_path / "notes.txt").touch()
-    message = r"holds other things \(notes.txt, ...\) and no study: choose a folder of its own$"
+    message = (
+        r"holds other files \(notes.txt, ...\) and no study: "
+        "choose a folder that is empty or does not exist$"
+    )
     with pytest.raises(OutputError, match=message):
         write(tmp_path, force=True)
-    with pytest.raises(OutputError, match=r"is a file; the study is written to a folder$"):
+    with pytest.raises(OutputError, match=r"is a file; a study is written to a folder$"):
         check_output_folder(tmp_path / "notes.txt", force=True)
     with pytest.raises(OutputError, match=r"no does not exist$"):
         check_output_folder(tmp_path / "no/out")

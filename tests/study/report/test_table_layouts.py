@@ -50,7 +50,7 @@ def test_markdown_by_hand():
         "| LogReg | held out | 95.3<br>*paper 95.3 (0.0)* | – |\n"
         "| SVM | held out | – | 0.012<br><sub>−0.010 to 0.020</sub> |\n\n"
         "Of \\<all\\> N\\_w = 14. On 60 recordings. Small print: 95 % interval, by bootstrap over "
-        "recordings. Paper: what it prints, and ours less that.\n"
+        "recordings. Paper: the value in the paper, and our value minus it.\n"
     )
 
 
@@ -101,7 +101,7 @@ def test_html_cells():
         '<span class="paper">paper 95.3 <b title="difference">−1.1</b></span></td>'
     ) in html
     assert html.count('<td class="none">–</td>') == 2
-    assert html.count('class="again">LogReg') == 1
+    assert html.count('class="repeated">LogReg') == 1
     assert "<all>" not in html and "&lt;all&gt; <i>N</i><sub>w</sub>" in html
 
 

@@ -80,8 +80,8 @@ class FingerDocument(Struct, frozen=True, kw_only=True, gc=False):
     taxels: list[Vector] | None = None
 
 
-class FingerSeries(Struct, frozen=True, gc=False):
-    """Estimates of a finger at each of the times; null where it has no sample.
+class EstimateSeries(Struct, frozen=True, gc=False):
+    """Estimates of a finger at each of the times; null if it has no sample.
 
     Attributes:
         force: F_x, F_y and F_z [unit].
@@ -100,7 +100,7 @@ class HandSeries(Struct, frozen=True, gc=False):
     """All estimates since the previous document."""
 
     times: list[float]
-    fingers: dict[str, FingerSeries]
+    fingers: dict[str, EstimateSeries]
 
 
 class EventDocument(Struct, frozen=True, gc=False):

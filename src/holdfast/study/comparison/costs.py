@@ -1,4 +1,4 @@
-"""What a decision costs: features and probability of a recording, and a live update."""
+"""The time of a decision: features and probability of a recording, and a live update."""
 
 import time
 from collections.abc import Callable, Sequence
@@ -8,124 +8,133 @@ import numpy as np
 
 from holdfast.classifiers import LinearClassifier
 from holdfast.detector import Detector
-from holdfast.features import DEPLOYED_FEATURES, Tare, parse_features
+from holdfast.features import DEFAULT_WINDOW, DEPLOYED_FEATURES, Tare, parse_features
 from holdfast.features.specs import HOLDFAST_FEATURES, FeatureSpec
 from holdfast.model import FingerModel, Model
 from holdfast.recordings import Recording
-from holdfast.study.comparison.jobs import Results, titles
+from holdfast.study.comparison.jobs import Results, method_titles
 from holdfast.study.evaluation.fitted_method import FittedMethod, gather_training_samples
 from holdfast.study.evaluation.recording_features import corpus_features
 from holdfast.study.evaluation.variation import Variation
 from holdfast.study.methods import METHODS, hand_signal
-from holdfast.study.methods.paper import WINDOW
 from holdfast.study.plan import Corpus, StudyPlan
 from holdfast.study.report.result_tables import Key, ResultTable, Row
 from holdfast.study.tasks import Task
 
 TASK = "cost"
-FITTED_TO = 4
-"""Recordings that are enough for a classifier whose time is taken."""
-ROUNDS = 7
+N_RECORDINGS = 4
+"""Recordings that the timed classifiers are fitted to."""
+MAX_SAMPLES = 2_000
+"""Samples of a finger that the timed classifiers are fitted to."""
+N_ROUNDS = 7
 N_UPDATES = 3_000
-N_WARM = 200
-LIVE: dict[str, tuple[FeatureSpec, ...]] = {
-    "logreg": parse_features(DEPLOYED_FEATURES, WINDOW),
-    "svm": parse_features(DEPLOYED_FEATURES, WINDOW),
+N_WARM_UP = 200
+LIVE_FEATURES: dict[str, tuple[FeatureSpec, ...]] = {
+    "logreg": parse_features(DEPLOYED_FEATURES, DEFAULT_WINDOW),
+    "svm": parse_features(DEPLOYED_FEATURES, DEFAULT_WINDOW),
     "holdfast": HOLDFAST_FEATURES,
 }
-"""Features of the methods whose model the detector runs; all have a linear rule."""
-MICRO = 1e6
+"""Features of the methods that the detector can run; all have a linear rule."""
+MICROSECONDS = 1e6
 
 
-class Cost(msgspec.Struct, frozen=True):
-    """Times of one method [s], for one sample of one finger.
+class MethodCost(msgspec.Struct, frozen=True):
+    """Times of one method for one sample of one finger [s].
 
     Attributes:
-        features: to compute them, of a whole recording, its forces given.
-        probability: to get it from the features.
+        features: of the features of a whole recording, with given forces.
+        probability: of the probability, with given features.
     """
 
     features: float
     probability: float
 
 
-class Costs(msgspec.Struct, frozen=True):
-    """Times of all methods, taken in one process.
+class MethodCosts(msgspec.Struct, frozen=True):
+    """Times of all methods, measured in one process.
 
     Attributes:
         methods: by name.
-        live: by name, median time of `Detector.update` of all fingers of a hand [s].
+        live: median time of `Detector.update` for all fingers of a hand, by name [s].
         n_fingers: of that hand.
     """
 
-    methods: dict[str, Cost]
+    methods: dict[str, MethodCost]
     live: dict[str, float]
     n_fingers: int
 
 
 def tasks(plan: StudyPlan) -> list[Task]:
-    """One task, for times are compared."""
-    arguments = (plan.main, tuple(titles(plan)), plan.seed)
-    return [Task(TASK, measure, arguments, Costs, cost=30.0)]
+    """Return one task, so that all times are measured in one process."""
+    arguments = (plan.main, tuple(method_titles(plan)), plan.seed)
+    return [Task(TASK, measure_costs, arguments, MethodCosts, cost=30.0)]
 
 
-def measure(corpus: Corpus, names: Sequence[str], seed: int) -> Costs:
-    """The times of methods, the least of some rounds.
+def measure_costs(corpus: Corpus, names: Sequence[str], seed: int) -> MethodCosts:
+    """Measure the times of methods: the shortest of several rounds.
 
     Args:
-        corpus: of whose recordings the first is taken.
+        corpus: its first recording is used.
         names: of the methods.
         seed: of the classifiers.
     """
-    few = msgspec.structs.replace(corpus, recordings=_few(corpus.recordings))
+    few = msgspec.structs.replace(corpus, recordings=_select(corpus.recordings))
     recording = few.load()[0]
-    live = {name: _live(recording, few, LIVE[name]) for name in names if name in LIVE}
-    costs = {name: _cost(name, few, seed) for name in names}
-    return Costs(costs, live, len(_fingers(recording, few)))
+    live = {
+        name: _measure_update(recording, few, LIVE_FEATURES[name])
+        for name in names
+        if name in LIVE_FEATURES
+    }
+    costs = {name: _measure_method(name, few, seed) for name in names}
+    return MethodCosts(costs, live, len(_fingers(recording, few)))
 
 
 def table(plan: StudyPlan, results: Results) -> ResultTable:
-    """What a decision costs."""
-    costs: Costs = results[TASK]
+    """Return the table of the times of a decision."""
+    costs: MethodCosts = results[TASK]
     rows: list[Row] = []
-    for name, title in titles(plan).items():
+    for name, title in method_titles(plan).items():
         cost = costs.methods[name]
         times = {"features [µs]": cost.features, "probability [µs]": cost.probability}
         times["both [µs]"] = sum(times.values())
         if name in costs.live:
             times["live, a hand [µs]"] = costs.live[name]
         keys: dict[str, Key] = {"method": title}
-        rows += [Row(keys | {"figure": each}, MICRO * value) for each, value in times.items()]
+        rows += [Row(keys | {"figure": f}, MICROSECONDS * each) for f, each in times.items()]
     note = (
-        "Times of this machine, which differ from run to run; compare them with one another. "
-        "For one sample of one finger (of a hand, where the hand is judged as a whole), of a "
-        "whole recording at once; forces are given to most, holdfast's are made anew. Live: the "
+        "Times of this machine, which differ from run to run: compare them only with each other. "
+        "For one sample of one finger (of one hand, for a whole-hand method), from a whole "
+        "recording at once. Most methods get the forces; holdfast computes its own. Live: the "
         f"median of one Detector.update of {costs.n_fingers} fingers, from readings to states."
     )
     return ResultTable("cost", "Cost of a decision", note, rows, ("method",), digits=2)
 
 
-def _cost(name: str, corpus: Corpus, seed: int) -> Cost:
+def _measure_method(name: str, corpus: Corpus, seed: int) -> MethodCost:
     method = METHODS[name]
     recordings = corpus_features(method, corpus, Variation())
-    fitted = FittedMethod.fit(
-        method, gather_training_samples(recordings, 2_000), range(len(recordings)), seed
-    )
-    recording = corpus.load()[0]
-    hand = hand_signal(recording, Tare.parse(corpus.tare), tuple(recordings[0].times))
-    n = sum(len(rows) for rows in recordings[0].features.values())
-    first = recordings[0].features
-    return Cost(
-        features=_least(lambda: method.features(hand)) / n,
-        probability=_least(
-            lambda: [c.probability(first[unit]) for unit, c in fitted.classifiers.items()]
-        )
-        / n,
+    training = gather_training_samples(recordings, MAX_SAMPLES)
+    fitted = FittedMethod.fit(method, training, range(len(recordings)), seed)
+    first = recordings[0]
+    hand = hand_signal(corpus.load()[0], Tare.parse(corpus.tare), tuple(first.times))
+    n = sum(len(rows) for rows in first.features.values())
+
+    def probabilities() -> object:
+        return [
+            classifier.probability(first.features[unit])
+            for unit, classifier in fitted.classifiers.items()
+        ]
+
+    return MethodCost(
+        features=_shortest(lambda: method.features(hand)) / n,
+        probability=_shortest(probabilities) / n,
     )
 
 
-def _live(recording: Recording, corpus: Corpus, features: tuple[FeatureSpec, ...]) -> float:
-    """Median time of an update [s]; what the rule says does not matter."""
+def _measure_update(
+    recording: Recording, corpus: Corpus, features: tuple[FeatureSpec, ...]
+) -> float:
+    """Return the median time of an update [s]. The weights of the rule do not matter."""
     ones = (1.0,) * len(features)
     rule = LinearClassifier(mean=ones, scale=ones, coefficients=(0.01,) * len(ones), intercept=0.1)
     modules = {name: recording.modules[name] for name in _fingers(recording, corpus)}
@@ -135,30 +144,31 @@ def _live(recording: Recording, corpus: Corpus, features: tuple[FeatureSpec, ...
     }
     sensors = {module.sensor.name: module.sensor for module in modules.values()}
     detector = Detector(Model(fingers=fingers, sensors=sensors, rate=corpus.rate))
-    n = min(N_WARM + N_UPDATES, *(module.n_samples for module in modules.values()))
+    n = min(N_WARM_UP + N_UPDATES, *(module.n_samples for module in modules.values()))
     nanoseconds = []
     for k in range(n):
         samples = {name: module.readings[k] for name, module in modules.items()}
         start = time.perf_counter_ns()
         detector.update(samples, k / corpus.rate)
         nanoseconds.append(time.perf_counter_ns() - start)
-    return float(np.median(nanoseconds[min(N_WARM, n // 2) :])) * 1e-9
+    return float(np.median(nanoseconds[min(N_WARM_UP, n // 2) :])) * 1e-9
 
 
 def _fingers(recording: Recording, corpus: Corpus) -> list[str]:
     return [name for name in corpus.fingers if name in recording.modules]
 
 
-def _few(names: Sequence[str]) -> tuple[str, ...]:
-    """Some recordings, spread over all."""
-    places = np.linspace(0, len(names) - 1, min(FITTED_TO, len(names))).round().astype(int)
+def _select(names: Sequence[str]) -> tuple[str, ...]:
+    """Return `N_RECORDINGS` of the names, at even steps."""
+    places = np.linspace(0, len(names) - 1, min(N_RECORDINGS, len(names))).round().astype(int)
     return tuple(names[place] for place in np.unique(places))
 
 
-def _least(work: Callable[[], object]) -> float:
+def _shortest(work: Callable[[], object]) -> float:
+    """Return the shortest time of a piece of work, after one warm-up [s]."""
     work()
     seconds = []
-    for _ in range(ROUNDS):
+    for _ in range(N_ROUNDS):
         start = time.perf_counter()
         work()
         seconds.append(time.perf_counter() - start)

@@ -1,57 +1,64 @@
-"""Tables of the comparison by circumstance: phase, grip force, direction of the push."""
+"""Tables of the comparison by circumstance: phase, grip force, direction of the disturbance."""
 
 from collections.abc import Iterator, Sequence
 from itertools import chain
 
 import numpy as np
 
-from holdfast.contact import Phase
+from holdfast.contact import CONTACT_FORCE, Phase
 from holdfast.sensors.types import Array
-from holdfast.study.comparison.jobs import SPLITS, Results, found, titles
+from holdfast.study.comparison.jobs import SPLIT_TITLES, Results, method_results, method_titles
 from holdfast.study.comparison.rows import ratio_row
-from holdfast.study.evaluation.error_breakdown import AXES, ErrorBreakdown, GripErrors
+from holdfast.study.evaluation.error_breakdown import (
+    DIRECTIONS,
+    OBLIQUE,
+    Count,
+    DisturbanceErrors,
+    ErrorBreakdown,
+    GripErrors,
+)
 from holdfast.study.plan import StudyPlan
 from holdfast.study.report.result_tables import Key, ResultTable, Row
-from holdfast.twin.labels import LabelRule
 
-DIRECTIONS = (*AXES, "oblique")
 QUARTERS = ("lightest quarter", "second", "third", "firmest quarter")
-SHOWN = ("recording", "others")
-DOUBTED, TRUSTED = "stable called otherwise [%]", "not stable called stable [%]"
+SHOWN_SPLITS = ("recording", "others")
+STABLE_MISSED = "stable called otherwise [%]"
+NOT_STABLE_MISSED = "not stable called stable [%]"
+ERROR_KINDS = (STABLE_MISSED, NOT_STABLE_MISSED)
 
 Keys = dict[str, Key]
 Line = tuple[Keys, Sequence[ErrorBreakdown]]
 
 
 def phases(plan: StudyPlan, results: Results) -> ResultTable:
-    """Errors by what was going on."""
+    """Return the table of errors by phase of the experiment."""
     rows: list[Row] = []
-    for keys, parts in _lines(plan, results):
+    for keys, breakdowns in _lines(plan, results):
         for phase in map(str, Phase):
-            n, wrong = np.array([each.phases.get(phase, (0, 0)) for each in parts]).T
+            n, wrong = np.array([each.phases.get(phase, (0, 0)) for each in breakdowns]).T
             if n.sum():
                 rows.append(ratio_row(keys | {"phase": phase}, wrong, n, plan.seed))
-    note = "Wrong samples of those in each phase of the true course of things; of all fingers."
+    note = "Share of wrong samples in each phase of the true course of the grasp; all fingers."
     title = "Errors by phase [%]"
     return ResultTable("phases", title, note, rows, ("on", "method"), column="phase")
 
 
 def force(plan: StudyPlan, results: Results) -> ResultTable:
-    """Errors by how firm the grip is: the paper says that it does not matter."""
+    """Return the table of errors by grip force. The paper states that it has no influence."""
     rows: list[Row] = []
     lines = [line for line in _lines(plan, results) if any(each.grips for each in line[1])]
-    edges = quarters(lines[0][1]) if lines else np.empty(0)
-    for keys, parts in lines:
-        for place, quarter in enumerate(QUARTERS):
-            for about, pair in ((DOUBTED, (0, 1)), (TRUSTED, (2, 3))):
-                n, wrong = _of_quarter(parts, edges, place, pair)
-                figure = keys | {"error": about, "grip": quarter}
+    edges = force_quartiles(lines[0][1]) if lines else np.empty(0)
+    for keys, breakdowns in lines:
+        for quarter, title in enumerate(QUARTERS):
+            for kind in ERROR_KINDS:
+                n, wrong = _counts_of_quarter(breakdowns, edges, quarter, kind)
+                figure = keys | {"error": kind, "grip": title}
                 rows.append(ratio_row(figure, wrong, n, plan.seed))
     bounds = ", ".join(f"{edge:.2f}" for edge in edges)
     note = (
-        "Quarters of fingers in recordings by the mean of their true contact force while the "
-        f"object is locked, of the recordings judged by recording (bounds {bounds} N). While the "
-        "object is held; of methods that judge fingers."
+        "Quarters of the fingers by the mean of their true contact force while the object is "
+        f"locked, over the recordings evaluated by recording (limits {bounds} N). Samples while "
+        "the object is held; methods that decide for fingers."
     )
     return ResultTable(
         "force", "Errors by grip force [%]", note, rows, ("on", "error", "method"), column="grip"
@@ -59,55 +66,62 @@ def force(plan: StudyPlan, results: Results) -> ResultTable:
 
 
 def directions(plan: StudyPlan, results: Results) -> ResultTable:
-    """Disturbances missed by where they push to: the paper says all possible directions."""
+    """Return the table of missed disturbances by direction. The paper states: all are found."""
     rows: list[Row] = []
-    counts: dict[str, int] = dict.fromkeys(DIRECTIONS, 0)
-    for keys, parts in _lines(plan, results):
-        pushes = [[p for p in each.pushes if p.n] for each in parts]
-        for direction in DIRECTIONS:
-            own = [[p for p in each if p.direction == direction] for each in pushes]
-            n, wrong = (
-                [sum(p.n for p in each) for each in own],
-                [sum(p.wrong for p in e) for e in own],
-            )
+    n_disturbances: dict[str, int] = {}
+    for keys, breakdowns in _lines(plan, results):
+        for direction in (*DIRECTIONS, OBLIQUE):
+            found = [_disturbances(each, direction) for each in breakdowns]
+            n = [sum(each.n for each in of_recording) for of_recording in found]
+            wrong = [sum(each.n_wrong for each in of_recording) for of_recording in found]
             if sum(n):
                 rows.append(ratio_row(keys | {"direction": direction}, wrong, n, plan.seed))
-                counts[direction] = counts[direction] or sum(len(each) for each in own)
-    told = ", ".join(f"{direction} {n}" for direction, n in counts.items() if n)
+                n_disturbances.setdefault(direction, sum(map(len, found)))
+    ordered = [each for each in (*DIRECTIONS, OBLIQUE) if each in n_disturbances]
+    counts = ", ".join(f"{direction} {n_disturbances[direction]}" for direction in ordered)
     note = (
-        "Samples labelled not stable, during a disturbance, that are called stable; of all "
-        "fingers. Directions of the mean outside force in the world, within 30 degrees; gravity "
-        f"pulls down. Disturbances by recording: {told or 'none'}."
+        "Share of the samples labelled not stable, during a disturbance, that are called stable; "
+        "all fingers. Directions of the mean outside force in the world frame, within 30 degrees; "
+        f"gravity acts downwards. Disturbances by recording: {counts or 'none'}."
     )
     title = "Disturbed called stable, by direction [%]"
     return ResultTable("directions", title, note, rows, ("on", "method"), column="direction")
 
 
-def quarters(parts: Sequence[ErrorBreakdown]) -> Array:
-    """The three forces [N] that part the fingers which hold something into quarters."""
-    forces = [grip.force for grip in _holding(parts)]
+def _disturbances(breakdown: ErrorBreakdown, direction: str) -> list[DisturbanceErrors]:
+    """Return the disturbances in a direction that have labelled samples."""
+    return [each for each in breakdown.disturbances if each.n and each.direction == direction]
+
+
+def force_quartiles(breakdowns: Sequence[ErrorBreakdown]) -> Array:
+    """Return the three quartiles of the force of the fingers that hold the object [N]."""
+    forces = [grip.force for grip in _holding_grips(breakdowns)]
     return np.quantile(forces, (0.25, 0.5, 0.75)) if forces else np.empty(0)
 
 
-def _holding(parts: Sequence[ErrorBreakdown]) -> Iterator[GripErrors]:
-    every = chain.from_iterable(each.grips for each in parts)
-    return (grip for grip in every if grip.force > LabelRule().contact)
+def _holding_grips(breakdowns: Sequence[ErrorBreakdown]) -> Iterator[GripErrors]:
+    grips = chain.from_iterable(each.grips for each in breakdowns)
+    return (grip for grip in grips if grip.force > CONTACT_FORCE)
 
 
-def _of_quarter(
-    parts: Sequence[ErrorBreakdown], edges: Array, place: int, pair: tuple[int, int]
+def _counts_of_quarter(
+    breakdowns: Sequence[ErrorBreakdown], edges: Array, quarter: int, kind: str
 ) -> Array:
-    """(2, n_recordings) samples, and wrong ones, of the fingers in one quarter."""
-    counts = np.zeros((2, len(parts)))
-    for column, each in enumerate(parts):
-        for grip in _holding([each]):
-            if np.searchsorted(edges, grip.force) == place:
-                counts[:, column] += [grip.counts[k] for k in pair]
+    """Return (2, n_recordings) samples, and wrong samples, of the fingers in one quarter."""
+    counts = np.zeros((2, len(breakdowns)))
+    for column, each in enumerate(breakdowns):
+        for grip in _holding_grips([each]):
+            if np.searchsorted(edges, grip.force) == quarter:
+                counts[:, column] += _count_of(grip, kind)
     return counts
 
 
+def _count_of(grip: GripErrors, kind: str) -> Count:
+    return grip.stable if kind == STABLE_MISSED else grip.not_stable
+
+
 def _lines(plan: StudyPlan, results: Results) -> Iterator[Line]:
-    for name, title in titles(plan).items():
-        for key, judged in found(plan, results, name):
-            if key in SHOWN and any(each.phases for each in judged.breakdown):
-                yield {"on": SPLITS[key], "method": title}, judged.breakdown
+    for name, title in method_titles(plan).items():
+        for key, evaluation in method_results(plan, results, name):
+            if key in SHOWN_SPLITS and any(each.phases for each in evaluation.breakdown):
+                yield {"on": SPLIT_TITLES[key], "method": title}, evaluation.breakdown

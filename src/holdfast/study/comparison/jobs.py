@@ -1,4 +1,4 @@
-"""Which methods the study judges, on what, and how thoroughly."""
+"""The evaluation jobs of the study: which methods, on which recordings, at which size."""
 
 from collections.abc import Iterator, Mapping
 from importlib.util import find_spec
@@ -16,24 +16,25 @@ from holdfast.study.methods import METHODS
 from holdfast.study.plan import StudyPlan
 from holdfast.study.tasks import Task
 
-PAPER = "logreg"
-"""What all others are compared to."""
-MAIN = ("logreg", "svm", "zhang", "trees", "holdfast")
-"""Evaluated on every corpus."""
-CORE = ("logreg", "holdfast")
-"""Those of them that a quick study judges there."""
+REFERENCE_METHOD = "logreg"
+"""The paper's method, which all others are compared with."""
+MAIN_METHODS = ("logreg", "svm", "zhang", "trees", "holdfast")
+"""Methods that are evaluated on every corpus."""
+QUICK_METHODS = ("logreg", "holdfast")
+"""Those of them that a quick study evaluates on every corpus."""
 NETWORK = "tcn"
-SLOW = ("jl_local_svm", "jl_global_svm", NETWORK)
-"""Left out of a quick study."""
-SECONDS = {"trees": 300.0, "jl_local_svm": 150.0, "jl_global_svm": 230.0, NETWORK: 1500.0}
-"""About how long they take; others `USUAL`."""
-USUAL = 30.0
+SLOW_METHODS = ("jl_local_svm", "jl_global_svm", NETWORK)
+"""Methods that a quick study leaves out."""
+METHOD_SECONDS = {"trees": 300.0, "jl_local_svm": 150.0, "jl_global_svm": 230.0, NETWORK: 1500.0}
+"""Approximate duration of the slow evaluations [s]."""
+DEFAULT_SECONDS = 30.0
+"""Approximate duration of the other evaluations [s]."""
 
-QUICK = EvaluationEffort(folds=3, inner=2, max_rows=10_000)
-OF_NETWORK = EvaluationEffort(folds=2, inner=2, stride=3, max_rows=6_000)
-"""A fit takes a minute for 20,000 windows of a finger."""
+QUICK_EFFORT = EvaluationEffort(folds=3, inner=2, max_samples=10_000)
+NETWORK_EFFORT = EvaluationEffort(folds=2, inner=2, stride=3, max_samples=6_000)
+"""A fit of the network takes a minute for 20,000 windows of a finger."""
 
-SPLITS = {
+SPLIT_TITLES = {
     "recording": "by recording",
     "object": "by object",
     "others": "unseen objects",
@@ -41,81 +42,86 @@ SPLITS = {
     "gentle": "gentle profile",
     "vigorous": "vigorous profile",
 }
-"""What the keys of a method's results are called in tables; the first two are splits of main."""
+"""Titles of splits and corpora in tables, by name. The first two are splits of "main"."""
 
 Results = Mapping[str, Any]
+"""Results of the tasks of the study, by name of the task."""
 
 
-def titles(plan: StudyPlan) -> dict[str, str]:
-    """The methods that are compared, by name."""
-    left_out = SLOW if plan.quick else () if has_network() else (NETWORK,)
+def method_titles(plan: StudyPlan) -> dict[str, str]:
+    """Return the titles of the compared methods, by name."""
+    left_out = SLOW_METHODS if plan.quick else () if is_torch_installed() else (NETWORK,)
     return {name: each.title for name, each in METHODS.items() if name not in left_out}
 
 
-def has_network() -> bool:
-    """Whether torch, which the network needs, is installed."""
+def is_torch_installed() -> bool:
+    """Return whether torch, which the network needs, is installed."""
     return find_spec("torch") is not None
 
 
 def network_note(plan: StudyPlan) -> str:
-    """What a reader has to know of the network: how it was judged, or why it was not."""
+    """Return a note on how the network was evaluated, or why it was not."""
     if plan.quick:
         return "Left out of a quick study: the TCN and the linear SVMs of James & Lepora."
-    if not has_network():
-        return "Left out: the TCN, for torch is not installed (pip install 'holdfast[deep]')."
-    effort = OF_NETWORK
+    if not is_torch_installed():
+        return "Left out: the TCN, because torch is not installed (pip install 'holdfast[deep]')."
+    effort = NETWORK_EFFORT
     return (
-        f"The TCN has a budget of its own: {effort.folds} folds, {effort.max_rows:,} windows of "
-        f"a finger to train, every {effort.stride}rd sample judged."
+        f"The TCN is evaluated at a smaller size: {effort.folds} folds, {effort.max_samples:,} "
+        f"windows of a finger to train, every {effort.stride}rd sample evaluated."
     )
 
 
-def task_of(plan: StudyPlan, method: str) -> Task:
-    """The task that judges a method on all that the plan has for it."""
-    return judging(f"methods/{method}", job_of(plan, method), quick=plan.quick)
+def method_task(plan: StudyPlan, method: str) -> Task:
+    """Return the task that evaluates a method on all corpora that the plan has for it."""
+    return evaluation_task(f"methods/{method}", method_job(plan, method), quick=plan.quick)
 
 
-def judging(name: str, job: EvaluationJob, *, quick: bool = False) -> Task:
-    """A task of that name that does a job; its cost is about right for the twin's recordings [s].
+def evaluation_task(name: str, job: EvaluationJob, *, quick: bool = False) -> Task:
+    """Return a task that does a job, with an approximate cost for recordings of the twin [s].
 
     Args:
         name: of the task.
         job: to do.
-        quick: whether folds are few.
+        quick: whether the study is quick, with fewer folds.
     """
     parts = len(job.splits) + 0.5 * len(job.tests)
-    seconds = SECONDS.get(job.method, USUAL) * parts / 2.5 * (0.5 if quick else 1.0)
-    return Task(name, evaluate_method, (job,), dict[str, MethodEvaluation], cost=seconds)
+    seconds = METHOD_SECONDS.get(job.method, DEFAULT_SECONDS) * parts / 2.5
+    cost = seconds * (0.5 if quick else 1.0)
+    return Task(name, evaluate_method, (job,), dict[str, MethodEvaluation], cost=cost)
 
 
-def job_of(plan: StudyPlan, method: str) -> EvaluationJob:
-    """All that is asked of a method."""
-    tests = tuple(plan.corpora[role] for role in _roles(plan, method))
+def method_job(plan: StudyPlan, method: str) -> EvaluationJob:
+    """Return the complete evaluation job of a method."""
+    tests = tuple(plan.corpora[role] for role in _test_roles(plan, method))
     splits: tuple[Split, ...] = ("recording", "object")
-    if method == NETWORK or (plan.quick and method not in CORE):
+    if method == NETWORK or (plan.quick and method not in QUICK_METHODS):
         splits = ("recording",)
     return EvaluationJob(
-        method, plan.main, splits, tests, Variation(), effort_of(plan, method), plan.seed
+        method, plan.main, splits, tests, Variation(), method_effort(plan, method), plan.seed
     )
 
 
-def effort_of(plan: StudyPlan, method: str) -> EvaluationEffort:
-    """How thoroughly a method is judged."""
+def method_effort(plan: StudyPlan, method: str) -> EvaluationEffort:
+    """Return the size of the evaluation of a method."""
     if method == NETWORK:
-        return OF_NETWORK
-    return QUICK if plan.quick else EvaluationEffort()
+        return NETWORK_EFFORT
+    return QUICK_EFFORT if plan.quick else EvaluationEffort()
 
 
-def found(plan: StudyPlan, results: Results, method: str) -> Iterator[tuple[str, MethodEvaluation]]:
-    """By key of `SPLITS`, what a method is worth there."""
-    judged: Mapping[str, MethodEvaluation] = results[f"methods/{method}"]
-    for key in SPLITS:
+def method_results(
+    plan: StudyPlan, results: Results, method: str
+) -> Iterator[tuple[str, MethodEvaluation]]:
+    """Yield the results of a method on each split and corpus, by key of `SPLIT_TITLES`."""
+    evaluations: Mapping[str, MethodEvaluation] = results[f"methods/{method}"]
+    for key in SPLIT_TITLES:
         name = plan.corpora[key].name if key in plan.corpora else key
-        if name in judged:
-            yield key, judged[name]
+        if name in evaluations:
+            yield key, evaluations[name]
 
 
-def _roles(plan: StudyPlan, method: str) -> list[str]:
-    everywhere = method in (CORE if plan.quick else MAIN)
-    wanted = list(SPLITS)[2:] if everywhere else [] if plan.quick else ["others"]
-    return [role for role in wanted if role in plan.corpora]
+def _test_roles(plan: StudyPlan, method: str) -> list[str]:
+    """Return the roles of the corpora, other than "main", that a method is tested on."""
+    if method in (QUICK_METHODS if plan.quick else MAIN_METHODS):
+        return [role for role in list(SPLIT_TITLES)[2:] if role in plan.corpora]
+    return [role for role in ("others",) if role in plan.corpora and not plan.quick]

@@ -1,4 +1,4 @@
-"""Rows out of what was counted of each recording, with intervals by bootstrap over recordings."""
+"""Table rows from counts by recording, with intervals by bootstrap over recordings."""
 
 from collections.abc import Mapping, Sequence
 
@@ -16,7 +16,7 @@ Keys = Mapping[str, Key]
 
 PERCENT = 100.0
 
-SAMPLE_FIGURES = {
+SAMPLE_METRICS = {
     "accuracy [%]": "accuracy",
     "FDR [%]": "fdr",
     "FNR [%]": "fnr",
@@ -24,8 +24,9 @@ SAMPLE_FIGURES = {
     "AUC contact": "auc_contact",
     "Brier": "brier",
 }
-"""By the head of a column, the name among the sample metrics."""
+"""Name of a sample metric, by the head of its column."""
 DIGITS = {"AUC": 3, "AUC contact": 3, "Brier": 3}
+"""Digits after the decimal point, by the head of the column."""
 
 
 def ratio_row(
@@ -36,15 +37,15 @@ def ratio_row(
     scale: float = PERCENT,
     paper: float | None = None,
 ) -> Row:
-    """The ratio of two sums over recordings; those with nothing of the whole do not count.
+    """Return the ratio of two sums over recordings. Recordings with a whole of 0 are left out.
 
     Args:
         keys: of the row.
         parts: (n_recordings,).
         wholes: (n_recordings,).
         seed: of the bootstrap.
-        scale: that the ratio is multiplied by.
-        paper: what the paper prints.
+        scale: factor of the ratio.
+        paper: the value that the paper prints.
     """
     part, whole = np.asarray(parts, dtype=np.float64), np.asarray(wholes, dtype=np.float64)
     part, whole = part[whole > 0] * scale, whole[whole > 0]
@@ -55,11 +56,11 @@ def ratio_row(
 
 
 def quantile_row(keys: Keys, values: Sequence[Sequence[float]], q: float, seed: int) -> Row:
-    """A quantile of all values of all recordings; they may be infinite.
+    """Return a quantile of the values of all recordings; values may be infinite.
 
     Args:
         keys: of the row.
-        values: of each recording; those without any do not count.
+        values: of each recording. Recordings without values are left out.
         q: from 0 to 1.
         seed: of the bootstrap.
     """
@@ -70,46 +71,43 @@ def quantile_row(keys: Keys, values: Sequence[Sequence[float]], q: float, seed: 
 
 
 def count_row(keys: Keys, counts: Sequence[int]) -> Row:
-    """How many there are in all recordings."""
+    """Return the sum of the counts of all recordings."""
     return Row(dict(keys), float(sum(counts)), None, len(counts))
 
 
 def sample_rows(
     keys: Keys,
     metrics: Metrics,
-    figures: Sequence[str] = tuple(SAMPLE_FIGURES),
+    figures: Sequence[str] = tuple(SAMPLE_METRICS),
     paper: Mapping[str, float] | None = None,
 ) -> list[Row]:
-    """Figures by sample, pooled over fingers and recordings.
+    """Return metrics by sample, pooled over fingers and recordings.
 
     Args:
         keys: of the rows.
-        metrics: whose.
-        figures: of `SAMPLE_FIGURES`.
-        paper: what the paper prints, by the same names.
+        metrics: of a method.
+        figures: heads of the columns, of `SAMPLE_METRICS`.
+        paper: the values that the paper prints, by the same heads.
     """
     rows = []
     for figure in figures:
-        name = SAMPLE_FIGURES[figure]
+        name = SAMPLE_METRICS[figure]
         interval: Interval | None = None
-        n = sum(
-            any(known(finger) for finger in each.fingers.values()) for each in metrics.recordings
-        )
+        n = sum(any(map(_has_samples, each.fingers.values())) for each in metrics.recordings)
         if metrics.intervals is not None:
             interval, n = getattr(metrics.intervals, name), metrics.intervals.n_recordings
         ours: float | None = getattr(metrics.pooled, name)
-        about = {**keys, "figure": figure}
-        rows.append(Row(about, ours, (paper or {}).get(figure), n, interval))
+        row_keys = {**keys, "figure": figure}
+        rows.append(Row(row_keys, ours, (paper or {}).get(figure), n, interval))
     return rows
 
 
-def known(metrics: SampleMetrics) -> bool:
-    """Whether any sample counts."""
+def _has_samples(metrics: SampleMetrics) -> bool:
     return metrics.n > 0
 
 
-def right_and_all(metrics: Metrics) -> dict[str, tuple[int, int]]:
-    """Of each recording, how many samples were told right, and how many there were."""
+def correct_and_all(metrics: Metrics) -> dict[str, tuple[int, int]]:
+    """Return the number of correct samples, and of all samples, of each recording."""
     counts = {}
     for recording in metrics.recordings:
         tables = np.array([f.confusion for f in recording.fingers.values()]).reshape(-1, 2, 2)
@@ -119,30 +117,34 @@ def right_and_all(metrics: Metrics) -> dict[str, tuple[int, int]]:
 
 
 def difference_row(keys: Keys, first: Metrics, second: Metrics, seed: int) -> Row:
-    """Accuracy of the first less that of the second, on the same recordings [points].
+    """Return the accuracy of `first` minus that of `second`, on the same recordings [points].
 
-    A resample draws the same recordings for both.
+    The interval is paired: a resample draws the same recordings for both.
     """
-    one, other = right_and_all(first), right_and_all(second)
+    one, other = correct_and_all(first), correct_and_all(second)
     names = [name for name in one if name in other and one[name][1] and other[name][1]]
     counts = np.array([(*one[name], *other[name]) for name in names], dtype=np.float64)
-    statistic = _difference(counts.reshape(-1, 4))
+    statistic = _accuracy_difference(counts.reshape(-1, 4))
     ours = float(statistic(np.ones((1, len(names))))[0]) if names else None
     interval = bootstrap_interval(statistic, len(names), seed=seed)
     return Row(dict(keys), ours, None, len(names), interval)
 
 
-def _difference(counts: Array) -> Statistic:
+def _accuracy_difference(counts: Array) -> Statistic:
     def statistic(draws: Array) -> Array:
-        right, n, other_right, other_n = (draws @ counts).T
-        return np.asarray(PERCENT * (right / n - other_right / other_n))
+        correct, n, other_correct, other_n = (draws @ counts).T
+        return np.asarray(PERCENT * (correct / n - other_correct / other_n))
 
     return statistic
 
 
-def calibration_row(keys: Keys, judged: MethodEvaluation, seed: int) -> Row:
-    """How far given probabilities are from what was so, mean over samples, by ten bins."""
-    table = np.array(judged.calibration, dtype=np.float64).reshape(len(judged.names), -1, 3)
+def calibration_row(keys: Keys, evaluation: MethodEvaluation, seed: int) -> Row:
+    """Return the calibration error: |mean probability - share of stable samples|, by ten bins.
+
+    The error is the mean over samples.
+    """
+    table = np.array(evaluation.calibration, dtype=np.float64)
+    table = table.reshape(len(evaluation.names), -1, 3)
     table = table[table[:, :, 2].sum(axis=1) > 0]
 
     def statistic(draws: Array) -> Array:

@@ -1,4 +1,4 @@
-"""What the alarms of a hand are worth in one recording: events, slips and false alarms."""
+"""Statistics of the alarms of a hand in one recording: events, slips and false alarms."""
 
 import math
 from collections.abc import Sequence
@@ -6,138 +6,141 @@ from typing import NamedTuple
 
 import msgspec
 import numpy as np
-import numpy.typing as npt
 
-from holdfast.contact import HELD_PHASES, STABLE, UNKNOWN
+from holdfast.contact import CONTACT_FORCE, HELD_PHASES, SLIP_SPEED, STABLE, UNKNOWN
 from holdfast.metrics import FingerDecisions, match_alarms
 from holdfast.metrics.events import POSTS, ROUNDING, STABLE_BEFORE
-from holdfast.metrics.masks import runs
+from holdfast.metrics.masks import Mask, runs
 from holdfast.recordings import Truth
 from holdfast.sensors.types import Array
-from holdfast.twin.labels import LabelRule
 
-Mask = npt.NDArray[np.bool_]
+JUMP_EFFECT_TIME = 0.1
+"""Time after a jump of the controller's set point in which the jump explains an alarm [s]."""
 
-AFTER_GLITCH = 0.1
-"""A false alarm within this [s] after the controller's set point jumped is due to that."""
-
-SET_POINT = "set_point_error"
-"""Of the truth of a hand: how far the controller's set point is off [rad]."""
+SET_POINT_ERROR = "set_point_error"
+"""Name of the error of the controller's set point in the truth of a hand [rad]."""
 
 
 class SlipInterval(NamedTuple):
-    """An object slides on a fingertip of a hand that holds it: first and last sample [s]."""
+    """Times of the first and the last sample at which a held object slides [s]."""
 
     onset: float
     end: float
 
 
 class AlarmStatistics(msgspec.Struct, frozen=True):
-    """What the alarms of a hand are worth in one recording, at one threshold.
+    """Statistics of the alarms of a hand in one recording, at one threshold.
 
     Attributes:
-        delays: of each event, alarm minus onset [s]; infinite where it was missed.
-        slips: of each slip, how long until the hand was not called stable [s]; infinite where
-            it was until the sliding ended.
-        false_alarms: alarms that belong to no event.
-        under_stable: of them, those under a stable label.
-        follows_jump: of those, those right after a jump of the controller's set point.
-        stable_seconds: how long the label is stable [s].
-        n_stable: samples labelled stable and decided.
-        n_doubted: of them, those that were not called stable.
+        delays: alarm minus onset of each event [s]; infinite for a missed event.
+        slip_delays: time from the onset of each slip until the hand is not called stable [s];
+            infinite if it is called stable until the sliding ends.
+        n_false_alarms: alarms that belong to no event.
+        n_under_stable: false alarms under a stable label.
+        n_after_jump: of those, alarms right after a jump of the controller's set point.
+        stable_seconds: duration of the stable label [s].
+        n_stable: samples labelled stable that have a decision.
+        n_not_called_stable: of those, samples that are not called stable.
     """
 
     delays: list[float]
-    slips: list[float]
-    false_alarms: int
-    under_stable: int
-    follows_jump: int
+    slip_delays: list[float]
+    n_false_alarms: int
+    n_under_stable: int
+    n_after_jump: int
     stable_seconds: float
     n_stable: int
-    n_doubted: int
+    n_not_called_stable: int
 
     def n_missed(self, post: float) -> int:
-        """Events without an alarm until onset + post."""
+        """Return the number of events without an alarm until onset + post [s]."""
         return sum(delay > post + ROUNDING for delay in self.delays)
 
-    def n_found(self, within: float) -> int:
-        """Slips that were told within that time [s]."""
-        return sum(latency <= within + ROUNDING for latency in self.slips)
+    def n_slips_found(self, within: float) -> int:
+        """Return the number of slips that are found within a time [s]."""
+        return sum(delay <= within + ROUNDING for delay in self.slip_delays)
 
 
 def alarm_statistics(
     hand: FingerDecisions, truth: Truth | None, slips: Sequence[SlipInterval]
 ) -> AlarmStatistics:
-    """What the alarms of a hand are worth.
+    """Return the statistics of the alarms of a hand.
 
     Args:
         hand: labels and decisions.
         truth: of the recording.
-        slips: of sliding, that `find_slips` finds in it.
+        slips: in the recording, see `find_slips`.
     """
     match = match_alarms(hand.times, hand.labels, hand.states)
-    false = [alarm for alarm in match.false_alarms if alarm.label.code == STABLE]
+    under_stable = [alarm for alarm in match.false_alarms if alarm.label.code == STABLE]
+    after_jump = is_after_jump(np.array([alarm.time for alarm in under_stable]), truth)
     stable = (hand.labels == STABLE) & (hand.states != UNKNOWN)
     return AlarmStatistics(
         delays=[event.delay for event in match.events],
-        slips=[_latency(slip, hand) for slip in slips],
-        false_alarms=len(match.false_alarms),
-        under_stable=len(false),
-        follows_jump=int(follows_jump(np.array([alarm.time for alarm in false]), truth).sum()),
+        slip_delays=[_slip_delay(slip, hand) for slip in slips],
+        n_false_alarms=len(match.false_alarms),
+        n_under_stable=len(under_stable),
+        n_after_jump=int(after_jump.sum()),
         stable_seconds=match.stable_seconds,
         n_stable=int(stable.sum()),
-        n_doubted=int((stable & (hand.states != STABLE)).sum()),
+        n_not_called_stable=int((stable & (hand.states != STABLE)).sum()),
     )
 
 
 def find_slips(truth: Truth | None) -> list[SlipInterval]:
-    """The slips of a recording; none where the truth is not known.
+    """Return the slips of a recording; none if the truth is not known.
 
-    A slip begins where the object starts to slide on a finger of a hand that has held it, and
-    on which it has rested, for half a second.
+    A slip begins when the object starts to slide on a finger. Before that, the hand has held the
+    object without sliding for half a second.
     """
     if truth is None or "phase" not in truth.hand:
         return []
-    times, slips, rested = truth.times, [], -np.inf
+    times, slips, last_sliding = truth.times, [], -np.inf
     for start, end in runs(_sliding(truth)):
-        since = max(rested, _held_since(truth, start))
-        if times[start] - since >= STABLE_BEFORE - ROUNDING:
+        rest_begin = max(last_sliding, _hold_begin(truth, start))
+        if times[start] - rest_begin >= STABLE_BEFORE - ROUNDING:
             slips.append(SlipInterval(float(times[start]), float(times[end - 1])))
-        rested = float(times[end - 1])
+        last_sliding = float(times[end - 1])
     return slips
 
 
 def _sliding(truth: Truth) -> Mask:
-    """Whether the object slides on a finger of a hand that holds it."""
-    rule = LabelRule()
+    """Return whether the object slides on a finger of a hand that holds it, (n,)."""
     found = np.zeros(len(truth.times), dtype=np.bool_)
     for finger in truth.fingers.values():
         if {"contact_force", "slip_speed"} <= set(finger):
-            touching = np.linalg.norm(finger["contact_force"], axis=1) > rule.contact
-            found |= touching & (finger["slip_speed"] > rule.sliding)
+            touching = np.linalg.norm(finger["contact_force"], axis=1) > CONTACT_FORCE
+            found |= touching & (finger["slip_speed"] > SLIP_SPEED)
     return np.asarray(np.isin(truth.hand["phase"], HELD_PHASES) & found)
 
 
-def _held_since(truth: Truth, place: int) -> float:
+def _hold_begin(truth: Truth, place: int) -> float:
+    """Return the time of the last sample before `place` at which nothing is held [s]."""
     free = np.flatnonzero(~np.isin(truth.hand["phase"][: place + 1], HELD_PHASES))
     return float(truth.times[free[-1]]) if len(free) else float(truth.times[0])
 
 
-def _latency(slip: SlipInterval, hand: FingerDecisions) -> float:
-    """How long until the hand is not called stable; at least until the last of `POSTS`."""
+def _slip_delay(slip: SlipInterval, hand: FingerDecisions) -> float:
+    """Return the time until the hand is not called stable [s]; infinite if it stays stable.
+
+    The search ends with the slip, but not before the last of `POSTS`.
+    """
     last = max(slip.end, slip.onset + POSTS[-1]) + ROUNDING
     rows = slice(*np.searchsorted(hand.times, (slip.onset - ROUNDING, last)))
-    told = (hand.states[rows] != STABLE) & (hand.states[rows] != UNKNOWN)
-    if not told.any():
+    found = (hand.states[rows] != STABLE) & (hand.states[rows] != UNKNOWN)
+    if not found.any():
         return math.inf
-    return max(float(hand.times[rows][np.argmax(told)]) - slip.onset, 0.0)
+    return max(float(hand.times[rows][np.argmax(found)]) - slip.onset, 0.0)
 
 
-def follows_jump(times: Array, truth: Truth | None) -> Mask:
-    """(n,) whether the controller's set point has just jumped; never, where that is not known."""
-    if truth is None or SET_POINT not in truth.hand:
+def is_after_jump(times: Array, truth: Truth | None) -> Mask:
+    """Return whether the set point of the controller has just jumped, (n,).
+
+    False at all times if the truth does not contain the set point.
+    """
+    if truth is None or SET_POINT_ERROR not in truth.hand:
         return np.zeros(len(times), dtype=np.bool_)
-    jumps: Array = truth.times[np.abs(truth.hand[SET_POINT]) > 0]
-    first = np.searchsorted(jumps, times - AFTER_GLITCH - ROUNDING)
+    jumps: Array = truth.times[np.abs(truth.hand[SET_POINT_ERROR]) > 0]
+    first = np.searchsorted(jumps, times - JUMP_EFFECT_TIME - ROUNDING)
     last = np.searchsorted(jumps, times + ROUNDING)
     return np.asarray(last > first)

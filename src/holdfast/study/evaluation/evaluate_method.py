@@ -1,11 +1,11 @@
-"""One method: fitted on some recordings, judged on others, and counted.
+"""Evaluation of one method: fit it to some recordings, score and count on others.
 
-No recording that is judged has a say in what judges it: not in its classifiers, not in its
-contact thresholds, not in the threshold for a rate of false alarms, which is chosen on the
-training recordings, each judged by a fit without it.
+A recording that is evaluated has no influence on the fit that scores it: not on the classifiers,
+not on the contact thresholds, and not on the thresholds for a rate of false alarms. Those are
+chosen on the training recordings, each scored by a fit without it.
 """
 
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import replace
 from typing import Literal, NamedTuple
 
@@ -13,17 +13,20 @@ import msgspec
 import numpy as np
 import numpy.typing as npt
 
+from holdfast.contact import STABLE, UNKNOWN
 from holdfast.metrics import Decisions, Metrics, summarise
+from holdfast.metrics.masks import Mask
 from holdfast.study.evaluation.alarm_statistics import (
     AlarmStatistics,
     alarm_statistics,
     find_slips,
-    follows_jump,
+    is_after_jump,
 )
 from holdfast.study.evaluation.error_breakdown import (
     ErrorBreakdown,
     break_down_errors,
     calibration_counts,
+    decided_units,
 )
 from holdfast.study.evaluation.fitted_method import (
     FittedMethod,
@@ -35,103 +38,106 @@ from holdfast.study.evaluation.scores import RecordingScores
 from holdfast.study.evaluation.thresholds import FalseAlarmRanges, threshold_shift
 from holdfast.study.evaluation.variation import Variation
 from holdfast.study.methods import HAND, METHODS, Method
-from holdfast.study.methods.cuts import CUTS
+from holdfast.study.methods.wavelets import CUTS
 from holdfast.study.plan import Corpus
 
 FALSE_ALARM_RATES = (0.5, 1.0, 2.0, 5.0, 10.0, 20.0, 50.0)
-"""False alarms per minute of stable label that thresholds are chosen for, in training."""
+"""Rates of false alarms that thresholds are chosen for, per minute of stable label [1/min]."""
 COMPARED_RATE = 1.0
-"""The rate that methods are compared at."""
+"""The rate of false alarms at which methods are compared [1/min]."""
 HOLD_TIME = 0.1
-"""For how long a hand goes on not to be stable at those thresholds, so that one disturbance is
-one alarm, whatever the method [s]."""
+"""Time for which a hand stays not stable at the chosen thresholds [s].
+
+So one disturbance is one alarm, whatever the method.
+"""
+N_POOLED_FOLDS = 5
+"""Folds of the random split of pooled samples: 80 % train, 20 % test."""
 
 Split = Literal["recording", "object"]
 
 
 class EvaluationEffort(msgspec.Struct, frozen=True):
-    """How thoroughly a method is judged.
+    """Size of an evaluation.
 
     Attributes:
-        folds: of whole recordings, each object spread over all of them.
-        inner: folds of the training recordings of each, on which thresholds are chosen.
-        stride: only every so many-th decision is looked at.
-        max_rows: samples of a finger that a classifier is fitted to, evenly spread.
+        folds: of whole recordings. Each object is spread over all folds.
+        inner: folds of the training recordings of each fold, on which thresholds are chosen.
+        stride: evaluate every n-th sample.
+        max_samples: of a unit, that train a classifier; evenly thinned.
     """
 
     folds: int = 5
     inner: int = 3
     stride: int = 1
-    max_rows: int = 20_000
+    max_samples: int = 20_000
 
 
 class EvaluationJob(msgspec.Struct, frozen=True):
-    """What is judged.
+    """One method and the recordings that it is evaluated on.
 
     Attributes:
-        method: name of it.
-        train: corpus that it is fitted to.
-        splits: of that corpus: a fold holds out recordings, or one object.
-        tests: other corpora that it is judged on, after a fit to all of `train`.
-        change: of the recordings of all corpora.
-        effort: how thoroughly.
-        seed: of everything random.
+        method: its name.
+        train: corpus that the method is fitted to.
+        splits: of that corpus. A fold holds out recordings, or all recordings of one object.
+        tests: other corpora, evaluated with a fit to all of `train`.
+        variation: of the recordings of all corpora.
+        effort: size of the evaluation.
+        seed: of all random numbers.
     """
 
     method: str
     train: Corpus
     splits: tuple[Split, ...] = ("recording",)
     tests: tuple[Corpus, ...] = ()
-    change: Variation = Variation()
+    variation: Variation = Variation()
     effort: EvaluationEffort = EvaluationEffort()
     seed: int = 0
 
 
 class MethodEvaluation(msgspec.Struct, frozen=True):
-    """What was counted.
+    """Results of one method on one split or corpus. Lists have one entry per recording.
 
     Attributes:
-        names: of the recordings judged, in order.
-        fingers: by sample, at the method's own threshold; None of a method for whole hands.
-        hand: the same of the hand.
-        own: its alarms, by exact labels, at the same threshold, of each recording.
-        held: the same, held for `HOLD_TIME`.
-        curve: the same, held, at thresholds for each of `FALSE_ALARM_RATES`.
-        spared: the same, held, at thresholds for one false alarm per minute, where those right
-            after a jump of the controller's set point are not counted.
-        breakdown: of errors at the method's own threshold, of each recording.
-        calibration: of each recording, (10, 3) sum of probabilities, stable samples and samples
-            of each bin.
+        names: of the evaluated recordings.
+        fingers: metrics by sample at the method's own threshold; None for a whole-hand method.
+        hand: the same for the hand.
+        alarms: of the hand, by exact labels, at the method's own threshold.
+        held_alarms: the same, with decisions held for `HOLD_TIME`.
+        alarms_by_rate: the same, held, at the threshold chosen for each of `FALSE_ALARM_RATES`.
+        alarms_without_jumps: the same, held, at the threshold chosen for `COMPARED_RATE` when
+            alarms right after a jump of the controller's set point are not counted.
+        breakdown: of the errors at the method's own threshold.
+        calibration: (10, 3) sum of probabilities, stable samples and all samples of each bin.
     """
 
     names: list[str]
     fingers: Metrics | None
     hand: Metrics
-    own: list[AlarmStatistics]
-    held: list[AlarmStatistics]
-    curve: list[list[AlarmStatistics]]
-    spared: list[AlarmStatistics]
+    alarms: list[AlarmStatistics]
+    held_alarms: list[AlarmStatistics]
+    alarms_by_rate: list[list[AlarmStatistics]]
+    alarms_without_jumps: list[AlarmStatistics]
     breakdown: list[ErrorBreakdown]
     calibration: list[list[list[float]]]
 
     @property
     def metrics(self) -> Metrics:
-        """Of what the method judges: the fingers, or the hand."""
+        """Metrics of what the method decides for: the fingers, or the hand."""
         return self.fingers or self.hand
 
     @property
-    def calm(self) -> list[AlarmStatistics]:
-        """At the threshold that methods are compared at."""
-        return self.curve[FALSE_ALARM_RATES.index(COMPARED_RATE)]
+    def compared_alarms(self) -> list[AlarmStatistics]:
+        """Alarms at the threshold at which methods are compared."""
+        return self.alarms_by_rate[FALSE_ALARM_RATES.index(COMPARED_RATE)]
 
 
 class FittedFold(NamedTuple):
-    """A fit and its thresholds.
+    """A fitted method and its thresholds.
 
     Attributes:
-        fitted: fitted to all training recordings.
-        shifts: of its threshold, for each of `FALSE_ALARM_RATES`, and for the one that is compared
-            with alarms spared.
+        fitted: to all training recordings.
+        shifts: of the threshold for each of `FALSE_ALARM_RATES`, then the one for
+            `COMPARED_RATE` without alarms after jumps.
     """
 
     fitted: FittedMethod
@@ -139,75 +145,80 @@ class FittedFold(NamedTuple):
 
 
 class ScoredRecording(NamedTuple):
-    """A recording that was judged: what was seen, what was thought of it, and the thresholds."""
+    """A recording, its scores and the shifts of the threshold, see `FittedFold`."""
 
-    seen: RecordingFeatures
+    recording: RecordingFeatures
     scores: RecordingScores
     shifts: Sequence[float]
 
 
 def evaluate_method(job: EvaluationJob) -> dict[str, MethodEvaluation]:
-    """What the method is worth by each split, and on each other corpus.
+    """Return the results of a method on each split and on each other corpus.
 
-    A split by object is left out where there are fewer than two, or not all are known.
+    A split by object is left out if there are fewer than two objects, or an unknown one.
 
     Returns:
-        By the split, or the name of the corpus.
+        By name of the split or of the corpus.
 
     Raises:
         TrainingError: a whole-hand method gets too few fingers.
     """
-    return {key: summarise_recordings(cases) for key, cases in scored_recordings(job) if cases}
+    return {key: summarise_recordings(scored) for key, scored in score_splits(job) if scored}
 
 
-def scored_recordings(job: EvaluationJob) -> Iterator[tuple[str, list[ScoredRecording]]]:
-    """By split, or corpus, the recordings and what was thought of them, in order."""
+def score_splits(job: EvaluationJob) -> Iterator[tuple[str, list[ScoredRecording]]]:
+    """Yield the scored recordings of each split and of each other corpus, in order."""
     method = find_method(job.method)
-    recordings = corpus_features(method, job.train, job.change, job.effort.stride)
-    material = gather_training_samples(recordings, job.effort.max_rows)
-    everyone = frozenset(range(len(recordings)))
+    recordings = corpus_features(method, job.train, job.variation, job.effort.stride)
+    training = gather_training_samples(recordings, job.effort.max_samples)
+    everything = frozenset(range(len(recordings)))
     for split in job.splits:
-        cases: dict[int, ScoredRecording] = {}
-        for held in held_out(material.objects, split, job.effort.folds, job.seed):
-            fold = _fold(job, method, material, recordings, everyone - held)
-            cases |= {place: _case(fold, recordings[place]) for place in held}
-        yield split, [cases[place] for place in sorted(cases)]
+        scored: dict[int, ScoredRecording] = {}
+        for held in held_out_folds(training.objects, split, job.effort.folds, job.seed):
+            fold = _fit_fold(job, method, training, recordings, everything - held)
+            scored |= {place: _score(fold, recordings[place]) for place in held}
+        yield split, [scored[place] for place in sorted(scored)]
     if job.tests:
-        fold = _fold(job, method, material, recordings, everyone)
+        fold = _fit_fold(job, method, training, recordings, everything)
         for corpus in job.tests:
-            tested = corpus_features(method, corpus, job.change, job.effort.stride)
-            yield corpus.name, [_case(fold, seen) for seen in tested]
+            tested = corpus_features(method, corpus, job.variation, job.effort.stride)
+            yield corpus.name, [_score(fold, recording) for recording in tested]
 
 
 def find_method(name: str) -> Method:
-    """The method of that name, also of those that the study has for one question alone."""
+    """Return the method of that name, of `METHODS` or of `CUTS`."""
     return METHODS[name] if name in METHODS else CUTS[name]
 
 
-def held_out(
+def held_out_folds(
     objects: Sequence[str | None], split: Split, n_folds: int, seed: int
 ) -> Iterator[frozenset[int]]:
-    """Places of the recordings that each fold holds out; every recording is in one fold.
+    """Yield the numbers of the recordings that each fold holds out.
+
+    Every recording is in one fold. There is no fold by object if there are fewer than two
+    objects, or an unknown one.
 
     Args:
-        objects: of the recordings; None where it is not known.
+        objects: of the recordings; None if unknown.
         split: `recording` or `object`.
-        n_folds: by recording, at most.
-        seed: of the same.
+        n_folds: maximum, by recording.
+        seed: of the folds by recording.
     """
     if split == "object":
         names = list(dict.fromkeys(objects))
         if len(names) < 2 or None in names:
             return
-        units = np.array([names.index(name) for name in objects])
+        folds = np.array([names.index(name) for name in objects])
     else:
-        units = groups_of(objects, min(n_folds, len(objects)), seed)
-    for unit in np.unique(units):
-        yield frozenset(np.flatnonzero(units == unit).tolist())
+        folds = balanced_groups(objects, min(n_folds, len(objects)), seed)
+    for fold in np.unique(folds):
+        yield frozenset(np.flatnonzero(folds == fold).tolist())
 
 
-def groups_of(objects: Sequence[str | None], n_groups: int, seed: int) -> npt.NDArray[np.int64]:
-    """(n_recordings,) groups of about equal size, the recordings of each object spread evenly."""
+def balanced_groups(
+    objects: Sequence[str | None], n_groups: int, seed: int
+) -> npt.NDArray[np.int64]:
+    """Return (n_recordings,) groups of equal size, with each object spread over the groups."""
     order = np.random.default_rng(seed).permutation(len(objects))
     order = order[np.argsort(np.array([str(objects[k]) for k in order]), kind="stable")]
     groups = np.empty(len(objects), dtype=np.int64)
@@ -215,80 +226,138 @@ def groups_of(objects: Sequence[str | None], n_groups: int, seed: int) -> npt.ND
     return groups
 
 
-def _fold(
+def _fit_fold(
     job: EvaluationJob,
     method: Method,
-    material: TrainingSamples,
+    training: TrainingSamples,
     recordings: Sequence[RecordingFeatures],
-    training: frozenset[int],
+    places: frozenset[int],
 ) -> FittedFold:
-    """The fit to the training recordings; nothing else is looked at."""
-    places = sorted(training)
-    objects = [material.objects[place] for place in places]
-    n_inner = min(job.effort.inner, len(places))
-    calms: list[tuple[FalseAlarmRanges, FalseAlarmRanges]] = []
-    for held in held_out(objects, "recording", n_inner, job.seed + 1) if n_inner > 1 else ():
-        left_out = {places[k] for k in held}
-        inner = FittedMethod.fit(method, material, training - left_out, job.seed)
-        calms += [_calm(inner, recordings[place]) for place in sorted(left_out)]
-    return FittedFold(FittedMethod.fit(method, material, training, job.seed), _shifts(calms))
+    """Fit the method to the recordings at `places`, and choose its thresholds on them."""
+    ordered = sorted(places)
+    objects = [training.objects[place] for place in ordered]
+    n_inner = min(job.effort.inner, len(ordered))
+    folds = held_out_folds(objects, "recording", n_inner, job.seed + 1) if n_inner > 1 else ()
+    ranges: list[tuple[FalseAlarmRanges, FalseAlarmRanges]] = []
+    for fold in folds:
+        held = {ordered[k] for k in fold}
+        fitted = FittedMethod.fit(method, training, places - held, job.seed)
+        ranges += [_false_alarm_ranges(fitted, recordings[place]) for place in sorted(held)]
+    return FittedFold(FittedMethod.fit(method, training, places, job.seed), _shifts(ranges))
 
 
-def _calm(
-    fitted: FittedMethod, seen: RecordingFeatures
+def _false_alarm_ranges(
+    fitted: FittedMethod, recording: RecordingFeatures
 ) -> tuple[FalseAlarmRanges, FalseAlarmRanges]:
-    """What tells its false alarms: of all, and of those that no jump of the set point caused."""
-    score, labels = fitted.scores(seen).hand(seen).held(HOLD_TIME), seen.hand(seen.exact).labels
-    spared = follows_jump(score.times, seen.truth)
-    return FalseAlarmRanges.of(score, labels), FalseAlarmRanges.of(score, labels, spared)
+    """Return the ranges of all false alarms, and of those that no jump explains."""
+    scores = fitted.scores(recording).hand(recording).hold(HOLD_TIME)
+    labels = recording.hand_labels(recording.exact_labels).labels
+    after_jump = is_after_jump(scores.times, recording.truth)
+    return FalseAlarmRanges.of(scores, labels), FalseAlarmRanges.of(scores, labels, after_jump)
 
 
-def _shifts(calms: Sequence[tuple[FalseAlarmRanges, FalseAlarmRanges]]) -> list[float]:
-    if not calms:
-        return [0.0] * (1 + len(FALSE_ALARM_RATES))
-    every, spared = zip(*calms, strict=True)
-    return [
-        *(threshold_shift(every, rate) for rate in FALSE_ALARM_RATES),
-        threshold_shift(spared, COMPARED_RATE),
-    ]
+def _shifts(ranges: Sequence[tuple[FalseAlarmRanges, FalseAlarmRanges]]) -> list[float]:
+    if not ranges:
+        return [0.0] * (len(FALSE_ALARM_RATES) + 1)
+    every, without_jumps = zip(*ranges, strict=True)
+    shifts = [threshold_shift(every, rate) for rate in FALSE_ALARM_RATES]
+    return [*shifts, threshold_shift(without_jumps, COMPARED_RATE)]
 
 
-def _case(fold: FittedFold, seen: RecordingFeatures) -> ScoredRecording:
-    return ScoredRecording(replace(seen, features={}), fold.fitted.scores(seen), fold.shifts)
+def _score(fold: FittedFold, recording: RecordingFeatures) -> ScoredRecording:
+    """Score a recording; its features are dropped to save memory."""
+    scores = fold.fitted.scores(recording)
+    return ScoredRecording(replace(recording, features={}), scores, fold.shifts)
 
 
-def summarise_recordings(cases: Sequence[ScoredRecording]) -> MethodEvaluation:
-    """What is counted of the recordings that were judged."""
-    own = [case.scores.decide(case.seen, case.seen.labels) for case in cases]
-    heard = [list(_heard(case)) for case in cases]
+def summarise_recordings(scored: Sequence[ScoredRecording]) -> MethodEvaluation:
+    """Return the results of a method on scored recordings."""
+    decisions = [each.scores.decide(each.recording, each.recording.labels) for each in scored]
+    alarms = [list(_alarms(each)) for each in scored]
+    pairs = zip(scored, decisions, strict=True)
     return MethodEvaluation(
-        names=[case.seen.name for case in cases],
-        fingers=summarise(own) if any(each.fingers for each in own) else None,
-        hand=summarise(_hands(own)),
-        own=[each[0] for each in heard],
-        held=[each[1] for each in heard],
-        curve=[[each[2 + k] for each in heard] for k in range(len(FALSE_ALARM_RATES))],
-        spared=[each[-1] for each in heard],
-        breakdown=[
-            break_down_errors(case.seen, each) for case, each in zip(cases, own, strict=True)
-        ],
-        calibration=[calibration_counts(each) for each in own],
+        names=[each.recording.name for each in scored],
+        fingers=summarise(decisions) if any(each.fingers for each in decisions) else None,
+        hand=summarise(_hands(decisions)),
+        alarms=[each[0] for each in alarms],
+        held_alarms=[each[1] for each in alarms],
+        alarms_by_rate=[[each[2 + k] for each in alarms] for k in range(len(FALSE_ALARM_RATES))],
+        alarms_without_jumps=[each[-1] for each in alarms],
+        breakdown=[break_down_errors(each.recording.truth, decided) for each, decided in pairs],
+        calibration=[calibration_counts(each) for each in decisions],
     )
 
 
-def _heard(case: ScoredRecording) -> Iterator[AlarmStatistics]:
-    """Its alarms at its own threshold, then held: at its own, and at each that was chosen."""
-    seen, scores, shifts = case
-    score, labels = scores.hand(seen), seen.hand(seen.exact).labels
-    slips = find_slips(seen.truth)
-    yield alarm_statistics(score.decide(labels), seen.truth, slips)
-    held = score.held(HOLD_TIME)
-    for shift in (0.0, *shifts):
-        yield alarm_statistics(held.decide(labels, shift), seen.truth, slips)
+def _alarms(scored: ScoredRecording) -> Iterator[AlarmStatistics]:
+    """Yield the alarms at the own threshold; held at it; held at each chosen threshold."""
+    recording = scored.recording
+    scores = scored.scores.hand(recording)
+    labels = recording.hand_labels(recording.exact_labels).labels
+    slips = find_slips(recording.truth)
+    yield alarm_statistics(scores.decide(labels), recording.truth, slips)
+    held = scores.hold(HOLD_TIME)
+    for shift in (0.0, *scored.shifts):
+        yield alarm_statistics(held.decide(labels, shift), recording.truth, slips)
 
 
-def _hands(decided: Iterable[Decisions]) -> Iterator[Decisions]:
-    """The hands alone, each as the one finger of its recording."""
-    for each in decided:
+def _hands(decisions: Iterable[Decisions]) -> Iterator[Decisions]:
+    """Yield the hands alone, each as the one finger of its recording."""
+    for each in decisions:
         if each.hand is not None:
             yield Decisions(each.name, {HAND: each.hand}, each.hand)
+
+
+def evaluate_pooled(job: EvaluationJob) -> list[list[int]]:
+    """Return [TN, FP, FN, TP] of each recording by random folds of the pooled samples.
+
+    This is the paper's split: neighbours of a test sample are in the training set. Everything
+    else is as in the other splits, so that the difference is due to the split alone.
+
+    Args:
+        job: gives the method, the training corpus, the variation, the effort and the seed.
+    """
+    method = find_method(job.method)
+    recordings = corpus_features(method, job.train, job.variation, job.effort.stride)
+    generator = np.random.default_rng(job.seed)
+    folds = [
+        {
+            unit: generator.integers(N_POOLED_FOLDS, size=len(rows))
+            for unit, rows in recording.features.items()
+        }
+        for recording in recordings
+    ]
+    counts = np.zeros((len(recordings), 4), dtype=np.int64)
+    for fold in range(N_POOLED_FOLDS):
+        trained = [
+            _with_features_of(recording, {unit: each != fold for unit, each in own.items()})
+            for recording, own in zip(recordings, folds, strict=True)
+        ]
+        training = gather_training_samples(trained, job.effort.max_samples)
+        fitted = FittedMethod.fit(method, training, range(len(recordings)), job.seed)
+        for place, (recording, own) in enumerate(zip(recordings, folds, strict=True)):
+            tested = _with_features_of(
+                recording, {unit: each == fold for unit, each in own.items()}
+            )
+            counts[place] += _confusion(fitted.scores(tested).decide(tested, tested.labels))
+    return [[int(n) for n in row] for row in counts]
+
+
+def _with_features_of(
+    recording: RecordingFeatures, chosen: Mapping[str, Mask]
+) -> RecordingFeatures:
+    """Return the recording with NaN as the features of all other samples."""
+    features = {
+        unit: np.where(chosen[unit][:, None], rows, np.nan)
+        for unit, rows in recording.features.items()
+    }
+    return replace(recording, features=features)
+
+
+def _confusion(decisions: Decisions) -> npt.NDArray[np.int64]:
+    """Return (4,) TN, FP, FN, TP of the samples with a label and a decision."""
+    counts = np.zeros(4, dtype=np.int64)
+    for unit in decided_units(decisions).values():
+        known = (unit.labels != UNKNOWN) & (unit.states != UNKNOWN)
+        place = 2 * (unit.labels == STABLE) + (unit.states == STABLE)
+        counts += np.bincount(place[known], minlength=4)
+    return counts

@@ -1,8 +1,9 @@
-"""What an fitted thinks of one recording, and what is decided from it at any threshold.
+"""Scores of one recording by a fitted method, and the decisions that follow at any threshold.
 
-A finger in contact is stable where its margin, the log odds of stability over the threshold of
-its classifier, is at least the shift. A hand is not stable where a finger is not: so of a hand
-only the least margin of the fingers in contact counts.
+The margin of a finger is its log odds of stability minus the threshold of its classifier. A
+finger in contact is stable if its margin is at least the shift of the threshold. A hand is not
+stable if one of its fingers is not stable. So the state of a hand depends only on the smallest
+margin of the fingers in contact.
 """
 
 from collections.abc import Mapping
@@ -11,145 +12,157 @@ from dataclasses import dataclass, replace
 import numpy as np
 import numpy.typing as npt
 
-from holdfast.contact import NO_CONTACT, STABLE, UNKNOWN, UNSTABLE
+from holdfast.contact import (
+    NO_CONTACT,
+    STABLE,
+    UNKNOWN,
+    UNSTABLE,
+    enough_contacts,
+    hand_states,
+)
 from holdfast.metrics import Decisions, FingerDecisions
 from holdfast.metrics.decisions import Codes
+from holdfast.metrics.masks import Mask
 from holdfast.sensors.types import Array
 from holdfast.study.evaluation.recording_features import RecordingFeatures
 from holdfast.study.methods import HAND
 
-Mask = npt.NDArray[np.bool_]
-
 
 @dataclass(frozen=True, eq=False)
 class HandScores:
-    """A hand over a recording, before a threshold decides.
+    """Scores of a hand over a recording, before a threshold is applied.
 
     Attributes:
         times: (n,) [s].
-        least: (n,) the least margin of the fingers in contact whose margin is known; infinite
-            where there is none.
+        margin: (n,) smallest margin of the fingers in contact whose margin is known; infinite
+            if there is none.
         known: (n,) whether the margin of every finger is known.
-        alone: (n,) whether too few fingers are in contact to hold anything.
-        probability: (n,) the least probability of stability of the same fingers, 0 where too
-            few are in contact; NaN where there is none.
+        held: (n,) whether enough fingers are in contact to hold an object.
+        probability: (n,) smallest probability of stability of the same fingers; NaN if there
+            is none, 0 if the object is not held.
     """
 
     times: Array
-    least: Array
+    margin: Array
     known: Mask
-    alone: Mask
+    held: Mask
     probability: Array
 
     def states(self, shift: float = 0.0) -> Codes:
-        """(n,) the states of the hand, as its fingers' would make them."""
-        choices = [
-            (self.least < shift, UNSTABLE),
-            (~self.known, UNKNOWN),
-            (self.alone, NO_CONTACT),
-        ]
-        states = np.select([c for c, _ in choices], [s for _, s in choices], default=STABLE)
-        return states.astype(np.int8)
-
-    def held(self, seconds: float) -> "HandScores":
-        """The score of a hand that goes on not to be stable for a while, as `Debounce.hold` does.
-
-        Not where too few fingers are in contact, nor where a finger is not known.
+        """Return the (n,) states of the hand, by the rule of `holdfast.contact.hand_state`.
 
         Args:
-            seconds: after the last sample at which it was not stable [s].
+            shift: added to the threshold of every finger [log odds].
+        """
+        return hand_states(self.margin < shift, ~self.known, self.held)
+
+    def hold(self, seconds: float) -> "HandScores":
+        """Return scores at which a hand stays not stable for a while, as `Debounce.hold` does.
+
+        Samples without a held object, or with an unknown finger, are not changed.
+
+        Args:
+            seconds: time after the last sample that was not stable [s].
         """
         if len(self.times) < 2:
             return self
         n = max(1, round(seconds / float(np.median(np.diff(self.times)))))
-        padded = np.concatenate([np.full(n - 1, np.inf), self.least])
-        least = np.lib.stride_tricks.sliding_window_view(padded, n).min(axis=1)
-        return replace(self, least=np.where(self.alone | ~self.known, self.least, least))
+        padded = np.concatenate([np.full(n - 1, np.inf), self.margin])
+        smallest = np.lib.stride_tricks.sliding_window_view(padded, n).min(axis=1)
+        return replace(self, margin=np.where(self.held & self.known, smallest, self.margin))
 
     def decide(self, labels: Codes, shift: float = 0.0) -> FingerDecisions:
-        """The hand's decisions beside those labels."""
+        """Return the decisions for the hand with these labels, at a shifted threshold."""
         return FingerDecisions(self.times, labels, self.states(shift), self.probability)
 
 
 @dataclass(frozen=True, eq=False)
 class RecordingScores:
-    """What an fitted thinks of one recording.
+    """Scores of one recording by a fitted method.
 
     Attributes:
-        margins: of each unit, (n,) log odds of stability over its own threshold; NaN where
-            there is none.
+        margins: (n,) log odds of stability minus the threshold, of each unit; NaN if unknown.
         thresholds: of each unit [log odds].
-        touching: of each finger, (n,) whether it is in contact.
+        in_contact: (n,) whether the finger is in contact, of each finger.
     """
 
     margins: Mapping[str, Array]
     thresholds: Mapping[str, float]
-    touching: Mapping[str, Mask]
+    in_contact: Mapping[str, Mask]
 
-    def decide(self, seen: RecordingFeatures, labels: Mapping[str, Codes]) -> Decisions:
-        """The decisions of the fingers at their own thresholds beside those labels, and the hand's.
+    def decide(self, recording: RecordingFeatures, labels: Mapping[str, Codes]) -> Decisions:
+        """Return the decisions for fingers and hand with these labels, at the own thresholds.
 
-        A method that judges the hand as a whole has no fingers there.
+        A whole-hand method decides for the hand only.
         """
-        hand = self.hand(seen).decide(seen.hand(labels).labels)
+        hand = self.hand(recording).decide(recording.hand_labels(labels).labels)
         if HAND in self.margins:
-            return Decisions(seen.name, {}, hand)
+            return Decisions(recording.name, {}, hand)
         fingers = {
-            name: _decide(finger, *self._finger(seen, name), ~self.touching[name])
-            for name, finger in seen.undecided(labels).items()
+            name: _decide_finger(finger, *self._unit_scores(name, recording), self.in_contact[name])
+            for name, finger in recording.finger_labels(labels).items()
         }
-        return Decisions(seen.name, fingers, hand)
+        return Decisions(recording.name, fingers, hand)
 
-    def hand(self, seen: RecordingFeatures) -> HandScores:
-        """The hand, at every time of any finger; each holds its last sample."""
-        times = np.unique(np.concatenate(list(seen.times.values())))
-        held = {f: np.searchsorted(own, times, side="right") - 1 for f, own in seen.times.items()}
-        touching = np.array([(at >= 0) & self.touching[f][at] for f, at in held.items()])
-        alone = touching.sum(axis=0) < min(2, len(held))
+    def hand(self, recording: RecordingFeatures) -> HandScores:
+        """Return the scores of the hand at every time of any finger.
+
+        A finger keeps the scores of its last sample until its next sample.
+        """
+        times = np.unique(np.concatenate(list(recording.times.values())))
+        last = {
+            finger: np.searchsorted(own, times, side="right") - 1
+            for finger, own in recording.times.items()
+        }
+        in_contact = np.array([(at >= 0) & self.in_contact[f][at] for f, at in last.items()])
+        held = enough_contacts(in_contact.sum(axis=0), len(last))
         if HAND in self.margins:
-            at = next(iter(held.values()))
-            own = self.thresholds[HAND]
-            margins = _hold(self.margins[HAND], at)[None]
-            probability = probability_of(margins + own)
-            touching = ~alone[None]
-            started = at[None] >= 0
-        else:
-            pairs = {f: self._finger(seen, f) for f in held}
-            margins = np.array([_hold(pairs[f][0], at) for f, at in held.items()])
-            probability = np.array([_hold(pairs[f][1], at) for f, at in held.items()])
-            started = np.array([at >= 0 for at in held.values()])
-        told = touching & ~np.isnan(margins)
-        none = np.where(told.any(axis=0), 0.0, np.nan)
+            last = {HAND: next(iter(last.values()))}
+            in_contact = held[None]
+        scores = {unit: self._unit_scores(unit, recording) for unit in last}
+        margins = np.array([_values_at(scores[unit][0], at) for unit, at in last.items()])
+        probability = np.array([_values_at(scores[unit][1], at) for unit, at in last.items()])
         return HandScores(
             times=times,
-            least=np.where(told, margins, np.inf).min(axis=0),
-            known=np.all(started & ~np.isnan(margins), axis=0),
-            alone=alone,
-            probability=np.where(alone, 0.0, np.where(told, probability, 1.0).min(axis=0) + none),
+            margin=np.where(in_contact & ~np.isnan(margins), margins, np.inf).min(axis=0),
+            known=~np.isnan(margins).any(axis=0),
+            held=held,
+            probability=np.where(held, _smallest(probability, in_contact), 0.0),
         )
 
-    def _finger(self, seen: RecordingFeatures, finger: str) -> tuple[Array, Array]:
-        """Margins and probabilities of a finger; NaN where its classifier is missing."""
-        nothing = np.full(len(seen.times[finger]), np.nan)
-        margins = self.margins.get(finger, nothing)
-        return margins, probability_of(margins + self.thresholds.get(finger, 0.0))
+    def _unit_scores(self, unit: str, recording: RecordingFeatures) -> tuple[Array, Array]:
+        """Return margins and probabilities of a unit; NaN if it has no classifier."""
+        margins = self.margins.get(unit)
+        if margins is None:
+            margins = np.full(len(recording.times[unit]), np.nan)
+        return margins, probability_of(margins + self.thresholds.get(unit, 0.0))
+
+
+def _smallest(probability: Array, in_contact: Mask) -> Array:
+    """Return the smallest known probability of the units in contact; NaN if there is none."""
+    counted = in_contact & ~np.isnan(probability)
+    smallest = np.where(counted, probability, 1.0).min(axis=0)
+    return np.where(counted.any(axis=0), smallest, np.nan)
 
 
 def probability_of(log_odds: Array) -> Array:
-    """The probabilities of log odds; NaN stays."""
+    """Return the probabilities of log odds. NaN stays NaN."""
     return np.asarray(1.0 / (1.0 + np.exp(-np.clip(log_odds, -50, 50))))
 
 
-def _hold(values: Array, at: npt.NDArray[np.intp]) -> Array:
-    return np.where(at >= 0, values[at], np.nan)
+def _values_at(values: Array, places: npt.NDArray[np.intp]) -> Array:
+    return np.where(places >= 0, values[places], np.nan)
 
 
-def _decide(
-    given: FingerDecisions, margins: Array, probability: Array, free: Mask
+def _decide_finger(
+    labelled: FingerDecisions, margins: Array, probability: Array, in_contact: Mask
 ) -> FingerDecisions:
     known = ~np.isnan(margins)
     stable = np.where(margins >= 0.0, STABLE, UNSTABLE)
-    states = np.select([~known, free], [UNKNOWN, NO_CONTACT], default=stable).astype(np.int8)
+    states = np.select([~known, ~in_contact], [UNKNOWN, NO_CONTACT], default=stable)
     return FingerDecisions(
-        given.times, given.labels, states, np.where(free & known, 0.0, probability)
+        labelled.times,
+        labelled.labels,
+        states.astype(np.int8),
+        np.where(~in_contact & known, 0.0, probability),
     )

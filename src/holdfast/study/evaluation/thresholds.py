@@ -1,8 +1,8 @@
-"""Where a method's threshold has to be for so many false alarms per minute of undisturbed hold.
+"""The threshold at which a method has a given rate of false alarms under a stable label.
 
-A sample that could raise a false alarm raises one where the hand was stable at the sample before
-and is not any more: for just the thresholds above its own score, up to that of the sample
-before. So the false alarms at all thresholds are counted at once.
+A sample that could raise a false alarm raises one if the hand was stable at the sample before and
+is not stable any more. This is so for the thresholds above its own margin, up to the margin of
+the sample before. So the false alarms at all thresholds are counted at once.
 """
 
 from collections.abc import Sequence
@@ -14,68 +14,69 @@ from holdfast.contact import STABLE
 from holdfast.metrics import match_alarms
 from holdfast.metrics.decisions import Codes
 from holdfast.metrics.events import EARLY, LATE, ROUNDING
+from holdfast.metrics.masks import Mask
 from holdfast.sensors.types import Array
-from holdfast.study.evaluation.scores import HandScores, Mask
+from holdfast.study.evaluation.scores import HandScores
 
 
 class FalseAlarmRanges(NamedTuple):
-    """What tells the false alarms of one recording at any threshold.
+    """The ranges of the threshold at which samples of one recording raise false alarms.
 
     Attributes:
-        before: (m,) up to which threshold the hand was stable at the sample before.
-        after: (m,) above which it is not stable at the sample; minus infinity where it holds
-            nothing, infinity where that is not known.
-        minutes: of stable label [min].
+        lower: (m,) the threshold above which the hand is not stable at the sample; minus
+            infinity if the object is not held, infinity if the state is not known.
+        upper: (m,) the threshold up to which the hand was stable at the sample before.
+        minutes: duration of the stable label [min].
     """
 
-    before: Array
-    after: Array
+    lower: Array
+    upper: Array
     minutes: float
 
     @classmethod
-    def of(cls, score: HandScores, labels: Codes, spared: Mask | None = None) -> Self:
-        """The false alarms under a stable label, of a hand.
+    def of(cls, scores: HandScores, labels: Codes, ignored: Mask | None = None) -> Self:
+        """Return the ranges of the false alarms under a stable label.
 
         Args:
-            score: of the hand.
-            labels: (n,) its codes.
-            spared: (n,) where an alarm is not counted.
+            scores: of the hand.
+            labels: (n,) label codes of the hand.
+            ignored: (n,) samples at which an alarm is not counted.
         """
-        found = match_alarms(score.times, labels, labels)
-        calm = labels == STABLE
-        for event in found.events:
-            calm &= (score.times < event.onset - EARLY - ROUNDING) | (
-                score.times > event.end + LATE + ROUNDING
+        match = match_alarms(scores.times, labels, labels)
+        counted = labels == STABLE
+        for event in match.events:
+            counted &= (scores.times < event.onset - EARLY - ROUNDING) | (
+                scores.times > event.end + LATE + ROUNDING
             )
-        if spared is not None:
-            calm &= ~spared
-        nothing = score.known & score.alone
-        after = np.where(nothing, -np.inf, score.least)
-        before = np.where(score.known & ~score.alone, score.least, -np.inf)
-        rows = np.flatnonzero(calm[1:] & (before[:-1] > after[1:]))
-        return cls(before[rows], after[rows + 1], found.stable_seconds / 60)
+        if ignored is not None:
+            counted &= ~ignored
+        lost = scores.known & ~scores.held
+        after = np.where(lost, -np.inf, scores.margin)
+        before = np.where(scores.known & scores.held, scores.margin, -np.inf)
+        rows = np.flatnonzero(counted[1:] & (before[:-1] > after[1:]))
+        return cls(after[rows + 1], before[rows], match.stable_seconds / 60)
 
 
-def threshold_shift(calms: Sequence[FalseAlarmRanges], per_minute: float) -> float:
-    """The most watchful threshold up to which there are never more false alarms than that.
+def threshold_shift(ranges: Sequence[FalseAlarmRanges], per_minute: float) -> float:
+    """Return the highest shift of the threshold with at most this rate of false alarms.
 
-    It goes no further than to the threshold with the most of them: beyond, a hand is hardly
-    ever stable, and has no alarm to give.
+    The rate is not exceeded at any smaller shift either. The search ends at the shift with the
+    most false alarms. Above it a hand is so rarely stable that it has few alarms to raise.
 
     Args:
-        calms: of the recordings that the threshold is chosen on.
-        per_minute: false alarms under a stable label, per minute of it.
+        ranges: of the recordings that the threshold is chosen on.
+        per_minute: false alarms per minute of stable label [1/min].
 
     Returns:
-        How far the threshold is moved [log odds]; minus infinity where alarms by loss of
-        contact alone are too many, 0 where no threshold gives any.
+        The shift [log odds]; minus infinity if the alarms by loss of contact alone are too many,
+        0 if there is no false alarm at any threshold.
     """
-    before = np.sort(np.concatenate([each.before for each in calms]))
-    after = np.sort(np.concatenate([each.after for each in calms]))
-    edges = np.unique(np.concatenate([before, after]))
+    upper = np.sort(np.concatenate([each.upper for each in ranges]))
+    lower = np.sort(np.concatenate([each.lower for each in ranges]))
+    edges = np.unique(np.concatenate([upper, lower]))
     if not len(edges):
         return 0.0
-    n_alarms = np.searchsorted(after, edges, "right") - np.searchsorted(before, edges, "right")
-    too_many = n_alarms > per_minute * sum(each.minutes for each in calms)
+    n_alarms = np.searchsorted(lower, edges, "right") - np.searchsorted(upper, edges, "right")
+    too_many = n_alarms > per_minute * sum(each.minutes for each in ranges)
     last = int(np.argmax(too_many)) if too_many.any() else int(np.argmax(n_alarms)) + 1
     return float(edges[last])

@@ -1,4 +1,4 @@
-"""What is changed in recordings before they train or test: noise, rate, the margin of labels."""
+"""Variations of recordings before training and testing: noise, sampling rate, label margin."""
 
 import zlib
 from dataclasses import replace
@@ -11,14 +11,14 @@ from holdfast.twin.labels import LabelRule, labels_from_truth
 
 
 class Variation(msgspec.Struct, frozen=True):
-    """How recordings are changed; nothing is, by default.
+    """A variation of recordings. The default changes nothing.
 
     Attributes:
-        noise: standard deviation of white noise that every reading gets [unit of the readings];
-            counts stay whole.
-        every: only every n-th sample is taken: a slower sensor of the same kind.
-        margin: by which labels out of the truth draw disturbances longer at both ends [s]; None
-            for the labels as they are.
+        noise: standard deviation of white noise added to every reading [unit of the readings].
+            Counts stay integers.
+        every: keep only every n-th sample, as a slower sensor of the same kind gives them.
+        margin: time by which labels made from the truth extend disturbances at both ends [s].
+            None keeps the labels of the recording.
     """
 
     noise: float = 0.0
@@ -26,19 +26,19 @@ class Variation(msgspec.Struct, frozen=True):
     margin: float | None = None
 
     def apply(self, recording: Recording) -> Recording:
-        """The recording, changed; the same whenever it is asked for."""
+        """Return the varied recording. The same recording always gets the same noise."""
         if self.margin is not None:
-            recording = relabelled(recording, self.margin)
+            recording = relabel(recording, self.margin)
         if self == Variation(margin=self.margin):
             return recording
         seed = zlib.crc32(recording.name.encode())
         modules = {
-            name: self._module(module, np.random.default_rng([seed, place]))
+            name: self._vary_module(module, np.random.default_rng([seed, place]))
             for place, (name, module) in enumerate(recording.modules.items())
         }
         return replace(recording, modules=modules)
 
-    def _module(self, module: Tactile, generator: np.random.Generator) -> Tactile:
+    def _vary_module(self, module: Tactile, generator: np.random.Generator) -> Tactile:
         readings = np.asarray(module.readings, dtype=np.float64)
         if self.noise:
             readings = readings + generator.normal(0.0, self.noise, size=readings.shape)
@@ -51,8 +51,15 @@ class Variation(msgspec.Struct, frozen=True):
         )
 
 
-def relabelled(recording: Recording, margin: float) -> Recording:
-    """The recording with labels out of its truth; as it is, where it has none."""
+def relabel(recording: Recording, margin: float) -> Recording:
+    """Return the recording with labels made from its truth.
+
+    A recording without a truth is returned unchanged. So are fingers without a truth.
+
+    Args:
+        recording: to label.
+        margin: time by which labels extend disturbances at both ends [s].
+    """
     truth = recording.truth
     if truth is None or not {"phase", "outside_force"} <= set(truth.hand):
         return recording

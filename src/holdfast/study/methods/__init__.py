@@ -1,19 +1,18 @@
-"""Ways of judging contacts that the study compares; one file each."""
+"""The methods that the study compares, in one file for each family."""
 
-from holdfast.study.methods.anyskin import ANYSKIN
-from holdfast.study.methods.difference import DIFFERENCE
-from holdfast.study.methods.friction import FRICTION
-from holdfast.study.methods.grover import TCN
+from holdfast.study.methods.force_rules import DIFFERENCE, FRICTION, TANGENTIAL
 from holdfast.study.methods.holdfast import HOLDFAST
-from holdfast.study.methods.james_lepora import JAMES_LEPORA
-from holdfast.study.methods.method import HAND, Method
-from holdfast.study.methods.paper import LOGREG, SVM
-from holdfast.study.methods.signals import FingerSignal, HandSignal, hand_signal, stretchwise
-from holdfast.study.methods.slip_servo import SLIP_SERVO
-from holdfast.study.methods.spectrum import SPECTRUM
-from holdfast.study.methods.tangential import TANGENTIAL
-from holdfast.study.methods.trees import TREES
-from holdfast.study.methods.wavelets import ZHANG
+from holdfast.study.methods.learning import ANYSKIN, JAMES_LEPORA, TCN
+from holdfast.study.methods.method import (
+    HAND,
+    FingerSignal,
+    HandSignal,
+    Method,
+    hand_signal,
+    stretchwise,
+)
+from holdfast.study.methods.vibration import SLIP_SERVO, SPECTRUM
+from holdfast.study.methods.wavelets import LOGREG, SVM, TREES, ZHANG
 
 METHODS: dict[str, Method] = {
     each.name: each
@@ -33,6 +32,7 @@ METHODS: dict[str, Method] = {
         TREES,
     )
 }
+"""All methods by name, in the order of the tables."""
 
 __all__ = [
     "HAND",

@@ -1,34 +1,142 @@
-"""What a method is: features of a hand, and a way of fitting a classifier to them."""
+"""What a method is: features of a hand, and a way to fit a classifier to them.
 
-from collections.abc import Callable, Mapping
+Every method starts from a `HandSignal`: the tared readings and forces of the fingers of one
+recording.
+"""
+
+from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass
+from functools import cached_property
+from itertools import pairwise
 from typing import Literal
 
+import numpy as np
+from numpy.lib.stride_tricks import sliding_window_view
+
 from holdfast.classifiers import Parameters, Recipe
+from holdfast.features import Tare
+from holdfast.features.force import tared_force
+from holdfast.features.kernel import GAP_LIMIT_PERIODS
+from holdfast.recordings import Recording, Tactile
+from holdfast.sensors import Sensor
 from holdfast.sensors.types import Array
-from holdfast.study.methods.signals import HandSignal
 
 HAND = "hand"
-"""Key of the features of a method that judges the hand as a whole."""
+"""Key of the features of a whole-hand method."""
+
+NEWTONS_PER_COUNT = 0.000729
+"""Of a uSkin taxel along its normal, by the data sheet of the uSPa46 [N/count]."""
 
 Category = Literal["paper", "friction", "vibration", "differentiation", "learning", "holdfast"]
 
 
-@dataclass(frozen=True)
-class Method:
-    """A way of judging contacts, as the study compares them: features, then a classifier.
+@dataclass(frozen=True, eq=False)
+class FingerSignal:
+    """The tared readings and the force of one finger over one recording.
 
     Attributes:
-        name: as in tables and files.
-        title: as in the report.
-        category: as in the paper's review of methods.
-        source: where it is from, and what was changed.
-        features: from a hand to (n, n_features) of each finger, one row a sample, causal; NaN
-            where there are none. A method that judges the hand as a whole gives one array
-            under `HAND`, at the times of its first finger.
-        recipe: how its classifier is fitted.
+        sensor: of the finger.
+        times: (n,) [s].
+        readings: (n, n_taxels, 3) in taxel frames, less the tare [unit of the readings].
+        force: (n, 3) F_tip [unit of the readings]; NaN until the tare is complete, and at
+            samples with a reading that is not finite.
+        rate: samples per second [Hz].
+    """
+
+    sensor: Sensor
+    times: Array
+    readings: Array
+    force: Array
+    rate: float
+
+    @property
+    def amplitude(self) -> Array:
+        """F_a = |F_tip|, (n,)."""
+        return np.asarray(np.linalg.norm(self.force, axis=1))
+
+    @property
+    def normal_force(self) -> Array:
+        """Force along the normal of the fingertip, the paper's F_x, (n,)."""
+        return np.asarray(self.force @ self.sensor.normal)
+
+    @property
+    def normal_magnitude(self) -> Array:
+        """|F_n|, (n,)."""
+        return np.abs(self.normal_force)
+
+    @property
+    def tangential_magnitude(self) -> Array:
+        """|F_t|, the magnitude of the force without its normal component, (n,)."""
+        normal = self.sensor.normal
+        tangential = self.force - np.outer(self.force @ normal, normal)
+        return np.asarray(np.linalg.norm(tangential, axis=1))
+
+    @property
+    def units_per_newton(self) -> float:
+        """One newton in the unit of the readings, for published constants in newtons.
+
+        Counts are converted as counts of a uSkin, whatever the sensor: for most other sensors
+        nothing is published.
+        """
+        return 1.0 if self.sensor.unit == "N" else 1.0 / NEWTONS_PER_COUNT
+
+    @cached_property
+    def stretches(self) -> tuple[slice, ...]:
+        """The unbroken stretches: known forces without a gap longer than 3 sample periods."""
+        known = np.isfinite(self.force.sum(axis=1))
+        broken = np.diff(self.times) > GAP_LIMIT_PERIODS / self.rate
+        edges = np.flatnonzero(broken | (known[1:] != known[:-1])) + 1
+        bounds = [0, *edges.tolist(), len(known)]
+        return tuple(slice(a, b) for a, b in pairwise(bounds) if b > a and known[a])
+
+    def part(self, rows: slice) -> "FingerSignal":
+        """Return the signal of some samples."""
+        return FingerSignal(
+            self.sensor, self.times[rows], self.readings[rows], self.force[rows], self.rate
+        )
+
+
+@dataclass(frozen=True, eq=False)
+class HandSignal:
+    """The signals of the fingers of one recording.
+
+    Attributes:
+        recording: the signals come from.
+        tare: that was subtracted.
+        fingers: signals by name.
+    """
+
+    recording: Recording
+    tare: Tare
+    fingers: Mapping[str, FingerSignal]
+
+    @property
+    def rate(self) -> float:
+        """Samples per second [Hz]."""
+        return self.recording.rate
+
+    def each_stretch(self, name: str) -> Iterator[tuple[slice, FingerSignal]]:
+        """Yield the rows and the signal of each unbroken stretch of a finger."""
+        finger = self.fingers[name]
+        for rows in finger.stretches:
+            yield rows, finger.part(rows)
+
+
+@dataclass(frozen=True)
+class Method:
+    """A method that the study compares: features, then a classifier.
+
+    Attributes:
+        name: in files and in the code.
+        title: in tables and figures.
+        category: in the paper's review of methods.
+        source: publication, and what differs from it here.
+        features: function from a hand to (n, n_features) of each finger, one row a sample,
+            causal; NaN where there are none. A whole-hand method returns one array under
+            `HAND`, at the times of the first finger.
+        recipe: fits the classifier.
         parameters: of the recipe; None for its reference setting.
-        whole_hand: whether it judges the hand as a whole.
+        whole_hand: whether the method decides for the hand as a whole.
     """
 
     name: str
@@ -42,5 +150,64 @@ class Method:
 
     @property
     def reference(self) -> Parameters:
-        """The parameters that it is fitted with."""
+        """The parameters of the fit."""
         return self.recipe.reference if self.parameters is None else self.parameters
+
+
+def hand_signal(
+    recording: Recording, tare: Tare, fingers: tuple[str, ...] | None = None
+) -> HandSignal:
+    """Return the signals of some fingers of a recording.
+
+    Args:
+        recording: of any sensors.
+        tare: how the baseline is found.
+        fingers: names; by default all fingers that have labels.
+    """
+    names = fingers or tuple(name for name, module in recording.modules.items() if module.labels)
+    modules = {name: recording.modules[name] for name in names}
+    signals = {n: _finger_signal(module, tare, recording.rate) for n, module in modules.items()}
+    return HandSignal(recording, tare, signals)
+
+
+def _finger_signal(module: Tactile, tare: Tare, rate: float) -> FingerSignal:
+    tared = tared_force(module, tare, rate)
+    readings = np.asarray(module.readings, dtype=np.float64) - tared.baseline
+    return FingerSignal(module.sensor, module.times, readings, tared.force, rate)
+
+
+def stretchwise(hand: HandSignal, function: Callable[[FingerSignal], Array]) -> dict[str, Array]:
+    """Return features of every finger, computed for each unbroken stretch; NaN elsewhere.
+
+    Args:
+        hand: gives the fingers.
+        function: from a signal of n samples to (n, n_features). It is called with n = 0 too,
+            for the number of features of a finger without a stretch.
+    """
+    found = {}
+    for name, finger in hand.fingers.items():
+        n_features = function(finger.part(slice(0, 0))).shape[1]
+        features = np.full((len(finger.times), n_features), np.nan)
+        for rows, stretch in hand.each_stretch(name):
+            features[rows] = function(stretch)
+        found[name] = features
+    return found
+
+
+def windowed(values: Array, window: int, function: Callable[[Array], Array]) -> Array:
+    """Return a function of the window that ends at each sample; NaN without a full window.
+
+    Args:
+        values: (n, ...) of one unbroken stretch.
+        window: samples in a window.
+        function: from (m, ..., window) windows, oldest sample first, to (m, n_features); m may
+            be 0.
+
+    Returns:
+        (n, n_features).
+    """
+    padding = np.zeros((max(window - len(values), 0), *values.shape[1:]))
+    windows = sliding_window_view(np.concatenate([padding, values]), window, axis=0)
+    found = function(windows[len(padding) > 0 :])
+    empty = np.full((len(values) - len(found), found.shape[1]), np.nan)
+    return np.concatenate([empty, found])

@@ -13,13 +13,12 @@ import numpy as np
 import numpy.typing as npt
 
 from holdfast.classifiers import Samples
-from holdfast.contact import STABLE, UNKNOWN
 from holdfast.features import FEATURE_NAMES, Tare, haar_features
 from holdfast.sensors.types import Array
 from holdfast.study.methods import FingerSignal, hand_signal
 from holdfast.study.methods.wavelets import detail_energy
 from holdfast.study.plan import Corpus
-from holdfast.training.design import at_rate
+from holdfast.training.design import at_rate, concatenate, labelled_samples, usable_rows
 
 N_PARTS = 25
 
@@ -60,26 +59,20 @@ def pooled(corpus: Corpus, rate: float, finger: str, window: int, seed: int) -> 
         window: N_w.
         seed: of the parts.
     """
-    features, stable, groups, parts = [], [], [], []
+    samples = [Samples(np.empty((0, len(COLUMNS))), np.empty(0, bool), np.empty(0, np.int64))]
+    parts = [np.empty(0, dtype=np.int64)]
     hands = _hands(corpus, rate)
     for place, hand in enumerate(hands):
         if finger not in hand.fingers:
             continue
         signal, states = hand.fingers[finger]
-        rows = _columns(signal, window)
-        kept = (states != UNKNOWN) & np.isfinite(rows).all(axis=1)
-        features.append(rows[kept])
-        stable.append(states[kept] == STABLE)
-        groups.append(np.full(int(kept.sum()), place))
+        features = _columns(signal, window)
+        rows = usable_rows(features, states)
+        samples.append(labelled_samples(features, states, rows, place))
         drawn = np.random.default_rng([seed, place]).integers(N_PARTS, size=len(states))
-        parts.append(drawn[kept])
-    samples = Samples(
-        np.concatenate([np.empty((0, len(COLUMNS))), *features]),
-        np.concatenate([np.empty(0, dtype=bool), *stable]),
-        np.concatenate([np.empty(0, dtype=np.int64), *groups]),
-    )
-    drawn = np.concatenate([np.empty(0, dtype=np.int64), *parts])
-    return Pool(samples, drawn, tuple(hand.object for hand in hands))
+        parts.append(drawn[rows])
+    objects = tuple(hand.object for hand in hands)
+    return Pool(concatenate(samples), np.concatenate(parts), objects)
 
 
 class _Hand(NamedTuple):
@@ -115,7 +108,7 @@ def _without_readings(signal: FingerSignal) -> FingerSignal:
 def _columns(signal: FingerSignal, window: int) -> Array:
     """(n, 7) all `COLUMNS`; NaN without a full window."""
     table = np.full((len(signal.times), len(COLUMNS)), np.nan)
-    normal = signal.normal
+    normal = signal.normal_magnitude
     for rows in signal.stretches:
         table[rows, :-1] = haar_features(signal.force[rows], window)
         table[rows, -1] = detail_energy(normal[rows], window)

@@ -17,6 +17,7 @@ from holdfast.metrics.statistics import percent
 from holdfast.study.paper.pooled_samples import Integers, Pool, pooled
 from holdfast.study.plan import Corpus
 from holdfast.study.report.result_tables import Row
+from holdfast.training.design import thin, thinning_step
 from holdfast.training.setting import SEARCH_SAMPLES
 from holdfast.training.splits import inner_folds
 from holdfast.training.tuning import search
@@ -113,13 +114,6 @@ def judge(
     return [_judge(main, tests, kind, effort, seed, thorough) for kind in kinds]
 
 
-def spread(samples: Samples, n: int) -> Samples:
-    """At most n samples, evenly spread."""
-    step = max(1, -(-len(samples.stable) // n))
-    features, stable, groups = samples
-    return Samples(features[::step], stable[::step], groups[::step])
-
-
 @dataclass(frozen=True)
 class _Fit:
     """A way of fitting, ready for samples."""
@@ -130,7 +124,7 @@ class _Fit:
     seed: int
 
     def __call__(self, samples: Samples) -> Classifier:
-        taken = ungrouped(spread(samples, self.n_fit))
+        taken = ungrouped(thin(samples, self.n_fit))
         return self.recipe.fit(taken, self.parameters, self.seed)
 
     def out_of_fold(
@@ -178,7 +172,7 @@ def _judge(
         classifier,
         tuple(names),
         dict(parameters),
-        len(spread(train, effort.n_fit).stable),
+        len(thin(train, effort.n_fit).stable),
         {on: counts[on].tolist() for on in ON if on in counts},
     )
 
@@ -202,8 +196,8 @@ def _search(train: Samples, folds: Integers, how: Recipe, trials: int, seed: int
     """The hyper-parameters by Bayesian optimisation over random folds, as the paper's toolbox."""
     if not how.reference:
         return {}
-    few = ungrouped(spread(train, SEARCH_SAMPLES))
-    step = max(1, -(-len(folds) // SEARCH_SAMPLES))
+    few = ungrouped(thin(train, SEARCH_SAMPLES))
+    step = thinning_step(len(folds), SEARCH_SAMPLES)
     masks = [folds[::step] == fold for fold in range(N_FOLDS)]
     return search(few, masks, how, n_trials=trials, seed=seed)
 

@@ -1,1 +1,1 @@
-"""What a reader gets: tables, figures, the page and the folder."""
+"""Tables, the HTML report and the folder of a study."""

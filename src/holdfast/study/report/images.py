@@ -1,33 +1,33 @@
-"""matplotlib figures as files and as parts of an HTML document."""
+"""Matplotlib figures as files and as elements of an HTML document."""
 
 import base64
-import html
 import io
 import re
+from typing import NamedTuple
 
 import matplotlib as mpl
 from matplotlib.figure import Figure
 
-LARGEST_SVG = 400_000
-"""Above this many bytes a report holds the PNG instead."""
-SHARP = 200
-"""Resolution of a PNG [dots per inch]."""
+MAX_INLINE_SVG = 400_000
+"""A larger SVG [bytes] is replaced by a PNG in the report."""
+PNG_RESOLUTION = 200
+"""Of a PNG [dots per inch]."""
 
 _ID = re.compile(r'(?<= id=")(?=[^"]+")')
 _REFERENCE = re.compile(r'(?<=url\(#)|(?<=href="#)')
 _OPENING = re.compile(r'<svg [^>]*?viewBox="([^"]*)"[^>]*>')
 _PATH = re.compile(r' d="[^"]*"')
-_LONG = re.compile(r"(?<=\.\d\d)\d+")
+_EXTRA_DIGITS = re.compile(r"(?<=\.\d\d)\d+")
 """Digits beyond 0.01 pt."""
-_USELESS = re.compile(r"<metadata>.*?</metadata>|<style.*?</style>|<!--.*?-->", re.DOTALL)
+_NOT_NEEDED = re.compile(r"<metadata>.*?</metadata>|<style.*?</style>|<!--.*?-->", re.DOTALL)
 
 
 def svg_of(figure: Figure, name: str) -> str:
-    """The figure as an SVG document, the same for the same figure and name.
+    """Return the figure as an SVG document, the same for the same figure and name.
 
     Args:
         figure: to write.
-        name: what its inner names are made from.
+        name: from which the ids of its elements are made.
     """
     file = io.StringIO()
     with mpl.rc_context({"svg.hashsalt": name, "svg.fonttype": "path"}):
@@ -36,40 +36,45 @@ def svg_of(figure: Figure, name: str) -> str:
 
 
 def png_of(figure: Figure) -> bytes:
-    """The figure as a PNG."""
+    """Return the figure as a PNG file."""
     file = io.BytesIO()
-    figure.savefig(file, format="png", dpi=SHARP, metadata={"Software": None})
+    figure.savefig(file, format="png", dpi=PNG_RESOLUTION, metadata={"Software": None})
     return file.getvalue()
 
 
-def inline_image(figure: Figure, name: str, title: str) -> str:
-    """The figure as a part of an HTML document: SVG, or PNG where that would be large.
+class InlineImage(NamedTuple):
+    """A figure inside an HTML document.
+
+    Attributes:
+        view_box: of the `svg` element.
+        svg: contents of the `svg` element and its end; empty if the image is a PNG.
+        png: of an `img` element, in base64; empty if the image is an SVG.
+    """
+
+    view_box: str
+    svg: str
+    png: str
+
+
+def inline_image(figure: Figure, name: str) -> InlineImage:
+    """Return the figure for an HTML document: as SVG, or as PNG if the SVG would be large.
 
     Args:
         figure: to draw.
-        name: begins every id within, so that they do not meet those of other figures.
-        title: for those who do not see it.
-
-    Returns:
-        An `svg` or an `img` element.
+        name: begins every id of the SVG, so that ids of two figures differ.
     """
-    svg = inline_svg(svg_of(figure, name), name, title)
-    if len(svg) <= LARGEST_SVG:
-        return svg
-    data = base64.b64encode(png_of(figure)).decode()
-    return f'<img alt="{html.escape(title)}" src="data:image/png;base64,{data}">\n'
+    view_box, svg = _svg_contents(svg_of(figure, name), name)
+    if len(svg) <= MAX_INLINE_SVG:
+        return InlineImage(view_box, svg, "")
+    return InlineImage("", "", base64.b64encode(png_of(figure)).decode())
 
 
-def inline_svg(document: str, name: str, title: str) -> str:
-    """An SVG document as an element of HTML: no prologue, no metadata, ids of its own."""
+def _svg_contents(document: str, name: str) -> tuple[str, str]:
+    """Return the viewBox and the contents of an SVG document, without metadata."""
     opening = _OPENING.search(document)
     if opening is None:
-        raise ValueError(f"figure {name}: no SVG with a viewBox")
-    inner = _USELESS.sub("", document[opening.end() :]).replace("xlink:href", "href")
+        raise ValueError(f"figure {name}: an SVG with a viewBox expected, none given")
+    inner = _NOT_NEEDED.sub("", document[opening.end() :]).replace("xlink:href", "href")
     inner = re.sub(r"\n\s*", "\n", inner)
-    inner = _PATH.sub(lambda path: _LONG.sub("", path[0]), inner)
-    inner = _REFERENCE.sub(f"{name}-", _ID.sub(f"{name}-", inner))
-    return (
-        f'<svg role="img" aria-label="{html.escape(title)}" viewBox="{opening[1]}" '
-        f'style="stroke-linejoin:round;stroke-linecap:butt">{inner}'
-    )
+    inner = _PATH.sub(lambda path: _EXTRA_DIGITS.sub("", path[0]), inner)
+    return opening[1], _REFERENCE.sub(f"{name}-", _ID.sub(f"{name}-", inner))

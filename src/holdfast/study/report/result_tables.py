@@ -1,7 +1,7 @@
-"""Tables of the study: tidy rows, and how they are laid out and written as data.
+"""Tables of the study: rows of values, and how they are written as data.
 
-One row is one figure: what it is about, ours, the paper's. CSV and JSON write the rows as they
-are; `holdfast.study.report.table_layouts` lays them out, lines by columns, for people.
+A row is one value: what it is about, ours, the paper's. CSV and JSON write the rows as they are;
+`holdfast.study.report.table_layouts` lays them out as lines and columns.
 """
 
 import csv
@@ -14,22 +14,22 @@ from typing import Any, NamedTuple
 import msgspec
 
 Key = str | int | float
-MEASURED = ("ours", "paper", "difference", "n", "low", "high", "interval", "infinite")
-"""Names of a row's own columns: keys are called otherwise."""
+RESERVED_KEYS = ("ours", "paper", "difference", "n", "low", "high", "interval", "infinite")
+"""Names of a row's own columns, which no key may have."""
 FILE_NAME = re.compile(r"[A-Za-z0-9][A-Za-z0-9_-]*")
-NOTHING = "–"
+MISSING = "–"
 INFINITE = "infinite"
 MINUS = "−"
 
 
 class Row(msgspec.Struct, frozen=True):
-    """One figure.
+    """One value of a table.
 
     Attributes:
         keys: what it is about: {"classifier": "LogReg", "figure": "accuracy [%]"}.
-        ours: None or NaN where there is none; infinity for a delay that never ends.
-        paper: what the paper prints.
-        n: recordings that it rests on.
+        ours: our value; None or NaN if there is none, infinity for a delay that never ends.
+        paper: the value in the paper.
+        n: number of recordings behind the value.
         interval: 95 %, by bootstrap over recordings; an end may be None or infinite.
     """
 
@@ -41,7 +41,7 @@ class Row(msgspec.Struct, frozen=True):
 
     @property
     def difference(self) -> float | None:
-        """Ours less the paper's, where both are finite."""
+        """Ours minus the paper's, if both are finite."""
         if self.ours is None or self.paper is None:
             return None
         difference = round(self.ours - self.paper, 9)
@@ -49,21 +49,21 @@ class Row(msgspec.Struct, frozen=True):
 
 
 class ResultTable(msgspec.Struct, frozen=True):
-    """Rows that belong together, and how they are laid out.
+    """Rows of one table, and how they are laid out.
 
     Attributes:
         name: of its files: letters, digits, "-" and "_".
         title: of one line.
-        note: what a reader must know to read it.
+        note: explanation for the reader.
         rows: in the order in which lines and columns appear.
-        lines: keys that name a line when laid out.
-        column: key that is spread over the columns.
-        digits: behind the point.
-        digits_of: of single columns, where they differ.
+        lines: keys that name a line of the layout.
+        column: key whose values are the columns of the layout.
+        digits: after the decimal point.
+        digits_of: the same of single columns that differ.
 
     Raises:
-        ValueError: a name that is no file name, no keys that name a line, a key with the name
-            of a measured column, a row without its column, or two rows for one cell.
+        ValueError: the name is no file name, no key names a line, a key has a reserved name, a
+            row has no column, or two rows have the same cell.
     """
 
     name: str
@@ -80,9 +80,9 @@ class ResultTable(msgspec.Struct, frozen=True):
             raise ValueError(f"a table's name is letters, digits, - and _; {self.name!r} given")
         if not self.lines:
             raise ValueError(f"table {self.name}: no key names its lines")
-        taken = [key for key in _keys(self.rows) if key in MEASURED]
-        if taken:
-            raise ValueError(f"table {self.name}: a key may not be called {taken[0]!r}")
+        reserved = [key for key in _keys(self.rows) if key in RESERVED_KEYS]
+        if reserved:
+            raise ValueError(f"table {self.name}: a key may not be called {reserved[0]!r}")
         seen = set()
         for row in self.rows:
             if self.column not in row.keys:
@@ -93,11 +93,11 @@ class ResultTable(msgspec.Struct, frozen=True):
 
 
 class TableLine(NamedTuple):
-    """A line of a table that is laid out.
+    """A line of a layout.
 
     Attributes:
-        heads: what it is about, one text for each of the table's `lines`.
-        cells: the row of each column, None where there is none.
+        heads: what the line is about, one text for each of the table's `lines`.
+        cells: the row of each column, None if there is none.
     """
 
     heads: tuple[str, ...]
@@ -105,14 +105,14 @@ class TableLine(NamedTuple):
 
 
 class TableGrid(NamedTuple):
-    """A table laid out: lines by columns, in the order in which they first appear."""
+    """A table as lines and columns, in the order in which they first appear."""
 
     columns: tuple[str, ...]
     lines: tuple[TableLine, ...]
 
 
 def pivot(table: ResultTable) -> TableGrid:
-    """The table as lines by columns; lines that begin alike stand together.
+    """Return the table as lines and columns; lines with the same first head are adjacent.
 
     Example:
         >>> rows = [Row({"finger": "index", "figure": "Acc"}, 94.2),
@@ -131,14 +131,14 @@ def pivot(table: ResultTable) -> TableGrid:
         columns[column] = None
     firsts = list(dict.fromkeys(heads[0] for heads in cells))
     lines = (
-        TableLine(heads, tuple(found.get(column) for column in columns))
-        for heads, found in sorted(cells.items(), key=lambda item: firsts.index(item[0][0]))
+        TableLine(heads, tuple(by_column.get(column) for column in columns))
+        for heads, by_column in sorted(cells.items(), key=lambda item: firsts.index(item[0][0]))
     )
     return TableGrid(tuple(columns), tuple(lines))
 
 
 def number_text(value: float | None, digits: int, *, signed: bool = False) -> str:
-    """A number for people: a dash for none, "infinite", a true minus.
+    """Return a number as text: a dash if there is none, "infinite", a typographic minus.
 
     Example:
         >>> number_text(94.25, 1), number_text(None, 1), number_text(float("inf"), 3)
@@ -147,7 +147,7 @@ def number_text(value: float | None, digits: int, *, signed: bool = False) -> st
         ('0.0', '−1.3')
     """
     if value is None or math.isnan(value):
-        return NOTHING
+        return MISSING
     if math.isinf(value):
         return INFINITE if value > 0 else MINUS + INFINITE
     text = f"{value:+.{digits}f}" if signed else f"{value:.{digits}f}"
@@ -157,24 +157,24 @@ def number_text(value: float | None, digits: int, *, signed: bool = False) -> st
 
 
 def digits_of(table: ResultTable, column: str) -> int:
-    """How many digits a column shows behind the point."""
+    """Return how many digits a column shows after the decimal point."""
     return table.digits_of.get(column, table.digits)
 
 
 def to_json(table: ResultTable) -> list[dict[str, Any]]:
-    """The rows as JSON takes them: keys beside `ours`, `paper`, `difference`, `n`, `interval`.
+    """Return the rows for JSON: their keys, `ours`, `paper`, `difference`, `n`, `interval`.
 
-    JSON has no infinity: it is null, as in every output of the commands, and a row whose `ours`
-    is infinite says `"infinite": true`.
+    JSON has no infinity: it is null, as in every output of the commands. A row whose `ours` is
+    infinite has `"infinite": true`.
     """
     return [_flat(row) for row in table.rows]
 
 
 def to_csv(table: ResultTable) -> str:
-    """The rows as comma-separated text with a header.
+    """Return the rows as comma-separated text with a header.
 
-    Columns are the keys, then `ours,paper,difference,n,low,high`; an empty field is unknown,
-    `inf` infinite.
+    The columns are the keys, then `ours,paper,difference,n,low,high`. An empty field is unknown,
+    `inf` is infinite.
     """
     keys = _keys(table.rows)
     file = io.StringIO()
@@ -184,7 +184,7 @@ def to_csv(table: ResultTable) -> str:
         low, high = row.interval or (None, None)
         values = (row.ours, row.paper, row.difference, row.n, low, high)
         writer.writerow(
-            [*(row.keys.get(key, "") for key in keys), *(_known(value) for value in values)]
+            [*(row.keys.get(key, "") for key in keys), *(_csv_field(value) for value in values)]
         )
     return file.getvalue()
 
@@ -207,17 +207,17 @@ def _json_key(value: Key) -> Key | None:
     return _finite(value) if isinstance(value, float) else value
 
 
-def _known(value: float | None) -> float | str:
+def _csv_field(value: float | None) -> float | str:
     return "" if value is None or math.isnan(value) else value
 
 
 def _keys(rows: Iterable[Row]) -> list[str]:
-    """All keys, in the order in which they first appear."""
+    """Return all keys, in the order in which they first appear."""
     return list(dict.fromkeys(key for row in rows for key in row.keys))
 
 
 def _cell(table: ResultTable, row: Row) -> tuple[str, ...]:
-    """Where the row stands: the heads of its line, and its column."""
+    """Return the position of a row in the layout: the heads of its line, and its column."""
     return tuple(_head(row.keys, key) for key in (*table.lines, table.column))
 
 

@@ -1,17 +1,17 @@
-"""Tables laid out for people: HTML, LaTeX and Markdown.
+"""Layouts of tables for people: HTML, LaTeX and Markdown.
 
-Each cell holds ours, the interval, and where there is one the paper's figure with the
-difference, ours less the paper's.
+Each cell holds our value and its interval, and where there is one the paper's value with the
+difference, ours minus the paper's.
 """
 
-import html
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Iterable
+from typing import NamedTuple
 
-from holdfast.study.report.escape import as_html, as_latex, as_markdown
+from holdfast.study.report.rendering import escape_markdown, render
 from holdfast.study.report.result_tables import (
     INFINITE,
     MINUS,
-    NOTHING,
+    MISSING,
     ResultTable,
     Row,
     TableLine,
@@ -20,210 +20,185 @@ from holdfast.study.report.result_tables import (
     pivot,
 )
 
-N = "recordings"
-"""Head of the column that says how many recordings a line rests on."""
-PAPER = "paper"
-DIFFERENCE = "difference"
-INTERVALS = "Small print: 95 % interval, by bootstrap over recordings."
-PAPERS = "Paper: what it prints, and ours less that."
-WIDE = 7
-"""A LaTeX table with more columns goes over both columns of a page."""
+N_RECORDINGS = "recordings"
+"""Head of the column with the number of recordings of each line."""
+INTERVAL_NOTE = "Small print: 95 % interval, by bootstrap over recordings."
+PAPER_NOTE = "Paper: the value in the paper, and our value minus it."
+WIDE_COLUMNS = 7
+"""A LaTeX table with more columns is as wide as both columns of a page."""
+
+
+class CellText(NamedTuple):
+    """Texts of a cell; empty where there is nothing to print.
+
+    Attributes:
+        ours: our value.
+        interval: of our value.
+        paper: the paper's value.
+        difference: ours minus the paper's.
+        exists: whether the table has a row for this cell.
+    """
+
+    ours: str = MISSING
+    interval: str = ""
+    paper: str = ""
+    difference: str = ""
+    exists: bool = False
+
+    @property
+    def paper_text(self) -> str:
+        """The paper's value, with the difference in parentheses."""
+        return f"{self.paper} ({self.difference})" if self.difference else self.paper
+
+
+class LineText(NamedTuple):
+    """Texts of a line.
+
+    Attributes:
+        heads: what the line is about.
+        n_repeated: number of first heads that are as in the line above.
+        cells: one for each value column.
+        n_recordings: number of recordings, if the table has a column for it; else empty.
+    """
+
+    heads: list[str]
+    n_repeated: int
+    cells: list[CellText]
+    n_recordings: list[str]
+
+    @property
+    def shown_heads(self) -> list[str]:
+        """Heads, empty where they repeat those above."""
+        return [""] * self.n_repeated + self.heads[self.n_repeated :]
+
+    def texts(self, name: str) -> list[str]:
+        """Return one text of each cell, by its name."""
+        return [str(getattr(cell, name)) for cell in self.cells]
+
+
+class TableText(NamedTuple):
+    """All texts of a table.
+
+    Attributes:
+        name: of its files.
+        title: of one line.
+        keys: heads of the columns that say what a line is about.
+        over: name of what the value columns vary; empty if their heads are clear without it.
+        columns: heads of the value columns, and of the number of recordings if it varies.
+        n_values: number of value columns.
+        lines: of the body.
+        notes: below the table.
+    """
+
+    name: str
+    title: str
+    keys: list[str]
+    over: str
+    columns: list[str]
+    n_values: int
+    lines: list[LineText]
+    notes: list[str]
 
 
 def to_html(table: ResultTable, number: int | None = None) -> str:
-    """The table as an HTML `figure`: caption above, note below.
+    """Return the table as an HTML `figure`: caption above, notes below.
 
     Args:
         table: to lay out.
-        number: in a report, told in the caption.
+        number: of the table in a report.
     """
-    grid = pivot(table)
-    counted = _n_varies(table)
-    heads = [f'<th scope="col">{as_html(key)}</th>' for key in table.lines]
-    columns = [*grid.columns, *[N] * counted]
-    heads += [f'<th scope="col" class="value">{as_html(column)}</th>' for column in columns]
-    body: list[str] = []
-    for before, line in zip((None, *grid.lines), grid.lines, strict=False):
-        cells = [
-            _html_cell(row, digits_of(table, column))
-            for column, row in zip(grid.columns, line.cells, strict=True)
-        ]
-        cells += [f'<td class="n">{_n_text(line.cells)}</td>'] * counted
-        body.append(_html_line(line, before, cells))
-    label = "" if number is None else f'<span class="number">Table {number}.</span> '
-    return (
-        f'<figure class="table" id="table-{table.name}">\n'
-        f"<figcaption>{label}{as_html(table.title)}</figcaption>\n"
-        f'<div class="scroll" tabindex="0" role="region" aria-label="{html.escape(table.title)}">\n'
-        f"<table>\n<thead>{_html_over(table, len(grid.columns))}<tr>{''.join(heads)}</tr></thead>\n"
-        "<tbody>\n"
-        + "\n".join(body)
-        + "\n</tbody>\n</table>\n</div>\n"
-        + "".join(f'<p class="note">{as_html(note)}</p>\n' for note in notes(table))
-        + "</figure>\n"
-    )
+    return render("table.html", table=table_text(table), number=number)
 
 
 def to_latex(table: ResultTable) -> str:
-    r"""The table as a LaTeX `table`; it needs the packages booktabs and graphicx.
+    r"""Return the table as a LaTeX `table`; it needs the packages booktabs and graphicx.
 
-    The interval, and the paper's figure with the difference, stand in lines of their own. What
-    is wider than the text is made smaller.
+    Intervals and the paper's values are in rows of their own. A table that is wider than the
+    text is made smaller.
     """
-    grid = pivot(table)
-    counted = _n_varies(table)
-    heads = [as_latex(text) for text in (*table.lines, *grid.columns, *[N] * counted)]
-    body: list[str] = []
-    for before, line in zip((None, *grid.lines), grid.lines, strict=False):
-        if before is not None and before.heads[:1] != line.heads[:1]:
-            body.append(r"\addlinespace")
-        body += _latex_lines(table, line, before, grid.columns, counted)
-    place = "table*" if len(heads) > WIDE else "table"
-    caption = " ".join(f"{_sentence(text)}" for text in (table.title, *notes(table)))
-    align = "l" * len(table.lines) + "r" * (len(grid.columns) + counted)
-    return "\n".join(
-        [
-            rf"\begin{{{place}}}[tb]",
-            r"\centering",
-            r"\small",
-            r"\setlength{\tabcolsep}{4pt}",
-            rf"\caption{{{as_latex(caption)}}}",
-            rf"\label{{tab:{table.name}}}",
-            r"\vspace{4pt}",
-            r"\resizebox{\ifdim\width>\linewidth\linewidth\else\width\fi}{!}{%",
-            rf"\begin{{tabular}}{{{align}}}",
-            r"\toprule",
-            *_latex_over(table, len(grid.columns)),
-            rf"{' & '.join(heads)} \\",
-            r"\midrule",
-            *body,
-            r"\bottomrule",
-            r"\end{tabular}}",
-            rf"\end{{{place}}}",
-            "",
-        ]
+    text = table_text(table)
+    n_columns = len(text.keys) + len(text.columns)
+    return render(
+        "table.tex",
+        table=text,
+        environment="table*" if n_columns > WIDE_COLUMNS else "table",
+        caption=" ".join(_sentence(each) for each in (text.title, *text.notes)),
+        alignment="l" * len(text.keys) + "r" * len(text.columns),
     )
 
 
 def to_markdown(table: ResultTable) -> str:
-    """The table as GitHub's Markdown, with its title above and its notes below."""
-    grid = pivot(table)
-    counted = _n_varies(table)
-    columns = [f"{_over(table)} {column}".strip() for column in grid.columns]
-    lines = [[as_markdown(text) for text in (*table.lines, *columns, *[N] * counted)]]
-    lines.append(["---"] * len(table.lines) + ["--:"] * (len(grid.columns) + counted))
-    for line in grid.lines:
-        cells = [
-            _markdown_cell(row, digits_of(table, column))
-            for column, row in zip(grid.columns, line.cells, strict=True)
-        ]
-        lines.append([*map(as_markdown, line.heads), *cells, *[_n_text(line.cells)] * counted])
-    below = " ".join(as_markdown(_sentence(note)) for note in notes(table))
+    """Return the table as GitHub's Markdown, with its title above and its notes below."""
+    text = table_text(table)
+    columns = [f"{text.over} {column}".strip() for column in text.columns[: text.n_values]]
+    heads = [*text.keys, *columns, *text.columns[text.n_values :]]
+    lines = [[escape_markdown(head) for head in heads]]
+    lines.append(["---"] * len(text.keys) + ["--:"] * len(text.columns))
+    for line in text.lines:
+        cells = [_markdown_cell(cell) for cell in line.cells]
+        lines.append([*map(escape_markdown, line.heads), *cells, *line.n_recordings])
     body = "\n".join(f"| {' | '.join(cells)} |" for cells in lines)
-    return f"**{as_markdown(table.title)}**\n\n{body}\n" + f"\n{below}\n" * bool(below)
+    below = " ".join(escape_markdown(_sentence(note)) for note in text.notes)
+    return f"**{escape_markdown(text.title)}**\n\n{body}\n" + f"\n{below}\n" * bool(below)
+
+
+def table_text(table: ResultTable) -> TableText:
+    """Return all texts of a table, for any format."""
+    grid = pivot(table)
+    n_varies = len({row.n for row in table.rows if row.n is not None}) > 1
+    digits = [digits_of(table, column) for column in grid.columns]
+    lines = []
+    for before, line in zip((None, *grid.lines), grid.lines, strict=False):
+        cells = [_cell_text(row, n) for row, n in zip(line.cells, digits, strict=True)]
+        n_recordings = [_n_text(line.cells)] if n_varies else []
+        lines.append(LineText(list(line.heads), _n_repeated(line, before), cells, n_recordings))
+    return TableText(
+        name=table.name,
+        title=table.title,
+        keys=list(table.lines),
+        over="" if table.column == "figure" else table.column,
+        columns=[*grid.columns, *[N_RECORDINGS] * n_varies],
+        n_values=len(grid.columns),
+        lines=lines,
+        notes=notes(table),
+    )
 
 
 def notes(table: ResultTable) -> list[str]:
-    """What stands below the table: its own note; what its cells rest on and mean."""
+    """Return the notes below the table: its own, and what its cells mean."""
     counts = {row.n for row in table.rows if row.n is not None}
-    found = []
+    sentences = []
     if len(counts) == 1:
         (n,) = counts
-        found.append(f"On {n} recording{'s' * (n != 1)}.")
+        sentences.append(f"On {n} recording{'s' * (n != 1)}.")
     if any(row.interval for row in table.rows):
-        found.append(INTERVALS)
+        sentences.append(INTERVAL_NOTE)
     if any(row.paper is not None for row in table.rows):
-        found.append(PAPERS)
-    return [note for note in (table.note.strip(), " ".join(found)) if note]
+        sentences.append(PAPER_NOTE)
+    return [note for note in (table.note.strip(), " ".join(sentences)) if note]
 
 
-def _over(table: ResultTable) -> str:
-    """What the columns are, where they do not say it themselves."""
-    return "" if table.column == "figure" else table.column
-
-
-def _html_over(table: ResultTable, n_columns: int) -> str:
-    if not _over(table):
-        return ""
-    blank = "<td></td>" * len(table.lines)
-    over = f'<th colspan="{n_columns}" scope="colgroup" class="over">{as_html(_over(table))}</th>'
-    return f"<tr>{blank}{over}</tr>\n"
-
-
-def _latex_over(table: ResultTable, n_columns: int) -> list[str]:
-    if not _over(table):
-        return []
-    first = len(table.lines) + 1
-    return [
-        "& " * len(table.lines)
-        + rf"\multicolumn{{{n_columns}}}{{c}}{{{as_latex(_over(table))}}} \\",
-        rf"\cmidrule(lr){{{first}-{first + n_columns - 1}}}",
-    ]
-
-
-def _html_line(line: TableLine, before: TableLine | None, cells: Iterable[str]) -> str:
-    """A line of the body; what it repeats of the line before is marked."""
-    same = _n_same(line, before)
-    again = ' class="again"'
-    heads = (
-        f'<th scope="row"{again * (k < same)}>{as_html(head)}</th>'
-        for k, head in enumerate(line.heads)
-    )
-    kind = ' class="begins"' if before is not None and same == 0 and len(line.heads) > 1 else ""
-    return f"<tr{kind}>{''.join(heads)}{''.join(cells)}</tr>"
-
-
-def _html_cell(row: Row | None, digits: int) -> str:
+def _cell_text(row: Row | None, digits: int) -> CellText:
     if row is None:
-        return f'<td class="none">{number_text(None, 0)}</td>'
-    text = f'<span class="ours">{number_text(row.ours, digits)}</span>'
-    if interval := _interval_text(row, digits):
-        text += f'<span class="interval">{interval}</span>'
-    if row.paper is not None:
-        text += f'<span class="paper">{PAPER} {number_text(row.paper, digits)}'
-        if row.ours is not None:
-            text += f' <b title="{DIFFERENCE}">{_difference_text(row, digits)}</b>'
-        text += "</span>"
-    return f"<td>{text}</td>"
+        return CellText()
+    ours = number_text(row.ours, digits)
+    interval = _interval_text(row, digits)
+    if row.paper is None:
+        return CellText(ours, interval, exists=True)
+    paper = number_text(row.paper, digits)
+    if row.ours is None:
+        return CellText(ours, interval, paper, exists=True)
+    difference = number_text(row.difference, digits, signed=True)
+    return CellText(ours, interval, paper, difference, exists=True)
 
 
-def _latex_lines(
-    table: ResultTable,
-    line: TableLine,
-    before: TableLine | None,
-    columns: Sequence[str],
-    counted: bool,
-) -> list[str]:
-    """A line of the body, and under it those of the intervals and of the paper."""
-    same = _n_same(line, before)
-    heads = ["" if k < same else as_latex(head) for k, head in enumerate(line.heads)]
-    digits = [digits_of(table, column) for column in columns]
-
-    def texts(text: Callable[[Row, int], str]) -> list[str]:
-        pairs = zip(line.cells, digits, strict=True)
-        return [as_latex(text(row, n)) if row is not None else "" for row, n in pairs]
-
-    ours = [text or "--" for text in texts(lambda row, n: number_text(row.ours, n))]
-    lines = [[*heads, *ours, *[as_latex(_n_text(line.cells))] * counted]]
-    blank = [""] * (len(heads) - 1)
-    intervals = [rf"\scriptsize {text}" if text else "" for text in texts(_interval_text)]
-    if any(intervals):
-        lines.append([*blank, "", *intervals, *[""] * counted])
-    papers = [rf"\scriptsize\itshape {text}" if text else "" for text in texts(_paper_text)]
-    if any(papers):
-        lines.append([*blank, rf"\quad\scriptsize\itshape {PAPER}", *papers, *[""] * counted])
-    return [rf"{' & '.join(cells)} \\" for cells in lines]
-
-
-def _markdown_cell(row: Row | None, digits: int) -> str:
-    if row is None:
-        return number_text(None, digits)
-    told = row.ours is not None or row.paper is None
-    parts = [number_text(row.ours, digits)] if told else []
-    if interval := _interval_text(row, digits):
-        parts.append(f"<sub>{interval}</sub>")
-    if row.paper is not None:
-        parts.append(f"*{PAPER} {_paper_text(row, digits)}*")
+def _markdown_cell(cell: CellText) -> str:
+    paper_only = cell.paper and not cell.difference
+    parts = [] if paper_only else [cell.ours]
+    if cell.interval:
+        parts.append(f"<sub>{cell.interval}</sub>")
+    if cell.paper:
+        parts.append(f"*paper {cell.paper_text}*")
     return "<br>".join(parts)
 
 
@@ -231,36 +206,20 @@ def _interval_text(row: Row, digits: int) -> str:
     if row.interval is None:
         return ""
     low, high = (number_text(end, digits).replace(INFINITE, "∞") for end in row.interval)
-    if (low, high) in ((NOTHING, NOTHING), ("∞", "∞")):
+    if (low, high) in ((MISSING, MISSING), ("∞", "∞")):
         return ""
-    if NOTHING in (low, high):
-        return f"from {low}" if high == NOTHING else f"to {high}"
+    if MISSING in (low, high):
+        return f"from {low}" if high == MISSING else f"to {high}"
     return f"{low} to {high}" if MINUS in low + high else f"{low}–{high}"
-
-
-def _paper_text(row: Row, digits: int) -> str:
-    """The paper's figure, and in brackets the difference."""
-    if row.paper is None:
-        return ""
-    paper = number_text(row.paper, digits)
-    return paper if row.ours is None else f"{paper} ({_difference_text(row, digits)})"
-
-
-def _difference_text(row: Row, digits: int) -> str:
-    return number_text(row.difference, digits, signed=True)
-
-
-def _n_varies(table: ResultTable) -> bool:
-    return len({row.n for row in table.rows if row.n is not None}) > 1
 
 
 def _n_text(cells: Iterable[Row | None]) -> str:
     counts = sorted({row.n for row in cells if row is not None and row.n is not None})
-    return "–".join(str(n) for n in dict.fromkeys([*counts[:1], *counts[-1:]])) or "–"
+    return "–".join(str(n) for n in dict.fromkeys([*counts[:1], *counts[-1:]])) or MISSING
 
 
-def _n_same(line: TableLine, before: TableLine | None) -> int:
-    """How many of the first heads the line repeats; the last is always told."""
+def _n_repeated(line: TableLine, before: TableLine | None) -> int:
+    """Return how many of the first heads are as in the line before, the last one excepted."""
     if before is None:
         return 0
     pairs = zip(line.heads[:-1], before.heads[:-1], strict=True)

@@ -5,7 +5,7 @@ from live.web.page.fake_service import Service, Tape, made_up
 
 @pytest.fixture(scope="session")
 def noted():
-    """What the browser itself notes of refusals and lost connections; no page can help it."""
+    """Messages of the browser about refusals and lost connections, which a page cannot prevent."""
     return r"Failed to load resource: .*(\b40[19]\b|ERR_CONNECTION)|WebSocket connection to"
 
 
@@ -18,7 +18,7 @@ def service():
 
 @pytest.fixture(scope="module")
 def module(browser):
-    """A page whose modules are called one by one, as functions."""
+    """A page for calling functions of its JavaScript modules."""
     with Service(Tape(*made_up())) as service:
         page = browser.new_page()
         page.goto(service.url)

@@ -32,7 +32,7 @@ PERIOD = 0.05
 
 
 class Track:
-    """What is known of one finger, sample by sample."""
+    """Values of one finger at each sample."""
 
     def __init__(self, layout, taxels, force, sigma, probability, state, reason, faults):
         self.layout = layout
@@ -42,7 +42,7 @@ class Track:
 
 
 def made_up(names=("thumb", "index", "middle", "ring"), layout="uskin-curved", rate=150.0):
-    """Twelve seconds of a hand that takes a thing, holds it, and is disturbed twice."""
+    """Twelve seconds of a hand that grasps an object, holds it, and is disturbed twice."""
     n = int(12 * rate)
     times = np.arange(n) / rate
     layout = sensor(layout)
@@ -71,7 +71,7 @@ def made_up(names=("thumb", "index", "middle", "ring"), layout="uskin-curved", r
 
 
 def played(path, model="builtin:twin"):
-    """A recording as a model sees it."""
+    """Detect a recording with a model."""
     recording = load_recording(path)
     found = detect(Model.load(model), recording)
     tracks = {}
@@ -79,16 +79,16 @@ def played(path, model="builtin:twin"):
         module = recording.modules[name]
         taxels = module.readings.astype(float)
         taxels -= taxels[:75].mean(axis=0)
-        told = [tuple(f for bit, f in enumerate(FAULTS) if m >> bit & 1) for m in trace.faults]
+        faults = [tuple(f for bit, f in enumerate(FAULTS) if m >> bit & 1) for m in trace.faults]
         tracks[name] = Track(
             module.sensor, taxels, trace.force, trace.instability, trace.stable_probability,
-            trace.state, trace.reason, told,
+            trace.state, trace.reason, faults,
         )  # fmt: skip
     return found.times, tracks
 
 
 def plain(value):
-    """JSON has no NaN."""
+    """Replace NaN by None, because JSON has no NaN."""
     if isinstance(value, np.ndarray):
         return plain(value.tolist())
     if isinstance(value, list):
@@ -104,12 +104,12 @@ def hand_word(states):
 
 
 class Tape:
-    """Messages out of tracks, over and over, on a clock that goes on."""
+    """Make messages from tracks, repeated without end, with increasing times."""
 
     def __init__(self, times, tracks, unit=None):
         self.times, self.tracks, self.unit = times, tracks, unit
         self.length = float(times[-1] - times[0] + times[1] - times[0])
-        self.told = dict.fromkeys((*tracks, "hand"), "UNKNOWN")
+        self.states = dict.fromkeys((*tracks, "hand"), "UNKNOWN")
         self.n_packets = 0
         self.change = {}  # finger -> fields to write over its part of a message
 
@@ -135,7 +135,7 @@ class Tape:
         }  # fmt: skip
 
     def message(self, start, stop):
-        """The samples in [start, stop) [s] of a time without end."""
+        """Message with the samples in [start, stop) [s]."""
         n = len(self.times)
         clock = (self.times - self.times[0])[None, :] + self.length * np.arange(
             start // self.length, stop // self.length + 1
@@ -160,11 +160,11 @@ class Tape:
         }
         states = {name: finger["state"] for name, finger in fingers.items()} | {"hand": hand}
         events = [
-            {"finger": name, "state": state, "previous": self.told[name], "time": now}
+            {"finger": name, "state": state, "previous": self.states[name], "time": now}
             for name, state in states.items()
-            if state != self.told[name]
+            if state != self.states[name]
         ]
-        self.told = states
+        self.states = states
         latency = {"p50": 0.00021, "p99": 0.0013, "max": 0.011}
         return {
             "type": "live", "time": now, "hand": hand, "fingers": fingers,
@@ -191,14 +191,14 @@ class Tape:
 
 
 class Service:
-    """The service on a port of its own, in a thread of its own."""
+    """Fake service with its own port and thread."""
 
     def __init__(self, tape, token=None, speed=1.0, port=0):
         self.tape, self.token, self.speed, self.port = tape, token, speed, port
-        self.refusal = None  # what every REST call is answered with
+        self.refusal = None  # error of every REST call
         self.calls = []
         self.recording = None
-        self.patch = {}  # fields to write over every message
+        self.patch = {}  # fields that replace those of every message
         self.notices = []
         self.muted = False
         self.at = 0.0

@@ -34,6 +34,6 @@ def test_every_state_reason_and_fault_has_its_words(module):
     words = module.evaluate("import('/page/format.js').then((m) => m.STATES)")
     assert words == [state.value for state in ContactState]
     for name, members in (("reasonWord", Reason), ("faultWord", Fault)):
-        told = [module.evaluate(CALL, [name, member.value]) for member in members]
-        assert len(set(told)) == len(members)
-        assert not any("_" in text for text in told)
+        texts = [module.evaluate(CALL, [name, member.value]) for member in members]
+        assert len(set(texts)) == len(members)
+        assert not any("_" in text for text in texts)

@@ -18,7 +18,7 @@ def laid_out(page, layout):
 
 
 @pytest.mark.parametrize("name", ["uskin-4x4", "uskin-4x6", "papillarray", "anyskin", "gtac"])
-def test_a_flat_patch_stays_as_it_is(module, name):
+def test_a_flat_patch_does_not_change(module, name):
     layout = sensor(name)
     found = laid_out(module, layout)
     assert found["places"] == pytest.approx(layout.positions[:, :2])

@@ -97,7 +97,7 @@ def test_everything_fits_without_scrolling(visit, service, size, scheme, state, 
     assert small == 0
 
 
-def test_cards_show_the_state_and_follow_it(visit, service):
+def test_cards_show_the_current_state(visit, service):
     change(service, state="STABLE", stable_probability=0.876, instability=3.3, force=[3, 4, 12])
     page = visit(service.url)
     shows(page, "#hand-word", "^STABLE$")
@@ -127,7 +127,7 @@ def test_changes_are_announced_to_screen_readers(visit, service):
     assert page.locator("#hand-spoken").get_attribute("aria-live") == "polite"
 
 
-def test_pause_freezes_what_is_drawn_and_nothing_else(visit, service):
+def test_pause_freezes_plots_and_maps_only(visit, service):
     page = visit(service.url)
     wait_for_samples(page)
     page.keyboard.press("Space")
@@ -329,7 +329,7 @@ def test_other_hands(visit, n, layout):
         assert inked == [True] * n
 
 
-def test_messages_out_of_shape_do_no_harm(visit, service):
+def test_messages_of_wrong_shape_do_no_harm(visit, service):
     page = visit(service.url)
     wait_for_samples(page)
     service.tape.change = {"index": {"taxels": [[1, 2, 3]], "faulty_taxels": [99]},

@@ -33,7 +33,7 @@ FEED = """async ([parts, gap]) => {
 
 
 @pytest.mark.parametrize("chunks", [[1000], [7] * 143, [1] * 205, [99, 1, 100, 250, 3], [50]])
-def test_it_keeps_the_newest_whatever_the_pieces(module, chunks):
+def test_the_store_keeps_the_newest_samples_for_any_chunks(module, chunks):
     found = module.evaluate(STORE, [100, chunks, 1000, 100])
     n = sum(chunks)
     newest = list(range(max(0, n - 100), n))
@@ -75,12 +75,12 @@ def test_a_gap_breaks_the_line(module):
     assert x == pytest.approx([-0.51, -0.5, -0.49, -0.25, -0.01, 0])
 
 
-def test_times_that_go_back_begin_anew(module):
+def test_times_that_go_back_clear_the_store(module):
     x, _ = module.evaluate(FEED, [[[5, 5.1, 5.2], [0, 0.1]], 1])
     assert x == pytest.approx([-0.1, 0])
 
 
-def test_a_frozen_copy_stays(module):
+def test_a_copy_does_not_change(module):
     same = module.evaluate("""async () => {
       const { SampleStore } = await import("/page/store.js");
       const store = new SampleStore(["a"], 10);
@@ -94,12 +94,12 @@ def test_a_frozen_copy_stays(module):
 
 
 @pytest.mark.parametrize(("rate", "capacity"), [("null", 12000), (150, 12000), (5000, 60000)])
-def test_it_is_sized_by_the_rate_within_bounds(module, rate, capacity):
+def test_the_capacity_follows_the_rate_within_bounds(module, rate, capacity):
     script = f"import('/page/store.js').then((m) => m.capacityFor({rate}))"
     assert module.evaluate(script) == capacity
 
 
-def test_fingers_that_take_turns_have_lines_without_holes(module):
+def test_fingers_sampled_in_turn_have_lines_without_gaps(module):
     found = module.evaluate("""async () => {
       const { SampleStore } = await import("/page/store.js");
       const store = new SampleStore(["a", "b"], 100);

@@ -1,12 +1,14 @@
+"""Methods on the vibration of the force."""
+
 import numpy as np
 import pytest
 
 from holdfast.study.methods import METHODS
-from holdfast.study.methods.signals import NEWTONS_PER_COUNT
-from holdfast.study.methods.slip_servo import band_pass, high_pass
+from holdfast.study.methods.method import NEWTONS_PER_COUNT
+from holdfast.study.methods.vibration import BANDS, band_energy, band_pass, high_pass
 from holdfast.twin.uskin_parameters import UskinParameters
 
-from .build import along_normal, pressed
+from .patch_signals import along_normal, pressed
 
 SERVO = METHODS["slip_servo"]
 RATE = 10 * np.pi
@@ -34,7 +36,7 @@ def test_band_pass_lets_its_band_through(frequency, gain):
     assert 2 * (found**2).mean() == pytest.approx(gain, abs=0.02)
 
 
-def test_the_ratio_by_hand():
+def test_the_slip_ratio_by_hand():
     # Newtons, the rate at which a = 1 / 2. |F_hp| after the step of 0.02 N is 0.01 N, and
     # 0.007 |F| is under 0.048 N; the grip does not change yet: |F_bp| < 0.18 N.
     hand = pressed(along_normal([1.0, 1.02, 1.02]), RATE, "N")
@@ -67,5 +69,48 @@ def test_counts_are_nominal_newtons():
     np.testing.assert_allclose(SERVO.features(one)["index"], SERVO.features(two)["index"])
 
 
-def test_a_nominal_newton_is_the_twins():
+def test_a_nominal_newton_is_that_of_the_twin():
     assert UskinParameters().counts_per_newton[2] == pytest.approx(1 / NEWTONS_PER_COUNT)
+
+
+def sine(frequency, amplitude, n=100, rate=150.0):
+    return amplitude * np.sin(2 * np.pi * frequency * np.arange(n) / rate + 0.3)[:, None]
+
+
+def test_band_energy_by_hand():
+    """Four samples: w = 0, 1/2, 1, 1/2, so that N sum w^2 / 2 = 3; bins at 0, 1 and 2 Hz."""
+    # Less their mean of 2, times w: 0, 1, 0, -1. |X| at 1 Hz: |-1j - 1j| = 2; at 2 Hz: 0.
+    found = band_energy(np.array([[2.0], [4.0], [2.0], [0.0]]), 4.0, ((1, 2), (2, 3)), 1.0)
+    np.testing.assert_allclose(found, [[np.nan] * 2] * 3 + [[4 / 3, 0]], atol=1e-15)
+
+
+@pytest.mark.parametrize("amplitude", [1.0, 30.0])
+def test_a_sine_inside_a_band_shows_its_power_there_and_nowhere_else(amplitude):
+    found = band_energy(sine(40.0, amplitude), 150.0, BANDS)[29:]
+    power = amplitude**2 / 2
+    np.testing.assert_allclose(found / power, [[0, 0, 1, 0, 1]] * 71, atol=1e-12)
+
+
+def test_the_window_of_the_spectrum_slides():
+    values = np.random.default_rng(0).normal(size=(90, 3)) * [1, 20, 3] + [0, 50, 4000]
+    found = METHODS["spectrum"].features(pressed(values, 150.0))["index"]
+    weights = np.hanning(31)[:30]
+    for k in (29, 50, 89):
+        window = values[k - 29 : k + 1]
+        power = np.abs(np.fft.fft((window - window.mean(axis=0)) * weights[:, None], axis=0)) ** 2
+        bins = [[1, 2], [3, 4, 5], [6, 7, 8, 9], [10, 11, 12, 13, 14], list(range(1, 15))]
+        wanted = [power[b].sum() * 2 / (30 * (weights**2).sum()) for b in bins]
+        np.testing.assert_allclose(10 ** found[k], wanted)
+    assert np.isnan(found[:29]).all()
+
+
+def test_the_energy_of_a_constant_force_is_finite():
+    found = METHODS["spectrum"].features(pressed(np.full((60, 3), 7.0), 150.0))["index"]
+    np.testing.assert_allclose(found[29:], -12, atol=0.01)
+
+
+def test_bands_above_half_the_rate_are_empty():
+    noise = np.random.default_rng(0).normal(size=(60, 3))
+    found = METHODS["spectrum"].features(pressed(noise, 60.0))["index"][20:]
+    assert (found[:, 3] == -12).all()
+    assert (found[:, :2] > -6).all()

@@ -1,4 +1,4 @@
-"""Hands of one flat patch whose force is given, so that features can be computed by hand."""
+"""Hands of one flat patch with given forces, for features computed by hand."""
 
 import numpy as np
 

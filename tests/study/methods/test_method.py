@@ -1,9 +1,11 @@
+"""Signals of a hand, stretches and windows."""
+
 import numpy as np
 import pytest
 
-from holdfast.study.methods.signals import stretchwise, windowed
+from holdfast.study.methods.method import stretchwise, windowed
 
-from .build import pressed
+from .patch_signals import pressed
 
 
 def last_and_first(windows):
@@ -17,7 +19,7 @@ def test_windows_end_at_their_sample(n):
     np.testing.assert_array_equal(found, np.reshape(wanted, (n, 2)))
 
 
-def test_stretches_start_anew():
+def test_features_restart_at_each_stretch():
     values = np.ones((8, 3)) * np.arange(8)[:, None]
     values[3] = np.nan
     times = np.arange(8) / 100.0 + np.where(np.arange(8) >= 6, 0.1, 0.0)
@@ -27,7 +29,7 @@ def test_stretches_start_anew():
     np.testing.assert_array_equal(found["index"][:, 0], wanted)
 
 
-def test_a_finger_without_a_stretch_has_the_width_of_any_other():
+def test_a_finger_without_a_stretch_has_the_same_number_of_features():
     hand = pressed(np.full((4, 3), np.nan))
     found = stretchwise(hand, lambda finger: finger.force[:, :2])
     assert found["index"].shape == (4, 2)
@@ -36,9 +38,11 @@ def test_a_finger_without_a_stretch_has_the_width_of_any_other():
 
 def test_normal_and_tangential():
     finger = pressed([[3, 4, -10]]).fingers["index"]
-    assert (finger.pressing[0], finger.normal[0], finger.tangential[0]) == (-10, 10, 5)
+    assert (finger.normal_force[0], finger.normal_magnitude[0]) == (-10, 10)
+    assert finger.tangential_magnitude[0] == 5
 
 
 @pytest.mark.parametrize(("unit", "newton"), [("N", 1.0), ("count", 1 / 0.000729)])
 def test_a_newton_in_the_unit_of_the_readings(unit, newton):
-    assert pressed([[0, 0, 0]], unit=unit).fingers["index"].newton == pytest.approx(newton)
+    finger = pressed([[0, 0, 0]], unit=unit).fingers["index"]
+    assert finger.units_per_newton == pytest.approx(newton)

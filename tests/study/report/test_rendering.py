@@ -5,7 +5,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from holdfast.study.report.escape import as_html, as_latex, as_markdown
+from holdfast.study.report.rendering import escape_html, escape_latex, escape_markdown
 
 
 @pytest.mark.parametrize(
@@ -26,12 +26,14 @@ from holdfast.study.report.escape import as_html, as_latex, as_markdown
     ],
 )
 def test_latex(text, latex):
-    assert as_latex(text) == latex
+    assert escape_latex(text) == latex
 
 
 @given(st.text())
 def test_latex_holds_no_bare_special_character(text):
-    bare = re.sub(r"\\(text\w+\{\}|ldots\{\}|[{}$&%#_,])|\$[^$]*\$|\{[][]\}", "", as_latex(text))
+    bare = re.sub(
+        r"\\(text\w+\{\}|ldots\{\}|[{}$&%#_,])|\$[^$]*\$|\{[][]\}", "", escape_latex(text)
+    )
     assert not re.search(r"[\\{}$&%#_^\n]", bare.replace("~", ""))
 
 
@@ -50,17 +52,17 @@ class Text(HTMLParser):
 @given(st.text(alphabet=st.characters(exclude_characters="\r\0", exclude_categories=["Cs"])))
 def test_html_reads_as_the_text_that_was_given(text):
     parser = Text()
-    parser.feed(as_html(text.replace("_", "-").replace("sigma", "")))
+    parser.feed(escape_html(text.replace("_", "-").replace("sigma", "")))
     parser.close()
     assert parser.text == text.replace("_", "-").replace("sigma", "")
     assert not parser.tags
 
 
 def test_html_sets_symbols():
-    assert as_html("F_a < F_tip, sigma") == (
+    assert escape_html("F_a < F_tip, sigma") == (
         "<i>F</i><sub>a</sub> &lt; <i>F</i><sub>tip</sub>, <i>σ</i>"
     )
 
 
 def test_markdown_keeps_a_cell_a_cell():
-    assert as_markdown("a|b\n*c* [x](y) <br> `z`") == r"a\|b \*c\* [x\](y) \<br\> \`z\`"
+    assert escape_markdown("a|b\n*c* [x](y) <br> `z`") == r"a\|b \*c\* [x\](y) \<br\> \`z\`"
