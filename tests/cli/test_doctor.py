@@ -96,5 +96,5 @@ def test_a_bad_master_is_told_and_harms_nothing(capsys, monkeypatch):
     monkeypatch.setattr("holdfast.ros.rospy_node.rospy_module", lambda: None)
     monkeypatch.setenv("ROS_MASTER_URI", "nonsense")
     assert report(capsys)["sources"]["ros1"] == (
-        "a master as http://localhost:11311 expected, 'nonsense' given"
+        "a ROS master like http://localhost:11311 expected, 'nonsense' given"
     )

@@ -27,5 +27,5 @@ def test_without_a_master():
         Ros1Publisher(UNITS, master=uri),
     ):
         pass
-    with pytest.raises(ValueError, match="a master as http"):
+    with pytest.raises(ValueError, match="a ROS master like http"):
         Ros1Publisher(UNITS, master="robot")

@@ -26,7 +26,7 @@ class _Silent(SimpleXMLRPCRequestHandler):
 
 @pytest.fixture
 def master():
-    """What answers as a master does; its answers are in a dictionary."""
+    """A server that answers like a ROS master, from a dictionary."""
     answers = {}
     with SimpleXMLRPCServer(("127.0.0.1", 0), _Silent) as server:
         for name in ("getPid", "getSystemState", "getTopicTypes"):
@@ -38,7 +38,7 @@ def master():
         thread.join()
 
 
-def test_what_is_published(master):
+def test_published_topics(master):
     uri, answers = master
     answers["getPid"] = (1, "", 7)
     check_master(uri)
@@ -54,29 +54,29 @@ def test_a_master_that_refuses(master):
         check_master(uri)
 
 
-def test_a_master_that_says_something_else(master):
+def test_a_server_that_is_not_a_master(master):
     uri, answers = master
     answers["getPid"] = 7
-    with pytest.raises(SourceError, match="is no ROS master"):
+    with pytest.raises(SourceError, match="is not a ROS master"):
         check_master(uri)
     del answers["getPid"]
-    with pytest.raises(SourceError, match="is no ROS master"):
+    with pytest.raises(SourceError, match="is not a ROS master"):
         check_master(uri)
 
 
-def test_nobody_listens():
+def test_no_server():
     with create_server(("127.0.0.1", 0)) as free:
         uri = f"http://127.0.0.1:{free.getsockname()[1]}"
     with pytest.raises(SourceError) as caught:
         start_node(uri)
     assert str(caught.value) == (
         f"no ROS master answers at {uri} (Connection refused): is roscore running? "
-        "ROS_MASTER_URI or ?master= tell where"
+        "ROS_MASTER_URI or ?master= sets its address"
     )
 
 
-def test_somebody_listens_but_says_nothing(monkeypatch):
-    monkeypatch.setattr(rospy_node, "ANSWER_TIME", 0.1)
+def test_a_server_that_does_not_answer(monkeypatch):
+    monkeypatch.setattr(rospy_node, "MASTER_TIMEOUT", 0.1)
     with create_server(("127.0.0.1", 0)) as mute:
         uri = f"http://127.0.0.1:{mute.getsockname()[1]}"
         with pytest.raises(SourceError, match=r"no ROS master answers at .* \(timed out\)"):
@@ -94,26 +94,26 @@ def test_another_web_server():
     with HTTPServer(("127.0.0.1", 0), Handler) as server:
         thread = Thread(target=server.handle_request)
         thread.start()
-        with pytest.raises(SourceError, match=r"is no ROS master: .*404"):
+        with pytest.raises(SourceError, match=r"is not a ROS master: .*404"):
             check_master(f"http://127.0.0.1:{server.server_address[1]}")
         thread.join()
 
 
-def test_which_master(monkeypatch):
+def test_the_uri_of_the_master(monkeypatch):
     monkeypatch.delenv("ROS_MASTER_URI", raising=False)
     assert master_uri(None) == "http://localhost:11311"
     monkeypatch.setenv("ROS_MASTER_URI", "http://robot:11311/")
     assert master_uri(None) == "http://robot:11311"
     assert master_uri("http://10.0.0.1:1") == "http://10.0.0.1:1"
     for bad in ("robot:11311", "http://robot", "https://robot:1", "http://robot:port"):
-        with pytest.raises(ValueError, match="a master as http://localhost:11311 expected, "):
+        with pytest.raises(ValueError, match="a ROS master like http://localhost:11311 expected, "):
             master_uri(bad)
 
 
 def test_no_rospy_at_all(monkeypatch):
     path = list(sys.path)
     monkeypatch.setitem(sys.modules, "rospy", None)
-    monkeypatch.setattr(rospy_node, "PLACES", ())
+    monkeypatch.setattr(rospy_node, "ROSPY_FOLDERS", ())
     with pytest.raises(SourceError) as caught:
         rospy_module()
     assert str(caught.value) == (
@@ -123,11 +123,11 @@ def test_no_rospy_at_all(monkeypatch):
     assert sys.path == path
 
 
-def test_a_rospy_for_another_python_is_left_alone(tmp_path, monkeypatch):
+def test_a_rospy_for_another_python_is_not_imported(tmp_path, monkeypatch):
     (tmp_path / "rospy").mkdir()
     monkeypatch.setitem(sys.modules, "rospy", None)
-    monkeypatch.setattr(rospy_node, "PLACES", (str(tmp_path),))
-    monkeypatch.setattr(rospy_node, "_pythons", lambda: ["python3.5", "python3.5-config"])
+    monkeypatch.setattr(rospy_node, "ROSPY_FOLDERS", (str(tmp_path),))
+    monkeypatch.setattr(rospy_node, "_system_pythons", lambda: ["python3.5", "python3.5-config"])
     path = list(sys.path)
     with pytest.raises(SourceError, match="apt install python3-rospy"):
         rospy_module()

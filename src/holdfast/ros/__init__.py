@@ -1,1 +1,1 @@
-"""ROS without ROS: message definitions, the CDR codec, and the transports of ROS 1 and ROS 2."""
+"""ROS without an installation of ROS: messages, their codec, and transports of ROS 1 and 2."""

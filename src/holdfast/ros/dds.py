@@ -1,4 +1,4 @@
-"""ROS 2 without ROS: its topics on the wire of DDS, by Cyclone DDS."""
+"""Topics of ROS 2 without an installation of ROS: over DDS, by Cyclone DDS."""
 
 import os
 from collections.abc import Callable, Mapping
@@ -31,22 +31,24 @@ try:
 except ImportError as cause:
     raise MissingExtra("cyclonedds", "ros2") from cause
 
-N_QUEUED = 256
-"""Messages that wait for a reader that is busy."""
-N_TAKEN = 32
-"""Messages that are taken at a time."""
-LARGEST_DOMAIN = 232
-"""Domains above it have no ports."""
-PREFIX, SEPARATOR = "rt/", "::msg::dds_::"
-"""What ROS 2 puts before the names of topics, and into those of types."""
+READER_QUEUE_SIZE = 256
+"""Maximum number of messages that wait for a busy reader."""
+WRITER_QUEUE_SIZE = 10
+"""Maximum number of messages that wait for a busy subscriber."""
+MAX_MESSAGES_PER_READ = 32
+"""Maximum number of messages that are read at a time."""
+MAX_DOMAIN = 232
+"""Largest number of a ROS domain; larger ones have no ports."""
+TOPIC_PREFIX, TYPE_SEPARATOR = "rt/", "::msg::dds_::"
+"""Parts that ROS 2 adds to the names of topics and of types in DDS."""
 
-LOOPBACK = (
+LOCALHOST_CONFIGURATION = (
     "<CycloneDDS><Domain><General><AllowMulticast>false</AllowMulticast><Interfaces>"
     '<NetworkInterface address="127.0.0.1"/></Interfaces></General><Discovery>'
     "<ParticipantIndex>auto</ParticipantIndex><MaxAutoParticipantIndex>60</MaxAutoParticipantIndex>"
     '<Peers><Peer address="127.0.0.1"/></Peers></Discovery></Domain></CycloneDDS>'
 )
-"""As `ROS_LOCALHOST_ONLY=1` wants it."""
+"""Configuration for `ROS_LOCALHOST_ONLY=1`."""
 
 _PRIMITIVES = {
     "bool": bool,
@@ -63,54 +65,57 @@ _domains: dict[int, Domain] = {}
 
 
 class Node:
-    """Takes part in a domain of ROS; on this machine only, where `ROS_LOCALHOST_ONLY` is 1.
+    """Participant in a ROS domain; on this machine only, if `ROS_LOCALHOST_ONLY` is 1.
 
     Args:
-        domain: of ROS.
+        domain: number of the ROS domain.
 
     Raises:
-        SourceError: DDS refuses, as where `CYCLONEDDS_URI` names no good configuration.
+        SourceError: DDS reports an error, for example if `CYCLONEDDS_URI` is not valid.
     """
 
     def __init__(self, domain: int) -> None:
         try:
             if _is_local() and domain not in _domains:
-                _domains[domain] = Domain(domain, LOOPBACK)
+                _domains[domain] = Domain(domain, LOCALHOST_CONFIGURATION)
             self._participant = DomainParticipant(domain)
             self._publications = BuiltinDataReader(self._participant, BuiltinTopicDcpsPublication)
         except DDSException as cause:
             raise SourceError(f"ROS domain {domain} cannot be joined: {cause.msg}") from cause
 
     def published_topics(self) -> dict[str, str]:
-        """Types of the topics that somebody publishes, by name, both as in ROS."""
+        """Return the types of all published topics by name, both as in ROS."""
         alive = InstanceState.Alive | ViewState.Any | SampleState.Any
         found = self._publications.read(1000, ReadCondition(self._publications, alive))
         return {
-            one.topic_name.removeprefix(PREFIX[:-1]): ros_type(one.type_name)
+            one.topic_name.removeprefix(TOPIC_PREFIX[:-1]): ros_type(one.type_name)
             for one in found
-            if not isinstance(one, InvalidSample) and one.topic_name.startswith(PREFIX)
+            if not isinstance(one, InvalidSample) and one.topic_name.startswith(TOPIC_PREFIX)
         }
 
     def reader(self, topic: str, definition: Definition) -> "TopicReader":
-        """Subscribes to a topic."""
-        qos = _qos(Policy.Reliability.BestEffort, N_QUEUED)  # takes reliable ones as well
+        """Subscribe to a topic."""
+        qos = _qos(
+            Policy.Reliability.BestEffort, READER_QUEUE_SIZE
+        )  # also matches reliable publishers
         reader = DataReader(self._participant, self._topic(topic, definition, qos), qos=qos)
         return TopicReader(reader, WaitSet(self._participant))
 
     def writer(self, topic: str, definition: Definition) -> Callable[[bytes], None]:
-        """Publishes on a topic, as ROS 2 does by default; what it returns takes messages."""
-        qos = _qos(Policy.Reliability.Reliable(duration(milliseconds=0)), 10)  # it never waits
+        """Return a function that publishes messages on a topic, with the defaults of ROS 2."""
+        reliable = Policy.Reliability.Reliable(duration(milliseconds=0))  # never blocks
+        qos = _qos(reliable, WRITER_QUEUE_SIZE)
         writer = DataWriter(self._participant, self._topic(topic, definition, qos), qos=qos)
         raw = _raw(definition)
         return lambda data: writer.write(raw(data))
 
     def _topic(self, name: str, definition: Definition, qos: Qos) -> Topic[Any]:
-        full = PREFIX + name.removeprefix("/")
+        full = TOPIC_PREFIX + name.removeprefix("/")
         return Topic(self._participant, full, _raw(definition), qos=qos)
 
 
 class TopicReader:
-    """A subscription to one topic."""
+    """Subscription to one topic."""
 
     def __init__(self, reader: DataReader[Any], wait: WaitSet) -> None:
         self._reader = reader
@@ -120,14 +125,14 @@ class TopicReader:
         self._wait.attach(self._new)
 
     def take(self, timeout: float) -> list[bytes]:
-        """The messages that are there; where there are none, those that come within `timeout`."""
-        found = self._reader.take(N_TAKEN)
+        """Return the waiting messages; if there are none, wait up to `timeout` [s] for some."""
+        found = self._reader.take(MAX_MESSAGES_PER_READ)
         if not found and self._wait.wait(duration(seconds=timeout)) > 0:
-            found = self._reader.take(N_TAKEN)
+            found = self._reader.take(MAX_MESSAGES_PER_READ)
         return [one.data for one in found if not isinstance(one, InvalidSample)]
 
     def n_writers(self) -> int:
-        """How many publish on the topic now."""
+        """Return the number of publishers on the topic."""
         return len(self._reader.get_matched_publications())
 
 
@@ -141,51 +146,51 @@ def _qos(reliability: object, depth: int) -> Qos:
 
 
 def _is_local() -> bool:
-    """Whether ROS is to stay on this machine, and Cyclone DDS has no configuration of its own."""
+    """Return whether ROS is limited to this machine and no other configuration is set."""
     return os.environ.get("ROS_LOCALHOST_ONLY") == "1" and not os.environ.get("CYCLONEDDS_URI")
 
 
 def domain_number(given: str | None) -> int:
-    """The domain that is asked for; else that of `ROS_DOMAIN_ID`, else 0.
+    """Return the given ROS domain; by default that of `ROS_DOMAIN_ID`, otherwise 0.
 
     Raises:
-        ValueError: it is no number from 0 to 232.
+        ValueError: the domain is not a number from 0 to 232.
     """
     text = given if given is not None else os.environ.get("ROS_DOMAIN_ID", "").strip() or "0"
-    if not (text.isdecimal() and int(text) <= LARGEST_DOMAIN):
-        raise ValueError(f"a ROS domain from 0 to {LARGEST_DOMAIN} expected, {text!r} given")
+    if not (text.isdecimal() and int(text) <= MAX_DOMAIN):
+        raise ValueError(f"a ROS domain from 0 to {MAX_DOMAIN} expected, {text!r} given")
     return int(text)
 
 
 def dds_type(name: str) -> str:
-    """The name of a type in DDS.
+    """Return the name in DDS of a type of ROS.
 
     Example:
         >>> dds_type("std_msgs/String")
         'std_msgs::msg::dds_::String_'
     """
     package, kind = name.split("/")
-    return f"{package}{SEPARATOR}{kind}_"
+    return f"{package}{TYPE_SEPARATOR}{kind}_"
 
 
 def ros_type(name: str) -> str:
-    """The name of a type in ROS; that in DDS, where it is not of ROS.
+    """Return the name in ROS of a type of DDS; a type that is not of ROS keeps its name.
 
     Example:
         >>> ros_type("std_msgs::msg::dds_::String_")
         'std_msgs/String'
     """
-    package, separator, kind = name.partition(SEPARATOR)
+    package, separator, kind = name.partition(TYPE_SEPARATOR)
     return f"{package}/{kind.removesuffix('_')}" if separator else name
 
 
 def _raw(definition: Definition) -> type[Any]:
-    """The type of a message for DDS, whose samples stay bytes in `data`."""
+    """Return the DDS type of a message; its samples keep their bytes in `data`."""
     return _raw_type(definition.name, tuple(definition.types.items()))
 
 
 class _Raw:
-    """How a type keeps its messages as bytes."""
+    """Methods of a DDS type that keep its messages as bytes."""
 
     def __init__(self, data: bytes) -> None:
         self.data = data

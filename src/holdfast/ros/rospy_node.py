@@ -1,7 +1,7 @@
-"""This process as a node of ROS 1, by the rospy of a ROS or of Debian.
+"""This process as a node of ROS 1, by the rospy of a ROS installation or of Debian.
 
-rospy is not on PyPI. It is imported as it is where the interpreter has it; else from where ROS
-and Debian put it, behind everything else, if it is of this Python's version.
+rospy is not on PyPI. If the interpreter cannot import it, the folders of ROS and of Debian are
+searched, after all other folders and only if they belong to the same version of Python.
 """
 
 import atexit
@@ -21,32 +21,32 @@ from xmlrpc.client import Error, ServerProxy, Transport
 
 from holdfast.errors import SourceError
 
-MASTER = "http://localhost:11311"
-"""Where a master is if nobody says otherwise, as in ROS."""
-ANSWER_TIME = 2.0
-"""How long a master may take to answer [s]."""
-PLACES = ("/opt/ros/*/lib/python3/dist-packages", "/usr/lib/python3/dist-packages")
-"""Where ROS and Debian put rospy."""
+DEFAULT_MASTER = "http://localhost:11311"
+"""URI of the ROS master by default, as in ROS."""
+MASTER_TIMEOUT = 2.0
+"""Maximum time for an answer of the ROS master [s]."""
+ROSPY_FOLDERS = ("/opt/ros/*/lib/python3/dist-packages", "/usr/lib/python3/dist-packages")
+"""Folders in which ROS and Debian install rospy."""
 
-_CALLER = "/holdfast"
+_NODE_NAME = "/holdfast"
 _lock = threading.Lock()
 _master: str | None = None
 
 
 def rospy_module() -> ModuleType:
-    """The module rospy.
+    """Import rospy.
 
     Raises:
-        SourceError: there is none, or none for this Python.
+        SourceError: it is not installed, or not for this version of Python.
     """
     with suppress(ImportError):
         return import_module("rospy")
-    for place in _places():
-        sys.path.append(place)
+    for folder in _rospy_folders():
+        sys.path.append(folder)
         try:
             return import_module("rospy")
         except ImportError:
-            sys.path.remove(place)
+            sys.path.remove(folder)
             for name in [name for name in sys.modules if name.split(".")[0] == "rospy"]:
                 del sys.modules[name]
     raise SourceError(
@@ -56,13 +56,16 @@ def rospy_module() -> ModuleType:
 
 
 def start_node(master: str) -> ModuleType:
-    """rospy, with this process as a node of that master.
+    """Make this process a node of a ROS master, and return rospy.
+
+    Args:
+        master: URI of the ROS master.
 
     Raises:
-        SourceError: there is no rospy, the master does not answer, or the process is a node
-            of another master already.
+        SourceError: rospy is not installed, the master does not answer, or this process is a
+            node of another master.
     """
-    global _master  # noqa: PLW0603 (so is rospy: a process is one node, for ever)
+    global _master  # noqa: PLW0603 (a process is one node only)
     check_master(master)
     with _lock:
         rospy = rospy_module()
@@ -73,93 +76,91 @@ def start_node(master: str) -> ModuleType:
         os.environ["ROS_MASTER_URI"] = master
         rospy.init_node("holdfast", argv=["holdfast"], anonymous=True, disable_signals=True)
         atexit.register(rospy.signal_shutdown, "the process ends")
-        _silence()
+        _remove_console_log()
         _master = master
         return rospy
 
 
 def master_uri(given: str | None) -> str:
-    """The master that is asked for; else that of `ROS_MASTER_URI`, else the one of this machine.
+    """Return the URI of the given master; by default `ROS_MASTER_URI`, otherwise this machine.
 
     Raises:
-        ValueError: it is no URI of one.
+        ValueError: it is not the URI of a ROS master.
     """
-    text = given if given is not None else os.environ.get("ROS_MASTER_URI", "").strip() or MASTER
+    if given is None:
+        given = os.environ.get("ROS_MASTER_URI", "").strip() or DEFAULT_MASTER
     with suppress(ValueError):
-        parts = urlsplit(text)
+        parts = urlsplit(given)
         if parts.scheme == "http" and parts.hostname and parts.port:
-            return text.rstrip("/")
-    raise ValueError(f"a master as {MASTER} expected, {text!r} given")
+            return given.rstrip("/")
+    raise ValueError(f"a ROS master like {DEFAULT_MASTER} expected, {given!r} given")
 
 
 def check_master(master: str) -> None:
-    """Returns where a master answers.
+    """Check that a ROS master answers.
 
     Raises:
-        SourceError: nothing does, within 2 s.
+        SourceError: there is no answer within 2 s.
     """
     call_master(master, "getPid")
 
 
 def published_topics(master: str) -> dict[str, str]:
-    """Types of the topics that somebody publishes, by name.
+    """Return the types of all published topics by name.
 
     Raises:
-        SourceError: the master does not answer.
+        SourceError: the ROS master does not answer.
     """
     names = {name for name, nodes in call_master(master, "getSystemState")[0] if nodes}
     return {name: kind for name, kind in call_master(master, "getTopicTypes") if name in names}
 
 
-def call_master(master: str, what: str, *given: str) -> Any:  # noqa: ANN401 (whatever it answers)
-    """What a master answers to a call of its interface.
+def call_master(master: str, method: str, *arguments: str) -> Any:  # noqa: ANN401 (any value)
+    """Call a method of the interface of a ROS master.
 
     Raises:
-        SourceError: nothing that is a master answers in time.
+        SourceError: no ROS master answers in time, or it reports an error.
     """
     try:
-        with ServerProxy(master, transport=_Impatient()) as proxy:
-            code, text, value = getattr(proxy, what)(_CALLER, *given)
+        with ServerProxy(master, transport=_TimeoutTransport()) as proxy:
+            code, text, value = getattr(proxy, method)(_NODE_NAME, *arguments)
     except OSError as cause:
         raise SourceError(
             f"no ROS master answers at {master} ({cause.strerror or cause}): is roscore running? "
-            "ROS_MASTER_URI or ?master= tell where"
+            "ROS_MASTER_URI or ?master= sets its address"
         ) from cause
     except (Error, HTTPException, ValueError, TypeError) as cause:
-        raise SourceError(f"what answers at {master} is no ROS master: {cause}") from cause
+        raise SourceError(f"the program at {master} is not a ROS master: {cause}") from cause
     if code != 1:
-        raise SourceError(f"the ROS master at {master} refuses {what}: {text}")
+        raise SourceError(f"the ROS master at {master} refuses {method}: {text}")
     return value
 
 
-class _Impatient(Transport):
-    """A connection that does not wait for ever."""
+class _TimeoutTransport(Transport):
+    """Connection with a timeout."""
 
     def make_connection(self, host: Any) -> HTTPConnection:  # noqa: ANN401
         connection = super().make_connection(host)
-        connection.timeout = ANSWER_TIME
+        connection.timeout = MASTER_TIMEOUT
         return connection
 
 
-def _places() -> Iterator[str]:
-    """Folders with a rospy for this Python."""
-    for pattern in PLACES:
+def _rospy_folders() -> Iterator[str]:
+    """Yield the folders with a rospy for this version of Python."""
+    python = f"python{sys.version_info[0]}.{sys.version_info[1]}"
+    for pattern in ROSPY_FOLDERS:
         for folder in sorted(Path("/").glob(pattern.removeprefix("/"))):
-            if (folder / "rospy").is_dir() and _fits(_pythons()):
+            if (folder / "rospy").is_dir() and python in _system_pythons():
                 yield str(folder)
 
 
-def _pythons() -> Sequence[str]:
-    """Names of the machine's own Pythons, for which those folders are."""
+def _system_pythons() -> Sequence[str]:
+    """Return the names of the Pythons of the operating system, which use these folders."""
     return [path.name for path in Path("/usr/bin").glob("python3.*")]
 
 
-def _fits(names: Sequence[str]) -> bool:
-    return f"python{sys.version_info[0]}.{sys.version_info[1]}" in names
-
-
-def _silence() -> None:
-    """Keeps rospy's log off the screen: stdout is for results. Its log file stays."""
+def _remove_console_log() -> None:
+    """Stop rospy from writing its log to stdout, which is for results; its log file stays."""
     logger = logging.getLogger("rosout")
     for handler in logger.handlers[:]:
         if type(handler).__name__ == "RosStreamHandler":

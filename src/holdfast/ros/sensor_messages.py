@@ -1,4 +1,4 @@
-"""Messages of tactile sensors in ROS: their definitions, and the readings in them."""
+"""Messages of tactile sensors in ROS: their definitions, and how to get readings from them."""
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
@@ -32,7 +32,7 @@ SENS_STREAM = (
     + SEPARATOR
     + "xela_server_ros/Forces\nfloat32 x\nfloat32 y\nfloat32 z\n"
 )
-"""XELA's, since 2021; in ROS 2 the package is called xela_server_ros2."""
+"""Definition of XELA's messages since 2021. In ROS 2 the package is xela_server_ros2."""
 
 _SENSOR_STATE = (
     "std_msgs/Header header\nint64 tus\nPillarState[] pillars\n"
@@ -45,20 +45,21 @@ _SENSOR_STATE = (
     + "bool in_contact\nint32 slip_state\n"
 )
 
+_NO_FORCES = np.empty((0, 3))
 _PILLARS = ("papillarray_ros_v2/SensorState", "sensor_interfaces/SensorState")
 
 
 class DeviceSample(NamedTuple):
-    """What one device says in a message.
+    """One sample of one device, from a message.
 
     Attributes:
-        number: the device numbers it so, from 1; None where it has no number.
-        model: as it is called; empty where it has no name.
-        time: on the clock of the device [s], or None.
-        stamp: in the header, when ROS got it [s], or None.
+        number: number of the device, from 1; None if it has none.
+        model: model name of the device; empty if it has none.
+        time: time on the clock of the device [s], or None.
+        stamp: time in the header, when ROS received the sample [s], or None.
         sequence: number of the packet, or None.
-        counts: (n_taxels, 3) [count]; None where it sends newtons only.
-        forces: (n_taxels, 3) [N]; of no taxels where it is not calibrated.
+        counts: (n_taxels, 3) [count]; None if the device sends newtons only.
+        forces: (n_taxels, 3) [N]; (0, 3) if the device is not calibrated.
     """
 
     number: int | None
@@ -70,13 +71,12 @@ class DeviceSample(NamedTuple):
     forces: Array
 
 
-_NO_FORCES = np.empty((0, 3))
 PAPILLARRAY = "papillarray"
-"""What we call Contactile's sensor, which sends no name."""
+"""Name of Contactile's sensor, which sends no model name."""
 
 
 def known_definition(name: str, *, ros2: bool) -> Definition | None:
-    """The definition of a message that is sent without one, if its type is known.
+    """Return the definition of a type of tactile messages, or None for any other type.
 
     Example:
         >>> known_definition("xela_server_ros2/msg/SensStream", ros2=True).fields[0].name
@@ -93,53 +93,50 @@ def known_definition(name: str, *, ros2: bool) -> Definition | None:
 
 
 class SampleDecoder:
-    """Takes what devices say out of messages of one type.
+    """Decoder of messages of one type into the samples in them.
 
     Args:
-        definition: of the messages.
-        ros2: they are as ROS 2 sends them, not ROS 1.
+        definition: definition of the messages.
+        ros2: whether messages are encoded as in ROS 2; otherwise as in ROS 1.
 
     Raises:
-        ValueError: nobody knows how to find readings in them.
+        ValueError: the messages are not of a supported type.
     """
 
     def __init__(self, definition: Definition, *, ros2: bool) -> None:
-        self._take = _taker(definition)
+        self._convert = _converter(definition)
         self._decode = MessageDecoder(definition, ros2=ros2)
-        self._name = definition.name
 
     def __call__(self, data: bytes) -> list[DeviceSample]:
-        """What each device says in a message.
+        """Return the sample of each device in a message.
 
         Raises:
-            ValueError: these bytes are no such message.
+            ValueError: the bytes are not a message of this type.
         """
-        return self._take(self._decode(data))
+        return self._convert(self._decode(data))
 
 
 SUPPORTED_MESSAGES = (
     "xela_server_ros/SensStream, xela_server_ros2/SensStream, XStream, xServerMsg, "
     "XelaServerMsg, SensorState"
 )
-"""Messages that readings can be taken from, for people."""
+"""Supported message types, for error messages."""
 
 
-def _taker(definition: Definition) -> Callable[[Mapping[str, Any]], list[DeviceSample]]:
-    """By the fields of the messages: packages change their names, and older ones differ."""
+def _converter(definition: Definition) -> Callable[[Mapping[str, Any]], list[DeviceSample]]:
+    """Choose by the fields of the messages: packages differ in the names of types."""
     paths = field_paths(definition)
-    for needed, take in _TAKERS:
+    for needed, convert in _CONVERTERS:
         if needed <= paths:
-            return take
-    raise ValueError(
-        f"{definition.name} is of no kind that holdfast knows; there are {SUPPORTED_MESSAGES}"
-    )
+            return convert
+    raise ValueError(f"{definition.name} is not supported; supported are {SUPPORTED_MESSAGES}")
 
 
-def _each(before: str, kind: str, names: str = "xyz") -> set[str]:
-    return {f"{before}{name} {kind}" for name in names}
+def _axis_paths(prefix: str, kind: str, axes: str = "xyz") -> set[str]:
+    return {f"{prefix}{axis} {kind}" for axis in axes}
 
 
-def _of_sens_stream(message: Mapping[str, Any]) -> list[DeviceSample]:
+def _from_sens_stream(message: Mapping[str, Any]) -> list[DeviceSample]:
     return [
         DeviceSample(
             one["sensor_pos"],
@@ -154,28 +151,28 @@ def _of_sens_stream(message: Mapping[str, Any]) -> list[DeviceSample]:
     ]
 
 
-def _of_x_stream(message: Mapping[str, Any]) -> list[DeviceSample]:
+def _from_x_stream(message: Mapping[str, Any]) -> list[DeviceSample]:
     return [
         DeviceSample(one["sensor"], "", None, None, None, _counts(_points(one["xyz"])), _NO_FORCES)
         for one in message["data"]
     ]
 
 
-def _of_x_server(message: Mapping[str, Any]) -> list[DeviceSample]:
+def _from_x_server(message: Mapping[str, Any]) -> list[DeviceSample]:
     counts = _counts(_points([one["point"] for one in message["points"]]))
     number, model = message["sensor"], message["model"]
     stamp = _seconds(message["header"]["stamp"])
     return [DeviceSample(number, model, None, stamp, None, counts, _NO_FORCES)]
 
 
-def _of_pillars(message: Mapping[str, Any]) -> list[DeviceSample]:
+def _from_sensor_state(message: Mapping[str, Any]) -> list[DeviceSample]:
     forces = _points(message["pillars"], ("fX", "fY", "fZ"))
     time = message["tus"] * 1e-6 if message["tus"] > 0 else None
     stamp = _seconds(message["header"]["stamp"])
     return [DeviceSample(None, PAPILLARRAY, time, stamp, None, None, forces)]
 
 
-_TAKERS: tuple[tuple[set[str], Callable[[Mapping[str, Any]], list[DeviceSample]]], ...] = (
+_CONVERTERS: tuple[tuple[set[str], Callable[[Mapping[str, Any]], list[DeviceSample]]], ...] = (
     (
         {
             "sensors[].message uint32",
@@ -183,19 +180,19 @@ _TAKERS: tuple[tuple[set[str], Callable[[Mapping[str, Any]], list[DeviceSample]]
             "sensors[].model string",
             "sensors[].sensor_pos uint8",
         }
-        | _each("sensors[].taxels[].", "uint16")
-        | _each("sensors[].forces[].", "float32"),
-        _of_sens_stream,
+        | _axis_paths("sensors[].taxels[].", "uint16")
+        | _axis_paths("sensors[].forces[].", "float32"),
+        _from_sens_stream,
     ),
-    ({"data[].sensor int16"} | _each("data[].xyz[].", "uint32"), _of_x_stream),
+    ({"data[].sensor int16"} | _axis_paths("data[].xyz[].", "uint32"), _from_x_stream),
     (
         {"sensor int16", "model string", "header.frame_id string"}
-        | _each("points[].point.", "float64"),
-        _of_x_server,
+        | _axis_paths("points[].point.", "float64"),
+        _from_x_server,
     ),
     (
-        {"tus int64", "header.frame_id string"} | _each("pillars[].f", "float32", "XYZ"),
-        _of_pillars,
+        {"tus int64", "header.frame_id string"} | _axis_paths("pillars[].f", "float32", "XYZ"),
+        _from_sensor_state,
     ),
 )
 
@@ -203,7 +200,7 @@ _TAKERS: tuple[tuple[set[str], Callable[[Mapping[str, Any]], list[DeviceSample]]
 def _points(
     given: npt.NDArray[Any] | list[dict[str, Any]], names: Sequence[str] = "xyz"
 ) -> npt.NDArray[Any]:
-    """(n, 3) of points that came as an array, or one by one."""
+    """Return (n, 3) of points that are an array or dictionaries."""
     if isinstance(given, np.ndarray):
         return given
     rows = [[one[name] for name in names] for one in given]
@@ -211,58 +208,62 @@ def _points(
 
 
 def _counts(values: npt.NDArray[Any]) -> npt.NDArray[np.uint16]:
-    """Counts that came as wider numbers.
+    """Convert counts of a wider number type.
 
     Raises:
-        ValueError: one is no count of 16 bits.
+        ValueError: one is not a whole number of 16 bits.
     """
     if values.dtype == np.uint16:
         return values
     with np.errstate(invalid="ignore"):
         counts = values.astype(np.uint16)
     if (counts != values).any():
-        raise ValueError("a reading is no whole number from 0 to 65535")
+        raise ValueError("a reading is not a whole number from 0 to 65535")
     return counts
 
 
 def _seconds(stamp: Mapping[str, int]) -> float | None:
-    """A stamp of ROS 1 or ROS 2 [s]; None where nobody set it."""
-    whole, nanoseconds = stamp.values()
-    return whole + nanoseconds * 1e-9 if whole or nanoseconds else None
+    """Return a stamp of ROS 1 or ROS 2 [s]; None if it was not set."""
+    seconds, nanoseconds = stamp.values()
+    return seconds + nanoseconds * 1e-9 if seconds or nanoseconds else None
 
 
-def sensors_of(message: DeviceSample, unit: Unit) -> dict[str, Sensor]:
-    """Sensors of a device by module, as `module_sensors`.
+def sensors_of(sample: DeviceSample, unit: Unit) -> dict[str, Sensor]:
+    """Return the sensors of a device by module, as `module_sensors` does.
+
+    Args:
+        sample: any sample of the device.
+        unit: unit of the readings.
 
     Raises:
-        ValueError: it has another number of taxels than its model.
+        ValueError: the device has another number of taxels than its model.
     """
-    readings = readings_of(message, unit)
-    if message.counts is None:
+    readings = readings_of(sample, unit)
+    if sample.counts is None:
         pillars = sensor(PAPILLARRAY)
         if len(readings) != pillars.n_taxels:
             raise ValueError(
                 f"{len(readings)} taxels given, {pillars.n_taxels} expected ({PAPILLARRAY})"
             )
         return {"": pillars}
-    sensors = module_sensors(message.model, len(readings))
+    sensors = module_sensors(sample.model, len(readings))
     if unit == "count":
         return sensors
     return {name: replace(one, unit=unit, limits=None) for name, one in sensors.items()}
 
 
-def readings_of(message: DeviceSample, unit: Unit) -> npt.NDArray[Any]:
-    """(n_taxels, 3) of a message: counts, or newtons where they are wanted or all there is."""
-    return message.forces if unit == "N" or message.counts is None else message.counts
+def readings_of(sample: DeviceSample, unit: Unit) -> npt.NDArray[Any]:
+    """Return (n_taxels, 3) in a unit; newtons if the device sends nothing else."""
+    return sample.forces if unit == "N" or sample.counts is None else sample.counts
 
 
 def module_name(finger: str, part: str, *, named: bool) -> str:
-    """What a module is called: of a hand by its part, else as the finger.
+    """Return the name of a module: the part of a hand, otherwise the finger.
 
     Args:
-        finger: of the device.
-        part: of a hand, or empty.
-        named: somebody called the device so: its name comes before the part.
+        finger: finger that the device is on.
+        part: part of the hand; empty if the device is not a hand.
+        named: whether a user gave the name of the finger; it then precedes the part.
 
     Example:
         >>> [module_name("left", "thumb", named=True), module_name("finger1", "", named=False)]

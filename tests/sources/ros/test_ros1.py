@@ -77,5 +77,7 @@ def test_topics_of_others(master):
 def test_unknown_parameters():
     with pytest.raises(ValueError, match="unknown parameter domain; there are master, values, fin"):
         open_source("ros1:///a?domain=0")
-    with pytest.raises(ValueError, match=r"a master as http://localhost:11311 expected, 'x' given"):
+    with pytest.raises(
+        ValueError, match=r"a ROS master like http://localhost:11311 expected, 'x' given"
+    ):
         open_source("ros1:///a?master=x")
