@@ -30,7 +30,7 @@ def test_it_reads_a_recording_each_time_it_is_asked(folder):
     assert dataset[0] is not dataset[0]
 
 
-def test_what_is_no_recording_is_ignored(folder):
+def test_other_files_are_ignored(folder):
     (folder / "model.json").write_text("{}")
     (folder / "b.labels.json.bak").write_text("{}")
     (folder / ".hidden.parquet").write_text("")
@@ -64,7 +64,7 @@ def test_a_file_is_a_dataset_of_one(folder):
     assert load_dataset(folder / "c.mcap").names == ("c",)
 
 
-def test_missing_and_empty_folders_are_told(tmp_path):
+def test_missing_and_empty_folders(tmp_path):
     with pytest.raises(RecordingError, match=r"there is no folder .*none; a folder of recordings"):
         load_dataset(tmp_path / "none")
     (tmp_path / "a.txt").write_text("")

@@ -26,7 +26,7 @@ def test_it_comes_back(make_recording):
         (lambda h: h["truth"]["hand"]["phase"].update(shape=[0.5]), "Expected `int`, got `float`"),
     ],
 )
-def test_what_is_not_as_described_is_refused(make_recording, change, text):
+def test_invalid_headers_are_refused(make_recording, change, text):
     data = msgspec.json.decode(encode_header(header_of(make_recording(), "a")))
     change(data)
     with pytest.raises(RecordingError, match=re.escape(text)) as caught:
@@ -34,6 +34,6 @@ def test_what_is_not_as_described_is_refused(make_recording, change, text):
     assert str(caught.value).startswith("a.parquet: the header of the recording is refused: ")
 
 
-def test_what_is_no_json_is_refused():
+def test_invalid_json_is_refused():
     with pytest.raises(RecordingError, match="the header of the recording is refused: Input data"):
         decode_header(b"", Path("a.parquet"))

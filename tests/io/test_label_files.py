@@ -97,7 +97,7 @@ def test_wrong_label_files_are_refused(saved, change, text):
     assert "can.labels.json" in str(caught.value)
 
 
-def test_what_is_no_json_is_refused(saved):
+def test_invalid_json_is_refused(saved):
     _, path = saved
     labels_path(path).write_text("finger,start\n")
     with pytest.raises(
@@ -152,7 +152,7 @@ def test_wrong_csv_is_refused(tmp_path, text, message):
         labels_from_csv(tmp_path / "a.csv")
 
 
-def test_missing_files_are_told(tmp_path):
+def test_missing_files(tmp_path):
     for read in (labels_from_csv, load_labels):
         with pytest.raises(RecordingError, match=r"cannot read .*: No such file"):
             read(tmp_path / "none")

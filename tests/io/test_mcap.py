@@ -95,7 +95,7 @@ def assert_prefix(got, want):
         np.testing.assert_array_equal(array, want.truth.hand[name][:n])
 
 
-def test_a_file_cut_anywhere_gives_what_is_left(make_recording, tmp_path):
+def test_a_file_cut_anywhere_gives_the_rest(make_recording, tmp_path):
     recording = make_recording(450)
     path, cut = tmp_path / "a.mcap", tmp_path / "b.mcap"
     save_recording(recording, path)

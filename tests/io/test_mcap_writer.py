@@ -53,7 +53,7 @@ def test_all_that_was_said_comes_back(tmp_path):
     assert (recording.markers, recording.media) == (((1.0, "now"),), (("a.mp4", 0.5),))
 
 
-def test_it_keeps_no_hold_of_what_it_is_given(tmp_path):
+def test_given_arrays_may_be_changed_afterwards(tmp_path):
     values = readings(1)
     with RecordingWriter(tmp_path / "a.mcap", {"thumb": ANYSKIN}) as writer:
         writer.append("thumb", [0.0], values)
@@ -110,7 +110,7 @@ def test_nothing_is_overwritten_unless_forced(tmp_path):
     assert load_recording(path).complete
 
 
-def test_a_full_disk_is_told(tmp_path, monkeypatch):
+def test_a_full_disk(tmp_path, monkeypatch):
     writer = RecordingWriter(tmp_path / "a.mcap", {"thumb": ANYSKIN})
 
     def full(data):
@@ -126,7 +126,7 @@ def test_a_full_disk_is_told(tmp_path, monkeypatch):
     writer.close()
 
 
-def test_what_is_flushed_is_there(tmp_path):
+def test_flushed_samples_are_on_disk(tmp_path):
     path = tmp_path / "a.mcap"
     with RecordingWriter(path, {"thumb": ANYSKIN, "index": ANYSKIN}) as writer:
         for k in range(30):
@@ -140,7 +140,7 @@ def test_what_is_flushed_is_there(tmp_path):
     assert (recording.complete, recording.modules["thumb"].n_samples) == (True, 30)
 
 
-def test_a_marker_that_may_wait_comes_with_what_follows(tmp_path):
+def test_a_marker_may_be_written_with_later_samples(tmp_path):
     path = tmp_path / "a.mcap"
     with RecordingWriter(path, {"thumb": ANYSKIN}) as writer:
         before = writer.n_bytes

@@ -133,7 +133,7 @@ def test_empty_and_foreign_files_are_refused(tmp_path):
         load_recording(path)
 
 
-def test_what_it_cannot_hold_is_refused_and_leaves_nothing(make_recording, tmp_path):
+def test_an_error_leaves_no_file(make_recording, tmp_path):
     recording = make_recording()
     thumb = recording.modules["thumb"]
     half = replace(thumb, readings=np.zeros_like(thumb.readings, np.float16))

@@ -13,7 +13,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from holdfast.errors import MissingExtra, RecordingError
-from holdfast.io.importers.table import natural
+from holdfast.io.importers.table import natural_order
 from holdfast.ros.definitions import Definition, parse_definition, short_name
 from holdfast.ros.pose_messages import PoseDecoder, has_poses, known_pose_definition
 from holdfast.ros.sensor_messages import known_definition
@@ -97,7 +97,7 @@ def find_bags(path: Path) -> list[Path]:
     """Return the bag at `path`, or the bags in that folder in natural order."""
     if _is_bag(path):
         return [path]
-    return sorted((inside for inside in path.glob("*") if _is_bag(inside)), key=natural)
+    return sorted((inside for inside in path.glob("*") if _is_bag(inside)), key=natural_order)
 
 
 def check_rosbags() -> None:

@@ -49,7 +49,7 @@ def test_both_sensors(tmp_path, n_taxels, name):
     assert recording.modules["finger1"].sensor.name == name
 
 
-def test_labels_say_what_is_known(tmp_path):
+def test_labels_of_known_states(tmp_path):
     codes = [0, 3, 0, 4, 0, 6, 1, 0, 5, 0, 2, 0]
     write(tmp_path / "a.h5", codes)
     (recording,) = import_recordings(tmp_path / "a.h5")
@@ -62,7 +62,7 @@ def test_labels_say_what_is_known(tmp_path):
     assert causes == [Cause.CLOSING, Cause.SLIP, Cause.SLIP, Cause.RELEASED]
 
 
-def test_rest_that_may_be_either_has_no_label(tmp_path):
+def test_rest_of_unknown_state_has_no_label(tmp_path):
     write(tmp_path / "a.h5", [0, 4, 5, 0])
     (recording,) = import_recordings(tmp_path / "a.h5")
     states = recording.modules["finger1"].label_states
@@ -83,7 +83,7 @@ def test_rest_that_may_be_either_has_no_label(tmp_path):
         (18, {"tactile_timestamps": np.zeros(2)}, "times stand still at sample 1: 0 s after 0 s;"),
     ],
 )
-def test_bad_input_is_told_in_one_line(tmp_path, n_taxels, changes, text):
+def test_bad_input_gives_one_line(tmp_path, n_taxels, changes, text):
     path = tmp_path / "a.h5"
     write(path, [0, 4], n_taxels, **changes)
     with pytest.raises(RecordingError) as caught:
@@ -91,17 +91,17 @@ def test_bad_input_is_told_in_one_line(tmp_path, n_taxels, changes, text):
     assert str(caught.value).startswith(f"{path}: GGCNN2/Solder/Pose1/Exp1: {text}")
 
 
-def test_what_is_no_data_set_is_told(tmp_path):
+def test_files_that_are_not_a_data_set(tmp_path):
     path = tmp_path / "a.h5"
     path.write_text("version https://git-lfs.github.com/spec/v1\n")
-    with pytest.raises(RecordingError, match=r"is no HDF5 file .a Git LFS pointer"):
+    with pytest.raises(RecordingError, match=r"is not an HDF5 file .for a Git LFS pointer"):
         list(import_recordings(path, "arq-crisp"))
     path.unlink()
     write(path, [0, 1], tactile_data_raw=None)
     with pytest.raises(RecordingError, match="no group with tactile_data_raw in it"):
         list(import_recordings(path, "arq-crisp"))
     path.write_bytes(path.read_bytes()[:200])
-    with pytest.raises(RecordingError, match="is damaged or no data set of ARQ-CRISP"):
+    with pytest.raises(RecordingError, match="is damaged or not a data set of ARQ-CRISP"):
         list(import_recordings(path, "arq-crisp"))
 
 

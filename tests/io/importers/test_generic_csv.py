@@ -45,7 +45,9 @@ def test_two_modules_with_labels_of_their_own(tmp_path):
 
 def test_the_sensor_can_be_given(tmp_path):
     write(tmp_path / "a.csv", [], ["time", *ONE], [[0, *[1] * 15]])
-    with pytest.raises(RecordingError, match=r"which sensor is finger1\? A line '# sensor: finger"):
+    with pytest.raises(
+        RecordingError, match=r"the sensor of finger1 is missing: a line '# sensor: finger"
+    ):
         list(import_recordings(tmp_path / "a.csv"))
     given = {"finger1": sensor("anyskin")}
     (recording,) = import_recordings(tmp_path / "a.csv", sensors=given)
@@ -98,7 +100,7 @@ def test_the_sensor_can_be_given(tmp_path):
         (["# sensor: anyskin"], ["time", *ONE], ["", *[1] * 15], "a time is not finite; seconds"),
     ],
 )
-def test_bad_input_is_told_in_one_line(tmp_path, comments, names, row, text):
+def test_bad_input_gives_one_line(tmp_path, comments, names, row, text):
     path = tmp_path / "a.csv"
     write(path, comments, names, [row])
     with pytest.raises(RecordingError, match=re.escape(text)) as caught:

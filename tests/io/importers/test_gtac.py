@@ -41,18 +41,18 @@ def test_numbered_columns_and_a_first_row_without_time(tmp_path):
 @pytest.mark.parametrize(
     ("stamps", "text"),
     [
-        ([0, "", 14], "a.csv, row 3: no timestamp; only the first row may lack its own"),
+        ([0, "", 14], "a.csv, row 3: no time; only the first row may have none"),
         ([0, 990, 5], "a.csv: times go back at sample 2: 0.005 s after 0.99 s"),
     ],
 )
-def test_bad_times_are_told(tmp_path, stamps, text):
+def test_bad_times(tmp_path, stamps, text):
     names = ["", *map(str, range(49))]
     write(tmp_path / "a.csv", names, rows(3, milliseconds=stamps))
     with pytest.raises(RecordingError, match=text.replace(".", r"\.")):
         list(import_recordings(tmp_path / "a.csv", "gtac"))
 
 
-def test_other_columns_are_told(tmp_path):
+def test_other_columns(tmp_path):
     write(tmp_path / "a.csv", ["a", "b"], [[1, 2]])
     with pytest.raises(
         RecordingError, match=r"columns mag_x1,mag_y1,\.\.\.,mag_z15 expected, or a"

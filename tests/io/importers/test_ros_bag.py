@@ -315,7 +315,7 @@ def test_the_command(tmp_path, bag, capsys):
 
 
 class TestRefusals:
-    def test_topics_that_nobody_knows(self, bag):
+    def test_unknown_topics(self, bag):
         with bag() as given:
             given.text(EPOCH)
         with pytest.raises(RecordingError) as caught:

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from holdfast.errors import RecordingError
-from holdfast.io.importers.table import counts_or, natural, read_table
+from holdfast.io.importers.table import natural_order, read_table, with_integer_type
 
 
 def test_numbers_text_comments_and_holes(tmp_path):
@@ -27,19 +27,19 @@ def test_numbers_text_comments_and_holes(tmp_path):
     ],
 )
 def test_whole_numbers_become_counts(values, number):
-    got = counts_or(np.array(values))
+    got = with_integer_type(np.array(values))
     assert got.dtype == number
     np.testing.assert_array_equal(got, values)
 
 
 def test_names_sort_as_a_person_would():
     paths = [Path(name) for name in ("Exp10", "Exp2", "Exp1")]
-    assert [p.name for p in sorted(paths, key=natural)] == ["Exp1", "Exp2", "Exp10"]
+    assert [p.name for p in sorted(paths, key=natural_order)] == ["Exp1", "Exp2", "Exp10"]
 
 
 @pytest.mark.parametrize("raw", [b"\xff\xfe\x00", b"a,b\n1,\xff\n"])
-def test_what_is_no_text_is_told(tmp_path, raw):
+def test_files_that_are_not_text(tmp_path, raw):
     path = tmp_path / "a.csv"
     path.write_bytes(raw)
-    with pytest.raises(RecordingError, match=r"a\.csv(, row 2, column 'b': .* given,| is no CSV)"):
+    with pytest.raises(RecordingError, match=r"a\.csv(, row 2, column 'b': .* given,| is not CSV)"):
         read_table(path)

@@ -137,7 +137,7 @@ def test_labels_can_stay_behind(folder):
         ),
     ],
 )
-def test_bad_input_is_told_in_one_line(folder, file, change, text):
+def test_bad_input_gives_one_line(folder, file, change, text):
     path = folder / file
     if change is None:
         path.unlink()

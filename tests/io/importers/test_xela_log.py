@@ -38,7 +38,7 @@ def test_numbers_that_are_no_counts_are_newtons(tmp_path):
     assert recording.modules["thumb"].unit == "N"
 
 
-def test_bad_input_is_told_in_one_line(tmp_path):
+def test_bad_input_gives_one_line(tmp_path):
     path = tmp_path / "a.csv"
     write(path, np.zeros((2, 360)))
     with pytest.raises(RecordingError) as caught:

@@ -1,4 +1,4 @@
-"""Other people's recordings: one file a format, loaded by name."""
+"""Import of recordings in other formats; each format has a module, which is loaded by name."""
 
 from collections.abc import Iterator, Mapping
 from dataclasses import replace
@@ -18,44 +18,44 @@ FORMATS = {
     "rosbag": "bags of ROS 1 and ROS 2 with topics of XELA or Contactile (extra: bags)",
     "csv": "the generic CSV of docs/formats.md",
 }
-"""The formats that can be imported, and what they are; sniffed in this order."""
+"""Formats that can be imported, with a description; they are detected in this order."""
 
 
 def import_recordings(
     path: str | Path,
-    format: str | None = None,  # noqa: A002 (the command line's own word)
+    format: str | None = None,  # noqa: A002 (as on the command line)
     *,
     labels: bool = True,
     sensors: Mapping[str, Sensor] | None = None,
 ) -> Iterator[Recording]:
-    """The recordings that a file or folder of another format holds, one at a time.
+    """Import the recordings in a file or folder of another format, one at a time.
 
     Args:
-        path: of the file or folder.
-        format: one of `FORMATS`; found out from the content where it is not given.
-        labels: keep the labels that the data come with.
-        sensors: sensor by module, for `csv` files that do not name theirs.
+        path: path of the file or folder.
+        format: one of `FORMATS`; by default it is detected from the content.
+        labels: keep the labels in the data.
+        sensors: sensor by module, for `csv` files that do not name their sensors.
 
     Yields:
-        Recordings, each when it is asked for.
+        Recordings; each is read when the iterator reaches it.
 
     Raises:
-        RecordingError: there is nothing at `path`, no format fits, or the data contradict
-            the format.
+        RecordingError: `path` does not exist, no format fits, or the data contradict the
+            format.
         MissingExtra: the format needs a package that is not installed.
-        ValueError: there is no format of that name.
+        ValueError: there is no format of this name.
     """
     place = Path(path)
     if format is not None and format not in FORMATS:
         raise ValueError(f"unknown format {format!r}; there are {', '.join(FORMATS)}")
     if not place.exists():
         raise RecordingError(f"{place} does not exist; a file or folder to import expected")
-    name = format or _sniffed(place)
+    name = format or _detected_format(place)
     source = _importer(name)
     recordings: Iterator[Recording] = (
         source.read(place, sensors) if name == "csv" else source.read(place)
     )
-    return recordings if labels else (_bare(recording) for recording in recordings)
+    return recordings if labels else (_without_labels(recording) for recording in recordings)
 
 
 def _importer(name: str) -> ModuleType:
@@ -63,7 +63,7 @@ def _importer(name: str) -> ModuleType:
     return import_module(f"holdfast.io.importers.{module}")
 
 
-def _sniffed(path: Path) -> str:
+def _detected_format(path: Path) -> str:
     for name in FORMATS:
         if _importer(name).sniff(path):
             return name
@@ -73,6 +73,6 @@ def _sniffed(path: Path) -> str:
     )
 
 
-def _bare(recording: Recording) -> Recording:
+def _without_labels(recording: Recording) -> Recording:
     modules = {name: replace(module, labels=()) for name, module in recording.modules.items()}
     return replace(recording, modules=modules)

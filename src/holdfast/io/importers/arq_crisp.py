@@ -1,11 +1,12 @@
-"""The ARQ-CRISP slip data sets of 2021 (3 x 6 taxels) and 2023 (4 x 6), in HDF5.
+"""Import of the ARQ-CRISP slip data sets of 2021 (3 x 6 taxels) and 2023 (4 x 6), in HDF5.
 
-A group `{planner}/{object}/PoseN/ExpM` is a recording. The authors' labels are: 0 nothing
-held, or held with the arm still; 1 slip with the arm still; 2 release; 3 grasp; 4 held with
+A group `{planner}/{object}/PoseN/ExpM` is a recording. The labels of the authors are: 0 nothing
+held, or held with the arm at rest; 1 slip with the arm at rest; 2 release; 3 grasp; 4 held with
 the arm in motion; 5 slip with the arm in motion; 6 anything else.
 """
 
 from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import replace
 from pathlib import Path
 from types import ModuleType
 from typing import Any
@@ -14,7 +15,7 @@ import numpy as np
 
 from holdfast.contact import Cause, ContactState
 from holdfast.errors import MissingExtra, RecordingError
-from holdfast.io.importers.table import counts_or, natural
+from holdfast.io.importers.table import natural_order, with_integer_type
 from holdfast.recordings import Label, Recording, Tactile, labels_from_samples
 from holdfast.sensors import Sensor, sensor
 from holdfast.sensors.types import Array
@@ -25,41 +26,42 @@ SOURCE = "ARQ-CRISP"
 DATA, TIMES, LABELS = "tactile_data_raw", "tactile_timestamps", "tactile_slips_label"
 MILLISECOND = 1e-3
 PITCH = (7.24e-3, 7.17e-3)
-"""Of the 4 x 6 patch [m]; taken for the 3 x 6 one too, of which no drawing is at hand."""
+"""Distances between the taxels of the 4 x 6 patch [m]; those of the 3 x 6 patch are unknown, and
+the same are assumed."""
 
-_NOTHING, _SLIP_STILL, _RELEASE, _GRASP, _HELD_MOVING, _SLIP_MOVING, _OTHER = range(7)
+_NOTHING, _SLIP_AT_REST, _RELEASE, _GRASP, _HELD_IN_MOTION, _SLIP_IN_MOTION, _OTHER = range(7)
 _State = tuple[ContactState, Cause | None]
 _STATES: dict[int, _State] = {
-    _SLIP_STILL: (ContactState.UNSTABLE, Cause.SLIP),
-    _SLIP_MOVING: (ContactState.UNSTABLE, Cause.SLIP),
+    _SLIP_AT_REST: (ContactState.UNSTABLE, Cause.SLIP),
+    _SLIP_IN_MOTION: (ContactState.UNSTABLE, Cause.SLIP),
     _RELEASE: (ContactState.UNSTABLE, Cause.RELEASED),
     _GRASP: (ContactState.UNSTABLE, Cause.CLOSING),
-    _HELD_MOVING: (ContactState.STABLE, None),
+    _HELD_IN_MOTION: (ContactState.STABLE, None),
 }
-_HELD_AFTER = (_GRASP, _HELD_MOVING, _SLIP_STILL, _SLIP_MOVING)
-_HELD_BEFORE = (_RELEASE, _HELD_MOVING, _SLIP_STILL, _SLIP_MOVING)
+_HELD_AFTER = (_GRASP, _HELD_IN_MOTION, _SLIP_AT_REST, _SLIP_IN_MOTION)
+_HELD_BEFORE = (_RELEASE, _HELD_IN_MOTION, _SLIP_AT_REST, _SLIP_IN_MOTION)
 
 
 def sniff(path: Path) -> bool:
-    """Whether it is an HDF5 file, or a folder that holds one."""
+    """Return whether `path` is an HDF5 file, or a folder with one."""
     return any(_is_hdf5(file) for file in _files(path))
 
 
 def read(path: Path) -> Iterator[Recording]:
-    """The recordings in an HDF5 file, or in the HDF5 files of a folder.
+    """Read the recordings in an HDF5 file, or in the HDF5 files of a folder.
 
     Raises:
-        RecordingError: there is no such file, or one is not as expected.
+        RecordingError: there is no such file, or one has another form.
         MissingExtra: h5py is not installed.
     """
-    h5py = _h5py()
+    h5py = _import_h5py()
     files = _files(path)
     if not files:
         raise RecordingError(f"no HDF5 file in {path}; {' or '.join(SUFFIXES)} expected")
     return (recording for file in files for recording in _recordings(file, h5py))
 
 
-def _h5py() -> ModuleType:
+def _import_h5py() -> ModuleType:
     try:
         import h5py
     except ImportError as cause:
@@ -71,7 +73,7 @@ def _h5py() -> ModuleType:
 def _files(path: Path) -> list[Path]:
     if path.is_file():
         return [path]
-    return sorted((p for p in path.glob("*") if p.suffix in SUFFIXES), key=natural)
+    return sorted((p for p in path.glob("*") if p.suffix in SUFFIXES), key=natural_order)
 
 
 def _is_hdf5(path: Path) -> bool:
@@ -82,7 +84,7 @@ def _is_hdf5(path: Path) -> bool:
 def _recordings(path: Path, h5py: ModuleType) -> Iterator[Recording]:
     if not _is_hdf5(path):
         raise RecordingError(
-            f"{path} is no HDF5 file (a Git LFS pointer? fetch the data with `git lfs pull`)"
+            f"{path} is not an HDF5 file (for a Git LFS pointer, fetch the data by `git lfs pull`)"
         )
     try:
         with h5py.File(path, "r") as file:
@@ -90,10 +92,12 @@ def _recordings(path: Path, h5py: ModuleType) -> Iterator[Recording]:
             file.visititems(lambda name, item: names.append(name) if DATA in _keys(item) else None)
             if not names:
                 raise RecordingError(f"{path}: no group with {DATA} in it")
-            for name in sorted(names, key=lambda name: natural(Path(name.replace("/", "_")))):
+            for name in sorted(names, key=lambda name: natural_order(Path(name.replace("/", "_")))):
                 yield _recording(f"{path}: {name}", name.split("/"), file[name])
     except (OSError, KeyError, ValueError) as cause:
-        raise RecordingError(f"{path} is damaged or no data set of ARQ-CRISP: {cause}") from cause
+        raise RecordingError(
+            f"{path} is damaged or not a data set of ARQ-CRISP: {cause}"
+        ) from cause
 
 
 def _keys(item: object) -> Sequence[str]:
@@ -109,11 +113,12 @@ def _recording(place: str, parts: list[str], group: Mapping[str, Any]) -> Record
         raise RecordingError(
             f"{place}: {DATA} of shape (n_taxels, 3, {len(times)}) expected, {raw.shape} given"
         )
-    readings = counts_or(raw.transpose(2, 0, 1))
+    readings = with_integer_type(raw.transpose(2, 0, 1))
     try:
-        bare = Tactile(_sensor(readings.shape[1]), times, readings)
-        labels = _labels(np.asarray(group[LABELS]).ravel(), bare) if LABELS in group else ()
-        module = Tactile(bare.sensor, times, readings, labels=labels)
+        module = Tactile(_sensor(readings.shape[1]), times, readings)
+        if LABELS in group:
+            labels = _labels(np.asarray(group[LABELS]).ravel(), module)
+            module = replace(module, labels=labels)
         return Recording("_".join(parts), {"finger1": module}, _metadata(parts))
     except RecordingError as cause:
         raise RecordingError(f"{place}: {cause}") from cause
@@ -132,9 +137,9 @@ def _sensor(n_taxels: int) -> Sensor:
             f"{n_taxels} taxels given; 18 (3 x 6, 2021) or 24 (4 x 6, 2023) expected"
         )
     positions = [[(k % 6 - 2.5) * PITCH[0], (1 - k // 6) * PITCH[1], 0.0] for k in range(18)]
-    turns = np.tile(np.eye(3), (18, 1, 1))
-    up = np.array([0.0, 0.0, 1.0])
-    return Sensor("uskin-3x6", np.array(positions), turns, up, 180.0, limits=(0.0, 65535.0))
+    rotations = np.tile(np.eye(3), (18, 1, 1))
+    normal = np.array([0.0, 0.0, 1.0])
+    return Sensor("uskin-3x6", np.array(positions), rotations, normal, 180.0, limits=(0.0, 65535.0))
 
 
 def _labels(codes: Array, module: Tactile) -> tuple[Label, ...]:
@@ -152,20 +157,21 @@ def _labels(codes: Array, module: Tactile) -> tuple[Label, ...]:
 
 
 def _states(codes: list[int]) -> list[_State | None]:
-    """A state a sample; label 0 by what comes before and after it.
+    """Return the state of each sample; that of label 0 depends on the labels around it.
 
-    Label 0 says both "nothing held" and "held, arm still". Between signs of an object held it
-    is stable; before a grasp, and after a release, it is no contact; else nobody knows.
+    Label 0 means both "nothing held" and "held, arm at rest". It is stable between labels of a
+    held object, and no contact before a grasp or after a release. Otherwise it is unknown.
     """
-    after = list(reversed(_last_events(list(reversed(codes)))))
+    previous_events = _previous_events(codes)
+    next_events = _previous_events(codes[::-1])[::-1]
     return [
-        _rest(before, behind) if code == _NOTHING else _STATES.get(code)
-        for code, before, behind in zip(codes, _last_events(codes), after, strict=True)
+        _state_at_rest(before, after) if code == _NOTHING else _STATES.get(code)
+        for code, before, after in zip(codes, previous_events, next_events, strict=True)
     ]
 
 
-def _last_events(codes: list[int]) -> list[int | None]:
-    """The newest code before each sample that is neither 0 nor 6."""
+def _previous_events(codes: list[int]) -> list[int | None]:
+    """Return the last label before each sample that is neither 0 nor 6."""
     events: list[int | None] = []
     last: int | None = None
     for code in codes:
@@ -175,7 +181,7 @@ def _last_events(codes: list[int]) -> list[int | None]:
     return events
 
 
-def _rest(before: int | None, after: int | None) -> _State | None:
+def _state_at_rest(before: int | None, after: int | None) -> _State | None:
     if before in _HELD_AFTER and after in _HELD_BEFORE:
         return ContactState.STABLE, None
     if before in (None, _RELEASE) and after in (None, _GRASP) and (before, after) != (None, None):

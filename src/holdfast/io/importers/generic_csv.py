@@ -1,4 +1,4 @@
-"""The generic CSV of docs/formats.md: for who has a logger and ten minutes."""
+"""Import of the generic CSV of docs/formats.md, a format that is easy to write."""
 
 import re
 from collections.abc import Iterator, Mapping
@@ -7,39 +7,42 @@ from pathlib import Path
 
 from holdfast.contact import Cause, ContactState
 from holdfast.errors import RecordingError
-from holdfast.io.importers.table import Table, counts_or, csv_files, header_line, read_table
+from holdfast.io.importers.table import Table, csv_files, header_line, read_table, with_integer_type
 from holdfast.recordings import Label, Recording, Tactile, labels_from_samples
 from holdfast.sensors import Sensor, built_in_sensors, sensor
 from holdfast.sensors.types import Unit
 
 TIME = "time"
-ONE_MODULE = "finger1"
-"""Name of the module where columns name none."""
+DEFAULT_MODULE = "finger1"
+"""Name of the module if the columns do not name one."""
+
+Settings = Mapping[tuple[str, str | None], str]
+"""Value by key (sensor or unit) and module; None for all modules."""
 
 _TAXEL = re.compile(r"(?:(?P<module>.+)\.)?t(?P<taxel>\d+)[._](?P<axis>[xyz])")
-_TEXT = re.compile(r"(?:(?P<module>.+)\.)?(?P<what>label|cause)")
+_TEXT = re.compile(r"(?:(?P<module>.+)\.)?(?P<column>label|cause)")
 _COMMENT = re.compile(r"(?P<key>sensor|unit)\s*:\s*(?:(?P<module>[^=]+?)\s*=)?\s*(?P<value>\S+)")
 
 
 def sniff(path: Path) -> bool:
-    """Whether it is such a CSV file, or a folder that holds one."""
+    """Return whether `path` is such a CSV file, or a folder with one."""
     return any(_is_header(header_line(file)) for file in csv_files(path))
 
 
 def read(path: Path, sensors: Mapping[str, Sensor] | None = None) -> Iterator[Recording]:
-    """The recording in a CSV file, or those in the CSV files of a folder.
+    """Read the recording in a CSV file, or those in the CSV files of a folder.
 
     Args:
-        path: of the file or folder.
-        sensors: by module; they win over those that the file names.
+        path: path of the file or folder.
+        sensors: sensor by module; they precede those that the file names.
 
     Raises:
-        RecordingError: there is no CSV file, or one is not as expected.
+        RecordingError: there is no CSV file, or one has another form.
     """
     files = [file for file in csv_files(path) if path.is_file() or _is_header(header_line(file))]
     if not files:
         raise RecordingError(
-            f"no CSV file in {path} with a column {TIME!r} and taxel columns as expected"
+            f"no CSV file in {path} with a column {TIME!r} and taxel columns; both are expected"
         )
     return (_recording(file, sensors or {}) for file in files)
 
@@ -52,10 +55,11 @@ def _recording(path: Path, sensors: Mapping[str, Sensor]) -> Recording:
     names = header_line(path)
     table, cells = read_table(path, [name for name in names if _TEXT.fullmatch(name)])
     layout = _layout(table)
-    said = _comments(table)
+    settings = _settings(table)
     try:
         modules = {
-            name: _module(table, name, columns, said, sensors) for name, columns in layout.items()
+            name: _module(table, name, columns, settings, sensors)
+            for name, columns in layout.items()
         }
         labelled = {
             name: replace(module, labels=_labels(table, cells, name, module))
@@ -68,12 +72,12 @@ def _recording(path: Path, sensors: Mapping[str, Sensor]) -> Recording:
 
 
 def _layout(table: Table) -> dict[str, dict[tuple[int, str], str]]:
-    """The column of each taxel and axis, by module."""
+    """Return the column of each taxel and axis, by module."""
     layout: dict[str, dict[tuple[int, str], str]] = {}
     for name in table.names:
         taxel = _TAXEL.fullmatch(name)
         if taxel:
-            columns = layout.setdefault(taxel["module"] or ONE_MODULE, {})
+            columns = layout.setdefault(taxel["module"] or DEFAULT_MODULE, {})
             columns[int(taxel["taxel"]), taxel["axis"]] = name
         elif name != TIME and not _TEXT.fullmatch(name):
             raise RecordingError(
@@ -85,8 +89,8 @@ def _layout(table: Table) -> dict[str, dict[tuple[int, str], str]]:
     return layout
 
 
-def _comments(table: Table) -> dict[tuple[str, str | None], str]:
-    """What lines such as `# sensor: thumb=uskin-curved` say, by key and module."""
+def _settings(table: Table) -> Settings:
+    """Return the values of comments like `# sensor: thumb=uskin-curved`, by key and module."""
     found = (_COMMENT.fullmatch(line) for line in table.comments)
     return {(match["key"], match["module"]): match["value"] for match in found if match}
 
@@ -95,28 +99,30 @@ def _module(
     table: Table,
     name: str,
     columns: Mapping[tuple[int, str], str],
-    said: Mapping[tuple[str, str | None], str],
+    settings: Settings,
     sensors: Mapping[str, Sensor],
 ) -> Tactile:
-    kind = sensors.get(name) or _sensor(name, said)
-    wanted = [(taxel + 1, axis) for taxel in range(kind.n_taxels) for axis in "xyz"]
+    one = sensors.get(name) or _sensor(name, settings)
+    wanted = [(taxel + 1, axis) for taxel in range(one.n_taxels) for axis in "xyz"]
     if set(columns) != set(wanted):
         n_given = len({taxel for taxel, _ in columns})
         raise RecordingError(
-            f"{name}: {n_given} taxels in {len(columns)} columns given; {kind.n_taxels} taxels "
-            f"x 3 axes from t01 on expected ({kind.name})"
+            f"{name}: {n_given} taxels in {len(columns)} columns given; {one.n_taxels} taxels "
+            f"x 3 axes from t01 on expected ({one.name})"
         )
     values = table.columns([columns[key] for key in wanted])
     times = table.columns([TIME])[:, 0]
-    return Tactile(kind, times, counts_or(values).reshape(-1, kind.n_taxels, 3), _unit(name, said))
+    return Tactile(
+        one, times, with_integer_type(values).reshape(-1, one.n_taxels, 3), _unit(name, settings)
+    )
 
 
-def _sensor(name: str, said: Mapping[tuple[str, str | None], str]) -> Sensor:
-    given = said.get(("sensor", name)) or said.get(("sensor", None))
+def _sensor(name: str, settings: Settings) -> Sensor:
+    given = settings.get(("sensor", name)) or settings.get(("sensor", None))
     if given is None:
         raise RecordingError(
-            f"which sensor is {name}? A line '# sensor: {name}=NAME' above the header expected; "
-            f"built in are {', '.join(built_in_sensors())}"
+            f"the sensor of {name} is missing: a line '# sensor: {name}=NAME' expected above the "
+            f"header; built in are {', '.join(built_in_sensors())}"
         )
     try:
         return sensor(given)
@@ -124,8 +130,8 @@ def _sensor(name: str, said: Mapping[tuple[str, str | None], str]) -> Sensor:
         raise RecordingError(str(cause)) from cause
 
 
-def _unit(name: str, said: Mapping[tuple[str, str | None], str]) -> Unit | None:
-    given = said.get(("unit", name)) or said.get(("unit", None))
+def _unit(name: str, settings: Settings) -> Unit | None:
+    given = settings.get(("unit", name)) or settings.get(("unit", None))
     match given:
         case None | "count" | "N":
             return given

@@ -1,7 +1,7 @@
-"""Recordings of the GTac gripper: 15 finger sections, each with a 3-axis Hall sensor.
+"""Import of recordings of the GTac gripper: 15 finger sections with a 3-axis Hall sensor each.
 
-Of the sensor's two layers only the magnetic one has three axes; the piezoresistive cells and
-the servos stay behind.
+Only the magnetic layer of the sensor has three axes. The piezoresistive cells and the servos
+are not imported.
 """
 
 from collections.abc import Iterator
@@ -10,7 +10,7 @@ from pathlib import Path
 import numpy as np
 
 from holdfast.errors import RecordingError
-from holdfast.io.importers.table import Table, counts_or, csv_files, header_line, read_table
+from holdfast.io.importers.table import Table, csv_files, header_line, read_table, with_integer_type
 from holdfast.recordings import Recording, Tactile
 from holdfast.sensors import sensor
 from holdfast.sensors.types import Array
@@ -19,19 +19,20 @@ N_NODES = 15
 NAMES = tuple(f"mag_{axis}{node + 1}" for node in range(N_NODES) for axis in "xyz")
 MILLISECOND = 1e-3
 TO_TAXEL_FRAME = np.array([1, -1, -1])
-"""Half a turn about x: the device's z goes down when a section is pressed, a taxel's goes up."""
+"""Half a turn about x: z of the device decreases when a section is pressed, z of a taxel
+increases."""
 
 
 def sniff(path: Path) -> bool:
-    """Whether it is such a CSV file, or a folder that holds one."""
+    """Return whether `path` is such a CSV file, or a folder with one."""
     return any(_is_header(header_line(file)) for file in csv_files(path))
 
 
 def read(path: Path) -> Iterator[Recording]:
-    """The recording in a CSV file, or those in the CSV files of a folder.
+    """Read the recording in a CSV file, or those in the CSV files of a folder.
 
     Raises:
-        RecordingError: there is no CSV file, or one is not as expected.
+        RecordingError: there is no CSV file, or one has another form.
     """
     files = [file for file in csv_files(path) if path.is_file() or _is_header(header_line(file))]
     if not files:
@@ -55,10 +56,10 @@ def _recording(path: Path) -> Recording:
         )
     numbered = table.names[0] == "" and "mag_x1" not in table.names
     values = table.values[:, 1 : 1 + len(NAMES)] if numbered else table.columns(NAMES)
-    times, n_left_out = _times(table)
-    turned = values[n_left_out:].reshape(-1, N_NODES, 3) * TO_TAXEL_FRAME
-    readings = counts_or(turned)
-    metadata = {"source": "roobooot/GTac_", "rows_without_time": n_left_out}
+    times, n_without_time = _times(table)
+    rotated = values[n_without_time:].reshape(-1, N_NODES, 3) * TO_TAXEL_FRAME
+    readings = with_integer_type(rotated)
+    metadata = {"source": "roobooot/GTac_", "rows_without_time": n_without_time}
     try:
         return Recording(path.stem, {"finger1": Tactile(sensor("gtac"), times, readings)}, metadata)
     except RecordingError as cause:
@@ -66,15 +67,14 @@ def _recording(path: Path) -> Recording:
 
 
 def _times(table: Table) -> tuple[Array, int]:
-    """Times [s], and how many rows before them have none (the logger's first)."""
+    """Return the times [s], and 1 if the first row has none (as the logger writes it), else 0."""
     named = "milliseconds" in table.names
     milliseconds = table.columns(["milliseconds"])[:, 0] if named else table.values[:, -1]
     missing = np.isnan(milliseconds)
-    n_left_out = int(missing[0])
+    n_without_time = int(missing[0])
     if missing[1:].any():
         row = int(np.flatnonzero(missing[1:])[0]) + 1
         raise RecordingError(
-            f"{table.path}, row {table.first_line + row}: no timestamp; "
-            "only the first row may lack its own"
+            f"{table.path}, row {table.first_line + row}: no time; only the first row may have none"
         )
-    return milliseconds[n_left_out:] * MILLISECOND, n_left_out
+    return milliseconds[n_without_time:] * MILLISECOND, n_without_time

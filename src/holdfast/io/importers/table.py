@@ -1,4 +1,4 @@
-"""Numbers out of CSV files, with the place of whatever is none."""
+"""Tables of numbers in CSV files; errors name the place of a wrong cell."""
 
 import csv
 import re
@@ -20,11 +20,11 @@ class Table(NamedTuple):
     """A CSV file of numbers.
 
     Attributes:
-        path: where it came from.
-        names: of its columns, as in the header.
-        values: (n_rows, n_columns); NaN where a cell is empty or says NaN.
-        first_line: line of the file that holds row 0, counted from 1.
-        comments: lines before the header that begin with `#`, without it.
+        path: path of the file.
+        names: names of the columns in the header.
+        values: (n_rows, n_columns); NaN for a cell that is empty or NaN.
+        first_line: line of row 0 in the file, counted from 1.
+        comments: lines before the header that begin with `#`, without the `#`.
     """
 
     path: Path
@@ -34,22 +34,22 @@ class Table(NamedTuple):
     comments: tuple[str, ...]
 
     def columns(self, names: Sequence[str]) -> Array:
-        """(n_rows, len(names)) of these columns.
+        """Return (n_rows, len(names)): the columns with these names.
 
         Raises:
-            RecordingError: one is missing.
+            RecordingError: a column is missing.
         """
         if missing := [name for name in names if name not in self.names]:
             raise RecordingError(
                 f"{self.path}: column {missing[0]!r} is missing"
                 f"{f' and {len(missing) - 1} more' if len(missing) > 1 else ''}; "
-                f"it has {_some(self.names)}"
+                f"it has {_shortened(self.names)}"
             )
         return self.values[:, [self.names.index(name) for name in names]]
 
 
 def header_line(path: Path) -> tuple[str, ...]:
-    """Names of the columns of a CSV file; none where it is no text."""
+    """Return the names of the columns of a CSV file; none if it is not text."""
     try:
         return _head(path)[1]
     except (RecordingError, UnicodeError):
@@ -57,15 +57,15 @@ def header_line(path: Path) -> tuple[str, ...]:
 
 
 def read_table(path: Path, text: Sequence[str] = ()) -> tuple[Table, dict[str, list[str]]]:
-    """The numbers of a CSV file, and the cells of its columns of text.
+    """Read the numbers of a CSV file, and the cells of its columns of text.
 
     Args:
-        path: of the file.
-        text: names of the columns that hold text; among the numbers they are NaN.
+        path: path of the file.
+        text: names of the columns of text; they are NaN among the numbers.
 
     Raises:
-        RecordingError: it cannot be read, is empty, has rows of different lengths, or a cell
-            that is no number.
+        RecordingError: the file cannot be read, is empty, has rows of different lengths, or a
+            cell that is not a number.
     """
     import pyarrow as pa
     from pyarrow import csv as arrow
@@ -86,7 +86,7 @@ def read_table(path: Path, text: Sequence[str] = ()) -> tuple[Table, dict[str, l
     except OSError as cause:
         raise RecordingError(f"cannot read {path}: {cause}") from cause
     except pa.ArrowException as cause:
-        raise _explained(path, names, first_line, set(text), str(cause)) from cause
+        raise _cause_of(path, names, first_line, set(text), str(cause)) from cause
     if len(table) == 0:
         raise _without_samples(path)
     cells = {
@@ -95,8 +95,8 @@ def read_table(path: Path, text: Sequence[str] = ()) -> tuple[Table, dict[str, l
     return Table(path, names, _numbers(table, set(places.values())), first_line, comments), cells
 
 
-def counts_or(values: Array) -> npt.NDArray[np.generic]:
-    """Whole numbers of 16 bits as uint16, other whole ones as int32, all else as it is."""
+def with_integer_type(values: Array) -> npt.NDArray[np.generic]:
+    """Convert whole numbers to uint16 or int32 if they fit; return other values unchanged."""
     if not np.isfinite(values).all() or (values != np.rint(values)).any():
         return values
     if values.min() >= 0 and values.max() <= np.iinfo(np.uint16).max:
@@ -110,17 +110,17 @@ def counts_or(values: Array) -> npt.NDArray[np.generic]:
 
 
 def csv_files(path: Path) -> list[Path]:
-    """The file at `path`, or the CSV files in that folder in the order of their names."""
-    return [path] if path.is_file() else sorted(path.glob("*.csv"), key=natural)
+    """Return the file at `path`, or the CSV files in that folder in natural order."""
+    return [path] if path.is_file() else sorted(path.glob("*.csv"), key=natural_order)
 
 
-def natural(path: Path) -> list[str | int]:
-    """Sorts names with numbers as a person would: Exp2 before Exp10."""
+def natural_order(path: Path) -> list[str | int]:
+    """Return a sort key for file names with numbers: Exp2 before Exp10."""
     return [int(part) if part.isdigit() else part for part in re.split(r"(\d+)", path.name)]
 
 
 def _head(path: Path) -> tuple[tuple[str, ...], tuple[str, ...], int]:
-    """Comments, names of the columns, and the line that holds the first row."""
+    """Return comments, names of the columns, and the line of the first row."""
     try:
         with path.open(encoding="utf-8-sig", newline="") as file:
             comments: list[str] = []
@@ -133,7 +133,7 @@ def _head(path: Path) -> tuple[tuple[str, ...], tuple[str, ...], int]:
     except OSError as cause:
         raise RecordingError(f"cannot read {path}: {cause.strerror}") from cause
     except (UnicodeError, csv.Error) as cause:
-        raise RecordingError(f"{path} is no CSV text: {cause}") from cause
+        raise RecordingError(f"{path} is not CSV text: {cause}") from cause
     raise RecordingError(f"{path} is empty; a header line and samples expected")
 
 
@@ -145,10 +145,10 @@ def _numbers(table: "pyarrow.Table", text: set[int]) -> Array:
     return values
 
 
-def _explained(
+def _cause_of(
     path: Path, names: tuple[str, ...], first_line: int, text: set[str], cause: str
 ) -> RecordingError:
-    """Which cell or row is to blame, found by a second, slow look."""
+    """Return an error that names the wrong cell or row; the file is read a second time."""
     with path.open(encoding="utf-8-sig", errors="replace", newline="") as file:
         lines = list(file)[first_line - 1 :]
     if not any(line.strip() for line in lines):
@@ -164,7 +164,7 @@ def _explained(
                 return RecordingError(
                     f"{path}, row {number}, column {name!r}: {cell[:40]!r} given, a number expected"
                 )
-    return RecordingError(f"{path} is no table of numbers: {' '.join(cause.split())[:200]}")
+    return RecordingError(f"{path} is not a table of numbers: {' '.join(cause.split())[:200]}")
 
 
 def _without_samples(path: Path) -> RecordingError:
@@ -179,6 +179,6 @@ def _is_number(cell: str) -> bool:
     return True
 
 
-def _some(names: Sequence[str]) -> str:
+def _shortened(names: Sequence[str]) -> str:
     shown = ", ".join(map(repr, names[:6]))
     return f"{shown} and {len(names) - 6} more" if len(names) > 6 else shown

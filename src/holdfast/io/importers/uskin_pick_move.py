@@ -1,7 +1,7 @@
-"""Real uSkin recordings of picking and moving a box, with measured slip.
+"""Import of real uSkin recordings of picking and moving a box, with measured slip.
 
 The data of "Proactive slip control by learned slip model and trajectory adaptation" (Nazari,
-Mandil, Ghalamzan, CoRL 2022): a folder `data_sample_*` a recording, five CSV files in each.
+Mandil, Ghalamzan, CoRL 2022): each folder `data_sample_*` is a recording of five CSV files.
 """
 
 import csv
@@ -16,34 +16,34 @@ import numpy.typing as npt
 
 from holdfast.contact import Cause, ContactState
 from holdfast.errors import RecordingError
-from holdfast.io.importers.table import Table, counts_or, read_table
+from holdfast.io.importers.table import Table, read_table, with_integer_type
 from holdfast.recordings import Label, Recording, Tactile, Truth, labels_from_samples
 from holdfast.sensors import sensor
 from holdfast.sensors.types import Array
 
 FILES = {"finger1": "xela_sensor1.csv", "finger2": "xela_sensor2.csv"}
 N_JOINTS = 7
-LOST_MARKER = 10.0
-"""Where the marker's pose freezes once it is out of sight."""
+LOST_MARKER_VALUE = 10.0
+"""Value of all components of the pose of a marker that the camera has lost."""
 
 SOURCE = "imanlab/proactive-slip-control"
 
 
 def sniff(path: Path) -> bool:
-    """Whether it is a recording's folder or a folder that holds some."""
+    """Return whether `path` is the folder of a recording, or a folder with some."""
     return bool(_folders(path))
 
 
 def read(path: Path) -> Iterator[Recording]:
-    """The recordings in a folder `data_sample_*`, or in the folder that holds many.
+    """Read the recording in a folder `data_sample_*`, or those in a folder of such folders.
 
     Raises:
-        RecordingError: there are none, a file is missing, or files contradict each other.
+        RecordingError: there is none, a file is missing, or files contradict each other.
     """
     folders = _folders(path)
     if not folders:
         raise RecordingError(
-            f"{path} holds no uskin-pick-move recording: folders data_sample_* with "
+            f"{path} has no uskin-pick-move recording: folders data_sample_* with "
             f"{FILES['finger1']}, {FILES['finger2']}, robot_state.csv, marker.csv and "
             "slip_label.csv expected"
         )
@@ -81,7 +81,7 @@ def _module(path: Path, times: Array) -> Tactile:
         )
     readings = table.columns(expected)
     _check_rows(table, len(times))
-    return Tactile(patch, times, counts_or(readings).reshape(-1, patch.n_taxels, 3))
+    return Tactile(patch, times, with_integer_type(readings).reshape(-1, patch.n_taxels, 3))
 
 
 def _check_rows(table: Table, n_rows: int) -> None:
@@ -114,18 +114,18 @@ def _state(slip: bool, fail: bool) -> tuple[ContactState, Cause | None]:
 
 
 def _marker(path: Path, n_rows: int) -> Mapping[str, npt.NDArray[Any]]:
-    """Pose of the marker in the wrist camera's frame; NaN where it was out of sight."""
+    """Return the pose of the marker in the frame of the wrist camera; NaN where it was lost."""
     table, _ = read_table(path)
     names = [f"marker_position_{axis}" for axis in "xyz"]
     names += [f"marker_quaternion_{axis}" for axis in "wxyz"]
     pose = table.columns(names).copy()
     _check_rows(table, n_rows)
-    pose[(pose == LOST_MARKER).all(axis=1)] = np.nan
+    pose[(pose == LOST_MARKER_VALUE).all(axis=1)] = np.nan
     return {"marker_pose": pose}
 
 
 def _robot(table: Table) -> Mapping[str, npt.NDArray[Any]]:
-    """The arm's joints, the pose of its end effector (4 x 4), and `v_x`, `v_y` as given."""
+    """Return joints and end effector pose (4 x 4) of the arm, and `v_x`, `v_y` unchanged."""
     places = [(row, column) for row in range(4) for column in range(4)]
     pose = table.columns([f"ee_T_{row}{column}" for row, column in places])
     return {

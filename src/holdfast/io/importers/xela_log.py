@@ -1,4 +1,4 @@
-"""Logs of a whole hand: a time column, then Fx, Fy, Fz of 368 taxels in flat order."""
+"""Import of CSV logs of a whole hand: time, then Fx, Fy, Fz of 368 taxels in flat order."""
 
 from collections.abc import Iterator
 from pathlib import Path
@@ -6,7 +6,7 @@ from pathlib import Path
 import numpy as np
 
 from holdfast.errors import RecordingError
-from holdfast.io.importers.table import counts_or, csv_files, header_line, read_table
+from holdfast.io.importers.table import csv_files, header_line, read_table, with_integer_type
 from holdfast.recordings import Recording, Tactile
 from holdfast.sensors import hand
 
@@ -15,15 +15,15 @@ N_COLUMNS = 368 * 3
 
 
 def sniff(path: Path) -> bool:
-    """Whether it is such a CSV file, or a folder that holds one."""
+    """Return whether `path` is such a CSV file, or a folder with one."""
     return any(len(header_line(file)) == N_COLUMNS + 1 for file in csv_files(path))
 
 
 def read(path: Path) -> Iterator[Recording]:
-    """The recording in a CSV file, or those in the CSV files of a folder.
+    """Read the recording in a CSV file, or those in the CSV files of a folder.
 
     Raises:
-        RecordingError: there is no CSV file, or one is not as expected.
+        RecordingError: there is no CSV file, or one has another form.
     """
     files = csv_files(path)
     if not files:
@@ -42,7 +42,7 @@ def _recording(path: Path) -> Recording:
         )
     place = _time_column(table.names)
     times = table.values[:, place]
-    readings = counts_or(np.delete(table.values, place, axis=1))
+    readings = with_integer_type(np.delete(table.values, place, axis=1))
     unit = "count" if np.issubdtype(readings.dtype, np.integer) else "N"
     try:
         modules = {
@@ -55,5 +55,5 @@ def _recording(path: Path) -> Recording:
 
 
 def _time_column(names: tuple[str, ...]) -> int:
-    """The column whose name holds "time"; the first where there is none."""
+    """Return the place of the first column with "time" in its name; 0 if there is none."""
     return next((k for k, name in enumerate(names) if "time" in name.lower()), 0)
