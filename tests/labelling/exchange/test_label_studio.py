@@ -95,7 +95,7 @@ def test_regions_are_labels(tmp_path):
 
 @st.composite
 def labels(draw):
-    """Labels of a finger, some touching, some apart, with all that a label may say."""
+    """Labels of a finger, some adjacent, some apart, with all fields."""
     cuts = sorted(draw(st.lists(st.floats(0, 4), unique=True, max_size=8)))
     spans = [pair for pair in pairwise(cuts) if draw(st.booleans())]
     states = st.sampled_from([s for s in ContactState if s is not ContactState.UNKNOWN])
@@ -113,7 +113,7 @@ def labels(draw):
 
 
 @given(labels(), labels(), st.booleans())
-def test_what_is_exported_comes_back(tmp_path_factory, thumb, index, predictions):
+def test_exported_labels_are_read_back(tmp_path_factory, thumb, index, predictions):
     recording = bare().with_labels({"thumb": thumb, "index": index})
     path = tmp_path_factory.mktemp("export") / "tasks.json"
     task = task_of(recording, "http://localhost/can.signals.csv", predictions=predictions)
@@ -162,34 +162,34 @@ def test_several_annotators(tmp_path):
     }
     assert ends == {"ann@lab.org": 1.0, "6": 2.0, "v2": 4.0}
     assert refusal(path) == (
-        "FILE: one annotation of 'can' expected, 2 found; it has been labelled by "
+        "FILE: one annotation of 'can' expected, 2 found; its annotators are "
         "ann@lab.org, 6, v2 (prediction)"
     )
     assert refusal(path, annotator="bob") == (
-        "FILE: one annotation by 'bob' of 'can' expected, 0 found; it has been labelled by "
+        "FILE: one annotation by 'bob' of 'can' expected, 0 found; its annotators are "
         "ann@lab.org, 6, v2 (prediction)"
     )
 
 
-def test_one_person_counts_more_than_models(tmp_path):
+def test_a_person_takes_precedence_over_models(tmp_path):
     made = [{"model_version": "v2", "result": [region(0.0, 4.0)]}]
     path = export(tmp_path, annotation(region(0.0, 1.0)), predictions=made)
     assert labels_from_label_studio(path, bare())["thumb"][0].end == 1.0
 
 
-def test_a_model_alone_counts(tmp_path):
+def test_a_model_is_used_without_a_person(tmp_path):
     made = [{"model_version": "v2", "result": [region(0.0, 4.0, score=0.7)]}]
     (label,) = labels_from_label_studio(export(tmp_path, predictions=made), bare())["thumb"]
     assert (label.confidence, label.author) == (0.7, "v2")
 
 
-def test_nobody_has_labelled(tmp_path):
+def test_no_annotation_at_all(tmp_path):
     assert refusal(export(tmp_path, predictions=[12, 13])) == (
-        "FILE: one annotation of 'can' expected, 0 found; it has been labelled by nobody"
+        "FILE: one annotation of 'can' expected, 0 found; its annotators are none"
     )
 
 
-def test_who_changes_a_proposal_is_its_author(tmp_path):
+def test_the_author_of_a_changed_proposal_is_the_person(tmp_path):
     proposed = {"meta": {"author": "rule:signal", "evidence": "force"}}
     path = export(
         tmp_path,
@@ -203,7 +203,7 @@ def test_who_changes_a_proposal_is_its_author(tmp_path):
     assert authors == ["rule:signal", "6"]
 
 
-def test_regions_of_other_kinds_are_left_alone(tmp_path):
+def test_regions_of_other_types_are_ignored(tmp_path):
     note = {"type": "textarea", "from_name": "note", "value": {"text": ["odd"]}}
     path = export(tmp_path, annotation(note, region(0.0, 1.0), {"type": "relation"}))
     assert len(labels_from_label_studio(path, bare())["thumb"]) == 1
@@ -236,7 +236,7 @@ def test_regions_of_other_kinds_are_left_alone(tmp_path):
         ([region(0.0, 1.0, score=1.5)], "confidence from 0 to 1 expected, 1.5 given"),
     ],
 )
-def test_a_region_that_is_no_label(tmp_path, results, text):
+def test_invalid_regions(tmp_path, results, text):
     path = export(tmp_path, annotation(*results))
     assert refusal(path) == f"FILE, 'can', annotation 7, thumb: {text}"
 
@@ -279,12 +279,12 @@ def test_predictions_are_named_in_messages(tmp_path):
         "can two.tsv",
     ],
 )
-def test_a_task_is_known_by_the_name_of_its_file(tmp_path, link):
+def test_a_task_is_found_by_the_name_of_its_file(tmp_path, link):
     path = export(tmp_path, annotation(region(0.0, 1.0)), data={"ts": link, "n": 3})
     assert labels_from_label_studio(path, bare("can two"))
 
 
-def test_a_task_is_known_by_its_hash_whatever_it_is_called(tmp_path):
+def test_a_task_is_found_by_its_hash_under_any_name(tmp_path):
     data = {"csv": "a.csv", "recording": "old name", "digest": bare().digest}
     path = export(tmp_path, annotation(region(0.0, 1.0)), data=data)
     assert labels_from_label_studio(path, bare("new name"))
@@ -333,7 +333,7 @@ def test_no_file(tmp_path):
     assert refusal(tmp_path / "no.json") == "cannot read FILE: No such file or directory"
 
 
-def test_which_json_is_of_label_studio():
+def test_json_of_label_studio_is_recognized():
     assert is_label_studio(b'[{"data": {}}]')
     assert is_label_studio(b'{"data": {}}')
     assert not is_label_studio(b'{"schema": "holdfast.labels/1"}')

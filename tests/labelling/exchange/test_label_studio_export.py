@@ -100,7 +100,7 @@ def test_the_task_of_a_recording_without_labels():
     assert task_of(bare, "x.csv", predictions=True)["predictions"] == []
 
 
-def test_the_config_names_what_tasks_and_signals_name():
+def test_the_config_has_the_names_of_tasks_and_signals():
     recording = tiny_recording(1, ("thumb", "index/1"))
     root = ElementTree.fromstring(labelling_config({"thumb": "count", "index/1": "N"}))
     groups = {each.get("name"): each for each in root.iter("TimeSeriesLabels")}
@@ -164,7 +164,7 @@ def test_another_place_for_the_signals_and_labels_as_predictions(tmp_path, grasp
 
 
 @pytest.mark.parametrize("name", ["label-studio.json", "label-studio.xml", "grasp-1.signals.csv"])
-def test_nothing_is_replaced_unasked(tmp_path, grasps, name):
+def test_nothing_is_replaced_without_force(tmp_path, grasps, name):
     (tmp_path / name).write_text("mine")
     with pytest.raises(OutputError) as error:
         save_label_studio(grasps, tmp_path)
@@ -176,7 +176,7 @@ def test_nothing_is_replaced_unasked(tmp_path, grasps, name):
     assert (tmp_path / name).read_text() != "mine"
 
 
-def test_a_folder_that_cannot_be(tmp_path, grasps):
+def test_a_folder_that_cannot_be_created(tmp_path, grasps):
     (tmp_path / "file").write_text("")
     with pytest.raises(OutputError) as error:
         save_label_studio(grasps, tmp_path / "file" / "folder")
@@ -186,12 +186,12 @@ def test_a_folder_that_cannot_be(tmp_path, grasps):
 def test_recordings_that_cannot_be_exported(tmp_path, grasps):
     with pytest.raises(RecordingError) as error:
         save_label_studio([grasps[0], grasps[0]], tmp_path / "a")
-    assert str(error.value) == "two recordings are called 'grasp-0'; each needs its own name"
+    assert str(error.value) == "two recordings have the name 'grasp-0'; different names expected"
     with pytest.raises(RecordingError) as error:
         save_label_studio([], tmp_path / "b")
     assert str(error.value) == "no recordings given; at least one expected"
     outside = Recording("../can", grasps[0].modules)
     with pytest.raises(RecordingError) as error:
         save_label_studio([outside], tmp_path / "c")
-    assert str(error.value) == "recording '../can' cannot lend its name to a file"
+    assert str(error.value) == "a name that is valid for a file expected, recording '../can' given"
     assert not (tmp_path / "can.signals.csv").exists()

@@ -8,7 +8,7 @@ from holdfast.contact import ContactState
 from holdfast.errors import RecordingError
 from holdfast.io import labels_to_csv, save_labels, save_recording
 from holdfast.labelling.exchange.label_studio_export import save_label_studio
-from holdfast.labelling.exchange.read_labels import labels_of
+from holdfast.labelling.exchange.read_labels import read_labels
 from holdfast.recordings import Label
 
 
@@ -27,7 +27,7 @@ def labels_in(recording):
 
 
 def plain(labels):
-    """Without what a table does not keep."""
+    """Labels without the fields that a table does not have."""
     return {
         name: [(x.start, x.end, x.state, x.cause) for x in each] for name, each in labels.items()
     }
@@ -63,13 +63,13 @@ KINDS = (as_csv, as_recording, as_mcap, as_label_file, as_label_studio)
 @pytest.mark.parametrize("write", KINDS)
 def test_labels_of_every_kind_of_file(tmp_path, grasp, bare, write):
     path = write(grasp, tmp_path)
-    assert plain(labels_of(path, bare)) == plain(labels_in(grasp))
+    assert plain(read_labels(path, bare)) == plain(labels_in(grasp))
 
 
 @pytest.mark.parametrize("write", KINDS)
 def test_labels_of_every_kind_of_file_in_a_folder(tmp_path, grasp, bare, write):
     write(grasp, tmp_path)
-    assert plain(labels_of(tmp_path, bare)) == plain(labels_in(grasp))
+    assert plain(read_labels(tmp_path, bare)) == plain(labels_in(grasp))
 
 
 def test_a_label_file_comes_before_the_recording(tmp_path, grasp, bare):
@@ -77,14 +77,14 @@ def test_a_label_file_comes_before_the_recording(tmp_path, grasp, bare):
     drawn = bare.with_labels({"thumb": [Label(0.0, 1.0, ContactState.STABLE)]})
     as_label_file(drawn, tmp_path)
     as_csv(grasp, tmp_path)
-    assert list(labels_of(tmp_path, bare)) == ["thumb"]
+    assert list(read_labels(tmp_path, bare)) == ["thumb"]
 
 
 def test_labels_come_in_order_and_without_fingers_that_have_none(tmp_path, grasp, bare):
     path = tmp_path / "labels.csv"
     path.write_text("finger,start,end,state,cause\nthumb,2,3,stable,\nthumb,1,2,unstable,slip\n")
-    assert [x.start for x in labels_of(path, bare)["thumb"]] == [1.0, 2.0]
-    assert list(labels_of(path, bare)) == ["thumb"]
+    assert [x.start for x in read_labels(path, bare)["thumb"]] == [1.0, 2.0]
+    assert list(read_labels(path, bare)) == ["thumb"]
 
 
 def test_an_annotator_may_be_chosen(tmp_path, grasp, bare):
@@ -96,13 +96,13 @@ def test_an_annotator_may_be_chosen(tmp_path, grasp, bare):
         {"completed_by": 2, "result": result},
     ]
     path.write_text(json.dumps(tasks))
-    assert len(labels_of(path, bare, "1")["thumb"]) == 1
-    assert len(labels_of(tmp_path, bare, "2")["thumb"]) == 4
+    assert len(read_labels(path, bare, "1")["thumb"]) == 1
+    assert len(read_labels(tmp_path, bare, "2")["thumb"]) == 4
 
 
 def refusal(path, recording):
     with pytest.raises(RecordingError) as error:
-        labels_of(path, recording)
+        read_labels(path, recording)
     return str(error.value).replace(f"{path}", "PATH")
 
 
@@ -145,7 +145,7 @@ def test_a_folder_without_labels_of_it(tmp_path, bare):
     )
 
 
-def test_files_that_are_none(tmp_path, bare):
+def test_files_without_labels(tmp_path, bare):
     assert refusal(tmp_path / "labels.txt", bare) == (
         "cannot read labels from PATH: .txt given; .labels.json, .json, .csv, .parquet or .mcap "
         "expected"

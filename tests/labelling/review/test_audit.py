@@ -28,7 +28,7 @@ NONE, UNSTABLE, STABLE = (
 TIMES = np.arange(1000) / 100.0
 
 
-def painted(*spans, first=STABLE):
+def codes_of(*spans, first=STABLE):
     """Codes by sample: the first state, and others in those spans (start, end, state)."""
     codes = np.full(len(TIMES), first.code)
     for start, end, state in spans:
@@ -38,7 +38,7 @@ def painted(*spans, first=STABLE):
     return codes
 
 
-def judged(labels, seen, *, name="one", finger="thumb", sure=0.9):
+def labelled(labels, seen, *, name="one", finger="thumb", sure=0.9):
     """Labels as codes, and probabilities that are sure of other codes."""
     cuts = [0, *(np.flatnonzero(np.diff(labels)) + 1).tolist(), len(labels)]
     each = [
@@ -52,15 +52,15 @@ def judged(labels, seen, *, name="one", finger="thumb", sure=0.9):
 
 def calm(name="calm", finger="thumb"):
     """A recording in which all is well, with every kind of edge."""
-    codes = painted(
+    codes = codes_of(
         (0, 1, NONE), (1, 2, UNSTABLE), (5, 6, UNSTABLE), (8, 9, UNSTABLE), (9, 10, NONE)
     )
-    return judged(codes, codes, name=name, finger=finger, sure=0.8)
+    return labelled(codes, codes, name=name, finger=finger, sure=0.8)
 
 
-def told(labels, seen, **more):
+def suspects_in(labels, seen, **more):
     others = [calm(f"calm {k}") for k in range(3)]
-    return suspects([judged(labels, seen, **more), *others])
+    return suspects([labelled(labels, seen, **more), *others])
 
 
 def test_labels_that_fit_are_not_suspect():
@@ -68,7 +68,7 @@ def test_labels_that_fit_are_not_suspect():
 
 
 def test_an_interval_within_a_label():
-    (found,) = told(painted(), painted((3.0, 3.4, UNSTABLE)))
+    (found,) = suspects_in(codes_of(), codes_of((3.0, 3.4, UNSTABLE)))
     assert found == Suspect(
         "one", "thumb", "interval", 3.0, 3.4, "stable", "unstable", pytest.approx(0.9), None
     )
@@ -76,27 +76,30 @@ def test_an_interval_within_a_label():
 
 
 def test_a_whole_label_that_is_wrong():
-    (found,) = told(painted((3.0, 3.4, NONE)), painted())
+    (found,) = suspects_in(codes_of((3.0, 3.4, NONE)), codes_of())
     assert (found.kind, found.start, found.end) == ("interval", 3.0, 3.4)
     assert (found.given, found.expected) == ("no_contact", "stable")
 
 
-def test_short_contradictions_are_not_told():
-    assert told(painted(), painted((3.0, 3.04, UNSTABLE))) == []
-    assert len(told(painted(), painted((3.0, 3.05, UNSTABLE)))) == 1
+def test_short_contradictions_are_ignored():
+    assert suspects_in(codes_of(), codes_of((3.0, 3.04, UNSTABLE))) == []
+    assert len(suspects_in(codes_of(), codes_of((3.0, 3.05, UNSTABLE)))) == 1
 
 
 def test_short_gaps_are_closed():
     spans = [(3.0, 3.1, UNSTABLE), (3.14, 3.3, UNSTABLE)]
-    (found,) = told(painted(), painted(*spans))
+    (found,) = suspects_in(codes_of(), codes_of(*spans))
     assert (found.start, found.end) == (3.0, 3.3)
     apart = [(3.0, 3.1, UNSTABLE), (3.15, 3.3, UNSTABLE)]
-    assert [(s.start, s.end) for s in told(painted(), painted(*apart))] == [(3.15, 3.3), (3.0, 3.1)]
+    assert [(s.start, s.end) for s in suspects_in(codes_of(), codes_of(*apart))] == [
+        (3.15, 3.3),
+        (3.0, 3.1),
+    ]
 
 
-def test_contradictions_for_different_states_are_told_apart():
+def test_contradictions_for_different_states_are_separate():
     spans = [(3.0, 3.4, UNSTABLE), (3.4, 4.0, NONE)]
-    found = told(painted(), painted(*spans))
+    found = suspects_in(codes_of(), codes_of(*spans))
     assert [(s.expected, s.start, s.end) for s in found] == [
         ("no_contact", 3.4, 4.0),
         ("unstable", 3.0, 3.4),
@@ -106,7 +109,7 @@ def test_contradictions_for_different_states_are_told_apart():
 @pytest.mark.parametrize("shift", [-0.3, -0.15, 0.15, 0.3])
 def test_an_edge_that_is_drawn_elsewhere(shift):
     """The label ends at 4 s; the contact is lost `shift` later."""
-    (found,) = told(painted((4.0, 10.0, UNSTABLE)), painted((4.0 + shift, 10.0, UNSTABLE)))
+    (found,) = suspects_in(codes_of((4.0, 10.0, UNSTABLE)), codes_of((4.0 + shift, 10.0, UNSTABLE)))
     assert found.kind == "edge"
     assert found.shift == pytest.approx(shift)
     assert (found.start, found.end) == pytest.approx(sorted((4.0, 4.0 + shift)))
@@ -115,39 +118,39 @@ def test_an_edge_that_is_drawn_elsewhere(shift):
     assert found.confidence == pytest.approx(0.9)
 
 
-def test_an_edge_may_be_a_little_elsewhere():
-    assert told(painted((4.0, 10.0, UNSTABLE)), painted((4.09, 10.0, UNSTABLE))) == []
+def test_small_shifts_of_an_edge_are_ignored():
+    assert suspects_in(codes_of((4.0, 10.0, UNSTABLE)), codes_of((4.09, 10.0, UNSTABLE))) == []
 
 
-def test_what_all_edges_of_a_kind_have_in_common_is_no_error():
-    """A window of the past tells everything 0.12 s late."""
+def test_the_usual_shift_of_edges_is_no_error():
+    """A window of the past delays every edge by 0.12 s."""
     parts = [
-        judged(painted((at, 10, UNSTABLE)), painted((at + 0.12, 10, UNSTABLE)), name=f"at {at}")
+        labelled(codes_of((at, 10, UNSTABLE)), codes_of((at + 0.12, 10, UNSTABLE)), name=f"at {at}")
         for at in (3.0, 4.0, 5.0, 6.0)
     ]
     assert suspects(parts) == []
-    late = judged(painted((7.0, 10, UNSTABLE)), painted((7.32, 10, UNSTABLE)), name="late")
+    late = labelled(codes_of((7.0, 10, UNSTABLE)), codes_of((7.32, 10, UNSTABLE)), name="late")
     (found,) = suspects([*parts, late])
     assert (found.recording, found.kind, found.start) == ("late", "edge", 7.0)
     assert (found.shift, found.confidence) == (pytest.approx(0.2), pytest.approx(0.9))
 
 
 def test_an_edge_that_is_far_off_is_an_interval():
-    (found,) = told(painted((4.0, 10.0, UNSTABLE)), painted((4.8, 10.0, UNSTABLE)))
+    (found,) = suspects_in(codes_of((4.0, 10.0, UNSTABLE)), codes_of((4.8, 10.0, UNSTABLE)))
     assert (found.kind, found.start, found.end) == ("interval", 4.0, 4.8)
 
 
-def test_doubtful_probabilities_tell_nothing():
+def test_low_probabilities_make_no_suspects():
     parts = [calm(f"calm {k}") for k in range(3)]
-    doubtful = judged(painted(), painted((3.0, 3.4, UNSTABLE)), sure=0.5)
+    doubtful = labelled(codes_of(), codes_of((3.0, 3.4, UNSTABLE)), sure=0.5)
     assert suspects([*parts, doubtful]) == []
-    edge = painted((4.0, 10.0, UNSTABLE)), painted((4.3, 10.0, UNSTABLE))
-    assert suspects([*parts, judged(*edge, sure=0.5)]) == []
-    assert len(suspects([*parts, judged(*edge, sure=0.7)])) == 1
+    edge = codes_of((4.0, 10.0, UNSTABLE)), codes_of((4.3, 10.0, UNSTABLE))
+    assert suspects([*parts, labelled(*edge, sure=0.5)]) == []
+    assert len(suspects([*parts, labelled(*edge, sure=0.7)])) == 1
 
 
-def test_stretches_without_label_or_probability_tell_nothing():
-    part = judged(painted(), painted((3.0, 3.4, UNSTABLE), (5.0, 6.0, UNSTABLE)))
+def test_stretches_without_label_or_probability_make_no_suspects():
+    part = labelled(codes_of(), codes_of((3.0, 3.4, UNSTABLE), (5.0, 6.0, UNSTABLE)))
     part.probabilities[490:610] = np.nan
     labels = [Label(0.0, 2.9, STABLE), Label(3.5, 10.0, STABLE)]
     assert suspects([replace(part, labels=labels), calm("a"), calm("b")]) == []
@@ -160,15 +163,15 @@ def test_the_weightiest_come_first_and_fingers_have_their_own_thresholds():
         calm("b"),
         calm("a", "index"),
         calm("b", "index"),
-        judged(painted(), painted(*spans)),
-        judged(painted(), painted((4.0, 4.3, UNSTABLE)), finger="index"),
+        labelled(codes_of(), codes_of(*spans)),
+        labelled(codes_of(), codes_of((4.0, 4.3, UNSTABLE)), finger="index"),
     ]
     found = suspects(parts)
     assert [(s.finger, s.start) for s in found] == [("thumb", 3.0), ("index", 4.0), ("thumb", 2.0)]
     assert found == suspects(parts[::-1])
 
 
-def test_nothing_is_told_of_nothing():
+def test_no_labels_have_no_suspects():
     assert suspects([]) == []
 
 
@@ -216,7 +219,7 @@ def test_an_audit_of_a_sequence_that_reads_lazily(grasps):
 
 def test_the_json_document():
     document = json.loads(
-        msgspec.json.encode(Audit(3, 12.5, told(painted(), painted((3, 4, NONE)))))
+        msgspec.json.encode(Audit(3, 12.5, suspects_in(codes_of(), codes_of((3, 4, NONE)))))
     )
     assert document["n_recordings"] == 3
     assert document["judged"] == 12.5
@@ -235,7 +238,7 @@ def test_the_json_document():
     ]
 
 
-def test_our_own_features_judge_counts_and_the_papers_newton(grasps):
+def test_the_default_features_depend_on_the_unit(grasps):
     assert default_setting(grasps).features == parse_features("holdfast")
     module = grasps[0].modules["thumb"]
     newton = Recording("n", {"thumb": Tactile(TINY, module.times, module.readings, unit="N")})
@@ -248,12 +251,12 @@ def test_our_own_features_judge_counts_and_the_papers_newton(grasps):
     [
         (
             [],
-            "an audit judges the labels of a recording by those of others: at least 2 recordings "
-            "expected, 0 given",
+            "an audit compares the labels of a recording with those of others: at least 2 "
+            "recordings expected, 0 given",
         ),
         (
             [tiny_recording(1, n=100), tiny_recording(2, n=100)],
-            "none of the labels of 2 recordings can be judged: a finger needs two states, after "
+            "none of the labels of 2 recordings can be audited: a finger needs two states, after "
             "tare and first window, in at least two recordings",
         ),
     ],

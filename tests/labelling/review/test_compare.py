@@ -58,7 +58,7 @@ def test_kappa_is_that_of_scikit_learn_over_what_both_label(pairs):
 
 
 @given(PAIRS)
-def test_exchanging_the_two_exchanges_what_only_one_has(pairs):
+def test_exchanging_a_and_b_exchanges_the_results(pairs):
     a, b = ("".join(each) for each in zip(*pairs, strict=True))
     one, two = of(a, b), of(b, a)
     assert (one.kappa, one.kappa_stable, one.n) == (two.kappa, two.kappa_stable, two.n)
@@ -90,7 +90,7 @@ def test_counts_do_not_overflow():
     assert cohens_kappa([[2**33, 0], [0, 2**33]]) == 1.0
 
 
-def test_samples_that_one_labels_alone_count_for_neither_kappa():
+def test_samples_that_only_one_labels_are_ignored_by_kappa():
     found = of("ssuu    ", "  uuss  ")
     assert found.confusion == [[0, 0, 0], [0, 2, 0], [0, 0, 0]]
     assert (found.only_a, found.only_b, found.n, found.n_samples) == (0.25, 0.25, 2, 8)
@@ -112,7 +112,7 @@ def test_an_onset_over_half_a_second_away_is_another():
     assert (beyond.median, beyond.p95) == (None, None)
 
 
-def test_as_many_onsets_as_can_be_are_matched():
+def test_as_many_onsets_as_possible_are_matched():
     """The nearest pair first would leave the two others alone."""
     a = [*held(0.0, 1.0, 1.2), *held(1.2, 1.4, 1.6)]
     b = [*held(0.0, 1.35, 1.5), *held(1.5, 1.8, 2.0)]
@@ -155,7 +155,7 @@ def test_intervals_that_only_touch_are_no_counterparts():
     assert [span.state for span in found.missing_in_a] == ["stable", "unstable"]
 
 
-def test_fingers_that_nobody_labels_are_left_out():
+def test_fingers_without_labels_are_left_out():
     times = {name: np.arange(3.0) for name in ("thumb", "index", "ring")}
     found = compare({"thumb": drawn("sus")}, {"index": drawn("sus"), "ring": ()}, times)
     assert list(found.fingers) == ["thumb", "index"]
@@ -183,7 +183,7 @@ def test_a_finger_that_the_recording_does_not_have():
 
 
 @given(st.lists(st.text("nus ", min_size=4, max_size=4), min_size=2, max_size=6))
-def test_pooled_is_as_if_all_had_been_one(texts):
+def test_pooled_agreement_is_that_of_one_long_recording(texts):
     times = {"thumb": np.arange(4.0)}
     pairs = list(pairwise(texts))
     parts = [compare({"thumb": drawn(a)}, {"thumb": drawn(b)}, times) for a, b in pairs]

@@ -8,12 +8,12 @@ from hypothesis import strategies as st
 from holdfast.contact import NO_CONTACT, STABLE, UNSTABLE
 from holdfast.labelling.review.contradictions import (
     Edge,
-    Typical,
+    UsualShift,
     confident_thresholds,
     contradictions,
     edges_of,
-    shift_of,
-    typical_shifts,
+    unusual_shift,
+    usual_shifts,
 )
 from holdfast.labelling.review.spans import Span
 
@@ -48,13 +48,13 @@ def test_thresholds_by_hand():
 
 
 def test_contradictions_by_hand():
-    """Sample 3 is as sure to be stable as stable ones are; sample 6 as unstable as those."""
+    """Samples 3 and 6 reach the threshold of the other state."""
     thresholds = confident_thresholds(LABELS, PROBABILITIES)
     found = contradictions(LABELS, PROBABILITIES, thresholds)
     assert found.tolist() == [0, 0, 0, STABLE, 0, 0, UNSTABLE]
 
 
-def test_without_a_class_nothing_is_taken_for_it():
+def test_a_state_without_samples_is_never_expected():
     labels = np.full(3, STABLE)
     probabilities = np.array([[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]])
     thresholds = confident_thresholds(labels, probabilities)
@@ -62,7 +62,7 @@ def test_without_a_class_nothing_is_taken_for_it():
     assert contradictions(labels, probabilities, thresholds).tolist() == [0, 0, 0]
 
 
-def test_samples_without_label_or_probability_count_for_nothing():
+def test_samples_without_label_or_probability_are_ignored():
     labels = np.append(LABELS, [0, STABLE])
     nothing = np.array([[0.0, 1.0, 0.0], [np.nan, np.nan, np.nan]])
     probabilities = np.concatenate([PROBABILITIES, nothing])
@@ -102,16 +102,16 @@ def drawn(*cuts, states=("stable", "unstable")):
 @given(st.integers(50, 150))
 def test_an_edge_is_found_where_the_probabilities_change(place):
     (edge,) = edges_of(drawn(0.0, 1.0, 2.0), TIMES, seen(place / 100))
-    assert edge.best == pytest.approx(place / 100)
-    assert (edge.at, edge.low, edge.high, edge.kind) == (1.0, 0.5, 1.5, (3, 2))
+    assert edge.likeliest == pytest.approx(place / 100)
+    assert (edge.time, edge.low, edge.high, edge.change) == (1.0, 0.5, 1.5, (3, 2))
 
 
-def test_no_edge_is_looked_for_beyond_half_a_second():
+def test_edges_shift_by_half_a_second_at_most():
     (edge,) = edges_of(drawn(0.0, 1.0, 2.0), TIMES, seen(1.8))
-    assert edge.best == 1.5
+    assert edge.likeliest == 1.5
 
 
-def test_no_edge_is_looked_for_beyond_the_neighbouring_label():
+def test_edges_stay_within_the_neighbouring_labels():
     first, second = edges_of(drawn(0.0, 1.0, 1.2, 2.0), TIMES, seen(1.4))
     assert (first.low, first.high) == (0.5, 1.2)
     assert (second.low, second.high) == (1.0, 1.7)
@@ -122,38 +122,38 @@ def test_a_gap_between_labels_is_no_edge():
     assert list(edges_of(spans, TIMES, seen(1.0))) == []
 
 
-def test_where_nothing_is_known_nothing_is_gained():
+def test_unknown_probabilities_do_not_count():
     probabilities = seen(1.2)
     probabilities[110:130] = np.nan
     (edge,) = edges_of(drawn(0.0, 1.0, 2.0), TIMES, probabilities)
-    assert edge.best == pytest.approx(1.1)
+    assert edge.likeliest == pytest.approx(1.1)
 
 
 def test_one_sample_alone_does_not_decide():
     probabilities = seen(1.0)
     probabilities[130] = [0.0, 0.0, 1.0]
     (edge,) = edges_of(drawn(0.0, 1.0, 2.0), TIMES, probabilities)
-    assert edge.best == 1.0
+    assert edge.likeliest == 1.0
 
 
-def edge_at(best, kind=(3, 2)):
-    return Edge(1.0, best, 0.5, 1.5, kind)
+def edge_at(likeliest, change=(3, 2)):
+    return Edge(1.0, likeliest, 0.5, 1.5, change)
 
 
-def test_what_edges_of_a_kind_have_in_common_is_no_shift():
-    found = typical_shifts([edge_at(1.1), edge_at(1.12), edge_at(1.14), edge_at(0.9, (2, 3))])
-    assert found[3, 2].shift == pytest.approx(0.12)
-    assert found[3, 2].spread == pytest.approx(1.4826 * 0.02)
+def test_the_usual_shift_is_subtracted():
+    found = usual_shifts([edge_at(1.1), edge_at(1.12), edge_at(1.14), edge_at(0.9, (2, 3))])
+    assert found[3, 2].median == pytest.approx(0.12)
+    assert found[3, 2].deviation == pytest.approx(1.4826 * 0.02)
     assert found[2, 3] == pytest.approx((-0.1, 0.0))
-    assert shift_of(edge_at(1.32), found[3, 2]) == pytest.approx(0.2)
+    assert unusual_shift(edge_at(1.32), found[3, 2]) == pytest.approx(0.2)
 
 
-def test_what_is_within_the_usual_spread_is_no_shift():
-    typical = Typical(0.0, 0.1)
-    assert shift_of(edge_at(1.19), typical) == 0.0
-    assert shift_of(edge_at(1.21), typical) == pytest.approx(0.21)
-    assert shift_of(edge_at(0.79), typical) == pytest.approx(-0.21)
+def test_shifts_within_the_usual_deviation_are_ignored():
+    usual = UsualShift(0.0, 0.1)
+    assert unusual_shift(edge_at(1.19), usual) == 0.0
+    assert unusual_shift(edge_at(1.21), usual) == pytest.approx(0.21)
+    assert unusual_shift(edge_at(0.79), usual) == pytest.approx(-0.21)
 
 
-def test_a_shift_stays_within_what_was_looked_at():
-    assert shift_of(edge_at(1.45), Typical(-0.2, 0.0)) == pytest.approx(0.5)
+def test_a_shift_stays_within_the_considered_times():
+    assert unusual_shift(edge_at(1.45), UsualShift(-0.2, 0.0)) == pytest.approx(0.5)

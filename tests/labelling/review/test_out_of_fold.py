@@ -47,7 +47,7 @@ def test_three_probabilities_for_every_sample(grasps, judged):
             assert not known[:40].any()  # tare
 
 
-def test_they_tell_the_states_apart(grasps, judged):
+def test_probabilities_separate_the_states(grasps, judged):
     for grasp, found in zip(grasps, judged, strict=True):
         codes = grasp.modules["thumb"].label_states
         probabilities = found["thumb"]
@@ -56,8 +56,8 @@ def test_they_tell_the_states_apart(grasps, judged):
         assert right.mean() > 0.85
 
 
-def test_no_recording_is_judged_by_its_own_labels(grasps):
-    """Labels that are all the other way round in one recording leave what is said of it."""
+def test_no_recording_is_predicted_from_its_own_labels(grasps):
+    """Wrong labels of one recording do not change its own probabilities."""
     swap = {STABLE: UNSTABLE, UNSTABLE: STABLE, NONE: NONE}
     turned = grasps[1].with_labels(
         {
@@ -81,7 +81,7 @@ def test_fewer_folds_leave_more_out(grasps):
 
 
 def test_objects_may_be_held_out(grasps):
-    """Recordings 0 and 3 are of one object: labels of 3 then say nothing of 0."""
+    """Recordings 0 and 3 are of one object: labels of 3 then do not affect 0."""
     setting = replace(SETTING, split="object")
     bare = [*grasps[:3], grasps[3].with_labels({})]
     one = next(out_of_fold(grasps, setting))[1]
@@ -124,7 +124,7 @@ def test_a_finger_of_one_state_is_left_out(grasps):
     assert [list(found) for _, found in out_of_fold(given, SETTING)] == 4 * [["thumb"]]
 
 
-def test_labels_between_two_samples_count_for_nothing(grasps):
+def test_labels_between_two_samples_are_ignored(grasps):
     slivers = [Label(1.001, 1.002, NONE), Label(1.003, 1.004, STABLE)]
     given = [
         each.with_labels({"thumb": each.modules["thumb"].labels, "index": slivers})
@@ -135,7 +135,7 @@ def test_labels_between_two_samples_count_for_nothing(grasps):
         assert np.isnan(found["index"]).any(axis=1).all()
 
 
-def test_recordings_without_labels_and_fingers_are_judged_too(grasps):
+def test_recordings_without_labels_or_fingers_get_probabilities(grasps):
     bare = tiny_recording(7).with_labels({})
     thumb = Recording("thumb only", {"thumb": tiny_recording(8).modules["thumb"]})
     given = [*grasps, bare, thumb]
@@ -144,8 +144,8 @@ def test_recordings_without_labels_and_fingers_are_judged_too(grasps):
     assert list(found[5]) == ["thumb"]
 
 
-def test_a_class_that_is_missing_without_a_recording_leaves_it_unjudged(grasps):
-    """Only the first knows what is unstable: by the others nobody can tell it."""
+def test_a_recording_with_the_only_labels_of_a_class_has_no_probabilities(grasps):
+    """Only the first has unstable labels: the others cannot train a model for it."""
     calm = [
         each.with_labels(
             {"thumb": [x for x in each.modules["thumb"].labels if x.state != UNSTABLE]}
@@ -157,7 +157,7 @@ def test_a_class_that_is_missing_without_a_recording_leaves_it_unjudged(grasps):
     assert np.isfinite(others[0][1]["thumb"][150:]).all()
 
 
-def test_another_rate_is_judged_at_its_own_times(grasps):
+def test_another_rate_has_probabilities_at_its_own_times(grasps):
     fast = resample(tiny_recording(9), 250.0)
     *_, (_, found) = out_of_fold([*grasps, fast], SETTING)
     module = fast.modules["thumb"]
@@ -175,8 +175,8 @@ def test_one_classifier_for_all_fingers(grasps):
 
 def test_one_recording_only(grasps):
     assert refusal(TrainingError, grasps[:1]) == (
-        "an audit judges the labels of a recording by those of others: at least 2 recordings "
-        "expected, 1 given"
+        "an audit compares the labels of a recording with those of others: at least 2 "
+        "recordings expected, 1 given"
     )
 
 
@@ -189,7 +189,7 @@ def test_no_labels(grasps):
 def test_one_state_only():
     calm = [tiny_recording(k, states=4 * [STABLE]) for k in range(2)]
     assert refusal(TrainingError, calm) == (
-        "two states at least are needed in a finger; labelled are thumb STABLE, index STABLE"
+        "a finger with at least two labelled states expected, thumb STABLE, index STABLE given"
     )
 
 
@@ -200,10 +200,10 @@ def test_one_object_only(grasps):
     )
 
 
-def test_settings_that_cannot_be(grasps):
+def test_invalid_settings(grasps):
     assert refusal(ValueError, grasps, Setting(split="random")) == (
-        "an audit holds out a whole recording or object; the split random gives the classifier "
-        "the neighbours of what it judges"
+        "split recording or object expected for an audit, random given: it trains on "
+        "neighbours of the samples that are audited"
     )
     assert refusal(ValueError, grasps, n_folds=1) == "at least 2 folds expected, 1 given"
 

@@ -92,11 +92,11 @@ def _compare_each(
 
 
 def _labels_of(place: Path, options: RuleOptions, annotator: str | None) -> LabelsOf:
-    from holdfast.labelling.exchange.read_labels import labels_of
+    from holdfast.labelling.exchange.read_labels import read_labels
 
     if _is_rule(place):
         return lambda recording: options.propose(str(place), recording)
-    return lambda recording: labels_of(place, recording, annotator)
+    return lambda recording: read_labels(place, recording, annotator)
 
 
 def _is_rule(place: Path) -> bool:

@@ -100,7 +100,7 @@ def import_labels(
         RecordingError: the labels cannot be read or do not fit.
     """
     from holdfast.errors import RecordingError
-    from holdfast.labelling.exchange.read_labels import labels_of
+    from holdfast.labelling.exchange.read_labels import read_labels
 
     files = recordings_at(paths)
     if not source.exists():
@@ -111,7 +111,7 @@ def import_labels(
         check_no_manual_labels(files)
 
     def label(path: Path, recording: "Recording") -> "Labels":
-        labels = labels_of(source, recording, annotator)
+        labels = read_labels(source, recording, annotator)
         if not dry_run:
             write_labels(path, recording, labels, author or annotator or login_name())
         return labels

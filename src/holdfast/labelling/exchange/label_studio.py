@@ -1,8 +1,8 @@
-"""Labels out of Label Studio's JSON export: one label group a finger, times in seconds.
+"""Labels from the JSON export of Label Studio: one label group per finger, times in seconds.
 
-A task is one recording, found by the hash or name that our own export writes into its data, or
-by the name of its CSV file. Each annotator's annotation of it is a labelling, each prediction
-another. Regions of other kinds (choices, texts) are no labels and left alone.
+A task is one recording. It is found by the hash or name that holdfast's export writes into its
+data, or by the name of its CSV file. Each annotation of a task, and each prediction, is a set of
+labels. Regions of other types, such as choices and texts, are ignored.
 """
 
 import re
@@ -14,23 +14,20 @@ from urllib.parse import unquote
 
 import msgspec
 
-from holdfast.contact import Cause, ContactState
+from holdfast.contact import LABEL_STATES, Cause, ContactState
 from holdfast.errors import RecordingError
 from holdfast.recordings import Label, Recording
-
-STATES = (ContactState.STABLE, ContactState.UNSTABLE, ContactState.NO_CONTACT)
 
 Labels = dict[str, tuple[Label, ...]]
 
 
 @dataclass(frozen=True)
 class Annotation:
-    """One labelling of one recording.
+    """Labels of one recording by one person or model.
 
     Attributes:
-        annotator: email or number of the person, or version of the model; "" where nobody is
-            named.
-        prediction: whether a model made it.
+        annotator: email or number of the person, or version of the model; "" if it is missing.
+        prediction: whether a model made the labels.
         labels: by finger.
     """
 
@@ -73,11 +70,11 @@ class _Task(msgspec.Struct):
     file_upload: str | None = None
     annotations: list[_Annotation] = []
     predictions: list[_Prediction | int] = []
-    """Numbers where the export leaves predictions out."""
+    """Numbers if the export leaves the content of predictions out."""
 
 
 def label_name(state: ContactState, cause: Cause | None = None) -> str:
-    """What a label is called in Label Studio.
+    """Return the name of a label in Label Studio.
 
     Example:
         >>> label_name(ContactState.UNSTABLE, Cause.SLIP)
@@ -87,10 +84,10 @@ def label_name(state: ContactState, cause: Cause | None = None) -> str:
 
 
 def state_of(name: str) -> tuple[ContactState, Cause | None]:
-    """The state and cause that a label is called by.
+    """Return the state and cause of the name of a label.
 
     Raises:
-        ValueError: another name.
+        ValueError: the name is unknown.
 
     Example:
         >>> state_of("UNSTABLE (slip)")
@@ -98,32 +95,32 @@ def state_of(name: str) -> tuple[ContactState, Cause | None]:
     """
     match = re.fullmatch(r"\s*(\w+)\s*(?:\(\s*(\w+)\s*\))?\s*", name)
     state, cause = match.groups() if match else ("", None)
-    if state.upper() not in STATES or (cause and cause.lower() not in tuple(Cause)):
+    if state.upper() not in LABEL_STATES or (cause and cause.lower() not in tuple(Cause)):
         raise ValueError(
-            f"unknown label {name!r}; there are {', '.join(STATES)}, "
+            f"unknown label {name!r}; there are {', '.join(LABEL_STATES)}, "
             f"alone or with a cause in brackets ({', '.join(Cause)})"
         )
     return ContactState(state.upper()), Cause(cause.lower()) if cause else None
 
 
 def is_label_studio(data: bytes) -> bool:
-    """Whether the JSON is a list of tasks, or one task."""
+    """Return whether a JSON document is a list of tasks, or one task."""
     try:
         document = msgspec.json.decode(data)
-    except (ValueError, RecursionError):  # msgspec's own errors are ValueErrors
+    except (ValueError, RecursionError):  # msgspec's errors are ValueErrors
         return False
     first = document[0] if isinstance(document, list) and document else document
     return isinstance(first, dict) and "data" in first
 
 
 def annotations_of(path: str | Path, recording: Recording) -> list[Annotation]:
-    """Every labelling of a recording in an export: annotations, then predictions.
+    """Return all annotations of a recording in an export, then all predictions.
 
     Annotations that were cancelled are left out.
 
     Args:
         path: of the JSON export.
-        recording: whose labels are wanted.
+        recording: the recording.
 
     Raises:
         RecordingError: the file is no such export or has no task of the recording, a label is
@@ -134,31 +131,35 @@ def annotations_of(path: str | Path, recording: Recording) -> list[Annotation]:
     found = []
     for each in task.annotations:
         if not each.was_cancelled:
-            who = _annotator(each.completed_by)
+            annotator = _annotator(each.completed_by)
             number = "an annotation" if each.id is None else f"annotation {each.id}"
             where = f"{path}, {recording.name!r}, {number}"
-            found.append(Annotation(who, False, _labels(each.result, recording, where, who)))
+            found.append(
+                Annotation(annotator, False, _labels(each.result, recording, where, annotator))
+            )
     for made in task.predictions:
         if isinstance(made, _Prediction):
-            who = made.model_version or ""
-            where = f"{path}, {recording.name!r}, prediction {who!r}"
-            found.append(Annotation(who, True, _labels(made.result, recording, where, who)))
+            annotator = made.model_version or ""
+            where = f"{path}, {recording.name!r}, prediction {annotator!r}"
+            found.append(
+                Annotation(annotator, True, _labels(made.result, recording, where, annotator))
+            )
     return found
 
 
 def labels_from_label_studio(
     path: str | Path, recording: Recording, annotator: str | None = None
 ) -> Labels:
-    """The labels of one annotator, or model, by finger.
+    """Return the labels of one annotator or model, by finger.
 
     Args:
         path: of the JSON export.
-        recording: whose labels are wanted.
+        recording: the recording.
         annotator: email or number of a person, or version of a model. By default the only
-            person who labelled the recording, or the only model where nobody did.
+            person who labelled the recording, or the only model if no person did.
 
     Raises:
-        RecordingError: as `annotations_of`, or it is not clear whose labels are meant.
+        RecordingError: see `annotations_of`; or the choice is not unique.
     """
     every = annotations_of(path, recording)
     if annotator is None:
@@ -167,13 +168,13 @@ def labels_from_label_studio(
         found = [each for each in every if each.annotator == annotator]
     if len(found) == 1:
         return found[0].labels
-    there = ", ".join(
-        f"{each.annotator or 'nobody named'}{' (prediction)' * each.prediction}" for each in every
+    annotators = ", ".join(
+        f"{each.annotator or 'unnamed'}{' (prediction)' * each.prediction}" for each in every
     )
     wanted = "one annotation" if annotator is None else f"one annotation by {annotator!r}"
     raise RecordingError(
         f"{path}: {wanted} of {recording.name!r} expected, {len(found)} found; "
-        f"it has been labelled by {there or 'nobody'}"
+        f"its annotators are {annotators or 'none'}"
     )
 
 
@@ -189,7 +190,7 @@ def _tasks(path: Path) -> list[_Task]:
 
 
 def _task_of(tasks: Sequence[_Task], recording: Recording, path: Path) -> _Task:
-    """The task of a recording, by its hash or else by name."""
+    """Return the task of a recording, by its hash or else by name."""
     named = [task for task in tasks if recording.name in _names(task)]
     known = [task for task in tasks if task.data.get("digest") == recording.digest]
     if not known and any("digest" in task.data for task in named):
@@ -200,20 +201,20 @@ def _task_of(tasks: Sequence[_Task], recording: Recording, path: Path) -> _Task:
     found = known or named
     if len(found) == 1:
         return found[0]
-    there = ", ".join(dict.fromkeys(name for task in tasks for name in _names(task)[:1]))
+    names = ", ".join(dict.fromkeys(name for task in tasks for name in _names(task)[:1]))
     raise RecordingError(
         f"{path}: one task of {recording.name!r} expected, {len(found)} found; "
-        f"its {len(tasks)} tasks are of {there or 'recordings without a name'}"
+        f"its {len(tasks)} tasks are of {names or 'recordings without a name'}"
     )
 
 
 def _names(task: _Task) -> list[str]:
-    """What the recording of a task may be called."""
+    """Return possible names of the recording of a task."""
     given = task.data.get("recording")
     texts = [each for each in task.data.values() if isinstance(each, str)]
     files = [*texts, task.file_upload or ""]
     stems = [_stem(each) for each in files if each.lower().endswith((".csv", ".tsv"))]
-    bare = [re.sub(r"^[0-9a-f]{8}-", "", stem) for stem in stems]  # as uploaded by hand
+    bare = [re.sub(r"^[0-9a-f]{8}-", "", stem) for stem in stems]  # without the prefix of an upload
     return [*([given] if isinstance(given, str) else []), *bare, *stems]
 
 
@@ -229,21 +230,21 @@ def _annotator(completed_by: object) -> str:
     return "" if completed_by is None else str(completed_by)
 
 
-def _labels(results: Sequence[_Result], recording: Recording, where: str, who: str) -> Labels:
+def _labels(results: Sequence[_Result], recording: Recording, where: str, annotator: str) -> Labels:
     labels: dict[str, list[Label]] = {}
-    for finger, label in _each(results, recording, where, who):
+    for finger, label in _each_label(results, recording, where, annotator):
         labels.setdefault(finger, []).append(label)
     try:
-        checked = recording.with_labels(labels)
+        validated = recording.with_labels(labels)
     except RecordingError as cause:
         raise RecordingError(f"{where}: {cause}") from cause
     return {
-        finger: checked.modules[finger].labels for finger in recording.modules if finger in labels
+        finger: validated.modules[finger].labels for finger in recording.modules if finger in labels
     }
 
 
-def _each(
-    results: Sequence[_Result], recording: Recording, where: str, who: str
+def _each_label(
+    results: Sequence[_Result], recording: Recording, where: str, annotator: str
 ) -> Iterator[tuple[str, Label]]:
     for result in results:
         if result.type != "timeserieslabels":
@@ -255,16 +256,16 @@ def _each(
                 f"{', '.join(recording.modules)} expected"
             )
         try:
-            yield finger, _label(result, who)
+            yield finger, _label(result, annotator)
         except ValueError as cause:
             raise RecordingError(f"{where}, {finger}: {cause}") from cause
 
 
-def _label(result: _Result, who: str) -> Label:
-    """The label that a region stands for.
+def _label(result: _Result, annotator: str) -> Label:
+    """Return the label of a region.
 
     Raises:
-        ValueError: it stands for none.
+        ValueError: the region is no valid label.
     """
     try:
         value = msgspec.convert(result.value, _Value)
@@ -288,5 +289,5 @@ def _label(result: _Result, who: str) -> Label:
         cause_of,
         evidence=str(meta.get("evidence", "")),
         confidence=1.0 if result.score is None else result.score,
-        author=who if changed else str(meta.get("author", who)),
+        author=annotator if changed else str(meta.get("author", annotator)),
     )

@@ -1,10 +1,10 @@
-"""Recordings for Label Studio: tasks with their labels, signals as CSV, and the labelling config.
+"""Recordings for Label Studio: tasks with labels, signals as CSV, and the labelling config.
 
-Three kinds of files: `label-studio.json` with a task for each recording, `label-studio.xml`
-with the labelling config of the project, and `<name>.signals.csv` for each recording. Label
-Studio has to be told where the CSV files are: either it serves the folder itself
-(LOCAL_FILES_SERVING_ENABLED=true, LOCAL_FILES_DOCUMENT_ROOT the folder above), or `url` is
-where something else does.
+There are three kinds of files: `label-studio.json` with a task for each recording,
+`label-studio.xml` with the labelling config of the project, and `<name>.signals.csv` for each
+recording. Label Studio needs access to the CSV files: either it serves the folder itself
+(LOCAL_FILES_SERVING_ENABLED=true, LOCAL_FILES_DOCUMENT_ROOT the folder above), or another server
+does, at `url`.
 """
 
 import csv
@@ -18,19 +18,18 @@ from xml.sax.saxutils import quoteattr
 import msgspec
 import numpy as np
 
-from holdfast.contact import Cause, ContactState
+from holdfast.contact import LABEL_STATES, Cause, ContactState
 from holdfast.errors import OutputError, RecordingError
-from holdfast.features import FEATURE_NAMES, fingertip_force, haar_features
+from holdfast.features import DEFAULT_WINDOW
 from holdfast.files import refuse_overwrite, write_whole
-from holdfast.labelling.exchange.label_studio import STATES, label_name, state_of
+from holdfast.labelling.exchange.label_studio import label_name, state_of
+from holdfast.labelling.server.signals import SERIES, signal_values
 from holdfast.recordings import Label, Recording, Tactile
 from holdfast.sensors.types import Array
 
 TASKS, CONFIG, SIGNALS = "label-studio.json", "label-studio.xml", ".signals.csv"
-SHOWN = ("F_a", "F_x", "F_y", "F_z", "sigma")
-"""Signals of each finger."""
 TARE = 0.5
-"""How long the first part of a recording is that counts as no force [s]."""
+"""Duration of the tare at the start of a recording [s]."""
 COLOURS = {
     ContactState.STABLE: "#2a9d5c",
     ContactState.UNSTABLE: "#d1495b",
@@ -44,30 +43,30 @@ def save_label_studio(
     *,
     url: str | None = None,
     predictions: bool = False,
-    window: int = 14,
+    window: int = DEFAULT_WINDOW,
     force: bool = False,
 ) -> Path:
-    """Writes recordings and their labels for Label Studio, one recording at a time.
+    """Write recordings and their labels for Label Studio, one recording at a time.
 
     Args:
         recordings: with or without labels.
-        folder: where the files go; it is made where it does not exist.
-        url: of the folder, as Label Studio reaches it; by default by its local file serving.
-        predictions: write the labels as predictions, which a person accepts or corrects, and
-            not as annotations, which are done.
+        folder: for the files; it is created if it does not exist.
+        url: of the folder, for Label Studio; by default its local file serving.
+        predictions: write labels as predictions, which a person accepts or corrects, and not as
+            annotations, which are final.
         window: N_w of sigma.
-        force: replace files that are there.
+        force: replace existing files.
 
     Returns:
         The path of the tasks.
 
     Raises:
         OutputError: a file exists already or cannot be written.
-        RecordingError: two recordings have the same name, one's name cannot be a file's, or
-            there is no recording.
+        RecordingError: there is no recording, two have the same name, or a name is not valid as
+            the name of a file.
     """
     target = Path(folder)
-    _make(target)
+    _create(target)
     for name in (TASKS, CONFIG):
         refuse_overwrite(target / name, force=force)
     base = f"/data/local-files/?d={quote(target.resolve().name)}" if url is None else url
@@ -93,20 +92,20 @@ def save_label_studio(
 
 
 def task_of(recording: Recording, link: str, *, predictions: bool = False) -> dict[str, Any]:
-    """The task of a recording, as plain JSON values.
+    """Return the task of a recording, as plain JSON values.
 
     Args:
         recording: with or without labels.
-        link: where Label Studio finds the signals.
-        predictions: labels go there, and not among the annotations.
+        link: URL of the signals, for Label Studio.
+        predictions: write labels as predictions, not as annotations.
     """
     results = [
         _result(finger, number, label)
         for finger, module in recording.modules.items()
         for number, label in enumerate(module.labels)
     ]
-    made: dict[str, Any] = {"model_version": "holdfast"} if predictions else {}
-    labelled = [made | {"result": results}] if results else []
+    version: dict[str, Any] = {"model_version": "holdfast"} if predictions else {}
+    labelled = [version | {"result": results}] if results else []
     return {
         "data": {"csv": link, "recording": recording.name, "digest": recording.digest},
         "annotations": [] if predictions else labelled,
@@ -114,21 +113,21 @@ def task_of(recording: Recording, link: str, *, predictions: bool = False) -> di
     }
 
 
-def signals_csv(recording: Recording, window: int = 14) -> str:
-    """Times [s] and, of each finger, F_a, F_x, F_y, F_z and sigma [unit of its readings].
+def signals_csv(recording: Recording, window: int = DEFAULT_WINDOW) -> str:
+    """Return a CSV table: time [s] and, by finger, F_a, F_x, F_y, F_z, sigma [unit of readings].
 
-    The mean of the first half second is taken off. Rows are the samples of the finger that
-    has most; another shows its latest. A cell without a value is empty.
+    The tare is the mean of the first half second. Rows are the samples of the finger with most
+    samples; other fingers have the values of their latest sample. Unknown values are empty cells.
 
     Args:
-        recording: whose signals are written.
+        recording: the recording.
         window: N_w of sigma.
     """
     longest = max(recording.modules.values(), key=lambda module: module.n_samples)
     columns = [
         column
         for module in recording.modules.values()
-        for column in _held(module, longest.times, window).T
+        for column in _latest_values(module, longest.times, window).T
     ]
     text = StringIO()
     writer = csv.writer(text, lineterminator="\n")
@@ -139,20 +138,20 @@ def signals_csv(recording: Recording, window: int = 14) -> str:
 
 
 def labelling_config(units: Mapping[str, str], extra: Iterable[str] = ()) -> str:
-    """The labelling config: for each finger its signals, and a group of labels called as it is.
+    """Return the labelling config: for each finger its signals, and a group of labels of its name.
 
     Args:
-        units: of the readings of each finger.
-        extra: names of labels beside the usual.
+        units: of the readings, by finger.
+        extra: names of labels beside the usual ones.
     """
-    usual = [label_name(state) for state in STATES]
+    usual = [label_name(state) for state in LABEL_STATES]
     usual += [label_name(ContactState.UNSTABLE, cause) for cause in Cause]
     names = list(dict.fromkeys([*usual, *sorted(extra)]))
     body = "\n".join(_finger_config(finger, unit, names) for finger, unit in units.items())
     return f"<View>\n{body}\n</View>\n"
 
 
-def _make(folder: Path) -> None:
+def _create(folder: Path) -> None:
     try:
         folder.mkdir(parents=True, exist_ok=True)
     except OSError as cause:
@@ -161,9 +160,9 @@ def _make(folder: Path) -> None:
 
 def _check_name(name: str, known: Collection[str]) -> None:
     if name in known:
-        raise RecordingError(f"two recordings are called {name!r}; each needs its own name")
+        raise RecordingError(f"two recordings have the name {name!r}; different names expected")
     if Path(name).name != name or "\\" in name:
-        raise RecordingError(f"recording {name!r} cannot lend its name to a file")
+        raise RecordingError(f"a name that is valid for a file expected, recording {name!r} given")
 
 
 def _result(finger: str, number: int, label: Label) -> dict[str, Any]:
@@ -172,7 +171,7 @@ def _result(finger: str, number: int, label: Label) -> dict[str, Any]:
         "id": f"{finger}-{number}",
         "type": "timeserieslabels",
         "from_name": finger,
-        "to_name": _series(finger),
+        "to_name": _series_name(finger),
         "value": {
             "start": float(label.start),
             "end": float(label.end),
@@ -184,30 +183,21 @@ def _result(finger: str, number: int, label: Label) -> dict[str, Any]:
     }
 
 
-def _series(finger: str) -> str:
+def _series_name(finger: str) -> str:
     return f"{finger}-signals"
 
 
 def _column_names(fingers: Iterable[str]) -> list[str]:
-    return [f"{finger}_{name}" for finger in fingers for name in SHOWN]
+    return [f"{finger}_{name}" for finger in fingers for name in SERIES]
 
 
-def _held(module: Tactile, times: Array, window: int) -> Array:
-    """(n, 5) signals of a finger: at each time those of its latest sample."""
-    shown = np.full((module.n_samples + 1, len(SHOWN)), np.nan)  # row 0: before the first
+def _latest_values(module: Tactile, times: Array, window: int) -> Array:
+    """Return (n, 5) signals of the latest sample of a finger at each time; NaN before the first."""
+    values = np.full((module.n_samples + 1, len(SERIES)), np.nan)
     if module.n_samples:
-        first = float(module.times[0])
-        try:
-            tip = fingertip_force(
-                module.readings, module.sensor, (first, first + TARE), module.times
-            )
-        except ValueError:  # no finite reading to take the baseline from
-            tip = np.full((module.n_samples, 3), np.nan)
-        places = [FEATURE_NAMES.index(name) for name in SHOWN]
-        shown[1:, :4] = np.column_stack([np.linalg.norm(tip, axis=1), tip])
-        shown[1:, 4] = haar_features(tip, window)[:, places[4]]
-    held: Array = shown[np.searchsorted(module.times, times, side="right")]
-    return held
+        values[1:] = signal_values(module, TARE, window)
+    latest: Array = values[np.searchsorted(module.times, times, side="right")]
+    return latest
 
 
 def _cells(values: Array) -> Iterator[str]:
@@ -222,9 +212,9 @@ def _finger_config(finger: str, unit: str, names: Sequence[str]) -> str:
     channels = "\n".join(
         f"    <Channel column={quoteattr(column)} legend={quoteattr(name)} "
         f"units={quoteattr(unit)}/>"
-        for column, name in zip(_column_names([finger]), SHOWN, strict=True)
+        for column, name in zip(_column_names([finger]), SERIES, strict=True)
     )
-    series = quoteattr(_series(finger))
+    series = quoteattr(_series_name(finger))
     return (
         f"  <Header value={quoteattr(finger)}/>\n"
         f'  <TimeSeriesLabels name={quoteattr(finger)} toName={series} choice="single">\n'

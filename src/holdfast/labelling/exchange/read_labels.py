@@ -1,4 +1,4 @@
-"""Labels of a recording by path, in whatever file they are."""
+"""Labels of a recording from a file of any known format, or from a folder of files."""
 
 from pathlib import Path
 
@@ -12,35 +12,35 @@ from holdfast.recordings import Label, Recording
 Labels = dict[str, tuple[Label, ...]]
 
 
-def labels_of(path: str | Path, recording: Recording, annotator: str | None = None) -> Labels:
-    """The labels of a recording in a file, or in its file in a folder.
+def read_labels(path: str | Path, recording: Recording, annotator: str | None = None) -> Labels:
+    """Read the labels of a recording from a file, or from a file in a folder.
 
     A file is a label file (`.labels.json`), a recording with labels inside or beside it
-    (`.parquet`, `.mcap`), a table (`.csv`) or a JSON export of Label Studio (`.json`). In a
-    folder that is the first there is of `NAME.labels.json`, `NAME.parquet`, `NAME.mcap`,
+    (`.parquet`, `.mcap`), a table (`.csv`) or a JSON export of Label Studio (`.json`). In a folder
+    it is the first that exists of `NAME.labels.json`, `NAME.parquet`, `NAME.mcap`,
     `NAME.labels.csv`, `NAME.csv`, `NAME.json`, and the only other `.json` file.
 
     Args:
         path: of the file or folder.
-        recording: whose labels are wanted.
-        annotator: of an export of Label Studio; see `labels_from_label_studio`.
+        recording: the recording.
+        annotator: in an export of Label Studio; see `labels_from_label_studio`.
 
     Returns:
         By finger, in order of time; fingers without labels are left out.
 
     Raises:
-        RecordingError: there are none, they are of another recording or do not fit it, or the
-            file cannot be read.
+        RecordingError: there are no labels, they are of another recording or do not fit it, or
+            the file cannot be read.
     """
     file = Path(path)
     if file.is_dir():
-        file = _in_folder(file, recording)
+        file = _find_in_folder(file, recording)
     labels = _read(file, recording, annotator)
     try:
-        checked = recording.with_labels(labels)
+        validated = recording.with_labels(labels)
     except RecordingError as cause:
         raise RecordingError(f"{file}: {cause}") from cause
-    return {name: module.labels for name, module in checked.modules.items() if module.labels}
+    return {name: module.labels for name, module in validated.modules.items() if module.labels}
 
 
 def _read(file: Path, recording: Recording, annotator: str | None) -> Labels:
@@ -87,7 +87,7 @@ def _is_label_studio(file: Path) -> bool:
         raise RecordingError(f"cannot read {file}: {cause.strerror}") from cause
 
 
-def _in_folder(folder: Path, recording: Recording) -> Path:
+def _find_in_folder(folder: Path, recording: Recording) -> Path:
     endings = (SUFFIX, *SUFFIXES, ".labels.csv", ".csv", ".json")
     for ending in endings:
         if (file := folder / f"{recording.name}{ending}").is_file():

@@ -1,4 +1,4 @@
-"""How far two labellings of the same recordings agree: two people, or a person and a rule."""
+"""Agreement of two sets of labels of the same recordings: by two people, or a person and a rule."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
@@ -17,24 +17,24 @@ from holdfast.metrics.statistics import quantile
 from holdfast.recordings import Label, label_states
 from holdfast.sensors.types import Array
 
-MATCHED = 0.5
-"""Onsets of two labellings that lie closer than this [s] may be the same."""
+MAX_ONSET_DIFFERENCE = 0.5
+"""Largest time between two onsets that may be the same [s]."""
 
-TOUCHING = 0.1
-"""A label follows on the one before where the gap is at most this [s]: drawn by hand."""
+MAX_LABEL_GAP = 0.1
+"""Largest gap between two labels that follow each other; people draw small gaps [s]."""
 
 Counts = npt.NDArray[np.int64]
 
 
 class OnsetDifferences(msgspec.Struct, frozen=True):
-    """How far apart two labellings set the onsets of instability.
+    """Differences between the onsets of instability in A and in B.
 
     Attributes:
-        n: onsets that both have.
-        only_a: onsets that only A has.
-        only_b: onsets that only B has.
-        median: of B minus A [s]: above 0 where B is later; None without a common onset.
-        p95: 95th percentile of the size of the difference [s].
+        n: number of onsets in both.
+        only_a: number of onsets only in A.
+        only_b: number of onsets only in B.
+        median: of B minus A [s], above 0 if B is later; None without a common onset.
+        p95: 95th percentile of the absolute difference [s].
         values: B minus A of each common onset [s], in order of time.
     """
 
@@ -47,20 +47,20 @@ class OnsetDifferences(msgspec.Struct, frozen=True):
 
 
 class FingerAgreement(msgspec.Struct, frozen=True):
-    """How far two labellings of one finger, or of several together, agree.
+    """Agreement of A and B on one finger of one recording.
 
     Attributes:
-        kappa: Cohen's, over no contact, unstable and stable; None where it is undefined.
-        kappa_stable: Cohen's, over stable and everything else.
-        n: samples that both label.
-        n_samples: all samples.
+        kappa: Cohen's kappa of no contact, unstable and stable; None if it is undefined.
+        kappa_stable: Cohen's kappa of stable against the other two.
+        n: number of samples that both label.
+        n_samples: number of all samples.
         only_a: share of all samples that only A labels, from 0 to 1.
         only_b: share of all samples that only B labels.
-        confusion: (3, 3) samples by the state in A (rows) and in B (columns), in the order
-            no contact, unstable, stable.
-        onset_differences: of not-stable after stable.
-        missing_in_a: intervals of B without one of the same state in A that overlaps.
-        missing_in_b: intervals of A without one in B.
+        confusion: (3, 3) number of samples by the state in A (rows) and in B (columns), in the
+            order no contact, unstable, stable.
+        onset_differences: of changes from stable to another state.
+        missing_in_a: intervals of B that no interval of the same state in A overlaps.
+        missing_in_b: intervals of A that no interval of the same state in B overlaps.
     """
 
     kappa: float | None
@@ -76,14 +76,14 @@ class FingerAgreement(msgspec.Struct, frozen=True):
 
 
 class RecordingAgreement(msgspec.Struct, frozen=True):
-    """How far two labellings of one recording agree, finger by finger."""
+    """Agreement of A and B on each finger of one recording."""
 
     name: str
     fingers: dict[str, FingerAgreement]
 
 
 class PooledAgreement(msgspec.Struct, frozen=True):
-    """As `FingerAgreement`, over all recordings; of missing intervals only how many."""
+    """Agreement over recordings, as `FingerAgreement`; missing intervals are only counted."""
 
     kappa: float | None
     kappa_stable: float | None
@@ -98,12 +98,12 @@ class PooledAgreement(msgspec.Struct, frozen=True):
 
 
 class Agreement(msgspec.Struct, frozen=True):
-    """How far two labellings of some recordings agree; `msgspec.json.encode` gives the JSON.
+    """Agreement of A and B on recordings; `msgspec.json.encode` gives the JSON.
 
     Attributes:
-        recordings: each of them.
-        fingers: each finger over all recordings.
-        pooled: all fingers and recordings.
+        recordings: agreement on each recording.
+        fingers: agreement on each finger over all recordings.
+        pooled: agreement over all fingers and recordings.
     """
 
     recordings: list[RecordingAgreement]
@@ -112,19 +112,19 @@ class Agreement(msgspec.Struct, frozen=True):
 
 
 def cohens_kappa(confusion: npt.ArrayLike) -> float | None:
-    """Cohen's kappa: agreement beyond that of chance, 1 for perfect and 0 for none.
+    """Return Cohen's kappa: agreement beyond chance, 1 if perfect and 0 if by chance.
 
         kappa = (p_o - p_e) / (1 - p_e)
 
-    p_o is the share of samples with the same state, p_e the share expected of two labellings
-    that have nothing to do with each other. Where both give one and the same state to every
-    sample p_e is 1, and kappa says nothing: they agree, but so would any two.
+    p_o is the share of samples with the same state, p_e the share that independent labels with the
+    same frequencies of states would have. If A and B give one state to all samples, p_e is 1 and
+    kappa is undefined.
 
     Args:
-        confusion: (k, k) samples by the state in A (rows) and in B (columns).
+        confusion: (k, k) number of samples by the state in A (rows) and in B (columns).
 
     Returns:
-        From -1 to 1; None where p_e is 1, or without samples.
+        From -1 to 1; None if p_e is 1, or without samples.
 
     Example:
         >>> cohens_kappa([[20, 5], [10, 15]])
@@ -146,23 +146,23 @@ def compare(
     times: Mapping[str, Array],
     name: str = "",
 ) -> RecordingAgreement:
-    """How far two labellings of a recording agree.
+    """Compare two sets of labels of a recording.
 
-    An onset is the start of a label that is not stable and follows on a stable one, with a gap
-    of at most 0.1 s. Onsets of A and B are matched one to one where they are at most 0.5 s
-    apart: as many as can be, and of all such ways the one with the smallest differences.
+    An onset is the start of a label that is not stable and follows a stable one, with a gap of at
+    most 0.1 s. Onsets of A and B at most 0.5 s apart are matched one to one: as many as possible,
+    with the smallest sum of differences.
 
     Args:
         a: labels by finger, without overlap.
-        b: the same.
+        b: labels by finger, without overlap.
         times: by finger of the recording, (n,) of its samples [s].
         name: of the recording.
 
     Returns:
-        The agreement of every finger that A or B labels.
+        The agreement on every finger that A or B labels.
 
     Raises:
-        RecordingError: labels for a finger that the recording does not have.
+        RecordingError: the recording has no such finger.
 
     Example:
         >>> import numpy as np
@@ -183,11 +183,11 @@ def compare(
         for finger in times
         if finger in labelled
     }
-    return RecordingAgreement(name, {finger: _figures(each) for finger, each in counted.items()})
+    return RecordingAgreement(name, {finger: _agreement(each) for finger, each in counted.items()})
 
 
 def pool(recordings: Sequence[RecordingAgreement]) -> Agreement:
-    """The agreement over many recordings, by finger and over all.
+    """Return the agreement over recordings, by finger and over all fingers.
 
     Args:
         recordings: from `compare`.
@@ -203,21 +203,23 @@ def pool(recordings: Sequence[RecordingAgreement]) -> Agreement:
     )
 
 
-class _Onsets(NamedTuple):
+class _OnsetMatch(NamedTuple):
+    """Differences of matched onsets [s], and numbers of the others."""
+
     values: list[float]
     only_a: int
     only_b: int
 
 
 @dataclass(frozen=True)
-class _Counted:
-    """What is counted of one finger."""
+class _FingerCounts:
+    """Counts of one finger in one recording."""
 
     confusion: Counts
     n_samples: int
     n_only_a: int
     n_only_b: int
-    onsets: _Onsets
+    onsets: _OnsetMatch
     missing_in_a: list[Span]
     missing_in_b: list[Span]
 
@@ -226,22 +228,22 @@ def _in_order(labels: Sequence[Label]) -> list[Label]:
     return sorted(labels, key=lambda label: label.start)
 
 
-def _count(a: Sequence[Label], b: Sequence[Label], times: Array) -> _Counted:
+def _count(a: Sequence[Label], b: Sequence[Label], times: Array) -> _FingerCounts:
     one, two = label_states(a, times), label_states(b, times)
     table = np.bincount(4 * one.astype(np.int64) + two, minlength=16).reshape(4, 4)
-    runs_a, runs_b = spans_of(a), spans_of(b)
-    return _Counted(
+    spans_a, spans_b = spans_of(a), spans_of(b)
+    return _FingerCounts(
         confusion=table[1:, 1:],
         n_samples=len(times),
         n_only_a=int(table[1:, 0].sum()),
         n_only_b=int(table[0, 1:].sum()),
         onsets=_match(_onsets(a), _onsets(b)),
-        missing_in_a=_without_counterpart(runs_b, runs_a),
-        missing_in_b=_without_counterpart(runs_a, runs_b),
+        missing_in_a=_unmatched(spans_b, spans_a),
+        missing_in_b=_unmatched(spans_a, spans_b),
     )
 
 
-def _figures(counted: _Counted) -> FingerAgreement:
+def _agreement(counted: _FingerCounts) -> FingerAgreement:
     n_samples = max(counted.n_samples, 1)
     return FingerAgreement(
         kappa=cohens_kappa(counted.confusion),
@@ -280,7 +282,7 @@ def _pooled(parts: Sequence[FingerAgreement]) -> PooledAgreement:
 
 
 def _binary(confusion: Counts) -> Counts:
-    """(2, 2) everything but stable, and stable."""
+    """Return (2, 2) counts of not stable and stable."""
     return np.add.reduceat(np.add.reduceat(confusion, [0, 2], axis=0), [0, 2], axis=1)
 
 
@@ -297,36 +299,34 @@ def _differences(values: list[float], only_a: int, only_b: int) -> OnsetDifferen
 
 
 def _onsets(labels: Sequence[Label]) -> Array:
-    """When a stable contact ceases to be, by labels in order of time [s]."""
+    """Return the onsets of instability in labels in order of time [s]."""
     return np.array(
         [
             after.start
             for before, after in pairwise(labels)
             if before.state is ContactState.STABLE
             and after.state is not ContactState.STABLE
-            and after.start - before.end <= TOUCHING + TIME_TOLERANCE
+            and after.start - before.end <= MAX_LABEL_GAP + TIME_TOLERANCE
         ],
         dtype=np.float64,
     )
 
 
-def _match(a: Array, b: Array) -> _Onsets:
-    """Onsets one to one: as many as can be, with the smallest differences."""
+def _match(a: Array, b: Array) -> _OnsetMatch:
+    """Match as many onsets as possible, with the smallest sum of differences."""
     differences = b[None, :] - a[:, None]
-    near = np.abs(differences) <= MATCHED + TIME_TOLERANCE
-    far = (len(a) + len(b) + 1) * (MATCHED + TIME_TOLERANCE)  # dearer than all that match
-    rows, columns = linear_sum_assignment(np.where(near, np.abs(differences), far))
+    near = np.abs(differences) <= MAX_ONSET_DIFFERENCE + TIME_TOLERANCE
+    unmatched_cost = (len(a) + len(b) + 1) * (MAX_ONSET_DIFFERENCE + TIME_TOLERANCE)
+    rows, columns = linear_sum_assignment(np.where(near, np.abs(differences), unmatched_cost))
     kept = near[rows, columns]
     values = differences[rows[kept], columns[kept]].tolist()
-    return _Onsets(values, len(a) - len(values), len(b) - len(values))
+    return _OnsetMatch(values, len(a) - len(values), len(b) - len(values))
 
 
-def _without_counterpart(runs: Sequence[Span], others: Sequence[Span]) -> list[Span]:
-    """The runs that no run of the same state among the others overlaps."""
-    return [
-        run
-        for run in runs
-        if not any(
-            other.state == run.state and run.overlap(other) > TIME_TOLERANCE for other in others
-        )
-    ]
+def _unmatched(spans: Sequence[Span], others: Sequence[Span]) -> list[Span]:
+    """Return the spans that none of the others with the same state overlaps."""
+
+    def matches(span: Span, other: Span) -> bool:
+        return span.state == other.state and span.overlap(other) > TIME_TOLERANCE
+
+    return [span for span in spans if not any(matches(span, other) for other in others)]

@@ -14,7 +14,7 @@ import msgspec
 import numpy as np
 from scipy.ndimage import maximum_filter1d, uniform_filter1d
 
-from holdfast.features import Tare, haar_features
+from holdfast.features import DEFAULT_WINDOW, Tare, haar_features
 from holdfast.features.force import tared_force
 from holdfast.features.tare import TareArgument
 from holdfast.recordings import GAP_PERIODS, Recording, Tactile
@@ -91,7 +91,7 @@ class FingerSignals:
     """
 
     def __init__(self, module: Tactile, tare: TareArgument | Tare = 0.5) -> None:
-        self.times, self.values = _with_gaps(module, _values(module, Tare.parse(tare)))
+        self.times, self.values = _with_gaps(module, signal_values(module, tare))
         self._levels: list[_Level] = []
         level = _Level(np.column_stack([self.times, self.times]), self.values, self.values)
         while len(level.times) > 2:
@@ -162,14 +162,28 @@ class Signals:
         return SignalPart(first, last, exact, {name: own for name, (_, own) in parts.items()})
 
 
-def _values(module: Tactile, tare: Tare) -> Array:
-    """Return (n, n_series) force and sigma of every sample; NaN where they are unknown."""
+def signal_values(
+    module: Tactile, tare: TareArgument | Tare, window: int = DEFAULT_WINDOW
+) -> Array:
+    """Return (n, n_series) force and sigma of every sample [unit of the readings].
+
+    The baseline is subtracted from all samples, including those of the tare. Unknown values are
+    NaN.
+
+    Args:
+        module: readings of the finger.
+        tare: how the baseline is found.
+        window: N_w of sigma.
+
+    Raises:
+        ValueError: the tare is unknown, or no finite sample lies in its time.
+    """
     force = _force(module, tare)
-    sigma = haar_features(force)[:, 5:]
+    sigma = haar_features(force, window)[:, 5:]
     return np.concatenate([np.linalg.norm(force, axis=1, keepdims=True), force, sigma], axis=1)
 
 
-def _force(module: Tactile, tare: Tare) -> Array:
+def _force(module: Tactile, tare: TareArgument | Tare) -> Array:
     """Return (n, 3) force with one baseline for all samples; NaN without any finite sample."""
     try:
         return tared_force(module, tare, offline=True).force
