@@ -123,7 +123,7 @@ def test_arrays_of_a_track_belong_together():
 
 def test_frozen_and_sentinel_poses_are_out_of_sight_a_slow_tracker_is_not():
     times = np.arange(60) / 100
-    place = np.repeat(np.arange(12), 5)[:, None] * [1.0, 0, 0]  # at 20 Hz, told at 100 Hz
+    place = np.repeat(np.arange(12), 5)[:, None] * [1.0, 0, 0]  # at 20 Hz, repeated at 100 Hz
     place[20:40] = place[20]
     place[50:] = 10.0
     turns = np.tile([1.0, 0, 0, 0], (60, 1))
