@@ -29,7 +29,7 @@ from holdfast.contact import (
 NAMES = {"-": NO_CONTACT, "S": STABLE, "U": UNSTABLE, "?": UNKNOWN}
 
 
-def test_codes_are_places_in_the_list():
+def test_codes_are_positions_in_the_list():
     assert [state.code for state in ContactState] == [0, 1, 2, 3]
     assert [
         ContactState(name).code for name in ("UNKNOWN", "NO_CONTACT", "UNSTABLE", "STABLE")
@@ -92,7 +92,7 @@ def test_the_order_of_fingers_does_not_matter(codes):
     assert len(states) == 1
 
 
-def test_estimates_are_values_that_json_takes():
+def test_estimates_can_be_written_as_json():
     finger = ContactEstimate(1.0, ContactState.STABLE, Reason.NONE, 0.9, 2.0, (1.0, 0.0, 0.0))
     hand = HandEstimate(1.0, ContactState.STABLE, {"thumb": finger})
     assert msgspec.json.decode(msgspec.json.encode(hand))["fingers"]["thumb"] == {
@@ -151,15 +151,15 @@ class TestWithFaults:
         shaken = hand({"thumb": ContactState.UNSTABLE, "index": ContactState.STABLE})
         assert with_faults(shaken, {"index": (Fault.LATE,)}, 2).state is ContactState.UNSTABLE
 
-    def test_a_reason_of_ones_own(self):
+    def test_another_reason(self):
         found = with_faults(HELD, {"thumb": (Fault.PACKET_GAP,)}, 2, Reason.GAP)
         assert found.fingers["thumb"].reason is Reason.GAP
 
-    def test_no_faults_are_a_fault_all_the_same(self):
+    def test_a_finger_without_a_named_fault_becomes_unknown_too(self):
         assert with_faults(HELD, {"thumb": ()}, 2).fingers["thumb"].state is ContactState.UNKNOWN
 
     @pytest.mark.parametrize("named", [{}, {"ring": (Fault.LATE,)}])
-    def test_nothing_named_that_is_there(self, named):
+    def test_unknown_fingers_change_nothing(self, named):
         assert with_faults(HELD, named, 2) is HELD
 
     @given(

@@ -17,12 +17,12 @@ FAMILIES = (
 
 
 @pytest.mark.parametrize("family", FAMILIES)
-def test_every_family_is_caught_as_one(family):
+def test_every_class_is_a_holdfast_error(family):
     assert issubclass(family, errors.HoldfastError)
     assert not issubclass(family, ValueError | TypeError | OSError)
 
 
-def test_the_page_names_every_family():
+def test_the_docstring_names_every_class():
     classes = {
         value
         for value in vars(errors).values()
@@ -32,13 +32,13 @@ def test_the_page_names_every_family():
     assert all(family.__name__ in errors.__doc__ for family in FAMILIES)
 
 
-def test_a_missing_extra_tells_how_to_get_it():
+def test_a_missing_extra_names_the_command_to_install_it():
     failure = errors.MissingExtra("h5py", "hdf5")
     assert str(failure) == (
         'this needs the package h5py, which is not installed: pip install "holdfast[hdf5]"'
     )
 
 
-def test_a_missing_extra_comes_back_whole_from_another_process():
+def test_a_missing_extra_can_be_pickled():
     failure = errors.MissingExtra("torch", "deep")
     assert str(pickle.loads(pickle.dumps(failure))) == str(failure)

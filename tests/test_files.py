@@ -20,7 +20,7 @@ def test_the_part_has_the_suffix_and_folder_of_the_output(tmp_path):
         assert not (tmp_path / "a.parquet").exists()
 
 
-def test_others_may_read_it_as_any_new_file(tmp_path):
+def test_the_file_has_the_mode_of_any_new_file(tmp_path):
     write_whole(tmp_path / "a", b"")
     (tmp_path / "b").touch()
     assert (tmp_path / "a").stat().st_mode == (tmp_path / "b").stat().st_mode
@@ -64,7 +64,7 @@ def test_a_full_disk_leaves_nothing(tmp_path, monkeypatch):
     assert not list(tmp_path.iterdir())
 
 
-def test_a_full_disk_keeps_what_was_there(tmp_path, monkeypatch):
+def test_a_full_disk_keeps_the_old_file(tmp_path, monkeypatch):
     target = tmp_path / "a.json"
     target.write_text("old")
 
@@ -87,7 +87,7 @@ def test_no_temporary_file_can_be_made(tmp_path, monkeypatch):
 
 
 @pytest.mark.parametrize("failure", [RuntimeError, KeyboardInterrupt])
-def test_nothing_is_left_of_a_failure(tmp_path, failure):
+def test_a_failure_leaves_no_file(tmp_path, failure):
     with pytest.raises(failure), whole_file(tmp_path / "a.json") as part:
         part.write_text("half")
         raise failure

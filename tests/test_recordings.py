@@ -52,7 +52,7 @@ class TestLabel:
         ):
             Label(0, 1, state)
 
-    def test_other_words_are_no_state_and_no_cause(self):
+    def test_refuses_unknown_states_and_causes(self):
         with pytest.raises(ValueError, match="'wobbly' is not a valid ContactState"):
             Label(0, 1, "wobbly")
         with pytest.raises(ValueError, match="'wind' is not a valid Cause"):
@@ -246,7 +246,7 @@ class TestRecording:
         with pytest.raises(TypeError):
             recording().metadata["object"] = "can"
 
-    def test_labels_for_a_module_that_is_not_there(self):
+    def test_labels_for_a_missing_module(self):
         with pytest.raises(RecordingError) as refused:
             recording().with_labels({"thumb": ()})
         assert str(refused.value) == "labels for thumb given; recording 'one' has finger1"
@@ -278,7 +278,7 @@ class TestRecording:
         changed = recording(modules={"finger1": tactile(readings=readings)})
         assert changed.digest != recording().digest
 
-    def test_digest_knows_times_module_sensor_and_unit(self):
+    def test_digest_depends_on_times_module_sensor_and_unit(self):
         others = [
             {"finger2": tactile()},
             {"finger1": tactile(times=1 + np.arange(10) / 100)},
@@ -290,7 +290,7 @@ class TestRecording:
         assert len(digests | {recording().digest}) == 6
 
     @pytest.mark.parametrize("copied", [copy.deepcopy, lambda r: pickle.loads(pickle.dumps(r))])
-    def test_travels_to_other_processes(self, copied):
+    def test_can_be_sent_to_other_processes(self, copied):
         truth = Truth(
             np.arange(3.0), {"phase": np.ones(3)}, {"finger1": {"slip_speed": np.ones(3)}}
         )

@@ -113,7 +113,7 @@ def test_labels_stay_up_to_the_last_sample(source, rate, n):
         assert (found.labels[1].start, found.labels[1].evidence) == (middle, "hand")
 
 
-def test_all_else_stays():
+def test_everything_else_stays():
     one = made(np.zeros(9), np.arange(9) / 100)
     found = resample(
         Recording("made", one.modules, {"object": "can"}, markers=((0.01, "push"),)), 150.0
@@ -130,7 +130,7 @@ def test_all_else_stays():
     seed=st.integers(0, 9),
 )
 @settings(deadline=None)
-def test_every_value_rests_on_samples_up_to_the_first_at_or_after_it(cut, pair, jitter, seed):
+def test_every_value_depends_on_samples_up_to_the_first_at_or_after_it(cut, pair, jitter, seed):
     source, rate = pair
     rng = np.random.default_rng(seed)
     times = np.sort(np.arange(120) + jitter * rng.uniform(-1, 1, size=120)) / source
@@ -143,14 +143,14 @@ def test_every_value_rests_on_samples_up_to_the_first_at_or_after_it(cut, pair, 
 
 
 def fed(module, rate):
-    """What a `Resampler` says of a module, sample by sample."""
+    """Return the result of a `Resampler` for a module, sample by sample."""
     resampler = Resampler(1 / module.period, rate)
-    told = [
+    samples = [
         one
         for time, reading in zip(module.times, module.readings, strict=True)
         for one in resampler.push(time, reading)
     ]
-    return np.array([time for time, _ in told]), np.array([reading for _, reading in told])
+    return np.array([time for time, _ in samples]), np.array([reading for _, reading in samples])
 
 
 def uneven(source, jitter, gaps, seed, start=0.0, n=300):
@@ -185,26 +185,26 @@ def test_live_is_offline(pair, jitter, gaps, start, seed):
 
 @given(pair=st.sampled_from(RATES), n=st.integers(1, 300), seed=st.integers(0, 99))
 @settings(deadline=None)
-def test_live_says_what_it_knows_at_once(pair, n, seed):
-    """Of the first samples of a recording it says as much as is said of them offline."""
+def test_live_returns_new_samples_at_once(pair, n, seed):
+    """The first samples of a recording give as many new samples as offline."""
     source, rate = pair
     module = uneven(source, 0.4, [100, 200], seed)
     assume(abs(rate * module.period - 1) > 1e-9)
     first = Tactile(SENSOR, module.times[:n], module.readings[:n])
     resampler = Resampler(1 / module.period, rate)
-    told = [x for k in range(n) for x in resampler.push(module.times[k], module.readings[k])]
+    samples = [x for k in range(n) for x in resampler.push(module.times[k], module.readings[k])]
     whole = resample(Recording("made", {"thumb": module}), rate).modules["thumb"].times
     until = first.times[-1] + 1e-3 / rate
-    assert [time for time, _ in told] == [time for time in whole if time <= until]
+    assert [time for time, _ in samples] == [time for time in whole if time <= until]
 
 
-def test_live_readings_are_its_own():
+def test_live_readings_are_copies():
     resampler, reading = Resampler(100.0, 150.0), np.ones((1, 3))
-    told = resampler.push(0.0, reading)
+    samples = resampler.push(0.0, reading)
     reading[:] = 5.0
-    told += resampler.push(0.01, reading)
+    samples += resampler.push(0.01, reading)
     reading[:] = 9.0
-    assert [value[0, 0] for _, value in told] == pytest.approx([1.0, 1 + 4 * 2 / 3])
+    assert [value[0, 0] for _, value in samples] == pytest.approx([1.0, 1 + 4 * 2 / 3])
 
 
 @pytest.mark.parametrize(

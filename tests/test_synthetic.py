@@ -15,7 +15,7 @@ def test_the_same_seed_gives_the_same_bytes():
     assert synthetic_recording("a", 3).digest != synthetic_recording("a", 4).digest
 
 
-def test_fingers_are_those_asked_for_and_differ():
+def test_fingers_have_their_names_and_differ():
     recording = synthetic_recording("a", 0, ("ring", "thumb"))
     assert list(recording.modules) == ["ring", "thumb"]
     ring, thumb = recording.modules.values()

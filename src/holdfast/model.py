@@ -1,4 +1,4 @@
-"""A model: the savable whole of what is needed to judge a hand, as plain checked data."""
+"""Models: features, classifiers and decision rule of a hand, as plain validated data."""
 
 import math
 from collections.abc import Mapping
@@ -21,21 +21,24 @@ from holdfast.sensors.types import ROTATION_TOLERANCE
 
 SCHEMA = "holdfast.model/1"
 ANY_FINGER = "*"
-"""Key of a classifier that serves every finger."""
+"""Name in place of a finger, for a model of any finger."""
 RATE_TOLERANCE = 0.2
-"""A source whose rate is so close to the model's is taken as it is; another is resampled."""
+"""A source whose rate differs less from the model's, as a share of it, is not resampled."""
 
 
 class FingerModel(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
-    """How one finger is judged.
+    """Model of one finger.
 
     Attributes:
-        features: what the classifier sees, in its order.
-        classifier: from features to a probability of stability.
-        sensor: name of the sensor it was trained on; None where any will do.
+        features: input of the classifier, in its order.
+        classifier: maps features to a probability of stability.
+        sensor: name of the sensor of the training; None for any sensor.
         contact_threshold: F_a below it is no contact [unit of the readings]; None for none.
-        contact_noise: the same as a multiple of the noise of the tare stretch, where
+        contact_noise: the same as a multiple of the noise during the tare, used if
             `contact_threshold` is None.
+
+    Raises:
+        ModelError: the fields contradict each other.
     """
 
     features: tuple[FeatureSpec, ...]
@@ -56,13 +59,16 @@ class FingerModel(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_on
 
 
 class Debounce(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
-    """How a change of state is held back; nothing is, by default and for the paper's figures.
+    """Debouncing of state changes. By default, and for the paper's figures, there is none.
 
     Attributes:
-        min_duration: how long a new state must last before it is told [s].
-        hysteresis: how far past its threshold a probability must go to change the state.
-        hold: for how long UNSTABLE is told after the rule last said so, while the finger
-            touches: one disturbance is one alarm [s].
+        min_duration: time that a new state must last before it is reported [s].
+        hysteresis: distance past its threshold that a probability needs to change the state.
+        hold: time for which UNSTABLE is still reported after the last unstable sample, while
+            the finger is in contact, so that one disturbance is one alarm [s].
+
+    Raises:
+        ModelError: a value is out of range.
     """
 
     min_duration: float = 0.0
@@ -78,15 +84,15 @@ class Debounce(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
 
 
 class Training(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
-    """Where a model came from.
+    """Provenance of a model.
 
     Attributes:
-        recordings: content digest of each recording it has seen, by name.
-        split: how its figures were cross-validated.
-        parameters: of each finger's classifier.
-        figures: pooled figures out of fold.
-        seed: of everything random.
-        versions: of the packages that fitted it.
+        recordings: content digest of each training recording, by name.
+        split: split of the cross-validation.
+        parameters: hyper-parameters of each finger's classifier.
+        figures: pooled metrics out of fold.
+        seed: seed of all random numbers.
+        versions: versions of the packages that fitted it.
     """
 
     recordings: dict[str, str]
@@ -98,21 +104,26 @@ class Training(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
 
 
 class Model(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
-    """What is needed to judge a hand: a classifier per finger, or one for all (`"*"`).
+    """Model of a hand: a classifier for each finger, or one for all fingers (`"*"`).
 
     Attributes:
-        fingers: by name; `"*"` alone serves any finger.
-        sensors: the layouts that the fingers name.
-        rate: samples per second that the windows are meant for [Hz]; None for any source's own.
+        fingers: models of the fingers, by name; `"*"` alone is for any finger.
+        sensors: the sensors that the fingers name.
+        rate: samples per second for which the windows are meant [Hz]; None for any rate.
         window: N_w of the instability that is reported [samples].
         tare: how the baseline is found, as text: "0.5", "first", "none" or "START:END".
-        debounce: how changes of state are held back.
-        training: where it came from; None for one that needed no training.
+        debounce: debouncing of state changes.
+        training: provenance; None for a model without training.
         schema: version of the file format.
-        name: what it is called.
+        name: of the model.
 
     Raises:
-        ModelError: parts contradict each other.
+        ModelError: the fields contradict each other.
+
+    Example:
+        >>> model = Model.load("builtin:twin")
+        >>> model.rate, list(model.fingers), [str(x) for x in model.finger("thumb").features[:2]]
+        (150.0, ['*'], ['log(F_a)', 'log(sigma_xyz[4])'])
     """
 
     fingers: dict[str, FingerModel]
@@ -143,11 +154,11 @@ class Model(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=Tru
 
     @classmethod
     def load(cls, path: str | Path) -> Self:
-        """The model in that file, or the built-in one of that name (`builtin:twin`).
+        """Load a model from a file, or a built-in model by its name (`builtin:twin`).
 
         Raises:
-            ModelError: no such file or name; no JSON; an unknown field, another shape, a
-                number that is not finite, or another schema.
+            ModelError: the file or name does not exist; the file is not JSON; it has an unknown
+                field, another shape, a number that is not finite, or another schema.
         """
         if str(path).startswith("builtin:"):
             return cls(**msgspec.structs.asdict(built_in(str(path))))
@@ -159,13 +170,13 @@ class Model(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=Tru
             _check_sensors(data)
             return msgspec.json.decode(data, type=cls, dec_hook=_decode)
         except (ModelError, TypeError, ValueError, RecursionError) as cause:  # msgspec's too
-            raise ModelError(f"{path} is no model of {SCHEMA}: {cause}") from cause
+            raise ModelError(f"{path} is not a model of {SCHEMA}: {cause}") from cause
 
     def save(self, path: str | Path, *, force: bool = False) -> None:
-        """Writes the model as JSON, whole or not at all.
+        """Write the model as JSON, whole or not at all.
 
         Raises:
-            OutputError: the file exists already (and no `force`), or cannot be written.
+            OutputError: the file exists and `force` is not given, or it cannot be written.
         """
         if str(path).startswith("builtin:"):
             raise OutputError(f"{path} is the name of a built-in model; a file expected")
@@ -173,10 +184,10 @@ class Model(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=Tru
         write_whole(path, msgspec.json.format(data, indent=1) + b"\n", force=force)
 
     def finger(self, name: str) -> FingerModel:
-        """The part of the model that judges the finger of that name.
+        """Return the model of a finger.
 
         Raises:
-            ModelError: there is none.
+            ModelError: the model does not have that finger.
         """
         if ANY_FINGER in self.fingers:
             return self.fingers[ANY_FINGER]
@@ -185,13 +196,16 @@ class Model(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=Tru
         return self.fingers[name]
 
     def fingers_of(self, modules: Mapping[str, Sensor]) -> dict[str, Sensor]:
-        """The fingers that the model is for on a hand with those modules, and their sensors.
+        """Return the fingers that the model estimates on a hand, and their sensors.
 
-        All fingers that the model names, even those that the hand lacks; a model for any
-        finger judges every module of its sensor (fingertips only, where there are any).
+        They are all fingers that the model names, even those that the hand lacks. A model of
+        any finger estimates every module of its sensor (only fingertips, if there are any).
+
+        Args:
+            modules: sensor of each module of the hand.
 
         Raises:
-            ModelError: none of its fingers is there, or one has another sensor.
+            ModelError: the hand has none of the fingers, or a finger has another sensor.
         """
         if ANY_FINGER in self.fingers:
             return self._any_fingers(modules)
@@ -208,7 +222,7 @@ class Model(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=Tru
         }
 
     def plan(self, sensors: Mapping[str, Sensor], source_rate: float) -> StreamPlan:
-        """The stream of features that those fingers need, from a source of that rate [Hz]."""
+        """Return the plan of the feature stream of some fingers, for a source of a rate [Hz]."""
         return StreamPlan(
             sensors=sensors,
             features={name: self.finger(name).features for name in sensors},
@@ -218,17 +232,17 @@ class Model(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=Tru
         )
 
     def rate_fits(self, rate: float) -> bool:
-        """Whether a source of that rate [Hz] is taken as it is."""
+        """Return whether a source of a rate [Hz] needs no resampling."""
         return self.rate is None or abs(rate / self.rate - 1) <= RATE_TOLERANCE
 
     def predict_proba(self, recording: Recording) -> dict[str, npt.NDArray[np.float64]]:
-        """The probability of stability of every finger at each of its samples.
+        """Return the probability of stability of every finger at each of its samples.
 
         Args:
             recording: at the model's rate.
 
         Returns:
-            By finger, (n,); NaN where there is none (tare, warm-up, gap, fault).
+            By finger, (n,); NaN during tare, warm-up, gap and fault.
 
         Raises:
             ModelError: the recording has other fingers or sensors.
@@ -271,16 +285,16 @@ class Model(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=Tru
             )
         if not np.allclose(sensor.rotations, known.rotations, atol=ROTATION_TOLERANCE):
             raise ModelError(
-                f"{name}: the taxels of {sensor.name} are turned otherwise than those that the "
-                "model was trained with"
+                f"{name}: the taxels of {sensor.name} have other rotations than those of the "
+                "training"
             )
 
 
 def built_in(name: str) -> Model:
-    """The model of that name that comes with holdfast.
+    """Return a built-in model by its name.
 
     Raises:
-        ModelError: there is none.
+        ModelError: the name is unknown.
     """
     if name not in BUILT_IN:
         raise ModelError(f"unknown model {name!r}; built in are {', '.join(BUILT_IN)}")
@@ -288,16 +302,17 @@ def built_in(name: str) -> Model:
 
 
 def _twin() -> Model:
-    """Trained on recordings of the twin, reference profile: see docs/training.md."""
+    """Return the model trained on recordings of the twin, see docs/training.md."""
     data = (resources.files("holdfast") / "models" / "twin.json").read_bytes()
     model = msgspec.json.decode(data, type=Model, dec_hook=_decode)
     return msgspec.structs.replace(model, name="builtin:twin")
 
 
 def _noise_floor() -> Model:
-    """Stable while sigma is under three times what the noise of the tare stretch gives.
+    """Return a model without training: stable while sigma is under three times the noise.
 
-    It needs no training: at the noise itself the probability is 0.9, at nine times it 0.1.
+    The noise is that of the tare. At the noise itself the probability is 0.9, at nine times the
+    noise it is 0.1.
     """
     slope = 2.0
     rule = LinearClassifier(
@@ -315,7 +330,7 @@ BUILT_IN = {"builtin:twin": _twin, "builtin:noise-floor": _noise_floor}
 
 
 def _check_sensors(data: bytes) -> None:
-    """Refuses fields that no sensor has: msgspec would pass over them in a dataclass."""
+    """Refuse fields that no sensor has, which msgspec ignores in a dataclass."""
     found = msgspec.json.decode(data)
     sensors = found.get("sensors") if isinstance(found, dict) else None
     for fields in sensors.values() if isinstance(sensors, dict) else ():

@@ -310,7 +310,7 @@ def test_a_model_to_adapt_that_is_not_there(capsys, data, model, tmp_path):
         f"cannot read the model {missing}: No such file or directory"
     )
     missing.write_text("{}")
-    assert f"{missing} is no model of" in refusal(capsys, data, "-o", model, "--init", missing)
+    assert f"{missing} is not a model of" in refusal(capsys, data, "-o", model, "--init", missing)
     assert list(tmp_path.iterdir()) == [missing]
 
 

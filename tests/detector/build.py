@@ -70,6 +70,16 @@ def tactile(n=200, seed=0, which=None, start=0.0, rate=None, times=None):
     return Tactile(which, times, values)
 
 
+def broken(module):
+    """Return the module with a NaN, a gap and a frozen stretch."""
+    values = np.array(module.readings)
+    values[90, 0, 0] = np.nan
+    values[120:180] = values[120]
+    kept = np.ones(len(values), dtype=bool)
+    kept[70:80] = False
+    return type(module)(module.sensor, module.times[kept], values[kept])
+
+
 def recording(**modules):
     return Recording("made", modules)
 

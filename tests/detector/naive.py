@@ -1,4 +1,4 @@
-"""A slow obvious twin of the detector: lists, dictionaries and one rule after the other."""
+"""A slow and simple detector with the same results: lists, dictionaries, one rule at a time."""
 
 import math
 
@@ -16,7 +16,7 @@ ORDER = (
 
 
 class Taxel:
-    """What is remembered of one taxel: by the number of the sample that changed the finger."""
+    """Memory of one taxel, by the number of the sample that changed the finger."""
 
     def __init__(self, share):
         self.share = share
@@ -112,13 +112,13 @@ class Finger:
                 self.watch_taxels(self.samples[-1][1], readings, fresh)
         self.samples.append((time, readings))
         elapsed = time - self.samples[0][0] + self.period / 2
-        self.listen(elapsed)
+        self.measure_noise(elapsed)
         if self.baseline is None and not self.tared(elapsed):
             self.status, self.faults, self.faulty_taxels = "tare", (), ()
             return None
-        return self.feel(readings)
+        return self.process_force(readings)
 
-    def feel(self, readings):
+    def process_force(self, readings):
         force = naive.force(readings[self.used], self.baseline[self.used], self.rotations)
         self.force = tuple(force)
         faults, taxels = self.find_faults(readings)
@@ -177,7 +177,7 @@ class Finger:
         loud = math.sqrt(rougher[i] / 6) > 100 * quiet
         return {i} if alone and loud and rougher[i] > 2.5 * rough[i] else set()
 
-    def listen(self, elapsed):
+    def measure_noise(self, elapsed):
         enough = self.seconds if self.kind == "seconds" else 0.5
         if not math.isnan(self.noise) or elapsed < enough:
             return
@@ -185,9 +185,9 @@ class Finger:
         zero = np.zeros_like(values[0])
         forces = np.array([naive.force(v, zero, self.rotations) for v in values])
         steps = np.diff(forces, axis=0)
-        heard = math.sqrt((steps**2).sum() / (6 * max(len(steps), 1)))
+        measured = math.sqrt((steps**2).sum() / (6 * max(len(steps), 1)))
         rounding = 1 / math.sqrt(12) if self.sensor.unit == "count" else 1e-6
-        self.noise = max(heard, rounding * math.sqrt(len(self.used)))
+        self.noise = max(measured, rounding * math.sqrt(len(self.used)))
 
     def tared(self, elapsed):
         if self.kind == "first":
@@ -265,7 +265,7 @@ class Finger:
             self.state = self.candidate = "UNKNOWN"
             self.probability = self.unstable_at = NAN
             return
-        state = self.judge(features, debounce.hysteresis)
+        state = self.contact_state(features, debounce.hysteresis)
         if state == "UNSTABLE":
             self.unstable_at = time
         elif state == "STABLE" and time - self.unstable_at + self.period / 2 < debounce.hold:
@@ -301,7 +301,7 @@ class Finger:
             self.above = "drift" if long and jump <= threshold / 2 else "touch"
         return self.above == "drift"
 
-    def judge(self, features, hysteresis):
+    def contact_state(self, features, hysteresis):
         if math.hypot(*self.force) < self.contact():
             self.probability = 0.0
             return "NO_CONTACT"
@@ -321,7 +321,7 @@ class Finger:
 
 
 class Hand:
-    """Takes what `Detector` takes; tells (time, state, {finger: row})."""
+    """Detector with the same samples as `Detector`; it returns (time, state, {finger: row})."""
 
     def __init__(self, model, sensors, tare, rate, ignore=None):
         self.model = model
@@ -345,8 +345,8 @@ class Hand:
     @staticmethod
     def row(finger):
         last = NAN if finger.last is None else finger.last
-        told = (finger.state, finger.status, finger.faults, finger.faulty_taxels)
-        return told, (last, finger.probability, finger.sigma, *finger.force)
+        names = (finger.state, finger.status, finger.faults, finger.faulty_taxels)
+        return names, (last, finger.probability, finger.sigma, *finger.force)
 
     def state(self):
         states = [finger.state for finger in self.fingers.values()]

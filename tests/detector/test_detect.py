@@ -10,14 +10,12 @@ from hypothesis import strategies as st
 from holdfast.contact import ContactState
 from holdfast.detector import Detector, detect
 from holdfast.errors import ModelError, StreamError
-from holdfast.features import fingertip_force, haar_features, parse_features
-from holdfast.features.stream import StreamPlan, extract
-from holdfast.features.tare import Tare
+from holdfast.features import fingertip_force
 from holdfast.model import ANY_FINGER, Debounce, Model
 from holdfast.recordings import Recording
 from holdfast.resampling import resample
 
-from .build import RATE, RICH, finger_model, model, recording, sensor, tactile
+from .build import RATE, RICH, broken, finger_model, model, recording, sensor, tactile
 
 STATES = tuple(ContactState)
 
@@ -35,13 +33,13 @@ def feed(detector, made):
 
 def fields(estimate):
     numbers = (estimate.time, estimate.stable_probability, estimate.instability, *estimate.force)
-    told = (estimate.state, estimate.reason, estimate.faults, estimate.faulty_taxels)
-    return repr((*numbers, *told))
+    codes = (estimate.state, estimate.reason, estimate.faults, estimate.faulty_taxels)
+    return repr((*numbers, *codes))
 
 
-def assert_same(detection, told):
+def assert_same(detection, estimates):
     rows = dict.fromkeys(detection.fingers, 0)
-    for k, (present, estimate) in enumerate(told):
+    for k, (present, estimate) in enumerate(estimates):
         assert estimate.time == detection.times[k]
         assert estimate.state is STATES[detection.hand[k]]
         for finger in present:
@@ -49,17 +47,7 @@ def assert_same(detection, told):
             assert fields(estimate.fingers[finger]) == fields(one)
             rows[finger] += 1
     assert rows == {finger: len(trace) for finger, trace in detection.fingers.items()}
-    assert len(detection.times) == len(told)
-
-
-def broken(module):
-    """The same module with a hole, a break and a frozen stretch."""
-    values = np.array(module.readings)
-    values[90, 0, 0] = np.nan
-    values[120:180] = values[120]
-    kept = np.ones(len(values), dtype=bool)
-    kept[70:80] = False
-    return type(module)(module.sensor, module.times[kept], values[kept])
+    assert len(detection.times) == len(estimates)
 
 
 CLOCKS = {
@@ -79,39 +67,39 @@ CLOCKS = {
 @pytest.mark.parametrize("clock", CLOCKS)
 def test_detect_equals_update(clock, tare):
     made = recording(**CLOCKS[clock])
-    judge = model(features=RICH, tare=tare, threshold=20.0, debounce=Debounce(0.02, 0.05))
-    assert_same(detect(judge, made), list(feed(Detector(judge), made)))
+    hand_model = model(features=RICH, tare=tare, threshold=20.0, debounce=Debounce(0.02, 0.05))
+    assert_same(detect(hand_model, made), list(feed(Detector(hand_model), made)))
 
 
 def test_detect_equals_update_over_many_chunks():
     made = recording(thumb=tactile(5000, seed=1), index=tactile(4000, seed=2, rate=71.0))
-    judge = model()
-    assert_same(detect(judge, made), list(feed(Detector(judge), made)))
+    hand_model = model()
+    assert_same(detect(hand_model, made), list(feed(Detector(hand_model), made)))
 
 
 def test_detect_equals_update_without_a_rate():
     which = sensor()
-    judge = Model(fingers={ANY_FINGER: finger_model(RICH, contact_noise=3.0)}, tare="0.2")
+    hand_model = Model(fingers={ANY_FINGER: finger_model(RICH, contact_noise=3.0)}, tare="0.2")
     made = recording(finger1=tactile(seed=1, rate=80.0), finger2=tactile(seed=2, rate=80.0))
-    live = Detector(judge, {"finger1": which, "finger2": which}, rate=made.rate)
-    assert_same(detect(judge, made), list(feed(live, made)))
+    live = Detector(hand_model, {"finger1": which, "finger2": which}, rate=made.rate)
+    assert_same(detect(hand_model, made), list(feed(live, made)))
 
 
 @pytest.mark.parametrize("kind", [np.int16, np.uint16, np.float32, np.float64])
 def test_readings_of_any_type(kind):
     module = tactile(120, seed=3)
     made = recording(thumb=type(module)(module.sensor, module.times, module.readings.astype(kind)))
-    judge = model(("thumb",))
-    assert_same(detect(judge, made), list(feed(Detector(judge), made)))
+    hand_model = model(("thumb",))
+    assert_same(detect(hand_model, made), list(feed(Detector(hand_model), made)))
 
 
 @given(cuts=st.lists(st.integers(1, 260), max_size=5), clock=st.sampled_from(sorted(CLOCKS)))
 @settings(max_examples=40, deadline=None)
 def test_any_pieces_give_the_same(cuts, clock):
     made = recording(**CLOCKS[clock])
-    judge = model(features=RICH, threshold=20.0)
-    whole = detect(judge, made)
-    detector = Detector(judge)
+    hand_model = model(features=RICH, threshold=20.0)
+    whole = detect(hand_model, made)
+    detector = Detector(hand_model)
     bounds = [
         -np.inf,
         *sorted({float(whole.times[c]) for c in cuts if c < len(whole.times)}),
@@ -122,7 +110,7 @@ def test_any_pieces_give_the_same(cuts, clock):
         part = {
             n: m.slice(*np.searchsorted(m.times, (start, stop))) for n, m in made.modules.items()
         }
-        if any(m.n_samples for n, m in part.items() if n in judge.fingers):
+        if any(m.n_samples for n, m in part.items() if n in hand_model.fingers):
             pieces.append(detector.run(Recording("piece", part)))
     assert np.array_equal(np.concatenate([p.hand for p in pieces]), whole.hand)
     for finger, trace in whole.fingers.items():
@@ -135,11 +123,11 @@ def test_any_pieces_give_the_same(cuts, clock):
 @settings(max_examples=25, deadline=None)
 def test_run_and_update_take_turns(cuts):
     made = recording(**CLOCKS["broken"])
-    judge = model(threshold=20.0)
-    whole = Detector(judge)
-    told = [(e.time, e.state) for _, e in feed(whole, made)]
-    mixed = Detector(judge)
-    bounds = [-np.inf, *(told[c][0] for c in sorted(cuts)), np.inf]
+    hand_model = model(threshold=20.0)
+    whole = Detector(hand_model)
+    estimates = [(e.time, e.state) for _, e in feed(whole, made)]
+    mixed = Detector(hand_model)
+    bounds = [-np.inf, *(estimates[c][0] for c in sorted(cuts)), np.inf]
     for i, (start, stop) in enumerate(pairwise(bounds)):
         part = {
             n: m.slice(*np.searchsorted(m.times, (start, stop))) for n, m in made.modules.items()
@@ -153,9 +141,9 @@ def test_run_and_update_take_turns(cuts):
 
 def test_a_recording_at_another_rate_is_resampled():
     made = recording(thumb=tactile(400, seed=1, rate=250.0), index=tactile(400, seed=2, rate=250.0))
-    judge = model()
-    found = detect(judge, made)
-    assert_same(found, list(feed(Detector(judge), resample(made, RATE))))
+    hand_model = model()
+    found = detect(hand_model, made)
+    assert_same(found, list(feed(Detector(hand_model), resample(made, RATE))))
     assert len(found.times) == pytest.approx(160, abs=1)
 
 
@@ -172,8 +160,8 @@ def test_the_future_changes_nothing():
         values = np.array(module.readings)
         values[130:] = 990 - values[130:]
         modules[name] = type(module)(module.sensor, module.times, values)
-    judge = model(features=RICH, threshold=20.0)
-    one, two = detect(judge, made), detect(judge, recording(**modules))
+    hand_model = model(features=RICH, threshold=20.0)
+    one, two = detect(hand_model, made), detect(hand_model, recording(**modules))
     assert np.array_equal(one.hand[:260], two.hand[:260])
     for finger, trace in one.fingers.items():
         for found, other in zip(trace, two.fingers[finger], strict=True):
@@ -182,36 +170,11 @@ def test_the_future_changes_nothing():
 
 @pytest.mark.parametrize("start", [0.0, 0.3, 1e9, 1.7e9])
 def test_a_shift_of_time_changes_nothing(start):
-    judge = model(("thumb",), threshold=20.0)
-    plain = detect(judge, recording(thumb=tactile(seed=4))).fingers["thumb"]
-    moved = detect(judge, recording(thumb=tactile(seed=4, start=start))).fingers["thumb"]
+    hand_model = model(("thumb",), threshold=20.0)
+    plain = detect(hand_model, recording(thumb=tactile(seed=4))).fingers["thumb"]
+    moved = detect(hand_model, recording(thumb=tactile(seed=4, start=start))).fingers["thumb"]
     for found, expected in zip(moved[1:], plain[1:], strict=True):
         assert np.array_equal(found, expected, equal_nan=True)
-
-
-class TestExtract:
-    @pytest.mark.parametrize("tare", [0.2, "first", "none", (0.3, 0.6)])
-    @pytest.mark.parametrize("window", [2, 6, 14, 40])
-    def test_equals_the_batch_functions(self, tare, window):
-        which, module = sensor(5), tactile(300, which=sensor(5))
-        features = parse_features("F_a,F_x,F_y,F_z,m,sigma", window)
-        plan = StreamPlan({"thumb": which}, {"thumb": features}, window, Tare.parse(tare), RATE)
-        force = fingertip_force(module.readings, which, tare, module.times)
-        expected = haar_features(force, window)
-        found = extract(plan, recording(thumb=module))["thumb"]
-        assert np.array_equal(found.features, expected, equal_nan=True)
-        assert np.allclose(found.amplitude, np.linalg.norm(force, axis=1), equal_nan=True)
-
-    def test_stretches_begin_anew_after_gaps(self):
-        which, module = sensor(), broken(tactile())
-        features = parse_features("sigma", 6)
-        plan = StreamPlan({"thumb": which}, {"thumb": features}, 6, Tare.parse("first"), RATE)
-        found = extract(plan, recording(thumb=module))["thumb"].features
-        batch = haar_features(fingertip_force(module.readings, which, "first"), 6)[:, 5:]
-        both = np.isfinite(found)
-        assert np.array_equal(found[both], batch[both])
-        assert np.isnan(found[70:75]).all()
-        assert np.isfinite(found[75])
 
 
 class TestIntervalTare:

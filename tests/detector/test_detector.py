@@ -55,22 +55,24 @@ def pushes(detector, forces, finger="finger1", start=0.0):
 
 
 class TestReasons:
-    def test_tare_then_warm_up_then_an_answer(self):
-        told = feed(Detector(model(("thumb",))), lively(60))
-        assert runs(told, lambda e: e.reason)[:3] == [("tare", 20), ("warm_up", 5), ("", 35)]
-        assert all(np.isnan(e.force).all() for e in told[:N_TARE])
-        assert np.isfinite([e.force for e in told[N_TARE:]]).all()
-        assert np.isfinite([e.instability for e in told]).tolist() == [False] * 25 + [True] * 35
-        assert np.isfinite([e.stable_probability for e in told]).tolist() == (
+    def test_tare_then_warm_up_then_a_state(self):
+        estimates = feed(Detector(model(("thumb",))), lively(60))
+        assert runs(estimates, lambda e: e.reason)[:3] == [("tare", 20), ("warm_up", 5), ("", 35)]
+        assert all(np.isnan(e.force).all() for e in estimates[:N_TARE])
+        assert np.isfinite([e.force for e in estimates[N_TARE:]]).all()
+        assert (
+            np.isfinite([e.instability for e in estimates]).tolist() == [False] * 25 + [True] * 35
+        )
+        assert np.isfinite([e.stable_probability for e in estimates]).tolist() == (
             [False] * 25 + [True] * 35
         )
 
     @pytest.mark.parametrize("tare", ["first", "none"])
     def test_no_time_for_a_tare(self, tare):
-        told = feed(Detector(model(("thumb",), tare=tare)), lively(30))
-        assert runs(told, lambda e: e.reason) == [("warm_up", 5), ("", 25)]
+        estimates = feed(Detector(model(("thumb",), tare=tare)), lively(30))
+        assert runs(estimates, lambda e: e.reason) == [("warm_up", 5), ("", 25)]
 
-    def test_the_state_is_unknown_just_where_there_is_a_reason(self):
+    def test_the_state_is_unknown_exactly_where_there_is_a_reason(self):
         values = lively()
         values[[40, 90], 0, 0] = np.nan
         for estimate in feed(Detector(model(("thumb",))), values):
@@ -81,11 +83,11 @@ class TestReasons:
     def test_a_sample_that_is_not_finite(self, bad):
         values = lively(60)
         values[40, 1, 2] = bad
-        told = feed(Detector(model(("thumb",))), values)
+        estimates = feed(Detector(model(("thumb",))), values)
         expected = [("tare", 20), ("warm_up", 5), ("", 15), ("fault", 1), ("warm_up", 5), ("", 14)]
-        assert runs(told, lambda e: e.reason) == expected
-        assert told[40].faults == (Fault.NOT_FINITE,)
-        assert told[41].faults == ()
+        assert runs(estimates, lambda e: e.reason) == expected
+        assert estimates[40].faults == (Fault.NOT_FINITE,)
+        assert estimates[41].faults == ()
 
     @pytest.mark.parametrize("start", [0.0, 1.7e9])
     @pytest.mark.parametrize(("periods", "gap"), [(2.5, False), (3.0, False), (3.1, True)])
@@ -93,33 +95,33 @@ class TestReasons:
         detector = Detector(model(("thumb",)))
         feed(detector, lively(60), start=start)
         again = start + (59 + periods) / RATE
-        told = feed(detector, lively(20), start=again)
+        estimates = feed(detector, lively(20), start=again)
         expected = [("gap", 5), ("", 15)] if gap else [("", 20)]
-        assert runs(told, lambda e: e.reason) == expected
+        assert runs(estimates, lambda e: e.reason) == expected
 
     def test_jitter_is_no_gap(self):
         rng = np.random.default_rng(0)
         times = np.arange(200) / RATE + rng.uniform(-0.9, 0.9, size=200) / RATE
         detector = Detector(model(("thumb",)))
-        told = [
+        estimates = [
             detector.update({"thumb": sample}, time).fingers["thumb"]
             for sample, time in zip(lively(), np.sort(times), strict=True)
         ]
-        assert Reason.GAP not in {e.reason for e in told}
+        assert Reason.GAP not in {e.reason for e in estimates}
 
     def test_a_missing_finger_keeps_its_estimate_for_three_periods(self):
         detector = Detector(model())
         values = lively()
         for k in range(50):
             last = detector.update({"thumb": values[k], "index": values[k]}, k / RATE)
-        told = [detector.update({"thumb": values[k]}, k / RATE) for k in range(50, 60)]
-        assert [e.fingers["index"] for e in told[:3]] == [last.fingers["index"]] * 3
-        assert {e.fingers["index"].reason for e in told[3:]} == {Reason.GAP}
-        assert {e.fingers["index"].time for e in told} == {49 / RATE}
-        assert {e.fingers["thumb"].reason for e in told} == {Reason.NONE}
-        assert np.isnan(told[-1].fingers["index"].force).all()
+        estimates = [detector.update({"thumb": values[k]}, k / RATE) for k in range(50, 60)]
+        assert [e.fingers["index"] for e in estimates[:3]] == [last.fingers["index"]] * 3
+        assert {e.fingers["index"].reason for e in estimates[3:]} == {Reason.GAP}
+        assert {e.fingers["index"].time for e in estimates} == {49 / RATE}
+        assert {e.fingers["thumb"].reason for e in estimates} == {Reason.NONE}
+        assert np.isnan(estimates[-1].fingers["index"].force).all()
 
-    def test_a_finger_that_never_came(self):
+    def test_a_finger_without_any_sample(self):
         detector = Detector(model())
         estimate = detector.update({"thumb": lively(1)[0]}, 0.0).fingers["index"]
         assert (estimate.state, estimate.reason) == (UNKNOWN, Reason.TARE)
@@ -127,8 +129,8 @@ class TestReasons:
 
     def test_repeated_samples_count(self):
         values = np.repeat(lively(30), 2, axis=0)
-        told = feed(Detector(model(("thumb",))), values)
-        assert runs(told, lambda e: e.reason) == [("tare", 20), ("warm_up", 5), ("", 35)]
+        estimates = feed(Detector(model(("thumb",))), values)
+        assert runs(estimates, lambda e: e.reason) == [("tare", 20), ("warm_up", 5), ("", 35)]
 
     def test_the_tare_stays_over_a_gap(self):
         detector = Detector(model(("thumb",)))
@@ -140,29 +142,31 @@ class TestReasons:
 
 class TestContactThreshold:
     def test_absolute(self):
-        judge = by_force()
+        hand_model = by_force()
         forces = [200, 200, 4.9, 5.0, 5.1, 101, 99]
-        found = pushes(Detector(judge, {"finger1": FLAT}), forces)
+        found = pushes(Detector(hand_model, {"finger1": FLAT}), forces)
         expected = [STABLE, STABLE, NO_CONTACT, UNSTABLE, UNSTABLE, STABLE, UNSTABLE]
         assert found[1:] == expected[1:]
 
     def test_the_probability_without_contact_is_zero(self):
-        told = feed(Detector(by_force(), {"f": FLAT}), [[[1.0, 0, 0]]] * 3, "f")
-        assert (told[-1].state, told[-1].stable_probability) == (NO_CONTACT, 0.0)
+        estimates = feed(Detector(by_force(), {"f": FLAT}), [[[1.0, 0, 0]]] * 3, "f")
+        assert (estimates[-1].state, estimates[-1].stable_probability) == (NO_CONTACT, 0.0)
 
     def test_none(self):
         values = np.full((60, 2, 3), 500.0)
-        told = feed(Detector(model(("thumb",))), values)
-        assert {e.state for e in told[26:]} <= {STABLE, UNSTABLE}
+        estimates = feed(Detector(model(("thumb",))), values)
+        assert {e.state for e in estimates[26:]} <= {STABLE, UNSTABLE}
 
     def test_by_noise(self):
         rng = np.random.default_rng(0)
         values = rng.normal(scale=3.0, size=(600, 1, 3))
         values[300:, 0, 0] += 40.0
-        judge = Model(fingers={ANY_FINGER: finger_model(contact_noise=5.0)}, window=6, rate=RATE)
-        told = feed(Detector(judge, {"f": FLAT}), values, "f")
-        assert {e.state for e in told[60:300]} == {NO_CONTACT}
-        assert NO_CONTACT not in {e.state for e in told[300:]}
+        hand_model = Model(
+            fingers={ANY_FINGER: finger_model(contact_noise=5.0)}, window=6, rate=RATE
+        )
+        estimates = feed(Detector(hand_model, {"f": FLAT}), values, "f")
+        assert {e.state for e in estimates[60:300]} == {NO_CONTACT}
+        assert NO_CONTACT not in {e.state for e in estimates[300:]}
 
 
 class TestDebounce:
@@ -171,40 +175,44 @@ class TestDebounce:
         found = pushes(Detector(by_force(), {"finger1": FLAT}), forces)
         assert found[2:] == [UNSTABLE, STABLE] * 20
 
-    def test_a_state_is_told_when_it_has_lasted(self):
-        judge = by_force(debounce=Debounce(min_duration=0.03))
+    def test_a_state_is_reported_when_it_has_lasted(self):
+        hand_model = by_force(debounce=Debounce(min_duration=0.03))
         forces = [150] * 5 + [50] * 2 + [150] * 5 + [50] * 6
-        found = pushes(Detector(judge, {"finger1": FLAT}), forces)
+        found = pushes(Detector(hand_model, {"finger1": FLAT}), forces)
         assert [s for s, _ in itertools.groupby(found[1:])] == [STABLE, UNSTABLE]
         assert found.index(UNSTABLE) == 12 + 3
 
-    def test_what_is_unknown_does_not_hold_back(self):
-        judge = by_force(debounce=Debounce(min_duration=1.0))
-        detector = Detector(judge, {"finger1": FLAT})
+    def test_the_first_state_after_unknown_is_reported_at_once(self):
+        hand_model = by_force(debounce=Debounce(min_duration=1.0))
+        detector = Detector(hand_model, {"finger1": FLAT})
         assert pushes(detector, [150, 150, 50, np.nan, 50, 50]) == [
             UNKNOWN, STABLE, STABLE, UNKNOWN, UNKNOWN, UNSTABLE,
         ]  # fmt: skip
 
     def test_instability_is_held(self):
-        judge = by_force(debounce=Debounce(hold=0.05))
-        told = pushes(Detector(judge, {"finger1": FLAT}, RATE), [110] * 5 + [90] + [110] * 8)
-        assert told[1:] == [STABLE] * 4 + [UNSTABLE] * 5 + [STABLE] * 4
+        hand_model = by_force(debounce=Debounce(hold=0.05))
+        estimates = pushes(
+            Detector(hand_model, {"finger1": FLAT}, RATE), [110] * 5 + [90] + [110] * 8
+        )
+        assert estimates[1:] == [STABLE] * 4 + [UNSTABLE] * 5 + [STABLE] * 4
 
-    def test_a_finger_that_lets_go_is_not_held(self):
-        judge = by_force(debounce=Debounce(hold=0.5))
-        told = pushes(Detector(judge, {"finger1": FLAT}, RATE), [110] * 5 + [90] + [0] * 2 + [110])
-        assert told[1:] == [STABLE] * 4 + [UNSTABLE] + [NO_CONTACT] * 2 + [UNSTABLE]
+    def test_no_contact_is_not_held(self):
+        hand_model = by_force(debounce=Debounce(hold=0.5))
+        estimates = pushes(
+            Detector(hand_model, {"finger1": FLAT}, RATE), [110] * 5 + [90] + [0] * 2 + [110]
+        )
+        assert estimates[1:] == [STABLE] * 4 + [UNSTABLE] + [NO_CONTACT] * 2 + [UNSTABLE]
 
     def test_hysteresis_moves_the_threshold_away(self):
-        judge = by_force(debounce=Debounce(hysteresis=0.2))  # 0.3 and 0.7 are 91.5 and 108.5
+        hand_model = by_force(debounce=Debounce(hysteresis=0.2))  # 0.3 and 0.7 are 91.5 and 108.5
         forces = [50, 50, 101, 108, 109, 101, 92, 91, 108]
-        found = pushes(Detector(judge, {"finger1": FLAT}), forces)
+        found = pushes(Detector(hand_model, {"finger1": FLAT}), forces)
         expected = [UNSTABLE] * 3 + [STABLE] * 3 + [UNSTABLE] * 2
         assert found[1:] == expected
 
     def test_a_gap_forgets_the_candidate(self):
-        judge = by_force(debounce=Debounce(min_duration=0.05))
-        detector = Detector(judge, {"finger1": FLAT})
+        hand_model = by_force(debounce=Debounce(min_duration=0.05))
+        detector = Detector(hand_model, {"finger1": FLAT})
         pushes(detector, [150] * 5 + [50] * 2)
         assert pushes(detector, [150] * 4, start=9.0)[1:] == [STABLE] * 3
 
@@ -226,8 +234,8 @@ def test_states_of_the_hand(fingers, expected):
         for name, kind in zip(names, fingers, strict=True)
         if kind != "?"
     }
-    told = [detector.update(samples, k / RATE) for k in range(3)][-1]
-    assert told.state is expected
+    estimate = [detector.update(samples, k / RATE) for k in range(3)][-1]
+    assert estimate.state is expected
 
 
 class TestEvents:
@@ -317,8 +325,8 @@ def test_refuses_a_first_time_that_is_not_finite(time):
 
 @pytest.mark.parametrize("time", [1, np.float32(1), np.int64(1)])
 def test_times_of_any_type(time):
-    told = Detector(model()).update({"thumb": lively(1)[0]}, time)
-    assert (told.time, type(told.time)) == (1.0, float)
+    estimate = Detector(model()).update({"thumb": lively(1)[0]}, time)
+    assert (estimate.time, type(estimate.time)) == (1.0, float)
 
 
 def test_a_sample_is_not_aliased():
@@ -327,9 +335,9 @@ def test_a_sample_is_not_aliased():
     buffer = np.empty((2, 3))
     for k in range(100):
         buffer[:] = values[k]
-        told = two.update({"thumb": buffer}, k / RATE)
+        estimate = two.update({"thumb": buffer}, k / RATE)
         buffer[:] = np.nan
-        assert repr(told) == repr(one.update({"thumb": values[k]}, k / RATE))
+        assert repr(estimate) == repr(one.update({"thumb": values[k]}, k / RATE))
     assert (values == lively()).all()
 
 
@@ -343,9 +351,9 @@ def test_an_estimate_stays_as_it_was():
 
 
 def test_two_detectors_share_nothing():
-    judge, values = model(("thumb",)), lively()
-    alone = list(map(repr, feed(Detector(judge), values)))
-    one, two = Detector(judge), Detector(judge)
+    hand_model, values = model(("thumb",)), lively()
+    alone = list(map(repr, feed(Detector(hand_model), values)))
+    one, two = Detector(hand_model), Detector(hand_model)
     for k, sample in enumerate(values):
         assert repr(one.update({"thumb": sample}, k / RATE).fingers["thumb"]) == alone[k]
         two.update({"thumb": sample[::-1] + k}, k / RATE)
@@ -381,7 +389,7 @@ def test_memory_does_not_grow():
 
 
 class TestConstruction:
-    def test_a_model_for_any_finger_asks_which(self):
+    def test_a_model_for_any_finger_needs_the_fingers(self):
         with pytest.raises(ModelError) as raised:
             Detector(Model.load("builtin:noise-floor"))
         assert str(raised.value) == (
@@ -424,7 +432,7 @@ class TestNoiseFloor:
         # half a second holds 50 samples only: 10 % is one and a half standard errors
         assert found == pytest.approx(level, rel=0.1 if tare == "2" else 0.2)
 
-    def test_no_sensor_in_counts_is_more_quiet_than_its_step(self):
+    def test_the_noise_in_counts_is_at_least_that_of_the_step(self):
         detector = Detector(model(("thumb",)))
         feed(detector, np.full((40, 2, 3), 500.0))
         assert detector._stream.memory.levels[0, NOISE] == pytest.approx(np.sqrt(2 / 12))

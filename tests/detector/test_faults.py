@@ -1,4 +1,4 @@
-"""Faults that show in the readings: what is told, when it begins and when it ends."""
+"""Faults that show in the readings: their estimates, their begin and their end."""
 
 from itertools import pairwise
 
@@ -15,7 +15,7 @@ from holdfast.recordings import Tactile
 
 from . import naive
 from .build import RATE, feed, finger_model, lively, model, recording, runs, sensor, tactile
-from .test_against_twin import same
+from .test_against_naive import same
 
 UNKNOWN = ContactState.UNKNOWN
 TIP = sensor(6, "tip", limits=(0.0, 65_535.0))
@@ -35,9 +35,9 @@ class TestFaults:
     def test_the_state_is_unknown_while_stuck(self):
         values = lively(300)
         values[150:] = values[150]
-        told = feed(Detector(model(("thumb",))), values)[-1]
-        assert (told.state, told.reason) == (UNKNOWN, Reason.FAULT)
-        assert np.isfinite(told.force).all()
+        estimate = feed(Detector(model(("thumb",))), values)[-1]
+        assert (estimate.state, estimate.reason) == (UNKNOWN, Reason.FAULT)
+        assert np.isfinite(estimate.force).all()
 
     def test_a_quiet_sensor_is_not_stuck(self):
         values = np.full((900, 2, 3), 500.0)
@@ -60,13 +60,13 @@ class TestFaults:
     def test_out_of_range_is_no_reading(self, value):
         values = lively(100)
         values[50:53, 1, 1] = value
-        told = feed(Detector(model(("thumb",))), values)
-        assert runs(told, lambda e: (e.reason, e.faults))[2:] == [
+        estimates = feed(Detector(model(("thumb",))), values)
+        assert runs(estimates, lambda e: (e.reason, e.faults))[2:] == [
             (("", ()), 25), (("fault", (Fault.OUT_OF_RANGE,)), 3), (("warm_up", ()), 5),
             (("", ()), 42),
         ]  # fmt: skip
-        assert {e.faulty_taxels for e in told[50:53]} == {(1,)}
-        assert np.isnan([e.force for e in told[50:53]]).all()
+        assert {e.faulty_taxels for e in estimates[50:53]} == {(1,)}
+        assert np.isnan([e.force for e in estimates[50:53]]).all()
 
     def test_out_of_range_does_not_spoil_the_tare(self):
         values = lively(100)
@@ -83,10 +83,12 @@ class TestFaults:
         assert set(self.faults(values)) == {()}
 
     def test_no_limits_no_saturation(self):
-        judge = model(("thumb",), which=sensor(limits=None))
+        hand_model = model(("thumb",), which=sensor(limits=None))
         values = lively(60)
         values[40:] = 1e9 * np.sign(values[40:] - 500)
-        assert Fault.SATURATED not in {f for e in feed(Detector(judge), values) for f in e.faults}
+        assert Fault.SATURATED not in {
+            f for e in feed(Detector(hand_model), values) for f in e.faults
+        }
 
     def loaded(self):
         rng = np.random.default_rng(3)
@@ -121,38 +123,38 @@ def white(n=900, which=TIP, seed=0, level=3.0, middle=30_000.0):
     return np.rint(middle + rng.normal(scale=level, size=(n, which.n_taxels, 3)))
 
 
-def told_of(values, which=TIP, **options):
+def estimates_of(values, which=TIP, **options):
     return feed(Detector(model(("thumb",), which=which, **options)), values)
 
 
 def told_faults(values, which=TIP, **options):
-    return runs(told_of(values, which, **options), lambda e: (e.faults, e.faulty_taxels))
+    return runs(estimates_of(values, which, **options), lambda e: (e.faults, e.faulty_taxels))
 
 
 class TestDead:
-    def test_after_two_seconds_of_lively_company(self):
+    def test_after_two_seconds_while_others_move(self):
         values = white()
         values[:, 4] = 30_000.0
         assert told_faults(values) == [(((), ()), 200), (((Fault.DEAD,), (4,)), 700)]
 
-    def test_until_it_comes_alive(self):
+    def test_until_it_changes(self):
         values = white()
         values[:500, 4] = 30_000.0
         found = told_faults(values)
         assert found == [(((), ()), 200), (((Fault.DEAD,), (4,)), 300), (((), ()), 400)]
 
-    def test_sent_twice_is_no_sign_of_death(self):
+    def test_repeated_samples_do_not_count(self):
         values = np.repeat(white(450), 2, axis=0)
         assert told_faults(values) == [(((), ()), 900)]
         values[:, 4] = 30_000.0
         assert told_faults(values)[0] == (((), ()), 400)  # two hundred that differ
 
-    def test_a_dead_band_is_not_death(self):
+    def test_a_dead_band_is_no_fault(self):
         values = white()
         values[:, 2:] = 0.0  # two of six feel something
         assert told_faults(values, sensor(6, "tip", limits=None)) == [(((), ()), 900)]
 
-    def test_two_dead_among_six_are_not_told_from_a_dead_band(self):
+    def test_two_dead_among_six_look_like_a_dead_band(self):
         values = white()
         values[:, 4:] = 30_000.0
         assert told_faults(values) == [(((), ()), 900)]
@@ -173,25 +175,25 @@ class TestStuckTaxel:
         found = told_faults(values)
         assert found == [(((), ()), 350), (((Fault.STUCK,), (2,)), 150), (((), ()), 400)]
 
-    def test_windows_begin_anew_after_it(self):
+    def test_windows_start_again_after_it(self):
         values = white()
         values[300:500, 2] = values[300, 2] + 4000.0
-        told = told_of(values)
-        assert [(str(reason), n) for reason, n in runs(told, lambda e: e.reason)[-3:]] == [
+        estimates = estimates_of(values)
+        assert [(str(reason), n) for reason, n in runs(estimates, lambda e: e.reason)[-3:]] == [
             ("fault", 150),
             ("warm_up", 5),
             ("", 395),
         ]
-        assert np.isfinite([e.force for e in told[350:500]]).all()
-        assert np.isnan([e.instability for e in told[350:505]]).all()
-        assert max(e.instability for e in told[505:]) < 20.0
+        assert np.isfinite([e.force for e in estimates[350:500]]).all()
+        assert np.isnan([e.instability for e in estimates[350:505]]).all()
+        assert max(e.instability for e in estimates[505:]) < 20.0
 
-    def test_the_whole_finger_at_once_names_no_taxel(self):
+    def test_a_finger_that_is_stuck_as_a_whole_names_no_taxel(self):
         values = white()
         values[300:] = values[300]
         assert told_faults(values)[-1][0] == ((Fault.STUCK,), ())
 
-    def test_sent_again_and_again_for_a_while(self):
+    def test_samples_that_repeat_for_a_while(self):
         values = white()
         values[300:340] = values[300]
         assert told_faults(values) == [(((), ()), 900)]
@@ -218,7 +220,7 @@ class TestNoisy:
         return values
 
     def test_a_loose_wire(self):
-        found = told_of(self.noisy(2000.0))
+        found = estimates_of(self.noisy(2000.0))
         bad = np.array([e.faults == (Fault.NOISY,) for e in found])
         assert not bad[:301].any()
         assert bad[310:500].all()
@@ -226,7 +228,7 @@ class TestNoisy:
         assert {e.faulty_taxels for e in found} == {(), (3,)}
         assert max(e.instability for e in found[810:]) < 20.0
 
-    def test_that_was_loose_all_the_time(self):
+    def test_a_wire_that_was_always_loose(self):
         values = white()
         values[:, 3] += np.rint(np.random.default_rng(9).normal(scale=2000.0, size=(900, 3)))
         assert told_faults(values)[1:] == [(((Fault.NOISY,), (3,)), 880)]
@@ -261,19 +263,19 @@ class TestNoisy:
 
     def test_in_newtons_beside_what_was_measured(self):
         loud = self.noisy(2000.0, IN_NEWTONS) * 1e-3
-        assert (Fault.NOISY,) in {e.faults for e in told_of(loud, IN_NEWTONS)}
+        assert (Fault.NOISY,) in {e.faults for e in estimates_of(loud, IN_NEWTONS)}
         quiet = self.noisy(100.0, IN_NEWTONS) * 1e-3
-        assert {e.faults for e in told_of(quiet, IN_NEWTONS)} == {()}
+        assert {e.faults for e in estimates_of(quiet, IN_NEWTONS)} == {()}
 
 
 class TestTaxelsBeyondAMask:
-    def test_are_a_fault_all_the_same(self):
+    def test_faults_of_taxels_beyond_the_mask_are_reported(self):
         which = sensor(70, limits=(0.0, 65_535.0))
         values = white(400, which)
         values[:, [3, 66]] = 30_000.0
         assert told_faults(values, which)[-1] == (((Fault.DEAD,), (3,)), 200)
         values[300, 66, 0] = np.nan
-        assert told_of(values, which)[300].faulty_taxels == ()
+        assert estimates_of(values, which)[300].faulty_taxels == ()
 
 
 class TestTareDrift:
@@ -284,15 +286,15 @@ class TestTareDrift:
         values[:, 0] += np.rint(ramp)[:, None] * sensor(1).rotations[0].T[:, 0]
         return values
 
-    def told(self, values):
+    def feed(self, values):
         which = sensor(1, limits=None)
-        judge = model(("thumb",), which=which, threshold=100.0, window=14)
-        return feed(Detector(judge), values)
+        hand_model = model(("thumb",), which=which, threshold=100.0, window=14)
+        return feed(Detector(hand_model), values)
 
     @pytest.mark.parametrize("seconds", [10.0, 14.0])
-    def test_what_creeps_over_the_threshold_is_drift(self, seconds):
-        told = self.told(self.crept(seconds))
-        above = [e for e in told[30:] if np.hypot.reduce(e.force) >= 100.0]
+    def test_a_slow_rise_over_the_threshold_is_drift(self, seconds):
+        estimates = self.feed(self.crept(seconds))
+        above = [e for e in estimates[30:] if np.hypot.reduce(e.force) >= 100.0]
         drifted = [e for e in above if e.faults]
         assert len(drifted) > 0.98 * len(above) > 100  # but for noise, far under the threshold
         assert {(e.state, e.reason, e.faults, e.faulty_taxels) for e in drifted} == {
@@ -302,28 +304,28 @@ class TestTareDrift:
 
     @pytest.mark.parametrize("seconds", [0.01, 0.3, 2.0])
     def test_a_touch_is_no_drift(self, seconds):
-        told = self.told(self.crept(seconds))
-        assert {e.faults for e in told} == {()}
-        assert UNKNOWN not in {e.state for e in told[40:]}
+        estimates = self.feed(self.crept(seconds))
+        assert {e.faults for e in estimates} == {()}
+        assert UNKNOWN not in {e.state for e in estimates[40:]}
 
     def test_a_touch_ends_it(self):
         values = self.crept(10.0)
         values[1700:, 0, 2] += 900.0
-        told = self.told(values)
-        assert {e.faults for e in told[1600:1700]} == {(Fault.TARE_DRIFT,)}
-        assert {e.faults for e in told[1710:]} == {()}
-        assert UNKNOWN not in {e.state for e in told[1710:]}
+        estimates = self.feed(values)
+        assert {e.faults for e in estimates[1600:1700]} == {(Fault.TARE_DRIFT,)}
+        assert {e.faults for e in estimates[1710:]} == {()}
+        assert UNKNOWN not in {e.state for e in estimates[1710:]}
 
     def test_it_ends_under_the_threshold(self):
         values = self.crept(10.0)
         values = np.concatenate([values, values[::-1]])
-        told = self.told(values)
-        assert {e.faults for e in told[1600:2400]} == {(Fault.TARE_DRIFT,)}
-        assert {e.state for e in told[-400:]} == {ContactState.NO_CONTACT}
+        estimates = self.feed(values)
+        assert {e.faults for e in estimates[1600:2400]} == {(Fault.TARE_DRIFT,)}
+        assert {e.state for e in estimates[-400:]} == {ContactState.NO_CONTACT}
 
     def test_a_model_without_a_threshold_has_none(self):
-        judge = model(("thumb",), which=sensor(1, limits=None))
-        assert {e.faults for e in feed(Detector(judge), self.crept(10.0))} == {()}
+        hand_model = model(("thumb",), which=sensor(1, limits=None))
+        assert {e.faults for e in feed(Detector(hand_model), self.crept(10.0))} == {()}
 
 
 class TestIgnore:
@@ -355,12 +357,12 @@ class TestIgnore:
         values = white(300).astype(float)
         values[:, 5] = np.nan
         made = recording(thumb=Tactile(TIP, np.arange(300) / RATE, values))
-        judge = model(("thumb",), which=TIP, tare=tare)
-        detector = Detector.for_recording(judge, made, ignore={"thumb": (5,)})
+        hand_model = model(("thumb",), which=TIP, tare=tare)
+        detector = Detector.for_recording(hand_model, made, ignore={"thumb": (5,)})
         found = detector.run(made).fingers["thumb"]
         assert set(found.faults.tolist()) == {0}
         if ":" not in tare:
-            live = feed(Detector(judge, ignore={"thumb": (5,)}), values)
+            live = feed(Detector(hand_model, ignore={"thumb": (5,)}), values)
             assert list(map(repr, live)) == [repr(found.estimate(k)) for k in range(300)]
 
     @pytest.mark.parametrize(
@@ -371,12 +373,12 @@ class TestIgnore:
             ({"thumb": [-1]}, "thumb: taxel -1 to be ignored; it has the taxels 0 to 5"),
         ],
     )
-    def test_refuses_what_is_not_there(self, ignore, message):
-        judge = model(("thumb",), which=TIP)
+    def test_refuses_unknown_fingers_and_taxels(self, ignore, message):
+        hand_model = model(("thumb",), which=TIP)
         made = recording(thumb=tactile(which=TIP))
         for make in (
-            lambda: Detector(judge, ignore=ignore),
-            lambda: Detector.for_recording(judge, made, ignore=ignore),
+            lambda: Detector(hand_model, ignore=ignore),
+            lambda: Detector.for_recording(hand_model, made, ignore=ignore),
         ):
             with pytest.raises(ValueError) as raised:
                 make()
@@ -426,13 +428,13 @@ def ailing(draw, n=700):
     cuts=st.lists(st.integers(1, 699), max_size=3),
 )
 @settings(max_examples=25, deadline=None)
-def test_equals_the_twin_live_and_in_any_chunks(sick, tare, noise, cuts):
+def test_equals_the_naive_detector_live_and_in_any_chunks(sick, tare, noise, cuts):
     which, values, times, ignore = sick
-    judge = Model(fingers={ANY_FINGER: finger_model(contact_noise=noise)}, window=6, tare=tare)
+    hand_model = Model(fingers={ANY_FINGER: finger_model(contact_noise=noise)}, window=6, tare=tare)
     sensors = {"finger1": which}
-    live = Detector(judge, sensors, RATE, ignore=ignore)
-    twin = naive.Hand(judge, sensors, Tare.parse(tare), RATE, ignore)
-    offline = Detector(judge, sensors, RATE, ignore=ignore)
+    live = Detector(hand_model, sensors, RATE, ignore=ignore)
+    slow = naive.Hand(hand_model, sensors, Tare.parse(tare), RATE, ignore)
+    offline = Detector(hand_model, sensors, RATE, ignore=ignore)
     bounds = sorted({0, len(values), *(cut for cut in cuts if cut < len(values))})
     pieces = [
         offline.run(recording(finger1=Tactile(which, times[a:b], values[a:b])))
@@ -441,7 +443,7 @@ def test_equals_the_twin_live_and_in_any_chunks(sick, tare, noise, cuts):
     rows = [p.fingers["finger1"].estimate(k) for p in pieces for k in range(len(p.times))]
     for value, time, row in zip(values, times, rows, strict=True):
         estimate = live.update({"finger1": value}, time)
-        same(estimate, twin.update({"finger1": value}, time))
+        same(estimate, slow.update({"finger1": value}, time))
         assert repr(estimate.fingers["finger1"]) == repr(row)
 
 

@@ -1,4 +1,4 @@
-"""Slow obvious twins of tare, fingertip force and Haar window: plain Python, one loop each."""
+"""Slow and simple tare, fingertip force and Haar window: plain Python, one loop each."""
 
 import math
 

@@ -36,15 +36,15 @@ def stream(seed, fingers, which):
         yield {name: values[k] for name, (values, kept) in found.items() if kept[k]}, float(time)
 
 
-def same(estimate, twin):
-    time, hand, rows = twin
+def same(estimate, slow):
+    time, hand, rows = slow
     assert estimate.time == time
     assert str(estimate.state) == hand
     assert list(estimate.fingers) == list(rows)
-    for name, (told, numbers) in rows.items():
+    for name, (names, numbers) in rows.items():
         one = estimate.fingers[name]
         faults = tuple(map(str, one.faults))
-        assert (str(one.state), str(one.reason), faults, one.faulty_taxels) == told
+        assert (str(one.state), str(one.reason), faults, one.faulty_taxels) == names
         found = (one.time, one.stable_probability, one.instability, *one.force)
         assert found == pytest.approx(numbers, rel=1e-9, abs=1e-9, nan_ok=True)
 
@@ -61,27 +61,30 @@ MODELS = {
 
 @pytest.mark.parametrize("seed", range(3))
 @pytest.mark.parametrize("options", MODELS.values(), ids=MODELS)
-def test_equals_the_twin(options, seed):
-    judge = model(("thumb", "index", "ring"), **options)
+def test_equals_the_naive_detector(options, seed):
+    hand_model = model(("thumb", "index", "ring"), **options)
     which = sensor()
-    sensors = dict.fromkeys(judge.fingers, which)
-    detector, twin = Detector(judge), naive.Hand(judge, sensors, Tare.parse(judge.tare), RATE)
+    sensors = dict.fromkeys(hand_model.fingers, which)
+    detector, slow = (
+        Detector(hand_model),
+        naive.Hand(hand_model, sensors, Tare.parse(hand_model.tare), RATE),
+    )
     seen = set()
-    for samples, time in stream(seed, judge.fingers, which):
+    for samples, time in stream(seed, hand_model.fingers, which):
         estimate = detector.update(samples, time)
-        same(estimate, twin.update(samples, time))
+        same(estimate, slow.update(samples, time))
         seen |= {(x.state, x.reason, *x.faults) for x in estimate.fingers.values()}
     assert len(seen) >= 5  # of states, reasons and faults together
 
 
-def test_equals_the_twin_with_contact_by_noise():
-    judge = Model(fingers={ANY_FINGER: finger_model(contact_noise=5.0)}, window=6, tare="0.2")
+def test_equals_the_naive_detector_with_contact_by_noise():
+    hand_model = Model(fingers={ANY_FINGER: finger_model(contact_noise=5.0)}, window=6, tare="0.2")
     sensors = {"finger1": sensor(), "finger2": sensor(3, "other")}
-    detector = Detector(judge, sensors, RATE)
-    twin = naive.Hand(judge, sensors, Tare.parse("0.2"), RATE)
+    detector = Detector(hand_model, sensors, RATE)
+    slow = naive.Hand(hand_model, sensors, Tare.parse("0.2"), RATE)
     for k in range(300):
         samples = {
             name: tactile(300, 7 + i, which).readings[k] / (1 if k > 100 else 5)
             for i, (name, which) in enumerate(sensors.items())
         }
-        same(detector.update(samples, k / RATE), twin.update(samples, k / RATE))
+        same(detector.update(samples, k / RATE), slow.update(samples, k / RATE))
