@@ -188,8 +188,7 @@ def test_refusals(capsys, table, tmp_path):
     )
     for path in (empty, text):
         assert refusal(capsys, path, out) == (
-            f"{path} is of no format that holdfast knows; there are {formats} "
-            "(choose one with --format)"
+            f"{path} is of no supported format; supported are {formats} (choose one with --format)"
         )
     assert refusal(capsys, text, out, "--format", "bag") == (
         f"unknown format 'bag'; there are {formats}"

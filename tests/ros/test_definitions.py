@@ -18,7 +18,7 @@ def test_definitions():
 
 
 @pytest.mark.parametrize(
-    ("text", "told"),
+    ("text", "expected"),
     [
         ("uint8", "p/A: 'uint8' is no field of a message"),
         ("wstring x", "p/A: a field is of wstring, which is not defined"),
@@ -26,6 +26,6 @@ def test_definitions():
         ("B[] x\n===\nMSG: p/B\nA[] y", "p/A holds itself, or is nested too deep"),
     ],
 )
-def test_bad_definitions(text, told):
-    with pytest.raises(ValueError, match=re.escape(told)):
+def test_bad_definitions(text, expected):
+    with pytest.raises(ValueError, match=re.escape(expected)):
         parse_definition("p/A", text)

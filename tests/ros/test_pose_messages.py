@@ -59,6 +59,8 @@ def test_other_messages():
     assert known_pose_definition("std_msgs/String", ros2=True) is None
     text = parse_definition("pkg/Text", "string text")
     assert not has_poses(text)
-    told = "pkg/Text has no poses; messages like geometry_msgs/PoseStamped and tf2_msgs/TFMessage"
-    with pytest.raises(ValueError, match=re.escape(told)):
+    expected = (
+        "pkg/Text has no poses; messages like geometry_msgs/PoseStamped and tf2_msgs/TFMessage"
+    )
+    with pytest.raises(ValueError, match=re.escape(expected)):
         PoseDecoder(text, ros2=True)

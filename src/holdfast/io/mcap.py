@@ -19,16 +19,6 @@ from zstandard import ZstdError
 
 from holdfast.errors import RecordingError
 from holdfast.files import whole_file
-from holdfast.io.arrays import (
-    TRUTH,
-    ArraySpec,
-    TimedArray,
-    TimedArrays,
-    array_specs,
-    arrays_of,
-    recording_from,
-    time_spans,
-)
 from holdfast.io.header import Header, decode_header, header_of
 from holdfast.io.mcap_messages import decode_samples, decode_text, number_of_type
 from holdfast.io.mcap_writer import (
@@ -37,6 +27,16 @@ from holdfast.io.mcap_writer import (
     MARKERS_TOPIC,
     MESSAGE_SECONDS,
     MessageLog,
+)
+from holdfast.io.timed_arrays import (
+    TRUTH,
+    ArraySpec,
+    TimedArray,
+    TimedArrays,
+    array_specs,
+    arrays_of,
+    recording_from,
+    time_spans,
 )
 from holdfast.recordings import Recording
 

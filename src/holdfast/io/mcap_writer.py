@@ -13,7 +13,6 @@ from mcap.writer import CompressionType, Writer
 
 from holdfast.errors import OutputError, RecordingError
 from holdfast.files import refuse_overwrite
-from holdfast.io.arrays import TACTILE, time_spans
 from holdfast.io.header import Header, ModuleData, encode_header, number_type
 from holdfast.io.mcap_messages import (
     TEXT_SCHEMA,
@@ -23,6 +22,7 @@ from holdfast.io.mcap_messages import (
     samples_schema,
     samples_type,
 )
+from holdfast.io.timed_arrays import TACTILE, time_spans
 from holdfast.sensors import Sensor
 from holdfast.sensors.types import Array, Unit
 

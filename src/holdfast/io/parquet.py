@@ -21,7 +21,8 @@ import pyarrow.parquet as pq
 
 from holdfast.errors import RecordingError
 from holdfast.files import whole_file
-from holdfast.io.arrays import (
+from holdfast.io.header import Header, decode_header, encode_header, header_of
+from holdfast.io.timed_arrays import (
     TRUTH_TIME,
     ArraySpec,
     TimedArray,
@@ -31,7 +32,6 @@ from holdfast.io.arrays import (
     recording_from,
     time_spans,
 )
-from holdfast.io.header import Header, decode_header, encode_header, header_of
 from holdfast.recordings import Recording
 from holdfast.sensors.types import Array
 

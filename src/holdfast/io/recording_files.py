@@ -9,7 +9,9 @@ import msgspec
 import numpy as np
 
 from holdfast.errors import OutputError, RecordingError
-from holdfast.io.arrays import (
+from holdfast.io.header import Header
+from holdfast.io.label_files import labels_for, labels_path
+from holdfast.io.timed_arrays import (
     TACTILE,
     TimedArray,
     TimedArrays,
@@ -17,8 +19,6 @@ from holdfast.io.arrays import (
     recording_from,
     time_spans,
 )
-from holdfast.io.header import Header
-from holdfast.io.label_files import labels_for, labels_path
 from holdfast.recordings import Label, Recording
 
 SUFFIXES = (".parquet", ".mcap")

@@ -15,7 +15,7 @@ def test_a_file_of_no_known_format(tmp_path):
         with pytest.raises(RecordingError) as caught:
             import_recordings(path)
         assert str(caught.value) == (
-            f"{path} is of no format that holdfast knows; there are {', '.join(FORMATS)} "
+            f"{path} is of no supported format; supported are {', '.join(FORMATS)} "
             "(choose one with --format)"
         )
 

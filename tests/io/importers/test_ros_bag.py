@@ -296,7 +296,7 @@ def test_mcap_of_others_is_no_bag(tmp_path):
 
 def test_recordings_of_our_own_are_no_bags(tmp_path):
     save_recording(synthetic_recording("own", 0, ["thumb"]), tmp_path / "own.mcap")
-    with pytest.raises(RecordingError, match="is of no format that holdfast knows"):
+    with pytest.raises(RecordingError, match="is of no supported format"):
         import_recordings(tmp_path / "own.mcap")
     with pytest.raises(RecordingError) as caught:
         import_recordings(tmp_path / "own.mcap", "rosbag")
@@ -321,7 +321,7 @@ class TestRefusals:
         with pytest.raises(RecordingError) as caught:
             read(given.path)
         assert str(caught.value) == (
-            f"{given.path} has no topic of a tactile sensor that holdfast knows; it has "
+            f"{given.path} has no topic of a supported tactile sensor; it has "
             "/chatter (std_msgs/String)"
         )
 

@@ -68,7 +68,7 @@ def _detected_format(path: Path) -> str:
         if _importer(name).sniff(path):
             return name
     raise RecordingError(
-        f"{path} is of no format that holdfast knows; there are {', '.join(FORMATS)} "
+        f"{path} is of no supported format; supported are {', '.join(FORMATS)} "
         "(choose one with --format)"
     )
 

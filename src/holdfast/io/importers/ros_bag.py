@@ -153,7 +153,7 @@ class _BagImport:
                 topics.setdefault(part.name, topic).parts.append(part)
         if not topics:
             raise RecordingError(
-                f"{self._path} has no topic of a tactile sensor that holdfast knows; it has "
+                f"{self._path} has no topic of a supported tactile sensor; it has "
                 f"{', '.join(others) or 'none'}"
             )
         return list(topics.values())

@@ -2,7 +2,7 @@ import numpy as np
 from hypothesis import given
 from hypothesis import strategies as st
 
-from holdfast.io.arrays import time_spans
+from holdfast.io.timed_arrays import time_spans
 
 TIMES = st.lists(st.floats(-1e6, 1e17), unique=True, max_size=30).map(sorted).map(np.array)
 
