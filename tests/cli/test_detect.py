@@ -2,7 +2,6 @@ import json
 import os
 import re
 import signal
-import tracemalloc
 from dataclasses import replace
 
 import msgspec
@@ -12,7 +11,6 @@ import pytest
 from holdfast.classifiers import LinearClassifier
 from holdfast.cli import main
 from holdfast.cli.detect import CHUNK_SIZE
-from holdfast.cli.detect_output import chunk_from_detection, json_lines
 from holdfast.contact import UNSTABLE, Fault
 from holdfast.detector import detect
 from holdfast.features import FeatureSpec
@@ -155,17 +153,6 @@ def test_a_cut_file_is_judged(capsys, save):
     got, err = lines(capsys, NOISE_FLOOR, path)
     assert got
     assert err == f"{path} is cut off: only its readable part is used\n"
-
-
-def test_lines_keep_no_memory(grasp):
-    chunk = chunk_from_detection(detect(Model.load(NOISE_FLOOR), load_recording(grasp)))
-    sum(len(block) for block in json_lines(chunk))
-    tracemalloc.start()
-    for _ in range(3):
-        sum(len(block) for block in json_lines(chunk))
-    left, _ = tracemalloc.get_traced_memory()
-    tracemalloc.stop()
-    assert left < 100_000
 
 
 class TestSummary:

@@ -107,7 +107,10 @@ def test_a_table_for_people(capsys, data, model):
     assert code == 0
     assert "accuracy %" in out
     assert "false alarms/min" in out
-    assert f"{model}: trained on 3 recordings, judged by leaving out one recording at a time" in out
+    assert (
+        f"{model}: trained on 3 recordings; cross-validation leaves out one recording at a time"
+        in out
+    )
 
 
 def test_a_model_is_not_overwritten(capsys, data, model):
@@ -145,11 +148,11 @@ def test_a_model_is_not_overwritten(capsys, data, model):
         (["--init", "builtin:twin", "--hold", "nan"], "a hold of at least 0 s expected, nan given"),
         (
             ["--init", "builtin:twin", "--features", "F_a"],
-            "--init brings the classifier, window and features of its model; leave out --features",
+            "--init uses the classifier, window and features of its model; leave out --features",
         ),
         (
             ["--init", "builtin:twin", "--window", "14", "--classifier", "logreg"],
-            "--init brings the classifier, window and features of its model; leave out "
+            "--init uses the classifier, window and features of its model; leave out "
             "--classifier and --window",
         ),
         (
@@ -219,8 +222,8 @@ def test_a_search_left_over_is_refused_without_resume(capsys, data, model):
     journal = model.with_name("model.json.search")
     journal.write_text("")
     assert refusal(capsys, data, "-o", model) == (
-        f"{journal} holds a search that was stopped: go on with --resume, or start anew with "
-        "--force"
+        f"{journal} holds a search that was stopped: continue it with --resume, "
+        "or start again with --force"
     )
     assert run(capsys, data, "-o", model, "--trials", 0, "--force")[0] == 0
     assert not journal.exists()
@@ -228,7 +231,7 @@ def test_a_search_left_over_is_refused_without_resume(capsys, data, model):
 
 def test_nothing_to_resume(capsys, data, model):
     assert refusal(capsys, data, "-o", model, "--resume") == (
-        f"nothing to resume: there is no {model}.search"
+        f"nothing to resume: {model}.search does not exist"
     )
 
 
@@ -270,8 +273,7 @@ def test_an_interrupt_says_how_to_go_on(capsys, data, model, monkeypatch):
     code, out, err = run(capsys, data, "-o", model, "--trials", 4)
     assert (code, out) == (130, "")
     assert err == (
-        f"what the search found so far is in {model}.search: go on with --resume\n"
-        "holdfast: interrupted\n"
+        f"the trials so far are in {model}.search: continue with --resume\nholdfast: interrupted\n"
     )
 
 
