@@ -61,7 +61,7 @@ def test_no_split_by_object_without_two_known_objects(objects):
 
 @pytest.mark.parametrize("method", ["logreg", "jl_global_logreg"])
 def test_an_evaluated_recording_does_not_influence_its_scores(tmp_path, recordings, corpus, method):
-    """Inverting labels of the recordings of a fold changes no score of them, but of the others."""
+    """Inverting the labels of one fold changes the scores of all recordings but those of it."""
     held = next(held_out_folds([r.metadata["object"] for r in recordings], "recording", 3, 0))
     other = [inverted(r) if k in held else r for k, r in enumerate(recordings)]
     inverted_corpus = scan_corpus("main", save_all(tmp_path / "main", other))

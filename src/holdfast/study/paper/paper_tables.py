@@ -5,7 +5,7 @@ from typing import Any
 
 import numpy as np
 
-from holdfast.features import DEPLOYED_FEATURES, FEATURE_NAMES
+from holdfast.features import DEFAULT_WINDOW, DEPLOYED_FEATURES, FEATURE_NAMES
 from holdfast.plots.curves import Curve, draw_lines
 from holdfast.plots.style import PAPER
 from holdfast.study.paper import published
@@ -27,7 +27,6 @@ from holdfast.study.report.result_tables import Key, ResultTable, Row
 from holdfast.study.tasks import Task
 from holdfast.training.setting import MAX_SAMPLES
 
-WINDOW = 14
 ABLATED_AT = (14, 18)
 QUICK_WINDOWS = (4, 10, 14, 18)
 TITLES = {"logreg": "LogReg", "svm": "SVM"}
@@ -42,12 +41,12 @@ def tasks(plan: StudyPlan) -> list[Task]:
     """What has to be computed for the paper's tables."""
     first = first_finger(plan)
     named = [
-        _task(plan, f"fingers/{finger}", finger, WINDOW, _BOTH, thorough=True)
+        _task(plan, f"fingers/{finger}", finger, DEFAULT_WINDOW, _BOTH, thorough=True)
         for finger in _fingers(plan)
     ]
     for window in _windows(plan):
         kinds = (*(("logreg", names) for names in SETS.values()), _ZHANG, _BEST_CUT)
-        kinds = tuple(kind for kind in kinds if window != WINDOW or kind not in _BOTH)
+        kinds = tuple(kind for kind in kinds if window != DEFAULT_WINDOW or kind not in _BOTH)
         named.append(_task(plan, f"window/{window}", first, window, kinds))
     for window in ABLATED_AT:
         kinds = tuple(("logreg", columns_of(subset)) for subset in published.ABLATION)
@@ -105,7 +104,7 @@ class _Found:
         roles = {FRESH: "fresh", OBJECTS: "others"}
         self.tests = [on for on in TESTS if on not in roles or roles[on] in plan.corpora]
 
-    def cell(self, kind: Kind, window: int = WINDOW, finger: str | None = None) -> Cell:
+    def cell(self, kind: Kind, window: int = DEFAULT_WINDOW, finger: str | None = None) -> Cell:
         return self.cells[finger or first_finger(self.plan), window, kind]
 
     def rows(
@@ -129,7 +128,7 @@ class _Found:
         """What a reader of one table has to know of all."""
         return (
             f"Protocol, and what the lines are measured on, as with Table I "
-            f"({first_finger(self.plan)} and N_w = {WINDOW}, where no other is given)."
+            f"({first_finger(self.plan)} and N_w = {DEFAULT_WINDOW}, where no other is given)."
         )
 
 
@@ -277,9 +276,10 @@ def _protocol(plan: StudyPlan, cell: Cell) -> Iterator[str]:
     effort = _effort(plan)
     yield (
         f"Protocol as printed: samples of all recordings pooled ({first_finger(plan)}, "
-        f"N_w = {WINDOW}), 80 % drawn at random to train, hyper-parameters by {effort.trials} "
-        "trials of Bayesian optimisation over 5 random folds of at most 10,000 of them, no "
-        f"contact threshold. A fit takes at most {effort.n_fit:,} samples, evenly spread; here "
+        f"N_w = {DEFAULT_WINDOW}), 80 % drawn at random to train, hyper-parameters by "
+        f"{effort.trials} trials of Bayesian optimisation over 5 random folds of at most 10,000 "
+        "of them, no contact threshold. A fit takes at most "
+        f"{effort.n_fit:,} samples, evenly spread; here "
         f"{cell.n_fitted:,}."
     )
     yield (
