@@ -65,7 +65,7 @@ def _importer(name: str) -> ModuleType:
 
 def _detected_format(path: Path) -> str:
     for name in FORMATS:
-        if _importer(name).sniff(path):
+        if _importer(name).can_read(path):
             return name
     raise RecordingError(
         f"{path} is of no supported format; supported are {', '.join(FORMATS)} "

@@ -42,7 +42,7 @@ _HELD_AFTER = (_GRASP, _HELD_IN_MOTION, _SLIP_AT_REST, _SLIP_IN_MOTION)
 _HELD_BEFORE = (_RELEASE, _HELD_IN_MOTION, _SLIP_AT_REST, _SLIP_IN_MOTION)
 
 
-def sniff(path: Path) -> bool:
+def can_read(path: Path) -> bool:
     """Return whether `path` is an HDF5 file, or a folder with one."""
     return any(_is_hdf5(file) for file in _files(path))
 

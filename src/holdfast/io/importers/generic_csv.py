@@ -24,7 +24,7 @@ _TEXT = re.compile(r"(?:(?P<module>.+)\.)?(?P<column>label|cause)")
 _COMMENT = re.compile(r"(?P<key>sensor|unit)\s*:\s*(?:(?P<module>[^=]+?)\s*=)?\s*(?P<value>\S+)")
 
 
-def sniff(path: Path) -> bool:
+def can_read(path: Path) -> bool:
     """Return whether `path` is such a CSV file, or a folder with one."""
     return any(_is_header(header_line(file)) for file in csv_files(path))
 

@@ -23,7 +23,7 @@ TO_TAXEL_FRAME = np.array([1, -1, -1])
 increases."""
 
 
-def sniff(path: Path) -> bool:
+def can_read(path: Path) -> bool:
     """Return whether `path` is such a CSV file, or a folder with one."""
     return any(_is_header(header_line(file)) for file in csv_files(path))
 

@@ -31,7 +31,7 @@ MAX_CLOCK_DIFFERENCE = 1.0
 """Topics whose clocks differ by more, compared with the bag's clock, have two clocks [s]."""
 
 
-def sniff(path: Path) -> bool:
+def can_read(path: Path) -> bool:
     """Return whether `path` is a bag, or a folder with bags."""
     return bool(find_bags(path))
 

@@ -29,7 +29,7 @@ LOST_MARKER_VALUE = 10.0
 SOURCE = "imanlab/proactive-slip-control"
 
 
-def sniff(path: Path) -> bool:
+def can_read(path: Path) -> bool:
     """Return whether `path` is the folder of a recording, or a folder with some."""
     return bool(_folders(path))
 

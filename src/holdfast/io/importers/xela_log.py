@@ -14,7 +14,7 @@ HAND = "allegro-uskin"
 N_COLUMNS = 368 * 3
 
 
-def sniff(path: Path) -> bool:
+def can_read(path: Path) -> bool:
     """Return whether `path` is such a CSV file, or a folder with one."""
     return any(len(header_line(file)) == N_COLUMNS + 1 for file in csv_files(path))
 
