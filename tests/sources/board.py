@@ -1,4 +1,4 @@
-"""A board of magnetometers at a pseudo terminal, as if it were plugged in."""
+"""A board of magnetometers at a pseudo terminal, like that of a real board."""
 
 import os
 import select
@@ -21,7 +21,7 @@ def some(n, n_mags=5, seed=0):
 
 
 class Board:
-    """Sends what it is told to; its port is a path that stays when it is plugged in again."""
+    """A board that sends the bytes of a test. Its path is the same after it is plugged in again."""
 
     def __init__(self, folder):
         self.path = folder / "ttyACM0"
@@ -47,13 +47,13 @@ class Board:
             while left:
                 try:
                     left = left[os.write(self._master, left) :]
-                except BlockingIOError:  # nobody reads
+                except BlockingIOError:  # the buffer is full
                     ready = select.select([], [self._master], [], 0.05)[1]
                     if not ready and self._stop.is_set():
                         return
 
     def keep_sending(self, parts, period=0.005):
-        """Sends each part, one after the other, until it is hushed."""
+        """Sends each part, one after the other, until `hush`."""
 
         def work():
             for part in parts:

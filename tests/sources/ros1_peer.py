@@ -17,7 +17,7 @@ from holdfast.ros.sensor_messages import SENS_STREAM
 N_TAXELS = 30
 
 
-def tell(value):
+def emit(value):
     sys.stdout.write(json.dumps(value) + "\n")
     sys.stdout.flush()
 
@@ -64,31 +64,31 @@ def source(uri, until, patience=5.0):
     from holdfast.sources.ros import topic
 
     topic.OPEN_TIMEOUT = float(patience)
-    told = {"numbers": [], "times": [], "n_lost": 0, "notices": []}
+    result = {"numbers": [], "times": [], "n_lost": 0, "notices": []}
     try:
         with open_source(uri) as opened:
-            told["sensors"] = {name: [s.name, s.unit] for name, s in opened.sensors.items()}
-            tell("open")
+            result["sensors"] = {name: [s.name, s.unit] for name, s in opened.sensors.items()}
+            emit("open")
             end = time.monotonic() + 60
             n_after = 0
             while time.monotonic() < end and n_after < 3:
                 arrival = opened.read(0.2)
                 if arrival is not None:
-                    note(told, arrival)
-                n_after += any(notice.startswith(until) for notice in told["notices"])
+                    note(result, arrival)
+                n_after += any(notice.startswith(until) for notice in result["notices"])
     except HoldfastError as error:
-        told["error"] = str(error)
-    tell(told)
+        result["error"] = str(error)
+    emit(result)
 
 
-def note(told, arrival):
-    told["notices"] += arrival.notices
-    told["n_lost"] += arrival.n_lost
+def note(result, arrival):
+    result["notices"] += arrival.notices
+    result["n_lost"] += arrival.n_lost
     if arrival.samples:
         first = next(iter(arrival.samples.values()))
-        told["numbers"].append(float(first[0, 0]))
-        told["times"].append(arrival.time)
-        told["sample"] = first[1].tolist()
+        result["numbers"].append(float(first[0, 0]))
+        result["times"].append(arrival.time)
+        result["sample"] = first[1].tolist()
 
 
 def read():
@@ -112,7 +112,7 @@ def read():
         rospy.Subscriber(name, kind, lambda message, name=name: found.update({name: message}))
         for name, kind in topics.items()
     ]
-    tell("ready")
+    emit("ready")
     while len(found) < len(topics):
         time.sleep(0.02)
     for subscriber in keep:
@@ -120,7 +120,7 @@ def read():
     force, vector = found["/holdfast/thumb/force"], found["/holdfast/index_1/force"]
     status = {one.name: one for one in found["/diagnostics"].status}
     thumb = status["holdfast: thumb"]
-    tell(
+    emit(
         {
             "state": found["/holdfast/thumb/state"].data,
             "hand": found["/holdfast/hand/state"].data,
@@ -134,7 +134,7 @@ def read():
             "values": {pair.key: pair.value for pair in thumb.values},
         }
     )
-    rospy.signal_shutdown("all is told")
+    rospy.signal_shutdown("all is published")
 
 
 def estimates():
@@ -142,7 +142,7 @@ def estimates():
     from live.estimates import UNITS, estimate
 
     with Ros1Publisher(UNITS) as publisher:
-        tell("open")
+        emit("open")
         while True:
             publisher.publish(estimate())
             time.sleep(0.02)

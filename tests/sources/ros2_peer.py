@@ -171,14 +171,14 @@ def read(participant):
     for name, kind in TOPICS.items():
         topic = Topic(participant, f"rt{name}", kind, qos=RELIABLE)
         readers[name] = DataReader(participant, topic, qos=RELIABLE)
-    told = set()
-    while len(told) < len(readers):
+    matched = set()
+    while len(matched) < len(readers):
         for name, reader in readers.items():
             for message in reader.take(10):
                 if not isinstance(message, InvalidSample):
                     sys.stdout.write(json.dumps([name, plain(message)]) + "\n")
                     sys.stdout.flush()
-                    told.add(name)
+                    matched.add(name)
         time.sleep(0.01)
 
 

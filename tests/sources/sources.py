@@ -1,4 +1,4 @@
-"""Every source, made ready to be opened: what `test_contract.py` holds to one contract."""
+"""Every source, ready to be opened, for the contract in `test_contract.py`."""
 
 import os
 from collections.abc import Callable
@@ -25,9 +25,9 @@ from holdfast.twin.simulation import simulate
 from sources.board import Board, packet, some
 
 N_SOON = 40
-"""So many samples come from every source before it may fall silent."""
+"""Number of samples of every source before it may become silent."""
 NEVER = 1e4
-"""A sample so much later is not lived to see [s]."""
+"""A sample this much later is never due [s]."""
 
 
 @dataclass
@@ -36,7 +36,7 @@ class Ready:
 
     Attributes:
         source: to be tested.
-        hush: lets it fall silent after some samples.
+        hush: makes it silent after some samples.
     """
 
     source: Source
@@ -110,7 +110,7 @@ def twin_at_once(folder, monkeypatch):
 
 @contextmanager
 def twin_slow(folder, monkeypatch):
-    """After the first sample nothing comes for long."""
+    """After the first sample, no sample comes for a long time."""
     with _twin(monkeypatch, 1e-3) as ready:
         yield ready
 
@@ -135,7 +135,7 @@ def xela(folder, monkeypatch):
 
 
 class _Pads(Source):
-    """Without the module that a XELA server cannot have, and silent when told to be."""
+    """Source without the module that a XELA server cannot have; `hush` makes it silent."""
 
     def __init__(self, source):
         self._source = source
@@ -198,7 +198,7 @@ def ros2(folder, monkeypatch):
 
 
 def _sensor_full(k, number):
-    """Sample `k` of a 4 x 4 patch, as XELA's server tells it in ROS 2."""
+    """Sample `k` of a 4 x 4 patch, as XELA's server sends it in ROS 2."""
     return {
         "message": k,
         "time": 1000.0 + k / 100,
@@ -216,7 +216,7 @@ EVERY = {
 ENDING = {make.__name__: make for make in (parquet_at_once, mcap_at_once, twin_at_once)}
 """Sources that end."""
 LASTING = {make.__name__: make for make in (parquet, mcap, twin_slow, serial, xela, ros1, ros2)}
-"""Sources that fall silent, and do not end."""
+"""Sources that become silent, and do not end."""
 
 
 @contextmanager

@@ -90,7 +90,7 @@ def test_garbage_gives_the_same_in_pieces_of_any_size(parts, piece):
 
 @settings(deadline=None)
 @given(st.binary(min_size=1, max_size=300))
-def test_garbage_costs_the_packet_that_it_runs_into(garbage):
+def test_garbage_loses_only_the_packet_that_it_joins(garbage):
     given = some(6)
     before, after = b"".join(map(packet, given[:3])), b"".join(map(packet, given[3:]))
     samples, n_refused, _ = decoded(before + garbage + after)
@@ -99,7 +99,7 @@ def test_garbage_costs_the_packet_that_it_runs_into(garbage):
     assert 1 <= n_refused <= 2 + len(garbage) // 8
 
 
-def test_garbage_that_ends_like_a_packet_costs_none():
+def test_garbage_that_ends_like_a_packet_loses_none():
     given = some(4)
     before, after = b"".join(map(packet, given[:2])), b"".join(map(packet, given[2:]))
     samples, n_refused, _ = decoded(before + b"x" * 200 + b"\r\n" + after)
@@ -107,7 +107,7 @@ def test_garbage_that_ends_like_a_packet_costs_none():
     assert n_refused == 3
 
 
-def test_a_stream_that_is_joined_in_the_middle_refuses_nothing():
+def test_a_stream_from_the_middle_refuses_nothing():
     given = some(5)
     data = b"".join(map(packet, given))
     for start in range(1, 83):
@@ -116,7 +116,7 @@ def test_a_stream_that_is_joined_in_the_middle_refuses_nothing():
         assert n_refused == 0
 
 
-def test_a_packet_that_lost_a_byte_costs_one():
+def test_a_packet_without_a_byte_loses_one_sample():
     given = some(3)
     packets = [packet(sample) for sample in given]
     samples, n_refused, _ = decoded(packets[0] + packets[1][:40] + packets[1][41:] + packets[2])
@@ -125,7 +125,7 @@ def test_a_packet_that_lost_a_byte_costs_one():
 
 
 @pytest.mark.parametrize("bad", [np.nan, np.inf, 2e6, 1e-5])
-def test_numbers_that_cannot_be_are_refused(bad):
+def test_impossible_numbers_are_refused(bad):
     given = some(4)
     wrong = given[2].copy()
     wrong[3, 1] = bad
@@ -135,7 +135,7 @@ def test_numbers_that_cannot_be_are_refused(bad):
 
 
 @pytest.mark.parametrize("bad", [b"nan", b"ovf", b"1.2.3", b"1e30", b""])
-def test_lines_with_what_cannot_be_are_refused(bad):
+def test_impossible_lines_are_refused(bad):
     lines = [line(sample) + b"\t\r\n" for sample in some(4)]
     words = lines[2].split(b"\t")
     lines[2] = b"\t".join([*words[:9], bad, *words[10:]])
@@ -145,7 +145,7 @@ def test_lines_with_what_cannot_be_are_refused(bad):
 
 
 @pytest.mark.parametrize("temperature", [-201.0, 201.0, np.nan])
-def test_a_temperature_that_cannot_be_is_refused(temperature):
+def test_an_impossible_temperature_is_refused(temperature):
     given = some(3)
     packets = [packet(given[0]), packet(given[1], temperature), packet(given[2])]
     samples, n_refused, _ = decoded(b"".join(packets))
@@ -165,14 +165,14 @@ def test_lines_of_text_are_taken_from_the_second_on(end, piece):
 
 @pytest.mark.parametrize("n_mags", [1, 3, 4, 6, 10])
 @pytest.mark.parametrize("piece", [16, 82, None])
-def test_another_number_of_magnetometers_is_known(n_mags, piece):
+def test_another_number_of_magnetometers_is_recognized(n_mags, piece):
     samples, n_refused, other = decoded(b"".join(map(packet, some(30, n_mags))), 5, piece)
     assert samples == []
     assert n_refused > 0
     assert other == n_mags
 
 
-def test_another_number_in_a_line_is_known():
+def test_another_number_in_a_line_is_recognized():
     data = b"".join(line(sample) + b"\r\n" for sample in some(5, 4))
     samples, n_refused, other = decoded(data)
     assert samples == []
@@ -180,13 +180,13 @@ def test_another_number_in_a_line_is_known():
     assert other == 4
 
 
-def test_what_is_expected_makes_another_number_forgotten():
+def test_an_expected_packet_clears_another_number():
     decoder = AnySkinDecoder(5)
     assert decoder.feed(b"\n" + b"".join(map(packet, some(9, 4)))).other_n_mags == 4
     assert decoder.feed(b"".join(map(packet, some(9, 5)))).other_n_mags == 0
 
 
-def test_a_reset_forgets_half_a_packet():
+def test_a_reset_drops_half_a_packet():
     first, second = some(2)
     decoder = AnySkinDecoder(5)
     decoder.feed(packet(first)[:50])
@@ -196,7 +196,7 @@ def test_a_reset_forgets_half_a_packet():
     assert got.n_refused == 0
 
 
-def test_garbage_for_ever_is_held_in_bounded_memory():
+def test_endless_garbage_needs_bounded_memory():
     decoder = AnySkinDecoder(5)
     rng = np.random.default_rng(0)
     for piece in (rng.bytes(10_000), b"1.0\t" * 5000, b"\n" * 20_000, b"\r\n" * 9000):

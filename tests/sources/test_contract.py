@@ -61,14 +61,14 @@ def test_entering_makes_the_modules_known(ready):
         assert not source.ended
 
 
-def test_metadata_are_plain_and_say_where_from(ready):
+def test_metadata_are_plain_and_name_the_source(ready):
     with ready.source as source:
         assert source.metadata["source"] == source.name
-        told = msgspec.json.decode(msgspec.json.encode(source.metadata))
-    assert told == dict(source.metadata)
+        decoded = msgspec.json.decode(msgspec.json.encode(source.metadata))
+    assert decoded == dict(source.metadata)
 
 
-def test_samples_are_as_the_sensors_say(ready):
+def test_samples_have_the_shape_of_the_sensors(ready):
     with ready.source as source:
         for arrival in some_of(source):
             assert set(arrival.samples) <= set(source.sensors)
@@ -109,7 +109,7 @@ def test_a_detector_takes_everything(ready):
 
 
 @pytest.mark.parametrize("timeout", [0.0, 0.05])
-def test_where_nothing_comes_reading_waits_and_gives_none(lasting, timeout):
+def test_reading_without_samples_waits_and_gives_none(lasting, timeout):
     with lasting.source as source:
         some_of(source, 1)
         lasting.hush()
@@ -144,7 +144,7 @@ def test_closing_what_was_never_open_is_harmless(ready):
     ready.source.close()
 
 
-def test_entering_again_begins_anew(ready):
+def test_entering_again_starts_again(ready):
     with ready.source as source:
         sensors = dict(source.sensors)
         some_of(source, 3)
@@ -154,7 +154,7 @@ def test_entering_again_begins_anew(ready):
     assert times == sorted(set(times))
 
 
-def test_two_that_are_alike_do_not_disturb_each_other(ending):
+def test_two_equal_sources_are_independent(ending):
     with ending as source:
         first = list(islice(source, 3))
     with ending as source:

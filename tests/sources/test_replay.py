@@ -70,7 +70,7 @@ def put_together(arrivals):
 
 
 @pytest.mark.parametrize("suffix", SUFFIXES)
-def test_it_gives_just_what_is_in_the_file(tmp_path, suffix):
+def test_it_gives_exactly_the_content_of_the_file(tmp_path, suffix):
     recording = hand(3000)
     save_recording(recording, tmp_path / f"a.{suffix}")
     with open_source(str(tmp_path / f"a.{suffix}"), speed=0) as source:
@@ -85,7 +85,7 @@ def test_it_gives_just_what_is_in_the_file(tmp_path, suffix):
 
 
 @pytest.mark.parametrize("suffix", SUFFIXES)
-def test_a_detector_fed_with_it_says_what_detect_says(tmp_path, suffix):
+def test_a_detector_fed_with_it_equals_detect(tmp_path, suffix):
     """Offline detection is the detector fed with the recording."""
     whole = synthetic_recording("grasp", 0, ("thumb", "index", "middle"))
     thumb, index, middle = whole.modules.values()
@@ -94,25 +94,25 @@ def test_a_detector_fed_with_it_says_what_detect_says(tmp_path, suffix):
     recording = Recording("grasp", modules)
     save_recording(recording, tmp_path / f"grasp.{suffix}")
     model = Model.load("builtin:noise-floor")
-    told = detect(model, recording)
+    expected = detect(model, recording)
     detector = Detector.for_recording(model, recording)
     n_seen = dict.fromkeys(modules, 0)
     with Replay(tmp_path / f"grasp.{suffix}", speed=0) as source:
         for k, arrival in enumerate(source):
             estimate = detector.update(arrival.samples, arrival.time)
-            assert arrival.time == told.times[k]
-            assert estimate.state.code == told.hand[k]
+            assert arrival.time == expected.times[k]
+            assert estimate.state.code == expected.hand[k]
             for name in arrival.samples:
-                want = told.fingers[name].estimate(n_seen[name])
+                want = expected.fingers[name].estimate(n_seen[name])
                 assert repr(estimate.fingers[name]) == repr(want)  # NaN is NaN
                 n_seen[name] += 1
-    assert n_seen == {name: len(trace) for name, trace in told.fingers.items()}
-    assert k + 1 == len(told.times)
-    assert len({tuple(trace.state) for trace in told.fingers.values()}) > 1
+    assert n_seen == {name: len(trace) for name, trace in expected.fingers.items()}
+    assert k + 1 == len(expected.times)
+    assert len({tuple(trace.state) for trace in expected.fingers.values()}) > 1
 
 
 @pytest.mark.parametrize("speed", [0.5, 1.0, 20.0])
-def test_it_goes_at_its_pace(path, clock, speed):
+def test_it_plays_at_its_speed(path, clock, speed):
     with Replay(path, speed=speed) as source:
         assert source.paced
         clock.now += 7.0  # time begins with the first read
@@ -123,14 +123,14 @@ def test_it_goes_at_its_pace(path, clock, speed):
         assert arrival.received - began == pytest.approx((arrival.time - 3.0) / speed, abs=1e-9)
 
 
-def test_as_fast_as_it_is_taken_never_sleeps(path, clock):
+def test_speed_0_never_sleeps(path, clock):
     with Replay(path, speed=0) as source:
         assert not source.paced
         assert len(list(source)) == 75
     assert clock.slept == []
 
 
-def test_who_is_slow_gets_all_at_once(path, clock):
+def test_a_slow_reader_gets_all_at_once(path, clock):
     with Replay(path) as source:
         first = source.read(1.0)
         clock.now += 0.2
@@ -171,14 +171,14 @@ def test_it_ends(path):
         assert source.read(10.0) is None
 
 
-def test_markers_are_told(tmp_path):
+def test_markers_become_notices(tmp_path):
     markers = ((3.1, "closed"), (99.0, "over"))
     save_recording(hand(markers=markers), tmp_path / "a.mcap")
     with Replay(tmp_path / "a.mcap", speed=0) as source:
         arrivals = list(source)
-    told = [(k, a.notices) for k, a in enumerate(arrivals) if a.notices]
-    assert [notices for _, notices in told] == [("marker: closed",), ("marker: over",)]
-    (k, _), (last, _) = told
+    marked = [(k, a.notices) for k, a in enumerate(arrivals) if a.notices]
+    assert [notices for _, notices in marked] == [("marker: closed",), ("marker: over",)]
+    (k, _), (last, _) = marked
     assert np.isnan(arrivals[k].time)
     assert arrivals[k].samples == {}
     assert arrivals[k - 1].time <= 3.1 < arrivals[k + 1].time
@@ -186,7 +186,7 @@ def test_markers_are_told(tmp_path):
 
 
 @pytest.mark.parametrize("speed", [0.0, 10.0])
-def test_again_and_again_time_goes_on(path, clock, speed):
+def test_time_continues_in_a_loop(path, clock, speed):
     with Replay(path, speed=speed, loop=True) as source:
         got = list(itertools.islice(source, 75 * 3 + 5))
         assert not source.ended
@@ -195,15 +195,15 @@ def test_again_and_again_time_goes_on(path, clock, speed):
     passes = times[:225].reshape(3, 75)
     np.testing.assert_allclose(passes - passes[:, :1], [passes[0] - 3.0] * 3, atol=1e-12)
     np.testing.assert_allclose(passes[1:, 0] - passes[:-1, -1], 1.0)
-    told = [k for k, arrival in enumerate(got) if arrival.notices]
-    assert told == [75, 150, 225]
+    noticed = [k for k, arrival in enumerate(got) if arrival.notices]
+    assert noticed == [75, 150, 225]
     assert got[75].notices == (f"{path} starts again",)
     if speed:
         waited = got[224].received - got[0].received
         assert waited == pytest.approx((got[224].time - got[0].time) / speed)
 
 
-def test_again_after_a_slow_reader_it_does_not_hurry(path, clock):
+def test_the_next_pass_after_a_slow_reader_is_not_faster(path, clock):
     with Replay(path, loop=True) as source:
         list(itertools.islice(source, 75))
         clock.now += 60.0
@@ -211,7 +211,7 @@ def test_again_after_a_slow_reader_it_does_not_hurry(path, clock):
     assert second.received - first.received == pytest.approx(second.time - first.time)
 
 
-def test_metadata_are_those_of_the_recording_and_where_from(tmp_path):
+def test_metadata_are_those_of_the_recording_and_the_source(tmp_path):
     save_recording(hand(metadata={"object": "can", "source": "twin"}), tmp_path / "a.parquet")
     with Replay(tmp_path / "a.parquet") as source:
         assert source.metadata == {
@@ -226,7 +226,7 @@ def test_metadata_without_a_source(path):
         assert source.metadata == {"source": path}
 
 
-def test_one_that_was_cut_is_played_as_far_as_it_goes(tmp_path):
+def test_an_incomplete_recording_is_played_as_far_as_it_goes(tmp_path):
     file = tmp_path / "a.mcap"
     save_recording(hand(900), file)
     file.write_bytes(file.read_bytes()[:-30_000])
@@ -256,7 +256,7 @@ def test_damage_in_its_middle_ends_it_with_a_notice(tmp_path, monkeypatch):
     assert not any(arrival.notices for arrival in arrivals[:-1])
 
 
-def test_a_file_that_goes_away_ends_a_loop_with_a_notice(tmp_path):
+def test_a_deleted_file_ends_a_loop_with_a_notice(tmp_path):
     save_recording(hand(), tmp_path / "a.parquet")
     with Replay(tmp_path / "a.parquet", speed=0, loop=True) as source:
         got = list(itertools.islice(source, 75))
@@ -269,7 +269,7 @@ def test_a_file_that_goes_away_ends_a_loop_with_a_notice(tmp_path):
     assert len(got) == 76
 
 
-def test_samples_that_lie_back_in_time_are_told(monkeypatch):
+def test_samples_out_of_order_are_reported(monkeypatch):
     early, late = hand(600), hand(600)
     monkeypatch.setattr("holdfast.sources.replay.read_chunks", lambda *_, **__: iter([early, late]))
     with Replay("a.parquet", speed=0) as source:
@@ -278,7 +278,7 @@ def test_samples_that_lie_back_in_time_are_told(monkeypatch):
 
 
 @pytest.mark.parametrize("speed", [-1.0, np.nan, np.inf])
-def test_a_speed_that_makes_no_sense(speed):
+def test_an_invalid_speed(speed):
     with pytest.raises(ValueError) as error:
         Replay("grasp.parquet", speed=speed)
     assert str(error.value) == f"a speed of at least 0 expected, {speed} given"
@@ -303,7 +303,7 @@ def test_only_opening_finds_that_it_cannot_be_read(tmp_path, name, content, mess
     assert message in str(error.value)
 
 
-def test_a_file_that_may_not_be_read(path, monkeypatch):
+def test_a_file_without_permission(path, monkeypatch):
     def refuse(*args, **options):
         raise PermissionError(13, "Permission denied")
 

@@ -125,7 +125,7 @@ def test_a_board_may_carry_several_sensors(board):
     np.testing.assert_array_equal(arrival.samples["thumb"], given[0, 5:])
 
 
-def test_a_sensor_of_your_own(board, tmp_path):
+def test_a_sensor_from_a_file(board, tmp_path):
     path = tmp_path / "mine.json"
     mine = sensor("papillarray").to_dict() | {"name": "mine", "unit": "count"}
     path.write_bytes(msgspec.json.encode(mine))
@@ -136,7 +136,7 @@ def test_a_sensor_of_your_own(board, tmp_path):
         assert source.sensors["finger1"].name == "mine"
 
 
-def test_garbage_is_counted_and_told(board):
+def test_garbage_is_counted_and_reported(board):
     given = some(4)
     with started(board) as source:
         board.send(*map(packet, given[:2]), b"\xff" * 200 + b"\r\n", *map(packet, given[2:]))
@@ -150,7 +150,7 @@ def test_garbage_is_counted_and_told(board):
     assert notices == ["invalid packets are dropped"]
 
 
-def test_the_same_is_told_once_a_second(board, monkeypatch):
+def test_a_notice_is_given_once_a_second(board, monkeypatch):
     with started(board) as source:
         clock = [1000.0]
         monkeypatch.setattr(module, "time", _Clock(clock))
@@ -212,7 +212,7 @@ def test_lines_of_text_are_samples(board):
     np.testing.assert_allclose([a.samples["finger1"] for a in arrivals], given, atol=1e-3)
 
 
-def test_unplugged_it_is_waited_for_and_goes_on(board, impatient):
+def test_an_unplugged_board_is_connected_again(board, impatient):
     given = some(3)
     with started(board) as source:
         before = time.monotonic()
@@ -231,7 +231,7 @@ def test_unplugged_it_is_waited_for_and_goes_on(board, impatient):
     assert after[0].time > before
 
 
-def test_tries_less_and_less_often(board, monkeypatch):
+def test_attempts_become_less_frequent(board, monkeypatch):
     slept = []
     with started(board) as source:
         board.unplug()
@@ -263,7 +263,7 @@ class _Port:
         self.device = device
 
 
-def test_a_port_that_is_not_ours_is_an_error(board, monkeypatch):
+def test_a_port_without_permission_is_an_error(board, monkeypatch):
     def refuse(*args, **others):
         raise PermissionError(13, "Permission denied")
 
@@ -277,13 +277,13 @@ def test_a_port_that_is_not_ours_is_an_error(board, monkeypatch):
     )
 
 
-def test_what_is_no_port_is_an_error(tmp_path):
+def test_a_file_that_is_no_port_is_an_error(tmp_path):
     (tmp_path / "file").write_text("")
     with pytest.raises(SourceError, match="Could not configure port"):
         open_source(f"serial://{tmp_path}/file").open()
 
 
-def test_a_port_is_for_one(board):
+def test_a_port_can_be_opened_once(board):
     with started(board), pytest.raises(SourceError, match="lock"):
         open_source(f"serial://{board.path}").open()
 
@@ -360,13 +360,13 @@ def test_unplugged_while_opening_is_an_error(board):
         ),
     ],
 )
-def test_parameters_that_make_no_sense(text, message):
+def test_invalid_parameters(text, message):
     with pytest.raises(ValueError) as error:
         open_source(text)
     assert message in str(error.value)
 
 
-def test_windows_calls_its_ports_otherwise():
+def test_a_port_of_windows():
     assert open_source("serial:COM3")._path == "COM3"
 
 

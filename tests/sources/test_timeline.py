@@ -32,7 +32,7 @@ def test_steady_stamps_stay_as_they_are():
         max_size=50,
     )
 )
-def test_times_go_forward_whatever_the_device_says(given):
+def test_times_increase_for_any_stamps(given):
     received, last = 0.0, -math.inf
     timeline = Timeline()
     for device_time, passed in given:
@@ -46,37 +46,37 @@ def test_times_go_forward_whatever_the_device_says(given):
 def test_time_goes_on_as_on_the_host_where_the_clock_jumps(jump):
     before, after = steady(100), steady(200)[100:]
     given = before + [(t + jump, received) for t, received in after]
-    told = stamps(given)
-    assert [s.time for s in told] == pytest.approx([t for t, _ in before + after], abs=1e-6)
-    assert told[100].faults == (Fault.CLOCK_JUMP,)
-    assert not any(s.faults for k, s in enumerate(told) if k != 100)
+    stamped = stamps(given)
+    assert [s.time for s in stamped] == pytest.approx([t for t, _ in before + after], abs=1e-6)
+    assert stamped[100].faults == (Fault.CLOCK_JUMP,)
+    assert not any(s.faults for k, s in enumerate(stamped) if k != 100)
 
 
 def test_a_burst_after_a_stall_is_late_and_no_jump():
     pairs = steady(400)
     stalled = [(t, 52.0 if 51.0 < received < 52.0 else received) for t, received in pairs]
-    told = stamps(stalled)
-    assert [s.time for s in told] == [t for t, _ in pairs]
-    late = [s.time for s in told if s.faults == (Fault.LATE,)]
+    stamped = stamps(stalled)
+    assert [s.time for s in stamped] == [t for t, _ in pairs]
+    late = [s.time for s in stamped if s.faults == (Fault.LATE,)]
     assert late == [t for t, _ in pairs if 1001.0 < t < 1001.9 - 1e-3]
-    assert all(s.faults in ((), (Fault.LATE,)) for s in told)
+    assert all(s.faults in ((), (Fault.LATE,)) for s in stamped)
 
 
-def test_what_is_missing_after_a_stall_is_no_jump():
+def test_a_gap_after_a_stall_is_no_jump():
     """The reader stalls for 9 s; what was buffered comes, then what is new."""
     pairs = steady(150)
     buffered = [(1001.0 + k * PERIOD, 60.0) for k in range(1, 100)]
     new = [(1010.0 + k * PERIOD, 60.0 + k * PERIOD) for k in range(1, 100)]
-    told = stamps(pairs + buffered + new)
-    assert [s.time for s in told] == [t for t, _ in pairs + buffered + new]
-    assert not any(Fault.CLOCK_JUMP in s.faults for s in told)
-    assert all(s.faults == (Fault.LATE,) for s in told[150:249])
-    assert not any(s.faults for s in told[249:])
+    stamped = stamps(pairs + buffered + new)
+    assert [s.time for s in stamped] == [t for t, _ in pairs + buffered + new]
+    assert not any(Fault.CLOCK_JUMP in s.faults for s in stamped)
+    assert all(s.faults == (Fault.LATE,) for s in stamped[150:249])
+    assert not any(s.faults for s in stamped[249:])
 
 
 def test_clocks_that_drifted_over_a_long_pause_did_not_jump():
-    told = stamps([*steady(10), (11_000.0 + 0.9, 10_050.0)])
-    assert told[-1] == (11_000.9, ())
+    stamped = stamps([*steady(10), (11_000.0 + 0.9, 10_050.0)])
+    assert stamped[-1] == (11_000.9, ())
 
 
 def test_a_jump_after_a_late_sample_leaves_nothing_late():
@@ -84,10 +84,10 @@ def test_a_jump_after_a_late_sample_leaves_nothing_late():
     pairs = steady(300)
     t, received = pairs[100]
     after = [(t + 3600.0, received) for t, received in pairs[146:]]
-    told = stamps([*pairs[:100], (t, received + 0.3), *after])
-    assert told[100].faults == (Fault.LATE,)
-    assert told[101].faults == (Fault.CLOCK_JUMP,)
-    assert not any(s.faults for s in told[102:])
+    stamped = stamps([*pairs[:100], (t, received + 0.3), *after])
+    assert stamped[100].faults == (Fault.LATE,)
+    assert stamped[101].faults == (Fault.CLOCK_JUMP,)
+    assert not any(s.faults for s in stamped[102:])
 
 
 def test_a_small_step_back_is_just_after_the_last():
@@ -98,14 +98,14 @@ def test_a_small_step_back_is_just_after_the_last():
 
 
 def test_clocks_that_drift_are_not_late():
-    told = stamps([(1000.0 + k, 50.0 + k * (1 + 5e-5)) for k in range(10_000)])
-    assert not any(s.faults for s in told)
+    stamped = stamps([(1000.0 + k, 50.0 + k * (1 + 5e-5)) for k in range(10_000)])
+    assert not any(s.faults for s in stamped)
 
 
 def test_a_clock_that_runs_away_is_late():
-    told = stamps([(1000.0 + k, 50.0 + k * 1.01) for k in range(100)])
-    assert [s.faults for s in told[:9]] == [()] * 9
-    assert all(s.faults == (Fault.LATE,) for s in told[12:])
+    stamped = stamps([(1000.0 + k, 50.0 + k * 1.01) for k in range(100)])
+    assert [s.faults for s in stamped[:9]] == [()] * 9
+    assert all(s.faults == (Fault.LATE,) for s in stamped[12:])
 
 
 @pytest.mark.parametrize("wrong", [math.nan, math.inf, -math.inf])
@@ -122,7 +122,7 @@ def test_the_offset_is_what_jumps_add():
     assert timeline.offset == 61.0
 
 
-def test_a_delay_begins_anew():
+def test_a_delay_after_a_reset():
     delay = TransportDelay()
     assert delay.update(0.0, 1.0) == 0.0
     assert delay.update(1.0, 3.0) == pytest.approx(1.0, abs=1e-3)

@@ -57,7 +57,7 @@ def quick(monkeypatch):
 
 
 @pytest.mark.parametrize("server", [False, True])
-def test_samples_are_just_those_of_the_simulation(server):
+def test_samples_are_those_of_the_simulation(server):
     grasp = Grasp("ball", 1, 1, seed=3, server=server)
     recording = simulate(grasp)
     with open_source(f"{BALL}&server={str(server).lower()}", speed=0) as source:
@@ -79,7 +79,7 @@ def test_metadata_are_those_of_the_recording_and_the_uri(monkeypatch):
         assert source.name == BALL
 
 
-def test_what_is_not_given_has_its_default():
+def test_missing_parameters_have_defaults():
     assert grasp_of(parse("twin:")[1]) == Grasp("can", 2, 1, "reference", 0)
     text = "twin:?object=ball&case=1&repeat=7&profile=gentle&seed=9&server=true"
     assert grasp_of(parse(text)[1]) == Grasp("ball", 1, 7, "gentle", 9, server=True)
@@ -93,14 +93,14 @@ def test_a_grasp_that_fails_is_tried_again(quick):
     assert {int(a.samples["thumb"][0, 0]) for a in arrivals} == {12}
 
 
-def test_one_that_always_fails_is_played_as_it_is(quick):
+def test_a_grasp_that_always_fails_is_played(quick):
     quick(failing={(1, attempt) for attempt in range(ATTEMPTS)})
     with open_source("twin:", speed=0) as source:
         arrivals = list(source)
     assert arrivals[0].notices == ("the twin grasps: can-case2-1-failed4, after 3 failed attempts",)
 
 
-def test_it_is_tried_as_often_as_simulate_does():
+def test_it_makes_as_many_attempts_as_simulate():
     assert ATTEMPTS == verb.ATTEMPTS
 
 
@@ -112,8 +112,8 @@ def test_the_next_repeats_follow(quick):
         assert len(list(folder.iterdir())) == 2  # what is played and what comes next
     assert not folder.exists()
     assert [int(a.samples["thumb"][0, 0]) for a in arrivals[::10]] == [40, 50, 60, 70]
-    told = [arrival.notices for arrival in arrivals if arrival.notices]
-    assert told == [(f"the twin grasps: can-case2-{k}",) for k in (4, 5, 6, 7)]
+    notices = [arrival.notices for arrival in arrivals if arrival.notices]
+    assert notices == [(f"the twin grasps: can-case2-{k}",) for k in (4, 5, 6, 7)]
     times = np.array([arrival.time for arrival in arrivals[:30]]).reshape(3, 10)
     np.testing.assert_allclose(times[1:, 0] - times[:-1, -1], 1.0)
 
@@ -135,7 +135,7 @@ def short(recording):
     return replace(recording, modules=modules, truth=None)
 
 
-def test_until_the_next_grasp_is_there_it_is_waited_for(quick, monkeypatch):
+def test_it_waits_for_the_next_grasp(quick, monkeypatch):
     with open_source("twin:", speed=0, loop=True) as source:
         list(itertools.islice(source, 10))
         source._simulator._process.wait()
@@ -149,7 +149,7 @@ def test_until_the_next_grasp_is_there_it_is_waited_for(quick, monkeypatch):
     assert process.returncode is not None  # closing ended it
 
 
-def test_a_process_that_dies_costs_only_time(quick):
+def test_a_failed_process_is_replaced(quick):
     with open_source("twin:", speed=0, loop=True) as source:
         list(itertools.islice(source, 10))
         source._simulator._process.wait()
@@ -173,7 +173,7 @@ def test_a_process_is_ended_with_the_source(monkeypatch):
     assert process.returncode is not None
 
 
-def test_what_the_process_does(tmp_path, monkeypatch):
+def test_the_program_of_the_process(tmp_path, monkeypatch):
     monkeypatch.setattr(module, "simulate", lambda _: ball())
     write(json.dumps(asdict(Grasp("ball", 1, 1, seed=3))), str(tmp_path / "a.parquet"))
     assert load_recording(tmp_path / "a.parquet").digest == ball().digest
@@ -213,13 +213,13 @@ def test_metadata_are_plain(monkeypatch):
         ("twin://can", "twin://can: twin:?object=can&seed=1 expected, without a path"),
     ],
 )
-def test_parameters_that_make_no_sense(text, message):
+def test_invalid_parameters(text, message):
     with pytest.raises(ValueError) as error:
         open_source(text)
     assert str(error.value).startswith(message)
 
 
 @pytest.mark.parametrize("speed", [-1.0, np.nan])
-def test_a_speed_that_makes_no_sense(speed):
+def test_an_invalid_speed(speed):
     with pytest.raises(ValueError, match="a speed of at least 0 expected"):
         open_source("twin:", speed=speed)

@@ -39,7 +39,7 @@ def test_host_and_path(text, host, path):
 
 
 @pytest.mark.parametrize("text", ["grasp.csv:", "udp://host", "http://host/a", "can", "", ":"])
-def test_what_is_no_uri_of_ours(text):
+def test_unknown_schemes(text):
     with pytest.raises(ValueError) as error:
         parse(text)
     assert str(error.value) == (
@@ -58,7 +58,7 @@ def test_a_parameter_that_is_given_twice():
     assert str(error.value) == "twin:?seed=1&seed=2: a parameter is given twice"
 
 
-def test_a_uri_that_is_none():
+def test_an_invalid_uri():
     with pytest.raises(ValueError) as error:
         open_source("xela://[1:2")
     assert str(error.value) == "xela://[1:2 is no URI: Invalid IPv6 URL"
@@ -95,7 +95,7 @@ def test_names_of_fingers():
 @pytest.mark.parametrize(
     "given", ["thumb", "1:", ":thumb", "one:thumb", "-1:thumb", "1=thumb", "²:t"]
 )
-def test_names_that_are_none(given):
+def test_invalid_names(given):
     with pytest.raises(ValueError) as error:
         parse(f"xela:?fingers={given}")[1].names()
     assert str(error.value) == (
@@ -104,7 +104,7 @@ def test_names_that_are_none(given):
 
 
 @pytest.mark.parametrize("given", ["1:thumb,2:thumb", "1:thumb,1:index"])
-def test_names_that_are_given_twice(given):
+def test_repeated_names(given):
     with pytest.raises(ValueError) as error:
         parse(f"xela:?fingers={given}")[1].names()
     assert str(error.value) == (
@@ -112,7 +112,7 @@ def test_names_that_are_given_twice(given):
     )
 
 
-def test_a_file_is_a_file_whatever_it_is_called(tmp_path, monkeypatch):
+def test_an_existing_file_is_no_uri(tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     assert is_uri("twin:a.parquet")
     Path("twin:a.parquet").touch()
@@ -138,7 +138,7 @@ def test_every_scheme_is_described():
         assert f"{scheme}:" in text
 
 
-def test_nothing_is_imported_for_a_scheme_that_is_not_asked_for():
+def test_nothing_is_imported_for_other_schemes():
     import subprocess
 
     code = (

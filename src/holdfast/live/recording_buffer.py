@@ -14,6 +14,7 @@ from holdfast.recordings import GAP_PERIODS
 from holdfast.sensors import Sensor
 from holdfast.sensors.types import Array
 from holdfast.sources import Arrival
+from holdfast.sources.base import MARKER_PREFIX
 
 NOTICE_REPEAT_INTERVAL = 1.0
 """Minimum time between two markers of the same notice [s]."""
@@ -26,8 +27,6 @@ MAX_PENDING_MARKERS = 2048
 MAX_MARKER_LENGTH = 200
 """Maximum length of a marker [characters]; longer ones are cut."""
 
-_MARKER_PREFIX = "marker: "
-"""Prefix of the notices by which a replayed recording reports its own markers."""
 _N_STEPS = 32
 """Number of newest time steps from which the period is estimated."""
 _MIN_STEPS = 4
@@ -128,8 +127,8 @@ class RecordingBuffer:
         if arrival.faults or self._active_faults:
             self._add_faults(arrival)
         for notice in arrival.notices:
-            if notice.startswith(_MARKER_PREFIX):
-                self.add_marker(math.nan, notice.removeprefix(_MARKER_PREFIX))
+            if notice.startswith(MARKER_PREFIX):
+                self.add_marker(math.nan, notice.removeprefix(MARKER_PREFIX))
             else:
                 self.add_notice(f"note: {notice}", arrival.received)
 

@@ -82,7 +82,7 @@ class TestModules:
         assert arrival.time == 0.002
         np.testing.assert_array_equal(arrival.samples["tip"], np.ones((9, 3)))
 
-    def test_what_is_off_is_left_out(self):
+    def test_a_sensor_that_is_off_is_left_out(self):
         first = uskin(0), uskin(0, 2, "not_available", 0)
         assert list(identified(*first).sensors) == ["finger1"]
 
@@ -96,13 +96,13 @@ class TestModules:
             (uskin(0), {"names": {2: "a"}}, r"fingers= names 2; .* has 1 \(uSPa44\)"),
         ],
     )
-    def test_what_is_not_as_asked_for(self, message, given, text):
+    def test_devices_that_do_not_fit(self, message, given, text):
         with pytest.raises(SourceError, match=text):
             identified(message, **given)
 
 
 class TestTimes:
-    def test_of_the_device(self):
+    def test_stamps_of_the_device(self):
         packets = [[uskin(k)] for k in range(5)]
         arrivals = taken(identified(*packets[0]), packets)
         np.testing.assert_allclose(
@@ -110,7 +110,7 @@ class TestTimes:
         )
         assert [int(a.samples["finger1"][0, 0]) for a in arrivals] == list(range(5))
 
-    def test_of_the_header_or_of_the_host(self):
+    def test_stamps_of_the_header_or_of_the_host(self):
         for stamp, start in ((7.0, 7.0), (None, 50.0)):
             packets = [
                 [uskin(k, time=np.nan)._replace(time=None, stamp=stamp and stamp + 0.01 * k)]
@@ -155,7 +155,7 @@ class TestTimes:
         arrivals = assembler.assemble([uskin(1), uskin(2)], 50.0)
         assert [int(a.samples["finger1"][0, 0]) for a in arrivals] == [1, 2]
 
-    def test_what_comes_late(self):
+    def test_late_samples(self):
         assembler = identified(uskin(0))
         assembler.assemble([uskin(0)], 50.0)
         (arrival,) = assembler.assemble([uskin(1)], 50.3)
@@ -171,7 +171,7 @@ class TestTimes:
 
 
 class TestPackets:
-    def test_that_come_again_are_no_samples(self):
+    def test_repeated_packets_are_no_samples(self):
         packets = [[uskin(k // 2)] for k in range(6)]
         assert len(taken(identified(*packets[0]), packets)) == 3
 
@@ -179,27 +179,27 @@ class TestPackets:
         packets = [[uskin(k, sequence=0, counts=np.zeros((16, 3), np.uint16))] for k in range(3)]
         assert len(taken(identified(*packets[0]), packets)) == 3
 
-    def test_that_are_missing_are_counted(self):
+    def test_missing_packets_are_counted(self):
         sequence = [0, 1, 4, 2**32 - 2, 2**32 - 1, 0, 1, 0, 1]
         packets = [[uskin(k, sequence=n)] for k, n in enumerate(sequence)]
         arrivals = taken(identified(*packets[0]), packets)
         assert [a.n_lost for a in arrivals] == [0, 0, 2, 0, 0, 0, 0, 0, 0]
 
-    def test_of_another_publisher_lose_nothing(self):
+    def test_packets_of_another_publisher_lose_nothing(self):
         assembler = identified(uskin(0))
         assembler.assemble([uskin(0)], 50.0)
         assembler.reconnected()
         (arrival,) = assembler.assemble([uskin(1, sequence=90)], 50.01)
         assert arrival.n_lost == 0
 
-    def test_that_make_no_sense(self):
+    def test_invalid_messages_are_reported(self):
         assembler = identified(uskin(0))
         (one,) = assembler.refuse("cut", 50.0)
         (two,) = assembler.refuse("cut elsewhere", 50.5)
         (three,) = assembler.refuse("cut", 51.0)
         assert [a.n_refused for a in (one, two, three)] == [1, 1, 1]
-        told = ("invalid message: cut",)
-        assert [a.notices for a in (one, two, three)] == [told, (), told]
+        expected = ("invalid message: cut",)
+        assert [a.notices for a in (one, two, three)] == [expected, (), expected]
         assert np.isnan(one.time)
         assert one.samples == {}
 
@@ -212,7 +212,7 @@ class TestDevicesThatChange:
         assert arrival.faults == {"finger1": (Fault.TAXEL_COUNT,)}
         assert arrival.notices == ("sensor 1 sends 24 taxels, 16 expected",)
 
-    def test_one_that_is_off_now(self):
+    def test_a_device_that_is_off_now(self):
         assembler = identified(uskin(0))
         (arrival,) = assembler.assemble([uskin(1, n_taxels=0)], 50.0)
         assert (arrival.samples, arrival.faults) == ({}, {"finger1": (Fault.TAXEL_COUNT,)})
@@ -222,7 +222,7 @@ class TestDevicesThatChange:
         (arrival,) = assembler.assemble([uskin(1)], 50.0)
         assert arrival.faults == {"finger1": (Fault.TAXEL_COUNT,)}
 
-    def test_one_that_is_new(self):
+    def test_a_device_that_is_new(self):
         assembler = identified(uskin(0))
         (arrival,) = assembler.assemble([uskin(1), uskin(1, 2)], 50.0)
         assert set(arrival.samples) == {"finger1"}

@@ -17,32 +17,32 @@ def master(tmp_path):
         yield running
 
 
-def heard(child):
-    """What a source gave, after it was open."""
+def result_of(child):
+    """Return what a source gave after it was open."""
     first, *others = lines(child)
     assert first == "open"
-    (told,) = others
-    return told
+    (result,) = others
+    return result
 
 
 def test_xela_from_another_process(master):
     master.peer("publish", N)
-    told = heard(master.peer("source", "ros1:///xServTopic?fingers=1:thumb", LOST))
-    assert told["sensors"] == {
+    result = result_of(master.peer("source", "ros1:///xServTopic?fingers=1:thumb", LOST))
+    assert result["sensors"] == {
         "thumb": ["uskin-curved", "count"],
         "finger2": ["uskin-curved", "count"],
     }
-    numbers = told["numbers"]
+    numbers = result["numbers"]
     assert numbers[-1] == N - 1
     assert np.all(np.diff(numbers) > 0)
-    assert len(numbers) + told["n_lost"] == N - numbers[0]
+    assert len(numbers) + result["n_lost"] == N - numbers[0]
     assert len(numbers) > 0.9 * N
-    assert np.all(np.diff(told["times"]) > 0)
-    assert told["sample"] == [N - 1, 1, 65535]
-    assert LOST in told["notices"]
+    assert np.all(np.diff(result["times"]) > 0)
+    assert result["sample"] == [N - 1, 1, 65535]
+    assert LOST in result["notices"]
 
 
-def test_a_master_that_is_started_again(master):
+def test_a_restarted_master(master):
     master.peer("publish", 30)
     uri = f"ros1:///xServTopic?values=calibrated&master={master.uri}/"
     child = master.peer("source", uri, AGAIN)
@@ -50,26 +50,26 @@ def test_a_master_that_is_started_again(master):
     master.stop()
     master.start()
     master.peer("publish", 1500)
-    (told,) = lines(child)
-    assert LOST in told["notices"]
-    assert any(notice.startswith(AGAIN) for notice in told["notices"])
-    assert told["sensors"]["finger1"] == ["uskin-curved", "N"]
-    assert told["sample"][1:] == [1.0, 2.0]
-    assert told["numbers"][-1] < 20  # of the new one
-    assert np.all(np.diff(told["times"]) > 0)
+    (result,) = lines(child)
+    assert LOST in result["notices"]
+    assert any(notice.startswith(AGAIN) for notice in result["notices"])
+    assert result["sensors"]["finger1"] == ["uskin-curved", "N"]
+    assert result["sample"][1:] == [1.0, 2.0]
+    assert result["numbers"][-1] < 20  # of the new one
+    assert np.all(np.diff(result["times"]) > 0)
 
 
 def test_topics_of_others(master):
     master.peer("chatter")
     while "/chatter" not in published_topics(master.uri):
         time.sleep(0.05)
-    (told,) = lines(master.peer("source", "ros1:///xServTopic", LOST, 1))
-    assert told["error"].startswith(
+    (result,) = lines(master.peer("source", "ros1:///xServTopic", LOST, 1))
+    assert result["error"].startswith(
         f"no node publishes /xServTopic at the ROS master {master.uri}; published topics: "
         "/chatter (std_msgs/String), /rosout"
     )
-    (told,) = lines(master.peer("source", "ros1:///chatter", LOST))
-    assert told["error"].startswith(
+    (result,) = lines(master.peer("source", "ros1:///chatter", LOST))
+    assert result["error"].startswith(
         "/chatter has messages of type std_msgs/String; supported types: xela_server"
     )
 

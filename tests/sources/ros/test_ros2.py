@@ -82,7 +82,7 @@ def test_newtons_from_another_process(domain):
         assert arrival.samples["finger1"][0, 1:].tolist() == [1.0, 2.0]
 
 
-def test_a_publisher_that_goes_and_another_that_comes(domain):
+def test_a_publisher_is_replaced_by_another(domain):
     with publishing(domain, 20), open_source("ros2:///xServTopic") as source:
         until(source, lambda a: "connection lost (the topic has no publisher)" in a.notices)
         with publishing(domain, 2000):
@@ -131,7 +131,7 @@ def fed(source, write):
         thread.join()
 
 
-def test_a_topic_that_nobody_publishes(domain, monkeypatch):
+def test_a_topic_without_publishers(domain, monkeypatch):
     monkeypatch.setattr(topic, "OPEN_TIMEOUT", 1.0)
     with pytest.raises(SourceError) as caught, open_source("ros2:///xServTopic"):
         pass
@@ -151,7 +151,7 @@ def test_a_topic_that_nobody_publishes(domain, monkeypatch):
     del write
 
 
-def test_a_publisher_that_says_nothing(domain, monkeypatch):
+def test_a_publisher_without_messages(domain, monkeypatch):
     monkeypatch.setattr(topic, "OPEN_TIMEOUT", 1.0)
     node = dds.Node(domain)
     write = node.writer("/xServTopic", known_definition("xela_server_ros2/SensStream", ros2=True))

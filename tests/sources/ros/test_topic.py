@@ -105,7 +105,7 @@ def test_the_first_messages_are_samples_too(link):
     assert link.n_closed == 2  # before it opens, and after
 
 
-def test_devices_that_come_one_by_one_are_gathered(link):
+def test_devices_that_come_one_by_one_are_all_found(link):
     for number in (1, 2, 3, 1):
         link.samples(number, number)
     with source(link) as one:
@@ -229,7 +229,7 @@ def test_dropped_messages_are_reported(link):
 
 
 @pytest.mark.parametrize(
-    ("text", "told"),
+    ("text", "message"),
     [
         ("ros2://host/xServTopic", "ros2:///TOPIC expected, as in ros2:///xServTopic"),
         ("ros1:xServTopic", "ros1:///TOPIC expected, as in ros1:///xServTopic"),
@@ -239,9 +239,9 @@ def test_dropped_messages_are_reported(link):
         ("ros2:///a?fingers=thumb", "fingers=1:thumb,2:index expected, 'thumb' given"),
     ],
 )
-def test_bad_addresses(text, told):
+def test_bad_addresses(text, message):
     address = parse(text)[1]
-    with pytest.raises(ValueError, match=told):
+    with pytest.raises(ValueError, match=message):
         TopicSource(address, Script()) if "?" in text else topic_of(address)
 
 

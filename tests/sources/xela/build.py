@@ -30,8 +30,8 @@ def counts(n_taxels, k=0):
 def sensor(readings, model="uSPa44", **fields):
     """A sensor of a packet, as version 1.7 has it; a field of None is left out."""
     data = ",".join(f"{value:04X}" for value in np.ravel(readings))
-    told = {"data": data, "sensor": "1", "taxels": len(readings), "model": model}
-    return {name: value for name, value in (told | fields).items() if value is not None}
+    default = {"data": data, "sensor": "1", "taxels": len(readings), "model": model}
+    return {name: value for name, value in (default | fields).items() if value is not None}
 
 
 def text(k, sensors, **fields):

@@ -1,4 +1,4 @@
-"""Servers that say what a test wants them to."""
+"""Servers that send the messages of a test."""
 
 import socket
 from contextlib import contextmanager
@@ -12,40 +12,40 @@ from websockets.sync.server import serve
 from holdfast.sources.xela.client import _LOGGER
 
 HANG_UP = object()
-"""What makes a server end a connection."""
+"""Message that makes the server close a connection."""
 
 
 @contextmanager
 def server(first=(), *, port=0, broken=False):
-    """A server at a port, and a queue of what it says after `first` to whoever comes.
+    """A server at a port, and a queue of its messages after `first` to each client.
 
     Args:
-        first: said to every client at once.
-        port: 0 for any.
-        broken: it hangs up at once, without a word.
+        first: sent to every client at once.
+        port: 0 for any free port.
+        broken: it closes each connection at once.
     """
-    said = SimpleQueue()
+    queue = SimpleQueue()
 
-    def greet(connection):
+    def send(connection):
         try:
-            for word in first:
-                connection.send(word)
-            while not broken and (word := said.get()) is not HANG_UP:
-                if connection.state is not State.OPEN:  # it is for whoever came after
-                    said.put(word)
+            for message in first:
+                connection.send(message)
+            while not broken and (message := queue.get()) is not HANG_UP:
+                if connection.state is not State.OPEN:  # it is for the next client
+                    queue.put(message)
                     return
-                connection.send(word, text=True)  # bytes too, be they no UTF-8
+                connection.send(message, text=True)  # bytes too, be they no UTF-8
         except ConnectionClosed:
             pass
 
-    with serve(greet, "127.0.0.1", port, compression=None, close_timeout=1, logger=_LOGGER) as one:
+    with serve(send, "127.0.0.1", port, compression=None, close_timeout=1, logger=_LOGGER) as one:
         thread = Thread(target=one.serve_forever)
         thread.start()
         try:
-            yield one.socket.getsockname()[1], said
+            yield one.socket.getsockname()[1], queue
         finally:
             for _ in range(20):
-                said.put(HANG_UP)
+                queue.put(HANG_UP)
             one.shutdown()
             thread.join()
 

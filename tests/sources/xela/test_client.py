@@ -73,7 +73,7 @@ class TestOpening:
         with server(words) as (port, _), open_source(f"xela://127.0.0.1:{port}") as source:
             assert source.read(PATIENCE).time == START + 3 * PERIOD
 
-    def test_what_is_to_be_known_of_a_sensor_comes_first(self):
+    def test_notices_about_a_sensor_come_first(self):
         with server([NEW]) as (port, _), open_source(f"xela://127.0.0.1:{port}") as source:
             first = source.read(PATIENCE)
         assert list(first.samples) == ["finger1"]
@@ -140,7 +140,7 @@ class TestOpening:
             "with its sensors plugged in?"
         )
 
-    def test_what_comes_makes_no_sense(self, monkeypatch):
+    def test_only_invalid_packets_come(self, monkeypatch):
         monkeypatch.setattr(module, "OPEN_TIMEOUT", 0.3)
         broken = text(1, [sensor(counts(16), data="?")])
         with server([WELCOME, broken]) as (port, _), pytest.raises(SourceError) as refusal:
@@ -150,17 +150,17 @@ class TestOpening:
             "number expected in data, with commas between"
         )
 
-    def test_it_hangs_up(self):
+    def test_the_server_closes_the_connection(self):
         with server(broken=True) as (port, _), pytest.raises(SourceError) as refusal:
             open_source(f"xela://127.0.0.1:{port}").__enter__()
         assert str(refusal.value).startswith(f"127.0.0.1:{port} closed the connection: ")
 
     @pytest.mark.parametrize(
-        ("query", "told"),
+        ("query", "message"),
         [("values=calibrated", "has no calibrated values"), ("fingers=4:ring", "fingers= names 4")],
     )
-    def test_it_is_not_what_was_asked_for(self, query, told):
-        with server([patch(1)]) as (port, _), pytest.raises(SourceError, match=told):
+    def test_it_does_not_fit_the_parameters(self, query, message):
+        with server([patch(1)]) as (port, _), pytest.raises(SourceError, match=message):
             open_source(f"xela://127.0.0.1:{port}?{query}").__enter__()
 
 
@@ -188,7 +188,7 @@ class TestReading:
             arrival = until(source, lambda a: a.faults)[-1]
         assert (arrival.samples, arrival.faults) == ({}, {"finger1": (Fault.TAXEL_COUNT,)})
 
-    def test_silence_is_told_once(self, quick):
+    def test_silence_is_reported_once(self, quick):
         with server([patch(1)]) as (port, said), open_source(f"xela://127.0.0.1:{port}") as source:
             until(source, says("no new sample for 0.05 s"))
             silent_until = time.monotonic() + 0.3
@@ -243,7 +243,7 @@ class TestReconnecting:
             (*_, sample) = until(source, lambda a: a.samples)
         assert (sample.time, sample.n_lost) == (START + 5 * PERIOD, 0)
 
-    def test_a_server_that_was_started_anew(self, quick):
+    def test_a_restarted_server(self, quick):
         port = free_port()
         with ExitStack() as stack:
             with server([patch(k, message=90 + k) for k in range(10)], port=port):
@@ -267,7 +267,7 @@ class TestReconnecting:
             said.put(patch(7))
             assert until(source, lambda a: a.samples)[-1].time == START + 7 * PERIOD
 
-    def test_attempts_become_rarer(self, monkeypatch):
+    def test_attempts_become_less_frequent(self, monkeypatch):
         """Half a second, then twice as long each time, two seconds at the most."""
         waits = []
         now = [1000.0]

@@ -47,31 +47,31 @@ class TestSamples:
     @pytest.mark.parametrize("first", [OLD, NEW])
     def test_both_versions(self, first):
         (arrival,) = taught(first).decode(first, 5.0)
-        told = json.loads(first)
-        assert arrival.time == told["1"].get("time", told["time"])
+        fields = json.loads(first)
+        assert arrival.time == fields["1"].get("time", fields["time"])
         assert arrival.received == 5.0
 
     def test_real_packets(self, real_packets):
         for whole in real_packets.values():
             decoder = taught(whole)
             arrivals = decoder.decode(whole, 0.0)
-            told = json.loads(whole)
-            n_values = sum(len(told[str(n)]["integer"]) for n in decoder.devices)
+            fields = json.loads(whole)
+            n_values = sum(len(fields[str(n)]["integer"]) for n in decoder.devices)
             assert sum(s.size for a in arrivals for s in a.samples.values()) == n_values
             samples = {name: s for a in arrivals for name, s in a.samples.items()}
             assert samples.keys() == decoder.sensors.keys()
             for number, skin in decoder.devices.items():
-                flat = np.array(told[str(number)]["integer"]).reshape(-1, 3)
+                flat = np.array(fields[str(number)]["integer"]).reshape(-1, 3)
                 for name, expected in skin.split(flat).items():
                     np.testing.assert_array_equal(samples[name], expected)
 
     def test_real_newtons(self, real_packets):
         decoder = taught(real_packets["uSPa46"], calibrated=True)
         arrivals = decoder.decode(real_packets["uSPa46"], 0.0)
-        told = json.loads(real_packets["uSPa46"])
+        fields = json.loads(real_packets["uSPa46"])
         samples = {name: s for a in arrivals for name, s in a.samples.items()}
         for number in (1, 2):
-            expected = np.reshape(told[str(number)]["calibrated"], (24, 3))
+            expected = np.reshape(fields[str(number)]["calibrated"], (24, 3))
             np.testing.assert_array_equal(samples[f"finger{number}"], expected)
 
     def test_a_whole_hand(self):
@@ -102,12 +102,12 @@ class TestSamples:
 
 class TestLearning:
     @pytest.mark.parametrize("packet", [WELCOME, '{"message": "error", "data": []}'])
-    def test_nothing_is_learnt_from_what_has_no_samples(self, packet):
+    def test_a_packet_without_samples_identifies_nothing(self, packet):
         decoder = XelaDecoder()
         assert not decoder.identify(packet)
         assert decoder.sensors == {}
 
-    def test_what_the_server_tells(self):
+    def test_metadata_of_the_server(self):
         decoder = taught(NEW, names={1: "thumb"})
         assert list(decoder.sensors) == ["thumb"]
         assert decoder.metadata == {
@@ -116,7 +116,7 @@ class TestLearning:
         }
 
     @pytest.mark.parametrize(
-        ("packet", "told"),
+        ("packet", "message"),
         [
             ("?", "malformed"),
             (text(1, []), "it has no sensors"),
@@ -125,8 +125,8 @@ class TestLearning:
             (text(1, [sensor(counts(16)), sensor(counts(16), data="?")]), "sensor 2: "),
         ],
     )
-    def test_packets_that_make_no_sense(self, packet, told):
-        with pytest.raises(InvalidPacket, match=told):
+    def test_invalid_packets(self, packet, message):
+        with pytest.raises(InvalidPacket, match=message):
             XelaDecoder().identify(packet)
 
     def test_damaged_packets_are_refused_or_do_not_fit(self):
@@ -152,7 +152,7 @@ class TestLearning:
 
 
 class TestRepeats:
-    def test_a_packet_that_comes_again_is_no_sample(self):
+    def test_a_repeated_packet_is_no_sample(self):
         packets = [patch(k // 3) for k in range(30)]
         arrivals = fed(taught(packets[0]), packets)
         assert [a.time for a in arrivals] == [START + k * PERIOD for k in range(10)]
@@ -187,16 +187,16 @@ class TestCounter:
         packets = [patch(k, message=n) for k, n in enumerate(numbers)]
         assert [a.n_lost for a in fed(taught(packets[0]), packets)] == [0, 0, 0, 1]
 
-    @pytest.mark.parametrize("told", [True, False])
-    def test_a_restart_loses_nothing(self, told):
+    @pytest.mark.parametrize("reported", [True, False])
+    def test_a_restart_loses_nothing(self, reported):
         decoder = taught(patch(5000))
         fed(decoder, [patch(5000)])
-        if told:
+        if reported:
             decoder.reconnected()
         arrivals = fed(decoder, [patch(5001, message=0), patch(5002, message=1)], 100.01)
         assert [a.n_lost for a in arrivals] == [0, 0]
 
-    def test_a_counter_that_went_on_while_nobody_listened_loses_nothing(self):
+    def test_a_counter_that_continued_while_disconnected_loses_nothing(self):
         decoder = taught(patch(1))
         fed(decoder, [patch(1)])
         decoder.reconnected()
@@ -297,7 +297,7 @@ class TestTimes:
 
 
 class TestRefusals:
-    def test_a_sensor_that_makes_no_sense_does_not_spoil_the_others(self):
+    def test_an_invalid_sensor_does_not_affect_the_others(self):
         good = [sensor(counts(16, k)) for k in (1, 2)]
         decoder = taught(text(1, good))
         (arrival,) = decoder.decode(text(2, [good[0], sensor(counts(16), data="ZZ")]), 0.0)
@@ -308,7 +308,7 @@ class TestRefusals:
             "commas between",
         )
 
-    def test_garbage_is_counted_and_told_once_a_second(self):
+    def test_garbage_is_counted_and_reported_once_a_second(self):
         decoder = taught(patch(0))
         arrivals = fed(decoder, ["garbage"] * 250)
         assert len(arrivals) == 3
@@ -320,24 +320,24 @@ class TestRefusals:
 
     def test_a_packet_with_two_bad_sensors_is_refused_once(self):
         decoder = taught(text(0, [sensor(counts(16)), sensor(counts(16))]))
-        (told,) = decoder.decode(text(1, [{"data": "?"}, {"data": "?"}]), 0.0)
-        assert told.n_refused == 1
-        assert len(told.notices) == 2
+        (arrival,) = decoder.decode(text(1, [{"data": "?"}, {"data": "?"}]), 0.0)
+        assert arrival.n_refused == 1
+        assert len(arrival.notices) == 2
 
     def test_data_and_integer_that_differ(self):
         decoder = taught(patch(0))
         wrong = counts(16)
         integer = [*wrong.ravel().tolist()[:-1], 5]
-        (told,) = decoder.decode(text(1, [sensor(wrong, integer=integer)]), 0.0)
-        assert told.notices == ("sensor 1 is invalid: data and integer differ",)
-        assert told.samples == {}
+        (arrival,) = decoder.decode(text(1, [sensor(wrong, integer=integer)]), 0.0)
+        assert arrival.notices == ("sensor 1 is invalid: data and integer differ",)
+        assert arrival.samples == {}
 
     def test_newtons_that_are_gone(self):
         packet = text(1, [sensor([[1, 2, 3]], "odd", calibrated=[1, 2, 3])])
         decoder = taught(packet, calibrated=True)
-        (told,) = decoder.decode(text(2, [sensor([[1, 2, 3]], "odd", calibrated=None)]), 0.0)
-        assert told.notices == ("sensor 1 is invalid: it has no readings",)
-        assert (told.n_refused, told.samples) == (1, {})
+        (arrival,) = decoder.decode(text(2, [sensor([[1, 2, 3]], "odd", calibrated=None)]), 0.0)
+        assert arrival.notices == ("sensor 1 is invalid: it has no readings",)
+        assert (arrival.n_refused, arrival.samples) == (1, {})
 
     def test_another_number_of_taxels(self):
         decoder = taught(text(0, [sensor(counts(16)), sensor(counts(16))]))
@@ -352,8 +352,8 @@ class TestRefusals:
 
     def test_another_number_of_taxels_of_a_whole_hand(self):
         decoder = taught(text(0, [sensor(counts(368), "XR23AHRCPP")]))
-        (told,) = decoder.decode(text(1, [sensor(counts(240), "XR23AHRCPP", taxels=240)]), 0.0)
-        assert told.faults == dict.fromkeys(hand("allegro-uskin").modules, (Fault.TAXEL_COUNT,))
+        (arrival,) = decoder.decode(text(1, [sensor(counts(240), "XR23AHRCPP", taxels=240)]), 0.0)
+        assert arrival.faults == dict.fromkeys(hand("allegro-uskin").modules, (Fault.TAXEL_COUNT,))
 
     def test_a_sensor_that_comes_later_is_left_out(self):
         decoder = taught(patch(0))
@@ -379,7 +379,7 @@ class TestRefusals:
         assert [a.faults for a in arrivals] == [{"finger1": (Fault.TAXEL_COUNT,)}] * 2
         assert [len(a.notices) for a in arrivals] == [1, 0]
 
-    def test_a_sensor_that_goes_is_missing(self):
+    def test_a_sensor_that_ends_is_missing(self):
         decoder = taught(text(0, [sensor(counts(16)), sensor(counts(16))]))
         (arrival,) = decoder.decode(patch(1), 0.0)
         assert list(arrival.samples) == ["finger1"]

@@ -53,8 +53,8 @@ def test_names():
     assert names == [["thumb"], ["index"], ["finger5"]]
 
 
-@pytest.mark.parametrize("model", ["uSPa35", "uspr-dsf", "never heard of"])
-def test_a_model_without_a_layout_is_flat_and_told(model):
+@pytest.mark.parametrize("model", ["uSPa35", "uspr-dsf", "not in the table"])
+def test_a_model_without_a_layout_is_flat_and_gives_a_notice(model):
     device = xela_devices({1: (model, 15)}, {})[1]
     (flat,) = device.modules.values()
     assert (flat.name, flat.n_taxels, flat.limits) == (model.lower(), 15, (0.0, 65535.0))
@@ -64,7 +64,7 @@ def test_a_model_without_a_layout_is_flat_and_told(model):
     )
 
 
-def test_even_with_as_many_taxels_as_a_built_in_one():
+def test_a_model_without_a_layout_with_the_taxels_of_a_built_in_sensor():
     (flat,) = xela_devices({1: ("uspr-dsf", 30)}, {})[1].modules.values()
     assert (flat.name, flat.n_taxels) == ("uspr-dsf", 30)
 

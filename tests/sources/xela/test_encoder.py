@@ -36,7 +36,7 @@ def samples_of(sensors, k=0):
     }
 
 
-def told(encoder, samples, time=START, sent=START + 1):
+def parsed(encoder, samples, time=START, sent=START + 1):
     return json.loads(encoder.packet(samples, time, sent))
 
 
@@ -67,7 +67,7 @@ def test_what_is_decoded_is_what_was_encoded(version, sensors):
 
 def test_fields_of_1_7():
     encoder = XelaEncoder({"thumb": sensor("uskin-4x4")}, version="1.7")
-    packet = told(encoder, {"thumb": np.full((16, 3), 0xFA0C)})
+    packet = parsed(encoder, {"thumb": np.full((16, 3), 0xFA0C)})
     assert list(packet) == ["message", "time", "sensors", "1"]
     assert packet["1"] == {
         "data": ",".join(["FA0C"] * 48),
@@ -86,7 +86,7 @@ def test_fields_of_1_7():
 )
 def test_fields_of_1_8_are_those_of_a_real_server(model, sensors, real_packets):
     real = json.loads(real_packets[model])
-    packet = told(XelaEncoder(sensors, version="1.8"), samples_of(sensors))
+    packet = parsed(XelaEncoder(sensors, version="1.8"), samples_of(sensors))
     assert list(packet) == [key for key in real if key != "2"]
     assert list(packet["1"]) == list(real["1"])
     for field, value in real["1"].items():
@@ -98,7 +98,7 @@ def test_fields_of_1_8_are_those_of_a_real_server(model, sensors, real_packets):
 
 def test_fields_of_1_8():
     encoder = XelaEncoder({"thumb": newtons()}, version="1.8")
-    packet = told(encoder, {"thumb": np.zeros((16, 3))})
+    packet = parsed(encoder, {"thumb": np.zeros((16, 3))})
     assert list(packet) == ["message", "time", "sensors", "type", "version", "1", "sendtime"]
     assert list(packet["1"]) == [
         "time", "sensor", "data", "model", "taxels",
@@ -111,23 +111,23 @@ def test_fields_of_1_8():
     )
 
 
-def test_the_first_word_is_welcome():
+def test_the_first_message_is_welcome():
     assert json.loads(XelaEncoder(TIPS, version="1.7").welcome()) == {"message": "Welcome"}
     assert json.loads(XelaEncoder(TIPS).welcome())["message"] == "Welcome"
 
 
 def test_the_counter_counts():
     encoder = XelaEncoder({"a": sensor("uskin-4x4")})
-    numbers = [told(encoder, {"a": np.zeros((16, 3))})["message"] for _ in range(3)]
+    numbers = [parsed(encoder, {"a": np.zeros((16, 3))})["message"] for _ in range(3)]
     assert numbers == [0, 1, 2]
     encoder._counter = 2**32 - 1
-    numbers = [told(encoder, {"a": np.zeros((16, 3))})["message"] for _ in range(2)]
+    numbers = [parsed(encoder, {"a": np.zeros((16, 3))})["message"] for _ in range(2)]
     assert numbers == [2**32 - 1, 0]
 
 
 def test_a_sensor_without_a_sample_is_left_out():
     encoder = XelaEncoder(TIPS)
-    packet = told(encoder, {"index": counts(30), "ring": counts(30, 1)})
+    packet = parsed(encoder, {"index": counts(30), "ring": counts(30, 1)})
     assert [key for key in packet if key.isdigit()] == ["2", "4"]
     assert packet["sensors"] == 2
     assert encoder.modules == {1: ("thumb",), 2: ("index",), 3: ("middle",), 4: ("ring",)}
@@ -156,7 +156,7 @@ class TestWholeHand:
         first, second = (a.samples["palm/1"] for a in decoded(XelaEncoder(WHOLE), packets[0])[:2])
         assert 0 < np.abs(first.astype(int) - second).max() <= 4
 
-    def test_a_module_without_a_sample_stays_as_it_was(self):
+    def test_a_module_without_a_sample_repeats_its_last(self):
         encoder = XelaEncoder(WHOLE)
         first = samples_of(WHOLE)
         thumb = {"thumb": counts(30, 77)}
@@ -182,7 +182,7 @@ class TestWholeHand:
             ({"thumb": sensor("uskin-4x4")}, "16 taxels given for thumb, 30 expected"),
         ],
     )
-    def test_what_is_no_part_of_it(self, sensors, text):
+    def test_modules_that_are_no_part_of_a_hand(self, sensors, text):
         with pytest.raises(ValueError) as refusal:
             XelaEncoder(sensors, whole_hand=True)
         assert str(refusal.value).startswith(f"--whole-hand: {text}")
@@ -195,13 +195,13 @@ class TestReadings:
     @given(arrays(np.float64, (16, 3), elements=st.floats(-0.49, 65535.49)))
     def test_floats_are_rounded(self, readings):
         encoder = XelaEncoder({"a": sensor("uskin-4x4")})
-        packet = told(encoder, {"a": readings})
+        packet = parsed(encoder, {"a": readings})
         assert packet["1"]["integer"] == [int(value) for value in np.rint(readings).ravel()]
 
     @pytest.mark.parametrize("kind", [np.int16, np.int32, np.uint16, np.float32, ">u2"])
     def test_number_types(self, kind):
         readings = np.arange(48).reshape(16, 3).astype(kind)
-        packet = told(XelaEncoder({"a": sensor("uskin-4x4")}), {"a": readings})
+        packet = parsed(XelaEncoder({"a": sensor("uskin-4x4")}), {"a": readings})
         assert packet["1"]["integer"] == list(range(48))
 
     @pytest.mark.parametrize(("wrong", "told_as"), [(-1, "-1 to 0"), (65536.0, "0 to 65536")])
@@ -215,11 +215,11 @@ class TestReadings:
             "server hold no others"
         )
 
-    def test_a_module_with_what_is_no_number_is_left_out(self):
+    def test_a_module_with_nan_is_left_out(self):
         two = dict.fromkeys("ab", sensor("uskin-4x4"))
         broken = np.zeros((16, 3))
         broken[0, 0] = np.nan
-        packet = told(XelaEncoder(two), {"a": broken, "b": np.zeros((16, 3))})
+        packet = parsed(XelaEncoder(two), {"a": broken, "b": np.zeros((16, 3))})
         assert "1" not in packet
         assert packet["2"]["integer"] == [0] * 48
 
@@ -241,13 +241,13 @@ class TestReadings:
             XelaEncoder({"a": sensor("uskin-4x4")}).packet({"a": np.zeros((15, 3))}, 0.0, 0.0)
 
 
-def test_a_sensor_that_xela_does_not_make_goes_by_its_name():
+def test_a_sensor_unknown_to_xela_keeps_its_name():
     own = Sensor("mine", np.zeros((2, 3)), np.tile(np.eye(3), (2, 1, 1)), np.array([0, 0, 1]), 50.0)
-    packet = told(XelaEncoder({"a": own}), {"a": np.zeros((2, 3))})
+    packet = parsed(XelaEncoder({"a": own}), {"a": np.zeros((2, 3))})
     assert (packet["1"]["model"], packet["1"]["ups"]) == ("mine", [50.0, 50.0])
 
 
-def test_a_version_that_there_is_not():
+def test_an_unknown_version():
     with pytest.raises(ValueError, match=r"version 1\.7 or 1\.8 expected, '2\.0' given"):
         XelaEncoder(TIPS, version="2.0")
 

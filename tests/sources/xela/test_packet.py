@@ -16,16 +16,16 @@ def readings(part, *, calibrated=False):
     return read_sensor(packet.sensors[1], calibrated=calibrated).readings()
 
 
-def test_real_packets_say_what_their_integers_say(real_packets):
+def test_real_packets_contain_the_same_counts_twice(real_packets):
     assert len(real_packets) == 7
     for whole in real_packets.values():
-        told = json.loads(whole)
+        fields = json.loads(whole)
         packet = read_packet(whole)
-        assert (packet.counter, packet.time) == (told["message"], told["time"])
-        assert packet.version == told["version"]
-        assert sorted(packet.sensors) == list(range(1, told["sensors"] + 1))
+        assert (packet.counter, packet.time) == (fields["message"], fields["time"])
+        assert packet.version == fields["version"]
+        assert sorted(packet.sensors) == list(range(1, fields["sensors"] + 1))
         for number, raw in packet.sensors.items():
-            one = told[str(number)]
+            one = fields[str(number)]
             part = read_sensor(raw, calibrated=False)
             assert (part.model, part.taxels, part.time) == (
                 one["model"],
@@ -70,7 +70,7 @@ def test_both_versions(kind, given, counter, version, expected):
         '{"message": 7, "time": 1.0, "type": "calibration"}',
     ],
 )
-def test_what_has_no_samples(given):
+def test_packets_without_samples(given):
     assert read_packet(given) is None
 
 
@@ -131,7 +131,7 @@ def test_what_is_not_finite_is_missing():
         ("\ud800", "surrogate"),
     ],
 )
-def test_packets_that_make_no_sense(given, why):
+def test_invalid_packets(given, why):
     with pytest.raises(InvalidPacket, match=f"(?i).*{why}") as refusal:
         read_packet(given)
     assert len(str(refusal.value)) <= 160
@@ -164,7 +164,7 @@ def test_packets_that_make_no_sense(given, why):
         ([], "Expected `object`, got `array`"),
     ],
 )
-def test_sensors_that_make_no_sense(part, why):
+def test_invalid_sensors(part, why):
     with pytest.raises(InvalidPacket) as refusal:
         readings(part)
     assert why in str(refusal.value)
@@ -178,13 +178,13 @@ def test_sensors_that_make_no_sense(part, why):
         ({"calibrated": [1.0, "2", 3.0]}, "Expected `float | null`, got `str`"),
     ],
 )
-def test_newtons_that_make_no_sense(part, why):
+def test_invalid_newtons(part, why):
     with pytest.raises(InvalidPacket) as refusal:
         readings(part, calibrated=True)
     assert why in str(refusal.value)
 
 
-def test_newtons_do_not_ask_for_good_counts():
+def test_newtons_do_not_need_valid_counts():
     part = sensor([[1, 2, 3]], data="?", integer=["?"], calibrated=[1.0, 2, -3.5])
     assert readings(part, calibrated=True).tolist() == [[1.0, 2.0, -3.5]]
     assert readings(sensor([[1, 2, 3]], calibrated="?")).tolist() == [[1, 2, 3]]

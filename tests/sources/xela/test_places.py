@@ -27,7 +27,7 @@ def test_addresses(text, expected):
     assert found(text) == expected
 
 
-def test_auto_tries_the_address_on_the_way_out_too(monkeypatch):
+def test_auto_also_tries_the_address_of_the_default_route(monkeypatch):
     monkeypatch.setattr(module, "own_address", lambda: "10.1.2.3")
     assert found("xela://auto") == ["127.0.0.1:5000", "10.1.2.3:5000"]
     assert found("xela://auto:6000") == ["127.0.0.1:6000", "10.1.2.3:6000"]
@@ -45,7 +45,7 @@ def test_the_own_address_is_one_or_none():
         socket.inet_aton(own)
 
 
-def test_without_a_way_out_there_is_no_own_address(monkeypatch):
+def test_without_a_default_route_there_is_no_own_address(monkeypatch):
     def refuse(*_):
         raise OSError("Network is unreachable")
 
@@ -63,11 +63,11 @@ def test_without_a_way_out_there_is_no_own_address(monkeypatch):
         "xela://me@host",
     ],
 )
-def test_what_is_no_address(text):
+def test_invalid_addresses(text):
     with pytest.raises(ValueError, match="xela://HOST:PORT or xela://auto expected") as refusal:
         found(text)
     assert str(refusal.value).startswith(f"{text}: ")
 
 
-def test_a_place_reads_as_people_write_it():
+def test_a_place_as_text():
     assert (str(Place("a", 1)), str(Place("fe80::1", 2))) == ("a:1", "[fe80::1]:2")

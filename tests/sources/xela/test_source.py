@@ -14,7 +14,7 @@ def test_a_uri_makes_a_source_and_does_not_connect():
     assert (source.paced, source.ended) == (True, False)
 
 
-def test_a_sensor_of_ones_own(tmp_path):
+def test_a_sensor_from_a_file(tmp_path):
     path = tmp_path / "mine.json"
     path.write_text(json.dumps(sensor("uskin-4x4").to_dict()))
     assert isinstance(open_source(f"xela://auto?sensor={path}"), XelaSource)
