@@ -6,7 +6,7 @@ plain values, described by a `Definition`; nothing is generated from a definitio
 
 import struct
 from collections.abc import Callable, Mapping, Sequence
-from typing import Any
+from typing import Any, Literal
 
 import numpy as np
 import numpy.typing as npt
@@ -18,7 +18,9 @@ HEAD = b"\x00\x01\x00\x00"
 
 _CODES = dict(zip(NUMBER_CODES, "?BBbBhHiIqQfd", strict=True))
 """Codes of `struct` for the number types of ROS."""
-_DTYPES = {kind: np.dtype("<" + code) for kind, code in NUMBER_CODES.items()}
+_LITTLE_ENDIAN = {kind: np.dtype("<" + code) for kind, code in NUMBER_CODES.items()}
+_BIG_ENDIAN = {kind: np.dtype(">" + code) for kind, code in NUMBER_CODES.items()}
+_NATIVE = {kind: np.dtype(code) for kind, code in NUMBER_CODES.items()}
 _PADDING = tuple(bytes(n) for n in range(8))
 
 
@@ -142,8 +144,8 @@ class MessageEncoder:
 def _append_numbers(data: bytearray, kind: str, values: Sequence[float] | npt.NDArray[Any]) -> None:
     """Append numbers, aligned to their size; an array of the same type is copied as a whole."""
     if len(values):
-        data += _PADDING[-len(data) % _DTYPES[kind].itemsize]
-    if isinstance(values, np.ndarray) and values.dtype == _DTYPES[kind]:
+        data += _PADDING[-len(data) % _LITTLE_ENDIAN[kind].itemsize]
+    if isinstance(values, np.ndarray) and values.dtype == _LITTLE_ENDIAN[kind]:
         data += values.tobytes()
     else:
         data += struct.pack(f"<{len(values)}{_CODES[kind]}", *values)
@@ -168,24 +170,29 @@ class _Ros1Bytes:
     def __init__(self, data: bytes) -> None:
         self._data = data
         self._place = 0
-        self._byte_order = "<"
+        self._byte_order: Literal["little", "big"] = "little"
+        self._dtypes = _LITTLE_ENDIAN
 
     @property
     def n_left(self) -> int:
         return len(self._data) - self._place
 
     def array(self, kind: str, n: int) -> npt.NDArray[Any]:
-        dtype = np.dtype(self._byte_order + NUMBER_CODES[kind])
+        dtype = self._dtypes[kind]
         if n:
             self._align(dtype.itemsize)
         if n * dtype.itemsize > self.n_left:
             raise ValueError(f"the message is cut: {n} {kind} expected, {self.n_left} bytes left")
         values = np.frombuffer(self._data, dtype, n, self._place) if n else np.empty(0, dtype)
         self._place += values.nbytes
-        return values.astype(dtype.newbyteorder("="))
+        return values.astype(_NATIVE[kind])
 
     def length(self) -> int:
-        return int(self.array("uint32", 1)[0])
+        self._align(4)
+        if self.n_left < 4:
+            raise ValueError(f"the message is cut: 1 uint32 expected, {self.n_left} bytes left")
+        start, self._place = self._place, self._place + 4
+        return int.from_bytes(self._data[start : self._place], self._byte_order)
 
     def text(self) -> str:
         return self.array("uint8", self.length()).tobytes().decode()
@@ -203,7 +210,8 @@ class _CdrBytes(_Ros1Bytes):
         super().__init__(data)
         if len(data) < 4 or data[0] != 0 or data[1] > 1:
             raise ValueError("no CDR message")
-        self._byte_order = "<" if data[1] else ">"
+        if not data[1]:
+            self._byte_order, self._dtypes = "big", _BIG_ENDIAN
         self._place = 4
 
     def text(self) -> str:
