@@ -156,7 +156,7 @@ def test_stretches_without_label_or_probability_make_no_suspects():
     assert suspects([replace(part, labels=labels), calm("a"), calm("b")]) == []
 
 
-def test_the_weightiest_come_first_and_fingers_have_their_own_thresholds():
+def test_suspects_are_sorted_by_weight_and_thresholds_are_per_finger():
     spans = [(2.0, 2.2, UNSTABLE), (3.0, 3.5, UNSTABLE)]
     parts = [
         calm("a"),

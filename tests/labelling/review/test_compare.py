@@ -82,7 +82,7 @@ def test_two_states_that_are_both_not_stable_leave_only_the_binary_kappa_undefin
     assert found.kappa_stable is None
 
 
-def test_opposite_states_agree_as_chance_would():
+def test_opposite_states_agree_by_chance_only():
     assert of("ssss", "uuuu").kappa == 0.0
 
 
@@ -133,7 +133,7 @@ def test_a_gap_in_the_labels_hides_an_onset():
     assert (found.n, found.only_a, found.only_b) == (0, 1, 0)
 
 
-def test_letting_go_is_an_onset_and_taking_hold_is_none():
+def test_release_is_an_onset_and_closing_is_not():
     found = of("uussnn", "uussnn").onset_differences
     assert (found.n, found.values) == (1, [0.0])
 

@@ -75,7 +75,7 @@ SHARES = st.tuples(*3 * [st.integers(0, 20)]).map(lambda row: np.array(row) / ma
 
 
 @given(st.lists(st.tuples(st.integers(0, 3), SHARES), min_size=1))
-def test_as_by_a_loop(rows):
+def test_contradictions_equal_those_of_a_loop(rows):
     labels = np.array([label for label, _ in rows])
     probabilities = np.array([row for _, row in rows])
     thresholds = confident_thresholds(labels, probabilities)

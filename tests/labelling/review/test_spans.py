@@ -13,7 +13,7 @@ LETTERS = {"n": ContactState.NO_CONTACT, "u": ContactState.UNSTABLE, "s": Contac
 
 
 @given(st.text("nus ", min_size=1, max_size=12), st.randoms())
-def test_spans_say_what_the_labels_say(text, random):
+def test_spans_have_the_intervals_of_the_labels(text, random):
     times = np.arange(float(len(text)))
     each = [
         label
@@ -31,7 +31,7 @@ def test_spans_say_what_the_labels_say(text, random):
     assert all(a.end < b.start or a.state != b.state for a, b in pairwise(spans))
 
 
-def test_a_gap_parts_labels_of_one_state():
+def test_a_gap_separates_labels_of_one_state():
     labels = [Label(0.0, 1.0, ContactState.STABLE), Label(1.01, 2.0, ContactState.STABLE)]
     assert len(spans_of(labels)) == 2
 
@@ -43,7 +43,7 @@ def test_states_have_names_and_codes():
     assert codes == [NO_CONTACT, UNSTABLE, STABLE]
 
 
-def test_overlap_is_how_long_both_last():
+def test_overlap_is_the_common_duration():
     span = Span(1.0, 3.0, "stable")
     assert span.overlap(Span(2.5, 9.0, "stable")) == 0.5
     assert span.overlap(Span(3.0, 9.0, "stable")) == 0.0
@@ -63,14 +63,14 @@ def test_the_most_doubtful_comes_first():
     assert found == [("index", 0.1), ("thumb", 0.5), ("thumb", 0.79)]
 
 
-def test_of_equals_the_longest_comes_first_and_then_the_earliest():
+def test_of_equal_confidence_the_longest_comes_first_and_then_the_earliest():
     labels = {"b": [label(5, 6, 0.3), label(0, 2, 0.3)], "a": [label(0, 1, 0.3)]}
     found = [(finger, each.start) for finger, each in doubtful(labels)]
     assert found == [("b", 0), ("a", 0), ("b", 5)]
 
 
 @given(st.dictionaries(st.text(max_size=3), st.lists(st.floats(0, 1)), max_size=3), st.floats(0, 1))
-def test_all_below_and_nothing_else(confidences, below):
+def test_only_labels_below_the_limit(confidences, below):
     labels = {
         finger: [label(k, k + 1, each) for k, each in enumerate(given)]
         for finger, given in confidences.items()
@@ -81,6 +81,6 @@ def test_all_below_and_nothing_else(confidences, below):
     assert [c for _, c in found] == sorted(c for _, c in found)
 
 
-def test_a_confidence_that_is_none():
+def test_invalid_confidence():
     with pytest.raises(ValueError, match="a confidence from 0 to 1 expected, 80 given"):
         doubtful({}, below=80)

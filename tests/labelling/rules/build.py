@@ -1,4 +1,4 @@
-"""A grasp whose every instant is known: forces on flat patches, and poses of the object."""
+"""A synthetic grasp with known states: forces on flat patches, and poses of the object."""
 
 import numpy as np
 from scipy.spatial.transform import Rotation
@@ -21,7 +21,7 @@ SPANS = (
     ("UNSTABLE", RELEASE, FREE),
     ("NO_CONTACT", FREE, DURATION),
 )
-"""What a careful person would draw."""
+"""Labels that a careful person would draw: state, start and end [s]."""
 
 
 def clock(start=0.0, rate=RATE):
@@ -29,7 +29,7 @@ def clock(start=0.0, rate=RATE):
 
 
 def profile(times, push=0.2):
-    """The force of a finger in times of the grip: (n, 3)."""
+    """Force of a finger over the grip force: (n, 3)."""
     knots = [0, CLOSING, LOCKED, RELEASE, FREE, DURATION]
     normal = np.interp(times, knots, [0, 0, 1, 1, 0, 0])
     inside = (times >= PUSH) & (times < PUSHED)
@@ -38,14 +38,14 @@ def profile(times, push=0.2):
 
 
 def module(times, force, seed=0, scale=1.0):
-    """A patch on which a force (n, 3) rests, evenly, with noise."""
+    """Readings of a patch with an evenly distributed force (n, 3) and noise."""
     noise = np.random.default_rng(seed).normal(0, NOISE, (len(times), PATCH.n_taxels, 3))
     readings = force[:, None, :] / PATCH.n_taxels + noise
     return Tactile(PATCH, times, 1000 + scale * readings)
 
 
 def grasp(start=0.0, scale=1.0, push=0.2, rate=RATE, fingers=("thumb", "index"), **more):
-    """A recording of the whole grasp; the push shows on every finger."""
+    """Recording of the whole grasp; all fingers feel the push."""
     times = clock(rate=rate)
     modules = {
         name: module(times + start, GRIP * profile(times, push), seed, scale)
@@ -55,7 +55,7 @@ def grasp(start=0.0, scale=1.0, push=0.2, rate=RATE, fingers=("thumb", "index"),
 
 
 def slide(times, moves=((CLOSING, LOCKED), (PUSH, PUSHED)), speed=0.02):
-    """How far the object has slid (n,) [m], at a speed within the moves."""
+    """Distance (n,) that the object has slid, at a constant speed [m/s] during the moves [m]."""
     rate = np.zeros_like(times)
     for start, end in moves:
         rate[(times >= start) & (times < end)] = speed
@@ -63,7 +63,7 @@ def slide(times, moves=((CLOSING, LOCKED), (PUSH, PUSHED)), speed=0.02):
 
 
 def poses(times, way, turn=None, jitter=0.0, seed=0):
-    """The object's pose (n, 7), slid along x by `way`, turned about z by `turn` [rad]."""
+    """Poses (n, 7) of the object, shifted along x by `way` [m] and turned about z by `turn` [rad]."""
     rng = np.random.default_rng(seed)
     turns = Rotation.from_rotvec(
         np.outer(np.zeros_like(times) if turn is None else turn, [0, 0, 1])
@@ -75,14 +75,14 @@ def poses(times, way, turn=None, jitter=0.0, seed=0):
 
 
 def moved(pose, rotation, translation):
-    """The same poses in another frame of the world."""
+    """The same poses in another world frame."""
     turned = rotation * Rotation.from_quat(np.roll(pose[:, 3:], -1, axis=1))
     place = rotation.apply(pose[:, :3]) + translation
     return np.concatenate([place, np.roll(turned.as_quat(), 1, axis=1)], axis=1)
 
 
 def tracked(object_pose, tip_pose=None, start=0.0, **more):
-    """The grasp, with poses of the object and of fingertips that stay where they are."""
+    """Recording of the grasp with poses of the object and of fingertips, fixed by default."""
     times = clock()
     if tip_pose is None:
         tip_pose = poses(times, np.zeros_like(times))
@@ -97,7 +97,7 @@ def drawn(labels):
 
 
 def check(labels, within, spans=SPANS, start=0.0):
-    """That the labels are those spans, with every edge so near [s]."""
+    """Check that the labels have those spans, with every edge within a tolerance [s]."""
     assert [label.state.value for label in labels] == [state for state, _, _ in spans]
     for label, (_, first, last) in zip(labels, spans, strict=True):
         assert abs(label.start - start - first) <= within

@@ -30,7 +30,7 @@ def test_contact_begins_and_ends_where_the_force_does():
     assert touching[-1] == pytest.approx(FREE, abs=0.05)
 
 
-def test_a_short_knock_is_not_the_grip_force_force():
+def test_a_short_knock_is_not_the_grip_force():
     times = clock()
     force = GRIP * profile(times)
     force[500:505] *= 30

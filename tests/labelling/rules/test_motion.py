@@ -124,7 +124,7 @@ def test_smooth_motion_is_no_noise():
     assert motion.speed_noise < 0.01 * motion.speed.max()
 
 
-def test_how_far_it_is_from_a_pose():
+def test_distance_and_angle_from_a_pose():
     thing = track(np.outer(GRID, [0.01, 0, 0]), turning(0.2, [0, 0, 1]))
     far, turned = motion_of(thing, GRID).away_from(np.zeros(3), np.eye(3), None)
     assert far == pytest.approx(0.01 * GRID, abs=1e-9)

@@ -109,14 +109,14 @@ def test_poses_of_another_shape():
         poses_from_truth(recording(truth))
 
 
-def test_times_of_a_track_go_forward():
+def test_times_of_a_track_must_increase():
     with pytest.raises(
         RecordingError, match="times of poses must be finite and strictly increasing"
     ):
         PoseTrack(np.array([0.0, 0.0]), np.zeros((2, 3)), np.zeros((2, 4)))
 
 
-def test_arrays_of_a_track_belong_together():
+def test_arrays_of_a_track_must_have_equal_lengths():
     with pytest.raises(RecordingError, match=r"poses of shapes \(2, 3\) and \(2, 4\) expected"):
         PoseTrack(np.arange(2.0), np.zeros((2, 2)), np.zeros((2, 4)))
 

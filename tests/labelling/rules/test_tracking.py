@@ -188,7 +188,7 @@ def test_unreliable_clocks_halve_the_confidence():
     assert label.confidence <= 0.5
 
 
-def test_displacement_is_trouble_until_the_object_is_back():
+def test_displacement_is_unstable_until_the_object_is_back():
     times = clock()
     way = slide(times, ((PUSH, PUSHED),)) - slide(times, ((8.0, 8.8),))
     rule = TrackingRule(measure="displacement", distance=0.008)

@@ -188,7 +188,7 @@ def test_the_default_author_is_that_of_the_workspace(tmp_path):
     assert load_labels(labels_path(path)).author == "ada"
 
 
-def test_labels_inside_are_kept_by_the_first_to_save(tmp_path):
+def test_the_first_save_keeps_labels_inside(tmp_path):
     path = made(tmp_path, bare=False)
     _, reply = ask([path], OPEN)[0]
     assert reply["origin"] == "inside"
@@ -313,7 +313,7 @@ def test_a_file_that_may_only_be_read(tmp_path):
     assert saved[1]["error"].endswith("cannot be written: it or its folder is read-only")
 
 
-def test_a_disk_that_refuses(tmp_path, monkeypatch):
+def test_a_failed_write(tmp_path, monkeypatch):
     path = made(tmp_path)
 
     def full(*_):

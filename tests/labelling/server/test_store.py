@@ -207,12 +207,12 @@ def test_labels_that_contradict(bare, labels, text):
         ),
     ],
 )
-def test_labels_that_are_none(given, text):
+def test_invalid_labels(given, text):
     with pytest.raises(ValueError, match=text):
         parse_labels({"thumb": [given]})
 
 
-def test_labels_that_are_given():
+def test_valid_labels():
     given = LabelInput(4.0, 5.0, "unstable", "lost", "seen", 0.7, "eve")
     assert parse_labels({"thumb": [given], "index": []}) == {"thumb": (LOST,), "index": ()}
 

@@ -123,7 +123,7 @@ def test_the_warm_up_reads_nothing(tmp_path):
         kept.signals(0)
 
 
-def test_recordings_that_are_gone(tmp_path):
+def test_recordings_that_were_deleted(tmp_path):
     kept = workspace_of(made(tmp_path, "one"))
     assert kept.open(0).recording.name == "one"
     kept.paths[0].unlink()
@@ -200,7 +200,7 @@ def test_a_recording_without_a_sample(tmp_path):
 
 
 @pytest.mark.parametrize("name", ["a.parquet", "a.mcap", "a.txt"])
-def test_files_that_are_no_recordings(tmp_path, name):
+def test_files_that_are_not_recordings(tmp_path, name):
     (tmp_path / name).write_bytes(msgspec.json.encode({"a": 1}) * 10)
     with pytest.raises(RecordingError):
         summary_of(tmp_path / name)

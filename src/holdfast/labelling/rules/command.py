@@ -64,7 +64,7 @@ _STATES: dict[str, tuple[int, Cause | None]] = {
 }
 
 
-class Command(NamedTuple):
+class ProtocolMarker(NamedTuple):
     """A marker of the protocol.
 
     Attributes:
@@ -94,7 +94,9 @@ def propose(
         RecordingError: no marker has a known word, or no sample for the tare.
         ValueError: the tare is unknown.
     """
-    commands = [Command(each.time - delay, each.word) for each in commands_of(recording)]
+    commands = [
+        ProtocolMarker(each.time - delay, each.word) for each in protocol_markers(recording)
+    ]
     if not commands:
         raise RecordingError(
             f"recording {recording.name!r} has no marker of the protocol: one of "
@@ -108,10 +110,10 @@ def propose(
     }
 
 
-def commands_of(recording: Recording) -> list[Command]:
+def protocol_markers(recording: Recording) -> list[ProtocolMarker]:
     """Return the markers with a known word in order of time; others are ignored."""
     found = ((time, command_word(text)) for time, text in sorted(recording.markers))
-    return [Command(time, word) for time, word in found if word]
+    return [ProtocolMarker(time, word) for time, word in found if word]
 
 
 def command_word(text: str) -> str | None:
@@ -134,7 +136,7 @@ def command_word(text: str) -> str | None:
 
 
 def _timeline(
-    finger: FingerForce, hand: HandForce, commands: list[Command], opening: float
+    finger: FingerForce, hand: HandForce, commands: list[ProtocolMarker], opening: float
 ) -> StateTimeline:
     timeline = StateTimeline.unknown(hand.times)
     times, known = hand.times, finger.known
@@ -151,10 +153,10 @@ def _timeline(
     return timeline
 
 
-def _spans(commands: list[Command]) -> Iterator[tuple[Command, float, float]]:
+def _spans(commands: list[ProtocolMarker]) -> Iterator[tuple[ProtocolMarker, float, float]]:
     """Yield each command that is not a repetition, its end [s], and its evidence ratio."""
     groups = [list(group) for _, group in groupby(commands, key=lambda each: each.word)]
-    for group, following in pairwise([*groups, [Command(np.inf, "")]]):
+    for group, following in pairwise([*groups, [ProtocolMarker(np.inf, "")]]):
         ended = len(group) == 1 and following[0].word in ("locked", "lost")
         open_ended = group[0].word == "disturbance" and not ended
         yield group[0], following[0].time, OPEN_ENDED_RATIO if open_ended else CLEAR_RATIO
