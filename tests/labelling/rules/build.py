@@ -63,7 +63,7 @@ def slide(times, moves=((CLOSING, LOCKED), (PUSH, PUSHED)), speed=0.02):
 
 
 def poses(times, way, turn=None, jitter=0.0, seed=0):
-    """Poses (n, 7) of the object, shifted along x by `way` [m] and turned about z by `turn` [rad]."""
+    """Poses (n, 7) of the object, at x = `way` [m], turned about z by `turn` [rad]."""
     rng = np.random.default_rng(seed)
     turns = Rotation.from_rotvec(
         np.outer(np.zeros_like(times) if turn is None else turn, [0, 0, 1])
