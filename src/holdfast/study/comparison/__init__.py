@@ -1,1 +1,1 @@
-"""What the paper did not ask: methods, events, errors, sensitivities, real recordings."""
+"""Parts of the study beyond the paper: all methods, sensitivity, real recordings."""

@@ -1,1 +1,1 @@
-"""One method on one corpus: fitted, judged, and counted."""
+"""Evaluation of one method: fit it, score recordings, count errors and alarms."""

@@ -40,6 +40,7 @@ from holdfast.study.evaluation.variation import Variation
 from holdfast.study.methods import HAND, METHODS, Method
 from holdfast.study.methods.wavelets import CUTS
 from holdfast.study.plan import Corpus
+from holdfast.training.splits import RANDOM_FOLDS
 
 FALSE_ALARM_RATES = (0.5, 1.0, 2.0, 5.0, 10.0, 20.0, 50.0)
 """Rates of false alarms that thresholds are chosen for, per minute of stable label [1/min]."""
@@ -50,8 +51,6 @@ HOLD_TIME = 0.1
 
 So one disturbance is one alarm, whatever the method.
 """
-N_POOLED_FOLDS = 5
-"""Folds of the random split of pooled samples: 80 % train, 20 % test."""
 
 Split = Literal["recording", "object"]
 
@@ -321,13 +320,13 @@ def evaluate_pooled(job: EvaluationJob) -> list[list[int]]:
     generator = np.random.default_rng(job.seed)
     folds = [
         {
-            unit: generator.integers(N_POOLED_FOLDS, size=len(rows))
+            unit: generator.integers(RANDOM_FOLDS, size=len(rows))
             for unit, rows in recording.features.items()
         }
         for recording in recordings
     ]
     counts = np.zeros((len(recordings), 4), dtype=np.int64)
-    for fold in range(N_POOLED_FOLDS):
+    for fold in range(RANDOM_FOLDS):
         trained = [
             _with_features_of(recording, {unit: each != fold for unit, each in own.items()})
             for recording, own in zip(recordings, folds, strict=True)
