@@ -1,18 +1,18 @@
-"""What a few recordings of one's own are worth: the table of docs/training.md, as Markdown.
+"""Measure how much a few own recordings improve a model: table of docs/training.md, as Markdown.
 
     holdfast simulate twin/vigorous --profile vigorous --seed 0
     holdfast simulate twin/gentle --profile gentle --seed 0
     python benchmarks/adaptation.py twin/vigorous twin/gentle
 
-For each folder, N of its recordings are drawn at random; from them builtin:twin is adapted
-(`holdfast train --init builtin:twin`), and a model is trained from nothing
+For each folder, N of its recordings are drawn at random. builtin:twin is adapted to them
+(`holdfast train --init builtin:twin`), and a new model is trained on them
 (`holdfast train --features holdfast --hold 0.1`); both with a search of 30 trials and with
-`--trials 0`. They, and builtin:twin as it is, judge all other recordings of the folder; that is
-done for `--draws` draws. Figures are pooled over draws, intervals are by bootstrap over the
-recordings that are judged.
+`--trials 0`. These models, and builtin:twin without adaptation, are evaluated on all other
+recordings of the folder. This is repeated for `--draws` draws. Metrics are pooled over the draws;
+intervals are by bootstrap over the evaluated recordings.
 
-By sample the labels are those of the recordings; by event they are without margin, since nobody
-can tell a disturbance before its first touch.
+Metrics by sample use the labels of the recordings. Metrics by event use labels without margin,
+because a disturbance cannot be detected before its first touch.
 """
 
 import argparse
@@ -41,13 +41,13 @@ from holdfast.twin.labels import LabelRule, labels_from_truth
 
 START = "builtin:twin"
 HEADER = (
-    "recordings of one's own", "model", "accuracy %", "against builtin:twin, points",
+    "own recordings", "model", "accuracy %", "difference to builtin:twin, points",
     "worst to best draw", "events missed in 0.1 s %", "false alarms/min",
 )  # fmt: skip
 
 
 class Counts(NamedTuple):
-    """Of one recording: what its figures are made of."""
+    """Counts of one recording, from which its metrics are computed."""
 
     right: float
     samples: float
@@ -61,7 +61,7 @@ def main() -> None:
     arguments = parse()
     for folder in arguments.folders:
         print(f"\n{folder.name}, {arguments.draws} draws\n")
-        for row in chain((HEADER, ("---",) * len(HEADER)), rows_of(folder, arguments)):
+        for row in chain((HEADER, ("---",) * len(HEADER)), table_rows(folder, arguments)):
             print("| " + " | ".join(row) + " |", flush=True)
 
 
@@ -76,18 +76,18 @@ def parse() -> argparse.Namespace:
     return parser.parse_args()
 
 
-def rows_of(folder: Path, arguments: argparse.Namespace) -> Iterator[tuple[str, ...]]:
+def table_rows(folder: Path, arguments: argparse.Namespace) -> Iterator[tuple[str, ...]]:
     recordings = list(load_dataset(folder))
     n = len(recordings)
     rng = np.random.default_rng(arguments.seed)
     draws = [rng.permutation(n).tolist() for _ in range(arguments.draws)]
-    start = dict(enumerate(judge(Model.load(START), recordings)))
-    yield ("none", START, *figures([start], [start], n))
+    start = dict(enumerate(count_all(Model.load(START), recordings)))
+    yield ("none", START, *row_cells([start], [start], n))
     for size in arguments.sizes:
         for name, setting in settings().items():
-            ours = [one_draw(recordings, draw, size, setting) for draw in draws]
-            same = [{place: start[place] for place in judged} for judged in ours]
-            yield (str(size), name, *figures(ours, same, n))
+            counts = [evaluate_draw(recordings, draw, size, setting) for draw in draws]
+            same = [{place: start[place] for place in evaluated} for evaluated in counts]
+            yield (str(size), name, *row_cells(counts, same, n))
 
 
 def settings() -> dict[str, Setting]:
@@ -96,47 +96,49 @@ def settings() -> dict[str, Setting]:
     return {
         "adapted": Setting.adapting(model),
         "adapted, `--trials 0`": Setting.adapting(model, trials=0),
-        "from nothing": Setting(**own),
-        "from nothing, `--trials 0`": Setting(**own, trials=0),
+        "new": Setting(**own),
+        "new, `--trials 0`": Setting(**own, trials=0),
     }
 
 
-def one_draw(
+def evaluate_draw(
     recordings: Sequence[Recording], draw: Sequence[int], size: int, setting: Setting
 ) -> dict[int, Counts]:
-    """What a model from the first of the draw makes of each of the others."""
-    model = fitted([recordings[place] for place in draw[:size]], setting)
+    """Train on the first `size` recordings of the draw; return the counts of all others."""
+    model = train_model([recordings[place] for place in draw[:size]], setting)
     rest = draw[size:]
-    return dict(zip(rest, judge(model, [recordings[place] for place in rest]), strict=True))
+    return dict(zip(rest, count_all(model, [recordings[place] for place in rest]), strict=True))
 
 
-def fitted(recordings: Sequence[Recording], setting: Setting) -> Model:
-    """The model that `holdfast train` gives, without the figures out of fold."""
+def train_model(recordings: Sequence[Recording], setting: Setting) -> Model:
+    """Train a model as `holdfast train` does, without cross-validation."""
     found = survey(recordings, setting.rate)
     division = divide(found.entries, "recording", setting.seed)
     designs = gather(recordings, found, setting, division)
-    parameters = {finger: searched(each, setting, finger) for finger, each in designs.items()}
+    parameters = {
+        finger: search_parameters(each, setting, finger) for finger, each in designs.items()
+    }
     return fit_whole(Material(found, division, designs), setting, parameters)
 
 
-def searched(design: FingerDesign, setting: Setting, finger: str) -> Parameters:
+def search_parameters(design: FingerDesign, setting: Setting, finger: str) -> Parameters:
     recipe, samples = setting.recipe_of(finger), design.samples
-    every = np.arange(len(samples.stable)) % -(-len(samples.stable) // SEARCH_SAMPLES) == 0
-    some = samples.take(every)
+    chosen = np.arange(len(samples.stable)) % -(-len(samples.stable) // SEARCH_SAMPLES) == 0
+    some = samples.take(chosen)
     folds = inner_folds(some, INNER_FOLDS, setting.seed)
     if not setting.trials or len(folds) < 2:
         return recipe.reference
     return search(some, folds, recipe, n_trials=setting.trials, seed=setting.seed)
 
 
-def judge(model: Model, recordings: Sequence[Recording]) -> list[Counts]:
+def count_all(model: Model, recordings: Sequence[Recording]) -> list[Counts]:
     return [count(model, recording) for recording in recordings]
 
 
 def count(model: Model, recording: Recording) -> Counts:
     decisions = decisions_of(model, recording)
     pooled = summarise([decisions]).pooled
-    events = summarise([exact(decisions, recording)]).events.hand
+    events = summarise([without_margin(decisions, recording)]).events.hand
     (tn, _), (_, tp) = pooled.confusion
     return Counts(
         right=tn + tp,
@@ -148,8 +150,8 @@ def count(model: Model, recording: Recording) -> Counts:
     )
 
 
-def exact(decisions: Decisions, recording: Recording) -> Decisions:
-    """The same decisions beside labels without margin."""
+def without_margin(decisions: Decisions, recording: Recording) -> Decisions:
+    """Return the decisions with labels without margin."""
     rule = LabelRule(margin=0.0)
     fingers = {
         name: replace(
@@ -161,32 +163,32 @@ def exact(decisions: Decisions, recording: Recording) -> Decisions:
     return Decisions.of(decisions.name, fingers, len(fingers))
 
 
-def figures(
-    ours: Sequence[dict[int, Counts]], start: Sequence[dict[int, Counts]], n: int
+def row_cells(
+    counts: Sequence[dict[int, Counts]], start: Sequence[dict[int, Counts]], n: int
 ) -> tuple[str, ...]:
-    """The cells of a row, out of the counts of each draw and recording, ours and the start's."""
-    table, other = summed(ours, n), summed(start, n)
-    per_draw = [100 * right / samples for right, samples, *_ in map(sum_of, ours)]
+    """Return the cells of a row from the counts of each draw: the model, and the start model."""
+    table, other = sum_draws(counts, n), sum_draws(start, n)
+    per_draw = [100 * right / samples for right, samples, *_ in map(sum_counts, counts)]
     return (
-        ranged(100 * table[0], table[1]),
-        "" if ours == start else ranged(100 * (table[0] - other[0]), table[1], "+.2f"),
-        "" if len(ours) == 1 else f"{min(per_draw):.1f} to {max(per_draw):.1f}",
-        ranged(100 * table[2], table[3]),
-        ranged(table[4], table[5]),
+        with_interval(100 * table[0], table[1]),
+        "" if counts == start else with_interval(100 * (table[0] - other[0]), table[1], "+.2f"),
+        "" if len(counts) == 1 else f"{min(per_draw):.1f} to {max(per_draw):.1f}",
+        with_interval(100 * table[2], table[3]),
+        with_interval(table[4], table[5]),
     )
 
 
-def summed(draws: Sequence[dict[int, Counts]], n: int) -> np.ndarray:
-    """(6, n) the counts of each of n recordings, over the draws that judged it."""
+def sum_draws(draws: Sequence[dict[int, Counts]], n: int) -> np.ndarray:
+    """Return (6, n) counts of n recordings, summed over the draws."""
     nothing = Counts(*(0.0,) * 6)
     return np.array([[draw.get(k, nothing) for k in range(n)] for draw in draws]).sum(axis=0).T
 
 
-def sum_of(draw: dict[int, Counts]) -> np.ndarray:
+def sum_counts(draw: dict[int, Counts]) -> np.ndarray:
     return np.sum(list(draw.values()), axis=0)
 
 
-def ranged(parts: np.ndarray, wholes: np.ndarray, form: str = ".1f") -> str:
+def with_interval(parts: np.ndarray, wholes: np.ndarray, form: str = ".1f") -> str:
     low, high = bootstrap_interval(ratio_of_sums(parts, wholes), n_recordings=len(parts))
     value = parts.sum() / wholes.sum()
     return f"{value:{form}} ({low:{form}} to {high:{form}})"

@@ -1,9 +1,9 @@
-"""The label page with 250,000 samples of four fingers: how long until it is painted, and a zoom.
+"""Time to paint and to zoom the labelling page, with 250,000 samples of four fingers.
 
-A recording is made, `holdfast label` serves it from a process of its own, and a headless
-Chromium opens the page. Times are the browser's own: from navigation to the first paint of the
-plots, and from a turn of the wheel to the plots redrawn. The answers of the service are timed
-without a browser as well; `first` is the first of a process that has read nothing yet.
+`holdfast label` serves a synthetic recording from another process, and a headless Chromium opens
+the page. The browser measures the times: from navigation to the first paint of the plots, and
+from a turn of the mouse wheel to the new plots. The responses of the service are also measured
+without a browser; `first` is the first response of a new process.
 
     uv run python benchmarks/label_page.py
     uv run python benchmarks/label_page.py --samples 1000000 --wheels 50
@@ -30,11 +30,13 @@ from holdfast.recordings import Recording
 from holdfast.synthetic import RATE, synthetic_recording
 
 FINGERS = ("thumb", "index", "middle", "ring")
-PATIENCE = 120.0  # [s]
-QUIET = 0.5  # a zoom is over when nothing was drawn for so long [s]
+TIMEOUT = 120.0
+"""Maximum time to wait for the page [s]."""
+QUIET_TIME = 0.5
+"""A zoom is finished when nothing was drawn for this time [s]."""
 OPTIONS = ("--headless", "--no-sandbox", "--disable-gpu", "--no-first-run")
 
-WATCH = """
+DRAWING_TIMES_SCRIPT = """
 window.bench = {painted: null, wheel: null, drawn: []};
 new MutationObserver(() => requestAnimationFrame(() => {
   window.bench.painted ??= performance.now();
@@ -54,7 +56,7 @@ CanvasRenderingContext2D.prototype.stroke = function (...given) {
   return stroke.apply(this, given);
 };
 """
-"""Notes in the page when lines were drawn: at the next picture, when they are on the screen."""
+"""Script that stores when lines were drawn: at the next frame, when they are on the screen."""
 
 
 def main() -> None:
@@ -75,14 +77,14 @@ def main() -> None:
 
 def _options() -> argparse.Namespace:
     parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument("--samples", type=int, default=250_000, help="of each finger")
-    parser.add_argument("--wheels", type=int, default=20, help="how often the wheel is turned")
-    parser.add_argument("--no-browser", action="store_true", help="the service alone")
+    parser.add_argument("--samples", type=int, default=250_000, help="samples of each finger")
+    parser.add_argument("--wheels", type=int, default=20, help="number of turns of the mouse wheel")
+    parser.add_argument("--no-browser", action="store_true", help="measure only the service")
     return parser.parse_args()
 
 
 def _recording(n: int) -> Recording:
-    """Grasp after grasp, until there are n samples."""
+    """Return a recording that repeats a grasp until it has n samples."""
     grasp = synthetic_recording("long", 0, FINGERS)
     modules = {}
     for name, module in grasp.modules.items():
@@ -94,7 +96,7 @@ def _recording(n: int) -> Recording:
 
 @contextmanager
 def _served(path: Path):
-    """The address of the label page, in a process of its own."""
+    """Run the labelling page in another process, and yield its URL."""
     holdfast = Path(sys.executable).with_name("holdfast")
     words = ("label", str(path), "--port", "0", "--no-browser", "--json")
     process = subprocess.Popen([holdfast, *words], stdout=subprocess.PIPE, text=True)
@@ -106,11 +108,11 @@ def _served(path: Path):
 
 
 def _service(url: str) -> dict[str, float]:
-    """How long answers take, without a browser [s]."""
+    """Return the response times of the service without a browser [s]."""
     one = f"{url}api/v1/recordings/0"
     report = {
         "list": _timed(f"{url}api/v1/recordings"),
-        "opened, the file read": _timed(one),
+        "recording, with reading the file": _timed(one),
         "first signals": _timed(f"{one}/signals?points=1200"),
         "change points": _timed(f"{one}/changes"),
     }
@@ -132,14 +134,14 @@ def _timed(url: str) -> float:
 
 
 def _page(path: Path, options: argparse.Namespace) -> dict[str, float]:
-    """How long a person waits; the page is asked for as soon as the service answers."""
+    """Return the times in the browser; the page is opened as soon as the service responds."""
     from playwright.sync_api import sync_playwright
 
     chromium = shutil.which("chromium") or shutil.which("chromium-browser")
     with sync_playwright() as playwright:
         browser = playwright.chromium.launch(executable_path=chromium, args=OPTIONS)
         page = browser.new_page(viewport={"width": 1600, "height": 1000})
-        page.add_init_script(WATCH)
+        page.add_init_script(DRAWING_TIMES_SCRIPT)
         with _served(path) as url:
             page.goto(url)
             report = _visit(page, options.wheels)
@@ -166,7 +168,7 @@ def _visit(page, n_wheels: int) -> dict[str, float]:
 
 
 def _turn(page, delta: int) -> tuple[float, float]:
-    """From a turn of the wheel to the first and to the last time that plots are drawn [s]."""
+    """Return the times from a turn of the wheel to the first and the last drawing [s]."""
     page.evaluate("window.bench.wheel = null")
     page.mouse.wheel(0, delta)
     _until(page, "window.bench.wheel !== null && window.bench.drawn.length > 0")
@@ -178,15 +180,15 @@ def _turn(page, delta: int) -> tuple[float, float]:
 
 
 def _wait_until_quiet(page) -> None:
-    _until(page, f"performance.now() - (window.bench.drawn.at(-1) ?? 0) > {1e3 * QUIET}")
+    _until(page, f"performance.now() - (window.bench.drawn.at(-1) ?? 0) > {1e3 * QUIET_TIME}")
 
 
 def _until(page, condition: str) -> None:
-    """Asks now and then, from outside: the page's policy lets nobody wait inside it."""
-    end = time.monotonic() + PATIENCE
+    """Poll a condition; the security policy of the page does not allow to wait inside it."""
+    end = time.monotonic() + TIMEOUT
     while not page.evaluate(condition):
         if time.monotonic() > end:
-            raise TimeoutError(f"not within {PATIENCE:g} s: {condition}")
+            raise TimeoutError(f"not within {TIMEOUT:g} s: {condition}")
         time.sleep(0.02)
 
 

@@ -1,4 +1,4 @@
-"""How good labels by rules are, and what training on them costs: the tables of docs/labels.md.
+"""Measure the quality of labels by rules, and of models trained on them: tables of docs/labels.md.
 
     holdfast simulate twin/reference --profile reference --seed 0
     holdfast simulate twin/vigorous --profile vigorous --seed 0
@@ -7,11 +7,11 @@
     python benchmarks/label_rules.py --folder twin/reference --folder twin/vigorous \
         --folder twin/gentle --real real
 
-For each folder of the twin's recordings: the agreement of each rule with the truth (kappa, onset
-differences), with the poses as they are and with the jitter of a tracker; and the paper's model
-trained on every second recording with labels by the truth and by each rule, judged on the others
-against the truth. For real recordings with a marker on the object: the agreement with the
-measured labels, and with an angle chosen on the other recordings.
+For each folder of recordings of the twin: the agreement of each rule with the truth (kappa, onset
+differences), with exact poses and with the jitter of a tracker; and metrics of the paper's model,
+trained on every second recording with labels by the truth and by each rule, and evaluated on the
+others against the truth. For real recordings with a marker on the object: the agreement with the
+measured labels, also with an angle chosen on the other recordings.
 """
 
 import argparse
@@ -42,8 +42,9 @@ Rule = Callable[[Recording], Labels]
 
 REFERENCE = {"C": 1.0, "class_weight": "balanced"}
 ANGLES = (0.02, 0.03, 0.05, 0.07, 0.1, 0.14, 0.2, 0.3)
-DOUBT = (0.5, 0.7, 0.8)
-FAR = 1.0  # [m]: with it, displacement is the angle alone
+CONFIDENCES = (0.5, 0.7, 0.8)
+UNUSED_DISTANCE = 1.0
+"""Distance that is never reached, so that displacement depends on the angle only [m]."""
 
 
 def main() -> None:
@@ -54,7 +55,7 @@ def main() -> None:
             table(title, header, found)
     if arguments.real and arguments.only in (None, "real"):
         real = list(load_dataset(arguments.real))
-        table("Against measured slip: kappa, stable against the rest", *real_table(real))
+        table("Agreement with measured slip: kappa, stable against the rest", *real_table(real))
 
 
 def parse() -> argparse.Namespace:
@@ -63,8 +64,8 @@ def parse() -> argparse.Namespace:
     )
     parser.add_argument("--folder", type=Path, action="append", default=[])
     parser.add_argument("--real", type=Path)
-    parser.add_argument("--every", type=int, default=1, help="take every n-th recording only")
-    parser.add_argument("--only", choices=[*TABLES, "real"], help="one of the tables")
+    parser.add_argument("--every", type=int, default=1, help="use only every n-th recording")
+    parser.add_argument("--only", choices=[*TABLES, "real"], help="print only one table")
     return parser.parse_args()
 
 
@@ -86,7 +87,7 @@ def by_poses(recording: Recording) -> Labels:
 
 
 def by_tracker(metres: float, degrees: float) -> Rule:
-    """By poses as a tracker gives them: 60 a second, each with its own error."""
+    """Return the tracking rule with poses of a tracker: 60 per second, with random errors."""
 
     def rule(recording: Recording) -> Labels:
         rng = np.random.default_rng(int(recording.digest[:8], 16))
@@ -109,7 +110,7 @@ def by_tracker(metres: float, degrees: float) -> Rule:
 
 RULES: dict[str, Rule] = {
     "signal": by_signal,
-    "tracking, poses as they are": by_poses,
+    "tracking, exact poses": by_poses,
     "tracking, 0.1 mm and 0.1 degrees": by_tracker(1e-4, 0.1),
     "tracking, 0.5 mm and 0.5 degrees": by_tracker(5e-4, 0.5),
 }
@@ -122,12 +123,12 @@ def agreement_rows(folder: Path, every: int) -> Iterator[tuple[str, ...]]:
     for place in chosen:
         recording = recordings[place]
         for name, rule in RULES.items():
-            agreed[name].append(against_own(recording, rule(recording)))
+            agreed[name].append(compare_with_own(recording, rule(recording)))
     for name, found in agreed.items():
         yield f"{folder.name}, {len(chosen)}", name, *agreement_cells(pool(found).pooled)
 
 
-def against_own(recording: Recording, labels: Labels) -> RecordingAgreement:
+def compare_with_own(recording: Recording, labels: Labels) -> RecordingAgreement:
     own = {name: module.labels for name, module in recording.modules.items()}
     times = {name: module.times for name, module in recording.modules.items()}
     return compare(own, labels, times, recording.name)
@@ -139,26 +140,26 @@ def agreement_cells(found: PooledAgreement) -> Iterator[str]:
     yield f"{found.kappa_stable:.3f}"
     yield f"{onsets.n} of {onsets.n + onsets.only_a}"
     yield str(onsets.only_b)
-    yield f"{onsets.median * 1000:+.0f} ms"
-    yield f"{onsets.p95 * 1000:.0f} ms"
+    yield "-" if onsets.median is None else f"{onsets.median * 1000:+.0f} ms"
+    yield "-" if onsets.p95 is None else f"{onsets.p95 * 1000:.0f} ms"
 
 
-def doubt_rows(folder: Path, every: int) -> Iterator[tuple[str, ...]]:
-    """How much of the time, and of the time that is labelled wrongly, doubtful labels hold."""
+def confidence_rows(folder: Path, every: int) -> Iterator[tuple[str, ...]]:
+    """Yield the share of labels with low confidence: of all time, and of wrong time."""
     recordings = load_dataset(folder)
     chosen = range(0, len(recordings), every)
-    for name in ("signal", "tracking, poses as they are"):
-        counts = np.concatenate([right_or_wrong(recordings[k], RULES[name]) for k in chosen])
+    for name in ("signal", "tracking, exact poses"):
+        counts = np.concatenate([wrong_samples(recordings[k], RULES[name]) for k in chosen])
         cells = []
-        for below in DOUBT:
-            doubtful = counts[counts[:, 0] < below, 1:].sum(axis=0)
-            time, wrong = 100 * doubtful / counts[:, 1:].sum(axis=0)
+        for below in CONFIDENCES:
+            uncertain = counts[counts[:, 0] < below, 1:].sum(axis=0)
+            time, wrong = 100 * uncertain / counts[:, 1:].sum(axis=0)
             cells.append(f"{time:.0f}, {wrong:.0f}")
         yield f"{folder.name}, {len(chosen)}", name, *cells
 
 
-def right_or_wrong(recording: Recording, rule: Rule) -> np.ndarray:
-    """(n_labels, 3) confidence, samples, and samples that the truth labels otherwise."""
+def wrong_samples(recording: Recording, rule: Rule) -> np.ndarray:
+    """Return (n_labels, 3): confidence, samples, and samples with another label in the truth."""
     rows = []
     for name, labels in rule(recording).items():
         module = recording.modules[name]
@@ -174,20 +175,20 @@ def right_or_wrong(recording: Recording, rule: Rule) -> np.ndarray:
 
 def training_rows(folder: Path, every: int) -> Iterator[tuple[str, ...]]:
     recordings = list(load_dataset(folder))[::every]
-    taught, judged = recordings[::2], recordings[1::2]
+    training, evaluated = recordings[::2], recordings[1::2]
     best = None
     rules: dict[str, Rule | None] = {"the truth": None, **RULES}
     for name, rule in rules.items():
-        given = taught if rule is None else [each.with_labels(rule(each)) for each in taught]
-        metrics = evaluate(fit_all(given, Setting(trials=0), REFERENCE), judged)
+        given = training if rule is None else [each.with_labels(rule(each)) for each in training]
+        metrics = evaluate(fit_all(given, Setting(trials=0), REFERENCE), evaluated)
         best = best or metrics
         cells = training_cells(metrics, best)
-        yield f"{folder.name}, {len(taught)} and {len(judged)}", name, *cells
+        yield f"{folder.name}, {len(training)} and {len(evaluated)}", name, *cells
 
 
 def training_cells(metrics: Metrics, best: Metrics) -> Iterator[str]:
     yield f"{metrics.pooled.accuracy:.1f}"
-    mine, theirs = right_of(metrics), right_of(best)
+    mine, theirs = correct_samples(metrics), correct_samples(best)
     less = ratio_of_sums(theirs[:, 0] - mine[:, 0], mine[:, 1])
     low, high = bootstrap_interval(less, len(mine))
     cost = 100 * (theirs[:, 0] - mine[:, 0]).sum() / mine[:, 1].sum()
@@ -197,8 +198,8 @@ def training_cells(metrics: Metrics, best: Metrics) -> Iterator[str]:
     yield f"{metrics.events.hand.false_alarms_per_minute:.1f}"
 
 
-def right_of(metrics: Metrics) -> np.ndarray:
-    """(n_recordings, 2) samples that were told right, and all that were told."""
+def correct_samples(metrics: Metrics) -> np.ndarray:
+    """Return (n_recordings, 2): correct samples, and all samples with a decision."""
     confusions = [
         np.sum([finger.confusion for finger in each.fingers.values()], axis=0)
         for each in metrics.recordings
@@ -211,16 +212,19 @@ def right_of(metrics: Metrics) -> np.ndarray:
 
 def real_table(recordings: Sequence[Recording]) -> tuple[Sequence[str], Iterator[Sequence[str]]]:
     header = ("labels by", *(each.name[-8:] for each in recordings), "all", "onsets found",
-              "onset: median")  # fmt: skip
+              "onset difference: median")  # fmt: skip
 
     def rows() -> Iterator[Sequence[str]]:
         for name, rule in REAL_RULES.items():
-            yield name, *real_cells([against_own(each, rule(each)) for each in recordings])
-        agreed = {angle: [turned(each, angle) for each in recordings] for angle in ANGLES}
+            yield name, *real_cells([compare_with_own(each, rule(each)) for each in recordings])
+        agreed = {angle: [by_angle(each, angle) for each in recordings] for angle in ANGLES}
         best = [best_angle(agreed, place) for place in range(len(recordings))]
         found = [agreed[angle][place] for place, angle in enumerate(best)]
         shown = ", ".join(f"{angle:g}" for angle in best)
-        yield f"tracking, turned by an angle chosen on the others ({shown} rad)", *real_cells(found)
+        yield (
+            f"tracking, rotation by an angle chosen on the others ({shown} rad)",
+            *real_cells(found),
+        )
 
     return header, rows()
 
@@ -234,13 +238,13 @@ REAL_RULES: dict[str, Rule] = {
 }
 
 
-def turned(recording: Recording, angle: float) -> RecordingAgreement:
-    rule = TrackingRule(measure="displacement", distance=FAR, angle=angle)
-    return against_own(recording, tracking.propose(recording, tare="first", rule=rule))
+def by_angle(recording: Recording, angle: float) -> RecordingAgreement:
+    rule = TrackingRule(measure="displacement", distance=UNUSED_DISTANCE, angle=angle)
+    return compare_with_own(recording, tracking.propose(recording, tare="first", rule=rule))
 
 
 def best_angle(agreed: Mapping[float, Sequence[RecordingAgreement]], place: int) -> float:
-    """The angle that agrees best on all recordings but one."""
+    """Return the angle with the best agreement on all recordings but one."""
 
     def kappa(angle: float) -> float:
         others = [each for k, each in enumerate(agreed[angle]) if k != place]
@@ -252,20 +256,20 @@ def best_angle(agreed: Mapping[float, Sequence[RecordingAgreement]], place: int)
 def real_cells(found: Sequence[RecordingAgreement]) -> Iterator[str]:
     for each in found:
         (finger, *_) = each.fingers.values()
-        yield one_class(finger.confusion) or f"{finger.kappa_stable:.2f}"
+        yield single_class_share(finger.confusion) or f"{finger.kappa_stable:.2f}"
     whole: Agreement = pool(found)
     onsets = whole.pooled.onset_differences
     yield f"{whole.pooled.kappa_stable:.2f}"
-    yield f"{onsets.n} of {onsets.n + onsets.only_a}, {onsets.only_b} of its own"
+    yield f"{onsets.n} of {onsets.n + onsets.only_a}, {onsets.only_b} additional"
     yield "" if onsets.median is None else f"{onsets.median * 1000:+.0f} ms"
 
 
-def one_class(confusion: Sequence[Sequence[int]]) -> str:
-    """What is right, where the labels know one class and kappa means nothing."""
+def single_class_share(confusion: Sequence[Sequence[int]]) -> str:
+    """Return the share of correct samples if the labels have one class; kappa is undefined."""
     counts = np.array(confusion)
     if counts[:2].sum():
         return ""
-    return f"{100 * counts[2, 2] / counts.sum():.0f} % right"
+    return f"{100 * counts[2, 2] / counts.sum():.0f} % correct"
 
 
 Rows = Callable[[Path, int], Iterator[Sequence[str]]]
@@ -273,18 +277,18 @@ TABLES: dict[str, tuple[str, Sequence[str], Rows]] = {
     "agreement": (
         "Agreement with the twin's truth",
         ("recordings", "labels by", "kappa", "kappa, stable against the rest", "onsets found",
-         "onsets of its own", "onset: median", "95 % within"),
+         "additional onsets", "onset difference: median", "95 % within"),
         agreement_rows,
     ),
     "doubt": (
-        "Where the wrong labels are",
+        "Confidence of wrong labels",
         ("recordings", "labels by",
-         *(f"below {below}: time %, of what is wrong %" for below in DOUBT)),
-        doubt_rows,
+         *(f"below {below}: % of time, % of wrong time" for below in CONFIDENCES)),
+        confidence_rows,
     ),
     "training": (
-        "The paper's model, judged against the truth",
-        ("recordings", "trained on labels by", "accuracy %", "less than by the truth",
+        "The paper's model, evaluated against the truth",
+        ("recordings", "trained on labels by", "accuracy %", "loss against labels by the truth",
          "AUC in contact", "events missed in 0.2 s %", "false alarms/min"),
         training_rows,
     ),

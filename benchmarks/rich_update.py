@@ -1,9 +1,11 @@
-"""Updates of a hand by builtin:twin (15 features) and by the paper's deployed model, in turns.
+"""Time of an update of a hand with builtin:twin (15 features) and with the model of the paper.
 
-python benchmarks/rich_update.py [UPDATES]
+The two models run in turns.
+
+    python benchmarks/rich_update.py [UPDATES]
 """
 
-import sys
+import argparse
 import time
 
 import numpy as np
@@ -16,16 +18,18 @@ from holdfast.sensors import sensor
 
 FINGERS = ("thumb", "index", "middle", "ring")
 RATE = 150.0
-ROUNDS = 20
-N_WARM = 200
+N_ROUNDS = 20
+N_WARM_UP = 200
 
 
-def deployed() -> Model:
-    """A model of the paper's shape for any finger; its numbers do not matter here."""
+def paper_model() -> Model:
+    """Return a model with the features of the paper; its numbers have no effect on the speed."""
     features = parse_features(DEPLOYED_FEATURES, 14)
     ones = (1.0,) * len(features)
-    rule = LinearClassifier(mean=ones, scale=ones, coefficients=(0.01,) * len(ones), intercept=0.1)
-    finger = FingerModel(features=features, classifier=rule, contact_threshold=20.0)
+    classifier = LinearClassifier(
+        mean=ones, scale=ones, coefficients=(0.01,) * len(ones), intercept=0.1
+    )
+    finger = FingerModel(features=features, classifier=classifier, contact_threshold=20.0)
     return Model(fingers={"*": finger}, rate=RATE)
 
 
@@ -34,23 +38,27 @@ def main(n_updates: int) -> None:
     rng = np.random.default_rng(0)
     readings = rng.integers(32000, 34000, size=(1024, len(FINGERS), 30, 3)).astype(np.uint16)
     samples = [dict(zip(FINGERS, hand, strict=True)) for hand in readings]
-    models = {"the paper's": deployed(), "builtin:twin": Model.load("builtin:twin")}
+    models = {"model of the paper": paper_model(), "builtin:twin": Model.load("builtin:twin")}
     detectors = {
         name: Detector(model, dict.fromkeys(FINGERS, tip)) for name, model in models.items()
     }
-    took: dict[str, list[int]] = {name: [] for name in models}
-    done = 0
-    for part in [N_WARM, *[n_updates // ROUNDS] * ROUNDS]:
+    times: dict[str, list[int]] = {name: [] for name in models}
+    n_done = 0
+    for n in [N_WARM_UP, *[n_updates // N_ROUNDS] * N_ROUNDS]:
         for name, detector in detectors.items():
-            for k in range(done, done + part):
+            for k in range(n_done, n_done + n):
                 start = time.perf_counter_ns()
                 detector.update(samples[k % len(samples)], k / RATE)
-                took[name].append(time.perf_counter_ns() - start)
-        done += part
-    for name, nanoseconds in took.items():
-        p50, p99 = np.percentile(nanoseconds[N_WARM:], [50, 99]) / 1e3
+                times[name].append(time.perf_counter_ns() - start)
+        n_done += n
+    for name, nanoseconds in times.items():
+        p50, p99 = np.percentile(nanoseconds[N_WARM_UP:], [50, 99]) / 1e3
         print(f"{name}: p50 {p50:.1f} us, p99 {p99:.1f} us of {n_updates} updates")
 
 
 if __name__ == "__main__":
-    main(int(sys.argv[1]) if len(sys.argv) > 1 else 20_000)
+    parser = argparse.ArgumentParser(
+        description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
+    )
+    parser.add_argument("updates", type=int, nargs="?", default=20_000)
+    main(parser.parse_args().updates)

@@ -1,14 +1,14 @@
-"""The tables and the picture of docs/twin.md, as Markdown on stdout.
+"""Make the tables and the picture of docs/twin.md; tables are printed as Markdown.
 
-    python benchmarks/twin_figures.py make twin            recordings, and how long they take
-    python benchmarks/twin_figures.py count twin           what was made, and which grasps failed
+    python benchmarks/twin_figures.py make twin            simulate the recordings, with times
+    python benchmarks/twin_figures.py count twin           number of recordings, and failed grasps
     python benchmarks/twin_figures.py labels twin          label conventions (reference)
-    python benchmarks/twin_figures.py truth twin           weight, creep, moment of slip (reference)
-    python benchmarks/twin_figures.py objects FILE.png     a picture of every grasp
+    python benchmarks/twin_figures.py truth twin           weight, creep, time of slip (reference)
+    python benchmarks/twin_figures.py objects FILE.png     picture of every object in the hand
 
 `make` runs `holdfast simulate twin/PROFILE --profile PROFILE --seed 0`, the same with the other
-objects to twin/others, and with seed 1 to twin/fresh; `count`, `labels` and `truth` read what it
-made. How well holdfast does on such recordings is the matter of `holdfast study --twin`.
+objects to twin/others, and with seed 1 to twin/fresh. `count`, `labels` and `truth` read these
+recordings. `holdfast study --twin` measures how well the methods work on such recordings.
 """
 
 import argparse
@@ -38,14 +38,14 @@ FOLDERS = {
     "others": ("--profile", "reference", "--seed", "0", "--table", str(OTHER_OBJECTS)),
     "fresh": ("--profile", "reference", "--seed", "1"),
 }
-"""What each folder is made with."""
+"""Options of `holdfast simulate` for each folder."""
 RATE = 150
-"""Samples a second."""
+"""Samples per second [Hz]."""
 GRAVITY = 9.81
-CREEP = 1e-6
-"""Slip speed below which nothing is said to slide [m/s]."""
+MIN_CREEP_SPEED = 1e-6
+"""Minimum slip speed that counts as creep [m/s]."""
 MAX_SAMPLES = 20_000
-"""A finger to fit to, evenly spread (`--max-samples`); judged is every sample."""
+"""Maximum number of training samples per finger (`--max-samples`)."""
 
 
 def main() -> None:
@@ -67,7 +67,7 @@ def parse() -> argparse.Namespace:
     return parser.parse_args()
 
 
-# What every table is made of
+# Functions for all tables
 
 
 def load(folder: Path) -> list[Recording]:
@@ -82,7 +82,7 @@ def table(header: Sequence[str], rows: Sequence[Sequence[object]]) -> None:
     print(flush=True)
 
 
-def ranged(value: float, interval: Sequence[float | None], digits: int = 1) -> str:
+def with_interval(value: float, interval: Sequence[float | None], digits: int = 1) -> str:
     low, high = (("inf" if end is None else f"{end:.{digits}f}") for end in interval)
     return f"{value:.{digits}f} ({low} to {high})"
 
@@ -110,17 +110,17 @@ def make(arguments: argparse.Namespace) -> None:
 
 
 def count(arguments: argparse.Namespace) -> None:
-    made = {name: load(arguments.folder / name) for name in FOLDERS}
+    recordings_of = {name: load(arguments.folder / name) for name in FOLDERS}
     table(
-        ("folder", "recordings", "of them failed", "samples a finger", "of grasps that did not "
-         "fail", "simulated s", "nothing in the hand, % of samples"),
-        [count_row(name, recordings) for name, recordings in made.items()],
+        ("folder", "recordings", "failed", "samples per finger", "samples of successful "
+         "grasps", "simulated s", "empty hand, % of samples"),
+        [count_row(name, recordings) for name, recordings in recordings_of.items()],
     )  # fmt: skip
-    failed = [(n, r) for n, recordings in made.items() for r in recordings if has_failed(r)]
+    failed = [(n, r) for n, many in recordings_of.items() for r in many if has_failed(r)]
     table(
-        ("folder", "failed", "lost, s after the lock", "operator's last touch before, s after the "
-         "lock"),
-        [(name, r.name, *lost(r)) for name, r in failed],
+        ("folder", "failed", "lost, s after the lock", "last touch by the operator before, s after "
+         "the lock"),
+        [(name, r.name, *loss_times(r)) for name, r in failed],
     )  # fmt: skip
 
 
@@ -143,8 +143,8 @@ def has_failed(recording: Recording) -> bool:
     return recording.metadata["case"] == "failed"
 
 
-def lost(recording: Recording) -> tuple[str, str]:
-    """When it was lost and when somebody touched it last before that, since the lock [s]."""
+def loss_times(recording: Recording) -> tuple[str, str]:
+    """Return when the object was lost, and the last touch before, since the lock [s]."""
     facts, known = recording.metadata, recording.truth
     if facts["locked_at"] is None:
         return "never locked", ""
@@ -155,7 +155,7 @@ def lost(recording: Recording) -> tuple[str, str]:
 
 
 def labels(arguments: argparse.Namespace) -> None:
-    """What the paper's classifier reaches, trained and judged with the same convention."""
+    """Print metrics of the paper's classifier, trained and evaluated with one convention."""
     recordings = load(arguments.folder / "reference")
     conventions: dict[str, Callable[[Truth, str], tuple[Label, ...]]] = {
         "intervals, margin 0.1 s, merged below 0.35 s (the default)": labels_from_truth,
@@ -163,8 +163,8 @@ def labels(arguments: argparse.Namespace) -> None:
         "intervals, margin 0.25 s": by_rule(LabelRule(margin=0.25)),
         "intervals, no margin, none merged": by_rule(LabelRule(margin=0.0, merge=0.0)),
         "intervals, merged below 1 s": by_rule(LabelRule(merge=1.0)),
-        "sample by sample: an outside force over 0.05 N, or sliding": sample_wise,
-        "only sliding counts, a push without it is stable": only_slip,
+        "sample by sample: outside force above 0.05 N, or slip": sample_wise,
+        "only slip is unstable; a push without slip is stable": only_slip,
     }
     setting = Setting(trials=0, max_samples=MAX_SAMPLES)
     rows = []
@@ -184,10 +184,10 @@ def figure_row(name: str, metrics: Metrics) -> tuple[object, ...]:
     return (
         name,
         intervals.n_recordings,
-        ranged(pooled.accuracy, intervals.accuracy),
-        ranged(pooled.fdr, intervals.fdr),
-        ranged(pooled.auc, intervals.auc, 3),
-        ranged(pooled.auc_contact, intervals.auc_contact, 3),
+        with_interval(pooled.accuracy, intervals.accuracy),
+        with_interval(pooled.fdr, intervals.fdr),
+        with_interval(pooled.auc, intervals.auc, 3),
+        with_interval(pooled.auc_contact, intervals.auc_contact, 3),
         f"{stable_share(metrics):.1f}",
     )
 
@@ -209,8 +209,8 @@ def by_rule(rule: LabelRule) -> Callable[[Truth, str], tuple[Label, ...]]:
 def only_slip(known: Truth, finger: str) -> tuple[Label, ...]:
     phase = known.hand["phase"]
     held = np.isin(phase, HELD_PHASES)
-    nobody = np.zeros_like(known.hand["outside_force"])
-    hand = {"phase": np.where(held, Phase.LOCKED.value, phase), "outside_force": nobody}
+    no_force = np.zeros_like(known.hand["outside_force"])
+    hand = {"phase": np.where(held, Phase.LOCKED.value, phase), "outside_force": no_force}
     return labels_from_truth(Truth(known.times, hand, known.fingers), finger)
 
 
@@ -219,8 +219,8 @@ def sample_wise(known: Truth, finger: str) -> tuple[Label, ...]:
     phase = known.hand["phase"]
     held = np.isin(phase, HELD_PHASES)
     touching = np.linalg.norm(arrays["contact_force"], axis=1) > LabelRule().contact
-    troubled = np.linalg.norm(known.hand["outside_force"], axis=1) > LabelRule().contact
-    troubled |= arrays["slip_speed"] > LabelRule().sliding
+    disturbed = np.linalg.norm(known.hand["outside_force"], axis=1) > LabelRule().contact
+    disturbed |= arrays["slip_speed"] > LabelRule().sliding
     states = [
         (ContactState.NO_CONTACT, None)
         if not touches
@@ -228,7 +228,7 @@ def sample_wise(known: Truth, finger: str) -> tuple[Label, ...]:
         if holds and not shaken
         else (ContactState.UNSTABLE, Cause.DISTURBANCE if holds else None)
         for touches, holds, shaken in zip(
-            touching.tolist(), held.tolist(), troubled.tolist(), strict=True
+            touching.tolist(), held.tolist(), disturbed.tolist(), strict=True
         )
     ]
     period = float(np.median(np.diff(known.times)))
@@ -244,12 +244,16 @@ def truth(arguments: argparse.Namespace) -> None:
 
 
 def weight_table(recordings: Sequence[Recording]) -> None:
-    """Forces while nobody touches the object, from 1 s after the lock on."""
+    """Print the forces on the object without outside force, from 1 s after the lock."""
     rows = []
     for name, item in load_things().items():
         some = [
-            alone(recording) for recording in recordings if recording.metadata["object"] == name
+            hold_samples(recording)
+            for recording in recordings
+            if recording.metadata["object"] == name
         ]
+        if not some:
+            continue
         off = [100 * hold.off for hold in some]
         quiet = np.concatenate([hold.quiet for hold in some])
         every = np.linalg.norm(np.concatenate(off), axis=1)
@@ -269,18 +273,18 @@ def weight_table(recordings: Sequence[Recording]) -> None:
             "object",
             "recordings",
             "weight N",
-            "mean of a hold off by at most %",
+            "largest error of the mean of a hold, %",
             "samples without glitch in the last second, %",
-            "of these, a sample off by at most %",
-            "of all, within 2 %, %",
+            "largest error of these samples, %",
+            "all samples: error below 2 %, %",
         ),
         rows,
     )
 
 
 def slide_table(recordings: Sequence[Recording]) -> None:
-    """Samples of the same that slide, with a glitch in the last second and without."""
-    holds = [alone(recording) for recording in recordings]
+    """Print slip of the same samples, with and without a glitch in the last second."""
+    holds = [hold_samples(recording) for recording in recordings]
     off = np.linalg.norm(np.concatenate([hold.off for hold in holds]), axis=1)
     slip, since, quiet = (
         np.concatenate([getattr(hold, name) for hold in holds])
@@ -288,7 +292,7 @@ def slide_table(recordings: Sequence[Recording]) -> None:
     )
     rows = []
     for name, some in (("no", quiet), ("yes", ~quiet)):
-        creeps = some & (slip >= CREEP)
+        creeps = some & (slip >= MIN_CREEP_SPEED)
         rows.append(
             (name, f"{some.sum():,}", (some & (off > 0.02)).sum(),
              f"{creeps.sum()} ({100 * creeps.sum() / some.sum():.2f} %)",
@@ -296,21 +300,21 @@ def slide_table(recordings: Sequence[Recording]) -> None:
              f"{1e3 * slip[some].max():.1f}")
         )  # fmt: skip
     table(
-        ("glitch in the last second", "samples", "off by more than 2 %", "sliding 0.001 mm/s or "
-         "more", "of these within 3 s of the lock", "sliding more than 1 mm/s", "sliding at most, "
+        ("glitch in the last second", "samples", "error above 2 %", "slip of at least 0.001 "
+         "mm/s", "of these within 3 s of the lock", "slip above 1 mm/s", "largest slip, "
          "mm/s"),
         rows,
     )  # fmt: skip
 
 
 class Hold(NamedTuple):
-    """The samples in which nobody but the hand touches the object.
+    """Samples in which only the hand touches the object.
 
     Attributes:
-        off: (n, 3) sum of the contact forces less the weight, as a share of the weight.
+        off: (n, 3) sum of the contact forces minus the weight, as a share of the weight.
         slip: (n,) largest slip speed of a finger [m/s].
         since: (n,) time since the lock [s].
-        quiet: (n,) whether no set-point was wrong in the last second.
+        quiet: (n,) True without a wrong set-point in the last second.
     """
 
     off: np.ndarray
@@ -319,8 +323,8 @@ class Hold(NamedTuple):
     quiet: np.ndarray
 
 
-def alone(recording: Recording) -> Hold:
-    """Held in case 1 from 1 s after the lock until the operator's hand comes back."""
+def hold_samples(recording: Recording) -> Hold:
+    """Return the samples from 1 s after the lock until the operator's hand returns (case 1)."""
     known = recording.truth
     outside = np.linalg.norm(known.hand["outside_force"], axis=1)
     since = known.times - recording.metadata["locked_at"]
@@ -334,7 +338,7 @@ def alone(recording: Recording) -> Hold:
 
 
 def slip_table() -> None:
-    """A flat pad that holds a smooth box is a block on a spring: it slips when F = mu_s N."""
+    """Print when a smooth box in flat pads slips: like a block on a spring, when F = mu_s N."""
     sys.path.insert(0, str(Path(__file__).parents[1]))
     from tests.twin.grip import Grip
     from tests.twin.test_contact import flat_patch
@@ -356,7 +360,7 @@ def slip_table() -> None:
                  f"{1e3 * late:.1f}", f"{150 * late:.2f}")
             )  # fmt: skip
     table(
-        ("pressed in mm", "push grows N/s", "friction gives way at N", "after s", "it slips (over "
+        ("indentation mm", "push N/s", "friction limit N", "reached after s", "slip (above "
          "1 mm/s) later by ms", "samples"),
         rows,
     )  # fmt: skip
@@ -366,13 +370,13 @@ def slip_table() -> None:
 
 TILE = (480, 400)
 CAMERA = ((0.074, 0.0, 0.010), 0.52, 165.0, -38.0)
-"""Thumb and fingers are both seen."""
-FIELD = 25.0
-"""Of view [degrees]: a long lens keeps upright what is upright."""
+"""Camera from which the thumb and the fingers are visible."""
+FIELD_OF_VIEW = 25.0
+"""Field of view [degrees]; a small one keeps vertical lines vertical."""
 
 
-class _EnoughError(Exception):
-    """The picture is taken."""
+class _PictureTakenError(Exception):
+    """Stops the simulation when the picture is taken."""
 
 
 def objects(arguments: argparse.Namespace) -> None:
@@ -392,7 +396,7 @@ def objects(arguments: argparse.Namespace) -> None:
 
 
 def held(name: str) -> np.ndarray:
-    """The object five seconds after it was locked."""
+    """Return a picture of the object five seconds after the lock."""
     from holdfast.twin.render import Camera, render
 
     taken = []
@@ -403,13 +407,13 @@ def held(name: str) -> np.ndarray:
         if locked[0] == 5 * 150:
             forces = np.column_stack([world.bodies[:-1, :3], world.contact.contact_force])
             model, data = world.hand.model, world.hand.data
-            model.vis.global_.fovy = FIELD
+            model.vis.global_.fovy = FIELD_OF_VIEW
             taken.append(render(model, data, *TILE, Camera(*CAMERA), forces))
-            raise _EnoughError
+            raise _PictureTakenError
 
     try:
         simulate(Grasp(name, 1, 1), watch=watch)
-    except _EnoughError:
+    except _PictureTakenError:
         return taken[0]
     raise SystemExit(f"{name} was not held for five seconds")
 

@@ -28,7 +28,7 @@ def run(*words, **options):
 
 @pytest.fixture
 def failing(monkeypatch):
-    """Makes the verb `doctor` raise."""
+    """Return a function that makes the verb `doctor` raise an exception."""
 
     def arrange(failure):
         def verb() -> None:
@@ -122,14 +122,14 @@ def test_a_bug_asks_to_be_reported(failing, capsys, monkeypatch):
     assert one_line(capsys) == "holdfast: internal error (KeyError: 'thumb'): please report it"
 
 
-def test_the_traceback_is_for_those_who_ask(failing, capsys, monkeypatch):
+def test_a_traceback_only_with_holdfast_debug(failing, capsys, monkeypatch):
     monkeypatch.setenv("HOLDFAST_DEBUG", "1")
     failing(KeyError("thumb"))
     assert main(["doctor"]) == 1
     assert "Traceback" in capsys.readouterr().err
 
 
-def test_a_reader_that_left_is_no_failure():
+def test_a_closed_pipe_is_no_failure():
     reading, writing = os.pipe()
     os.close(reading)
     done = subprocess.run(
@@ -156,7 +156,7 @@ def test_exit_code_reaches_the_shell():
 
 
 class TestConsole:
-    def test_json_takes_what_verbs_have(self, capsys, tmp_path):
+    def test_json_converts_numpy_values_and_paths(self, capsys, tmp_path):
         import numpy as np
 
         given = {
@@ -179,7 +179,7 @@ class TestConsole:
             "infinite": None,
         }
 
-    def test_json_refuses_the_rest(self):
+    def test_json_refuses_other_objects(self):
         with pytest.raises(TypeError, match=r"^object cannot be written as JSON$"):
             print_json({"a": object()})
 
@@ -191,7 +191,7 @@ class TestConsole:
         print_table(("name", "rate"), [])
         assert capsys.readouterr().out == "name  rate\n"
 
-    def test_progress_is_silent_where_nobody_looks(self, capsys):
+    def test_progress_is_silent_without_a_terminal(self, capsys):
         assert list(progress(range(3), "counting")) == [0, 1, 2]
         assert capsys.readouterr() == ("", "")
 

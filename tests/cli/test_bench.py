@@ -20,7 +20,7 @@ def test_json(capsys):
     assert err == "measuring: about half a minute\n"
 
 
-def test_a_table_for_people(capsys, monkeypatch):
+def test_the_table(capsys, monkeypatch):
     monkeypatch.setattr(verb, "find_spec", lambda name: None)
     assert main(["bench", "--samples", "1000", "--updates", "1000"]) == 0
     out = capsys.readouterr().out

@@ -22,7 +22,7 @@ SHORT = msgspec.structs.replace(profile("reference"), idle=(0.7, 0.8), hold=6.0)
 
 @pytest.fixture(autouse=True)
 def small(monkeypatch):
-    """A flask, once in each case, in this process."""
+    """Simulate one flask per case, in this process."""
     whole = simulate_verb.simulate_grasps
     monkeypatch.setattr(verb, "OBJECTS", "flask")
     monkeypatch.setattr(verb, "N_REPEATS", 1)
@@ -40,23 +40,23 @@ def run(capsys, *words):
     return code, out, err
 
 
-def test_does_the_main_job(capsys, tmp_path):
+def test_simulates_trains_and_replays(capsys, tmp_path):
     code, out, err = run(capsys, tmp_path / "demo", "--speed", 0, "--json")
     assert code == 0
-    told = json.loads(out)
-    recordings = load_dataset(told["recordings"])
+    result = json.loads(out)
+    recordings = load_dataset(result["recordings"])
     assert list(recordings.names) == ["flask-case1-1", "flask-case2-1"]
-    assert tuple(Model.load(told["model"]).fingers) == ("thumb", "index", "middle", "ring")
-    assert told["updates"] == recordings[1].modules["thumb"].n_samples
-    assert 50 < told["accuracy"] <= 100
-    assert told["seconds"] > 0
+    assert tuple(Model.load(result["model"]).fingers) == ("thumb", "index", "middle", "ring")
+    assert result["updates"] == recordings[1].modules["thumb"].n_samples
+    assert 50 < result["accuracy"] <= 100
+    assert result["seconds"] > 0
     for step in ("1/4", "2/4", "3/4", "4/4  replaying flask-case2-1"):
         assert step in err
     assert "hand" in err
     assert "STABLE" in err
 
 
-def test_ends_by_telling_what_was_made_and_refuses_to_do_it_twice(capsys, tmp_path):
+def test_prints_next_steps_and_refuses_to_overwrite(capsys, tmp_path):
     folder = tmp_path / "demo"
     code, out, _ = run(capsys, folder, "--speed", 0)
     assert code == 0
@@ -70,7 +70,7 @@ def test_ends_by_telling_what_was_made_and_refuses_to_do_it_twice(capsys, tmp_pa
 
 
 @pytest.mark.parametrize("speed", ["-1", "nan", "inf"])
-def test_a_speed_that_is_none(capsys, tmp_path, speed):
+def test_bad_speed(capsys, tmp_path, speed):
     code, out, err = run(capsys, tmp_path / "demo", f"--speed={speed}")
     assert (code, out, err.count("\n")) == (2, "", 1)
     assert "--speed: at least 0 expected" in err
@@ -82,7 +82,7 @@ def test_a_negative_seed(capsys, tmp_path):
     assert (code, out, err.count("\n")) == (2, "", 1)
 
 
-def test_the_replay_is_shown_on_a_page_that_ends_with_it(capsys, tmp_path, monkeypatch):
+def test_the_replay_page_stops_at_the_end_of_the_recording(capsys, tmp_path, monkeypatch):
     pages = []
 
     def look(url):
@@ -121,7 +121,9 @@ def path(recording, tmp_path):
     return tmp_path / "grasp.parquet"
 
 
-def test_every_sample_is_an_update_and_changes_of_the_hand_are_told(capsys, model, recording, path):
+def test_every_sample_is_an_update_and_changes_of_the_hand_are_printed(
+    capsys, model, recording, path
+):
     assert replay(model, path, 0) == recording.modules["thumb"].n_samples
     out, err = capsys.readouterr()
     assert out == ""
@@ -134,7 +136,7 @@ def test_every_sample_is_an_update_and_changes_of_the_hand_are_told(capsys, mode
     assert len({line.split(" -> ")[1] for line in lines}) > 1
 
 
-def test_on_a_terminal_a_table_follows(capsys, model, recording, path, monkeypatch):
+def test_on_a_terminal_a_table_is_shown(capsys, model, recording, path, monkeypatch):
     monkeypatch.setattr(verb.sys.stderr, "isatty", lambda: True, raising=False)
     assert replay(model, path, 40.0) == recording.modules["thumb"].n_samples
     err = capsys.readouterr().err
@@ -142,7 +144,7 @@ def test_on_a_terminal_a_table_follows(capsys, model, recording, path, monkeypat
     assert "sigma" in err
 
 
-def test_for_the_eye_states_are_held_back(model):
+def test_replayed_states_are_debounced(model):
     before = model.debounce
     assert verb.with_debouncing(model).debounce == Debounce(verb.MIN_DURATION, verb.HYSTERESIS)
     assert model.debounce == before

@@ -53,7 +53,7 @@ def model(tmp_path_factory):
 
 @pytest.fixture(scope="module")
 def grasp(tmp_path_factory):
-    """A long grasp, whose index begins late and stands still at other times."""
+    """A long grasp, in which the index starts later and has other times."""
     one = synthetic_recording("grasp", 1, ("thumb", "index"))
     n = 2 * CHUNK_SIZE // one.modules["thumb"].n_samples + 1
     modules = {}
@@ -110,8 +110,8 @@ def plain(estimate):
 
 
 @pytest.mark.parametrize("name", ["model", NOISE_FLOOR])
-def test_lines_are_what_detect_says(name, request, capsys, grasp):
-    """In pieces as at once, one a finger and sample, in the order of time."""
+def test_lines_equal_the_result_of_detect(name, request, capsys, grasp):
+    """Reading in chunks gives the same lines; one per finger and sample, in the order of time."""
     given = request.getfixturevalue("model") if name == "model" else name
     got, err = lines(capsys, given, grasp)
     assert err == ""
@@ -141,13 +141,13 @@ def test_faults_are_named(capsys, save):
     assert (got[400]["reason"], got[400]["faults"]) == ("fault", [Fault.NOT_FINITE])
 
 
-def test_labels_beside_are_not_looked_at(capsys, save):
+def test_label_files_are_not_read(capsys, save):
     path = save(synthetic_recording("a", 1, ("thumb",)))
     path.with_name("a.labels.json").write_text("damaged")
     assert lines(capsys, NOISE_FLOOR, path)[0]
 
 
-def test_a_cut_file_is_judged(capsys, save):
+def test_a_cut_file_is_used(capsys, save):
     path = save(synthetic_recording("a", 1, ("thumb",)), "a.mcap")
     path.write_bytes(path.read_bytes()[:60_000])
     got, err = lines(capsys, NOISE_FLOOR, path)
@@ -157,31 +157,31 @@ def test_a_cut_file_is_judged(capsys, save):
 
 class TestSummary:
     def test_shares_and_events(self, capsys, model, grasp):
-        told = summary(capsys, model, grasp)
+        document = summary(capsys, model, grasp)
         want = detect(Model.load(model), load_recording(grasp))
-        assert list(told) == ["model", "name", "fingers", "hand", "events"]
-        assert (told["model"], told["name"]) == (str(model), "grasp")
+        assert list(document) == ["model", "name", "fingers", "hand", "events"]
+        assert (document["model"], document["name"]) == (str(model), "grasp")
         for finger, trace in want.fingers.items():
-            shares = told["fingers"][finger]
+            shares = document["fingers"][finger]
             assert shares["n_samples"] == len(trace)
             assert sum(shares["states"].values()) == pytest.approx(1)
             assert shares["states"]["STABLE"] == np.mean(trace.state == 3)
             assert sum(shares["reasons"].values()) == np.sum(trace.state == 0)
             changes = np.flatnonzero(np.diff(trace.state, prepend=0))
-            events = [event for event in told["events"] if event["finger"] == finger]
+            events = [event for event in document["events"] if event["finger"] == finger]
             assert [event["time"] for event in events] == trace.times[changes].tolist()
-        hand = [event for event in told["events"] if event["finger"] == "hand"]
+        hand = [event for event in document["events"] if event["finger"] == "hand"]
         assert len(hand) == np.count_nonzero(np.diff(want.hand, prepend=0))
-        assert told["hand"]["states"]["UNSTABLE"] == np.mean(want.hand == 2)
+        assert document["hand"]["states"]["UNSTABLE"] == np.mean(want.hand == 2)
 
-    def test_for_a_person(self, capsys, model, grasp):
+    def test_the_table(self, capsys, model, grasp):
         assert main(["detect", str(model), str(grasp), "--summary"]) == 0
         out = capsys.readouterr().out
         assert re.search(r"^thumb +\d+( +\d+\.\d){4} +tare 75, warm_up 13 +-$", out, re.MULTILINE)
         assert re.search(r"^ +\d+\.\d{3} +hand +\w+ +UNKNOWN$", out, re.MULTILINE)
         assert re.search(r"^and \d+ more events \(--json prints all\)$", out, re.MULTILINE)
 
-    def test_debouncing_thins_events_out(self, capsys, model, grasp):
+    def test_debouncing_reduces_the_events(self, capsys, model, grasp):
         raw = summary(capsys, model, grasp)["events"]
         held = summary(capsys, model, grasp, "--debounce", "0.2", "--hysteresis", "0.2")["events"]
         assert 0 < len(held) < len(raw)
@@ -198,7 +198,7 @@ class TestRate:
         }
         return save(replace(recording, modules=modules))
 
-    def test_resampled_and_told(self, capsys, model, slow):
+    def test_resampled_with_a_message(self, capsys, model, slow):
         got, err = lines(capsys, model, slow)
         assert err == f"{slow}: 75 Hz given, the model expects 150 Hz: resampled\n"
         times = [line["time"] for line in got if line["finger"] == "thumb"]
@@ -217,7 +217,7 @@ class TestRate:
 
 
 def test_the_hold_of_a_model_stays(capsys, model, grasp, tmp_path):
-    """Also where the other ways of holding back a change are chosen."""
+    """It stays when other options of debouncing are given."""
     path = tmp_path / "held.json"
     held = msgspec.structs.replace(Model.load(model), debounce=Debounce(0.3, 0.2, 0.4))
     held.save(path)
@@ -237,7 +237,7 @@ def test_a_tare_by_interval(capsys, model, grasp, tmp_path):
     assert None not in got[0]["force"]
 
 
-def test_missing_fingers_are_told(capsys, model, save):
+def test_missing_fingers_are_reported(capsys, model, save):
     path = save(synthetic_recording("one", 1, ("index",)))
     got, err = lines(capsys, model, path)
     assert {line["finger"] for line in got} == {"index"}
@@ -318,7 +318,7 @@ def test_real_uskin(capsys, data_folder, tmp_path):
     assert len(got) == 2 * 285
 
 
-def test_a_live_source_is_judged_as_it_comes(capsys, save):
+def test_a_live_source(capsys, save):
     grasp = save(synthetic_recording("a", 1, ("thumb", "index")))
     with (
         open_source(str(grasp), speed=1.5) as source,
@@ -338,7 +338,7 @@ def test_a_live_source_is_judged_as_it_comes(capsys, save):
 
 
 @pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
-def test_a_signal_ends_a_live_source_in_order(capsys, monkeypatch, save, number):
+def test_a_signal_stops_a_live_source(capsys, monkeypatch, save, number):
     grasp = save(synthetic_recording("a", 1, ("thumb", "index")))
     read, calls = StreamDetector.read, []
 

@@ -72,7 +72,7 @@ def test_the_summary_of_a_source_without_samples(capsys):
     assert capsys.readouterr().out.splitlines()[1].split()[:2] == ["hand", "0"]
 
 
-def test_lines_keep_no_memory(model, recording):
+def test_lines_do_not_leak_memory(model, recording):
     chunk = chunk_from_detection(detect(model, recording))
     sum(len(block) for block in json_lines(chunk))
     tracemalloc.start()

@@ -18,11 +18,11 @@ def report(capsys):
     return json.loads(out)
 
 
-def test_tells_versions(capsys):
-    told = report(capsys)
-    assert told["holdfast"] == metadata.version("holdfast")
-    assert told["packages"]["numpy"] == np.__version__
-    assert told["cpus"] >= 1
+def test_versions(capsys):
+    found = report(capsys)
+    assert found["holdfast"] == metadata.version("holdfast")
+    assert found["packages"]["numpy"] == np.__version__
+    assert found["cpus"] >= 1
 
 
 def test_the_kernels_work(capsys):
@@ -35,18 +35,18 @@ def test_every_extra_has_a_purpose_and_a_way_to_get_it(capsys):
     assert extras["hdf5"]["install"] == 'pip install "holdfast[hdf5]"'
 
 
-def test_missing_packages_are_told(capsys, monkeypatch):
+def test_missing_packages_are_reported(capsys, monkeypatch):
     monkeypatch.setattr("holdfast.cli.doctor._version", lambda package: None)
-    told = report(capsys)
-    assert told["packages"]["numpy"] is None
-    assert told["extras"]["hdf5"]["installed"] is False
+    found = report(capsys)
+    assert found["packages"]["numpy"] is None
+    assert found["extras"]["hdf5"]["installed"] is False
     assert main(["doctor"]) == 0
     out = capsys.readouterr().out
     assert "MISSING" in out
     assert 'pip install "holdfast[hdf5]"' in out
 
 
-def test_broken_kernels_are_told_and_exit_is_0(capsys, monkeypatch):
+def test_broken_kernels_are_reported_with_exit_code_0(capsys, monkeypatch):
     def broken(force):
         raise RuntimeError("no LLVM")
 
@@ -72,27 +72,27 @@ def test_no_data(capsys, monkeypatch):
 
 def test_what_can_be_reached(capsys, monkeypatch):
     monkeypatch.setattr("holdfast.sources.xela.places.own_address", lambda: None)
-    told = report(capsys)["sources"]
-    assert set(told) == {"xela", "ros1", "ros2", "serial"}
-    assert "127.0.0.1:5000" in told["xela"]
+    found = report(capsys)["sources"]
+    assert set(found) == {"xela", "ros1", "ros2", "serial"}
+    assert "127.0.0.1:5000" in found["xela"]
     assert main(["doctor"]) == 0
-    assert told["ros2"] in capsys.readouterr().out
+    assert found["ros2"] in capsys.readouterr().out
 
 
-def test_a_server_that_listens_is_told(monkeypatch):
+def test_a_listening_server_is_reported(monkeypatch):
     with socket.create_server(("127.0.0.1", 0)) as server:
         monkeypatch.setattr(places, "PORT", server.getsockname()[1])
         assert verb.check_sources()["xela"].startswith("a server listens at 127.0.0.1:")
 
 
-def test_missing_extras_are_told(monkeypatch):
+def test_missing_extras_are_reported(monkeypatch):
     monkeypatch.setattr(verb, "find_spec", lambda name: None)
-    told = verb.check_sources()
-    assert told["ros2"] == 'not installed: pip install "holdfast[ros2]"'
-    assert told["serial"] == 'not installed: pip install "holdfast[serial]"'
+    found = verb.check_sources()
+    assert found["ros2"] == 'not installed: pip install "holdfast[ros2]"'
+    assert found["serial"] == 'not installed: pip install "holdfast[serial]"'
 
 
-def test_a_bad_master_is_told_and_harms_nothing(capsys, monkeypatch):
+def test_a_bad_master_is_reported(capsys, monkeypatch):
     monkeypatch.setattr("holdfast.ros.rospy_node.rospy_module", lambda: None)
     monkeypatch.setenv("ROS_MASTER_URI", "nonsense")
     assert report(capsys)["sources"]["ros1"] == (

@@ -22,7 +22,7 @@ EVENT = {
 
 @pytest.fixture(scope="module")
 def folder(tmp_path_factory):
-    """A model trained on `seen`, and recordings `new` that it has not seen."""
+    """Return a folder with a model trained on `seen`, and other recordings `new`."""
     root = tmp_path_factory.mktemp("evaluate")
     for place, seeds in (("seen", (0, 1)), ("new", (2, 3))):
         (root / place).mkdir()
@@ -67,7 +67,7 @@ def test_figures_are_those_of_the_library(capsys, folder):
     assert pooled["auc"] == metrics.pooled.auc
 
 
-def test_recordings_seen_in_training_are_told_whatever_they_are_called(capsys, folder, tmp_path):
+def test_training_recordings_are_named_even_if_renamed(capsys, folder, tmp_path):
     seen = load_dataset(folder / "seen")[1]
     save_recording(seen, tmp_path / "renamed.mcap")
     save_recording(load_dataset(folder / "new")[0], tmp_path / "grasp-0.parquet")
@@ -78,8 +78,8 @@ def test_recordings_seen_in_training_are_told_whatever_they_are_called(capsys, f
     assert err.endswith("their metrics are optimistic\n")
 
 
-def test_labels_do_not_hide_what_was_seen(capsys, folder, tmp_path):
-    """Relabelled, a recording is the same recording."""
+def test_new_labels_do_not_hide_training_recordings(capsys, folder, tmp_path):
+    """A recording with other labels is the same recording."""
     seen = load_dataset(folder / "seen")[0]
     labels = {finger: seen.modules[finger].labels[:4] for finger in FINGERS}
     save_recording(seen.with_labels(labels), tmp_path / "relabelled.parquet")
@@ -87,7 +87,7 @@ def test_labels_do_not_hide_what_was_seen(capsys, folder, tmp_path):
     assert len(json.loads(out)["trained_on"]) == 1
 
 
-def test_one_recording_and_a_table_for_people(capsys, folder):
+def test_one_recording_and_the_table(capsys, folder):
     code, out, _ = run(capsys, folder / "model.json", folder / "new" / "grasp-2.parquet")
     assert code == 0
     assert "AUC in contact" in out
@@ -168,7 +168,7 @@ def twin_grasp(tmp_path_factory):
     return path
 
 
-def test_the_model_of_the_twin_judges_a_grasp_of_the_twin(capsys, twin_grasp):
+def test_the_model_of_the_twin_is_evaluated_on_a_grasp_of_the_twin(capsys, twin_grasp):
     code, out, err = run(capsys, "builtin:twin", twin_grasp, "--json")
     assert (code, err) == (0, "")
     report = json.loads(out)

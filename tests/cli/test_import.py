@@ -22,7 +22,7 @@ def grasp():
 
 @pytest.fixture
 def table(tmp_path):
-    """Writes a CSV file of an AnySkin, labelled stable."""
+    """Return a function that writes a CSV file of an AnySkin, labelled stable."""
 
     def write(name="press.csv", n=40, extra=""):
         rows = [
@@ -51,9 +51,9 @@ def imported(capsys, *words):
 
 
 def test_imports_a_file(capsys, table, tmp_path):
-    told = imported(capsys, table(), tmp_path / "a" / "b")
+    document = imported(capsys, table(), tmp_path / "a" / "b")
     path = tmp_path / "a" / "b" / "press.parquet"
-    assert told == {
+    assert document == {
         "out": str(path.parent),
         "n_recordings": 1,
         "n_modules": 1,
@@ -74,7 +74,7 @@ def test_imports_a_file(capsys, table, tmp_path):
     assert load_recording(path).modules["finger1"].n_samples == 40
 
 
-def test_tells_a_person(capsys, table, tmp_path):
+def test_the_table(capsys, table, tmp_path):
     table("one.csv")
     table("two.csv", n=30)
     assert main(["import", str(tmp_path / "in"), str(tmp_path / "out"), "--format", "csv"]) == 0
@@ -88,7 +88,7 @@ def test_without_labels_and_as_mcap(capsys, table, tmp_path):
     assert load_recording(tmp_path / "out" / "press.mcap").modules["finger1"].labels == ()
 
 
-def test_own_recordings_come_in(capsys, grasp, tmp_path):
+def test_own_recordings_are_imported(capsys, grasp, tmp_path):
     save_recording(grasp, tmp_path / "grasp.mcap")
     imported(capsys, tmp_path / "grasp.mcap", tmp_path / "out", "--no-labels")
     got = load_recording(tmp_path / "out" / "grasp.parquet")
@@ -106,8 +106,8 @@ def test_a_cut_file_is_recovered(capsys, grasp, tmp_path):
     assert main(["import", str(cut), str(tmp_path / "out"), "--json"]) == 0
     out, err = capsys.readouterr()
     assert re.fullmatch(rf"{re.escape(str(cut))} is cut off: \d+\.\d\d s recovered\n", err)
-    (told,) = json.loads(out)["recordings"]
-    assert (told["name"], told["complete"]) == ("cut", False)
+    (document,) = json.loads(out)["recordings"]
+    assert (document["name"], document["complete"]) == ("cut", False)
     got = load_recording(tmp_path / "out" / "cut.parquet")
     assert not got.complete
     n = got.modules["thumb"].n_samples
@@ -162,7 +162,7 @@ class TestOutputs:
         out.mkdir(mode=0o500)
         assert refusal(capsys, table(), out) == f"cannot write to {out}: Permission denied"
 
-    def test_a_name_that_leads_elsewhere(self, capsys, grasp, tmp_path):
+    def test_a_name_with_a_path(self, capsys, grasp, tmp_path):
         save_recording(replace(grasp, name="../up"), tmp_path / "a.parquet")
         assert refusal(capsys, tmp_path / "a.parquet", tmp_path / "out") == (
             "'../up' cannot be the name of a file"
@@ -204,7 +204,7 @@ def test_refusals(capsys, table, tmp_path):
 
 
 def test_real_uskin(capsys, data_folder, tmp_path):
-    told = imported(
+    document = imported(
         capsys, data_folder / "uskin_pick_move", tmp_path, "--format", "uskin-pick-move"
     )
-    assert (told["n_recordings"], told["n_modules"], told["n_samples"]) == (5, 10, 3272)
+    assert (document["n_recordings"], document["n_modules"], document["n_samples"]) == (5, 10, 3272)

@@ -40,13 +40,13 @@ def refusal(capsys, *words):
     return err.removeprefix("holdfast: ").rstrip("\n")
 
 
-def told(capsys, *words):
+def info_json(capsys, *words):
     assert main(["info", *map(str, words), "--json"]) == 0
     return json.loads(capsys.readouterr().out)
 
 
 def test_json_of_a_recording(capsys, path, grasp):
-    document = told(capsys, path)
+    document = info_json(capsys, path)
     thumb = document["modules"].pop("thumb")
     assert list(document["modules"]) == ["index"]
     del document["modules"]
@@ -89,7 +89,7 @@ def test_gaps_repeats_and_faults(capsys, tmp_path):
     times = np.arange(300) / 100 + np.where(np.arange(300) < 200, 0, 1.0)
     module = Tactile(sensor("anyskin"), times, readings)
     save_recording(Recording("a", {"finger1": module}), tmp_path / "a.parquet")
-    found = told(capsys, tmp_path / "a.parquet")["modules"]["finger1"]
+    found = info_json(capsys, tmp_path / "a.parquet")["modules"]["finger1"]
     assert (found["gaps"], found["repeats"], found["faults"]) == (1, 1, {"not_finite": 1})
 
 
@@ -97,11 +97,11 @@ def test_a_module_without_samples(capsys, grasp, tmp_path):
     thumb = grasp.modules["thumb"]
     both = {"thumb": thumb, "index": replace(thumb, labels=()).slice(0, 0)}
     save_recording(Recording("a", both), tmp_path / "a.parquet")
-    assert told(capsys, tmp_path / "a.parquet")["modules"]["index"]["n_samples"] == 0
+    assert info_json(capsys, tmp_path / "a.parquet")["modules"]["index"]["n_samples"] == 0
     assert main(["info", str(tmp_path / "a.parquet"), "--plot", str(tmp_path / "a.svg")]) == 0
 
 
-def test_tells_a_person(capsys, path):
+def test_the_table(capsys, path):
     assert main(["info", str(path)]) == 0
     out, err = capsys.readouterr()
     assert err == ""
@@ -120,16 +120,16 @@ def test_a_cut_file_is_shown(capsys, grasp, tmp_path):
     (tmp_path / "a.mcap").write_bytes(data[: len(data) // 2])
     assert main(["info", str(tmp_path / "a.mcap")]) == 0
     assert "no: the end of the file is cut off" in capsys.readouterr().out
-    assert told(capsys, tmp_path / "a.mcap")["complete"] is False
+    assert info_json(capsys, tmp_path / "a.mcap")["complete"] is False
 
 
 class TestFolder:
     def test_all_recordings_by_name(self, capsys, grasp, path):
         save_recording(replace(grasp, name="b"), path.with_name("b.mcap"))
         path.with_name("notes.txt").write_text("mine")
-        documents = told(capsys, path.parent)["recordings"]
+        documents = info_json(capsys, path.parent)["recordings"]
         assert [one["name"] for one in documents] == ["b", "grasp"]
-        assert documents[1] == told(capsys, path)
+        assert documents[1] == info_json(capsys, path)
         assert main(["info", str(path.parent)]) == 0
         assert re.search(r"^grasp +2 +\d+ +150\.0 .* ok$", capsys.readouterr().out, re.M)
 

@@ -23,13 +23,13 @@ from holdfast.sources import open_source
 from holdfast.synthetic import synthetic_recording
 
 PATIENCE = 30.0
-"""So long a test waits before it fails [s]."""
+"""Time after which a test fails [s]."""
 FAST = 8
 
 
 @pytest.fixture(scope="module")
 def recording():
-    """Six seconds, from before the grasp to after the shaking."""
+    """Return six seconds, from before the grasp to after the shaking."""
     whole = synthetic_recording("grasp", 3, ("thumb", "index", "middle", "ring"))
     return replace(whole, modules={n: m.slice(100, 1000) for n, m in whole.modules.items()})
 
@@ -48,7 +48,7 @@ def free_port():
 
 
 class Listener(threading.Thread):
-    """A client in a thread of its own: connects as soon as it can, and takes `n` samples."""
+    """Start a client in a thread that connects as soon as possible and reads `n` samples."""
 
     def __init__(self, uri, n):
         super().__init__()
@@ -88,7 +88,7 @@ def refusal(capsys, *words):
     ids=" ".join,
 )
 def test_a_client_decides_as_on_the_recording(capsys, path, recording, options):
-    """Sample by sample, over a socket, at eight times the pace."""
+    """Compare sample by sample, over a socket, at eight times real time."""
     port = free_port()
     names = "?fingers=1:thumb,2:index,3:middle,4:ring" if "--separate" in options else ""
     n = recording.modules["thumb"].n_samples
@@ -96,11 +96,11 @@ def test_a_client_decides_as_on_the_recording(capsys, path, recording, options):
     code, out, err = play(capsys, path, "--port", port, "--once", "--speed", FAST, *options)
     listener.join()
     assert (code, out) == (0, "")
-    told = err.splitlines()
+    message = err.splitlines()
     version = "1.7" if "1.7" in options else "1.8"
     uri = f"xela://127.0.0.1:{port}{names}"
-    assert told[0] == f"{uri} sends {path} as a XELA server {version}; Ctrl-C stops it"
-    assert told[-1] == f"{n} packets sent"
+    assert message[0] == f"{uri} sends {path} as a XELA server {version}; Ctrl-C stops it"
+    assert message[-1] == f"{n} packets sent"
 
     arrivals = listener.arrivals
     assert len(arrivals) == n
@@ -126,7 +126,7 @@ def test_a_client_decides_as_on_the_recording(capsys, path, recording, options):
     assert {state for trace in offline.fingers.values() for state in trace.state} >= {2, 3}
 
 
-def test_json_tells_where_and_how_much(capsys, path):
+def test_json_has_the_address_and_the_number_of_packets(capsys, path):
     port = free_port()
     listener = Listener(f"xela://127.0.0.1:{port}", 900)
     words = ("--port", port, "--once", "--separate", "--speed", FAST, "--json")
@@ -144,7 +144,7 @@ def test_json_tells_where_and_how_much(capsys, path):
 
 
 @pytest.mark.parametrize("ending", [signal.SIGINT, signal.SIGTERM])
-def test_it_plays_again_and_again_until_it_is_interrupted(path, ending):
+def test_it_repeats_until_it_is_interrupted(path, ending):
     command = (
         "import signal, sys; signal.signal(signal.SIGINT, signal.default_int_handler); "
         "from holdfast.cli import main; sys.exit(main())"
@@ -172,7 +172,7 @@ def test_it_plays_again_and_again_until_it_is_interrupted(path, ending):
     assert len(times) == 1500
 
 
-def test_who_listens_is_told(capsys, path, monkeypatch):
+def test_the_number_of_clients_is_printed(capsys, path, monkeypatch):
     monkeypatch.setattr(verb, "POLL_INTERVAL", 0.02)
     port = free_port()
     listener = Listener(f"xela://127.0.0.1:{port}", 900)
@@ -194,39 +194,41 @@ def test_a_terminal_shows_the_rate(capsys, path, monkeypatch):
 
 
 class TestRefusals:
-    def test_a_source_that_there_is_not(self, capsys, tmp_path):
+    def test_a_missing_source(self, capsys, tmp_path):
         assert "nothing.parquet does not exist" in refusal(capsys, tmp_path / "nothing.parquet")
 
-    def test_a_uri_that_there_is_not(self, capsys):
+    def test_an_unknown_uri(self, capsys):
         assert refusal(capsys, "can:3").startswith("'can:3' is neither the path of a recording")
 
-    def test_a_speed_that_is_none(self, capsys, path):
-        told = refusal(capsys, path, "--speed", "0")
-        assert told == "--speed: a speed above 0 expected, 0 given"
+    def test_bad_speed(self, capsys, path):
+        message = refusal(capsys, path, "--speed", "0")
+        assert message == "--speed: a speed above 0 expected, 0 given"
         assert refusal(capsys, path, "--speed=-1") == "--speed: at least 0 expected, -1 given"
         assert refusal(capsys, "xela://127.0.0.1:1", "--speed", "2") == (
             "--speed is for recordings and the twin; xela://127.0.0.1:1 is a device"
         )
 
-    def test_a_version_that_there_is_not(self, capsys, path):
-        told = refusal(capsys, path, "--version", "2.0", "--port", 0)
-        assert told == "version 1.7 or 1.8 expected, '2.0' given"
+    def test_an_unknown_version(self, capsys, path):
+        message = refusal(capsys, path, "--version", "2.0", "--port", 0)
+        assert message == "version 1.7 or 1.8 expected, '2.0' given"
 
     def test_a_port_that_is_taken(self, capsys, path):
         with socket.create_server(("127.0.0.1", 0)) as other:
             port = other.getsockname()[1]
-            told = refusal(capsys, path, "--port", port)
-        assert told == (
+            message = refusal(capsys, path, "--port", port)
+        assert message == (
             f"cannot listen at 127.0.0.1:{port} (it is in use); --port 0 finds a free port"
         )
 
-    def test_fingertips_of_no_hand(self, capsys, tmp_path):
+    def test_modules_that_are_not_of_the_hand(self, capsys, tmp_path):
         one = Tactile(sensor("uskin-4x4"), np.arange(3.0), np.zeros((3, 16, 3)))
         save_recording(Recording("x", {"finger1": one}), tmp_path / "x.parquet")
-        told = refusal(capsys, tmp_path / "x.parquet", "--whole-hand")
-        assert told.startswith("--whole-hand: finger1 is no module of allegro-uskin; it has thumb")
+        message = refusal(capsys, tmp_path / "x.parquet", "--whole-hand")
+        assert message.startswith(
+            "--whole-hand: finger1 is no module of allegro-uskin; it has thumb"
+        )
 
-    def test_readings_that_are_no_counts(self, capsys, tmp_path):
+    def test_readings_that_are_not_counts(self, capsys, tmp_path):
         one = Tactile(sensor("uskin-4x4"), np.arange(3.0), np.full((3, 16, 3), -2.0))
         save_recording(Recording("x", {"finger1": one}), tmp_path / "x.parquet")
         code, out, err = play(capsys, tmp_path / "x.parquet", "--port", 0)

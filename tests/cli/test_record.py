@@ -51,7 +51,7 @@ def grasp(tmp_path_factory):
 
 
 class Device(Source):
-    """Gives what it is told to, then falls silent, or ends."""
+    """Source that gives the arrivals of a list, then falls silent, or ends."""
 
     name = "xela://fake"
     paced = False
@@ -82,7 +82,7 @@ class Device(Source):
 
 @pytest.fixture
 def device(monkeypatch):
-    """Has `open_source` give a device with these arrivals."""
+    """Make `open_source` return a device with these arrivals."""
 
     def arrange(*arrivals, ends=True):
         made = Device(arrivals, ends)
@@ -99,20 +99,20 @@ def arrival(k, **fields):
 
 def run(capsys, *words):
     code = main(["record", *map(str, words)])
-    printed, told = capsys.readouterr()
-    return code, printed, told
+    printed, err = capsys.readouterr()
+    return code, printed, err
 
 
 def refusal(capsys, *words):
-    code, printed, told = run(capsys, *words)
+    code, printed, err = run(capsys, *words)
     assert (code, printed) == (2, "")
-    *_, last = told.splitlines()
+    *_, last = err.splitlines()
     return last.removeprefix("holdfast: ")
 
 
 def test_records_a_recording_as_it_is(capsys, grasp, tmp_path):
     out = tmp_path / "copy.mcap"
-    code, printed, told = run(capsys, grasp, out, "--speed", "0")
+    code, printed, err = run(capsys, grasp, out, "--speed", "0")
     copy, want = load_recording(out), load_recording(grasp)
     assert code == 0
     assert copy.complete
@@ -126,14 +126,14 @@ def test_records_a_recording_as_it_is(capsys, grasp, tmp_path):
         rf"{want.duration:.2f} s, {n} samples of 2 modules in {re.escape(str(out))} \(.* kB\)\n",
         printed,
     )
-    assert told.splitlines() == [
+    assert err.splitlines() == [
         f"recording {grasp} to {out}",
         "Ctrl-C stops",
         f"next: holdfast info {out}",
     ]
 
 
-def test_tells_machines_what_came(capsys, device, tmp_path):
+def test_json_of_a_recording(capsys, device, tmp_path):
     gap = {"thumb": (Fault.PACKET_GAP,)}
     came = [arrival(k) for k in range(50)]
     came += [arrival(k, faults=gap, n_lost=20, n_refused=1) for k in (70,)]
@@ -158,7 +158,7 @@ def test_tells_machines_what_came(capsys, device, tmp_path):
     }
 
 
-def test_what_a_person_says_of_it_goes_with_it(capsys, device, tmp_path):
+def test_metadata_of_the_options(capsys, device, tmp_path):
     device(arrival(0))
     out = tmp_path / "a.mcap"
     words = ("--object", "can", "--case", "2", "--note", "wet", "--set", "operator=Ann=Bo")
@@ -184,24 +184,24 @@ def test_pads_can_be_left_out(capsys, device, tmp_path):
     assert {name: m.n_samples for name, m in recording.modules.items()} == {"thumb": 2}
 
 
-def test_it_stops_by_itself(capsys, device, tmp_path):
+def test_it_stops_after_the_time(capsys, device, tmp_path):
     device(*(arrival(k) for k in range(100, 1000)), ends=False)
     run(capsys, "xela://fake", tmp_path / "a.mcap", "--seconds", "2")
     times = load_recording(tmp_path / "a.mcap").modules["thumb"].times
     np.testing.assert_array_equal(times, np.arange(100, 300) / 100)
 
 
-def test_it_stops_by_itself_though_the_source_is_silent(capsys, device, tmp_path, monkeypatch):
+def test_it_stops_although_the_source_is_silent(capsys, device, tmp_path, monkeypatch):
     monkeypatch.setattr(verb, "EXTRA_TIME", 0.1)
     device(arrival(0), notice_arrival(0.0, "connection\x1b lost"), ends=False)
-    code, _, told = run(capsys, "xela://fake", tmp_path / "a.mcap", "--seconds", "0.3")
+    code, _, err = run(capsys, "xela://fake", tmp_path / "a.mcap", "--seconds", "0.3")
     assert code == 0
-    assert "connection? lost" in told.splitlines()
+    assert "connection? lost" in err.splitlines()
     recording = load_recording(tmp_path / "a.mcap")
     assert (recording.complete, recording.modules["thumb"].n_samples) == (True, 1)
 
 
-def test_where_nothing_came_nothing_is_left(capsys, device, tmp_path):
+def test_without_samples_no_file_is_left(capsys, device, tmp_path):
     out = tmp_path / "a.mcap"
     device(notice_arrival(0.0, "hello"))
     assert refusal(capsys, "xela://fake", out) == (
@@ -214,7 +214,7 @@ def test_where_nothing_came_nothing_is_left(capsys, device, tmp_path):
     assert list(tmp_path.iterdir()) == []
 
 
-def test_what_is_there_is_kept_unless_forced(capsys, device, tmp_path):
+def test_existing_files_are_kept_without_force(capsys, device, tmp_path):
     out = tmp_path / "a.mcap"
     out.write_text("mine")
     device(arrival(0))
@@ -230,7 +230,7 @@ def test_what_is_there_is_kept_unless_forced(capsys, device, tmp_path):
     assert load_recording(out).complete
 
 
-def test_bad_words_are_refused(capsys, device, grasp, tmp_path):
+def test_bad_arguments_are_refused(capsys, device, grasp, tmp_path):
     device(arrival(0))
     out = tmp_path / "a.mcap"
     copy = tmp_path / "grasp.mcap"
@@ -278,7 +278,7 @@ def test_bad_words_are_refused(capsys, device, grasp, tmp_path):
         ("grasp.parquet", (), r"grasp\.mcap"),
     ],
 )
-def test_in_a_folder_it_finds_a_name(source, words, pattern, capsys, device, tmp_path):
+def test_in_a_folder_a_name_is_chosen(source, words, pattern, capsys, device, tmp_path):
     device(arrival(0))
     code, printed, _ = run(capsys, source, tmp_path / "new" / "folder", *words, "--json")
     assert code == 0
@@ -287,7 +287,7 @@ def test_in_a_folder_it_finds_a_name(source, words, pattern, capsys, device, tmp
     assert re.fullmatch(pattern, path.name)
 
 
-def test_a_file_that_is_taken_away_is_told(capsys, device, tmp_path, monkeypatch):
+def test_a_removed_file_is_reported(capsys, device, tmp_path, monkeypatch):
     out = tmp_path / "a.mcap"
     put = Recorder.put
 
@@ -303,12 +303,12 @@ def test_a_file_that_is_taken_away_is_told(capsys, device, tmp_path, monkeypatch
 
 
 class Child:
-    """The verb in a process of its own, on a terminal of its own."""
+    """The verb in another process, on another terminal."""
 
     def __init__(self, *words, stdin=None):
         self.master, self.terminal = pty.openpty()
         self.before = termios.tcgetattr(self.terminal)
-        self.told = b""
+        self.output = b""
         self.process = subprocess.Popen(
             [sys.executable, "-c", RUN, "record", *map(str, words)],
             stdin=self.terminal if stdin is None else stdin,
@@ -320,13 +320,13 @@ class Child:
 
     def wait_for(self, *words):
         end = time.monotonic() + PATIENCE
-        while not all(one in self.told for one in words):
-            assert time.monotonic() < end, self.told
+        while not all(one in self.output for one in words):
+            assert time.monotonic() < end, self.output
             if select.select([self.master], [], [], 0.1)[0]:
-                self.told += os.read(self.master, 65536)
+                self.output += os.read(self.master, 65536)
 
     def finish(self):
-        """The exit code, and what was printed; the terminal is as it was before."""
+        """Return the exit code and the output; the terminal must be restored."""
         reader = threading.Thread(target=self._swallow, daemon=True)
         reader.start()
         printed = self.process.communicate(timeout=PATIENCE)[0]
@@ -339,12 +339,12 @@ class Child:
     def _swallow(self):
         try:
             while data := os.read(self.master, 65536):
-                self.told += data
+                self.output += data
         except OSError:
             pass
 
 
-def test_keys_mark_and_stop_and_the_terminal_comes_back(grasp, tmp_path):
+def test_keys_set_markers_and_stop_and_the_terminal_is_restored(grasp, tmp_path):
     out = tmp_path / "a.mcap"
     child = Child(grasp, out, "--json")
     child.wait_for(b"keys: c closing", b" Hz")
@@ -360,7 +360,7 @@ def test_keys_mark_and_stop_and_the_terminal_comes_back(grasp, tmp_path):
 
 
 @pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM, signal.SIGHUP])
-def test_a_signal_ends_it_well(number, grasp, tmp_path):
+def test_a_signal_stops_it(number, grasp, tmp_path):
     out = tmp_path / "a.mcap"
     child = Child(grasp, out)
     child.wait_for(b" Hz")
@@ -368,11 +368,11 @@ def test_a_signal_ends_it_well(number, grasp, tmp_path):
     code, printed = child.finish()
     assert code == 0
     assert f" samples of 2 modules in {out}" in printed
-    assert f"next: holdfast info {out}" in child.told.decode().replace("\r\n", "\n")
+    assert f"next: holdfast info {out}" in child.output.decode().replace("\r\n", "\n")
     assert load_recording(out).complete
 
 
-def test_ctrl_c_on_the_terminal_ends_it_well(grasp, tmp_path):
+def test_ctrl_c_on_the_terminal_stops_it(grasp, tmp_path):
     child = Child(grasp, tmp_path / "a.mcap")
     child.wait_for(b" Hz")
     os.write(child.master, b"\x03")
@@ -380,7 +380,7 @@ def test_ctrl_c_on_the_terminal_ends_it_well(grasp, tmp_path):
     assert load_recording(tmp_path / "a.mcap").complete
 
 
-def test_a_script_marks_by_lines(grasp, tmp_path):
+def test_lines_of_a_pipe_set_markers(grasp, tmp_path):
     out = tmp_path / "a.mcap"
     words = [sys.executable, "-c", RUN, "record", str(grasp), str(out), "--seconds", "3"]
     with subprocess.Popen(
@@ -397,7 +397,7 @@ def test_a_script_marks_by_lines(grasp, tmp_path):
     assert texts == ["closing", "q", "\ufffd half a line"]
 
 
-def test_of_a_full_disk_what_went_before_stays(grasp, tmp_path):
+def test_on_a_full_disk_the_recorded_part_stays(grasp, tmp_path):
     out = tmp_path / "a.mcap"
     words = [sys.executable, "-c", FULL, "record", str(grasp), str(out), "--speed", "0"]
     done = subprocess.run(

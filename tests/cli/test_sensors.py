@@ -31,7 +31,7 @@ def test_lists_all(capsys):
         assert re.search(rf"^{name} +\d+", out, re.MULTILINE)
 
 
-def test_lists_all_for_machines(capsys):
+def test_lists_all_as_json(capsys):
     listed = json.loads(shown(capsys, "--json"))
     assert [one["name"] for one in listed["sensors"]] == list(built_in_sensors())
     assert listed["hands"][0]["n_taxels"] == 368
@@ -45,7 +45,7 @@ def test_shows_a_sensor(capsys):
 
 @pytest.mark.parametrize("name", built_in_sensors())
 def test_json_of_a_sensor_is_a_sensor_file(name, capsys, tmp_path):
-    """What it prints is what `from_json` reads, but for the number of taxels."""
+    """The JSON can be read by `from_json`, without the number of taxels."""
     printed = json.loads(shown(capsys, name, "--json"))
     assert printed.pop("n_taxels") == sensor(name).n_taxels
     assert Sensor.from_dict(printed) == sensor(name)

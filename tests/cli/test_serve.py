@@ -25,7 +25,7 @@ def grasp(tmp_path):
 
 @pytest.fixture
 def when_served(monkeypatch):
-    """Has work done, in a thread, once the page can be opened; then ends the service."""
+    """Run a function in a thread when the page can be opened; then stop the service."""
 
     def arrange(work):
         found = []
@@ -68,13 +68,13 @@ def ask(url, method="GET", **headers):
         return json.load(answer)
 
 
-def test_the_service_is_there_until_ctrl_c(capsys, grasp, when_served):
+def test_the_service_runs_until_ctrl_c(capsys, grasp, when_served):
     found = when_served(lambda url: ask(f"{url}api/v1/info"))
     code, out, err = run(capsys, MODEL, grasp, "--port", 0, "--json")
     assert code == 0
-    told = json.loads(out)
-    assert told["source"] == str(grasp)
-    assert told["url"] in err
+    document = json.loads(out)
+    assert document["source"] == str(grasp)
+    assert document["url"] in err
     assert found[0]["model"] == MODEL
     assert set(found[0]["fingers"]) == {"thumb", "index", "middle"}
 
@@ -134,7 +134,7 @@ def test_no_text_browser_is_opened(monkeypatch):
     assert open_browser("http://127.0.0.1:1/") is False
 
 
-def test_what_ros_does_not_take_is_told(capsys, monkeypatch, grasp):
+def test_estimates_that_ros_refuses_are_reported(capsys, monkeypatch, grasp):
     class Refuser:
         n_failed, n_dropped = 7, 2
 

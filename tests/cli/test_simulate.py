@@ -33,52 +33,52 @@ def out(tmp_path):
 
 def run(capsys, *words):
     code = main(["simulate", *map(str, words)])
-    printed, told = capsys.readouterr()
-    return code, printed, told
+    printed, err = capsys.readouterr()
+    return code, printed, err
 
 
 def refusal(capsys, *words):
-    code, printed, told = run(capsys, *words)
-    assert (code, printed, told.count("\n")) == (2, "", 1)
-    return told.removeprefix("holdfast: ").rstrip("\n")
+    code, printed, err = run(capsys, *words)
+    assert (code, printed, err.count("\n")) == (2, "", 1)
+    return err.removeprefix("holdfast: ").rstrip("\n")
 
 
 def names(folder):
     return sorted(path.name for path in folder.iterdir())
 
 
-def test_json_tells_what_was_made(capsys, out):
+def test_json_lists_the_recordings(capsys, out):
     code, printed, _ = run(
         capsys, out, "--objects", "flask,ball", "--repeats", 1, "--seed", 3, "--jobs", 1, "--json"
     )
     assert code == 0
-    told = json.loads(printed)
+    document = json.loads(printed)
     made = [f"{thing}-case{case}-1" for thing in ("flask", "ball") for case in (1, 2)]
-    assert told == {"out": str(out), "recordings": made, "failed": [], "profile": "reference"}
+    assert document == {"out": str(out), "recordings": made, "failed": [], "profile": "reference"}
     assert names(out) == sorted(f"{name}.parquet" for name in made)
     for recording in load_dataset(out):
         assert recording.metadata["seed"] == 3
         assert recording.truth is not None
 
 
-def test_text_tells_how_many(capsys, out):
+def test_text_has_the_number_of_recordings(capsys, out):
     code, printed, _ = run(capsys, out, *ONE)
     assert (code, printed) == (0, f"1 recordings in {out}, 0 of them of failed grasps\n")
 
 
-def test_what_is_finished_is_not_made_again(capsys, out):
+def test_existing_recordings_are_kept(capsys, out):
     run(capsys, out, *ONE)
     (path,) = out.iterdir()
     before = (path.stat().st_mtime_ns, path.stat().st_ino)
-    code, printed, told = run(capsys, out, *ONE[:-4], "--repeats", 2, "--jobs", 1, "--json")
+    code, printed, err = run(capsys, out, *ONE[:-4], "--repeats", 2, "--jobs", 1, "--json")
     assert code == 0
     assert json.loads(printed)["recordings"] == ["flask-case1-2"]
-    assert "1 of 2 recordings exist already" in told
+    assert "1 of 2 recordings exist already" in err
     assert (path.stat().st_mtime_ns, path.stat().st_ino) == before
     assert json.loads(run(capsys, out, *ONE, "--json")[1])["recordings"] == []
 
 
-def test_how_many_at_a_time_changes_nothing(capsys, out, tmp_path, monkeypatch):
+def test_the_number_of_processes_changes_nothing(capsys, out, tmp_path, monkeypatch):
     monkeypatch.undo()  # other processes know of no patch
     other = tmp_path / "other"
     words = ("--objects", "flask", "--cases", 1, "--repeats", 2)
@@ -90,22 +90,22 @@ def test_how_many_at_a_time_changes_nothing(capsys, out, tmp_path, monkeypatch):
 
 
 @pytest.mark.parametrize(
-    ("words", "told"),
+    ("words", "text"),
     [
         (("--seed", "1"), "seed 0"),
         (("--profile", "gentle"), "profile reference"),
         (("--server",), "server False"),
     ],
 )
-def test_one_folder_holds_what_was_made_alike(capsys, out, words, told):
+def test_recordings_with_other_settings_are_refused(capsys, out, words, text):
     run(capsys, out, *ONE)
     line = refusal(capsys, out, *ONE, *words)
     assert f"{out}/flask-case1-1.parquet has profile" in line
-    assert told in line
+    assert text in line
     assert "--force" in line
 
 
-def test_force_makes_all_anew(capsys, out):
+def test_force_simulates_all_again(capsys, out):
     run(capsys, out, *ONE)
     code, printed, _ = run(capsys, out, *ONE, "--seed", 1, "--force", "--json")
     assert (code, json.loads(printed)["recordings"]) == (0, ["flask-case1-1"])
@@ -115,7 +115,7 @@ def test_force_makes_all_anew(capsys, out):
 class TestFailures:
     @pytest.fixture
     def weak(self, monkeypatch):
-        """Hands too weak to hold; the list of grasps that were tried."""
+        """Make the hands too weak to hold; return the list of simulated grasps."""
         tried = []
 
         def simulate(grasp, *_):
@@ -129,7 +129,7 @@ class TestFailures:
 
     FAILED = tuple(f"flask-case1-1-failed{k}.parquet" for k in (1, 2, 3, 4))
 
-    def test_are_kept_and_tried_again_but_not_for_ever(self, capsys, out, weak):
+    def test_are_kept_and_repeated_a_limited_number_of_times(self, capsys, out, weak):
         code, printed, _ = run(capsys, out, *ONE, "--json")
         assert code == 0
         assert weak == list(range(verb.ATTEMPTS))
@@ -139,7 +139,7 @@ class TestFailures:
         ]
         assert {r.metadata["case"] for r in load_dataset(out)} == {"failed"}
 
-    def test_are_not_made_again(self, capsys, out, weak):
+    def test_are_not_simulated_again(self, capsys, out, weak):
         run(capsys, out, *ONE)
         (out / self.FAILED[2]).unlink()
         (out / self.FAILED[3]).unlink()
@@ -156,16 +156,16 @@ class TestFailures:
         (out / self.FAILED[3]).unlink()
         assert "parquet has profile" in refusal(capsys, out, *ONE, "--seed", 1)
 
-    def test_of_before_go_when_all_is_made_anew(self, capsys, out, weak, monkeypatch):
+    def test_older_ones_are_removed_by_force(self, capsys, out, weak, monkeypatch):
         run(capsys, out, *ONE)
         monkeypatch.setattr(simulation, "profile", lambda name: SHORT)
-        code, _, told = run(capsys, out, *ONE, "--seed", 1, "--force")
-        assert (code, told) == (0, "")
+        code, _, err = run(capsys, out, *ONE, "--seed", 1, "--force")
+        assert (code, err) == (0, "")
         assert names(out) == ["flask-case1-1.parquet"]
 
 
 @pytest.mark.parametrize(
-    ("words", "told"),
+    ("words", "text"),
     [
         (("--objects", "cup"), "no object 'cup'; there are ball, box, can"),
         (("--objects", "can,"), "no object ''; there are"),
@@ -178,8 +178,8 @@ class TestFailures:
         (("--video", "film.avi"), "film.avi"),
     ],
 )
-def test_bad_input_is_one_line_and_makes_no_folder(capsys, out, words, told):
-    assert told in refusal(capsys, out, *words)
+def test_bad_input_is_one_line_and_makes_no_folder(capsys, out, words, text):
+    assert text in refusal(capsys, out, *words)
     assert not out.exists()
 
 
@@ -193,14 +193,14 @@ def test_a_full_disk(capsys, out, monkeypatch):
         raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC), str(self))
 
     monkeypatch.setattr(files.Path, "replace", full)
-    code, printed, told = run(capsys, out, *ONE)
+    code, printed, err = run(capsys, out, *ONE)
     assert (code, printed) == (2, "")
     path = out / "flask-case1-1.parquet"
-    assert told.splitlines()[-1] == f"holdfast: cannot write {path}: No space left on device"
+    assert err.splitlines()[-1] == f"holdfast: cannot write {path}: No space left on device"
     assert not names(out)
 
 
-def test_a_killed_run_goes_on(capsys, out, monkeypatch):
+def test_a_killed_run_can_be_continued(capsys, out, monkeypatch):
     monkeypatch.undo()
     words = ["--objects", "flask", "--cases", "1", "--repeats", "4"]
     program = "import sys; from holdfast.cli import main; sys.exit(main(sys.argv[1:]))"
@@ -222,7 +222,7 @@ def test_a_killed_run_goes_on(capsys, out, monkeypatch):
     code, printed, _ = run(capsys, out, *words, "--jobs", 1, "--json")
     assert code == 0
     assert len(json.loads(printed)["recordings"]) == 4 - len(finished)
-    assert all(path.stat().st_mtime_ns == told for path, told in finished.items())
+    assert all(path.stat().st_mtime_ns == time for path, time in finished.items())
     assert len(load_dataset(out)) == 4
 
 
@@ -230,7 +230,7 @@ MUG = """mug = {shape = "cylinder", size = [0.036, 0.05, 0.003], mass = 0.2, fri
  texture = [10e-6, 1.5e-3], finger_height = 0.024, yaw = 0.0}""".replace("\n", "")
 
 
-def test_an_object_of_ones_own(tmp_path):
+def test_an_own_object(tmp_path):
     from holdfast.cli.simulate import plan_grasps
 
     table = tmp_path / "mine.toml"

@@ -40,23 +40,23 @@ def written(folder, recordings):
 
 def run(capsys, *words):
     code = main(["study", *map(str, words)])
-    printed, told = capsys.readouterr()
-    return code, printed, told
+    printed, err = capsys.readouterr()
+    return code, printed, err
 
 
 def refusal(capsys, *words):
-    code, printed, told = run(capsys, *words)
-    assert (code, printed, told.count("\n")) == (2, "", 1)
-    return told.removeprefix("holdfast: ").rstrip("\n")
+    code, printed, err = run(capsys, *words)
+    assert (code, printed, err.count("\n")) == (2, "", 1)
+    return err.removeprefix("holdfast: ").rstrip("\n")
 
 
 def test_own_recordings(capsys, data, tmp_path):
     out = tmp_path / "out"
-    code, printed, told = run(capsys, data, "--out", out, "--quick", "--jobs", 1)
+    code, printed, err = run(capsys, data, "--out", out, "--quick", "--jobs", 1)
     assert code == 0
     assert printed.startswith("The paper's Table I: confusion [%] (in parentheses: the paper)\n")
     assert printed.endswith(f"{out / 'report.html'}: all 7 tables, with figures\n")
-    assert "making tables and figures\n" in told
+    assert "making tables and figures\n" in err
     assert {path.name for path in out.iterdir()} == {
         "report.html", "study.json", "tables", "figures", "work",
     }  # fmt: skip
@@ -69,7 +69,7 @@ def test_own_recordings(capsys, data, tmp_path):
     assert json.loads(printed) == json.loads((out / "study.json").read_text())
 
 
-def test_the_twin_makes_the_recordings_first(capsys, monkeypatch, tmp_path):
+def test_the_twin_simulates_the_recordings_first(capsys, monkeypatch, tmp_path):
     brief = msgspec.structs.replace(profile("reference"), idle=(0.7, 0.8), hold=1.5)
     monkeypatch.setattr(simulation, "profile", lambda name: brief)
     monkeypatch.setattr(verb, "QUICK_CORPORA", {"main": verb.TwinCorpus()})
@@ -78,9 +78,9 @@ def test_the_twin_makes_the_recordings_first(capsys, monkeypatch, tmp_path):
     monkeypatch.setattr(verb, "plan_grasps", lambda _, *rest, **more: known("can", *rest, **more))
     out = tmp_path / "out"
     words = ("--twin", "--quick", "--jobs", 1, "--out", out, "--json")
-    code, printed, told = run(capsys, *words)
+    code, printed, err = run(capsys, *words)
     assert code == 0
-    assert "recordings of the twin, 1 of 1: main\n" in told
+    assert "recordings of the twin, 1 of 1: main\n" in err
     names = {path.stem for path in (out / "data/quick/main").iterdir()}
     assert {"can-case1-1", "can-case2-1"} <= names
     assert json.loads(printed)["data"]["main"]["recordings"] == len(names)
@@ -92,10 +92,10 @@ def test_the_twin_makes_the_recordings_first(capsys, monkeypatch, tmp_path):
 
 
 def refusal_after(capsys, *words):
-    """The last line, where others tell what was begun."""
-    code, printed, told = run(capsys, *words)
+    """Return the last line; the lines before report the progress."""
+    code, printed, err = run(capsys, *words)
     assert (code, printed) == (2, "")
-    return told.splitlines()[-1].removeprefix("holdfast: ")
+    return err.splitlines()[-1].removeprefix("holdfast: ")
 
 
 def test_real_recordings_that_cannot_be_used_are_left_out(capsys, monkeypatch, tmp_path):
@@ -109,7 +109,7 @@ def test_real_recordings_that_cannot_be_used_are_left_out(capsys, monkeypatch, t
     assert "the real recordings are left out: " in capsys.readouterr().err
 
 
-def test_real_recordings_are_brought_in(data_folder, monkeypatch, tmp_path):
+def test_real_recordings_are_imported(data_folder, monkeypatch, tmp_path):
     monkeypatch.setenv("HOLDFAST_DATA", str(data_folder))
     corpus, left_out = verb.real_corpus(tmp_path / "real")
     assert (len(corpus.recordings), corpus.tare, left_out) == (5, "first", [])
@@ -118,7 +118,7 @@ def test_real_recordings_are_brought_in(data_folder, monkeypatch, tmp_path):
 
 
 class TestBadInput:
-    def test_what_is_studied(self, capsys, data, tmp_path):
+    def test_recordings_or_twin(self, capsys, data, tmp_path):
         message = "a folder of recordings or --twin expected, {} given"
         assert refusal(capsys, "--out", tmp_path / "out") == message.format("neither")
         assert refusal(capsys, data, "--twin") == message.format("both")
@@ -155,8 +155,8 @@ class TestBadInput:
         )
         pytest.importorskip("distributed")
         monkeypatch.setattr(parallel, "CONNECT_TIMEOUT", 0.3)
-        told = refusal(capsys, data, *out, "--engine", "dask:tcp://127.0.0.1:9")
-        assert told.startswith("no Dask scheduler answers at tcp://127.0.0.1:9: start one with")
+        err = refusal(capsys, data, *out, "--engine", "dask:tcp://127.0.0.1:9")
+        assert err.startswith("no Dask scheduler answers at tcp://127.0.0.1:9: start one with")
         assert not (tmp_path / "out").exists()
 
     def test_out(self, capsys, data, tmp_path):
@@ -174,8 +174,8 @@ def stable(recording):
     return recording.with_labels(labels)
 
 
-def test_what_is_printed_is_short(capsys):
-    """The hardest split that most methods have, and few columns."""
+def test_only_one_split_and_few_columns_are_printed(capsys):
+    """The first split with the most methods is printed, with few columns."""
     rows = [
         Row({"on": on, "method": method, "figure": figure}, 1.0, 0.5 if method == "a" else None)
         for on, methods in (("by object", "a"), ("by recording", "ab"), ("fresh", "ab"))

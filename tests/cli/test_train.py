@@ -102,7 +102,7 @@ def test_it_is_the_library_that_trains(capsys, data, model):
     assert Model.load(model) == train(load_dataset(data), setting).model
 
 
-def test_a_table_for_people(capsys, data, model):
+def test_the_table(capsys, data, model):
     code, out, _ = run(capsys, data, "-o", model, "--trials", 0)
     assert code == 0
     assert "accuracy %" in out
@@ -213,7 +213,7 @@ def test_a_folder_that_does_not_exist(capsys, data, tmp_path):
     )
 
 
-def test_the_search_goes_when_the_model_is_written(capsys, data, model):
+def test_the_search_journal_is_removed_when_the_model_is_written(capsys, data, model):
     assert run(capsys, data, "-o", model, "--trials", 2)[0] == 0
     assert list(model.parent.iterdir()) == [model]
 
@@ -257,7 +257,7 @@ def test_a_killed_search_goes_on_to_the_same_end(capsys, data, model, tmp_path):
     assert not journal.exists()
 
 
-def test_an_interrupt_says_how_to_go_on(capsys, data, model, monkeypatch):
+def test_an_interrupt_names_resume(capsys, data, model, monkeypatch):
     from holdfast.training import tuning
 
     losses = tuning._log_loss
@@ -290,7 +290,7 @@ def test_a_model_is_adapted(capsys, data, model):
     assert adapted.fingers == train(load_dataset(data), setting).model.fingers
 
 
-def test_tare_and_hold_win_over_the_model_to_adapt(capsys, data, model):
+def test_tare_and_hold_override_the_model_to_adapt(capsys, data, model):
     words = ["--init", TWIN, "--trials", 0, "--tare", 0.3, "--hold", 0.25, "--shared"]
     assert run(capsys, data, "-o", model, *words)[0] == 0
     adapted = Model.load(model)
@@ -306,7 +306,7 @@ def test_hold_and_our_own_features(capsys, data, model):
     assert made.fingers["thumb"].features == Model.load(TWIN).fingers["*"].features
 
 
-def test_a_model_to_adapt_that_is_not_there(capsys, data, model, tmp_path):
+def test_a_missing_model_to_adapt(capsys, data, model, tmp_path):
     missing = tmp_path / "none.json"
     assert refusal(capsys, data, "-o", model, "--init", missing) == (
         f"cannot read the model {missing}: No such file or directory"
@@ -325,8 +325,8 @@ def test_one_for_all_from_one_for_each(capsys, data, model, tmp_path):
     )
 
 
-def test_doubts_about_the_model_to_adapt_are_told(capsys, data, model, tmp_path):
-    """Adapted to what it was trained on; and to another sensor."""
+def test_warnings_about_the_model_to_adapt(capsys, data, model, tmp_path):
+    """Adapt a model to its own training recordings, and to another sensor."""
     first = tmp_path / "first.json"
     assert run(capsys, data, "-o", first, "--trials", 0)[0] == 0
     code, _, err = run(capsys, data, "-o", model, "--trials", 0, "--init", first)

@@ -44,7 +44,7 @@ def test_an_audit_is_shown_on_the_page(capsys, folder, audited, monkeypatch):
     assert shown == [([folder], [SUSPECT])]
 
 
-def test_an_audit_needs_labels_to_learn_from(capsys, folder):
+def test_an_audit_needs_labels(capsys, folder):
     for path in folder.iterdir():
         recording = load_recording(path).with_labels({})
         save_recording(recording, path, force=True)

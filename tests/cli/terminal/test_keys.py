@@ -18,7 +18,7 @@ class Stdin:
 
 @pytest.fixture
 def pipe(monkeypatch):
-    """The end to write to, of the pipe that stdin is."""
+    """Replace stdin by a pipe; yield its end for writing."""
     read, write = os.pipe()
     monkeypatch.setattr(sys, "stdin", Stdin(read))
     with os.fdopen(write, "wb", buffering=0) as file:
@@ -48,7 +48,7 @@ def test_a_line_without_end_does_not_fill_the_memory(pipe):
 
 
 @pytest.mark.parametrize("stdin", [None, io.StringIO("a\n"), Stdin(-1), Stdin(10**6)])
-def test_without_stdin_nothing_comes(stdin, monkeypatch):
+def test_without_stdin_there_are_no_markers(stdin, monkeypatch):
     monkeypatch.setattr(sys, "stdin", stdin)
     with MarkerKeys() as keys:
         assert keys.poll() == []
@@ -65,7 +65,7 @@ def test_in_the_background_a_terminal_is_left_alone(monkeypatch):
     os.close(terminal)
 
 
-def test_the_legend_tells_the_keys():
+def test_the_key_help_names_all_keys():
     for key, label in MARKER_KEYS.items():
         assert key in "123456789 " or f"{key} {label}" in KEY_HELP
     assert f"{STOP_KEY} stops" in KEY_HELP

@@ -9,7 +9,7 @@ from holdfast.cli.terminal.progress import ProgressBar, progress
 
 @pytest.fixture
 def clock(monkeypatch):
-    """A clock that the test moves on."""
+    """Replace the clock; return a function that advances it."""
     now = [1000.0]
     monkeypatch.setattr(module.time, "monotonic", lambda: now[0])
 
@@ -23,7 +23,7 @@ def on_terminal(monkeypatch):
     monkeypatch.setattr("sys.stderr.isatty", lambda: True, raising=False)
 
 
-def test_where_nobody_looks_a_line_a_minute(capsys, clock):
+def test_without_a_terminal_one_line_per_minute(capsys, clock):
     with ProgressBar("working", 100.0) as bar:
         for _ in range(4):
             clock(50.0)
@@ -34,14 +34,14 @@ def test_where_nobody_looks_a_line_a_minute(capsys, clock):
     ]
 
 
-def test_without_a_total_nothing_is_foretold(capsys, clock):
+def test_without_a_total_nothing_is_printed(capsys, clock):
     with ProgressBar("working") as bar:
         clock(100.0)
         bar.advance()
     assert capsys.readouterr() == ("", "")
 
 
-def test_what_is_costly_weighs_more(capsys, clock):
+def test_costs_weigh_the_progress(capsys, clock):
     for _ in progress(iter((30.0, 70.0)), "working", 100.0, cost=lambda item: item):
         clock(90.0)
     assert capsys.readouterr().err.splitlines() == [
@@ -62,7 +62,7 @@ def test_a_bar_appears_before_the_first_step_is_done(capsys, monkeypatch):
     assert "-:--:--" in err
 
 
-def test_a_bar_tells_the_time_left(capsys, monkeypatch, clock):
+def test_a_bar_shows_the_remaining_time(capsys, monkeypatch, clock):
     on_terminal(monkeypatch)
     with ProgressBar("working", 10) as bar:
         clock(60.0)

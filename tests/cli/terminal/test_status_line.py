@@ -37,7 +37,7 @@ class Terminal(io.StringIO):
 
 
 class Still:
-    """A recorder of which one thing is known."""
+    """Recorder with a constant status."""
 
     def __init__(self, status):
         self.status = status
@@ -47,7 +47,7 @@ def words(status):
     return "   ".join(text for text, _ in status_parts(status))
 
 
-def test_it_says_how_far_it_is_and_what_is_wrong():
+def test_parts_of_the_status():
     assert words(WELL) == "12.3 s   150.0 Hz   gaps 0   lost 0   2.5 MB   markers 2"
     assert words(BAD) == (
         "12.3 s   no samples   gaps 1   lost 3   dropped 4   2.5 MB   markers 2   "
@@ -59,7 +59,7 @@ def test_it_says_how_far_it_is_and_what_is_wrong():
     ]
 
 
-def test_elsewhere_than_on_a_terminal_it_tells_a_line_now_and_then(monkeypatch, capsys):
+def test_without_a_terminal_a_line_at_intervals(monkeypatch, capsys):
     now = [100.0]
     monkeypatch.setattr(status_line.time, "monotonic", lambda: now[0])
     with StatusLine(Still(WELL)) as shown:
@@ -83,11 +83,11 @@ def test_on_a_terminal_it_is_rewritten_in_place(colours, red, monkeypatch):
         drawn = terminal.getvalue()
         shown.update()  # too soon
         assert terminal.getvalue() == drawn
-    told = terminal.getvalue()
-    assert "[bold]begun" in told
-    assert told.count("no samples") == 2  # and once more at the end
-    assert told.endswith("\x1b[2K")  # then it goes
-    assert ("31m" in told) is red
+    printed = terminal.getvalue()
+    assert "[bold]begun" in printed
+    assert printed.count("no samples") == 2  # and once more at the end
+    assert printed.endswith("\x1b[2K")  # then it goes
+    assert ("31m" in printed) is red
 
 
 def test_a_narrow_terminal_cuts_it(monkeypatch):
