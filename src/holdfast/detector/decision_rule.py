@@ -282,7 +282,7 @@ def _has_drifted(
 
 @compiled
 def _contact_state(probability: float, threshold: float, hysteresis: float, reported: int) -> int:
-    """Return STABLE from the threshold on, which hysteresis moves away from the reported state."""
+    """Return STABLE from the threshold on. Hysteresis moves it away from the reported state."""
     if reported == STABLE:
         threshold -= hysteresis
     elif reported != UNKNOWN:

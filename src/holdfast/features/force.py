@@ -142,7 +142,7 @@ def rest_amplitude(module: Tactile, tare: Tare, rate: float) -> Array:
 def sum_taxels(
     readings: Array, baseline: Array, rotations: Array, first: int, last: int
 ) -> tuple[float, float, float, float]:
-    """Return F_tip = sum over taxels of R_i (f_i - baseline_i), and the sum of normal readings."""
+    """Return F_tip = sum_i R_i (f_i - baseline_i), and the sum of the normal readings."""
     fx = fy = fz = normal = 0.0
     for i in range(np.uint64(first), np.uint64(last)):
         x = readings[i, 0] - baseline[i, 0]
