@@ -1,8 +1,8 @@
 """One update of a detector from Python, with all arrays by their addresses in one table.
 
 A compiled function unwraps every array that it receives, at 50 ns each. For the twenty arrays of
-a detector that is a fifth of an update. So `fast_step` receives one table of addresses. Whoever
-makes a table keeps the arrays, and neither resizes nor replaces them while the table is in use.
+a detector that is a fifth of an update. So `fast_step` receives one table of addresses. The
+caller must keep the arrays, and must not resize or replace them while the table is in use.
 """
 
 from collections.abc import Sequence
