@@ -24,7 +24,7 @@ def folder(tmp_path_factory):
     return save_synthetic(tmp_path_factory.mktemp("corpus") / "main", range(3))
 
 
-def test_it_says_what_is_in_a_folder(folder):
+def test_a_corpus_describes_a_folder(folder):
     corpus = scan_corpus("main", folder, tare="0.4")
     assert corpus.name == "main"
     assert corpus.recordings == ("grasp-0", "grasp-1", "grasp-2")
@@ -33,7 +33,7 @@ def test_it_says_what_is_in_a_folder(folder):
     assert corpus.tare == "0.4"
 
 
-def test_it_loads_its_recordings_and_no_others(folder, tmp_path):
+def test_a_corpus_loads_only_its_recordings(folder, tmp_path):
     corpus = scan_corpus("main", folder)
     save_synthetic(folder, [7])
     try:
@@ -43,19 +43,19 @@ def test_it_loads_its_recordings_and_no_others(folder, tmp_path):
         (folder / "grasp-7.parquet").unlink()
 
 
-def test_it_goes_over_the_wire_and_is_a_key(folder):
+def test_a_corpus_can_be_sent_and_hashed(folder):
     corpus = scan_corpus("main", folder)
     back = msgspec.msgpack.decode(msgspec.msgpack.encode(corpus), type=Corpus)
     assert back == corpus
     assert hash(back) == hash(corpus)
 
 
-def test_the_plan_names_what_is_trained_on(folder):
+def test_methods_are_trained_on_main(folder):
     corpus = scan_corpus("main", folder)
     assert StudyPlan({"main": corpus}).main is corpus
 
 
-def test_the_digest_follows_all_that_a_study_looks_at():
+def test_the_digest_depends_on_everything_that_a_study_uses():
     one = synthetic_recording("one", 0, ["index"])
     index = one.modules["index"]
     others = [
@@ -69,7 +69,7 @@ def test_the_digest_follows_all_that_a_study_looks_at():
     assert content_digest(synthetic_recording("one", 0, ["index"])) == content_digest(one)
 
 
-def test_a_finger_of_one_class_is_not_judged(tmp_path):
+def test_a_finger_of_one_class_is_left_out(tmp_path):
     recordings = []
     for seed in range(2):
         one = synthetic_recording(f"grasp-{seed}", seed, ["thumb", "index"])
@@ -78,24 +78,24 @@ def test_a_finger_of_one_class_is_not_judged(tmp_path):
     assert scan_corpus("main", save_all(tmp_path / "data", recordings)).fingers == ("index",)
 
 
-def test_a_worker_without_the_folder_says_so(folder, tmp_path):
+def test_a_worker_without_the_folder_is_an_error(folder, tmp_path):
     corpus = msgspec.structs.replace(scan_corpus("main", folder), folder=str(tmp_path / "gone"))
     with pytest.raises(RecordingError) as error:
         corpus.load()
     assert str(error.value) == (
-        f"there is no folder {tmp_path / 'gone'} here with the recordings of 'main': "
-        "every worker has to find them at the same path"
+        f"the folder {tmp_path / 'gone'} with the recordings of 'main' does not exist here: "
+        "every worker needs it at the same path"
     )
 
 
-def test_a_recording_that_is_gone_is_named(tmp_path):
+def test_a_deleted_recording_is_named(tmp_path):
     folder = save_synthetic(tmp_path / "data", range(3))
     corpus = scan_corpus("main", folder)
     (folder / "grasp-1.parquet").unlink()
     with pytest.raises(RecordingError) as error:
         corpus.load()
     assert str(error.value) == (
-        f"1 of the 3 recordings of 'main' are not in {folder} (any more): grasp-1"
+        f"1 of the 3 recordings of 'main' are no longer in {folder}: grasp-1"
     )
 
 
@@ -129,7 +129,7 @@ def test_one_recording(tmp_path, n_bare):
         scan_corpus("main", folder)
     assert str(error.value) == (
         f"{folder}: one recording with labels given (grasp-0); at least two are needed, "
-        "for what trains must not test"
+        "because test recordings must not be used for training"
     )
 
 

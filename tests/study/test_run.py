@@ -16,7 +16,7 @@ from holdfast.study.plan import StudyPlan, scan_corpus
 from holdfast.study.report.html_report import ReportFigure
 from holdfast.study.report.result_tables import ResultTable, Row
 from holdfast.study.run import check_plan, run_study
-from holdfast.study.sections import CHAPTERS, TWIN, Made, sections
+from holdfast.study.sections import OUTLINES, TWIN_NOTE, PartOutput, report_sections
 from holdfast.synthetic import synthetic_recording
 
 from .example_recordings import save_all, save_synthetic
@@ -32,20 +32,20 @@ def titles(found):
     return [(section.title, [table.name for table in section.tables]) for section in found]
 
 
-class TestChapters:
+class TestSections:
     def test_tables_stand_where_they_are_named_else_with_their_part(self):
         made = {
-            "paper": Made(
+            "paper": PartOutput(
                 [table("unseen"), table("more"), table("confusion"), discrepancies()], []
             ),
-            "real": Made([table("hand")], [ReportFigure("forces", "", None)]),
+            "real": PartOutput([table("hand")], [ReportFigure("forces", "", None)]),
         }
-        found = sections(made, ["a", "b"], twin=False)
+        found = report_sections(made, ["a", "b"], twin=False)
         assert titles(found) == [
             ("What was run", []),
             ("The paper's tables", ["confusion", "more"]),
             ("Where the paper disagrees with itself", ["discrepancies"]),
-            ("On data that training never saw", ["unseen"]),
+            ("Results on new data", ["unseen"]),
             ("Real recordings", ["hand"]),
         ]
         assert found[0].text == "- a\n- b"
@@ -53,21 +53,21 @@ class TestChapters:
 
     def test_what_the_twin_cannot_show_stands_beside_what_rests_on_it(self):
         made = {
-            "paper": Made([table("confusion"), table("cost", None), discrepancies()], []),
-            "real": Made([table("hand")], []),
+            "paper": PartOutput([table("confusion"), table("cost", None), discrepancies()], []),
+            "real": PartOutput([table("hand")], []),
         }
-        found = sections(made, [], twin=True)
+        found = report_sections(made, [], twin=True)
         notes = {table.name: table.note for section in found for table in section.tables}
-        assert notes["confusion"] == f"Note. {TWIN}"
+        assert notes["confusion"] == f"Note. {TWIN_NOTE}"
         assert notes["hand"] == notes["cost"] == "Note."
-        assert TWIN not in notes["discrepancies"]
+        assert TWIN_NOTE not in notes["discrepancies"]
         assert found[-1].title == "What the twin cannot show"
         lines = found[-1].text.split("\n\n")[1].splitlines()
         assert len(lines) > 3 and all(line.startswith("- ") for line in lines)
 
-    def test_every_chapter_says_how_to_read_it(self):
-        assert all(len(chapter.text.split()) > 20 for chapter in CHAPTERS)
-        named = [name for chapter in CHAPTERS for name in chapter.names]
+    def test_every_section_has_a_text_on_how_to_read_it(self):
+        assert all(len(outline.text.split()) > 20 for outline in OUTLINES)
+        named = [name for outline in OUTLINES for name in outline.names]
         assert len(named) == len(set(named))
 
 
@@ -186,7 +186,7 @@ def test_what_is_kept_is_not_computed_again(done, plan, tmp_path):
     (out / "data").mkdir()
     told = []
     run_study(plan, out, notify=told.append, force=True)
-    assert told[0] == f"{len(kept)} of {len(kept)} tasks are done already"
+    assert told[0] == f"{len(kept)} of {len(kept)} tasks are already done"
     assert {path.name: path.read_bytes() for path in (out / "work").iterdir()} == kept
     assert (out / "data").is_dir()
     assert summary(out)["tables"] == summary(done[0])["tables"]

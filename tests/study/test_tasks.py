@@ -137,7 +137,7 @@ def test_what_is_kept_is_not_done_again(tmp_path, log):
     assert set(calls(log).values()) == {1}
     assert again == {f"noted/{place}": place for place in range(6)}
     assert first.items() <= again.items()
-    assert told == ["4 of 6 tasks are done already"]
+    assert told == ["4 of 6 tasks are already done"]
 
 
 def test_a_study_that_is_killed_does_only_what_is_missing(tmp_path, log):
@@ -210,7 +210,9 @@ def test_another_source_is_other_work(tmp_path, log, monkeypatch):
 
 def test_a_worker_with_another_source_is_refused(tmp_path, monkeypatch):
     monkeypatch.setattr(work, "source_digest", lambda: "another")
-    with pytest.raises(EngineError, match=r"^figure/\d: its worker has another version of holdf"):
+    with pytest.raises(
+        EngineError, match=r"^figure/\d: the version of holdfast of its worker diff"
+    ):
         TaskRunner(tmp_path, Engine(2)).run(tasks(2))
 
 
@@ -266,7 +268,7 @@ def test_a_result_that_is_not_as_announced(tmp_path):
 
 
 def test_a_result_that_cannot_be_kept(tmp_path):
-    with pytest.raises(TypeError, match=r"^odd: a [a-zA-Z]*Path cannot be kept"):
+    with pytest.raises(TypeError, match=r"^odd: a [a-zA-Z]*Path cannot be stored"):
         TaskRunner(tmp_path).run([Task("odd", Path, ("x",), str)])
 
 

@@ -1,1 +1,1 @@
-"""The study: every table and figure of the paper, and the ones that it should have had."""
+"""The study: the tables and figures of the paper, and evaluations that the paper lacks."""

@@ -1,4 +1,4 @@
-"""A folder of labelled recordings as a value: by name and digest, small enough to send about."""
+"""The recordings that a study uses, as small values that can be sent to workers."""
 
 import hashlib
 from collections import Counter
@@ -17,16 +17,16 @@ from holdfast.training.survey import survey
 
 
 class Corpus(msgspec.Struct, frozen=True):
-    """A folder of labelled recordings; workers get this, and read the files themselves.
+    """Description of a folder of labelled recordings, whose files workers read themselves.
 
     Attributes:
-        name: what the study calls it: "main", "fresh", "others", ...
-        folder: where the recordings are.
+        name: of the corpus in the study: "main", "fresh", "others", ...
+        folder: of the recordings.
         recordings: their names, sorted.
-        digest: over their samples, labels, metadata and truth.
-        fingers: that have labels of both classes, in the order of the device.
-        rate: the median over the recordings [Hz].
-        tare: how the baseline is found, as `--tare` takes it.
+        digest: of their samples, labels, metadata and ground truth.
+        fingers: with labels of both classes, in the order of the device.
+        rate: median over the recordings [Hz].
+        tare: how the baseline is found, as an argument of `--tare`.
         n_samples: of all fingers and pads together.
     """
 
@@ -40,34 +40,35 @@ class Corpus(msgspec.Struct, frozen=True):
     n_samples: int = 0
 
     def load(self) -> Dataset:
-        """The recordings, each read when it is asked for.
+        """Return the recordings; each is read when it is used.
 
         Raises:
-            RecordingError: the folder, or a recording of the corpus, is not there.
+            RecordingError: the folder, or a recording of the corpus, does not exist.
         """
         if not Path(self.folder).is_dir():
             raise RecordingError(
-                f"there is no folder {self.folder} here with the recordings of {self.name!r}: "
-                "every worker has to find them at the same path"
+                f"the folder {self.folder} with the recordings of {self.name!r} does not exist "
+                "here: every worker needs it at the same path"
             )
         paths = {path.stem: path for path in load_dataset(self.folder).paths}
         if gone := [name for name in self.recordings if name not in paths]:
             raise RecordingError(
-                f"{len(gone)} of the {len(self.recordings)} recordings of {self.name!r} are not "
-                f"in {self.folder} (any more): {gone[0]}"
+                f"{len(gone)} of the {len(self.recordings)} recordings of {self.name!r} are no "
+                f"longer in {self.folder}: {gone[0]}"
             )
         return Dataset([paths[name] for name in self.recordings])
 
 
 class StudyPlan(msgspec.Struct, frozen=True):
-    """All that the tasks of a study follow from.
+    """Everything that determines the tasks of a study.
 
     Attributes:
-        corpora: by role: "main" always; "fresh" (the same objects, other seeds), "others"
-            (other objects), "gentle" and "vigorous" (other profiles) where there are.
-        real: recordings of a real hand; None where there are none.
+        corpora: by role: "main" always, and of the following those that exist: "fresh" (the same
+            objects, other seeds), "others" (other objects), "gentle" and "vigorous" (other
+            profiles).
+        real: recordings of a real hand; None if there are none.
         quick: fewer windows, methods and trials.
-        seed: of everything random.
+        seed: of all random numbers.
     """
 
     corpora: dict[str, Corpus]
@@ -77,49 +78,49 @@ class StudyPlan(msgspec.Struct, frozen=True):
 
     @property
     def main(self) -> Corpus:
-        """What is trained on."""
+        """The corpus that methods are trained on."""
         return self.corpora["main"]
 
 
 def scan_corpus(name: str, folder: str | Path, tare: str = "0.5") -> Corpus:
-    """The corpus of a folder, after one pass over its recordings.
+    """Read the recordings of a folder once and return the corpus.
 
     Args:
-        name: what the study calls it.
+        name: of the corpus in the study.
         folder: of recordings.
         tare: how the baseline is found.
 
     Raises:
-        RecordingError: no recording there, or one that cannot be read.
-        TrainingError: no labels, labels of one class, or fewer than two labelled recordings:
-            nothing could be told from that.
-        ValueError: an unknown tare.
+        RecordingError: the folder has no recording, or one that cannot be read.
+        TrainingError: there are no labels, labels of one class only, or fewer than two labelled
+            recordings.
+        ValueError: the tare is unknown.
     """
     dataset = load_dataset(folder)
     digest = hashlib.blake2b(digest_size=16)
     n_labelled: dict[str, Counter[bool]] = {}
     n_samples: list[int] = []
 
-    def looked_at() -> Iterator[Recording]:
+    def counted() -> Iterator[Recording]:
         for recording in dataset:
             n_samples.extend(len(module.times) for module in recording.modules.values())
             digest.update(content_digest(recording))
             _count(recording, n_labelled)
             yield recording
 
-    found = survey(looked_at())
+    found = survey(counted())
     labelled = [entry.name for entry in found.entries if entry.n_labelled]
     if len(labelled) < 2:
         raise TrainingError(
             f"{folder}: one recording with labels given ({labelled[0]}); at least two are "
-            "needed, for what trains must not test"
+            "needed, because test recordings must not be used for training"
         )
     return Corpus(
         name=name,
         folder=str(Path(folder).resolve()),
         recordings=dataset.names,
         digest=digest.hexdigest(),
-        fingers=_judgeable(n_labelled, folder),
+        fingers=_fingers_of_both_classes(n_labelled, folder),
         rate=found.rate,
         tare=str(Tare.parse(tare)),
         n_samples=sum(n_samples),
@@ -127,7 +128,7 @@ def scan_corpus(name: str, folder: str | Path, tare: str = "0.5") -> Corpus:
 
 
 def content_digest(recording: Recording) -> bytes:
-    """A hash of all that a study looks at: samples, labels, metadata, truth."""
+    """Return a hash of everything that a study uses: samples, labels, metadata, ground truth."""
     labels = [(finger, module.labels) for finger, module in recording.modules.items()]
     metadata = sorted(recording.metadata.items())
     state = hashlib.blake2b(repr((recording.name, recording.digest, labels, metadata)).encode())
@@ -142,7 +143,7 @@ def content_digest(recording: Recording) -> bytes:
 
 
 def _count(recording: Recording, n_labelled: dict[str, Counter[bool]]) -> None:
-    """Adds the labelled samples of every finger, stable and not."""
+    """Add the numbers of samples labelled stable and not stable of every finger."""
     for finger, module in recording.modules.items():
         if module.labels:
             states = module.label_states
@@ -150,11 +151,13 @@ def _count(recording: Recording, n_labelled: dict[str, Counter[bool]]) -> None:
             n_labelled.setdefault(finger, Counter()).update((known == STABLE).tolist())
 
 
-def _judgeable(n_labelled: dict[str, Counter[bool]], folder: str | Path) -> tuple[str, ...]:
-    """The fingers that have both classes.
+def _fingers_of_both_classes(
+    n_labelled: dict[str, Counter[bool]], folder: str | Path
+) -> tuple[str, ...]:
+    """Return the fingers with labels of both classes.
 
     Raises:
-        TrainingError: none has.
+        TrainingError: there is no such finger.
     """
     fingers = tuple(f for f, counts in n_labelled.items() if counts[True] and counts[False])
     if not fingers:

@@ -1,4 +1,4 @@
-"""The report's chapters in a reader's order, with words on how to read each."""
+"""Sections of the report in reading order, each with a text on how to read it."""
 
 from collections.abc import Iterable, Mapping, Sequence
 from typing import NamedTuple, TypeVar
@@ -11,14 +11,14 @@ from holdfast.study.report.result_tables import ResultTable
 E = TypeVar("E", ResultTable, ReportFigure)
 
 
-class Chapter(NamedTuple):
-    """A section before its tables and figures are there.
+class SectionOutline(NamedTuple):
+    """A section before its tables and figures are made.
 
     Attributes:
         title: of one line.
-        text: how to read it, in paragraphs.
-        part: of the study, whose tables and figures come here unless another chapter names them.
-        names: of tables and figures that come here whatever their part, with those first.
+        text: how to read the section, in paragraphs.
+        part: of the study whose tables and figures belong here, unless an outline names them.
+        names: of tables and figures of any part that belong here; they come first.
     """
 
     title: str
@@ -27,170 +27,177 @@ class Chapter(NamedTuple):
     names: tuple[str, ...] = ()
 
 
-TWIN = (
-    "Of the physical twin: skin, friction and operator are models, so this compares methods; it "
-    "does not foretell figures on a real hand."
+class PartOutput(NamedTuple):
+    """Tables and figures of one part of the study."""
+
+    tables: Sequence[ResultTable]
+    figures: Sequence[ReportFigure]
+
+
+TWIN_NOTE = (
+    "These recordings are simulated: skin, friction and operator are models. The values compare "
+    "methods; they do not predict how well a method works on a real hand."
 )
-"""Stands beside every table that rests on the twin."""
+"""Note of every table that is made from recordings of the twin."""
 
-CHAPTERS = (
-    Chapter(
+OUTLINES = (
+    SectionOutline(
         "The paper's tables",
-        """Each cell holds our figure; in small print its 95 % interval and, where the paper prints
-one, the paper's figure with the difference, ours less the paper's. Percent, of labelled samples;
-1 = stable is the positive class.
+        """Each cell holds our value. In small print below it are its 95 % interval and, where the
+paper prints a value, the paper's value with the difference (ours minus the paper's). Values are
+percentages of labelled samples. Stable (1) is the positive class.
 
-The paper splits samples at random, so that nearly the same sample stands on both sides of the
-split. What it mixes is kept apart here, line by line: "training data" is what the fit itself saw,
-"cross-validated" and "held out" are samples of the same recordings, and only "fresh recordings"
-(or "other recordings") and "other objects" are what a user of the classifier will meet. Read the
-last lines first.
+The paper splits samples at random. Nearly identical samples of one recording are then on both
+sides of the split. The lines here keep apart on which data a classifier was tested. "Training
+data" are the samples of the fit itself. "Cross-validated" and "held out" are other samples of the
+same recordings. Only "fresh recordings" (or "other recordings") and "other objects" are new data,
+as in actual use. Read those lines first.
 
-- FPR: of what is not stable, how much is called stable: a danger missed.
-- FNR: of what is stable, how much is called unstable: a needless alarm.
-- FDR: of what is called stable, how much is not.
-- N_w: samples in the window of the features; at 150 Hz 14 samples are 93 ms.""",
+- FPR: fraction of the samples not stable that are called stable, a missed danger.
+- FNR: fraction of the stable samples that are called unstable, a needless alarm.
+- FDR: fraction of the samples called stable that are not stable.
+- N_w: number of samples in the window of the features; at 150 Hz, 14 samples are 93 ms.""",
         "paper",
         ("confusion", "window", "ablation", "zhang", "fingers"),
     ),
-    Chapter(
+    SectionOutline(
         "The paper's figures",
-        """One finger over single recordings. Shades are what was going on, where the recordings
-say it. Recordings are chosen by what was done in them and by their names, before anybody saw the
-figure; where there are recordings that did not train, those are taken.
-Where no recording is of a failed grasp, experiment 1 is missing.""",
+        """Each figure shows one finger in one recording. The shades are the phases of the
+experiment, if the recording has them. A recording is chosen by what was done in it and by its
+name, not by the look of its figure. Recordings that were not used for training are preferred.
+If no recording is of a failed grasp, the figure of experiment 1 is missing.""",
         "experiments",
     ),
-    Chapter(
+    SectionOutline(
         "Where the paper disagrees with itself",
-        """Lines of one subject are statements of the paper about one thing that cannot all be
-true, or that leave open what a repetition needs. They are the reason why some tables stand here
-twice, and why a difference to one printed figure means little.""",
+        """Lines with the same subject are statements of the paper about one thing. They
+contradict each other, or they leave open what a repetition needs. For this reason some tables
+are given twice in this report, and a difference to one printed value means little.""",
         "",
         ("discrepancies",),
     ),
-    Chapter(
-        "On data that training never saw",
-        """The same classifiers on recordings made anew, on other objects, and out of fold. The
-distance between a random split and these lines is what a random split flatters; it is the figure
-to quote.""",
+    SectionOutline(
+        "Results on new data",
+        """The same classifiers on new recordings, on other objects, and out of fold. With a random
+split the accuracy is higher; the difference shows how much a random split overestimates it. Quote
+the values of new data.""",
         "",
         ("unseen", "splits"),
     ),
-    Chapter(
+    SectionOutline(
         "Methods compared",
-        """Every method is fitted to the same recordings and judged on the same other ones, finger
-by finger or as a whole hand. Differences to the paper's method are paired, recording by
-recording: an interval that does not hold zero means that the one is better on these data, however
-wide the intervals of each alone are. A method that judges fingers and one that judges the whole
-hand do not have the same task: as hands all are compared.""",
+        """Every method is fitted to the same recordings and evaluated on the same other
+recordings, for each finger or for the whole hand. Differences to the paper's method are paired by
+recording. If the interval of a difference does not contain zero, one of the two methods is better
+on these data, even if the intervals of the two methods overlap. A method for fingers and a method
+for the whole hand solve different tasks. The table of hands evaluates all of them on the same
+task.""",
         "comparison",
         ("methods", "hands", "cost"),
     ),
-    Chapter(
-        "Events: how late, how often in vain",
-        """A user does not meet samples but events: a held object begins to move. "Missed at 50 ms"
-is the share of events without an alarm 50 ms after the onset; a delay counts from the onset, and
-one that was never found counts as infinite. False alarms are counted per minute of undisturbed
-hold. Each trades against the other by the threshold, so compare methods where their false alarms
-are alike: thresholds are chosen on training recordings alone.""",
+    SectionOutline(
+        "Events: detection delay and false alarms",
+        """A user does not see samples but events: an object that was held begins to move. "Missed
+at 50 ms" is the fraction of events without an alarm 50 ms after the onset. The delay counts from
+the onset, and is infinite for an event that was never detected. False alarms are counted per
+minute of undisturbed hold. A threshold with fewer missed events has more false alarms, so compare
+methods at similar rates of false alarms. All thresholds are chosen on training recordings
+only.""",
         "",
         ("events", "slips", "alarms"),
     ),
-    Chapter(
+    SectionOutline(
         "Where the errors are",
-        """The same decisions, taken apart: by what was going on, by how strong the grip was, by
-the direction of the push, and by whether a probability of 0.8 is right in 80 of 100 cases (the
-Brier score is the mean squared error of the probability; 0 is best). These are the claims that the
-paper makes and does not test.""",
+        """The same decisions by group: by phase of the experiment, by grip force and by direction
+of the push. The last table shows whether the probabilities are right: whether of 100 samples with
+a probability of 0.8 about 80 are stable. The Brier score is the mean squared error of the
+probability; 0 is best. The paper makes claims about grip force and direction, but does not test
+them.""",
         "",
         ("phases", "force", "grip", "directions", "reliability"),
     ),
-    Chapter(
+    SectionOutline(
         "Sensitivity",
-        """What happens when one thing is changed: noise on the readings, the margin by which
-labels are drawn longer, the profile of the twin (how hard it grips and how it is disturbed), the
-sampling rate. A method whose curve falls early is a method to distrust on another hand.""",
+        """What happens if one condition changes: the noise of the readings, the margin by which
+labels of disturbances are extended, the profile of the twin (how hard it grips and how it is
+disturbed), or the sampling rate. Be careful with a method whose curve falls early: it may fail on
+another hand.""",
         "sensitivity",
     ),
-    Chapter(
+    SectionOutline(
         "Real recordings",
         """Five short recordings of one box, held by two flat uSkin patches of a gripper (Nazari,
-Mandil and Ghalamzan, CoRL 2022). Slip happens in two of them, and in those the arm also moves
-faster: slip and speed cannot be told apart. The box is already held at the first sample, so that
-there is no stretch without contact. Look at each recording and at its AUC, and take no single
-figure as the accuracy on real data.""",
+Mandil and Ghalamzan, CoRL 2022). The box slips in two of them. In those two the arm also moves
+faster, so the effects of slip and speed cannot be separated. The box is already held at the first
+sample, so there is no part without contact. Look at each recording and its AUC. No single value
+here is the accuracy on real data.""",
         "real",
     ),
 )  # fmt: skip
 
-LIMITS = """These figures rest on recordings of a simulated hand. It is fixed, and was not tuned
-until figures came out right; yet it cannot show:
+LIMITS = """These results come from recordings of a simulated hand. The simulation was not tuned to
+make the results better. It cannot show:
 
 - how good a method is on a given real hand: tremor, stiffness of the operator, texture and
-friction are plausible guesses, fitted to nothing;
-- what lies between taxels and object: each node of the skin is a spring of its own, without
-sideways coupling or torsion, and friction does not grow while an object is held;
-- the skin's real flaws: dead taxels, magnetic disturbance by metal, unsteady stamps;
-- how hands wear: no play in gears, no cables; only the fingertips touch;
-- how a person labels: labels here know the true outside force; a person is late and misses slips
-of a tenth of a millimetre;
-- the idle hand: about three in ten samples have nothing in the hand and are told without error.
-More idle time makes a better accuracy, not a better detector: look at phases and events."""
+friction are plausible guesses that are not fitted to measurements;
+- the material between taxels and object: each node of the skin is a separate spring, without
+lateral coupling and torsion, and friction does not grow while an object is held;
+- defects of a real skin: dead taxels, magnetic disturbance by metal, irregular time stamps;
+- mechanics and wear of a hand: there is no play in gears and there are no cables, and only the
+fingertips touch the object;
+- how a person labels: these labels are computed from the true outside force, while a person is
+late and misses slips of a tenth of a millimetre;
+- the share of idle time: in about three of ten samples the hand is empty, and those are classified
+without error. More idle time gives a higher accuracy, not a better detector: look at phases and
+events."""
 
 
-class Made(NamedTuple):
-    """What one part of the study made."""
-
-    tables: Sequence[ResultTable]
-    pictures: Sequence[ReportFigure]
-
-
-def sections(made: Mapping[str, Made], run: Sequence[str], *, twin: bool) -> list[Section]:
-    """The sections of the report: what was run, the chapters that hold anything, the limits.
+def report_sections(
+    outputs: Mapping[str, PartOutput], run_notes: Sequence[str], *, twin: bool
+) -> list[Section]:
+    """Return the sections of the report: the run, the results, the limits of the twin.
 
     Args:
-        made: by part.
-        run: what was run and what was left out, in sentences.
-        twin: whether the recordings, but for the real ones, are of the twin.
+        outputs: tables and figures, by part.
+        run_notes: sentences on what was run and what was left out.
+        twin: whether the recordings, except the real ones, are of the twin.
     """
-    found = [Section("What was run", "\n".join(f"- {each}" for each in run))]
-    tables_of = {part: one.tables for part, one in made.items()}
-    pictures_of = {part: one.pictures for part, one in made.items()}
-    for chapter in CHAPTERS:
-        tables = _own(chapter, tables_of)
-        pictures = _own(chapter, pictures_of)
-        if tables or pictures:
-            marked = [_marked(table, chapter) if twin else table for table in tables]
-            found.append(Section(chapter.title, _filled(chapter.text), marked, pictures))
+    sections = [Section("What was run", "\n".join(f"- {note}" for note in run_notes))]
+    tables_by_part = {part: output.tables for part, output in outputs.items()}
+    figures_by_part = {part: output.figures for part, output in outputs.items()}
+    for outline in OUTLINES:
+        tables = _select(outline, tables_by_part)
+        figures = _select(outline, figures_by_part)
+        if tables or figures:
+            if twin:
+                tables = [_with_twin_note(table, outline) for table in tables]
+            sections.append(Section(outline.title, _join_lines(outline.text), tables, figures))
     if twin:
-        found.append(Section("What the twin cannot show", _filled(LIMITS)))
-    return found
+        sections.append(Section("What the twin cannot show", _join_lines(LIMITS)))
+    return sections
 
 
-def _own(chapter: Chapter, by_part: Mapping[str, Sequence[E]]) -> list[E]:
-    """What belongs to a chapter: what it names, in that order, then the rest of its part."""
+def _select(outline: SectionOutline, by_part: Mapping[str, Sequence[E]]) -> list[E]:
+    """Return what an outline names, in that order, then the rest of its part."""
     every = {each.name: each for part in by_part.values() for each in part}
-    named = [every[name] for name in chapter.names if name in every]
-    named += [each for each in by_part.get(chapter.part, ()) if each.name not in _NAMED]
-    return named
+    named = [every[name] for name in outline.names if name in every]
+    return named + [each for each in by_part.get(outline.part, ()) if each.name not in _NAMED]
 
 
-_NAMED = frozenset(name for chapter in CHAPTERS for name in chapter.names)
+_NAMED = frozenset(name for outline in OUTLINES for name in outline.names)
 
 
-def _marked(table: ResultTable, chapter: Chapter) -> ResultTable:
-    """The table with a word on the twin, where it rests on it."""
-    if chapter.part == "real" or not any(row.n for row in table.rows):
+def _with_twin_note(table: ResultTable, outline: SectionOutline) -> ResultTable:
+    """Add the note on the twin to a table that is made from recordings of the twin."""
+    if outline.part == "real" or not any(row.n for row in table.rows):
         return table
-    return msgspec.structs.replace(table, note=f"{table.note} {TWIN}".strip())
+    return msgspec.structs.replace(table, note=f"{table.note} {TWIN_NOTE}".strip())
 
 
-def _filled(text: str) -> str:
-    """Paragraphs whose lines are joined; each item of a list on one line."""
-    return "\n\n".join(_joined(paragraph.splitlines()) for paragraph in text.split("\n\n"))
+def _join_lines(text: str) -> str:
+    """Join the lines of each paragraph and of each item of a list."""
+    return "\n\n".join(_join_paragraph(part.splitlines()) for part in text.split("\n\n"))
 
 
-def _joined(lines: Iterable[str]) -> str:
-    """One line, or one for each item of a list."""
+def _join_paragraph(lines: Iterable[str]) -> str:
     return "".join(f"\n{line}" if line.startswith("- ") else f" {line}" for line in lines).strip()

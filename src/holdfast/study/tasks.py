@@ -1,4 +1,4 @@
-"""Tasks whose results are kept, so that a stopped study goes on where it was stopped."""
+"""Tasks whose results are stored, so that a stopped study continues where it stopped."""
 
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
@@ -21,14 +21,14 @@ Notify = Callable[[str], None]
 
 
 class Task(NamedTuple):
-    """A piece of work that depends on nothing but its arguments.
+    """A call of a function whose result depends only on its arguments.
 
     Attributes:
-        name: unique among the tasks, for people: `window/index/14`.
-        function: of the package, at the top of its module.
-        arguments: that msgspec can encode: Structs, numbers, text, None and lists of them.
-        result: type of what it returns, to which msgspec can decode.
-        cost: how long it takes, in any unit that is the same for all tasks.
+        name: unique among the tasks: `window/index/14`.
+        function: at the top level of a module of the package.
+        arguments: values that msgspec can encode: Structs, numbers, text, None, lists of them.
+        result: type of the result, for decoding by msgspec.
+        cost: expected duration, in a unit that is the same for all tasks.
     """
 
     name: str
@@ -39,28 +39,35 @@ class Task(NamedTuple):
 
 
 class ShowProgress(Protocol):
-    """Goes through items, with a word on what for and what they cost; may show progress."""
+    """Function that passes items on, and may show their progress meanwhile."""
 
     def __call__(
         self, items: Iterable[T], what: str, total: float, cost: Callable[[T], float]
     ) -> Iterator[T]:
-        """Yields the items."""
+        """Yield the items.
+
+        Args:
+            items: to pass on.
+            what: title of the work.
+            total: sum of the costs of all items.
+            cost: from an item to its cost.
+        """
         ...
 
 
 @dataclass(frozen=True)
 class TaskRunner:
-    """Does tasks and keeps what each returns in a file of its own.
+    """Runs tasks and stores the result of each in its own file.
 
-    A file is found again by what the result depends on: the package's source, the function and
-    the arguments. So nothing that is kept is ever out of date, and whatever stops the work
-    costs only what was being done.
+    The name of the file is a digest of what the result depends on: the source of the package,
+    the function and the arguments. A stored result is therefore never outdated, and a study that
+    is stopped loses only the tasks that were running.
 
     Attributes:
-        folder: of the study; results are kept in `folder/work`.
-        engine: where the work is done.
-        progress: goes through the tasks as they are done.
-        notify: is given what a person would want to know.
+        folder: of the study; results are stored in `folder/work`.
+        engine: that runs the tasks.
+        progress: that passes on the finished tasks.
+        notify: that is called with messages for the user.
     """
 
     folder: Path
@@ -69,72 +76,76 @@ class TaskRunner:
     notify: Notify = lambda _: None
 
     def run(self, tasks: Sequence[Task]) -> dict[str, Any]:
-        """What each task returns, by name; long ones are begun first.
+        """Return the result of each task, by name; tasks of high cost are started first.
 
         Raises:
-            ValueError: two tasks have one name.
-            EngineError: as `Engine.map_unordered`, or a worker has another source of the package.
-            Exception: what a task raises, its text beginning with the task's name; it stops the
-                work. What was done before stays kept.
+            ValueError: two tasks have the same name.
+            EngineError: as `Engine.map_unordered`, or a worker has another version of the package.
+            Exception: of a task, its text beginning with the name of the task. Later tasks are
+                not run; the results of earlier ones stay stored.
         """
         keys = _keys(tasks)
         self._prepare()
         by_key = {keys[task.name]: task for task in tasks}
-        results = {key: self._read(key, task) for key, task in by_key.items()}
+        results = {key: self._load(key, task) for key, task in by_key.items()}
         missing = [task for key, task in by_key.items() if results[key] is UNSET]
         if len(missing) < len(by_key):
-            self.notify(f"{len(by_key) - len(missing)} of {len(by_key)} tasks are done already")
+            self.notify(f"{len(by_key) - len(missing)} of {len(by_key)} tasks are already done")
         total = sum(task.cost for task in missing)
-        for task, result in self.progress(self._done(missing, keys), "working", total, _cost):
+        for task, result in self.progress(
+            self._run_missing(missing, keys), "working", total, _cost
+        ):
             results[keys[task.name]] = result
         return {name: results[key] for name, key in keys.items()}
 
-    def _done(self, tasks: Iterable[Task], keys: Mapping[str, str]) -> Iterator[tuple[Task, Any]]:
-        """Each task with its result, which is kept by then."""
+    def _run_missing(
+        self, tasks: Iterable[Task], keys: Mapping[str, str]
+    ) -> Iterator[tuple[Task, Any]]:
+        """Yield each task with its result, after storing it."""
         by_name = {task.name: task for task in sorted(tasks, key=lambda task: -task.cost)}
         source = source_digest()
         calls = ((name, (source, *task[:3])) for name, task in by_name.items())
-        for name, data in self.engine.map_unordered(_do, calls):
+        for name, data in self.engine.map_unordered(_call, calls):
             result = _decoded(data, by_name[name])
-            kept = _Kept(name, sha256(data).hexdigest(), Raw(data))
-            write_whole(self._path(keys[name]), msgpack.encode(kept), force=True)
+            stored = StoredResult(name, sha256(data).hexdigest(), Raw(data))
+            write_whole(self._path(keys[name]), msgpack.encode(stored), force=True)
             yield by_name[name], result
 
     def _prepare(self) -> None:
-        place = self._path("").parent
+        folder = self._path("").parent
         try:
-            place.mkdir(parents=True, exist_ok=True)
+            folder.mkdir(parents=True, exist_ok=True)
         except OSError as cause:
-            raise OutputError(f"cannot write {place}: {cause.strerror}") from cause
+            raise OutputError(f"cannot write {folder}: {cause.strerror}") from cause
 
     def _path(self, key: str) -> Path:
         return self.folder / "work" / f"{key}.msgpack"
 
-    def _read(self, key: str, task: Task) -> Any | UnsetType:  # noqa: ANN401 (any function's)
-        """The result as it is kept; UNSET where there is none, or none that is whole."""
+    def _load(self, key: str, task: Task) -> Any | UnsetType:  # noqa: ANN401 (any function's)
+        """Return the stored result; UNSET if there is none, or if its file is damaged."""
         try:
-            kept = msgpack.decode(self._path(key).read_bytes(), type=_Kept)
-            whole = kept.digest == sha256(kept.result).hexdigest()
-            return msgpack.decode(kept.result, type=task.result) if whole else UNSET
+            stored = msgpack.decode(self._path(key).read_bytes(), type=StoredResult)
+            valid = stored.digest == sha256(stored.result).hexdigest()
+            return msgpack.decode(stored.result, type=task.result) if valid else UNSET
         except (FileNotFoundError, MsgspecError, ValueError):
             return UNSET
 
 
 @lru_cache
 def source_digest() -> str:
-    """Digest of what the package's results depend on: its files, but not the command line's."""
+    """Return a digest of all files of the package, except those of the command line."""
     package = Path(__file__).parents[1]
     digest = sha256()
     for path in sorted(package.rglob("*")):
-        place = path.relative_to(package)
-        if path.is_file() and place.parts[0] != "cli" and "__pycache__" not in place.parts:
+        name = path.relative_to(package)
+        if path.is_file() and name.parts[0] != "cli" and "__pycache__" not in name.parts:
             content = sha256(path.read_bytes()).hexdigest()
-            digest.update(f"{place.as_posix()} {content}\n".encode())
+            digest.update(f"{name.as_posix()} {content}\n".encode())
     return digest.hexdigest()
 
 
-class _Kept(Struct, frozen=True):
-    """A result on disk; `digest` is over the bytes of `result`."""
+class StoredResult(Struct, frozen=True):
+    """A result on disk, with a digest of its bytes."""
 
     task: str
     digest: str
@@ -142,12 +153,12 @@ class _Kept(Struct, frozen=True):
 
 
 def _keys(tasks: Sequence[Task]) -> dict[str, str]:
-    """By the name of each task, the digest of what its result depends on."""
+    """Return a digest of what each result depends on, by the name of the task."""
     keys = {task.name: _key(task) for task in tasks}
     if len(keys) < len(tasks):
         names = [task.name for task in tasks]
-        twice = next(name for name in names if names.count(name) > 1)
-        raise ValueError(f"two tasks are called {twice}")
+        repeated = next(name for name in names if names.count(name) > 1)
+        raise ValueError(f"two tasks are called {repeated}")
     return keys
 
 
@@ -161,24 +172,26 @@ def _cost(done: tuple[Task, Any]) -> float:
     return done[0].cost
 
 
-def _do(source: str, name: str, function: Callable[..., Any], arguments: tuple[Any, ...]) -> bytes:
-    """What the function returns, encoded; wherever it runs, by the source that asks for it."""
+def _call(
+    source: str, name: str, function: Callable[..., Any], arguments: tuple[Any, ...]
+) -> bytes:
+    """Return the encoded result of a function; the worker must have the same source."""
     try:
         if source != source_digest():
-            raise EngineError("its worker has another version of holdfast than this one")
+            raise EngineError("the version of holdfast of its worker differs from this one")
         with _one_thread():
-            return msgpack.encode(function(*arguments), enc_hook=_plain)
+            return msgpack.encode(function(*arguments), enc_hook=_to_builtin)
     except Exception as failure:
-        _put_before(name, failure)
+        _add_name(name, failure)
         raise
 
 
 @contextmanager
 def _one_thread() -> Iterator[None]:
-    """Within it neither NumPy nor compiled kernels use threads of their own.
+    """Make NumPy and compiled kernels use one thread.
 
-    Workers side by side would take processors from each other; and sums of many threads round
-    otherwise than those of one.
+    Workers would compete for processors otherwise, and a sum over several threads is rounded
+    differently.
     """
     before = numba.get_num_threads()
     numba.set_num_threads(1)
@@ -189,8 +202,8 @@ def _one_thread() -> Iterator[None]:
         numba.set_num_threads(before)
 
 
-def _put_before(name: str, failure: Exception) -> None:
-    """The failure's text begins with the name; where it has several parts, a note holds it."""
+def _add_name(name: str, failure: Exception) -> None:
+    """Put the name of a task before the text of an exception, or into a note."""
     match failure.args:
         case (str(text),):
             failure.args = (f"{name}: {text}",)
@@ -198,10 +211,10 @@ def _put_before(name: str, failure: Exception) -> None:
             failure.add_note(f"in the task {name}")
 
 
-def _plain(value: Any) -> Any:  # noqa: ANN401 (NumPy's numbers and arrays)
+def _to_builtin(value: Any) -> Any:  # noqa: ANN401 (NumPy's numbers and arrays)
     if hasattr(value, "tolist"):
         return value.tolist()
-    raise TypeError(f"a {type(value).__name__} cannot be kept")
+    raise TypeError(f"a {type(value).__name__} cannot be stored")
 
 
 def _decoded(data: bytes, task: Task) -> Any:  # noqa: ANN401 (any function's)
