@@ -23,7 +23,7 @@ def nowhere(monkeypatch, tmp_path):
     monkeypatch.setenv("HOLDFAST_DATA", str(tmp_path / "nothing"))
     monkeypatch.setattr(study_run, "PARTS", {"paper": paper_tables, "experiments": experiments})
     monkeypatch.setattr(paper_tables, "QUICK_WINDOWS", (14,))
-    monkeypatch.setattr(paper_tables, "ABLATED_AT", (14,))
+    monkeypatch.setattr(paper_tables, "ABLATION_WINDOWS", (14,))
 
 
 @pytest.fixture

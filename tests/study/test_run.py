@@ -85,7 +85,7 @@ class TestExperiments:
     def test_recordings_are_chosen_by_case_and_name_where_nothing_trained(self, tmp_path):
         main = scan_corpus("main", save_all(tmp_path / "a", recordings(["2", "failed", "1"])))
         others = scan_corpus("others", save_all(tmp_path / "b", recordings(["2", "2"], 5)))
-        shown = experiments.predict({"others": others, "main": main}, "index", 0)
+        shown = experiments.predict_examples({"others": others, "main": main}, "index", 0)
         assert [(s.experiment, s.role, s.recording) for s in shown] == [
             ("protocol", "main", "2-0"),
             ("failed", "main", "failed-1"),
@@ -107,13 +107,13 @@ class TestExperiments:
             }
             place = tmp_path / state.value
             main = scan_corpus("main", save_all(place, [first.with_labels(labels), *rest]))
-            found.append(experiments.predict({"main": main}, "index", 0)[1])
+            found.append(experiments.predict_examples({"main": main}, "index", 0)[1])
         assert found[0].recording == "2-0"
         assert found[0] == found[1]
 
     def test_without_cases_the_first_recording_is_shown(self, tmp_path):
         main = scan_corpus("main", save_synthetic(tmp_path / "a", range(2)))
-        shown = experiments.predict({"main": main}, "index", 0)
+        shown = experiments.predict_examples({"main": main}, "index", 0)
         assert [(s.experiment, s.recording) for s in shown] == [
             ("protocol", "grasp-0"),
             ("any", "grasp-0"),
@@ -125,7 +125,7 @@ def few():
     """A study of few tasks."""
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(paper_tables, "QUICK_WINDOWS", (14,))
-        patch.setattr(paper_tables, "ABLATED_AT", (14,))
+        patch.setattr(paper_tables, "ABLATION_WINDOWS", (14,))
         patch.setattr(run, "PARTS", {"paper": paper_tables, "experiments": experiments})
         yield
 

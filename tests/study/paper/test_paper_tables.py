@@ -21,7 +21,7 @@ def corpora(tmp_path_factory):
 def made(plan):
     """All tables of a plan, each task's result once through msgpack; one trial, few samples."""
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(paper_tables, "_effort", lambda _: FitBudget(trials=1, n_fit=1000))
+        patch.setattr(paper_tables, "_budget", lambda _: FitBudget(trials=1, n_fit=1000))
         patch.setattr(random_split, "SEARCH_SAMPLES", 1000)
         results = {}
         for task in paper_tables.tasks(plan):
@@ -165,7 +165,7 @@ def test_one_corpus_alone(corpora):
     on = {row.keys["on"] for row in found["unseen"].rows}
     assert on == {"other recordings", "other objects"}
     assert {row.keys["on"] for row in found["ablation"].rows} == {"held out", "other recordings"}
-    assert "each judged by a fit on others" in found["confusion"].note
+    assert "each is tested with a fit to others" in found["confusion"].note
 
 
 def test_the_full_plan_has_every_window(corpora):

@@ -5,7 +5,7 @@ import pytest
 
 from holdfast.contact import STABLE, UNKNOWN
 from holdfast.features import fingertip_force, haar_features
-from holdfast.study.paper.pooled_samples import COLUMNS, pooled
+from holdfast.study.paper.pooled_samples import COLUMNS, pool_samples
 from holdfast.study.plan import scan_corpus
 from holdfast.synthetic import synthetic_recording
 from study.example_recordings import save_all, save_synthetic
@@ -17,7 +17,7 @@ def corpus(tmp_path_factory):
 
 
 def test_features_and_classes_are_those_of_each_recording(corpus):
-    pool = pooled(corpus, corpus.rate, "index", 8, seed=0)
+    pool = pool_samples(corpus, corpus.rate, "index", 8, seed=0)
     for place, recording in enumerate(corpus.load()):
         module = recording.modules["index"]
         force = fingertip_force(module.readings, module.sensor, 0.5, module.times)
@@ -29,32 +29,32 @@ def test_features_and_classes_are_those_of_each_recording(corpus):
 
 
 def test_energy_is_the_sum_of_squared_details_of_the_normal_force(corpus):
-    pool = pooled(corpus, corpus.rate, "index", 4, seed=0)
+    pool = pool_samples(corpus, corpus.rate, "index", 4, seed=0)
     x = pool.samples.features[pool.samples.groups == 0, COLUMNS.index("F_x")]
     k = 700
     details = (x[k - 3] - x[k - 2]) ** 2 / 2 + (x[k - 1] - x[k]) ** 2 / 2
-    assert pool.only(["energy"]).features[k, 0] == pytest.approx(details)
+    assert pool.select(["energy"]).features[k, 0] == pytest.approx(details)
 
 
 def test_parts_do_not_depend_on_the_window_or_the_finger(corpus):
-    one = pooled(corpus, corpus.rate, "index", 4, seed=3)
-    two = pooled(corpus, corpus.rate, "thumb", 14, seed=3)
+    one = pool_samples(corpus, corpus.rate, "index", 4, seed=3)
+    two = pool_samples(corpus, corpus.rate, "thumb", 14, seed=3)
     for place in range(3):
         mine, other = (pool.parts[pool.samples.groups == place] for pool in (one, two))
         assert np.array_equal(mine[10:], other)  # a window of 14 begins ten samples later
 
 
 def test_parts_are_drawn_by_the_seed(corpus):
-    first, again, other = (pooled(corpus, corpus.rate, "index", 4, seed=s) for s in (0, 0, 1))
+    first, again, other = (pool_samples(corpus, corpus.rate, "index", 4, seed=s) for s in (0, 0, 1))
     assert np.array_equal(first.parts, again.parts)
     assert not np.array_equal(first.parts, other.parts)
     share = np.bincount(first.parts, minlength=25) / len(first.parts)
     assert share == pytest.approx(np.full(25, 0.04), abs=0.015)
 
 
-def test_only_gives_the_features_in_the_order_asked_for(corpus):
-    pool = pooled(corpus, corpus.rate, "index", 4, seed=0)
-    few = pool.only(["sigma", "F_a"]).features
+def test_select_returns_the_features_in_the_given_order(corpus):
+    pool = pool_samples(corpus, corpus.rate, "index", 4, seed=0)
+    few = pool.select(["sigma", "F_a"]).features
     assert np.array_equal(few, pool.samples.features[:, [5, 0]])
 
 
@@ -62,13 +62,13 @@ def test_a_recording_without_the_finger_has_no_samples(tmp_path):
     fingers = (["thumb", "index"], ["thumb"], ["thumb", "index"])
     recordings = [synthetic_recording(f"r{k}", k, names) for k, names in enumerate(fingers)]
     corpus = scan_corpus("main", save_all(tmp_path / "data", recordings))
-    assert set(pooled(corpus, corpus.rate, "index", 14, seed=0).samples.groups) == {0, 2}
-    assert len(pooled(corpus, corpus.rate, "ring", 14, seed=0).samples.stable) == 0
+    assert set(pool_samples(corpus, corpus.rate, "index", 14, seed=0).samples.groups) == {0, 2}
+    assert len(pool_samples(corpus, corpus.rate, "ring", 14, seed=0).samples.stable) == 0
 
 
 def test_objects_are_those_of_the_metadata(tmp_path):
     recordings = [synthetic_recording(f"r{k}", k, ["index"]) for k in range(2)]
     recordings.append(replace(synthetic_recording("r2", 2, ["index"]), metadata={}))
     corpus = scan_corpus("main", save_all(tmp_path / "data", recordings))
-    pool = pooled(corpus, corpus.rate, "index", 14, seed=0)
+    pool = pool_samples(corpus, corpus.rate, "index", 14, seed=0)
     assert pool.objects == ("object 0", "object 1", None)

@@ -1,28 +1,33 @@
 import msgspec
 import numpy as np
 import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
 
-from holdfast.classifiers import Samples, recipe
+from holdfast.classifiers import LinearClassifier, Samples, recipe
 from holdfast.classifiers.threshold import best_cut
 from holdfast.features import DEPLOYED_FEATURES
-from holdfast.study.paper.pooled_samples import pooled
+from holdfast.study.paper.pooled_samples import pool_samples
 from holdfast.study.paper.random_split import (
-    ELSEWHERE,
+    CONFUSION_RATES,
     FRESH,
     HELD_OUT,
     OBJECTS,
+    OTHER_RECORDINGS,
     TRAINING,
     VALIDATED,
-    Cell,
     FitBudget,
-    judge,
+    VariantResult,
+    confusion_counts,
+    evaluate_variants,
+    rate_rows,
 )
 from holdfast.study.plan import scan_corpus
 from study.example_recordings import save_synthetic
 
-EFFORT = FitBudget(trials=1, n_fit=100_000)
+BUDGET = FitBudget(trials=1, n_fit=100_000)
 """One trial is the reference setting."""
-KINDS = (("logreg", DEPLOYED_FEATURES), ("svm", ("energy",)))
+VARIANTS = (("logreg", DEPLOYED_FEATURES), ("svm", ("energy",)))
 
 
 @pytest.fixture(scope="module")
@@ -32,19 +37,19 @@ def corpora(tmp_path_factory):
     return {name: scan_corpus(name, save_synthetic(folder / name, s)) for name, s in seeds.items()}
 
 
-def judged(corpora, *, thorough=True, effort=EFFORT, seed=0):
-    return judge(corpora, "index", 14, KINDS, effort, seed, thorough)
+def evaluated(corpora, *, thorough=True, budget=BUDGET, seed=0):
+    return evaluate_variants(corpora, "index", 14, VARIANTS, budget, seed, thorough)
 
 
 @pytest.fixture(scope="module")
 def alone(corpora):
-    return judged({"main": corpora["main"]})
+    return evaluated({"main": corpora["main"]})
 
 
 def naive(corpora, on):
-    """ConfusionCounts of LogReg of the deployed features, fitted and counted the long way."""
-    main = pooled(corpora["main"], 150.0, "index", 14, seed=0)
-    data = main.only(DEPLOYED_FEATURES)
+    """ConfusionCounts of LogReg of the deployed features, fitted and counted sample by sample."""
+    main = pool_samples(corpora["main"], 150.0, "index", 14, seed=0)
+    data = main.select(DEPLOYED_FEATURES)
     every = np.arange(len(main.parts))
     train = every[main.parts >= 5]
     folds = {
@@ -53,7 +58,7 @@ def naive(corpora, on):
         VALIDATED: [
             (train[main.parts[train] % 5 != k], train[main.parts[train] % 5 == k]) for k in range(5)
         ],
-        ELSEWHERE: [(every[data.groups != g], every[data.groups == g]) for g in range(5)],
+        OTHER_RECORDINGS: [(every[data.groups != g], every[data.groups == g]) for g in range(5)],
         OBJECTS: [
             (every[data.groups % 3 != k], every[data.groups % 3 == k])  # by turns, as synthetic
             for k in range(3)
@@ -69,53 +74,53 @@ def naive(corpora, on):
     return counts
 
 
-@pytest.mark.parametrize("on", [TRAINING, VALIDATED, HELD_OUT, ELSEWHERE, OBJECTS])
-def test_counts_are_those_of_the_long_way(corpora, alone, on):
+@pytest.mark.parametrize("on", [TRAINING, VALIDATED, HELD_OUT, OTHER_RECORDINGS, OBJECTS])
+def test_counts_are_those_of_a_naive_fit(corpora, alone, on):
     assert alone[0].counts[on] == naive(corpora, on)
 
 
 def test_what_it_was_measured_on(corpora, alone):
-    together = [TRAINING, VALIDATED, HELD_OUT, ELSEWHERE, OBJECTS]
+    together = [TRAINING, VALIDATED, HELD_OUT, OTHER_RECORDINGS, OBJECTS]
     assert [list(cell.counts) for cell in alone] == [together] * 2
-    light = judged({"main": corpora["main"]}, thorough=False)
-    assert list(light[0].counts) == [HELD_OUT, ELSEWHERE]
-    assert light[0].counts[ELSEWHERE] == alone[0].counts[ELSEWHERE]
-    everything = judged(corpora)
+    light = evaluated({"main": corpora["main"]}, thorough=False)
+    assert list(light[0].counts) == [HELD_OUT, OTHER_RECORDINGS]
+    assert light[0].counts[OTHER_RECORDINGS] == alone[0].counts[OTHER_RECORDINGS]
+    everything = evaluated(corpora)
     assert list(everything[0].counts) == [TRAINING, VALIDATED, HELD_OUT, FRESH, OBJECTS]
-    assert list(judged(corpora, thorough=False)[0].counts) == [HELD_OUT, FRESH, OBJECTS]
+    assert list(evaluated(corpora, thorough=False)[0].counts) == [HELD_OUT, FRESH, OBJECTS]
 
 
 def test_fresh_recordings_are_all_of_them(corpora):
-    counts = judged(corpora, thorough=False)[0].counts
-    fresh = pooled(corpora["fresh"], 150.0, "index", 14, seed=0)
+    counts = evaluated(corpora, thorough=False)[0].counts
+    fresh = pool_samples(corpora["fresh"], 150.0, "index", 14, seed=0)
     assert np.sum(counts[FRESH], axis=1).tolist() == np.bincount(fresh.samples.groups).tolist()
     assert len(counts[OBJECTS]) == 2
 
 
 def test_the_split_is_reproducible_and_follows_the_seed(corpora, alone):
     main = {"main": corpora["main"]}
-    assert judged(main) == alone
-    other = judged(main, seed=1)
+    assert evaluated(main) == alone
+    other = evaluated(main, seed=1)
     assert other[0].counts[HELD_OUT] != alone[0].counts[HELD_OUT]
-    assert np.sum(other[0].counts[ELSEWHERE]) == np.sum(alone[0].counts[ELSEWHERE])
+    assert np.sum(other[0].counts[OTHER_RECORDINGS]) == np.sum(alone[0].counts[OTHER_RECORDINGS])
 
 
 def test_80_percent_train(alone):
     counts = alone[0].counts
-    total = np.sum(counts[ELSEWHERE])
+    total = np.sum(counts[OTHER_RECORDINGS])
     assert np.sum(counts[TRAINING]) == alone[0].n_fitted == pytest.approx(0.8 * total, rel=0.02)
     assert np.sum(counts[TRAINING]) + np.sum(counts[HELD_OUT]) == total
 
 
 def test_a_fit_takes_no_more_than_it_may(corpora):
-    cell = judged({"main": corpora["main"]}, thorough=False, effort=FitBudget(1, 500))[0]
+    cell = evaluated({"main": corpora["main"]}, thorough=False, budget=FitBudget(1, 500))[0]
     assert 400 < cell.n_fitted <= 500
 
 
 def test_a_search_tries_more_than_the_reference(corpora, alone):
     reference = recipe("logreg").reference
     assert alone[0].parameters == reference
-    cell = judged({"main": corpora["main"]}, thorough=False, effort=FitBudget(4, 500))[0]
+    cell = evaluated({"main": corpora["main"]}, thorough=False, budget=FitBudget(4, 500))[0]
     assert set(cell.parameters) == set(reference)
     assert cell.parameters != reference
 
@@ -123,17 +128,77 @@ def test_a_search_tries_more_than_the_reference(corpora, alone):
 def test_a_threshold_has_nothing_to_search_and_calls_little_energy_stable(corpora):
     kinds = [("threshold", ("energy",))]
     main = {"main": corpora["main"]}
-    (cell,) = judge(main, "index", 14, kinds, EFFORT, 0, thorough=False)
+    (cell,) = evaluate_variants(main, "index", 14, kinds, BUDGET, 0, thorough=False)
     assert cell.parameters == {}
-    pool = pooled(corpora["main"], 150.0, "index", 14, seed=0)
+    pool = pool_samples(corpora["main"], 150.0, "index", 14, seed=0)
     train = pool.parts >= 5
-    energy = pool.only(["energy"]).features[:, 0]
+    energy = pool.select(["energy"]).features[:, 0]
     cut = best_cut(energy[train], pool.samples.stable[train], "below").place
     right = (energy <= cut) == pool.samples.stable
     tn, _, _, tp = np.sum(cell.counts[HELD_OUT], axis=0)
     assert tn + tp == right[~train].sum()
 
 
-def test_cells_go_over_the_wire(alone):
+def test_results_can_be_sent(alone):
     data = msgspec.msgpack.encode(alone)
-    assert msgspec.msgpack.decode(data, type=list[Cell]) == alone
+    assert msgspec.msgpack.decode(data, type=list[VariantResult]) == alone
+
+
+RULE = LinearClassifier((0.0,), (1.0,), (1.0,), intercept=0.0, threshold=0.5)
+"""Stable where the feature is at least 0."""
+
+
+def count_one_by_one(features, stable, groups, n):
+    """[TN, FP, FN, TP] of each recording, sample by sample."""
+    found = [[0, 0, 0, 0] for _ in range(n)]
+    for value, truth, group in zip(features[:, 0], stable, groups, strict=True):
+        called = value >= 0
+        found[group][
+            ["TN", "FP", "FN", "TP"].index(
+                ("T" if called == truth else "F") + ("P" if called else "N")
+            )
+        ] += 1
+    return found
+
+
+@given(
+    st.lists(
+        st.tuples(st.sampled_from([-1.0, 0.0, 2.0]), st.booleans(), st.integers(0, 3)), max_size=60
+    )
+)
+@settings(max_examples=50, deadline=None)
+def test_confusions_are_those_of_a_loop(rows):
+    features = np.array([[row[0]] for row in rows]).reshape(-1, 1)
+    stable = np.array([row[1] for row in rows], dtype=bool)
+    groups = np.array([row[2] for row in rows], dtype=np.int64)
+    found = confusion_counts(RULE, Samples(features, stable, groups), 5)
+    assert found.tolist() == count_one_by_one(features, stable, groups, 5)
+
+
+def test_figures_by_hand():
+    counts = [[8, 2, 1, 9], [0, 0, 0, 0], [6, 4, 3, 7]]
+    found = dict(rate_rows(counts, CONFUSION_RATES, seed=0))
+    assert {name: row.ours for name, row in found.items()} == pytest.approx(
+        {
+            "TNR": 100 * 14 / 20,
+            "FPR": 100 * 6 / 20,
+            "FNR": 100 * 4 / 20,
+            "TPR": 100 * 16 / 20,
+            "FDR": 100 * 6 / 22,
+            "accuracy": 100 * 30 / 40,
+        }
+    )
+    assert {row.n for row in found.values()} == {2}
+    # two recordings: a resample holds both, or one of them twice
+    assert found["accuracy"].interval == pytest.approx((65.0, 85.0))
+
+
+def test_nothing_called_stable_has_no_fdr():
+    ((_, row),) = rate_rows([[5, 0, 5, 0]] * 3, ["FDR"], seed=0)
+    assert row.ours is None
+    assert row.interval is None
+
+
+def test_no_recordings():
+    ((_, row),) = rate_rows([[0, 0, 0, 0]], ["accuracy"], seed=0)
+    assert (row.ours, row.n, row.interval) == (None, 0, None)

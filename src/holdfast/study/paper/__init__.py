@@ -1,1 +1,1 @@
-"""The paper's own tables and figures, by its own protocol."""
+"""The tables and figures of the paper, by the protocol of the paper."""

@@ -1,7 +1,6 @@
-"""Part of the study: the paper's figures, of recordings that are chosen by name alone.
+"""Part of the study: the figures of the paper.
 
-Which recording is shown depends on nothing but what was done in it and what it is called, so
-that no figure is shown because it looks well.
+A recording is chosen by what was done in it and by its name, not by the look of its figure.
 """
 
 from collections.abc import Iterator, Mapping
@@ -29,25 +28,32 @@ from holdfast.study.report.result_tables import ResultTable
 from holdfast.study.tasks import Task
 
 TASK = "figures/experiments"
-SHOWN = ("logreg", "svm")
-UNSEEN = ("fresh", "others", "gentle", "vigorous", "main")
-"""Where a recording is looked for, in this order: what did not train comes first."""
+TITLES = {"logreg": "LogReg", "svm": "SVM"}
+"""Methods whose decisions are drawn, and their titles."""
+SEARCH_ORDER = ("fresh", "others", "gentle", "vigorous", "main")
+"""Roles in which a recording is searched; those not used for training come first."""
 
 Experiment = Literal["protocol", "failed", "disturbed", "any"]
 CASES: dict[Experiment, str] = {"failed": "failed", "disturbed": "2"}
-"""What its metadata say of the case of a recording: 2 is with disturbances."""
+"""Case of each experiment in the metadata of a recording; 2 is with disturbances."""
+CAPTIONS: dict[Experiment, tuple[str, str]] = {
+    "failed": ("experiment-1", "Experiment 1, a grasp that failed"),
+    "disturbed": ("experiment-2", "Experiment 2: locked, disturbed, released"),
+    "any": ("experiment", "One recording and predicted states"),
+}
+"""Name of the figure of each experiment, and first words of its caption."""
 
 
-class Shown(msgspec.Struct, frozen=True):
+class ExampleRecording(msgspec.Struct, frozen=True):
     """A recording that a figure shows.
 
     Attributes:
-        experiment: "protocol" (of the main recordings, nothing predicted), "failed",
-            "disturbed", or "any" where no recording tells its case.
+        experiment: "protocol" (of the main recordings, without predictions), "failed",
+            "disturbed", or "any" if no recording has a case.
         role: of its corpus.
-        recording: its name.
-        finger: that is shown.
-        states: by the name of a method, (n,) codes of what a fit without it says.
+        recording: name of the recording.
+        finger: that is drawn.
+        states: by name of a method: (n,) state codes, by a fit without this recording.
     """
 
     experiment: Experiment
@@ -58,144 +64,139 @@ class Shown(msgspec.Struct, frozen=True):
 
 
 def tasks(plan: StudyPlan) -> list[Task]:
-    """One: what LogReg and SVM say of the recordings of the figures."""
-    corpora = {role: plan.corpora[role] for role in UNSEEN if role in plan.corpora}
+    """Return one task: the decisions of LogReg and SVM on the recordings of the figures."""
+    corpora = {role: plan.corpora[role] for role in SEARCH_ORDER if role in plan.corpora}
     arguments = (corpora, first_finger(plan), plan.seed)
-    return [Task(TASK, predict, arguments, list[Shown], cost=5.0)]
+    return [Task(TASK, predict_examples, arguments, list[ExampleRecording], cost=5.0)]
 
 
 def tables(plan: StudyPlan, results: Mapping[str, Any]) -> list[ResultTable]:
-    """None."""
+    """Return no tables."""
     return []
 
 
 def figures(plan: StudyPlan, results: Mapping[str, Any]) -> list[ReportFigure]:
-    """The paper's figures."""
-    drawn: list[ReportFigure] = []
-    for shown in results[TASK]:
-        series = _series(plan.corpora[shown.role], shown.recording, shown.finger)
-        if shown.experiment == "protocol":
-            drawn += _of_protocol(series)
+    """Return the figures of the paper."""
+    every: list[ReportFigure] = []
+    for example in results[TASK]:
+        corpus = plan.corpora[example.role]
+        series = _series(corpus, example.recording, example.finger)
+        if example.experiment == "protocol":
+            every += _protocol_figures(series)
         else:
-            drawn.append(_of_experiment(shown, series))
-    return drawn
+            every.append(_experiment_figure(example, series))
+    return every
 
 
-def predict(corpora: Mapping[str, Corpus], finger: str, seed: int) -> list[Shown]:
-    """What the paper's methods say of a recording of each experiment, not having seen it.
+def predict_examples(
+    corpora: Mapping[str, Corpus], finger: str, seed: int
+) -> list[ExampleRecording]:
+    """Choose a recording of each experiment, and predict its states without training on it.
 
     Args:
-        corpora: "main", which trains, and others, in the order in which they are searched.
-        finger: whose labels train, and whose are predicted.
+        corpora: "main" for training, and others, in the order in which they are searched.
+        finger: for training and prediction.
         seed: of the fits.
 
     Raises:
-        TrainingError: the finger has one class.
+        TrainingError: the finger has labels of one class only.
     """
     main = corpora["main"]
-    judged = list(_chosen(corpora, finger))
-    for name in SHOWN:
-        material = gather_training_samples(
-            corpus_features(METHODS[name], _of(main, finger), Variation())
-        )
-        for shown in judged:
-            states = _states(METHODS[name], material, corpora, shown, seed)
-            shown.states[name] = states.tolist()
+    examples = list(_choose(corpora, finger))
+    for name in TITLES:
+        features = corpus_features(METHODS[name], _select(main, finger), Variation())
+        samples = gather_training_samples(features)
+        for example in examples:
+            states = _predict(METHODS[name], samples, corpora, example, seed)
+            example.states[name] = states.tolist()
     first = _first(main, finger, CASES["disturbed"]) or main.recordings[0]
-    return [Shown("protocol", "main", first, finger), *judged]
+    return [ExampleRecording("protocol", "main", first, finger), *examples]
 
 
-def _chosen(corpora: Mapping[str, Corpus], finger: str) -> Iterator[Shown]:
-    """The recording of each experiment; the first of all where no case is told."""
-    found = False
+def _choose(corpora: Mapping[str, Corpus], finger: str) -> Iterator[ExampleRecording]:
+    """Yield a recording of each experiment; the first recording if none has a case."""
+    any_found = False
     for experiment, case in CASES.items():
         names = ((role, _first(corpus, finger, case)) for role, corpus in corpora.items())
         for role, name in names:
             if name is not None:
-                found = True
-                yield Shown(experiment, role, name, finger)
+                any_found = True
+                yield ExampleRecording(experiment, role, name, finger)
                 break
-    if not found:
+    if not any_found:
         role, corpus = next(iter(corpora.items()))
-        yield Shown("any", role, corpus.recordings[0], finger)
+        yield ExampleRecording("any", role, corpus.recordings[0], finger)
 
 
 def _first(corpus: Corpus, finger: str, case: str) -> str | None:
-    """The first recording of a case, by name."""
+    """Return the name of the first recording of a case."""
     for recording in corpus.load():
         if recording.metadata.get("case") == case and finger in recording.modules:
             return recording.name
     return None
 
 
-def _states(
+def _predict(
     method: Method,
-    material: TrainingSamples,
+    samples: TrainingSamples,
     corpora: Mapping[str, Corpus],
-    shown: Shown,
+    example: ExampleRecording,
     seed: int,
 ) -> Codes:
-    """What a fit to all main recordings, but for the one that is judged, says of it."""
+    """Return states (n,) of a recording, by a fit to all other main recordings."""
+    own = (example.role, example.recording)
     names = corpora["main"].recordings
-    places = {k for k, name in enumerate(names) if (shown.role, shown.recording) != ("main", name)}
-    fitted = FittedMethod.fit(method, material, places, seed)
+    numbers = {k for k, name in enumerate(names) if own != ("main", name)}
+    fitted = FittedMethod.fit(method, samples, numbers, seed)
     if not fitted.classifiers:
-        raise TrainingError(f"without {shown.recording} the {shown.finger} has labels of one class")
-    (seen,) = corpus_features(
-        method, _of(corpora[shown.role], shown.finger, shown.recording), Variation()
-    )
-    return fitted.scores(seen).decide(seen, seen.labels).fingers[shown.finger].states
+        raise TrainingError(
+            f"without {example.recording} the {example.finger} has labels of one class"
+        )
+    corpus = _select(corpora[example.role], example.finger, example.recording)
+    (features,) = corpus_features(method, corpus, Variation())
+    return fitted.scores(features).decide(features, features.labels).fingers[example.finger].states
 
 
-def _of(corpus: Corpus, finger: str, recording: str | None = None) -> Corpus:
-    """One finger of a corpus, or of one recording of it."""
+def _select(corpus: Corpus, finger: str, recording: str | None = None) -> Corpus:
+    """Return one finger of a corpus, or of one recording of it."""
     names = corpus.recordings if recording is None else (recording,)
     return msgspec.structs.replace(corpus, fingers=(finger,), recordings=names)
 
 
 def _series(corpus: Corpus, name: str, finger: str) -> FingerSeries:
-    (recording,) = _of(corpus, finger, name).load()
+    (recording,) = _select(corpus, finger, name).load()
     series = finger_series(recording, finger, Tare.parse(corpus.tare))
     return series._replace(name=f"{name}, {finger}")
 
 
-def _of_protocol(series: FingerSeries) -> Iterator[ReportFigure]:
-    chosen = "The first of the recordings with disturbances, by name."
+def _protocol_figures(series: FingerSeries) -> Iterator[ReportFigure]:
+    chosen = "Chosen: the first recording with disturbances, by name."
     yield ReportFigure(
         "forces",
-        "Components of the fingertip force over one recording, and what was going on (the paper's "
-        f"figure of the phases). F_x is along the normal of the pad. {chosen}",
+        "Components of the fingertip force in one recording, with the phases of the experiment "
+        f"(the paper's figure of the phases). F_x is along the normal of the pad. {chosen}",
         draw_forces(series),
     )
     yield ReportFigure(
         "features",
-        "Features and labels of one experiment (the paper's figure of the same). From above: the "
-        "components of the force; its amplitude F_a and mean m over the window; the instability "
-        f"sigma; the label, 1 = stable. {chosen}",
+        "Features and labels of one experiment (the paper's figure of features and labels). From "
+        "top to bottom: components of the force; its amplitude F_a and mean m over the window; "
+        f"the instability sigma; the label, 1 = stable. {chosen}",
         draw_features(series),
     )
 
 
-_TITLES: dict[Experiment, tuple[str, str]] = {
-    "failed": ("experiment-1", "Experiment 1, a grasp that failed"),
-    "disturbed": ("experiment-2", "Experiment 2: locked, disturbed, released"),
-    "any": ("experiment", "One recording and what is predicted of it"),
-}
-
-
-def _of_experiment(shown: Shown, series: FingerSeries) -> ReportFigure:
-    name, title = _TITLES[shown.experiment]
-    predicted = {
-        {"logreg": "LogReg", "svm": "SVM"}[method]: np.array(states)
-        for method, states in shown.states.items()
-    }
-    where = (
-        "by fits to all the other recordings"
-        if shown.role == "main"
-        else f"by fits to the main recordings; this one is of {shown.role!r}"
+def _experiment_figure(example: ExampleRecording, series: FingerSeries) -> ReportFigure:
+    name, title = CAPTIONS[example.experiment]
+    predicted = {TITLES[method]: np.array(states) for method, states in example.states.items()}
+    fits = (
+        "fits to all other recordings"
+        if example.role == "main"
+        else f"fits to the main recordings (this recording is from {example.role!r})"
     )
     caption = (
-        f"{title}. F_a, sigma, the label, and what LogReg and SVM predict {where}. The share of "
-        "labelled samples that they have right stands beside. Chosen: the first by name."
+        f"{title}. F_a, sigma, the label, and the states that LogReg and SVM predict by {fits}. "
+        "Beside each strip: the fraction of labelled samples that are correct. Chosen: the first "
+        "recording by name."
     )
     return ReportFigure(name, caption, draw_experiment(series, predicted))

@@ -1,7 +1,7 @@
-"""The labelled samples of one finger, of all recordings of a corpus together.
+"""The labelled samples of one finger, pooled over all recordings of a corpus.
 
-A sample's part, one of 25, is drawn by its recording and place, whatever the finger, window and
-features.
+Each sample belongs to one of 25 parts, which is drawn at random from its recording and position.
+The part does not depend on finger, window and features.
 """
 
 from collections.abc import Iterator, Sequence
@@ -30,52 +30,52 @@ Integers = npt.NDArray[np.int64]
 
 
 @dataclass(frozen=True, eq=False)
-class Pool:
-    """The labelled samples of one finger, of all recordings together.
+class SamplePool:
+    """The labelled samples of one finger of all recordings.
 
     Attributes:
-        samples: with all `COLUMNS`; groups are the recordings.
-        parts: (n,) from 0 to 24, at random.
-        objects: of each recording; None where it does not say.
+        samples: with all features of `COLUMNS`; the groups are the recordings.
+        parts: (n,) random part of each sample, 0 to 24.
+        objects: of each recording; None if it is not known.
     """
 
     samples: Samples
     parts: Integers
     objects: tuple[str | None, ...]
 
-    def only(self, names: Sequence[str]) -> Samples:
-        """The samples with some of the features."""
+    def select(self, names: Sequence[str]) -> Samples:
+        """Return the samples with some of the features."""
         columns = [COLUMNS.index(name) for name in names]
         return self.samples._replace(features=self.samples.features[:, columns])
 
 
-def pooled(corpus: Corpus, rate: float, finger: str, window: int, seed: int) -> Pool:
-    """The labelled samples of a finger in a corpus.
+def pool_samples(corpus: Corpus, rate: float, finger: str, window: int, seed: int) -> SamplePool:
+    """Return the labelled samples of a finger in a corpus.
 
     Args:
-        corpus: that is read, or was lately.
-        rate: that recordings are brought to where theirs is another [Hz].
-        finger: whose.
-        window: N_w.
+        corpus: of recordings; the last four are kept in memory.
+        rate: to which recordings with another rate are resampled [Hz].
+        finger: name of the finger.
+        window: N_w [samples].
         seed: of the parts.
     """
     samples = [Samples(np.empty((0, len(COLUMNS))), np.empty(0, bool), np.empty(0, np.int64))]
     parts = [np.empty(0, dtype=np.int64)]
-    hands = _hands(corpus, rate)
-    for place, hand in enumerate(hands):
-        if finger not in hand.fingers:
+    forces = _corpus_forces(corpus, rate)
+    for number, recording in enumerate(forces):
+        if finger not in recording.fingers:
             continue
-        signal, states = hand.fingers[finger]
+        signal, states = recording.fingers[finger]
         features = _columns(signal, window)
         rows = usable_rows(features, states)
-        samples.append(labelled_samples(features, states, rows, place))
-        drawn = np.random.default_rng([seed, place]).integers(N_PARTS, size=len(states))
+        samples.append(labelled_samples(features, states, rows, number))
+        drawn = np.random.default_rng([seed, number]).integers(N_PARTS, size=len(states))
         parts.append(drawn[rows])
-    objects = tuple(hand.object for hand in hands)
-    return Pool(concatenate(samples), np.concatenate(parts), objects)
+    objects = tuple(recording.object for recording in forces)
+    return SamplePool(concatenate(samples), np.concatenate(parts), objects)
 
 
-class _Hand(NamedTuple):
+class _RecordingForces(NamedTuple):
     """Forces and label codes of the labelled fingers of a recording, without its readings."""
 
     fingers: dict[str, tuple[FingerSignal, npt.NDArray[np.int8]]]
@@ -83,12 +83,12 @@ class _Hand(NamedTuple):
 
 
 @lru_cache(maxsize=4)
-def _hands(corpus: Corpus, rate: float) -> tuple[_Hand, ...]:
-    """Each recording of a corpus is read once for all tasks that a worker does."""
-    return tuple(_hand_of(corpus, rate))
+def _corpus_forces(corpus: Corpus, rate: float) -> tuple[_RecordingForces, ...]:
+    """Return the forces of all recordings; a worker reads a corpus once for all its tasks."""
+    return tuple(_read_forces(corpus, rate))
 
 
-def _hand_of(corpus: Corpus, rate: float) -> Iterator[_Hand]:
+def _read_forces(corpus: Corpus, rate: float) -> Iterator[_RecordingForces]:
     for given in corpus.load():
         recording = at_rate(given, rate)
         hand = hand_signal(recording, Tare.parse(corpus.tare))
@@ -96,17 +96,17 @@ def _hand_of(corpus: Corpus, rate: float) -> Iterator[_Hand]:
             name: (_without_readings(signal), recording.modules[name].label_states)
             for name, signal in hand.fingers.items()
         }
-        thing = recording.metadata.get("object")
-        yield _Hand(fingers, None if thing is None else str(thing))
+        held_object = recording.metadata.get("object")
+        yield _RecordingForces(fingers, None if held_object is None else str(held_object))
 
 
 def _without_readings(signal: FingerSignal) -> FingerSignal:
-    nothing = np.empty((len(signal.times), 0, 3))
-    return FingerSignal(signal.sensor, signal.times, nothing, signal.force, signal.rate)
+    empty = np.empty((len(signal.times), 0, 3))
+    return FingerSignal(signal.sensor, signal.times, empty, signal.force, signal.rate)
 
 
 def _columns(signal: FingerSignal, window: int) -> Array:
-    """(n, 7) all `COLUMNS`; NaN without a full window."""
+    """Return the features of `COLUMNS` (n, 7); NaN without a full window."""
     table = np.full((len(signal.times), len(COLUMNS)), np.nan)
     normal = signal.normal_magnitude
     for rows in signal.stretches:
