@@ -84,6 +84,16 @@ class TestTimes:
         (arrival,) = packet(assembler(1, 2), 0, 1, 2)
         assert (arrival.time, list(arrival.samples)) == (START, ["finger1", "finger2"])
 
+    def test_a_stamp_equal_to_that_of_the_packet_shares_its_arrival(self):
+        made = assembler(1, 2)
+        packet(made, 3, 1, 2)
+        made.stamp(START + 2 * PERIOD, 50.0)  # a small step back, moved after the last time
+        made.add(1, readings())
+        made.add(2, readings(), START + 2 * PERIOD)
+        (arrival,) = made.finish(50.0)
+        assert arrival.time == math.nextafter(START + 3 * PERIOD, math.inf)
+        assert list(arrival.samples) == ["finger1", "finger2"]
+
     def test_a_device_twice_in_a_packet_arrives_twice(self):
         made = assembler(1)
         made.stamp(START, 50.0)

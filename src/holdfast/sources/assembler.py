@@ -221,7 +221,8 @@ class Assembler:
         packet = self._packet
         if stamp is None or stamp > packet.time + MAX_STAMP_LEAD:
             return packet.stamp
-        time = stamp + self._timeline.offset
+        same = stamp == packet.time
+        time = packet.stamp.time if same else stamp + self._timeline.offset
         late = self._delays.setdefault(number, TransportDelay()).is_late(time, packet.received)
         return Stamp(time, (Fault.CLOCK_JUMP,) * packet.jumped + (Fault.LATE,) * late)
 
