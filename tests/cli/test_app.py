@@ -1,4 +1,3 @@
-import json
 import os
 import subprocess
 import sys
@@ -6,8 +5,6 @@ import sys
 import pytest
 
 from holdfast.cli import app, main
-from holdfast.cli.terminal.console import print_json, print_table
-from holdfast.cli.terminal.progress import ProgressBar, progress
 from holdfast.errors import RecordingError
 
 
@@ -153,56 +150,3 @@ def test_exit_code_reaches_the_shell():
     assert done.returncode == 2
     assert done.stdout == ""
     assert done.stderr.count("\n") == 1
-
-
-class TestConsole:
-    def test_json_converts_numpy_values_and_paths(self, capsys, tmp_path):
-        import numpy as np
-
-        given = {
-            "array": np.array([1.0, np.nan]),
-            "number": np.float64(2.5),
-            "count": np.int64(3),
-            "flag": np.bool_(True),
-            "path": tmp_path,
-            "infinite": float("inf"),
-        }
-        print_json(given)
-        out = capsys.readouterr().out
-        assert out.count("\n") == 1
-        assert json.loads(out) == {
-            "array": [1.0, None],
-            "number": 2.5,
-            "count": 3,
-            "flag": True,
-            "path": str(tmp_path),
-            "infinite": None,
-        }
-
-    def test_json_refuses_other_objects(self):
-        with pytest.raises(TypeError, match=r"^object cannot be written as JSON$"):
-            print_json({"a": object()})
-
-    def test_table(self, capsys):
-        print_table(("name", "rate"), [("a", 5), ("long", "-"), ("b", "12.5")])
-        assert capsys.readouterr().out == "name  rate\na        5\nlong     -\nb     12.5\n"
-
-    def test_empty_table(self, capsys):
-        print_table(("name", "rate"), [])
-        assert capsys.readouterr().out == "name  rate\n"
-
-    def test_progress_is_silent_without_a_terminal(self, capsys):
-        assert list(progress(range(3), "counting")) == [0, 1, 2]
-        assert capsys.readouterr() == ("", "")
-
-    def test_progress_appears_on_a_terminal_after_a_while(self, capsys, monkeypatch):
-        monkeypatch.setattr("sys.stderr.isatty", lambda: True, raising=False)
-        monkeypatch.setattr("holdfast.cli.terminal.progress.DISPLAY_DELAY", -1.0)
-        with ProgressBar("counting", 3) as bar:
-            bar.advance(3)
-        assert "counting" in capsys.readouterr().err
-
-    def test_a_quick_task_shows_no_bar(self, capsys, monkeypatch):
-        monkeypatch.setattr("sys.stderr.isatty", lambda: True, raising=False)
-        assert list(progress(iter("ab"), "counting", total=2)) == ["a", "b"]
-        assert capsys.readouterr() == ("", "")

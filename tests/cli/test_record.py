@@ -266,7 +266,7 @@ def test_bad_arguments_are_refused(capsys, device, grasp, tmp_path):
     made = device(arrival(0))
     made.sensors = {"palm/1": ANYSKIN}
     assert refusal(capsys, "xela://fake", out, "--fingers-only") == (
-        "no fingers: xela://fake has palm/1"
+        "no fingers to record: xela://fake has palm/1"
     )
 
 

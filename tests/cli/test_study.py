@@ -55,7 +55,7 @@ def test_own_recordings(capsys, data, tmp_path):
     code, printed, err = run(capsys, data, "--out", out, "--quick", "--jobs", 1)
     assert code == 0
     assert printed.startswith("The paper's Table I: confusion [%] (in parentheses: the paper)\n")
-    assert printed.endswith(f"{out / 'report.html'}: all 7 tables, with figures\n")
+    assert printed.endswith(f"{out / 'report.html'}: all 7 tables and the figures\n")
     assert "making tables and figures\n" in err
     assert {path.name for path in out.iterdir()} == {
         "report.html", "study.json", "tables", "figures", "work",

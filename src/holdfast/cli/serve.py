@@ -88,7 +88,7 @@ def serve(
     compile_kernels()
 
     def announce(url: str) -> None:
-        page = url if token is None else f"{url}?token={quote(token, safe='')}"
+        page = page_url(url, token)
         if as_json:
             print_json({"url": page, "model": loaded.name, "source": source})
             sys.stdout.flush()
@@ -182,6 +182,11 @@ def run_page(
         session.stop()
     if session.failure is not None:
         raise session.failure
+
+
+def page_url(url: str, token: str | None) -> str:
+    """Return the URL of a page with the token that it requires."""
+    return url if token is None else f"{url}?token={quote(token, safe='')}"
 
 
 def open_browser(url: str) -> bool:

@@ -70,3 +70,22 @@ def test_a_bar_shows_the_remaining_time(capsys, monkeypatch, clock):
         assert bar._expected_duration() == pytest.approx(600.0)
     assert math.isnan(ProgressBar("working", 10)._expected_duration())
     assert "10%" in capsys.readouterr().err
+
+
+def test_progress_is_silent_without_a_terminal(capsys):
+    assert list(progress(range(3), "counting")) == [0, 1, 2]
+    assert capsys.readouterr() == ("", "")
+
+
+def test_progress_appears_on_a_terminal_after_a_while(capsys, monkeypatch):
+    monkeypatch.setattr("sys.stderr.isatty", lambda: True, raising=False)
+    monkeypatch.setattr("holdfast.cli.terminal.progress.DISPLAY_DELAY", -1.0)
+    with ProgressBar("counting", 3) as bar:
+        bar.advance(3)
+    assert "counting" in capsys.readouterr().err
+
+
+def test_a_quick_task_shows_no_bar(capsys, monkeypatch):
+    monkeypatch.setattr("sys.stderr.isatty", lambda: True, raising=False)
+    assert list(progress(iter("ab"), "counting", total=2)) == ["a", "b"]
+    assert capsys.readouterr() == ("", "")

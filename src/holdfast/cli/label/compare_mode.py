@@ -44,7 +44,7 @@ def compare_labels(
     if len(paths) != 2:
         raise ValueError(f"--compare A B: two paths expected, {len(paths)} given")
     a, b = paths
-    files = _recordings(a, b)
+    files = _recordings_to_compare(a, b)
     both = (_labels_of(a, options, annotator), _labels_of(b, options, annotator))
     results = dict(_compare_each(files, both))
     compared = [each for each in results.values() if not isinstance(each, str)]
@@ -105,7 +105,7 @@ def _is_rule(place: Path) -> bool:
     return str(place) in RULES and not place.exists()
 
 
-def _recordings(a: Path, b: Path) -> list[Path]:
+def _recordings_to_compare(a: Path, b: Path) -> list[Path]:
     """Return the recordings to compare: those in A, otherwise those in B.
 
     Raises:
@@ -120,14 +120,14 @@ def _recordings(a: Path, b: Path) -> list[Path]:
         if not _is_rule(place) and not place.exists():
             raise RecordingError(f"{place} does not exist; labels, recordings or a rule expected")
     for place in (a, b):
-        if not _is_rule(place) and (found := _recordings_at(place)):
+        if not _is_rule(place) and (found := _recordings_beside(place)):
             return found
     raise RecordingError(
         f"no recordings beside the labels in {a} or {b}; their sample times are needed"
     )
 
 
-def _recordings_at(place: Path) -> list[Path]:
+def _recordings_beside(place: Path) -> list[Path]:
     """Return the recordings in a folder, at a path, or beside a label file."""
     from holdfast.errors import RecordingError
     from holdfast.io import load_dataset

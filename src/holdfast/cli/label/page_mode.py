@@ -14,7 +14,7 @@ from holdfast.cli.label.inputs import (
     login_name,
     recordings_at,
 )
-from holdfast.cli.serve import open_browser
+from holdfast.cli.serve import open_browser, page_url
 from holdfast.cli.terminal.console import print_json, print_message
 
 if TYPE_CHECKING:
@@ -51,7 +51,7 @@ def show_label_page(
 
     guard = Guard(page_options.host, page_options.token)
     files = recordings_at(paths)
-    shelf = Workspace(
+    workspace = Workspace(
         files,
         author=login_name() if author is None else author,
         clock=current_time,
@@ -61,7 +61,7 @@ def show_label_page(
     )
 
     def announce(url: str) -> None:
-        page = url if page_options.token is None else f"{url}?token={page_options.token}"
+        page = page_url(url, page_options.token)
         if page_options.as_json:
             print_json({"url": page, "recordings": len(files)})
             sys.stdout.flush()
@@ -70,17 +70,19 @@ def show_label_page(
         print_message(f"{page} {where} for {_describe(files)}; Ctrl-C stops it")
 
     for work in (_prepare, Workspace.warm_up):
-        Thread(target=work, args=(shelf,), daemon=True).start()
-    run_server(LabellingService(shelf, guard).app, page_options.host, page_options.port, announce)
+        Thread(target=work, args=(workspace,), daemon=True).start()
+    run_server(
+        LabellingService(workspace, guard).app, page_options.host, page_options.port, announce
+    )
 
 
 def _describe(files: Sequence[Path]) -> str:
     return f"{len(files)} recordings" if len(files) > 1 else str(files[0])
 
 
-def _prepare(shelf: "Workspace") -> None:
+def _prepare(workspace: "Workspace") -> None:
     """Read the first recording while the browser starts."""
     from holdfast.errors import HoldfastError
 
     with suppress(HoldfastError, ValueError, OSError):  # the page reports it
-        shelf.changes(0)
+        workspace.changes(0)
