@@ -30,12 +30,12 @@ from holdfast.io import load_dataset
 from holdfast.metrics import Decisions, bootstrap_interval, ratio_of_sums, summarise
 from holdfast.model import Model
 from holdfast.recordings import Recording, label_states
-from holdfast.training import Setting, decisions_of
-from holdfast.training.design import FingerDesign, gather
-from holdfast.training.fitting import Material, fit_whole
+from holdfast.training import Setting, compute_decisions
+from holdfast.training.dataset_scan import scan_dataset
+from holdfast.training.model_fit import TrainingData, fit_full_model
 from holdfast.training.setting import SEARCH_SAMPLES
-from holdfast.training.splits import divide, inner_folds
-from holdfast.training.survey import survey
+from holdfast.training.splits import inner_folds, split_data
+from holdfast.training.training_samples import FingerSamples, gather_samples
 from holdfast.training.tuning import INNER_FOLDS, search
 from holdfast.twin.labels import LabelRule, labels_from_truth
 
@@ -112,17 +112,17 @@ def evaluate_draw(
 
 def train_model(recordings: Sequence[Recording], setting: Setting) -> Model:
     """Train a model as `holdfast train` does, without cross-validation."""
-    found = survey(recordings, setting.rate)
-    division = divide(found.entries, "recording", setting.seed)
-    designs = gather(recordings, found, setting, division)
+    found = scan_dataset(recordings, setting.rate)
+    data_split = split_data(found.recordings, "recording", setting.seed)
+    fingers = gather_samples(recordings, found, setting, data_split)
     parameters = {
-        finger: search_parameters(each, setting, finger) for finger, each in designs.items()
+        finger: search_parameters(each, setting, finger) for finger, each in fingers.items()
     }
-    return fit_whole(Material(found, division, designs), setting, parameters)
+    return fit_full_model(TrainingData(found, data_split, fingers), setting, parameters)
 
 
-def search_parameters(design: FingerDesign, setting: Setting, finger: str) -> Parameters:
-    recipe, samples = setting.recipe_of(finger), design.samples
+def search_parameters(own: FingerSamples, setting: Setting, finger: str) -> Parameters:
+    recipe, samples = setting.recipe_of(finger), own.samples
     chosen = np.arange(len(samples.stable)) % -(-len(samples.stable) // SEARCH_SAMPLES) == 0
     some = samples.take(chosen)
     folds = inner_folds(some, INNER_FOLDS, setting.seed)
@@ -136,7 +136,7 @@ def count_all(model: Model, recordings: Sequence[Recording]) -> list[Counts]:
 
 
 def count(model: Model, recording: Recording) -> Counts:
-    decisions = decisions_of(model, recording)
+    decisions = compute_decisions(model, recording)
     pooled = summarise([decisions]).pooled
     events = summarise([without_margin(decisions, recording)]).events.hand
     (tn, _), (_, tp) = pooled.confusion

@@ -35,7 +35,7 @@ from holdfast.labelling.rules.tracking import TrackingRule
 from holdfast.metrics import Metrics, bootstrap_interval, ratio_of_sums
 from holdfast.recordings import Label, Recording, Truth
 from holdfast.training import Setting, evaluate
-from holdfast.training.fitting import fit_all
+from holdfast.training.model_fit import fit_recordings
 
 Labels = Mapping[str, Sequence[Label]]
 Rule = Callable[[Recording], Labels]
@@ -180,7 +180,7 @@ def training_rows(folder: Path, every: int) -> Iterator[tuple[str, ...]]:
     rules: dict[str, Rule | None] = {"the truth": None, **RULES}
     for name, rule in rules.items():
         given = training if rule is None else [each.with_labels(rule(each)) for each in training]
-        metrics = evaluate(fit_all(given, Setting(trials=0), REFERENCE), evaluated)
+        metrics = evaluate(fit_recordings(given, Setting(trials=0), REFERENCE), evaluated)
         best = best or metrics
         cells = training_cells(metrics, best)
         yield f"{folder.name}, {len(training)} and {len(evaluated)}", name, *cells

@@ -182,8 +182,8 @@ def test_data_that_cannot_train_leave_everything_as_it_was(capsys, tmp_path, mod
     bare = Recording("bare", {"thumb": synthetic_recording("x", 1).modules["thumb"]})
     save_recording(bare.with_labels({}), folder / "bare.parquet")
     assert refusal(capsys, folder, "-o", model, "--force", "--split", "object") == (
-        "recording 'bare' does not say its object ('object' in its metadata); the split by "
-        "object needs it of every recording"
+        "recording 'bare' does not name its object ('object' in its metadata); the split by "
+        "object needs the object of every recording"
     )
     save_recording(grasp.with_labels({}), folder / "grasp.parquet", force=True)
     assert refusal(capsys, folder, "-o", model, "--force") == (
@@ -320,8 +320,8 @@ def test_one_for_all_from_one_for_each(capsys, data, model, tmp_path):
     first = tmp_path / "first.json"
     assert run(capsys, data, "-o", first, "--trials", 0)[0] == 0
     assert refusal(capsys, data, "-o", model, "--init", first, "--shared") == (
-        f"one classifier for all fingers (shared) cannot begin from {first}, which has one for "
-        "each of thumb, index"
+        f"one classifier for all fingers (shared) cannot be adapted from {first}, which has "
+        "one for each of thumb, index"
     )
 
 
@@ -332,8 +332,8 @@ def test_warnings_about_the_model_to_adapt(capsys, data, model, tmp_path):
     code, _, err = run(capsys, data, "-o", model, "--trials", 0, "--init", first)
     assert (code, err) == (
         0,
-        f"{first} has seen 3 of these 3 recordings in training (grasp-0, grasp-1, grasp-2): "
-        "figures on them flatter\n",
+        f"{first} was trained on 3 of these 3 recordings (grasp-0, grasp-1, grasp-2): "
+        "the metrics on them are too good\n",
     )
     others = tmp_path / "others"
     others.mkdir()
@@ -344,7 +344,7 @@ def test_warnings_about_the_model_to_adapt(capsys, data, model, tmp_path):
     assert (code, err) == (
         0,
         "thumb, index: the sensor is flat (count), builtin:twin was trained on uskin-curved "
-        "(count); its features are taken as they are, what it knows may not fit\n",
+        "(count); its features are used unchanged, its weights may not fit\n",
     )
 
 

@@ -1,4 +1,4 @@
-"""Beginning from a model: what is kept of it, what the data change, and what is told."""
+"""Beginning from a model: what is kept of it, what the data change, and what is warnings."""
 
 from dataclasses import replace
 
@@ -37,9 +37,9 @@ def by_finger(model):
     return msgspec.structs.replace(model, fingers=parts)
 
 
-def told_by(recordings, setting):
-    told = []
-    return train(recordings, setting, tell=told.append).model, told
+def train_with_warnings(recordings, setting):
+    warnings = []
+    return train(recordings, setting, warn=warnings.append).model, warnings
 
 
 def accuracy(model, recordings):
@@ -47,14 +47,14 @@ def accuracy(model, recordings):
 
 
 def test_it_keeps_what_the_model_has(known, few):
-    adapted, told = told_by(few, Setting.adapting(known, trials=0))
+    adapted, warnings = train_with_warnings(few, Setting.adapting(known, trials=0))
     assert set(adapted.fingers) == {"thumb", "index"}
     assert {part.features for part in adapted.fingers.values()} == {FEATURES}
     assert (adapted.window, adapted.tare, adapted.debounce) == (8, "0.4", Debounce(0.02, 0.05, 0.1))
     scales = {part.classifier.scale for part in adapted.fingers.values()}
     assert scales == {known.fingers[ANY_FINGER].classifier.scale}
     assert adapted.training.parameters == {f: {"C": 1e-3} for f in ("thumb", "index")}
-    assert (adapted.name, told) == ("", [])
+    assert (adapted.name, warnings) == ("", [])
 
 
 def test_what_is_chosen_wins(known, few):
@@ -125,41 +125,41 @@ def test_windows_are_meant_for_the_rate_of_the_model(known):
     assert train(fast, Setting.adapting(for_any, trials=0)).model.rate == pytest.approx(300.0)
 
 
-# --- what is told ----------------------------------------------------------------------------
+# --- what is warnings ----------------------------------------------------------------------------
 
 
-def test_another_sensor_is_told_and_taken(known):
+def test_another_sensor_is_used_with_a_warning(known):
     other = replace(TINY, name="other", unit="N")
     own = [tiny_recording(seed, sensor=other) for seed in (50, 51)]
-    adapted, told = told_by(own, Setting.adapting(known, trials=0))
-    assert told == [
+    adapted, warnings = train_with_warnings(own, Setting.adapting(known, trials=0))
+    assert warnings == [
         "thumb, index: the sensor is other (N), mine was trained on tiny (count); its features "
-        "are taken as they are, what it knows may not fit"
+        "are used unchanged, its weights may not fit"
     ]
     assert adapted.sensors == {"other": other}
     assert {part.sensor for part in adapted.fingers.values()} == {"other"}
 
 
 @pytest.mark.parametrize("shared", [True, False])
-def test_another_sensor_is_told_in_one_line(known, shared):
+def test_one_warning_names_all_fingers_with_another_sensor(known, shared):
     own = [tiny_recording(seed, sensor=replace(TINY, name="other")) for seed in (50, 51)]
     unnamed = msgspec.structs.replace(known, name="")
-    _, told = told_by(own, Setting.adapting(unnamed, trials=0, shared=shared))
-    assert len(told) == 1
-    assert "the model to begin from was trained on tiny (count)" in told[0]
+    _, warnings = train_with_warnings(own, Setting.adapting(unnamed, trials=0, shared=shared))
+    assert len(warnings) == 1
+    assert "the model to adapt was trained on tiny (count)" in warnings[0]
 
 
-def test_a_model_for_any_sensor_has_nothing_to_tell(known, few):
+def test_a_model_for_any_sensor_needs_no_warning(known, few):
     part = msgspec.structs.replace(known.fingers[ANY_FINGER], sensor=None)
     init = msgspec.structs.replace(known, fingers={ANY_FINGER: part}, sensors={})
-    assert told_by(few, Setting.adapting(init, trials=0))[1] == []
+    assert train_with_warnings(few, Setting.adapting(init, trials=0))[1] == []
 
 
-def test_recordings_that_the_model_has_seen_are_told(known, few):
+def test_warn_of_recordings_that_the_model_was_trained_on(known, few):
     seen = tiny_recording(30)
-    adapted, told = told_by([seen, *few], Setting.adapting(known, trials=0))
-    assert told == [
-        "mine has seen 1 of these 3 recordings in training (grasp-30): figures on them flatter"
+    adapted, warnings = train_with_warnings([seen, *few], Setting.adapting(known, trials=0))
+    assert warnings == [
+        "mine was trained on 1 of these 3 recordings (grasp-30): the metrics on them are too good"
     ]
     assert set(known.training.recordings.values()) <= set(adapted.training.recordings.values())
     assert adapted.training.recordings["grasp-30"] == seen.digest
@@ -169,12 +169,12 @@ def test_recordings_that_the_model_has_seen_are_told(known, few):
 # --- what is refused -------------------------------------------------------------------------
 
 
-def test_one_classifier_for_all_cannot_begin_from_one_for_each(known):
+def test_a_shared_classifier_cannot_be_adapted_from_one_for_each_finger(known):
     with pytest.raises(ModelError) as raised:
         Setting.adapting(by_finger(known), shared=True)
     assert str(raised.value) == (
-        "one classifier for all fingers (shared) cannot begin from mine, which has one for each "
-        "of thumb, index"
+        "one classifier for all fingers (shared) cannot be adapted from mine, which has one for "
+        "each of thumb, index"
     )
 
 
@@ -186,7 +186,8 @@ def test_fingers_with_different_features(known):
     with pytest.raises(ModelError) as raised:
         Setting.adapting(unlike)
     assert str(raised.value) == (
-        "mine has different features for its fingers; one list for all expected to begin from"
+        "mine has different features for its fingers; only a model with the same features for "
+        "all fingers can be adapted"
     )
 
 

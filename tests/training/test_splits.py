@@ -5,44 +5,46 @@ from hypothesis import strategies as st
 
 from holdfast.classifiers import Samples
 from holdfast.errors import TrainingError
-from holdfast.training.splits import RANDOM_FOLDS, divide, inner_folds
-from holdfast.training.survey import Entry
+from holdfast.training.dataset_scan import ScannedRecording
+from holdfast.training.splits import RANDOM_FOLDS, inner_folds, split_data
 
 
 def entries(*objects):
-    return [Entry(f"grasp-{k}", str(k), thing, 100.0, {}) for k, thing in enumerate(objects)]
+    return [
+        ScannedRecording(f"grasp-{k}", str(k), thing, 100.0, {}) for k, thing in enumerate(objects)
+    ]
 
 
 def test_a_unit_of_the_split_by_recording_is_a_recording():
-    division = divide(entries("can", "can", None), "recording", 0)
-    assert division.units == ("grasp-0", "grasp-1", "grasp-2")
-    assert division.units_of(2, 4).tolist() == [2] * 4
-    assert division.recordings_without({1}) == [0, 2]
+    data_split = split_data(entries("can", "can", None), "recording", 0)
+    assert data_split.units == ("grasp-0", "grasp-1", "grasp-2")
+    assert data_split.units_of(2, 4).tolist() == [2] * 4
+    assert data_split.recordings_without({1}) == [0, 2]
 
 
 def test_a_unit_of_the_split_by_object_is_all_its_recordings():
-    division = divide(entries("can", "egg", "can"), "object", 0)
-    assert division.units == ("can", "egg")
-    assert [division.units_of(place, 1)[0] for place in range(3)] == [0, 1, 0]
-    assert division.recordings_without({0}) == [1]
+    data_split = split_data(entries("can", "egg", "can"), "object", 0)
+    assert data_split.units == ("can", "egg")
+    assert [data_split.units_of(place, 1)[0] for place in range(3)] == [0, 1, 0]
+    assert data_split.recordings_without({0}) == [1]
 
 
 @given(seed=st.integers(0, 2**32 - 1), place=st.integers(0, 50))
 def test_random_fifths(seed, place):
-    division = divide(entries("can"), "random", seed)
-    units = division.units_of(place, 2000)
-    assert (units == division.units_of(place, 2000)).all()
+    data_split = split_data(entries("can"), "random", seed)
+    units = data_split.units_of(place, 2000)
+    assert (units == data_split.units_of(place, 2000)).all()
     shares = np.bincount(units, minlength=RANDOM_FOLDS) / 2000
     assert shares == pytest.approx(0.2, abs=0.06)
-    assert division.recordings_without({0}) == [0]
+    assert data_split.recordings_without({0}) == [0]
 
 
 def test_random_fifths_differ_by_recording_and_seed():
-    division = divide(entries("can", "can"), "random", 0)
-    other = divide(entries("can", "can"), "random", 1)
-    assert (division.units_of(0, 100) != division.units_of(1, 100)).any()
-    assert (division.units_of(0, 100) != other.units_of(0, 100)).any()
-    assert division.group_of.tolist() == [0, 1]  # a search never parts a recording
+    data_split = split_data(entries("can", "can"), "random", 0)
+    other = split_data(entries("can", "can"), "random", 1)
+    assert (data_split.units_of(0, 100) != data_split.units_of(1, 100)).any()
+    assert (data_split.units_of(0, 100) != other.units_of(0, 100)).any()
+    assert data_split.group_of.tolist() == [0, 1]  # a search never parts a recording
 
 
 @pytest.mark.parametrize(
@@ -51,8 +53,8 @@ def test_random_fifths_differ_by_recording_and_seed():
         (
             ["can", None],
             "object",
-            "recording 'grasp-1' does not say its object ('object' in its metadata); the split "
-            "by object needs it of every recording",
+            "recording 'grasp-1' does not name its object ('object' in its metadata); the split "
+            "by object needs the object of every recording",
         ),
         (["can", "can"], "object", "the split by object needs at least two, 1 given (can)"),
         (["can"], "recording", "the split by recording needs at least two, 1 given (grasp-0)"),
@@ -60,7 +62,7 @@ def test_random_fifths_differ_by_recording_and_seed():
 )
 def test_refusals(objects, split, message):
     with pytest.raises(TrainingError) as refusal:
-        divide(entries(*objects), split, 0)
+        split_data(entries(*objects), split, 0)
     assert str(refusal.value) == message
 
 

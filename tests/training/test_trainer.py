@@ -12,10 +12,10 @@ from holdfast.errors import TrainingError
 from holdfast.features import Tare, parse_features
 from holdfast.metrics import summarise
 from holdfast.recordings import Recording
-from holdfast.training import Setting, decisions_of, train, trainer
-from holdfast.training.fitting import fit_model
-from holdfast.training.splits import divide
-from holdfast.training.survey import survey
+from holdfast.training import Setting, compute_decisions, train, trainer
+from holdfast.training.dataset_scan import scan_dataset
+from holdfast.training.model_fit import fit_model
+from holdfast.training.splits import split_data
 
 from .build import TINY, tiny_module, tiny_recording
 
@@ -35,10 +35,10 @@ def fitted_by(recordings, setting, monkeypatch, **options):
     """The groups that each fit of the figures was given, with what was held out."""
     seen = []
 
-    def spy(material, given, parameters, held):
-        designs = material.designs.values()
+    def spy(data, given, parameters, held):
+        designs = data.fingers.values()
         seen.extend((set(held), set(each.without(held).groups.tolist())) for each in designs)
-        return fit_model(material, given, parameters, held)
+        return fit_model(data, given, parameters, held)
 
     monkeypatch.setattr(trainer, "fit_model", spy)
     train(recordings, setting, **options)
@@ -48,9 +48,9 @@ def fitted_by(recordings, setting, monkeypatch, **options):
 @pytest.mark.parametrize("split", ["recording", "object"])
 def test_no_model_of_the_figures_has_seen_what_it_judges(grasps, split, monkeypatch):
     setting = replace(QUICK, split=split)
-    division = divide(survey(grasps).entries, split, 0)
+    data_split = split_data(scan_dataset(grasps).recordings, split, 0)
     found = fitted_by(grasps, setting, monkeypatch)
-    every = set(range(len(division.units)))
+    every = set(range(len(data_split.units)))
     assert [held for held, _ in found[::2]] == [{unit} for unit in sorted(every)]
     for held, groups in found:
         assert groups == every - held
@@ -59,16 +59,16 @@ def test_no_model_of_the_figures_has_seen_what_it_judges(grasps, split, monkeypa
 @pytest.mark.parametrize("split", ["recording", "object"])
 def test_no_search_for_the_figures_has_seen_what_they_judge(grasps, split, monkeypatch):
     """Parameters of a unit's model come from a search without that unit."""
-    searched, judged = {}, {}
+    searched, evaluated = {}, {}
 
     def spy_search(samples, setting, finger, journal):
         token = float(len(searched) + 1)
         searched[token] = set(samples.groups.tolist())
         return {"C": token, "class_weight": None}, ""
 
-    def spy_fit(material, setting, parameters, held):
-        judged[min(held)] = [given["C"] for given in parameters.values()]
-        return fit_model(material, setting, parameters, held)
+    def spy_fit(data, setting, parameters, held):
+        evaluated[min(held)] = [given["C"] for given in parameters.values()]
+        return fit_model(data, setting, parameters, held)
 
     monkeypatch.setattr(trainer, "_search", spy_search)
     monkeypatch.setattr(trainer, "fit_model", spy_fit)
@@ -76,8 +76,8 @@ def test_no_search_for_the_figures_has_seen_what_they_judge(grasps, split, monke
     n_units = 6 if split == "recording" else 3
     n_searches = min(5, n_units)
     assert len(searched) == 2 * (1 + n_searches)  # two fingers, and once for the model itself
-    assert set(judged) == set(range(n_units))
-    for unit, tokens in judged.items():
+    assert set(evaluated) == set(range(n_units))
+    for unit, tokens in evaluated.items():
         for token in tokens:
             assert unit not in searched[token]
 
@@ -102,17 +102,17 @@ def test_what_cannot_be_learnt_is_not_learnt():
 def test_out_of_fold_figures_are_those_of_the_folds_own_models(grasps):
     """Anew, from a model that was trained on the other recordings alone."""
     trained = train(grasps, SETTING)
-    judged = []
+    evaluated = []
     for place, recording in enumerate(grasps):
         others = [other for k, other in enumerate(grasps) if k != place]
-        judged.append(decisions_of(train(others, SETTING).model, recording))
-    expected = summarise(judged)
+        evaluated.append(compute_decisions(train(others, SETTING).model, recording))
+    expected = summarise(evaluated)
     assert trained.cross_validation.pooled.confusion == expected.pooled.confusion
     assert trained.cross_validation.pooled.auc == pytest.approx(expected.pooled.auc)
     assert trained.cross_validation.events == expected.events
 
 
-def test_a_random_sample_is_judged_by_the_model_without_it(grasps, monkeypatch):
+def test_a_random_sample_is_evaluated_by_the_model_without_it(grasps, monkeypatch):
     """Every fold's classifier says another constant probability."""
     calls = []
 
@@ -133,11 +133,13 @@ def test_a_random_sample_is_judged_by_the_model_without_it(grasps, monkeypatch):
             )
 
     monkeypatch.setattr(Setting, "recipe_of", lambda self, finger: Marked())
-    told = []
-    monkeypatch.setattr(trainer, "summarise", lambda judged, seed: told.extend(judged) or _some())
+    warnings = []
+    monkeypatch.setattr(
+        trainer, "summarise", lambda evaluated, seed: warnings.extend(evaluated) or _some()
+    )
     train(grasps, replace(SETTING, split="random"))
-    for place, decisions in enumerate(told):
-        units = divide(survey(grasps).entries, "random", 0).units_of(place, 400)
+    for place, decisions in enumerate(warnings):
+        units = split_data(scan_dataset(grasps).recordings, "random", 0).units_of(place, 400)
         for k, finger in enumerate(decisions.fingers.values()):
             number = 2 + 2 * units + k
             expected = 1 / (1 + np.exp(-0.1 * number))
@@ -156,12 +158,12 @@ def _some():
 
 def test_the_model_says_where_it_came_from(grasps):
     trained = train(grasps, QUICK)
-    told = trained.model.training
-    assert told.recordings == {each.name: each.digest for each in grasps}
-    assert (told.split, told.seed) == ("recording", 0)
-    assert set(told.parameters) == {"thumb", "index"}
-    assert told.figures["auc"] == trained.cross_validation.pooled.auc
-    assert set(told.versions) == {"holdfast", "numpy", "scikit-learn"}
+    warnings = trained.model.training
+    assert warnings.recordings == {each.name: each.digest for each in grasps}
+    assert (warnings.split, warnings.seed) == ("recording", 0)
+    assert set(warnings.parameters) == {"thumb", "index"}
+    assert warnings.figures["auc"] == trained.cross_validation.pooled.auc
+    assert set(warnings.versions) == {"holdfast", "numpy", "scikit-learn"}
     assert trained.model.rate == pytest.approx(100.0)
     assert trained.model.sensors == {"tiny": TINY}
 
@@ -220,14 +222,14 @@ def test_the_contact_threshold_of_a_fold_is_without_what_it_judges(grasps):
     loud[:50] += np.random.default_rng(0).normal(0, 500, size=(50, 1, 3))
     noisy = Recording("loud", {"thumb": replace(module, readings=loud)})
     calm = [tiny_recording(seed, ("thumb",)) for seed in range(1, 4)]
-    found = survey([noisy, *calm])
-    division = divide(found.entries, "recording", 0)
-    material = trainer.Material(
-        found, division, trainer.gather([noisy, *calm], found, SETTING, division)
+    found = scan_dataset([noisy, *calm])
+    data_split = split_data(found.recordings, "recording", 0)
+    data = trainer.TrainingData(
+        found, data_split, trainer.gather_samples([noisy, *calm], found, SETTING, data_split)
     )
     parameters = {"thumb": recipe("logreg").reference}
     thresholds = [
-        fit_model(material, SETTING, parameters, {unit}).fingers["thumb"].contact_threshold
+        fit_model(data, SETTING, parameters, {unit}).fingers["thumb"].contact_threshold
         for unit in range(4)
     ]
     assert thresholds[0] < 100 < min(thresholds[1:])
@@ -238,7 +240,7 @@ def test_a_shared_model(grasps):
     assert set(model.fingers) == {"*"}
     assert set(model.training.parameters) == {"*"}
     stranger = tiny_recording(20, fingers=("ring",))
-    assert set(decisions_of(model, stranger).fingers) == {"ring"}
+    assert set(compute_decisions(model, stranger).fingers) == {"ring"}
 
 
 def test_max_samples_keeps_training_deterministic(grasps):
@@ -250,13 +252,13 @@ def test_max_samples_keeps_training_deterministic(grasps):
 
 
 def test_fewer_than_two_usable_folds_give_the_reference_setting_and_a_warning():
-    told = []
+    warnings = []
     given = [tiny_recording(seed, ("thumb",)) for seed in range(2)]
-    trained = train(given, QUICK, tell=told.append)
+    trained = train(given, QUICK, warn=warnings.append)
     # Two recordings make two folds for the model itself, but one for each of the figures.
-    assert told == [
-        "thumb: 0 of the folds by recording hold both classes, 2 needed to search for "
-        "parameters; the reference setting is taken"
+    assert warnings == [
+        "thumb: 0 of the folds by recording have both classes, 2 needed to search for "
+        "parameters; the reference parameters are used"
     ]
     assert trained.cross_validation.pooled.n == 2 * 345
     found, warning = trainer._search(
@@ -266,7 +268,7 @@ def test_fewer_than_two_usable_folds_give_the_reference_setting_and_a_warning():
         None,
     )
     assert found == recipe("logreg").reference
-    assert warning == told[0]
+    assert warning == warnings[0]
 
 
 def test_fingers_may_be_missing_from_some_recordings(grasps):
@@ -276,22 +278,22 @@ def test_fingers_may_be_missing_from_some_recordings(grasps):
     assert set(by_name(trained.cross_validation)["grasp-21"].fingers) == {"thumb"}
 
 
-def test_a_finger_of_one_recording_is_trained_but_not_judged(grasps):
-    told = []
+def test_a_finger_of_one_recording_is_trained_but_not_evaluated(grasps):
+    warnings = []
     given = [*grasps[:3], tiny_recording(22, fingers=("thumb", "ring"))]
-    trained = train(given, SETTING, tell=told.append)
-    assert told == ["ring has labels of only one class left without grasp-22: not judged there"]
+    trained = train(given, SETTING, warn=warnings.append)
+    assert warnings == ["ring has only one class of labels without grasp-22: not evaluated there"]
     assert set(trained.model.fingers) == {"thumb", "index", "ring"}
     assert set(by_name(trained.cross_validation)["grasp-22"].fingers) == {"thumb"}
 
 
 def test_a_recording_whose_fingers_nobody_else_has(grasps):
     given = [*grasps[:3], tiny_recording(23, fingers=("ring",))]
-    trained = train(given, SETTING, tell=lambda _: None)
+    trained = train(given, SETTING, warn=lambda _: None)
     assert by_name(trained.cross_validation)["grasp-23"].fingers == {}
 
 
-def test_a_recording_without_labels_is_not_judged(grasps):
+def test_a_recording_without_labels_is_not_evaluated(grasps):
     bare = tiny_recording(24, fingers=("palm/1",), states=[None] * 4)
     trained = train([*grasps[:3], bare], SETTING)
     assert by_name(trained.cross_validation)["grasp-24"].fingers == {}
@@ -305,7 +307,7 @@ def test_recordings_with_one_class_help_those_with_both(grasps):
 
 
 @pytest.mark.parametrize("split", ["recording", "random"])
-def test_another_rate_is_judged_at_the_models(grasps, split):
+def test_another_rate_is_evaluated_at_the_models(grasps, split):
     fast = tiny_recording(26, n=1200, rate=300.0)
     metrics = train([*grasps, fast], replace(SETTING, split=split)).cross_validation
     assert by_name(metrics)["grasp-26"].fingers["thumb"].n == pytest.approx(345, abs=3)
@@ -327,14 +329,14 @@ def test_another_rate_is_judged_at_the_models(grasps, split):
         (
             [tiny_recording(0), Recording("bare", {"thumb": tiny_module(1)})],
             "object",
-            "recording 'bare' does not say its object ('object' in its metadata); the split by "
-            "object needs it of every recording",
+            "recording 'bare' does not name its object ('object' in its metadata); the split by "
+            "object needs the object of every recording",
         ),
         (
             [tiny_recording(0, ("thumb",)), tiny_recording(1, ("index",))],
             "recording",
-            "no finger has both classes left without one recording: nothing would be judged "
-            "out of fold",
+            "no finger has both classes in the training samples when one recording is held out: "
+            "cross-validation is not possible",
         ),
     ],
 )
@@ -355,26 +357,28 @@ def test_a_window_longer_than_the_data(grasps):
 
 
 def test_what_takes_long_can_be_followed(grasps):
-    told = []
+    warnings = []
 
-    def follow(items, what, total):
-        told.append((what, total))
+    def progress(items, what, total):
+        warnings.append((what, total))
         return iter(items)
 
-    train(grasps, QUICK, follow=follow)
-    assert told == [
+    train(grasps, QUICK, progress=progress)
+    assert warnings == [
         ("reading", 6),
         ("features", 6),
         ("searching", 12),
         ("fitting", 6),
-        ("judging", 6),
+        ("evaluating", 6),
     ]
 
 
-def test_much_that_stays_undecided_is_told(grasps, monkeypatch):
-    told = []
-    monkeypatch.setattr("holdfast.training.trainer.UNDECIDED_SHARE", 0.0)
-    train(grasps, Setting(trials=0), tell=told.append)
-    assert len(told) == 1
-    assert told[0].endswith("recordings that begin in contact need --tare first")
-    assert " % of the labelled samples have no decision, for tare, warm-up, gaps" in told[0]
+def test_much_that_stays_undecided_is_warnings(grasps, monkeypatch):
+    warnings = []
+    monkeypatch.setattr("holdfast.training.trainer.MAX_UNDECIDED_FRACTION", 0.0)
+    train(grasps, Setting(trials=0), warn=warnings.append)
+    assert len(warnings) == 1
+    assert warnings[0].endswith("recordings that begin in contact need --tare first")
+    assert (
+        " % of the labelled samples have no decision because of tare, warm-up, gaps" in warnings[0]
+    )

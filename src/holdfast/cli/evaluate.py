@@ -51,7 +51,7 @@ def evaluate(
     from holdfast.io import load_dataset
     from holdfast.metrics import summarise
     from holdfast.model import Model
-    from holdfast.training import decisions_of
+    from holdfast.training import compute_decisions
 
     if plot is not None:
         check_plot(plot, force)
@@ -64,7 +64,7 @@ def evaluate(
         for recording in progress(recordings, "evaluating"):
             if _was_trained_on(loaded, recording):
                 trained_on.append(recording.name)
-            decisions = decisions_of(loaded, recording)
+            decisions = compute_decisions(loaded, recording)
             if plot is not None:
                 plotted.append(decisions)
             yield decisions

@@ -120,7 +120,7 @@ def train(
     journal = _search_journal(model, resume=resume, force=force)
     try:
         trained = fit(
-            recordings, setting, journal=journal, tell=print_message, follow=progress, n_jobs=jobs
+            recordings, setting, journal=journal, warn=print_message, progress=progress, n_jobs=jobs
         )
     except KeyboardInterrupt:
         if journal.exists():

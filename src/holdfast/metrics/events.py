@@ -19,25 +19,25 @@ from holdfast.metrics.masks import runs
 from holdfast.metrics.statistics import finite_or_none, percent, quantile
 from holdfast.sensors.types import Array
 
-SHORTEST_EVENT = 0.05
+MIN_EVENT_DURATION = 0.05
 """A run of not-stable labels of at least this [s] is an event."""
 
-CLOSED_GAP = 0.1
+MIN_GAP_DURATION = 0.1
 """Gaps between not-stable labels shorter than this [s] are closed first."""
 
-STABLE_BEFORE = 0.5
+MIN_STABLE_DURATION = 0.5
 """An event comes right after at least this [s] of unbroken stable labels."""
 
-EARLY = 0.02
+EARLY_TOLERANCE = 0.02
 """An alarm may come this [s] before the onset and still belong to the event."""
 
-LATE = 0.25
+LATE_TOLERANCE = 0.25
 """An alarm may come this [s] after the end and still belong to the event."""
 
-POSTS = (0.05, 0.1, 0.2)
+POST_DURATIONS = (0.05, 0.1, 0.2)
 """An event is missed at `post` where no alarm came until onset + post [s]."""
 
-ROUNDING = 1e-6
+TIME_TOLERANCE = 1e-6
 """Times that differ by less [s] are equal: what times in float64 lose by subtraction."""
 
 
@@ -88,7 +88,7 @@ class AlarmMatch:
 
     def n_missed(self, post: float) -> int:
         """Events without an alarm until onset + post."""
-        return sum(event.delay > post + ROUNDING for event in self.events)
+        return sum(event.delay > post + TIME_TOLERANCE for event in self.events)
 
 
 class EventMetrics(msgspec.Struct, frozen=True):
@@ -207,7 +207,7 @@ def pool_events(matches: Sequence[AlarmMatch]) -> EventMetrics:
         stable_minutes=minutes,
         missed={
             str(post): percent(sum(match.n_missed(post) for match in matches), len(delays))
-            for post in POSTS
+            for post in POST_DURATIONS
         },
         delay_median=finite_or_none(quantile(delays, 0.5)),
         delay_p95=finite_or_none(quantile(delays, 0.95)),
@@ -237,18 +237,20 @@ def _spans(mask: npt.NDArray[np.bool_], times: Array) -> Array:
 
 def _events(unstable: Array, stable: Array) -> tuple[Array, Array]:
     """Onsets and ends [s] of the not-stable runs that are events."""
-    wide = unstable[1:, 0] - unstable[:-1, 1] >= CLOSED_GAP - ROUNDING
+    wide = unstable[1:, 0] - unstable[:-1, 1] >= MIN_GAP_DURATION - TIME_TOLERANCE
     first, last = np.append(True, wide)[: len(unstable)], np.append(wide, True)[: len(unstable)]
     onsets, ends = unstable[first, 0], unstable[last, 1]
-    long_stable = stable[stable[:, 1] - stable[:, 0] >= STABLE_BEFORE - ROUNDING]
-    chosen = (ends - onsets >= SHORTEST_EVENT - ROUNDING) & np.isin(onsets, long_stable[:, 1])
+    long_stable = stable[stable[:, 1] - stable[:, 0] >= MIN_STABLE_DURATION - TIME_TOLERANCE]
+    chosen = (ends - onsets >= MIN_EVENT_DURATION - TIME_TOLERANCE) & np.isin(
+        onsets, long_stable[:, 1]
+    )
     return onsets[chosen], ends[chosen]
 
 
 def _owners(alarms: Array, onsets: Array, ends: Array) -> npt.NDArray[np.intp]:
     """The place of the event that each alarm belongs to; -1 for a false alarm."""
-    latest = np.searchsorted(onsets - EARLY - ROUNDING, alarms, side="right") - 1
-    limits = np.append(ends, -np.inf) + LATE + ROUNDING
+    latest = np.searchsorted(onsets - EARLY_TOLERANCE - TIME_TOLERANCE, alarms, side="right") - 1
+    limits = np.append(ends, -np.inf) + LATE_TOLERANCE + TIME_TOLERANCE
     return np.where(alarms <= limits[latest], latest, -1)
 
 

@@ -9,7 +9,7 @@ import numpy as np
 
 from holdfast.metrics.decisions import Decisions, FingerDecisions
 from holdfast.metrics.events import (
-    POSTS,
+    POST_DURATIONS,
     AlarmMatch,
     EventMetrics,
     event_delays,
@@ -188,7 +188,7 @@ def _intervals(counted: Sequence[_Counted], n: int, seed: int, level: float) -> 
     tallies = [pool_tallies(list(each.tallies.values())) for each in counted]
     samples = {name: interval(each) for name, each in _sample_statistics(tallies).items()}
     events = {name: interval(each) for name, each in _event_statistics(counted).items()}
-    missed = {str(post): events.pop(str(post)) for post in POSTS}
+    missed = {str(post): events.pop(str(post)) for post in POST_DURATIONS}
     hand = EventIntervals(missed=missed, **events)
     return Intervals(n_recordings=len(counted), level=level, hand=hand, **samples)
 
@@ -218,7 +218,7 @@ def _event_statistics(counted: Sequence[_Counted]) -> dict[str, Statistic]:
     delays = [event_delays([match]) for match in matches]
     missed = {
         str(post): ratio_of_sums([100 * match.n_missed(post) for match in matches], n_events)
-        for post in POSTS
+        for post in POST_DURATIONS
     }
     return missed | {
         "delay_median": quantile_of(delays, 0.5),

@@ -17,7 +17,7 @@ from holdfast.metrics import (
     match_alarms,
 )
 from holdfast.metrics.decisions import FingerDecisions
-from holdfast.metrics.events import EARLY, POSTS, event_delays
+from holdfast.metrics.events import EARLY_TOLERANCE, POST_DURATIONS, event_delays
 from holdfast.plots.style import (
     FAINT,
     GREY,
@@ -159,14 +159,14 @@ def _draw_delays(
     styles: Mapping[str, SeriesStyle],
 ) -> None:
     """Draw the fraction of events with an alarm, by the time since their onset."""
-    for post in POSTS:
+    for post in POST_DURATIONS:
         axes.axvline(post, color=GREY, linewidth=0.8, linestyle=":")
     for name, style in styles.items():
         fingers = [each.fingers[name] for each in decisions if name in each.fingers]
         _draw_delay_curve(axes, fingers, color=style.color, linewidth=0.9, alpha=0.8)
     hands = [each.hand for each in decisions if each.hand is not None]
     _draw_delay_curve(axes, hands, color=HAND_COLOUR, linewidth=1.8, alpha=1.0)
-    axes.set(xlim=(-EARLY, MAX_DELAY), ylim=(0, 1.02))
+    axes.set(xlim=(-EARLY_TOLERANCE, MAX_DELAY), ylim=(0, 1.02))
     axes.yaxis.set_major_formatter(PercentFormatter(1.0))
     add_labels(axes, "time since the onset [s]", "events with an alarm by then")
     add_title(axes, _events_title(metrics.events.hand))
@@ -180,7 +180,7 @@ def _draw_delay_curve(
     if not len(delays):
         return
     detected = delays[delays <= MAX_DELAY]
-    times = np.concatenate([[-EARLY], detected, [MAX_DELAY]])
+    times = np.concatenate([[-EARLY_TOLERANCE], detected, [MAX_DELAY]])
     counts = np.concatenate([[0], np.arange(1, len(detected) + 1), [len(detected)]])
     share = counts / len(delays)
     axes.step(times, share, where="post", color=color, linewidth=linewidth, alpha=alpha)

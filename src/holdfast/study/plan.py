@@ -13,7 +13,7 @@ from holdfast.errors import RecordingError, TrainingError
 from holdfast.features import Tare
 from holdfast.io import Dataset, load_dataset
 from holdfast.recordings import Recording
-from holdfast.training.survey import survey
+from holdfast.training.dataset_scan import scan_dataset
 
 
 class Corpus(msgspec.Struct, frozen=True):
@@ -108,8 +108,8 @@ def scan_corpus(name: str, folder: str | Path, tare: str = "0.5") -> Corpus:
             _count(recording, n_labelled)
             yield recording
 
-    found = survey(counted())
-    labelled = [entry.name for entry in found.entries if entry.n_labelled]
+    found = scan_dataset(counted())
+    labelled = [entry.name for entry in found.recordings if entry.n_labelled]
     if len(labelled) < 2:
         raise TrainingError(
             f"{folder}: one recording with labels given ({labelled[0]}); at least two are "

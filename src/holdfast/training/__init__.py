@@ -1,8 +1,8 @@
-"""Training, honest figures, and judging: everything between recordings and a model."""
+"""Training and evaluation: from labelled recordings to a model and its metrics."""
 
 from typing import TYPE_CHECKING
 
-from holdfast.training.judging import decisions_of, evaluate
+from holdfast.training.evaluation import compute_decisions, evaluate
 from holdfast.training.setting import SPLITS, Setting
 from holdfast.training.trainer import Trained, train
 
@@ -14,14 +14,14 @@ __all__ = [
     "Setting",
     "StabilityClassifier",
     "Trained",
-    "decisions_of",
+    "compute_decisions",
     "evaluate",
     "train",
 ]
 
 
 def __getattr__(name: str) -> object:
-    """Loads the scikit-learn face, and scikit-learn with it, when somebody asks for it."""
+    """Import the scikit-learn estimator, and with it scikit-learn, at its first use."""
     if name == "StabilityClassifier":
         from holdfast.training.estimator import StabilityClassifier
 

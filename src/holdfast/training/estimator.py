@@ -1,4 +1,4 @@
-"""The scikit-learn face: an estimator over lists of recordings."""
+"""Estimator for scikit-learn over lists of recordings."""
 
 from collections.abc import Sequence
 from typing import Self
@@ -11,18 +11,18 @@ from sklearn.utils.validation import check_is_fitted
 from holdfast.contact import STABLE
 from holdfast.features import DEFAULT_WINDOW, DEPLOYED_FEATURES, Tare, parse_features
 from holdfast.recordings import Recording
-from holdfast.training.design import at_rate
-from holdfast.training.fitting import fit_all
-from holdfast.training.judging import decisions_of, evaluate
+from holdfast.training.evaluation import compute_decisions, evaluate
+from holdfast.training.model_fit import fit_recordings
 from holdfast.training.setting import Setting
+from holdfast.training.training_samples import resample_if_needed
 
 
 class StabilityClassifier(ClassifierMixin, BaseEstimator):
-    """Stability of contacts, as a scikit-learn estimator over lists of recordings.
+    """Classifier of the stability of contacts, for scikit-learn, over lists of recordings.
 
-    Windows never cross the boundary of a recording. Labels come with the recordings, so `y` is
-    not looked at; it may be None. `GridSearchCV(StabilityClassifier(), {"window": [8, 14]})`
-    with `groups` works as for any estimator.
+    Windows never cross the boundary of a recording. The labels are part of the recordings; `y`
+    is ignored and may be None. `GridSearchCV(StabilityClassifier(), {"window": [8, 14]})` with
+    `groups` works as for any estimator.
 
     Args:
         classifier: `logreg` or `svm`.
@@ -32,7 +32,7 @@ class StabilityClassifier(ClassifierMixin, BaseEstimator):
         C: inverse strength of the regularisation.
         class_weight: `balanced` or None.
         shared: one classifier for all fingers.
-        seed: of everything random.
+        seed: of all random numbers.
 
     Attributes:
         model_: the fitted `Model`.
@@ -59,38 +59,42 @@ class StabilityClassifier(ClassifierMixin, BaseEstimator):
         self.seed = seed
 
     def fit(self, X: Sequence[Recording], y: object = None) -> Self:
-        """Fits a classifier for every finger that the recordings label.
+        """Fit a classifier for every finger that has labels.
 
         Raises:
-            TrainingError: no labels, or only one class.
+            TrainingError: there are no labels, or only one class.
         """
-        self.model_ = fit_all(X, self._setting(), {"C": self.C, "class_weight": self.class_weight})
+        self.model_ = fit_recordings(
+            X, self._setting(), {"C": self.C, "class_weight": self.class_weight}
+        )
         self.classes_ = np.array([0, 1])
         return self
 
     def predict_proba(self, X: Sequence[Recording]) -> list[dict[str, npt.NDArray[np.float64]]]:
-        """By recording and finger, (n,) the probability of stability; NaN where there is none."""
+        """Return, by recording and finger, (n,) probabilities of stability; NaN if unknown."""
         check_is_fitted(self)
         rate = self.model_.rate
         return [
-            self.model_.predict_proba(recording if rate is None else at_rate(recording, rate))
+            self.model_.predict_proba(
+                recording if rate is None else resample_if_needed(recording, rate)
+            )
             for recording in X
         ]
 
     def predict(self, X: Sequence[Recording]) -> list[dict[str, npt.NDArray[np.int64]]]:
-        """By recording and finger, (n,) 1 where the contact is stable, else 0."""
+        """Return, by recording and finger, (n,) 1 if the contact is stable, else 0."""
         check_is_fitted(self)
-        judged = [decisions_of(self.model_, recording) for recording in X]
+        decisions = [compute_decisions(self.model_, recording) for recording in X]
         return [
             {
                 name: (finger.states == STABLE).astype(np.int64)
                 for name, finger in each.fingers.items()
             }
-            for each in judged
+            for each in decisions
         ]
 
     def score(self, X: Sequence[Recording], y: object = None) -> float:
-        """The accuracy over all labelled samples, from 0 to 1."""
+        """Return the accuracy over all labelled samples, from 0 to 1."""
         check_is_fitted(self)
         accuracy = evaluate(self.model_, X).pooled.accuracy
         return float("nan") if accuracy is None else accuracy / 100

@@ -1,4 +1,4 @@
-"""What a search has measured, kept in a file, so that one that was stopped can go on."""
+"""Journal of a parameter search: a file of its trials, from which a stopped search resumes."""
 
 import hashlib
 from collections.abc import Mapping
@@ -18,15 +18,15 @@ class _Trial(msgspec.Struct, frozen=True):
 
 
 class Journal:
-    """The losses of one search's trials, by their parameters; a line of JSON each.
+    """Losses of the trials of one search, by their parameters; one line of JSON for each trial.
 
-    A search is known by the content of all that it rests on, so that other data or another
-    setting never take up its figures. Searches may share a file, side by side as well. A line
-    that a kill cut short is passed over.
+    The key of a search depends on its samples and its setting, so that the losses are never used
+    with other data or another setting. Several searches may write to one file, also at the same
+    time. Incomplete lines are ignored.
 
     Args:
-        path: of the file, which is made with the first trial.
-        search: the key of the search, from `search_key`.
+        path: of the file, which is created with the first trial.
+        search: key of the search, from `search_key`.
 
     Raises:
         OutputError: the file cannot be read.
@@ -38,26 +38,26 @@ class Journal:
         self._losses = {_text(t.parameters): t.loss for t in _trials(path) if t.search == search}
 
     def find(self, parameters: Mapping[str, Any]) -> float | None:
-        """The loss that those parameters had; None where they have not been tried."""
+        """Return the loss of some parameters; None if they have not been tried."""
         return self._losses.get(_text(parameters))
 
     def add(self, parameters: Mapping[str, Any], loss: float) -> None:
-        """Keeps the loss of those parameters.
+        """Append the loss of some parameters.
 
         Raises:
-            OutputError: the disk refuses.
+            OutputError: the file cannot be written.
         """
         self._losses[_text(parameters)] = loss
         line = msgspec.json.encode(_Trial(self._search, dict(parameters), loss))
         try:
             with self._path.open("ab", buffering=0) as file:
-                file.write(b"\n" + line + b"\n")  # one write: searches side by side do not mix
+                file.write(b"\n" + line + b"\n")  # one write: parallel searches do not mix
         except OSError as cause:
             raise OutputError(f"cannot write {self._path}: {cause.strerror}") from cause
 
 
 def search_key(*parts: object) -> str:
-    """A hash of arrays and plain values."""
+    """Return a hash of arrays and plain values."""
     state = hashlib.blake2b(digest_size=16)
     for part in parts:
         if isinstance(part, np.ndarray):

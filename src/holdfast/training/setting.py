@@ -1,4 +1,4 @@
-"""How a model is trained: everything that a user may choose, in one value."""
+"""Setting of a training: all options that a user can choose."""
 
 import math
 from dataclasses import dataclass, field
@@ -14,36 +14,37 @@ Split = Literal["recording", "object", "random"]
 SPLITS: tuple[Split, ...] = ("recording", "object", "random")
 
 MAX_SAMPLES = 200_000
-"""Samples a finger that training keeps in memory; of larger data it takes every n-th.
+"""Maximum number of samples per finger that training keeps in memory.
 
-Neighbouring samples are nearly copies: a linear rule learns the same from every other one."""
+Of larger data it uses every n-th sample. Neighbouring samples are nearly equal, so a linear rule
+loses little."""
 SEARCH_SAMPLES = 10_000
-"""Samples a finger that the search for hyper-parameters looks at, evenly spread."""
+"""Maximum number of samples per finger in the search for hyper-parameters, at even steps."""
 
 
 @dataclass(frozen=True)
 class Setting:
-    """How a model is trained.
+    """Setting of a training.
 
     Attributes:
-        classifier: name of the way of fitting.
-        features: what it sees.
+        classifier: `logreg` or `svm`.
+        features: input of the classifier.
         window: N_w of the instability that is reported [samples].
         tare: how the baseline is found.
-        split: how figures are cross-validated: leave one `recording` or one `object` out, or
-            at `random` over samples, which repeats the paper's protocol and flatters.
-        trials: of the search for hyper-parameters; 0 takes the reference setting.
-        seed: of everything random.
+        split: unit that cross-validation leaves out: one `recording`, one `object`, or `random`
+            samples. The random split repeats the paper's protocol; its metrics are too good.
+        trials: of the search for hyper-parameters; 0 uses the reference parameters.
+        seed: of all random numbers.
         shared: one classifier for all fingers instead of one for each.
-        contact_threshold: F_a below it is no contact [unit of the readings]; None for mean +
-            5 standard deviations over the tare stretches, where they are without contact.
-        max_samples: a finger that are kept in memory.
-        hold: for how long the model goes on to tell UNSTABLE after its rule last said so [s].
-        init: a model to begin from: its features, window and rule are adapted to the data.
+        contact_threshold: F_a below it is no contact [unit of the readings]; None for the mean +
+            5 standard deviations over the tare intervals, if they are without contact.
+        max_samples: maximum number of samples per finger that are kept in memory.
+        hold: time for which UNSTABLE is still reported after the last unstable sample [s].
+        init: model to adapt to the data, with its features and window; None for none.
 
     Raises:
-        ValueError: an unknown name or a number out of range.
-        ModelError: one classifier for all fingers is asked to begin from one for each.
+        ValueError: a name is unknown, or a number is out of range.
+        ModelError: `shared` is given, but the model to adapt has a classifier for each finger.
     """
 
     classifier: str = "logreg"
@@ -80,37 +81,37 @@ class Setting:
             raise ValueError(f"a hold of at least 0 s expected, {self.hold} given")
         if self.shared and self.init is not None and ANY_FINGER not in self.init.fingers:
             raise ModelError(
-                f"one classifier for all fingers (shared) cannot begin from {_name(self.init)}, "
-                f"which has one for each of {', '.join(self.init.fingers)}"
+                f"one classifier for all fingers (shared) cannot be adapted from "
+                f"{_name(self.init)}, which has one for each of {', '.join(self.init.fingers)}"
             )
 
     @classmethod
     def adapting(cls, init: Model, **chosen: Any) -> Self:  # noqa: ANN401 (the fields above)
-        """The setting that adapts a model, with its features, window, tare and hold.
+        """Return the setting that adapts a model, with its features, window, tare and hold.
 
         Args:
-            init: the model.
-            chosen: fields that win over what the model has.
+            init: the model to adapt.
+            chosen: other fields; they replace those of the model.
 
         Raises:
-            ModelError: its fingers have different features; or as above.
-            ValueError: as above.
+            ModelError: the fingers of the model have different features; or as the class.
+            ValueError: as the class.
         """
         features = {part.features for part in init.fingers.values()}
         if len(features) > 1:
             raise ModelError(
-                f"{_name(init)} has different features for its fingers; one list for all "
-                "expected to begin from"
+                f"{_name(init)} has different features for its fingers; only a model with the same "
+                "features for all fingers can be adapted"
             )
         own = {"features": features.pop(), "window": init.window, "tare": Tare.parse(init.tare)}
         own["hold"] = init.debounce.hold
         return cls(**{**own, **chosen}, init=init)
 
     def recipe_of(self, finger: str) -> LinearRecipe:
-        """The way of fitting a finger's classifier.
+        """Return the way of fitting the classifier of a finger.
 
         Raises:
-            ModelError: the model to begin from has no such finger.
+            ModelError: the model to adapt lacks the finger.
         """
         if self.init is not None:
             return Adapted(self.init.finger(finger).classifier)
@@ -118,15 +119,15 @@ class Setting:
 
     @property
     def debounce(self) -> Debounce:
-        """How the model holds back changes of state: as the one it began from, but for the hold."""
+        """Debouncing of the model: that of the adapted model, but for the hold."""
         known = Debounce() if self.init is None else self.init.debounce
         return Debounce(known.min_duration, known.hysteresis, self.hold)
 
     @property
     def rate(self) -> float | None:
-        """The rate that the model's windows are meant for [Hz]; None for that of the data."""
+        """Rate for which the model's windows are meant [Hz]; None for that of the data."""
         return None if self.init is None else self.init.rate
 
 
 def _name(model: Model) -> str:
-    return model.name or "the model to begin from"
+    return model.name or "the model to adapt"

@@ -1,8 +1,7 @@
-"""Training and its honest figures: fit on all, judge out of fold, by the detector itself."""
+"""Training: fit a model to all recordings, and cross-validate it with the detector itself."""
 
 from collections.abc import Callable, Collection, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
-from importlib.metadata import version
 from pathlib import Path
 from typing import Protocol, TypeVar
 
@@ -10,46 +9,51 @@ import msgspec
 
 from holdfast.classifiers import Parameters, Samples
 from holdfast.metrics import Decisions, Metrics, summarise
-from holdfast.model import ANY_FINGER, Model, Training
+from holdfast.model import ANY_FINGER, Model
 from holdfast.parallel import map_ordered
 from holdfast.recordings import Recording
-from holdfast.training.design import gather, thin
-from holdfast.training.fitting import Material, fit_model, fit_whole
-from holdfast.training.judging import decisions_of, pick
-from holdfast.training.origin import doubts, seen_by
+from holdfast.training.dataset_scan import scan_dataset
+from holdfast.training.evaluation import combine_decisions, compute_decisions
+from holdfast.training.model_fit import TrainingData, fit_full_model, fit_model
+from holdfast.training.provenance import adaptation_warnings, training_record
 from holdfast.training.setting import SEARCH_SAMPLES, Setting
-from holdfast.training.splits import divide, inner_folds
-from holdfast.training.survey import survey
+from holdfast.training.splits import inner_folds, split_data
+from holdfast.training.training_samples import gather_samples, thin
 from holdfast.training.tuning import INNER_FOLDS, search
 
-N_SEARCHES = 5
-"""Searches for the parameters of the figures. What is held out takes no part in the search for
-the parameters that it is judged with."""
+MAX_SEARCHES = 5
+"""Maximum number of parameter searches for the cross-validation.
 
-UNDECIDED_SHARE = 0.2
-"""Share of labelled samples without a decision from which on the user is told."""
+The parameters with which a unit is evaluated come from a search that leaves the unit out."""
 
-NOBODY: frozenset[int] = frozenset()
+MAX_UNDECIDED_FRACTION = 0.2
+"""Warn when more than this fraction of the labelled samples has no decision."""
 
 T = TypeVar("T")
-Tell = Callable[[str], None]
+Warn = Callable[[str], None]
 
 
-class Follow(Protocol):
-    """Goes through items, with a word on what for and how many; may show progress."""
+class Progress(Protocol):
+    """Iteration over items that may show a progress bar."""
 
     def __call__(self, items: Iterable[T], what: str, total: int) -> Iterator[T]:
-        """Yields the items."""
+        """Yield the items.
+
+        Args:
+            items: to yield.
+            what: is done with them, in one word.
+            total: number of items.
+        """
         ...
 
 
 @dataclass(frozen=True)
 class Trained:
-    """A model and its figures.
+    """A model and its metrics.
 
     Attributes:
         model: fitted to all recordings.
-        cross_validation: from predictions out of fold.
+        cross_validation: metrics of predictions out of fold.
     """
 
     model: Model
@@ -61,36 +65,38 @@ def train(
     setting: Setting | None = None,
     *,
     journal: Path | None = None,
-    tell: Tell = lambda _: None,
-    follow: Follow = lambda items, _, __: iter(items),
+    warn: Warn = lambda _: None,
+    progress: Progress = lambda items, _, __: iter(items),
     n_jobs: int = 1,
 ) -> Trained:
-    """Trains a model, and measures it on what it has not seen.
+    """Train a model, and evaluate it on recordings that it was not trained on.
 
-    Recordings are read one at a time, and more than once; memory holds their features.
+    Recordings are read one at a time, and more than once. Only their features stay in memory.
 
     Args:
-        recordings: labelled; a lazy dataset will do.
-        setting: how to train; the default of the paper's deployed model.
-        journal: file that keeps the search, so that a stopped one can go on.
-        tell: is given every warning.
-        follow: goes through recordings and through what is done with them.
-        n_jobs: searches or fits at a time; -1 for as many as there are processors.
+        recordings: labelled; may be a lazy dataset.
+        setting: of the training; by default that of the paper's deployed model.
+        journal: file that keeps the trials of the search, so that it can be resumed.
+        warn: is called with the text of every warning.
+        progress: iterates over recordings, searches and fits.
+        n_jobs: number of parallel searches or fits; -1 for one per processor.
 
     Raises:
-        TrainingError: no labels, one class, or too few recordings or objects for the split.
-        ModelError: the model to begin from does not have all the fingers of the recordings.
+        TrainingError: there are no labels, only one class, or too few recordings or objects
+            for the split.
+        ModelError: the model to adapt lacks a finger of the recordings.
         RecordingError: a recording cannot be read.
         OutputError: the journal cannot be written.
     """
     setting = setting or Setting()
-    trainer = _Trainer(recordings, setting, journal, tell, follow, n_jobs)
+    trainer = _Trainer(recordings, setting, journal, warn, progress, n_jobs)
     trainer.check()
-    whole, *without = trainer.search([NOBODY, *trainer.searches_without()])
-    model = fit_whole(trainer.material, setting, whole)
-    metrics = trainer.cross_validate(without or [whole])
-    _tell_undecided(metrics, tell)
-    return Trained(trainer.sign(model, whole, metrics), metrics)
+    final, *held_out = trainer.search([set(), *trainer.search_units()])
+    model = fit_full_model(trainer.data, setting, final)
+    metrics = trainer.cross_validate(held_out or [final])
+    _warn_of_undecided(metrics, warn)
+    provenance = training_record(setting, trainer.scan, final, metrics.pooled)
+    return Trained(msgspec.structs.replace(model, training=provenance), metrics)
 
 
 class _Trainer:
@@ -99,120 +105,122 @@ class _Trainer:
         recordings: Sequence[Recording],
         setting: Setting,
         journal: Path | None,
-        tell: Tell,
-        follow: Follow,
+        warn: Warn,
+        progress: Progress,
         n_jobs: int,
     ) -> None:
         self.recordings, self.setting, self.journal = recordings, setting, journal
-        self.tell, self.follow, self.n_jobs = tell, follow, n_jobs
-        self.found = survey(self._read("reading"), setting.rate)
-        self.division = divide(self.found.entries, setting.split, setting.seed)
-        self.designs = gather(self._read("features"), self.found, setting, self.division)
-        self.material = Material(self.found, self.division, self.designs)
+        self.warn, self.progress, self.n_jobs = warn, progress, n_jobs
+        self.scan = scan_dataset(self._read("reading"), setting.rate)
+        self.data_split = split_data(self.scan.recordings, setting.split, setting.seed)
+        self.fingers = gather_samples(self._read("features"), self.scan, setting, self.data_split)
+        self.data = TrainingData(self.scan, self.data_split, self.fingers)
 
     def check(self) -> None:
-        """Tells which figures there cannot be, before any work is done.
+        """Check the samples, and warn of metrics that are missing or may be wrong.
 
         Raises:
-            TrainingError: a finger has only one class; or there is no figure at all.
-            ModelError: the model to begin from has no such finger.
+            TrainingError: a finger has only one class, or cross-validation is not possible.
+            ModelError: the model to adapt lacks a finger.
         """
-        self.material.check_classes()
+        self.data.check_classes()
         if self.setting.init is not None:
-            for doubt in doubts(self.setting.init, self.found, self.designs):
-                self.tell(doubt)
-        for finger, names in self.material.not_judged().items():
-            some = ", ".join(names[:3]) + (" ..." if len(names) > 3 else "")
-            self.tell(
-                f"{finger} has labels of only one class left without {some}: not judged there"
-            )
+            for warning in adaptation_warnings(self.setting.init, self.scan, self.fingers):
+                self.warn(warning)
+        for finger, names in self.data.units_without_model().items():
+            first = ", ".join(names[:3]) + (" ..." if len(names) > 3 else "")
+            self.warn(f"{finger} has only one class of labels without {first}: not evaluated there")
 
-    def searches_without(self) -> list[set[int]]:
-        """The units that each search for the parameters of the figures leaves out."""
-        n_units = len(self.division.units)
-        n_searches = min(N_SEARCHES, n_units) if self.setting.trials else 0
+    def search_units(self) -> list[set[int]]:
+        """Return the units that each search for the cross-validation leaves out."""
+        n_units = len(self.data_split.units)
+        n_searches = min(MAX_SEARCHES, n_units) if self.setting.trials else 0
         return [set(range(k, n_units, n_searches)) for k in range(n_searches)]
 
-    def search(self, without: Sequence[Collection[int]]) -> list[dict[str, Parameters]]:
-        """The parameters of every finger, found without those units, for each set of units."""
+    def search(self, held_units: Sequence[Collection[int]]) -> list[dict[str, Parameters]]:
+        """Search the parameters of every finger, once for each collection of held-out units.
+
+        Without trials, return the reference parameters.
+        """
         setting = self.setting
         if not setting.trials:
-            reference = {finger: setting.recipe_of(finger).reference for finger in self.designs}
-            return [reference for _ in without]
+            reference = {finger: setting.recipe_of(finger).reference for finger in self.fingers}
+            return [reference for _ in held_units]
         tasks = [
-            (thin(design.without(held), SEARCH_SAMPLES), setting, finger, self.journal)
-            for held in without
-            for finger, design in self.designs.items()
+            (thin(own.without(held), SEARCH_SAMPLES), setting, finger, self.journal)
+            for held in held_units
+            for finger, own in self.fingers.items()
         ]
-        found = list(self.follow(map_ordered(_search, tasks, self.n_jobs), "searching", len(tasks)))
+        results = map_ordered(_search, tasks, self.n_jobs)
+        found = list(self.progress(results, "searching", len(tasks)))
         for warning in dict.fromkeys(warning for _, warning in found if warning):
-            self.tell(warning)
+            self.warn(warning)
         parameters = iter(parameters for parameters, _ in found)
-        return [{finger: next(parameters) for finger in self.designs} for _ in without]
+        return [{finger: next(parameters) for finger in self.fingers} for _ in held_units]
 
     def cross_validate(self, found: Sequence[Mapping[str, Parameters]]) -> Metrics:
-        """The metrics of predictions out of fold.
+        """Compute the metrics of predictions out of fold.
 
         Args:
-            found: parameters of every finger; unit k takes those of place k, modulo how many.
+            found: parameters of every finger from each search. Unit k uses those of search k
+                modulo the number of searches.
         """
-        n_units = len(self.division.units)
+        n_units = len(self.data_split.units)
         tasks = [
-            (self.material, self.setting, found[unit % len(found)], {unit})
-            for unit in range(n_units)
+            (self.data, self.setting, found[unit % len(found)], {unit}) for unit in range(n_units)
         ]
-        models = list(self.follow(map_ordered(fit_model, tasks, self.n_jobs), "fitting", n_units))
-        judged = (
-            self._judge(models, place, recording)
-            for place, recording in enumerate(self._read("judging"))
+        models = list(self.progress(map_ordered(fit_model, tasks, self.n_jobs), "fitting", n_units))
+        decisions = (
+            self._decisions_out_of_fold(models, place, recording)
+            for place, recording in enumerate(self._read("evaluating"))
         )
-        return summarise(judged, seed=self.setting.seed)
-
-    def sign(self, model: Model, parameters: Mapping[str, Parameters], metrics: Metrics) -> Model:
-        """The model with its origin written into it."""
-        pooled = metrics.pooled
-        training = Training(
-            recordings=seen_by(self.setting.init, self.found),
-            split=self.setting.split,
-            parameters={finger: dict(found) for finger, found in parameters.items()},
-            figures={name: getattr(pooled, name) for name in ("accuracy", "fdr", "fnr", "auc")},
-            seed=self.setting.seed,
-            versions={name: version(name) for name in ("holdfast", "numpy", "scikit-learn")},
-        )
-        return msgspec.structs.replace(model, training=training)
+        return summarise(decisions, seed=self.setting.seed)
 
     def _read(self, what: str) -> Iterator[Recording]:
-        return self.follow(self.recordings, what, len(self.recordings))
+        return self.progress(self.recordings, what, len(self.recordings))
 
-    def _judge(self, models: Sequence[Model | None], place: int, recording: Recording) -> Decisions:
-        """What the models that have not seen it say; nothing where there is nothing to say."""
-        nothing = Decisions(recording.name, {})
-        if not self.found.entries[place].n_labelled:
-            return nothing
-        if self.division.split != "random":
-            model = models[self.division.group_of[place]]
-            return nothing if model is None else _judged(model, recording)
-        judged = [_judged(model, recording) for model in models if model is not None]
-        if len(judged) < len(models) or len({tuple(each.fingers) for each in judged}) > 1:
-            return nothing
-        return pick(judged, lambda n: self.division.units_of(place, n), len(self.designs))
+    def _decisions_out_of_fold(
+        self, models: Sequence[Model | None], place: int, recording: Recording
+    ) -> Decisions:
+        """Return the decisions about a recording of the models that are fitted without it.
+
+        They are empty if there are no labels or no models.
+
+        Args:
+            models: the model that is fitted without each unit.
+            place: index of the recording in the dataset.
+            recording: to decide about.
+        """
+        empty = Decisions(recording.name, {})
+        if not self.scan.recordings[place].n_labelled:
+            return empty
+        if self.data_split.split != "random":
+            model = models[self.data_split.group_of[place]]
+            return empty if model is None else _decisions(model, recording)
+        each = [_decisions(model, recording) for model in models if model is not None]
+        if len(each) < len(models) or len({tuple(one.fingers) for one in each}) > 1:
+            return empty
+        return combine_decisions(
+            each, lambda n: self.data_split.units_of(place, n), len(self.fingers)
+        )
 
 
-def _judged(model: Model, recording: Recording) -> Decisions:
+def _decisions(model: Model, recording: Recording) -> Decisions:
+    """Return the decisions of a model; empty if the recording has none of its fingers."""
     if ANY_FINGER not in model.fingers and not set(model.fingers) & set(recording.modules):
         return Decisions(recording.name, {})
-    return decisions_of(model, recording)
+    return compute_decisions(model, recording)
 
 
 def _search(
     samples: Samples, setting: Setting, finger: str, journal: Path | None
 ) -> tuple[Parameters, str]:
-    """The parameters found, and a warning where no search was possible."""
+    """Return the parameters of a finger, and a warning if a search is not possible."""
     folds = inner_folds(samples, INNER_FOLDS, setting.seed)
     if len(folds) < 2:
         return setting.recipe_of(finger).reference, (
-            f"{finger}: {len(folds)} of the folds by recording hold both classes, 2 needed to "
-            "search for parameters; the reference setting is taken"
+            f"{finger}: {len(folds)} of the folds by recording have both classes, 2 needed to "
+            "search for parameters; the reference parameters are used"
         )
     return search(
         samples,
@@ -224,13 +232,12 @@ def _search(
     ), ""
 
 
-def _tell_undecided(metrics: Metrics, tell: Tell) -> None:
-    """Warns where much of the labelled data was left without a decision."""
+def _warn_of_undecided(metrics: Metrics, warn: Warn) -> None:
     n_labelled = metrics.pooled.n + metrics.pooled.n_undecided
-    share = metrics.pooled.n_undecided / max(n_labelled, 1)
-    if share > UNDECIDED_SHARE:
-        tell(
-            f"{100 * share:.0f} % of the labelled samples have no decision, for tare, warm-up, "
-            "gaps or faults (holdfast detect --summary tells which); recordings that begin in "
+    fraction = metrics.pooled.n_undecided / max(n_labelled, 1)
+    if fraction > MAX_UNDECIDED_FRACTION:
+        warn(
+            f"{100 * fraction:.0f} % of the labelled samples have no decision because of tare, "
+            "warm-up, gaps or faults (see holdfast detect --summary); recordings that begin in "
             "contact need --tare first"
         )

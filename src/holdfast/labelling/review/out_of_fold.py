@@ -23,11 +23,11 @@ from holdfast.model import ANY_FINGER, Model
 from holdfast.parallel import map_ordered
 from holdfast.recordings import Label, Recording
 from holdfast.sensors.types import Array
-from holdfast.training.design import at_rate, gather
-from holdfast.training.fitting import Material, fit_model
+from holdfast.training.dataset_scan import scan_dataset
+from holdfast.training.model_fit import TrainingData, fit_model
 from holdfast.training.setting import Setting
-from holdfast.training.splits import divide
-from holdfast.training.survey import survey
+from holdfast.training.splits import split_data
+from holdfast.training.training_samples import gather_samples, resample_if_needed
 
 MAX_FOLDS = 10
 """Largest number of groups of recordings that are held out in turn."""
@@ -150,15 +150,17 @@ class _FoldModels:
     ) -> "_FoldModels":
         if not recordings.fingers:
             return cls(frozenset(), constant, [None], [0] * len(recordings))
-        found = survey(recordings, setting.rate)
-        division = divide(found.entries, setting.split, setting.seed)
-        material = Material(found, division, gather(recordings, found, setting, division))
-        one_class = _one_class_fingers(material, recordings.fingers)
-        order = np.random.default_rng(setting.seed).permutation(len(division.units))
-        fold_of = (np.argsort(order) % n_folds)[division.group_of].tolist()
-        parameters = {f: setting.recipe_of(f).reference for f in material.designs}
+        found = scan_dataset(recordings, setting.rate)
+        data_split = split_data(found.recordings, setting.split, setting.seed)
+        data = TrainingData(
+            found, data_split, gather_samples(recordings, found, setting, data_split)
+        )
+        one_class = _one_class_fingers(data, recordings.fingers)
+        order = np.random.default_rng(setting.seed).permutation(len(data_split.units))
+        fold_of = (np.argsort(order) % n_folds)[data_split.group_of].tolist()
+        parameters = {f: setting.recipe_of(f).reference for f in data.fingers}
         tasks = [
-            (material, setting, parameters, set(order[fold::n_folds].tolist()))
+            (data, setting, parameters, set(order[fold::n_folds].tolist()))
             for fold in range(min(n_folds, len(order)))
         ]
         fingers = recordings.fingers - one_class.keys()
@@ -174,7 +176,7 @@ class _FoldModels:
         }
         if model is None or not (ANY_FINGER in model.fingers or set(model.fingers) & set(modules)):
             return found
-        given = recording if model.rate is None else at_rate(recording, model.rate)
+        given = recording if model.rate is None else resample_if_needed(recording, model.rate)
         for finger, probability in model.predict_proba(given).items():
             if finger in self.fingers:
                 own_times, times = modules[finger].times, given.modules[finger].times
@@ -183,14 +185,14 @@ class _FoldModels:
         return found
 
 
-def _one_class_fingers(material: Material, fingers: Collection[str]) -> dict[str, float]:
+def _one_class_fingers(data: TrainingData, fingers: Collection[str]) -> dict[str, float]:
     """Return the only class of each finger whose samples with features have only one."""
-    shared = material.designs.get(ANY_FINGER)
-    designs = {f: material.designs.get(f, shared) for f in fingers}
+    shared = data.fingers.get(ANY_FINGER)
+    samples_of = {f: data.fingers.get(f, shared) for f in fingers}
     return {
-        f: float(design.samples.stable.any())
-        for f, design in designs.items()
-        if design and design.samples.one_class
+        f: float(own.samples.stable.any())
+        for f, own in samples_of.items()
+        if own and own.samples.one_class
     }
 
 

@@ -4,7 +4,7 @@ from collections.abc import Mapping, Sequence
 
 import numpy as np
 
-from holdfast.metrics.events import POSTS
+from holdfast.metrics.events import POST_DURATIONS
 from holdfast.plots.curves import Curve, draw_alarms, draw_reliability
 from holdfast.plots.dots import IntervalEstimate, draw_dots, draw_groups
 from holdfast.sensors.types import Array
@@ -108,7 +108,7 @@ def _accuracy_figure(plan: StudyPlan, results: Results) -> ReportFigure:
 
 
 def _alarm_figure(plan: StudyPlan, results: Results) -> ReportFigure:
-    post = f"{1000 * POSTS[0]:.0f} ms"
+    post = f"{1000 * POST_DURATIONS[0]:.0f} ms"
     groups: dict[str, dict[str, Curve]] = {
         f"events missed at {post} [%]": {},
         f"slips not found within {post} [%]": {},
@@ -143,12 +143,12 @@ def _false_alarms_per_minute(alarms: Sequence[AlarmStatistics]) -> float:
 
 def _missed_share(alarms: Sequence[AlarmStatistics]) -> float:
     n_events = sum(len(each.delays) for each in alarms)
-    return _percent(sum(each.n_missed(POSTS[0]) for each in alarms), n_events)
+    return _percent(sum(each.n_missed(POST_DURATIONS[0]) for each in alarms), n_events)
 
 
 def _slips_found_share(alarms: Sequence[AlarmStatistics]) -> float:
     n_slips = sum(len(each.slip_delays) for each in alarms)
-    return _percent(sum(each.n_slips_found(POSTS[0]) for each in alarms), n_slips)
+    return _percent(sum(each.n_slips_found(POST_DURATIONS[0]) for each in alarms), n_slips)
 
 
 def _percent(part: int, whole: int) -> float:

@@ -2,7 +2,7 @@
 
 from collections.abc import Callable, Iterator, Sequence
 
-from holdfast.metrics.events import POSTS
+from holdfast.metrics.events import POST_DURATIONS
 from holdfast.study.comparison.jobs import SPLIT_TITLES, Results, method_results, method_titles
 from holdfast.study.comparison.rows import count_row, quantile_row, ratio_row
 from holdfast.study.evaluation.alarm_statistics import JUMP_EFFECT_TIME, AlarmStatistics
@@ -57,7 +57,7 @@ def slips(plan: StudyPlan, results: Results) -> ResultTable:
     rows: list[Row] = []
     for keys, alarms in _lines(plan, results, SLIP_THRESHOLDS, SLIP_SPLITS):
         n_slips = [len(each.slip_delays) for each in alarms]
-        for post in POSTS:
+        for post in POST_DURATIONS:
             found = [each.n_slips_found(post) for each in alarms]
             figure = {"figure": f"found within {1000 * post:.0f} ms [%]"}
             rows.append(ratio_row(keys | figure, found, n_slips, plan.seed))
@@ -99,7 +99,7 @@ def _event_splits(plan: StudyPlan) -> tuple[str, ...]:
 
 def _missed_rows(keys: Keys, alarms: Sequence[AlarmStatistics], seed: int) -> Iterator[Row]:
     n_events = [len(each.delays) for each in alarms]
-    for post in POSTS:
+    for post in POST_DURATIONS:
         figure = {"figure": f"missed at {1000 * post:.0f} ms [%]"}
         yield ratio_row(keys | figure, [each.n_missed(post) for each in alarms], n_events, seed)
 

@@ -10,7 +10,7 @@ from typing import NamedTuple
 import numpy as np
 
 from holdfast.contact import UNSTABLE_MARGIN
-from holdfast.metrics.events import POSTS
+from holdfast.metrics.events import POST_DURATIONS
 from holdfast.plots.curves import Curve, draw_lines
 from holdfast.study.comparison.event_tables import FALSE_ALARMS_UNDER_STABLE
 from holdfast.study.comparison.jobs import (
@@ -46,7 +46,7 @@ NOISE = "noise"
 MARGIN = "margin [s]"
 RATE = "rate [Hz]"
 SAMPLE_FIGURES = ("accuracy [%]", "FDR [%]", "AUC contact")
-SLIPS_FOUND = f"slips found within {1000 * POSTS[0]:.0f} ms [%]"
+SLIPS_FOUND = f"slips found within {1000 * POST_DURATIONS[0]:.0f} ms [%]"
 ACCURACY_DIFFERENCE = "accuracy less sigma's [points]"
 CURVES = ("accuracy [%]", "AUC contact", SLIPS_FOUND)
 """Figures of the tables that are drawn as curves."""
@@ -258,7 +258,7 @@ def _rows(keys: Keys, evaluation: MethodEvaluation, seed: int) -> Iterator[Row]:
     alarms = evaluation.compared_alarms
     n_slips = [len(each.slip_delays) for each in alarms]
     if sum(n_slips):
-        found = [each.n_slips_found(POSTS[0]) for each in alarms]
+        found = [each.n_slips_found(POST_DURATIONS[0]) for each in alarms]
         yield ratio_row(keys | {"figure": SLIPS_FOUND}, found, n_slips, seed)
     minutes = [each.stable_seconds / 60 for each in alarms]
     n_false = [each.n_under_stable for each in alarms]

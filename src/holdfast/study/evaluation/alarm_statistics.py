@@ -9,7 +9,7 @@ import numpy as np
 
 from holdfast.contact import CONTACT_FORCE, HELD_PHASES, SLIP_SPEED, STABLE, UNKNOWN
 from holdfast.metrics import FingerDecisions, match_alarms
-from holdfast.metrics.events import POSTS, ROUNDING, STABLE_BEFORE
+from holdfast.metrics.events import MIN_STABLE_DURATION, POST_DURATIONS, TIME_TOLERANCE
 from holdfast.metrics.masks import Mask, runs
 from holdfast.recordings import Truth
 from holdfast.sensors.types import Array
@@ -54,11 +54,11 @@ class AlarmStatistics(msgspec.Struct, frozen=True):
 
     def n_missed(self, post: float) -> int:
         """Return the number of events without an alarm until onset + post [s]."""
-        return sum(delay > post + ROUNDING for delay in self.delays)
+        return sum(delay > post + TIME_TOLERANCE for delay in self.delays)
 
     def n_slips_found(self, within: float) -> int:
         """Return the number of slips that are found within a time [s]."""
-        return sum(delay <= within + ROUNDING for delay in self.slip_delays)
+        return sum(delay <= within + TIME_TOLERANCE for delay in self.slip_delays)
 
 
 def alarm_statistics(
@@ -98,7 +98,7 @@ def find_slips(truth: Truth | None) -> list[SlipInterval]:
     times, slips, last_sliding = truth.times, [], -np.inf
     for start, end in runs(_sliding(truth)):
         rest_begin = max(last_sliding, _hold_begin(truth, start))
-        if times[start] - rest_begin >= STABLE_BEFORE - ROUNDING:
+        if times[start] - rest_begin >= MIN_STABLE_DURATION - TIME_TOLERANCE:
             slips.append(SlipInterval(float(times[start]), float(times[end - 1])))
         last_sliding = float(times[end - 1])
     return slips
@@ -123,10 +123,10 @@ def _hold_begin(truth: Truth, place: int) -> float:
 def _slip_delay(slip: SlipInterval, hand: FingerDecisions) -> float:
     """Return the time until the hand is not called stable [s]; infinite if it stays stable.
 
-    The search ends with the slip, but not before the last of `POSTS`.
+    The search ends with the slip, but not before the last of `POST_DURATIONS`.
     """
-    last = max(slip.end, slip.onset + POSTS[-1]) + ROUNDING
-    rows = slice(*np.searchsorted(hand.times, (slip.onset - ROUNDING, last)))
+    last = max(slip.end, slip.onset + POST_DURATIONS[-1]) + TIME_TOLERANCE
+    rows = slice(*np.searchsorted(hand.times, (slip.onset - TIME_TOLERANCE, last)))
     found = (hand.states[rows] != STABLE) & (hand.states[rows] != UNKNOWN)
     if not found.any():
         return math.inf
@@ -141,6 +141,6 @@ def is_after_jump(times: Array, truth: Truth | None) -> Mask:
     if truth is None or SET_POINT_ERROR not in truth.hand:
         return np.zeros(len(times), dtype=np.bool_)
     jumps: Array = truth.times[np.abs(truth.hand[SET_POINT_ERROR]) > 0]
-    first = np.searchsorted(jumps, times - JUMP_EFFECT_TIME - ROUNDING)
-    last = np.searchsorted(jumps, times + ROUNDING)
+    first = np.searchsorted(jumps, times - JUMP_EFFECT_TIME - TIME_TOLERANCE)
+    last = np.searchsorted(jumps, times + TIME_TOLERANCE)
     return np.asarray(last > first)

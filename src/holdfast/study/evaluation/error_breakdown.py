@@ -8,7 +8,7 @@ import numpy.typing as npt
 
 from holdfast.contact import HELD_PHASES, STABLE, UNKNOWN, Phase
 from holdfast.metrics import Decisions, FingerDecisions, calibration_sums
-from holdfast.metrics.events import ROUNDING
+from holdfast.metrics.events import TIME_TOLERANCE
 from holdfast.metrics.masks import Mask, runs
 from holdfast.recordings import Truth
 from holdfast.sensors.types import Array
@@ -161,7 +161,7 @@ def _count(samples: Mask, wrong: Mask) -> Count:
 
 def _truth_rows(truth: Truth, times: Array) -> npt.NDArray[np.intp]:
     """Return the latest row of the truth at each time."""
-    return np.maximum(np.searchsorted(truth.times, times + ROUNDING) - 1, 0)
+    return np.maximum(np.searchsorted(truth.times, times + TIME_TOLERANCE) - 1, 0)
 
 
 def calibration_counts(decisions: Decisions) -> list[list[float]]:

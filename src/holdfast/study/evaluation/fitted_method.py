@@ -12,7 +12,7 @@ from holdfast.sensors.types import Array
 from holdfast.study.evaluation.recording_features import RecordingFeatures
 from holdfast.study.evaluation.scores import RecordingScores
 from holdfast.study.methods import Method
-from holdfast.training.design import (
+from holdfast.training.training_samples import (
     concatenate,
     contact_threshold,
     labelled_samples,

@@ -15,7 +15,7 @@ from holdfast.sensors.types import Array
 from holdfast.study.evaluation.variation import Variation, relabel
 from holdfast.study.methods import HAND, Method, hand_signal
 from holdfast.study.plan import Corpus
-from holdfast.training.design import rest_moments
+from holdfast.training.training_samples import rest_moments
 
 
 @dataclass(frozen=True, eq=False)

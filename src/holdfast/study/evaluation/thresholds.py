@@ -13,7 +13,7 @@ import numpy as np
 from holdfast.contact import STABLE
 from holdfast.metrics import match_alarms
 from holdfast.metrics.decisions import Codes
-from holdfast.metrics.events import EARLY, LATE, ROUNDING
+from holdfast.metrics.events import EARLY_TOLERANCE, LATE_TOLERANCE, TIME_TOLERANCE
 from holdfast.metrics.masks import Mask
 from holdfast.sensors.types import Array
 from holdfast.study.evaluation.scores import HandScores
@@ -45,8 +45,8 @@ class FalseAlarmRanges(NamedTuple):
         match = match_alarms(scores.times, labels, labels)
         counted = labels == STABLE
         for event in match.events:
-            counted &= (scores.times < event.onset - EARLY - ROUNDING) | (
-                scores.times > event.end + LATE + ROUNDING
+            counted &= (scores.times < event.onset - EARLY_TOLERANCE - TIME_TOLERANCE) | (
+                scores.times > event.end + LATE_TOLERANCE + TIME_TOLERANCE
             )
         if ignored is not None:
             counted &= ~ignored

@@ -18,7 +18,12 @@ from holdfast.sensors.types import Array
 from holdfast.study.methods import FingerSignal, hand_signal
 from holdfast.study.methods.wavelets import detail_energy
 from holdfast.study.plan import Corpus
-from holdfast.training.design import at_rate, concatenate, labelled_samples, usable_rows
+from holdfast.training.training_samples import (
+    concatenate,
+    labelled_samples,
+    resample_if_needed,
+    usable_rows,
+)
 
 N_PARTS = 25
 
@@ -90,7 +95,7 @@ def _corpus_forces(corpus: Corpus, rate: float) -> tuple[_RecordingForces, ...]:
 
 def _read_forces(corpus: Corpus, rate: float) -> Iterator[_RecordingForces]:
     for given in corpus.load():
-        recording = at_rate(given, rate)
+        recording = resample_if_needed(given, rate)
         hand = hand_signal(recording, Tare.parse(corpus.tare))
         fingers = {
             name: (_without_readings(signal), recording.modules[name].label_states)

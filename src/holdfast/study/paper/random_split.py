@@ -18,9 +18,9 @@ from holdfast.metrics.statistics import percent
 from holdfast.study.paper.pooled_samples import Integers, SamplePool, pool_samples
 from holdfast.study.plan import Corpus
 from holdfast.study.report.result_tables import Row
-from holdfast.training.design import thin, thinning_step
 from holdfast.training.setting import SEARCH_SAMPLES
 from holdfast.training.splits import inner_folds
+from holdfast.training.training_samples import thin, thinning_step
 from holdfast.training.tuning import search
 
 N_FOLDS = 5

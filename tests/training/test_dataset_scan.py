@@ -4,7 +4,7 @@ import pytest
 
 from holdfast.errors import TrainingError
 from holdfast.recordings import Recording
-from holdfast.training.survey import survey
+from holdfast.training.dataset_scan import scan_dataset
 
 from .build import TINY, tiny_module, tiny_recording
 
@@ -13,11 +13,11 @@ WIDE = replace(TINY, name="wide", positions=TINY.positions.repeat(2, 0),
 
 
 def test_what_is_found(grasps):
-    found = survey(iter(grasps))
-    assert [entry.name for entry in found.entries] == [each.name for each in grasps]
-    assert [entry.digest for entry in found.entries] == [each.digest for each in grasps]
-    assert found.entries[4].object == "object 1"
-    assert found.entries[0].n_labelled == {"thumb": 400, "index": 400}
+    found = scan_dataset(iter(grasps))
+    assert [entry.name for entry in found.recordings] == [each.name for each in grasps]
+    assert [entry.digest for entry in found.recordings] == [each.digest for each in grasps]
+    assert found.recordings[4].object == "object 1"
+    assert found.recordings[0].n_labelled == {"thumb": 400, "index": 400}
     assert found.sensors == {"thumb": TINY, "index": TINY}
     assert found.rate == pytest.approx(100.0)
     assert found.n_labelled == 2400
@@ -25,13 +25,13 @@ def test_what_is_found(grasps):
 
 def test_fingers_without_labels_do_not_count(grasps):
     bare = grasps[0].with_labels({"thumb": grasps[0].modules["thumb"].labels})
-    assert set(survey([bare]).sensors) == {"thumb"}
+    assert set(scan_dataset([bare]).sensors) == {"thumb"}
 
 
 def test_the_rate_is_the_median():
     given = [tiny_recording(seed, rate=rate) for seed, rate in enumerate([100.0, 50.0, 105.0])]
-    assert survey(given).rate == pytest.approx(100.0)
-    assert survey(given, 80.0).rate == 80.0
+    assert scan_dataset(given).rate == pytest.approx(100.0)
+    assert scan_dataset(given, 80.0).rate == 80.0
 
 
 def same_samples():
@@ -49,36 +49,36 @@ def same_samples():
         ),
         (
             same_samples(),
-            "recordings 'grasp-0' and 'copy' hold the same samples: one would test what the "
-            "other trained",
+            "recordings 'grasp-0' and 'copy' hold the same samples: one would be tested by "
+            "a model that was trained on the other",
         ),
         (
             [tiny_recording(0), replace(tiny_recording(1), name="grasp-0")],
-            "two recordings are called 'grasp-0'; each needs its own",
+            "two recordings are called 'grasp-0'; different names expected",
         ),
         (
             [tiny_recording(0), tiny_recording(1, sensor=WIDE)],
-            "thumb of 'grasp-1' has the sensor wide (2 taxels, count), that of others tiny "
-            "(1 taxels, count)",
+            "thumb of 'grasp-1' has the sensor wide (2 taxels, count), other recordings "
+            "have tiny (1 taxels, count)",
         ),
         (
             [tiny_recording(0), tiny_recording(1, unit="N")],
-            "thumb of 'grasp-1' has the sensor tiny (1 taxels, N), that of others tiny "
-            "(1 taxels, count)",
+            "thumb of 'grasp-1' has the sensor tiny (1 taxels, N), other recordings have "
+            "tiny (1 taxels, count)",
         ),
         (
             [tiny_recording(0), tiny_recording(1, sensor=replace(TINY, rate=99.0))],
-            "thumb of 'grasp-1' has the sensor tiny (1 taxels, count), that of others tiny "
-            "(1 taxels, count), laid out in another way",
+            "thumb of 'grasp-1' has the sensor tiny (1 taxels, count), other recordings "
+            "have tiny (1 taxels, count) with another layout or rate",
         ),
     ],
 )
 def test_refusals(given, message):
     with pytest.raises(TrainingError) as refusal:
-        survey(given)
+        scan_dataset(given)
     assert str(refusal.value) == message
 
 
-def test_another_sensor_without_labels_is_none_of_our_business():
+def test_another_sensor_without_labels_is_ignored():
     other = Recording("other", {"thumb": tiny_module(9, sensor=WIDE, states=[None] * 4)})
-    assert survey([tiny_recording(0), other]).sensors["thumb"] == TINY
+    assert scan_dataset([tiny_recording(0), other]).sensors["thumb"] == TINY

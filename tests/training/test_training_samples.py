@@ -14,9 +14,9 @@ from holdfast.features import Tare, fingertip_force, haar_features, parse_featur
 from holdfast.model import ANY_FINGER
 from holdfast.recordings import Recording
 from holdfast.training import Setting
-from holdfast.training.design import gather, thin, thinning_step
-from holdfast.training.splits import divide
-from holdfast.training.survey import survey
+from holdfast.training.dataset_scan import scan_dataset
+from holdfast.training.splits import split_data
+from holdfast.training.training_samples import gather_samples, thin, thinning_step
 
 from .build import TINY, tiny_module, tiny_recording
 
@@ -24,8 +24,10 @@ SETTING = Setting(window=6, features=parse_features("F_a,F_x,F_y,F_z,m,sigma", 6
 
 
 def designs(recordings, setting=SETTING, split="recording"):
-    found = survey(recordings)
-    return gather(recordings, found, setting, divide(found.entries, split, setting.seed))
+    found = scan_dataset(recordings)
+    return gather_samples(
+        recordings, found, setting, split_data(found.recordings, split, setting.seed)
+    )
 
 
 def test_rows_are_the_features_of_the_labelled_samples(grasps):

@@ -8,8 +8,8 @@ from holdfast.detector import detect
 from holdfast.errors import ModelError
 from holdfast.metrics import hand_decisions
 from holdfast.model import Model
-from holdfast.training import Setting, decisions_of, evaluate, train
-from holdfast.training.judging import pick
+from holdfast.training import Setting, compute_decisions, evaluate, train
+from holdfast.training.evaluation import combine_decisions
 
 from .build import tiny_recording
 
@@ -20,7 +20,7 @@ def model(grasps):
 
 
 def test_decisions_are_the_detectors_beside_the_labels(model, grasps):
-    decisions = decisions_of(model, grasps[0])
+    decisions = compute_decisions(model, grasps[0])
     detection = detect(model, grasps[0])
     assert decisions.name == "grasp-0"
     for finger, trace in detection.fingers.items():
@@ -36,7 +36,7 @@ def test_decisions_are_the_detectors_beside_the_labels(model, grasps):
 
 def test_labels_of_a_recording_at_another_rate(model):
     fast = tiny_recording(31, n=1200, rate=300.0)
-    finger = decisions_of(model, fast).fingers["thumb"]
+    finger = compute_decisions(model, fast).fingers["thumb"]
     assert len(finger.times) == pytest.approx(400, abs=1)
     assert (finger.labels == STABLE).mean() == pytest.approx(0.5, abs=0.01)
 
@@ -74,9 +74,9 @@ def test_a_model_for_other_fingers(model):
 
 def test_pick_takes_each_sample_from_the_judge_that_its_unit_names(grasps):
     settings = [Setting(trials=0, window=window) for window in (4, 10)]
-    judged = [decisions_of(train(grasps[:2], each).model, grasps[3]) for each in settings]
+    judged = [compute_decisions(train(grasps[:2], each).model, grasps[3]) for each in settings]
     units = np.random.default_rng(0).integers(2, size=400)
-    found = pick(judged, lambda n: units[:n], 2)
+    found = combine_decisions(judged, lambda n: units[:n], 2)
     for name, finger in found.fingers.items():
         for k in (0, 1):
             rows = units == k

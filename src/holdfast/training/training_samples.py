@@ -1,4 +1,4 @@
-"""From recordings to training samples, one recording at a time."""
+"""Training samples: labelled samples with features, from recordings that are read one by one."""
 
 from collections.abc import Collection, Iterable, Mapping, Sequence
 from dataclasses import dataclass
@@ -17,23 +17,23 @@ from holdfast.model import ANY_FINGER, RATE_TOLERANCE
 from holdfast.recordings import Recording, Tactile, label_states
 from holdfast.resampling import resample
 from holdfast.sensors import Sensor
+from holdfast.training.dataset_scan import DatasetScan
 from holdfast.training.setting import Setting
-from holdfast.training.splits import Division, Integers
-from holdfast.training.survey import Survey
+from holdfast.training.splits import DataSplit, Integers
 
 CONTACT_DEVIATIONS = 5.0
-"""Standard deviations of F_a over the mean of the tare stretches, from which on is contact."""
+"""Contact threshold: number of standard deviations of F_a at rest above its mean."""
 
 
 @dataclass(frozen=True)
-class FingerDesign:
-    """What one classifier is trained from.
+class FingerSamples:
+    """Training samples of one classifier.
 
     Attributes:
         sensor: of the finger.
-        samples: labelled, with features; groups are those of the division.
-        units: (n,) what each sample is held out with.
-        at_rest: (n_recordings, 3) number, sum and sum of squares of F_a in each tare stretch.
+        samples: labelled, with features; the groups are those of the split.
+        units: (n,) unit of each sample, with which it is held out.
+        at_rest: (n_recordings, 3) number, sum and sum of squares of F_a in each tare interval.
     """
 
     sensor: Sensor
@@ -42,79 +42,79 @@ class FingerDesign:
     at_rest: npt.NDArray[np.float64]
 
     def without(self, held: Collection[int]) -> Samples:
-        """The samples that those units leave to train from."""
+        """Return the samples that are not in held units."""
         return self.samples.take(~np.isin(self.units, list(held)))
 
-    def judged(self, n_units: int) -> npt.NDArray[np.bool_]:
-        """(n_units,) whether it has samples there, and both classes without them."""
+    def can_evaluate(self, n_units: int) -> npt.NDArray[np.bool_]:
+        """Return (n_units,) whether a unit has samples, and both classes are left without it."""
         counts = self._class_counts(n_units)
         left = counts.sum(axis=1, keepdims=True) - counts
         found: npt.NDArray[np.bool_] = self.present(n_units) & (left > 0).all(axis=0)
         return found
 
     def present(self, n_units: int) -> npt.NDArray[np.bool_]:
-        """(n_units,) whether it has samples there."""
+        """Return (n_units,) whether a unit has samples."""
         found: npt.NDArray[np.bool_] = self._class_counts(n_units).sum(axis=0) > 0
         return found
 
     def _class_counts(self, n_units: int) -> Integers:
-        """(2, n_units) samples of class 0 and class 1 in each unit."""
+        """Return (2, n_units) number of samples of class 0 and class 1 in each unit."""
         stable = self.samples.stable
         parts = (self.units[stable == kind] for kind in (False, True))
         return np.array([np.bincount(part, minlength=n_units) for part in parts])
 
     def contact_threshold(self, recordings: Sequence[int]) -> float | None:
-        """Mean + 5 standard deviations of F_a over those recordings' tare stretches."""
+        """Return the contact threshold from the tare intervals of some recordings."""
         return contact_threshold(self.at_rest[list(recordings)])
 
 
-def gather(
-    recordings: Iterable[Recording], found: Survey, setting: Setting, division: Division
-) -> dict[str, FingerDesign]:
-    """The training samples of every finger, or of all together under `"*"`.
+def gather_samples(
+    recordings: Iterable[Recording], scan: DatasetScan, setting: Setting, data_split: DataSplit
+) -> dict[str, FingerSamples]:
+    """Return the training samples of every finger, or of all fingers together under `"*"`.
 
     Args:
-        recordings: the same that were surveyed.
-        found: by the survey.
-        setting: which features, tare and so on.
-        division: of the recordings.
+        recordings: the same that were scanned.
+        scan: of the recordings.
+        setting: of the training: features, tare and so on.
+        data_split: of the recordings.
 
     Returns:
-        By finger; at most `setting.max_samples` each, every n-th of larger data.
+        By finger. Each has at most `setting.max_samples`; of larger data every n-th sample.
 
     Raises:
         RecordingError: a recording cannot be read.
-        TrainingError: one classifier is asked for fingers with different sensors.
+        TrainingError: one classifier of all fingers is required, but their sensors differ.
     """
-    step = thinning_step(found.n_labelled, setting.max_samples)
-    piles: dict[str, list[Samples]] = {finger: [] for finger in found.sensors}
-    units: dict[str, list[Integers]] = {finger: [] for finger in found.sensors}
-    at_rest = {finger: np.zeros((len(found.entries), 3)) for finger in found.sensors}
-    n_seen = dict.fromkeys(found.sensors, 0)
+    step = thinning_step(scan.n_labelled, setting.max_samples)
+    parts: dict[str, list[Samples]] = {finger: [] for finger in scan.sensors}
+    units: dict[str, list[Integers]] = {finger: [] for finger in scan.sensors}
+    at_rest = {finger: np.zeros((len(scan.recordings), 3)) for finger in scan.sensors}
+    n_seen = dict.fromkeys(scan.sensors, 0)
     for place, given in enumerate(recordings):
-        if not found.entries[place].n_labelled:
+        if not scan.recordings[place].n_labelled:
             continue
-        recording = at_rate(given, found.rate)
-        sensors = {f: s for f, s in found.sensors.items() if _has(recording, f, s)}
-        plan = stream_plan(sensors, setting.features, setting, found.rate)
+        recording = resample_if_needed(given, scan.rate)
+        sensors = {f: s for f, s in scan.sensors.items() if _has_finger(recording, f, s)}
+        plan = stream_plan(sensors, setting.features, setting, scan.rate)
         for finger, rows in extract(plan, recording).items():
             module = recording.modules[finger]
             states = label_states(module.labels, module.times)
             usable = usable_rows(rows.features, states)
             kept = usable[-n_seen[finger] % step :: step]
             n_seen[finger] += len(usable)
-            group = int(division.group_of[place])
-            piles[finger].append(labelled_samples(rows.features, states, kept, group))
-            units[finger].append(division.units_of(place, module.n_samples)[kept])
+            group = int(data_split.group_of[place])
+            parts[finger].append(labelled_samples(rows.features, states, kept, group))
+            units[finger].append(data_split.units_of(place, module.n_samples)[kept])
             if plan.tare.without_contact:
-                at_rest[finger][place] = rest_moments(module, plan.tare, found.rate)
-    designs = {
-        finger: FingerDesign(
-            found.sensors[finger], concatenate(pile), np.concatenate(units[finger]), at_rest[finger]
+                at_rest[finger][place] = rest_moments(module, plan.tare, scan.rate)
+    fingers = {
+        finger: FingerSamples(
+            scan.sensors[finger], concatenate(own), np.concatenate(units[finger]), at_rest[finger]
         )
-        for finger, pile in piles.items()
+        for finger, own in parts.items()
     }
-    return {ANY_FINGER: _pool(designs)} if setting.shared else designs
+    return {ANY_FINGER: _pool(fingers)} if setting.shared else fingers
 
 
 def usable_rows(features: npt.NDArray[np.floating[Any]], states: npt.NDArray[np.int8]) -> Integers:
@@ -155,8 +155,8 @@ def thin(samples: Samples, n_max: int) -> Samples:
     return Samples(samples.features[::step], samples.stable[::step], samples.groups[::step])
 
 
-def at_rate(recording: Recording, rate: float) -> Recording:
-    """The recording as a model of that rate takes it: as it is within 20 %, else resampled."""
+def resample_if_needed(recording: Recording, rate: float) -> Recording:
+    """Return a recording for a model of a rate [Hz]: unchanged within 20 %, else resampled."""
     if abs(recording.rate / rate - 1) <= RATE_TOLERANCE:
         return recording
     return resample(recording, rate)
@@ -168,25 +168,26 @@ def stream_plan(
     setting: Setting,
     rate: float,
 ) -> StreamPlan:
-    """The stream of features that the setting asks of those fingers."""
+    """Return the plan of the feature stream of some fingers, with a setting's window and tare."""
     tare = Tare.parse(setting.tare)
     return StreamPlan(sensors, dict.fromkeys(sensors, features), setting.window, tare, rate)
 
 
-def _has(recording: Recording, finger: str, sensor: Sensor) -> bool:
-    """Whether the recording has samples of that finger, by that sensor."""
+def _has_finger(recording: Recording, finger: str, sensor: Sensor) -> bool:
+    """Return whether the recording has samples of a finger by that sensor."""
     module = recording.modules.get(finger)
     return module is not None and module.n_samples > 0 and module.sensor == sensor
 
 
 def contact_threshold(moments: npt.NDArray[np.float64]) -> float | None:
-    """Mean + 5 standard deviations of F_a at rest.
+    """Return the mean + 5 standard deviations of F_a at rest.
 
     Args:
-        moments: (n_recordings, 3) number, sum and sum of squares of F_a in each tare stretch.
+        moments: (n_recordings, 3) number, sum and sum of squares of F_a in each tare interval.
 
     Returns:
-        F_a from which on there is contact [unit of the readings]; None where nothing is known.
+        F_a from which on there is contact [unit of the readings]; None with fewer than two
+        samples.
     """
     n, total, squares = moments.sum(axis=0)
     if n < 2:
@@ -196,24 +197,28 @@ def contact_threshold(moments: npt.NDArray[np.float64]) -> float | None:
 
 
 def rest_moments(module: Tactile, tare: Tare, rate: float) -> tuple[int, float, float]:
-    """Number, sum and sum of squares of F_a in the tare stretch; none of a dead finger."""
+    """Return number, sum and sum of squares of F_a in the tare interval.
+
+    All are 0 if no sample in the tare interval is finite.
+    """
     try:
         amplitude = rest_amplitude(module, tare, rate)
-    except ValueError:  # no finite sample in that time
+    except ValueError:  # no finite sample in the tare interval
         return 0, 0.0, 0.0
     return len(amplitude), float(amplitude.sum()), float((amplitude**2).sum())
 
 
-def _pool(designs: Mapping[str, FingerDesign]) -> FingerDesign:
-    if len({design.sensor for design in designs.values()}) > 1:
+def _pool(fingers: Mapping[str, FingerSamples]) -> FingerSamples:
+    """Return the samples of all fingers together."""
+    each = list(fingers.values())
+    if len({own.sensor for own in each}) > 1:
         raise TrainingError(
             "one classifier for all fingers needs one sensor; given are "
-            + ", ".join(f"{finger} ({each.sensor.name})" for finger, each in designs.items())
+            + ", ".join(f"{finger} ({own.sensor.name})" for finger, own in fingers.items())
         )
-    each = list(designs.values())
-    return FingerDesign(
+    return FingerSamples(
         each[0].sensor,
-        concatenate([design.samples for design in each]),
-        np.concatenate([design.units for design in each]),
-        np.sum([design.at_rest for design in each], axis=0),
+        concatenate([own.samples for own in each]),
+        np.concatenate([own.units for own in each]),
+        np.sum([own.at_rest for own in each], axis=0),
     )

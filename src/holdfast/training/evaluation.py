@@ -1,4 +1,4 @@
-"""Recordings beside their labels: what a model says of them, as the metrics take it."""
+"""Evaluation of models: the decisions of a model beside the labels, and their metrics."""
 
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import replace
@@ -13,8 +13,8 @@ from holdfast.recordings import Recording, label_states
 from holdfast.training.splits import Integers
 
 
-def decisions_of(model: Model, recording: Recording) -> Decisions:
-    """What the model decides about a recording, beside the labels.
+def compute_decisions(model: Model, recording: Recording) -> Decisions:
+    """Return the decisions of a model about a recording, with the labels.
 
     Raises:
         ModelError: the recording has other fingers or sensors.
@@ -34,36 +34,38 @@ def decisions_of(model: Model, recording: Recording) -> Decisions:
 
 
 def evaluate(model: Model, recordings: Iterable[Recording], seed: int = 0) -> Metrics:
-    """The metrics of a model on recordings, taken one at a time.
+    """Compute the metrics of a model on recordings, which are read one at a time.
 
     Args:
-        model: that judges.
+        model: to evaluate.
         recordings: labelled.
         seed: of the bootstrap.
 
     Raises:
         ModelError: a recording has other fingers or sensors.
     """
-    return summarise((decisions_of(model, recording) for recording in recordings), seed=seed)
+    return summarise((compute_decisions(model, recording) for recording in recordings), seed=seed)
 
 
-def pick(
-    judged: Sequence[Decisions], units_of: Callable[[int], Integers], n_model_fingers: int
+def combine_decisions(
+    decisions: Sequence[Decisions], units_of: Callable[[int], Integers], n_model_fingers: int
 ) -> Decisions:
-    """One recording's decisions, each sample's from the judge that its unit names.
+    """Combine the decisions of several models about one recording.
+
+    The decision about a sample is that of the model whose index is the unit of the sample.
 
     Args:
-        judged: the same recording by several models.
-        units_of: the unit of each of n samples.
-        n_model_fingers: how many fingers the models have.
+        decisions: of each model, about the same recording.
+        units_of: returns the unit of each of n samples.
+        n_model_fingers: number of fingers of the models.
     """
     fingers = {}
-    for name, first in judged[0].fingers.items():
+    for name, first in decisions[0].fingers.items():
         every = np.arange(len(first.times))
         unit = units_of(len(every))
-        states = np.stack([each.fingers[name].states for each in judged])
-        probabilities = np.stack([each.fingers[name].stable_probability for each in judged])
+        states = np.stack([each.fingers[name].states for each in decisions])
+        probabilities = np.stack([each.fingers[name].stable_probability for each in decisions])
         fingers[name] = replace(
             first, states=states[unit, every], stable_probability=probabilities[unit, every]
         )
-    return Decisions.of(judged[0].name, fingers, n_model_fingers)
+    return Decisions.of(decisions[0].name, fingers, n_model_fingers)

@@ -1,0 +1,137 @@
+"""Fit of a model to training samples, with or without some units."""
+
+from collections.abc import Collection, Mapping, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from holdfast.classifiers import Parameters
+from holdfast.errors import TrainingError
+from holdfast.model import FingerModel, Model
+from holdfast.recordings import Recording
+from holdfast.training.dataset_scan import DatasetScan, scan_dataset
+from holdfast.training.setting import Setting
+from holdfast.training.splits import DataSplit, split_data
+from holdfast.training.training_samples import FingerSamples, gather_samples
+
+
+@dataclass(frozen=True)
+class TrainingData:
+    """Samples of a dataset, and its split.
+
+    Attributes:
+        scan: of the dataset.
+        data_split: of the dataset into units.
+        fingers: training samples of each classifier: by finger, or `"*"` for all fingers.
+    """
+
+    scan: DatasetScan
+    data_split: DataSplit
+    fingers: Mapping[str, FingerSamples]
+
+    def check_classes(self) -> None:
+        """Check that the samples of every finger have both classes.
+
+        Raises:
+            TrainingError: a finger has only one class.
+        """
+        for finger, own in self.fingers.items():
+            if own.samples.one_class:
+                n_stable = int(np.count_nonzero(own.samples.stable))
+                raise TrainingError(
+                    f"{finger}: {n_stable} samples labelled stable and "
+                    f"{len(own.samples.stable) - n_stable} labelled not stable; both classes "
+                    "are needed"
+                )
+
+    def units_without_model(self) -> dict[str, list[str]]:
+        """Return, by finger, the units without which only one class is left.
+
+        A finger cannot be evaluated on them, for no model can be fitted without them.
+
+        Raises:
+            TrainingError: that is so for all units of all fingers.
+        """
+        names = np.array(self.data_split.units)
+        n = len(names)
+        if not any(own.can_evaluate(n).any() for own in self.fingers.values()):
+            raise TrainingError(
+                "no finger has both classes in the training samples when one "
+                f"{self.data_split.split} is held out: cross-validation is not possible"
+            )
+        skipped = {f: own.present(n) & ~own.can_evaluate(n) for f, own in self.fingers.items()}
+        return {finger: names[units].tolist() for finger, units in skipped.items() if units.any()}
+
+
+def fit_model(
+    data: TrainingData,
+    setting: Setting,
+    parameters: Mapping[str, Parameters],
+    held: Collection[int],
+) -> Model | None:
+    """Fit a model to all samples that are not in held units. It has no provenance yet.
+
+    Args:
+        data: to fit.
+        setting: of the training.
+        parameters: of each finger's classifier.
+        held: units that are left out.
+
+    Returns:
+        The model of all fingers that have both classes left; None if there is no such finger.
+    """
+    recordings = data.data_split.recordings_without(held)
+    fingers = {}
+    for finger, own in data.fingers.items():
+        samples = own.without(held)
+        if samples.one_class:
+            continue
+        threshold = setting.contact_threshold
+        fingers[finger] = FingerModel(
+            features=setting.features,
+            classifier=setting.recipe_of(finger).fit(samples, parameters[finger], setting.seed),
+            sensor=own.sensor.name,
+            contact_threshold=(
+                own.contact_threshold(recordings) if threshold is None else threshold
+            ),
+        )
+    if not fingers:
+        return None
+    return Model(
+        fingers=fingers,
+        rate=data.scan.rate,
+        sensors={own.sensor.name: own.sensor for own in data.fingers.values()},
+        window=setting.window,
+        tare=str(setting.tare),
+        debounce=setting.debounce,
+    )
+
+
+def fit_full_model(
+    data: TrainingData, setting: Setting, parameters: Mapping[str, Parameters]
+) -> Model:
+    """Fit a model of all fingers to all samples.
+
+    Raises:
+        TrainingError: a finger has only one class.
+    """
+    data.check_classes()
+    model = fit_model(data, setting, parameters, ())
+    if model is None:
+        raise TrainingError("no finger given; at least one expected")
+    return model
+
+
+def fit_recordings(
+    recordings: Sequence[Recording], setting: Setting, parameters: Parameters
+) -> Model:
+    """Fit a model to recordings, with the same parameters for every finger.
+
+    Raises:
+        TrainingError: the recordings have no labels, or only one class.
+    """
+    scan = scan_dataset(recordings, setting.rate)
+    data_split = split_data(scan.recordings, "random", setting.seed)
+    fingers = gather_samples(recordings, scan, setting, data_split)
+    data = TrainingData(scan, data_split, fingers)
+    return fit_full_model(data, setting, dict.fromkeys(fingers, parameters))
