@@ -138,13 +138,13 @@ class DetectionSummary:
         names = [name for name in self._counts if name != HAND] + [HAND]
         states = (f"{state} %" for state in ContactState)
         print_table(
-            (self._name, "samples", *states, "unknown for", "faults"),
+            (self._name, "samples", *states, "reasons for UNKNOWN", "faults"),
             [(name, *self._counts[name].row()) for name in names],
         )
         events = self._sorted_events()
         print_line()
         print_table(
-            ("time [s]", "finger", "state", "before"),
+            ("time [s]", "finger", "state", "previous"),
             [(f"{e.time:.3f}", e.finger, e.state, e.previous) for e in events[:MAX_EVENTS_SHOWN]],
         )
         if len(events) > MAX_EVENTS_SHOWN:
