@@ -9,7 +9,7 @@ from scipy.optimize import approx_fprime
 from sklearn.linear_model import LogisticRegression
 
 from holdfast.classifiers import Adapted, LinearClassifier
-from holdfast.classifiers.adapted import _curvature, _log_odds, _loss
+from holdfast.classifiers.adapted import _hessian, _log_odds, _loss
 from holdfast.errors import TrainingError
 
 from .test_recipes import samples
@@ -38,7 +38,7 @@ def rule_of(rule):
     return np.array([rule.intercept, *rule.coefficients])
 
 
-def test_gradient_and_curvature_are_those_of_finite_differences():
+def test_gradient_and_hessian_are_those_of_finite_differences():
     rng = np.random.default_rng(1)
     rows = np.column_stack([np.ones(50), rng.normal(size=(50, 3))])
     stable = rng.random(50) < 0.3
@@ -47,7 +47,7 @@ def test_gradient_and_curvature_are_those_of_finite_differences():
     expected = approx_fprime(at, lambda v: _loss(v, *given)[0], 1e-7)
     assert _loss(at, *given)[1] == pytest.approx(expected, rel=1e-4, abs=1e-5)
     bent = [approx_fprime(at, lambda v, j=j: _loss(v, *given)[1][j], 1e-7) for j in range(4)]
-    assert _curvature(at, *given) == pytest.approx(np.array(bent), rel=1e-4, abs=1e-5)
+    assert _hessian(at, *given) == pytest.approx(np.array(bent), rel=1e-4, abs=1e-5)
 
 
 def test_the_loss_is_that_of_the_docstring():

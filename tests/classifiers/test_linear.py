@@ -73,7 +73,7 @@ GOOD = {"mean": (0.0,), "scale": (1.0,), "coefficients": (1.0,), "intercept": 0.
     ("change", "message"),
     [
         ({"mean": (0.0, 1.0)},
-         "2 means, 1 scales and 1 coefficients given; as many of each expected"),
+         "2 means, 1 scales and 1 coefficients given; the same number of each expected"),
         ({"mean": (np.nan,)}, "a number of the classifier is not finite"),
         ({"coefficients": (np.inf,)}, "a number of the classifier is not finite"),
         ({"intercept": np.nan}, "a number of the classifier is not finite"),

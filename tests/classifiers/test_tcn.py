@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from holdfast.classifiers import Samples
-from holdfast.classifiers.tcn import Network, TemporalConvolution, shapes
+from holdfast.classifiers.tcn import Network, TemporalConvolution, weight_shapes
 from holdfast.errors import MissingExtra, TrainingError
 
 RECIPE = TemporalConvolution()
@@ -31,7 +31,7 @@ def drawn(n_channels, seed=0):
     rng = np.random.default_rng(seed)
     return {
         name: rng.normal(scale=0.3, size=shape).astype(np.float32)
-        for name, shape in shapes(n_channels).items()
+        for name, shape in weight_shapes(n_channels).items()
     }
 
 
@@ -80,7 +80,7 @@ def torch_scores(windows, weights):
 
 @pytest.mark.parametrize(("n_channels", "n_weights"), [(6, 9974), (3, 9650), (1, 9434)])
 def test_as_many_parameters_as_the_source(n_channels, n_weights):
-    assert sum(math.prod(shape) for shape in shapes(n_channels).values()) == n_weights
+    assert sum(math.prod(shape) for shape in weight_shapes(n_channels).values()) == n_weights
 
 
 @deep
@@ -163,15 +163,15 @@ def test_what_it_keeps_of_the_training():
     assert network.scale == pytest.approx(steps.std(axis=0), rel=1e-4)
     assert network.n_features == given.features.shape[1]
     assert network.threshold == pytest.approx(given.stable.mean())
-    assert {n: w.shape for n, w in network.weights.items()} == shapes(3)
+    assert {n: w.shape for n, w in network.weights.items()} == weight_shapes(3)
 
 
 @deep
 def test_an_epoch_has_as_many_of_either_class():
-    from holdfast.classifiers.tcn import _balanced
+    from holdfast.classifiers.tcn import _balanced_rows
 
     stable = np.array([True] * 3 + [False] * 9)
-    epochs = [_balanced(stable, np.random.default_rng(seed)) for seed in range(20)]
+    epochs = [_balanced_rows(stable, np.random.default_rng(seed)) for seed in range(20)]
     for rows in epochs:
         assert len(set(rows.tolist())) == 6
         assert stable[rows].sum() == 3
@@ -182,10 +182,10 @@ def test_an_epoch_has_as_many_of_either_class():
 def test_what_is_left_out_is_whole_channels_and_made_up_for():
     import torch
 
-    from holdfast.classifiers.tcn import _thinned
+    from holdfast.classifiers.tcn import _drop_channels
 
     chance = torch.Generator().manual_seed(0)
-    thinned = _thinned(torch.ones((500, 12, 5)), 0.2, chance).numpy()
+    thinned = _drop_channels(torch.ones((500, 12, 5)), 0.2, chance).numpy()
     assert (thinned == thinned[:, :, :1]).all()
     assert set(np.unique(thinned).tolist()) == {0.0, 1.25}
     assert (thinned == 0).mean() == pytest.approx(0.2, abs=0.02)
@@ -195,13 +195,13 @@ def test_what_is_left_out_is_whole_channels_and_made_up_for():
 def test_kernels_begin_by_hes_rule():
     import torch
 
-    from holdfast.classifiers.tcn import _drawn
+    from holdfast.classifiers.tcn import _initial_weights
 
     chance = torch.Generator().manual_seed(0)
-    kernel = _drawn(chance, "block1/0", (400, 12, 8)).detach().numpy()
+    kernel = _initial_weights(chance, "block1/0", (400, 12, 8)).detach().numpy()
     assert kernel.var() == pytest.approx(2 / 96, rel=0.05)
     for name, value in (("bias", 0.0), ("gain", 1.0), ("shift", 0.0)):
-        assert (_drawn(chance, f"block1/0/{name}", (12,)).detach().numpy() == value).all()
+        assert (_initial_weights(chance, f"block1/0/{name}", (12,)).detach().numpy() == value).all()
 
 
 @deep

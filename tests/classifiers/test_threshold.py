@@ -68,7 +68,7 @@ def test_against_brute_force(rows, side):
     best = brute_force(values, stable, side)
     assert 0.5 + cut.gain / (2 * n_pairs) == pytest.approx(best)
     if len(set(values.tolist())) > 1:
-        called = values > cut.place if cut.sign > 0 else values < cut.place
+        called = values > cut.value if cut.sign > 0 else values < cut.value
         assert balanced_accuracy(called, stable) == pytest.approx(best)
         assert side == "either" or cut.sign == {"below": -1, "above": 1}[side]
         fitted = fit(samples(values, stable), side)

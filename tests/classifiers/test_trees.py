@@ -47,7 +47,7 @@ def test_they_are_deterministic():
 
 @pytest.mark.parametrize("share", [0.1, 1.0])
 def test_balance_moves_the_threshold_and_not_the_probability(share):
-    """Where the classes cannot be told apart, the probability is the base rate throughout."""
+    """Where the classes cannot be separated, the probability is the base rate throughout."""
     rng = np.random.default_rng(0)
     stable = rng.random(5000) < 0.5 * share
     given = Samples(rng.integers(2, size=(5000, 1)).astype(float), stable, np.arange(5000) % 5)

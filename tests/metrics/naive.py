@@ -56,7 +56,7 @@ def match(labels, states):
     return [(on, end, matched.get((on, end))) for on, end in events(labels)], false
 
 
-def pairs_won(positive, negative):
+def mann_whitney_u(positive, negative):
     return sum((p > q) + 0.5 * (p == q) for p in positive for q in negative)
 
 

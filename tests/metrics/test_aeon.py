@@ -101,7 +101,7 @@ def test_false_alarms_against_precision():
         assert len(match(case).false_alarms) == pytest.approx((1 - true) * n_alarms)
 
 
-def test_a_state_that_is_not_stable_already_is_no_alarm():
+def test_a_state_that_was_not_stable_before_is_no_alarm():
     """Where we differ on purpose: aeon's whole ranges overlap with more than an alarm would."""
     more = 0
     for case in CASES:

@@ -31,7 +31,7 @@ def test_one_finger_holds_where_the_model_has_one():
     assert hand_decisions({"thumb": thumb}, 4).states.tolist() == [NO_CONTACT]
 
 
-def test_labels_and_states_are_told_apart():
+def test_labels_and_states_are_kept_apart():
     thumb = finger([0.0], [STABLE], labels=[UNSTABLE])
     hand = Decisions.of("grasp", {"thumb": thumb}, 1).hand
     assert (hand.labels.tolist(), hand.states.tolist()) == ([UNSTABLE], [STABLE])

@@ -88,7 +88,7 @@ LABELS = codes((S, 100), (F, 10), (S, 100))
         ([], (None, [])),
     ],
 )
-def test_which_alarms_belong(alarms, expected):
+def test_which_alarms_belong_to_an_event(alarms, expected):
     states = np.full(len(LABELS), S)
     states[alarms] = F
     found = match(LABELS, states)
@@ -112,7 +112,7 @@ def test_what_is_an_alarm(runs, alarms):
     assert ticks(match(np.full(len(states), S), states)) == ([], alarms)
 
 
-def test_a_false_alarm_tells_under_which_label_it_came():
+def test_a_false_alarm_has_the_label_at_its_time():
     labels = codes((S, 10), (U, 10), (N, 10))
     states = np.tile([S, S, S, S, F], 6)
     found = match(labels, states)
@@ -132,7 +132,7 @@ def test_an_alarm_in_two_windows_belongs_to_the_later_event():
     assert _owners(alarms, onsets, ends).tolist() == [-1, 0, 0, 1, 1, -1]
 
 
-def test_figures_by_hand():
+def test_event_metrics_computed_by_hand():
     events = [InstabilityEvent(t, t + 1, t + d) for t, d in ((1, 0.03), (3, 0.05), (5, 0.15))]
     metrics = pool_events(
         [AlarmMatch(tuple(events), (), 90.0), AlarmMatch((InstabilityEvent(1.0, 2.0),), (), 30.0)]
@@ -144,7 +144,7 @@ def test_figures_by_hand():
     assert metrics.false_alarms_per_minute == 0.0
 
 
-def test_nothing_has_no_figures():
+def test_without_samples_there_are_no_event_metrics():
     for metrics in (pool_events([]), event_metrics([], [], [])):
         assert (metrics.n_events, metrics.stable_minutes) == (0, 0.0)
         assert metrics.missed == {"0.05": None, "0.1": None, "0.2": None}

@@ -6,7 +6,7 @@ from sklearn.metrics import brier_score_loss, confusion_matrix, roc_auc_score
 
 from holdfast.contact import NO_CONTACT, STABLE, UNKNOWN, UNSTABLE
 from holdfast.metrics import sample_metrics
-from holdfast.metrics.samples import measure, pool_tallies, tally_samples
+from holdfast.metrics.samples import measure, pool_samples, score_samples
 
 sample = st.tuples(st.integers(0, 3), st.integers(0, 3), st.sampled_from([0, 0.1, 0.5, 0.7, 1]))
 
@@ -61,7 +61,7 @@ def test_many_samples_without_ties_agree_with_scikit_learn():
     assert metrics.auc == pytest.approx(roc_auc_score(labels == STABLE, scores), abs=1e-12)
 
 
-def test_what_is_unlabelled_or_undecided_is_left_out():
+def test_unlabelled_and_undecided_samples_are_left_out():
     labels = [UNKNOWN, STABLE, UNSTABLE, STABLE]
     states = [STABLE, UNKNOWN, UNKNOWN, STABLE]
     metrics = sample_metrics(labels, states, [0.9, np.nan, np.nan, 0.9])
@@ -76,7 +76,7 @@ def test_a_rate_without_a_denominator_is_none():
     assert (metrics.auc, metrics.auc_contact) == (1.0, None)
 
 
-def test_no_samples_measure_nothing():
+def test_without_samples_there_are_no_metrics():
     metrics = sample_metrics([], [], [])
     assert (metrics.n, metrics.accuracy, metrics.brier) == (0, None, None)
 
@@ -97,9 +97,9 @@ def test_shapes_that_differ_are_refused():
 
 
 @given(st.lists(sample, min_size=1, max_size=60), st.integers(0, 60))
-def test_tallies_pool_to_the_tally_of_all(samples, cut):
+def test_pooled_samples_equal_all_samples(samples, cut):
     parts = [part for part in (samples[:cut], samples[cut:]) if part]
-    pooled = measure(pool_tallies([tally_samples(*columns(part)) for part in parts]))
+    pooled = measure(pool_samples([score_samples(*columns(part)) for part in parts]))
     whole = sample_metrics(*columns(samples))
     assert pooled.confusion == whole.confusion
     assert (pooled.auc, pooled.auc_contact) == (whole.auc, whole.auc_contact)

@@ -3,7 +3,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from holdfast.metrics.statistics import finite_or_none, pairs_won, percent, quantile
+from holdfast.metrics.statistics import finite_or_none, mann_whitney_u, percent, quantile
 
 from . import naive
 
@@ -11,9 +11,9 @@ scores = st.lists(st.sampled_from([-np.inf, 0.0, 0.25, 0.5, 1.0, np.inf]), max_s
 
 
 @given(scores, scores)
-def test_pairs_won_equals_two_loops(positive, negative):
-    won = pairs_won(np.array(positive), np.array(negative))
-    assert won == naive.pairs_won(positive, negative)
+def test_mann_whitney_u_equals_two_loops(positive, negative):
+    won = mann_whitney_u(np.array(positive), np.array(negative))
+    assert won == naive.mann_whitney_u(positive, negative)
 
 
 @given(st.lists(st.floats(-1e6, 1e6), min_size=1, max_size=50), st.floats(0, 1))
@@ -30,7 +30,7 @@ def test_a_quantile_is_infinite_only_where_it_falls_on_a_miss(n_misses, q, expec
     assert quantile(values, q) == expected
 
 
-def test_nothing_has_no_quantile_and_no_percentage():
+def test_empty_input_has_no_quantile_and_no_percentage():
     assert quantile(np.empty(0), 0.5) is None
     assert percent(0, 0) is None
     assert percent(1, 4) == 25.0

@@ -132,7 +132,7 @@ def test_fingers_may_differ_between_recordings():
     assert metrics.fingers["ring"].n == metrics.recordings[1].fingers["ring"].n
 
 
-def test_samples_of_earlier_recordings_are_let_go():
+def test_samples_of_earlier_recordings_are_released():
     seen = []
 
     def stream():

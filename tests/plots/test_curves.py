@@ -29,8 +29,8 @@ def test_lines_bands_and_the_papers():
     assert {91.0, 93.0} <= set(band.get_paths()[0].vertices[:, 1])
     assert [label.get_text() for label in axes.get_xticklabels()] == ["4", "8", "14"]
     assert (axes.get_xlabel(), axes.get_ylabel()) == ("N_w", "Acc [%]")
-    told = [text.get_text() for text in figure.legends[0].get_texts()]
-    assert told == ["ours", "b", PAPER]
+    texts = [text.get_text() for text in figure.legends[0].get_texts()]
+    assert texts == ["ours", "b", PAPER]
 
 
 def test_lines_over_many_values_on_a_logarithmic_axis():
@@ -63,5 +63,5 @@ def test_reliability():
     figure = drawn(draw_reliability({"a": table, "b": np.empty((0, 3))}, {"a": "Brier 0.1"}))
     np.testing.assert_array_equal(figure.axes[0].lines[1].get_ydata(), table[:, 1])
     np.testing.assert_allclose(figure.axes[1].lines[0].get_ydata(), [75.0, 25.0])
-    told = [text.get_text() for text in figure.axes[0].get_legend().get_texts()]
-    assert told == ["a, Brier 0.1", "b"]
+    texts = [text.get_text() for text in figure.axes[0].get_legend().get_texts()]
+    assert texts == ["a, Brier 0.1", "b"]

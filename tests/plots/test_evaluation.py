@@ -21,7 +21,7 @@ def finger(seed, *, delay=0.05, labelled=True, n=400):
     return FingerDecisions(times, labels if labelled else 0 * labels, states, score)
 
 
-def judged(n, names=("thumb", "index"), **options):
+def example_decisions(n, names=("thumb", "index"), **options):
     return [
         Decisions.of(
             f"grasp-{k}", {name: finger(10 * k + i, **options) for i, name in enumerate(names)}, 2
@@ -37,7 +37,7 @@ def draw(decisions):
 @pytest.mark.parametrize("form", ["png", "svg", "pdf"])
 def test_it_is_drawn_without_a_screen(form):
     file = io.BytesIO()
-    draw(judged(3)).savefig(file, format=form)
+    draw(example_decisions(3)).savefig(file, format=form)
     assert len(file.getvalue()) > 5000
 
 
@@ -54,13 +54,13 @@ def test_no_global_state_is_touched():
 @pytest.mark.parametrize(
     "decisions",
     [
-        judged(1),
-        judged(40),
-        judged(2, names=tuple(f"finger{k}" for k in range(9))),
-        judged(2, labelled=False),
+        example_decisions(1),
+        example_decisions(40),
+        example_decisions(2, names=tuple(f"finger{k}" for k in range(9))),
+        example_decisions(2, labelled=False),
         [Decisions("nothing", {})],
-        [*judged(2), Decisions("nothing", {})],
-        [*judged(1), *judged(1, names=("ring",))],
+        [*example_decisions(2), Decisions("nothing", {})],
+        [*example_decisions(1), *example_decisions(1, names=("ring",))],
         [],
     ],
     ids=["one", "many", "hand", "bare", "nothing", "some", "unlike", "none"],
@@ -79,7 +79,7 @@ def test_recordings_are_sorted_with_the_best_on_top():
 
 
 def test_a_dot_stands_at_the_accuracy_of_its_finger():
-    decisions = judged(3)
+    decisions = example_decisions(3)
     metrics = summarise(decisions, n_resamples=10)
     dots = draw_evaluation(metrics, decisions).axes[0].collections
     for name, drawn in zip(("thumb", "index"), dots, strict=True):
@@ -89,7 +89,7 @@ def test_a_dot_stands_at_the_accuracy_of_its_finger():
 
 def test_the_curve_of_the_hand_reaches_the_share_of_events_told():
     """Alarms 0.05 s late in four of five recordings, never in the fifth."""
-    decisions = judged(4, delay=0.05)
+    decisions = example_decisions(4, delay=0.05)
     silent = finger(9)
     never = np.where(silent.states == UNKNOWN, UNKNOWN, STABLE)
     score = np.where(silent.states == UNKNOWN, np.nan, 0.9)

@@ -79,8 +79,8 @@ def test_a_narrow_phase_is_named_in_the_legend_alone():
     phases = np.array(["locked"] * 195 + ["slipping"] * 5)
     figure = drawn(draw_forces(series(phases=phases)))
     assert [text.get_text() for text in figure.axes[0].texts] == ["locked"]
-    told = {text.get_text() for legend in figure.legends for text in legend.get_texts()}
-    assert {"locked", "slipping"} <= told
+    texts = {text.get_text() for legend in figure.legends for text in legend.get_texts()}
+    assert {"locked", "slipping"} <= texts
 
 
 def test_features_are_those_given():

@@ -107,13 +107,13 @@ def test_time_since_1970_counts_from_the_start(grasp):
 
 
 def test_title_tells_the_tare(grasp):
-    told = {
+    texts = {
         "0.5": "tare: first 0.5 s",
         "first": "tare: first sample",
         "none": "no tare",
         "1:2": "tare: 1 to 2 s",
     }
-    for tare, text in told.items():
+    for tare, text in texts.items():
         figure = plot_recording(grasp, Tare.parse(tare), window=8)
         assert figure.get_suptitle() == f"grasp   ({text}, window of 8 samples)"
 

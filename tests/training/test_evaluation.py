@@ -72,15 +72,17 @@ def test_a_model_for_other_fingers(model):
     assert str(refusal.value) == "the model is for thumb, index; ring given"
 
 
-def test_pick_takes_each_sample_from_the_judge_that_its_unit_names(grasps):
+def test_each_decision_is_that_of_the_model_of_the_unit(grasps):
     settings = [Setting(trials=0, window=window) for window in (4, 10)]
-    judged = [compute_decisions(train(grasps[:2], each).model, grasps[3]) for each in settings]
+    decisions_of_models = [
+        compute_decisions(train(grasps[:2], each).model, grasps[3]) for each in settings
+    ]
     units = np.random.default_rng(0).integers(2, size=400)
-    found = combine_decisions(judged, lambda n: units[:n], 2)
+    found = combine_decisions(decisions_of_models, lambda n: units[:n], 2)
     for name, finger in found.fingers.items():
         for k in (0, 1):
             rows = units == k
-            expected = judged[k].fingers[name]
+            expected = decisions_of_models[k].fingers[name]
             np.testing.assert_array_equal(finger.states[rows], expected.states[rows])
             np.testing.assert_array_equal(
                 finger.stable_probability[rows], expected.stable_probability[rows]

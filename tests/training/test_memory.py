@@ -16,7 +16,7 @@ from .build import tiny_recording
 
 
 class Lazy(Sequence):
-    """Makes a recording whenever it is asked for, and counts those that are alive."""
+    """Create a recording at every access, and count those in memory."""
 
     def __init__(self, n):
         self.n = n
@@ -31,7 +31,7 @@ class Lazy(Sequence):
             raise IndexError(index)
         recording = tiny_recording(index)
         self.alive.add(recording)
-        gc.collect()  # what only a circle of references holds, nobody holds
+        gc.collect()  # also frees objects that only refer to each other
         self.most = max(self.most, len(self.alive))
         return recording
 

@@ -65,7 +65,7 @@ def test_the_first_trial_is_the_reference_setting():
 
 
 def test_the_best_by_log_loss_is_taken():
-    """Computed anew from the definition for everything that was tried."""
+    """Compute the loss of every trial again, from its definition."""
     spy, samples = Spy(), blobs()
     best = run(spy, samples=samples)
     tried = {repr(asked): asked for asked in spy.asked}.values()

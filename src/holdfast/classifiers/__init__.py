@@ -1,4 +1,4 @@
-"""Ways of fitting a classifier, by name; one file each."""
+"""Classifiers, and the recipes that fit them, by name; one file for each."""
 
 from holdfast.classifiers.adapted import Adapted
 from holdfast.classifiers.fitting import (
@@ -30,10 +30,10 @@ __all__ = [
 
 
 def recipe(name: str) -> LinearRecipe:
-    """The way of fitting of that name.
+    """Return the recipe with a name.
 
     Raises:
-        ValueError: there is none.
+        ValueError: the name is unknown.
     """
     if name not in RECIPES:
         raise ValueError(f"unknown classifier {name!r}; there are {', '.join(RECIPES)}")

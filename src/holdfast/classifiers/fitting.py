@@ -1,4 +1,4 @@
-"""What every way of fitting has in common: samples in, a classifier of plain numbers out."""
+"""Interfaces and functions that all recipes share: samples, classifiers, calibration."""
 
 from collections.abc import Mapping
 from typing import TYPE_CHECKING, Any, NamedTuple, Protocol
@@ -14,8 +14,8 @@ if TYPE_CHECKING:
 
 Parameters = Mapping[str, Any]
 
-LEAST_SLOPE = 1e-6
-"""Of a sigmoid: so little that the probability is the base rate, yet it rises."""
+MIN_SLOPE = 1e-6
+"""Minimum slope of a sigmoid: its probability rises, but is nearly the base rate."""
 
 
 class Samples(NamedTuple):
@@ -23,8 +23,8 @@ class Samples(NamedTuple):
 
     Attributes:
         features: (n, n_features) finite.
-        stable: (n,) the class: True where the label is STABLE.
-        groups: (n,) which recording (or object) a sample comes from.
+        stable: (n,) class: True if the label is STABLE.
+        groups: (n,) index of the recording, or object, of each sample.
     """
 
     features: npt.NDArray[np.float64]
@@ -32,76 +32,78 @@ class Samples(NamedTuple):
     groups: npt.NDArray[np.int64]
 
     def take(self, rows: npt.NDArray[np.bool_]) -> "Samples":
-        """The samples where `rows` is True."""
+        """Return the samples where `rows` is True."""
         return Samples(self.features[rows], self.stable[rows], self.groups[rows])
 
     @property
     def one_class(self) -> bool:
-        """Whether all labels are the same, or there are none."""
+        """Whether all labels are the same, or there are no samples."""
         return not self.stable.any() or bool(self.stable.all())
 
 
 class Classifier(Protocol):
-    """What every way of fitting gives."""
+    """Fitted classifier."""
 
     @property
     def n_features(self) -> int:
-        """How many features it looks at."""
+        """Number of features of its input."""
         ...
 
     @property
     def threshold(self) -> float:
-        """The probability from which on a contact is called stable."""
+        """Probability from which on a contact is stable."""
         ...
 
     def probability(self, features: npt.ArrayLike) -> npt.NDArray[np.float64]:
-        """The probability of stability of each row of (n, n_features); NaN for rows with NaN."""
+        """Return the probability of stability of each row of (n, n_features); NaN if it has NaN."""
         ...
 
 
 class Recipe(Protocol):
-    """A way of fitting a classifier."""
+    """Way of fitting a classifier."""
 
     @property
     def name(self) -> str:
-        """What it is called on the command line."""
+        """Name on the command line."""
         ...
 
     @property
     def reference(self) -> Parameters:
-        """The parameters of the reference setting (no search)."""
+        """Reference parameters, used without a search."""
         ...
 
     def suggest(self, trial: "Trial") -> Parameters:
-        """Parameters to try, drawn from an Optuna trial."""
+        """Draw parameters from an Optuna trial."""
         ...
 
     def fit(self, samples: Samples, parameters: Parameters, seed: int) -> Classifier:
-        """The classifier fitted to the samples, with a calibrated probability."""
+        """Fit a classifier with a calibrated probability to the samples."""
         ...
 
 
 class LinearRecipe(Recipe, Protocol):
-    """A way of fitting a classifier that a model file can hold."""
+    """Way of fitting a classifier that a model file can store."""
 
     def fit(self, samples: Samples, parameters: Parameters, seed: int) -> LinearClassifier:
-        """The classifier fitted to the samples, with a calibrated probability."""
+        """Fit a classifier with a calibrated probability to the samples."""
         ...
 
 
 def standardise(features: npt.NDArray[np.float64]) -> tuple[npt.NDArray[np.float64], ...]:
-    """Mean and scale of each feature, and the features standardised by them."""
+    """Return mean and scale of each feature, and the features standardised by them."""
     mean = features.mean(axis=0)
     scale = features.std(axis=0)
-    scale[np.ptp(features, axis=0) == 0] = 1.0  # rounding may leave a constant 1e-17 of spread
+    scale[np.ptp(features, axis=0) == 0] = (
+        1.0  # rounding can give a constant feature a spread of 1e-17
+    )
     return mean, scale, (features - mean) / scale
 
 
 def check_classes(samples: Samples) -> None:
-    """Does nothing where there is something to learn.
+    """Check that the samples have both classes.
 
     Raises:
-        TrainingError: fewer than two classes among the samples.
+        TrainingError: they have only one class.
     """
     if samples.one_class:
         n_stable = int(samples.stable.sum())
@@ -111,27 +113,29 @@ def check_classes(samples: Samples) -> None:
         )
 
 
-def balance_of(stable: npt.NDArray[np.bool_]) -> float:
-    """n_0 / n_1: by how much balanced classes multiply the odds of stability."""
+def class_ratio(stable: npt.NDArray[np.bool_]) -> float:
+    """Return n_0 / n_1, the factor by which balanced classes multiply the odds of stability."""
     n_stable = int(stable.sum())
     return (len(stable) - n_stable) / n_stable
 
 
-def unbalanced(probability: npt.NDArray[np.float64], balance: float) -> npt.NDArray[np.float64]:
-    """The probability whose odds are `balance` times less."""
-    return probability / (probability + balance * (1.0 - probability))
+def undo_balancing(
+    probability: npt.NDArray[np.float64], class_ratio: float
+) -> npt.NDArray[np.float64]:
+    """Return the probability whose odds are smaller by the factor `class_ratio`."""
+    return probability / (probability + class_ratio * (1.0 - probability))
 
 
 def sigmoid(values: npt.NDArray[np.float64], stable: npt.NDArray[np.bool_]) -> tuple[float, float]:
-    """Slope and offset of the logistic function that the classes follow along the values.
+    """Fit a logistic function of the values to the classes; return its slope and offset.
 
-    The slope stays above 0; where the classes call for less, the offset is the base rate's.
+    The slope is above 0. If the fitted slope is not, the offset is that of the base rate.
     """
     from sklearn.linear_model import LogisticRegression
 
     spread = float(values.std()) or 1.0
     fit = LogisticRegression(C=1e6, max_iter=1000).fit(values[:, None] / spread, stable)
     slope = float(fit.coef_[0, 0]) / spread
-    if slope < LEAST_SLOPE:
-        return LEAST_SLOPE, -float(np.log(balance_of(stable)))
+    if slope < MIN_SLOPE:
+        return MIN_SLOPE, -float(np.log(class_ratio(stable)))
     return slope, float(fit.intercept_[0])

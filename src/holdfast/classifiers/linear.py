@@ -1,4 +1,4 @@
-"""A linear rule over standardised features, with a calibrated probability: plain numbers."""
+"""Linear classifier of standardised features, with a calibrated probability."""
 
 import math
 
@@ -13,10 +13,11 @@ Array = npt.NDArray[np.float64]
 
 
 class LinearClassifier(msgspec.Struct, frozen=True, forbid_unknown_fields=True, tag="linear"):
-    """What logistic regression and the linear SVM come down to.
+    """Linear classifier, as fitted by logistic regression and the linear SVM.
 
-    Decision value z = intercept + sum_j coefficients_j (phi_j - mean_j) / scale_j, probability
-    of stability p = 1 / (1 + exp(-(slope z + offset))), stable where p >= threshold.
+    The decision value is z = intercept + sum_j coefficients_j (phi_j - mean_j) / scale_j, the
+    probability of stability p = 1 / (1 + exp(-(slope z + offset))). A contact is stable if
+    p >= threshold.
 
     Attributes:
         mean: of each feature in training.
@@ -25,10 +26,11 @@ class LinearClassifier(msgspec.Struct, frozen=True, forbid_unknown_fields=True, 
         intercept: of the decision value.
         slope: of the calibration.
         offset: of the calibration.
-        threshold: the probability from which on a contact is called stable.
+        threshold: probability from which on a contact is stable.
 
     Raises:
-        ModelError: lengths differ, a number is not finite, or a scale or slope is not above 0.
+        ModelError: lengths differ, a number is not finite, a scale or the slope is not above 0, the
+            weights overflow, or the threshold is not from 0 to 1.
     """
 
     mean: tuple[float, ...]
@@ -44,7 +46,7 @@ class LinearClassifier(msgspec.Struct, frozen=True, forbid_unknown_fields=True, 
         if len(lengths) != 1:
             raise ModelError(
                 f"{len(self.mean)} means, {len(self.scale)} scales and "
-                f"{len(self.coefficients)} coefficients given; as many of each expected"
+                f"{len(self.coefficients)} coefficients given; the same number of each expected"
             )
         numbers = (*self.mean, *self.scale, *self.coefficients, self.intercept, self.offset)
         if not all(math.isfinite(number) for number in (*numbers, self.slope)):
@@ -59,45 +61,45 @@ class LinearClassifier(msgspec.Struct, frozen=True, forbid_unknown_fields=True, 
 
     @property
     def n_features(self) -> int:
-        """How many features it looks at."""
+        """Number of features of its input."""
         return len(self.mean)
 
     def weights(self) -> Array:
-        """The rule in the order of the kernel: offset first, then one weight a feature.
+        """Return the weights of the raw features: first the offset, then one weight per feature.
 
-        The scale and the calibration are folded in: p = logistic(w_0 + sum_j w_j phi_j).
+        They contain the scale and the calibration: p = logistic(w_0 + sum_j w_j phi_j).
         """
         folded = np.array(self.coefficients) / np.array(self.scale)
         intercept = self.intercept - float(folded @ np.array(self.mean))
         return np.concatenate([[self.slope * intercept + self.offset], self.slope * folded])
 
     def decision(self, features: npt.ArrayLike) -> Array:
-        """The uncalibrated decision value z of each row of (n, n_features).
+        """Return the uncalibrated decision value z of each row of (n, n_features).
 
         Raises:
-            ValueError: another number of features.
+            ValueError: the number of features is not `n_features`.
         """
-        rows = rows_of(features, self.n_features)
+        rows = feature_rows(features, self.n_features)
         standardised = (rows - np.array(self.mean)) / np.array(self.scale)
         return np.asarray(standardised @ np.array(self.coefficients) + self.intercept)
 
     def probability(self, features: npt.ArrayLike) -> Array:
-        """The probability of stability of each row of (n, n_features); NaN for rows with NaN.
+        """Return the probability of stability of each row of (n, n_features); NaN if it has NaN.
 
         Raises:
-            ValueError: another number of features.
+            ValueError: the number of features is not `n_features`.
         """
-        rows = rows_of(features, self.n_features)
+        rows = feature_rows(features, self.n_features)
         probabilities = np.empty(len(rows))
         _probabilities(rows, self.weights(), probabilities)
         return probabilities
 
 
-def rows_of(features: npt.ArrayLike, n_features: int) -> Array:
-    """The features as (n, n_features) float64, contiguous.
+def feature_rows(features: npt.ArrayLike, n_features: int) -> Array:
+    """Return the features as contiguous (n, n_features) float64.
 
     Raises:
-        ValueError: another number of features.
+        ValueError: the number of features is not `n_features`.
     """
     rows = np.ascontiguousarray(features, dtype=np.float64)
     if rows.ndim != 2 or rows.shape[1] != n_features:
@@ -107,7 +109,7 @@ def rows_of(features: npt.ArrayLike, n_features: int) -> Array:
 
 @compiled
 def linear_probability(features: Array, weights: Array) -> float:
-    """Logistic of the weighted sum: the one place where a probability is computed."""
+    """Return the logistic function of the weighted sum, for offline and live detection."""
     value = weights[0]
     for j in range(len(weights) - 1):
         value += weights[j + 1] * features[j]

@@ -8,8 +8,8 @@ import numpy as np
 from holdfast.classifiers.fitting import (
     Parameters,
     Samples,
-    balance_of,
     check_classes,
+    class_ratio,
     standardise,
 )
 from holdfast.classifiers.linear import LinearClassifier
@@ -22,25 +22,25 @@ if TYPE_CHECKING:
 class LogisticRegression:
     """L2-regularised logistic regression on standardised features.
 
-    Balanced class weights multiply the odds by n_0 / n_1. The probability is corrected by just
-    that factor; the decision stays where the weights put it.
+    Balanced class weights multiply the odds by n_0 / n_1. The probability is corrected by that
+    factor; the decision is not changed by the correction.
     """
 
     name: str = "logreg"
     reference: Parameters = field(default_factory=lambda: {"C": 1.0, "class_weight": "balanced"})
 
     def suggest(self, trial: "Trial") -> Parameters:
-        """C over eight decades, and whether classes are weighted."""
+        """Draw C over eight decades, and whether classes are weighted."""
         return {
             "C": trial.suggest_float("C", 1e-4, 1e4, log=True),
             "class_weight": trial.suggest_categorical("class_weight", ["balanced", None]),
         }
 
     def fit(self, samples: Samples, parameters: Parameters, seed: int) -> LinearClassifier:
-        """The classifier fitted to the samples; deterministic, the seed is not used.
+        """Fit the classifier to the samples. The fit is deterministic; the seed is not used.
 
         Raises:
-            TrainingError: only one class.
+            TrainingError: the samples have only one class.
         """
         from sklearn.linear_model import LogisticRegression as Estimator
 
@@ -54,7 +54,7 @@ class LogisticRegression:
             solver="newton-cholesky",
             max_iter=1000,
         ).fit(features, samples.stable)
-        odds = balance_of(samples.stable) if balanced else 1.0
+        odds = class_ratio(samples.stable) if balanced else 1.0
         return LinearClassifier(
             mean=tuple(mean.tolist()),
             scale=tuple(scale.tolist()),

@@ -1,4 +1,4 @@
-"""A threshold on one feature."""
+"""Threshold on one feature."""
 
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Literal, NamedTuple
@@ -20,36 +20,36 @@ if TYPE_CHECKING:
 
 
 Side = Literal["below", "above", "either"]
-"""On which side of the cut stable contacts may lie."""
+"""Side of the cut on which contacts are stable; `either` is decided by the fit."""
 
 
 class Cut(NamedTuple):
-    """Where one feature is cut in two.
+    """Cut of the values of one feature into two classes.
 
     Attributes:
-        place: the value of the feature.
-        sign: 1 where stable lies above it, -1 where below.
-        gain: 2 n_0 n_1 (balanced accuracy - 1/2), which is a whole number.
+        value: value of the feature at the cut.
+        sign: 1 if contacts are stable above it, -1 if below.
+        gain: 2 n_0 n_1 (balanced accuracy - 1/2), an integer.
     """
 
-    place: float
+    value: float
     sign: int
     gain: int
 
 
 @dataclass(frozen=True)
 class Threshold:
-    """The cut on one feature that maximises balanced accuracy: exact, nothing to set.
+    """Cut on one feature that maximises balanced accuracy. It is exact and has no parameters.
 
-    All cuts halfway between neighbouring values are tried; among equals the lowest is taken. Of
-    several features the one with the best cut is taken, the first among equals; the others have
-    no say. The probability is a sigmoid of the feature.
+    All cuts halfway between neighbouring values are tried; the lowest of equal cuts is used. Of
+    several features, the first with the best cut is used and the others are ignored. The
+    probability is a sigmoid of the feature.
 
     Attributes:
-        side: on which side of the cut stable lies; a rule that calls slip what is above its
-            threshold knows it, and keeps its meaning.
-        name: of the way of fitting.
-        reference: nothing.
+        side: side of the cut on which contacts are stable. A slip rule with an upper threshold
+            has `below`.
+        name: of the recipe.
+        reference: reference parameters: none.
     """
 
     side: Side = "either"
@@ -57,25 +57,25 @@ class Threshold:
     reference: Parameters = field(default_factory=dict)
 
     def suggest(self, trial: "Trial") -> Parameters:
-        """Nothing: there is nothing to search for."""
+        """Return no parameters; there are none to search."""
         del trial
         return {}
 
     def fit(self, samples: Samples, parameters: Parameters, seed: int) -> LinearClassifier:
-        """The classifier fitted to the samples; deterministic, the seed is not used.
+        """Fit the classifier to the samples. The fit is deterministic; the seed is not used.
 
         Raises:
-            TrainingError: only one class.
+            TrainingError: the samples have only one class.
         """
         del parameters, seed
         check_classes(samples)
         cuts = [best_cut(column, samples.stable, self.side) for column in samples.features.T]
         chosen = int(np.argmax([cut.gain for cut in cuts]))
-        place, sign, _ = cuts[chosen]
+        value, sign, _ = cuts[chosen]
         mean, scale, features = standardise(samples.features)
         coefficients = np.zeros(len(mean))
         coefficients[chosen] = sign
-        intercept = sign * (mean[chosen] - place) / scale[chosen]
+        intercept = sign * (mean[chosen] - value) / scale[chosen]
         slope, offset = sigmoid(sign * features[:, chosen] + intercept, samples.stable)
         return LinearClassifier(
             mean=tuple(mean.tolist()),
@@ -91,30 +91,30 @@ class Threshold:
 def best_cut(
     values: npt.NDArray[np.float64], stable: npt.NDArray[np.bool_], side: Side = "either"
 ) -> Cut:
-    """The cut that maximises balanced accuracy; counted in whole numbers, so without rounding.
+    """Return the cut that maximises balanced accuracy, computed in integers without rounding.
 
     Args:
         values: (n,) of a feature, finite.
-        stable: (n,) the class; both are there.
-        side: on which side of the cut stable may lie.
+        stable: (n,) class; both classes occur.
+        side: side of the cut on which contacts are stable.
 
     Returns:
-        Halfway between two neighbours; at the value itself where all are the same.
+        The cut halfway between two neighbouring values; at the value itself if all are equal.
 
     Example:
         >>> best_cut(np.array([1.0, 4.0, 2.0, 8.0]), np.array([True, False, True, False]))
-        Cut(place=3.0, sign=-1, gain=4)
+        Cut(value=3.0, sign=-1, gain=4)
     """
     order = np.argsort(values, kind="stable")
     ordered, is_stable = values[order], stable[order]
-    places = np.flatnonzero(ordered[1:] > ordered[:-1])
-    if not len(places):
+    edges = np.flatnonzero(ordered[1:] > ordered[:-1])
+    if not len(edges):
         return Cut(float(ordered[0]), 1 if side == "above" else -1, 0)
     n_stable = int(is_stable.sum())
-    n_below, stable_below = places + 1, np.cumsum(is_stable)[places]
+    n_below, stable_below = edges + 1, np.cumsum(is_stable)[edges]
     excess = stable_below * len(stable) - n_below * n_stable
     gains = {"below": excess, "above": -excess, "either": np.abs(excess)}[side]
     best = int(np.argmax(gains))
     below = side == "below" or (side == "either" and excess[best] > 0)
-    left, right = ordered[places[best]], ordered[places[best] + 1]
+    left, right = ordered[edges[best]], ordered[edges[best] + 1]
     return Cut(float(left / 2 + right / 2), -1 if below else 1, int(gains[best]))

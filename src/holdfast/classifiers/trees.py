@@ -10,11 +10,11 @@ import numpy.typing as npt
 from holdfast.classifiers.fitting import (
     Parameters,
     Samples,
-    balance_of,
     check_classes,
-    unbalanced,
+    class_ratio,
+    undo_balancing,
 )
-from holdfast.classifiers.linear import Array, rows_of
+from holdfast.classifiers.linear import Array, feature_rows
 
 if TYPE_CHECKING:
     from optuna import Trial
@@ -22,48 +22,48 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True, eq=False)
 class Trees:
-    """Fitted trees.
+    """Fitted gradient-boosted trees.
 
     Attributes:
         estimator: of scikit-learn, fitted with balanced classes.
-        balance: by how much the balance has multiplied the odds.
+        class_ratio: factor by which the balanced classes multiplied the odds.
     """
 
     estimator: Any
-    balance: float
+    class_ratio: float
 
     @property
     def n_features(self) -> int:
-        """How many features they look at."""
+        """Number of features of their input."""
         return int(self.estimator.n_features_in_)
 
     @property
     def threshold(self) -> float:
-        """The probability from which on a contact is called stable: even odds once balanced."""
-        return 1.0 / (1.0 + self.balance)
+        """Probability from which on a contact is stable: even odds with balanced classes."""
+        return 1.0 / (1.0 + self.class_ratio)
 
     def probability(self, features: npt.ArrayLike) -> Array:
-        """The probability of stability of each row of (n, n_features); NaN for rows with NaN.
+        """Return the probability of stability of each row of (n, n_features); NaN if it has NaN.
 
         Raises:
-            ValueError: another number of features.
+            ValueError: the number of features is not `n_features`.
         """
-        rows = rows_of(features, self.n_features)
+        rows = feature_rows(features, self.n_features)
         found = np.full(len(rows), np.nan)
         known = ~np.isnan(rows).any(axis=1)
         if known.any():
             with _one_thread():
                 balanced = self.estimator.predict_proba(rows[known])[:, 1]
-            found[known] = unbalanced(balanced, self.balance)
+            found[known] = undo_balancing(balanced, self.class_ratio)
         return found
 
 
 @dataclass(frozen=True)
 class GradientBoosting:
-    """Gradient-boosted trees over histograms of the features, as many as asked for.
+    """Gradient-boosted trees over histograms of the features, without early stopping.
 
-    Classes are balanced by weights, the probability is corrected by the factor that they put on
-    the odds, the decision stays where they put it: as of logistic regression.
+    Classes are balanced by weights. The weights multiply the odds by a factor. The probability
+    is corrected by it; the decision is not changed by the correction.
     """
 
     name: str = "trees"
@@ -77,7 +77,7 @@ class GradientBoosting:
     )
 
     def suggest(self, trial: "Trial") -> Parameters:
-        """How many trees, how large, and how much each of them says."""
+        """Draw the number and size of the trees, and the weight of each."""
         return {
             "n_trees": trial.suggest_int("n_trees", 50, 400, log=True),
             "learning_rate": trial.suggest_float("learning_rate", 0.02, 0.3, log=True),
@@ -86,10 +86,10 @@ class GradientBoosting:
         }
 
     def fit(self, samples: Samples, parameters: Parameters, seed: int) -> Trees:
-        """The trees fitted to the samples.
+        """Fit the trees to the samples.
 
         Raises:
-            TrainingError: only one class.
+            TrainingError: the samples have only one class.
         """
         from sklearn.ensemble import HistGradientBoostingClassifier
 
@@ -105,11 +105,11 @@ class GradientBoosting:
         )
         with _one_thread():
             estimator.fit(samples.features, samples.stable)
-        return Trees(estimator, balance_of(samples.stable))
+        return Trees(estimator, class_ratio(samples.stable))
 
 
 def _one_thread() -> AbstractContextManager[Any]:
-    """Scikit-learn's threads wait for each other: on a busy machine six times as long."""
+    """Limit scikit-learn to one thread; its threads take six times as long on a busy machine."""
     from threadpoolctl import threadpool_limits
 
     limits: AbstractContextManager[Any] = threadpool_limits(1)

@@ -1,6 +1,5 @@
-"""How good decisions are: by sample, by event, pooled over recordings, with intervals."""
+"""Metrics of decisions: by sample, by event, pooled over recordings, with intervals."""
 
-from holdfast.metrics.calibration import calibration_sums
 from holdfast.metrics.decisions import Decisions, FingerDecisions, hand_decisions
 from holdfast.metrics.events import (
     AlarmMatch,
@@ -12,7 +11,7 @@ from holdfast.metrics.events import (
     pool_events,
 )
 from holdfast.metrics.intervals import Interval, bootstrap_interval, ratio_of_sums
-from holdfast.metrics.samples import SampleMetrics, sample_metrics
+from holdfast.metrics.samples import SampleMetrics, calibration_sums, sample_metrics
 from holdfast.metrics.summary import (
     EventIntervals,
     HandEventMetrics,

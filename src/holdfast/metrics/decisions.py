@@ -1,4 +1,4 @@
-"""What was decided about a recording, beside its labels: the input of all metrics."""
+"""Decisions about a recording, with its labels: the input of all metrics."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -16,19 +16,19 @@ Codes = npt.NDArray[np.int8]
 
 @dataclass(frozen=True, eq=False)
 class FingerDecisions:
-    """The labels of one finger, or of the hand, and what was decided, sample by sample.
+    """Labels and decided states of one finger, or of the hand, sample by sample.
 
     Arrays become read-only.
 
     Attributes:
         times: (n,) strictly increasing [s].
-        labels: (n,) codes of the label's state; UNKNOWN where there is none.
-        states: (n,) codes of the decided state.
-        stable_probability: (n,) that the contact is stable; NaN where the state is UNKNOWN,
-            and all NaN for a hand, whose state comes from its fingers'.
+        labels: (n,) codes of the labelled states; UNKNOWN without a label.
+        states: (n,) codes of the decided states.
+        stable_probability: (n,) probability that the contact is stable; NaN if the state is
+            UNKNOWN. All NaN for a hand, whose state follows from those of its fingers.
 
     Raises:
-        ValueError: the arrays differ in length, or the times do not increase.
+        ValueError: the lengths of the arrays differ, or the times do not increase.
     """
 
     times: Array
@@ -53,12 +53,12 @@ class FingerDecisions:
 
 @dataclass(frozen=True, eq=False)
 class Decisions:
-    """What was decided about one recording.
+    """Decisions about one recording.
 
     Attributes:
         name: of the recording.
-        fingers: labels and decisions of each finger, each at its own times.
-        hand: those of the hand; None where they are not asked for.
+        fingers: labels and decisions of each finger, at its own times.
+        hand: labels and decisions of the hand; None if they are not needed.
     """
 
     name: str
@@ -70,20 +70,20 @@ class Decisions:
 
     @classmethod
     def of(cls, name: str, fingers: Mapping[str, FingerDecisions], n_model_fingers: int) -> Self:
-        """The decisions of a recording, with the hand's made from the fingers'."""
+        """Return the decisions of a recording; those of the hand follow from the fingers."""
         return cls(name, fingers, hand_decisions(fingers, n_model_fingers))
 
 
 def hand_decisions(fingers: Mapping[str, FingerDecisions], n_model_fingers: int) -> FingerDecisions:
-    """The hand's labels and states out of its fingers', at every time of any finger.
+    """Return the labels and states of a hand, at every time of any finger.
 
-    A finger holds its latest code until its next sample, and is UNKNOWN before its first. The
-    hand's code follows from the fingers' codes as in `holdfast.contact.hand_state`, for the
-    labels as for the decided states.
+    A finger keeps its latest code until its next sample, and is UNKNOWN before its first. The
+    code of the hand follows from those of the fingers as in `holdfast.contact.hand_state`, both
+    for the labels and for the decided states.
 
     Args:
         fingers: of one recording, each at its own times.
-        n_model_fingers: how many fingers the model has.
+        n_model_fingers: number of fingers of the model.
 
     Returns:
         Codes at the merged times; the probabilities are NaN.
@@ -98,8 +98,8 @@ def hand_decisions(fingers: Mapping[str, FingerDecisions], n_model_fingers: int)
     """
     each = list(fingers.values())
     times = np.unique(np.concatenate([np.empty(0), *(finger.times for finger in each)]))
-    labels = [_held(finger.times, finger.labels, times) for finger in each]
-    states = [_held(finger.times, finger.states, times) for finger in each]
+    labels = [_latest_codes(finger.times, finger.labels, times) for finger in each]
+    states = [_latest_codes(finger.times, finger.states, times) for finger in each]
     return FingerDecisions(
         times,
         _hand_states(labels, len(times), n_model_fingers),
@@ -109,10 +109,10 @@ def hand_decisions(fingers: Mapping[str, FingerDecisions], n_model_fingers: int)
 
 
 def check_lengths(**arrays: npt.NDArray[Any]) -> None:
-    """Refuses arrays that are not of one length.
+    """Check that all arrays are one-dimensional and have the same length.
 
     Raises:
-        ValueError: an array is not (n,), with the same n for all.
+        ValueError: an array is not (n,), or n differs.
     """
     if any(a.ndim != 1 for a in arrays.values()) or len({len(a) for a in arrays.values()}) > 1:
         shapes = ", ".join(f"{name} {array.shape}" for name, array in arrays.items())
@@ -120,17 +120,17 @@ def check_lengths(**arrays: npt.NDArray[Any]) -> None:
 
 
 def check_times(times: Array) -> None:
-    """Refuses times that do not increase.
+    """Check that times increase.
 
     Raises:
-        ValueError: a time is not finite, or not after the one before.
+        ValueError: a time is not finite, or not later than the previous one.
     """
     if not (np.isfinite(times).all() and (np.diff(times) > 0).all()):
-        raise ValueError("finite, strictly increasing times expected; these are not")
+        raise ValueError("finite, strictly increasing times expected; the given times are not")
 
 
-def _held(times: Array, codes: Codes, at: Array) -> Codes:
-    """The latest code at each instant; UNKNOWN before the first."""
+def _latest_codes(times: Array, codes: Codes, at: Array) -> Codes:
+    """Return the latest code at each instant; UNKNOWN before the first."""
     padded = np.concatenate([np.array([UNKNOWN], dtype=np.int8), codes])
     return padded[np.searchsorted(times, at, side="right")]
 
@@ -139,5 +139,5 @@ def _hand_states(codes: list[Codes], n_times: int, n_model_fingers: int) -> Code
     """Return the state of the hand at every instant, from (n_times,) codes of each finger."""
     table = np.array(codes, dtype=np.int8).reshape(len(codes), n_times)
     unstable, unknown = (table == UNSTABLE).any(axis=0), (table == UNKNOWN).any(axis=0)
-    held = enough_contacts((table == STABLE).sum(axis=0), n_model_fingers)
-    return hand_states(unstable, unknown, held)
+    in_grasp = enough_contacts((table == STABLE).sum(axis=0), n_model_fingers)
+    return hand_states(unstable, unknown, in_grasp)

@@ -1,7 +1,7 @@
-"""Metrics by event: was the loss of stability told, how late, and how often for nothing.
+"""Metrics by event: missed events, detection delays and false alarms.
 
-A sample's label and decided state hold until the next sample; those of the last sample hold
-for the median step in time.
+The label and the decided state of a sample last until the next sample; those of the last sample
+last for the median interval between samples.
 """
 
 import math
@@ -20,25 +20,25 @@ from holdfast.metrics.statistics import finite_or_none, percent, quantile
 from holdfast.sensors.types import Array
 
 MIN_EVENT_DURATION = 0.05
-"""A run of not-stable labels of at least this [s] is an event."""
+"""Minimum duration of the not-stable labels of an event [s]."""
 
 MIN_GAP_DURATION = 0.1
-"""Gaps between not-stable labels shorter than this [s] are closed first."""
+"""Shorter gaps between not-stable labels are closed first [s]."""
 
 MIN_STABLE_DURATION = 0.5
-"""An event comes right after at least this [s] of unbroken stable labels."""
+"""Minimum duration of unbroken stable labels directly before an event [s]."""
 
 EARLY_TOLERANCE = 0.02
-"""An alarm may come this [s] before the onset and still belong to the event."""
+"""Maximum time of an alarm before the onset of its event [s]."""
 
 LATE_TOLERANCE = 0.25
-"""An alarm may come this [s] after the end and still belong to the event."""
+"""Maximum time of an alarm after the end of its event [s]."""
 
 POST_DURATIONS = (0.05, 0.1, 0.2)
-"""An event is missed at `post` where no alarm came until onset + post [s]."""
+"""Values of `post` [s]: an event is missed at `post` without an alarm until onset + post."""
 
 TIME_TOLERANCE = 1e-6
-"""Times that differ by less [s] are equal: what times in float64 lose by subtraction."""
+"""Times that differ by less are equal [s]; covers rounding errors of float64."""
 
 
 class InstabilityEvent(NamedTuple):
@@ -46,8 +46,8 @@ class InstabilityEvent(NamedTuple):
 
     Attributes:
         onset: time of the first not-stable label [s].
-        end: time of the first label after the run [s].
-        alarm: time of the first alarm that belongs to it [s]; None where it was missed.
+        end: time of the first label after the not-stable labels [s].
+        alarm: time of the first alarm that belongs to the event [s]; None if it was missed.
     """
 
     onset: float
@@ -56,7 +56,7 @@ class InstabilityEvent(NamedTuple):
 
     @property
     def delay(self) -> float:
-        """Alarm minus onset [s], at least -0.02; infinite where it was missed."""
+        """Detection delay [s]: alarm minus onset, at least -0.02; infinite for a missed event."""
         return math.inf if self.alarm is None else self.alarm - self.onset
 
 
@@ -65,7 +65,7 @@ class FalseAlarm(NamedTuple):
 
     Attributes:
         time: of the alarm [s].
-        label: the label's state at that time; UNKNOWN where there is none.
+        label: labelled state at that time; UNKNOWN without a label.
     """
 
     time: float
@@ -74,12 +74,12 @@ class FalseAlarm(NamedTuple):
 
 @dataclass(frozen=True)
 class AlarmMatch:
-    """The events and alarms of one finger, or hand, in one recording.
+    """Events and alarms of one finger, or hand, in one recording.
 
     Attributes:
         events: in order of time, each with its alarm.
         false_alarms: in order of time.
-        stable_seconds: how long the label is stable [s].
+        stable_seconds: duration of stable labels [s].
     """
 
     events: tuple[InstabilityEvent, ...]
@@ -87,23 +87,23 @@ class AlarmMatch:
     stable_seconds: float
 
     def n_missed(self, post: float) -> int:
-        """Events without an alarm until onset + post."""
+        """Return the number of events without an alarm until onset + post [s]."""
         return sum(event.delay > post + TIME_TOLERANCE for event in self.events)
 
 
 class EventMetrics(msgspec.Struct, frozen=True):
-    """How well the onsets of instability were told.
+    """Metrics of the detection of the onsets of instability.
 
     Attributes:
-        n_events: how many there were.
-        stable_minutes: how long the label was stable [min].
-        missed: for each `post` [s], the share of events without an alarm until onset + post
-            [%]; None without events.
-        delay_median: of alarm minus onset over all events, a miss counting as infinite [s];
-            None where it is infinite, or without events.
-        delay_p95: the 95th percentile of the same.
-        false_alarms_per_minute: false alarms per minute of stable label; None without any.
-        false_alarms: how many false alarms came under each label; UNKNOWN for none.
+        n_events: number of events.
+        stable_minutes: duration of stable labels [min].
+        missed: for each `post` [s], the percentage of events without an alarm until
+            onset + post [%]; None without events.
+        delay_median: median of alarm minus onset over all events; a missed event counts as
+            infinite [s]. None if it is infinite, or without events.
+        delay_p95: 95th percentile of the same.
+        false_alarms_per_minute: per minute of stable label; None without stable labels.
+        false_alarms: number of false alarms by labelled state; UNKNOWN without a label.
     """
 
     n_events: int
@@ -118,13 +118,13 @@ class EventMetrics(msgspec.Struct, frozen=True):
 def event_metrics(
     times: npt.ArrayLike, labels: npt.ArrayLike, states: npt.ArrayLike
 ) -> EventMetrics:
-    """How well the onsets of instability were told in one recording.
+    """Compute the event metrics of one recording.
 
-    `match_alarms` has the definitions, `pool_events` does the same for many recordings.
+    `match_alarms` has the definitions. `pool_events` does the same for several recordings.
 
     Args:
         times: (n,) strictly increasing [s].
-        labels: (n,) codes of the labels' states; UNKNOWN where there is none.
+        labels: (n,) codes of the labelled states; UNKNOWN without a label.
         states: (n,) codes of the decided states.
 
     Raises:
@@ -142,21 +142,21 @@ def event_metrics(
 
 
 def match_alarms(times: npt.ArrayLike, labels: npt.ArrayLike, states: npt.ArrayLike) -> AlarmMatch:
-    """The events of one recording, each with its alarm, and the false alarms.
+    """Return the events of one recording, each with its alarm, and the false alarms.
 
-    An event is a run of not-stable labels (UNSTABLE or NO_CONTACT) of at least 0.05 s, gaps
-    under 0.1 s closed, that follows at once on at least 0.5 s of unbroken stable labels. An
-    alarm is a change of the decided state from STABLE, at one sample, to UNSTABLE or
-    NO_CONTACT at the next. It belongs to the event where
+    An event is a run of not-stable labels (UNSTABLE or NO_CONTACT) of at least 0.05 s, after
+    gaps under 0.1 s are closed. It directly follows at least 0.5 s of unbroken stable labels.
+    An alarm is a change of the decided state from STABLE at one sample to UNSTABLE or
+    NO_CONTACT at the next. It belongs to the event for which
 
         onset - 0.02 s <= alarm <= end + 0.25 s
 
-    and to no other: to the one with the latest onset, should there be two. The first alarm of
-    an event counts, its others count nowhere; an alarm that belongs to no event is false.
+    If there are two, it belongs to the one with the later onset. The first alarm of an event
+    counts; its other alarms are ignored. An alarm that belongs to no event is a false alarm.
 
     Args:
         times: (n,) strictly increasing [s].
-        labels: (n,) codes of the labels' states; UNKNOWN where there is none.
+        labels: (n,) codes of the labelled states; UNKNOWN without a label.
         states: (n,) codes of the decided states.
 
     Raises:
@@ -177,17 +177,17 @@ def match_alarms(times: npt.ArrayLike, labels: npt.ArrayLike, states: npt.ArrayL
     stable = _spans(label == STABLE, time)
     onsets, ends = _events(_spans(_not_stable(label), time), stable)
     alarms = np.flatnonzero((state[:-1] == STABLE) & _not_stable(state[1:])) + 1
-    owners = _owners(time[alarms], onsets, ends)
-    false = alarms[owners < 0]
+    event_of = _event_of_alarms(time[alarms], onsets, ends)
+    false = alarms[event_of < 0]
     return AlarmMatch(
-        _with_alarms(onsets, ends, time[alarms], owners),
+        _with_alarms(onsets, ends, time[alarms], event_of),
         tuple(FalseAlarm(float(time[k]), _STATES[label[k]]) for k in false),
         float((stable[:, 1] - stable[:, 0]).sum()),
     )
 
 
 def pool_events(matches: Sequence[AlarmMatch]) -> EventMetrics:
-    """The event metrics over many recordings, or fingers; events never cross from one to another.
+    """Compute the event metrics of several recordings, or fingers, together.
 
     Args:
         matches: one for each recording, from `match_alarms`.
@@ -201,7 +201,7 @@ def pool_events(matches: Sequence[AlarmMatch]) -> EventMetrics:
     """
     delays = event_delays(matches)
     minutes = sum(match.stable_seconds for match in matches) / 60
-    under = [alarm.label for match in matches for alarm in match.false_alarms]
+    false_labels = [alarm.label for match in matches for alarm in match.false_alarms]
     return EventMetrics(
         n_events=len(delays),
         stable_minutes=minutes,
@@ -211,13 +211,13 @@ def pool_events(matches: Sequence[AlarmMatch]) -> EventMetrics:
         },
         delay_median=finite_or_none(quantile(delays, 0.5)),
         delay_p95=finite_or_none(quantile(delays, 0.95)),
-        false_alarms_per_minute=len(under) / minutes if minutes else None,
-        false_alarms={str(state): under.count(state) for state in ContactState},
+        false_alarms_per_minute=len(false_labels) / minutes if minutes else None,
+        false_alarms={str(state): false_labels.count(state) for state in ContactState},
     )
 
 
 def event_delays(matches: Sequence[AlarmMatch]) -> Array:
-    """Delays of all events in ascending order [s]; infinite for a miss."""
+    """Return the delays of all events in ascending order [s]; infinite for a missed event."""
     return np.sort(np.array([event.delay for match in matches for event in match.events]))
 
 
@@ -229,14 +229,14 @@ def _not_stable(codes: Codes) -> npt.NDArray[np.bool_]:
 
 
 def _spans(mask: npt.NDArray[np.bool_], times: Array) -> Array:
-    """(m, 2) start and end [s] of each unbroken run of True."""
+    """Return (m, 2) start and end [s] of each run of True."""
     period = float(np.median(np.diff(times))) if len(times) > 1 else 0.0
     instants = np.append(times, times[-1:] + period)
     return instants[runs(mask)]
 
 
 def _events(unstable: Array, stable: Array) -> tuple[Array, Array]:
-    """Onsets and ends [s] of the not-stable runs that are events."""
+    """Return the onsets and ends [s] of the not-stable runs that are events."""
     wide = unstable[1:, 0] - unstable[:-1, 1] >= MIN_GAP_DURATION - TIME_TOLERANCE
     first, last = np.append(True, wide)[: len(unstable)], np.append(wide, True)[: len(unstable)]
     onsets, ends = unstable[first, 0], unstable[last, 1]
@@ -247,18 +247,18 @@ def _events(unstable: Array, stable: Array) -> tuple[Array, Array]:
     return onsets[chosen], ends[chosen]
 
 
-def _owners(alarms: Array, onsets: Array, ends: Array) -> npt.NDArray[np.intp]:
-    """The place of the event that each alarm belongs to; -1 for a false alarm."""
+def _event_of_alarms(alarms: Array, onsets: Array, ends: Array) -> npt.NDArray[np.intp]:
+    """Return the index of the event that each alarm belongs to; -1 for a false alarm."""
     latest = np.searchsorted(onsets - EARLY_TOLERANCE - TIME_TOLERANCE, alarms, side="right") - 1
     limits = np.append(ends, -np.inf) + LATE_TOLERANCE + TIME_TOLERANCE
     return np.where(alarms <= limits[latest], latest, -1)
 
 
 def _with_alarms(
-    onsets: Array, ends: Array, alarms: Array, owners: npt.NDArray[np.intp]
+    onsets: Array, ends: Array, alarms: Array, event_of: npt.NDArray[np.intp]
 ) -> tuple[InstabilityEvent, ...]:
     first: dict[int, float] = {}
-    for owner, alarm in zip(owners.tolist(), alarms.tolist(), strict=True):
-        first.setdefault(owner, alarm)
+    for index, alarm in zip(event_of.tolist(), alarms.tolist(), strict=True):
+        first.setdefault(index, alarm)
     spans = zip(onsets.tolist(), ends.tolist(), strict=True)
     return tuple(InstabilityEvent(*span, first.get(k)) for k, span in enumerate(spans))

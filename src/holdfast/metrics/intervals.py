@@ -1,7 +1,7 @@
-"""Intervals by bootstrap over recordings: neighbouring samples are nearly copies.
+"""Confidence intervals by bootstrap over recordings, because neighbouring samples are nearly equal.
 
-A resample draws as many recordings as there are, with replacement; it is told by how often
-each recording was drawn. A statistic takes all resamples at once.
+A resample draws as many recordings as there are, with replacement. It is an array of the number
+of times that each recording was drawn. A statistic is computed for all resamples at once.
 """
 
 from collections.abc import Callable, Sequence
@@ -14,13 +14,13 @@ from holdfast.metrics.statistics import finite_or_none, quantile
 from holdfast.sensors.types import Array
 
 Interval = tuple[float | None, float | None]
-"""Lower and upper end; None where an end is infinite."""
+"""Lower and upper end; None for an infinite end."""
 
 Statistic = Callable[[Array], Array]
-"""From draws (n, n_recordings) to values (n,); NaN where a resample does not define it."""
+"""Function of draws (n, n_recordings) to values (n,); NaN if a resample does not define it."""
 
-_N_BINS = 4096
-"""Bins of about equal count that stand for many scores: far finer than an interval is wide."""
+MAX_SCORE_BINS = 4096
+"""Maximum number of bins of scores, of about equal count; far finer than an interval is wide."""
 
 
 def bootstrap_interval(
@@ -31,20 +31,20 @@ def bootstrap_interval(
     seed: int = 0,
     level: float = 0.95,
 ) -> Interval | None:
-    """The percentile interval of a statistic over resampled recordings.
+    """Compute the percentile interval of a statistic over resampled recordings.
 
     Its ends are the (1 - level)/2 and (1 + level)/2 quantiles of the statistic over n
     resamples. Resamples that do not define the statistic are left out.
 
     Args:
         statistic: see `ratio_of_sums`, `auc_of` and `quantile_of`.
-        n_recordings: how many there are.
-        n: how many resamples.
+        n_recordings: number of recordings.
+        n: number of resamples.
         seed: of the resamples; the same seed draws the same recordings for every statistic.
-        level: share of the resamples within the interval.
+        level: fraction of the resamples within the interval.
 
     Returns:
-        The interval; None with fewer than two recordings, or where nothing defines it.
+        The interval; None with fewer than two recordings, or if no resample defines it.
 
     Example:
         >>> right, samples = np.array([90, 80, 99]), np.array([100, 100, 100])
@@ -62,7 +62,7 @@ def bootstrap_interval(
 
 
 def ratio_of_sums(parts: npt.ArrayLike, wholes: npt.ArrayLike) -> Statistic:
-    """The statistic sum(parts) / sum(wholes); with wholes of 1, the mean of the parts.
+    """Return the statistic sum(parts) / sum(wholes); with wholes of 1, the mean of the parts.
 
     Args:
         parts: (n_recordings,).
@@ -73,30 +73,30 @@ def ratio_of_sums(parts: npt.ArrayLike, wholes: npt.ArrayLike) -> Statistic:
 
 
 def auc_of(positives: Sequence[Array], negatives: Sequence[Array]) -> Statistic:
-    """The statistic AUC over the pooled samples.
+    """Return the statistic AUC over the pooled samples.
 
-    With U[r, s] the pairs that positives of recording r win over negatives of recording s,
-    and w[r] how often r was drawn,
+    U[r, s] is the number of pairs in which a positive of recording r has a higher score than a
+    negative of recording s; w[r] is the number of times that r was drawn:
 
         AUC = sum(w[r] w[s] U[r, s]) / (sum(w[r] p[r]) sum(w[s] q[s]))
 
-    which needs no sorting for a resample. Up to 4096 samples U is exact; beyond, scores of
-    one bin count as ties.
+    No resample needs sorting. Up to 4096 samples U is exact; with more samples, scores in the
+    same bin count as ties.
 
     Args:
         positives: scores of class 1 for each recording.
         negatives: scores of class 0 for each recording.
     """
     ordered = np.sort(np.concatenate([*positives, *negatives]))
-    edges = np.unique(ordered[:: max(1, -(-len(ordered) // _N_BINS))])
+    edges = np.unique(ordered[:: max(1, -(-len(ordered) // MAX_SCORE_BINS))])
     positive, negative = _histograms(positives, edges), _histograms(negatives, edges)
-    won = positive @ (np.cumsum(negative, axis=1) - negative / 2).T
+    ordered_pairs = positive @ (np.cumsum(negative, axis=1) - negative / 2).T
     p, q = positive.sum(axis=1), negative.sum(axis=1)
-    return lambda w: _divide(((w @ won) * w).sum(axis=1), (w @ p) * (w @ q))
+    return lambda w: _divide(((w @ ordered_pairs) * w).sum(axis=1), (w @ p) * (w @ q))
 
 
 def quantile_of(values: Sequence[Array], q: float) -> Statistic:
-    """The statistic quantile over the pooled values, which may be infinite.
+    """Return the statistic q-quantile over the pooled values, which may be infinite.
 
     Args:
         values: for each recording.
@@ -117,7 +117,7 @@ def quantile_of(values: Sequence[Array], q: float) -> Statistic:
 
 @lru_cache(maxsize=1)
 def _draws(n_recordings: int, n: int, seed: int) -> Array:
-    """(n, n_recordings) how often each resample drew each recording."""
+    """Return (n, n_recordings) number of times that each resample drew each recording."""
     shares = np.full(n_recordings, 1 / n_recordings)
     draws = np.random.default_rng(seed).multinomial(n_recordings, shares, size=n).astype(float)
     draws.flags.writeable = False
@@ -125,14 +125,14 @@ def _draws(n_recordings: int, n: int, seed: int) -> Array:
 
 
 def _histograms(scores: Sequence[Array], edges: Array) -> Array:
-    """(n_recordings, n_edges + 1) how many scores of each recording lie in each bin."""
+    """Return (n_recordings, n_edges + 1) number of scores of each recording in each bin."""
     bins = [np.searchsorted(edges, np.sort(each), side="right") for each in scores]
     rows = [np.bincount(each, minlength=len(edges) + 1) for each in bins]
     return np.array(rows, dtype=np.float64)
 
 
 def _divide(part: Array, whole: Array) -> Array:
-    """Part / whole; NaN where the whole is 0."""
+    """Return part / whole; NaN where the whole is 0."""
     out = np.full(len(part), np.nan)
     np.divide(part, whole, out=out, where=whole > 0)
     return out

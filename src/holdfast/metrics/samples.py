@@ -9,25 +9,29 @@ import numpy as np
 import numpy.typing as npt
 
 from holdfast.contact import NO_CONTACT, STABLE, UNKNOWN, UNSTABLE
-from holdfast.metrics.decisions import check_lengths
-from holdfast.metrics.statistics import finite_or_none, pairs_won, percent
+from holdfast.metrics.decisions import FingerDecisions, check_lengths
+from holdfast.metrics.statistics import finite_or_none, mann_whitney_u, percent
 from holdfast.sensors.types import Array
+
+N_CALIBRATION_BINS = 10
+"""Number of bins of probabilities from 0 to 1."""
 
 
 class SampleMetrics(msgspec.Struct, frozen=True):
-    """How well the samples of a finger, or of many, were told apart.
+    """Metrics of a binary classification, of the samples of one or more fingers.
 
     Attributes:
-        n: samples with a label and a decision; only they count below.
+        n: number of samples with a label and a decision; only they count below.
         accuracy: (TP + TN) / n [%].
-        fdr: FP / (TP + FP), of what was called stable the share that was not [%].
-        fpr: FP / (FP + TN), of what was not stable the share called stable [%].
-        fnr: FN / (FN + TP), of what was stable the share not called so [%].
-        auc: probability that a stable sample scores above one that is not; ties count half.
-        auc_contact: the same, with the samples labelled NO_CONTACT left out.
+        fdr: FP / (TP + FP), false discovery rate: not stable, of the samples decided stable [%].
+        fpr: FP / (FP + TN), false positive rate: decided stable, of those not stable [%].
+        fnr: FN / (FN + TP), false negative rate: decided not stable, of those stable [%].
+        auc: probability that a stable sample has a higher score than one that is not stable;
+            ties count half.
+        auc_contact: the same without the samples labelled NO_CONTACT.
         confusion: [[TN, FP], [FN, TP]].
-        brier: mean of (stable_probability - class)^2; None where a score is no probability.
-        n_undecided: samples with a label whose decided state is UNKNOWN.
+        brier: mean of (stable_probability - class)^2; None if a score is no probability.
+        n_undecided: number of samples with a label whose decided state is UNKNOWN.
     """
 
     n: int
@@ -43,8 +47,8 @@ class SampleMetrics(msgspec.Struct, frozen=True):
 
 
 @dataclass(frozen=True, eq=False)
-class Tally:
-    """What the metrics need of some samples; tallies pool without the samples.
+class ScoredSamples:
+    """Scores and counts of labelled samples, from which the metrics are computed.
 
     Attributes:
         stable: scores of the samples labelled STABLE.
@@ -52,7 +56,7 @@ class Tally:
         no_contact: scores of those labelled NO_CONTACT.
         confusion: (2, 2) counts [[TN, FP], [FN, TP]].
         squared_error: sum of (score - class)^2; NaN where a score lies outside [0, 1].
-        n_undecided: samples with a label whose decided state is UNKNOWN.
+        n_undecided: number of samples with a label whose decided state is UNKNOWN.
     """
 
     stable: Array
@@ -64,25 +68,26 @@ class Tally:
 
     @property
     def not_stable(self) -> Array:
-        """Scores of the samples of class 0."""
+        """Scores of the samples of class 0 (not stable)."""
         return np.concatenate([self.unstable, self.no_contact])
 
 
 def sample_metrics(
     labels: npt.ArrayLike, states: npt.ArrayLike, stable_probability: npt.ArrayLike
 ) -> SampleMetrics:
-    """How well the samples were told apart, stable (positive) from everything else.
+    """Compute the metrics of the classification stable (positive) against all other states.
 
     Samples without a label, or whose decided state is UNKNOWN, are left out. The decision is
-    class 1 where the state is STABLE. A figure whose denominator is 0 is None.
+    class 1 if the state is STABLE. A metric whose denominator is 0 is None.
 
     Args:
-        labels: (n,) codes of the labels' states.
+        labels: (n,) codes of the labelled states.
         states: (n,) codes of the decided states.
-        stable_probability: (n,) that the contact is stable; ignored where left out.
+        stable_probability: (n,) probability that the contact is stable; ignored for samples that
+            are left out.
 
     Raises:
-        ValueError: the shapes differ, or a decided sample's probability is NaN.
+        ValueError: the shapes differ, or the probability of a decided sample is NaN.
 
     Example:
         >>> labels = [STABLE, STABLE, UNSTABLE, NO_CONTACT, UNKNOWN]
@@ -93,13 +98,13 @@ def sample_metrics(
         >>> metrics.auc, metrics.auc_contact
         (0.75, 0.5)
     """
-    return measure(tally_samples(labels, states, stable_probability))
+    return metrics_of_samples(score_samples(labels, states, stable_probability))
 
 
-def tally_samples(
+def score_samples(
     labels: npt.ArrayLike, states: npt.ArrayLike, stable_probability: npt.ArrayLike
-) -> Tally:
-    """Counts the samples of one finger; see `sample_metrics`."""
+) -> ScoredSamples:
+    """Return the scores and counts of the samples of one finger; see `sample_metrics`."""
     label, state = np.asarray(labels, dtype=np.int8), np.asarray(states, dtype=np.int8)
     score = np.asarray(stable_probability, dtype=np.float64)
     check_lengths(labels=label, states=state, stable_probability=score)
@@ -110,7 +115,7 @@ def tally_samples(
         raise ValueError(f"{n_missing} decided samples have NaN for stable_probability")
     truth, decision = label == STABLE, state == STABLE
     confusion = np.bincount(2 * truth + decision, minlength=4).reshape(2, 2)
-    return Tally(
+    return ScoredSamples(
         stable=score[truth],
         unstable=score[label == UNSTABLE],
         no_contact=score[label == NO_CONTACT],
@@ -120,38 +125,57 @@ def tally_samples(
     )
 
 
-def pool_tallies(tallies: Sequence[Tally]) -> Tally:
-    """One tally of all samples, as if they had been one finger's."""
-    return Tally(
-        stable=np.concatenate([np.empty(0), *(each.stable for each in tallies)]),
-        unstable=np.concatenate([np.empty(0), *(each.unstable for each in tallies)]),
-        no_contact=np.concatenate([np.empty(0), *(each.no_contact for each in tallies)]),
-        confusion=sum((each.confusion for each in tallies), np.zeros((2, 2), dtype=np.int64)),
-        squared_error=float(sum(each.squared_error for each in tallies)),
-        n_undecided=sum(each.n_undecided for each in tallies),
+def pool_samples(parts: Sequence[ScoredSamples]) -> ScoredSamples:
+    """Return the scores and counts of all samples together."""
+    return ScoredSamples(
+        stable=np.concatenate([np.empty(0), *(each.stable for each in parts)]),
+        unstable=np.concatenate([np.empty(0), *(each.unstable for each in parts)]),
+        no_contact=np.concatenate([np.empty(0), *(each.no_contact for each in parts)]),
+        confusion=sum((each.confusion for each in parts), np.zeros((2, 2), dtype=np.int64)),
+        squared_error=float(sum(each.squared_error for each in parts)),
+        n_undecided=sum(each.n_undecided for each in parts),
     )
 
 
-def measure(tally: Tally) -> SampleMetrics:
-    """The metrics of a tally."""
-    (tn, fp), (fn, tp) = tally.confusion.tolist()
+def metrics_of_samples(samples: ScoredSamples) -> SampleMetrics:
+    """Compute the metrics of scored samples."""
+    (tn, fp), (fn, tp) = samples.confusion.tolist()
     n = tn + fp + fn + tp
-    won_unstable = pairs_won(tally.stable, tally.unstable)
-    won = won_unstable + pairs_won(tally.stable, tally.no_contact)
-    contact_pairs = len(tally.stable) * len(tally.unstable)
-    pairs = contact_pairs + len(tally.stable) * len(tally.no_contact)
+    u_unstable = mann_whitney_u(samples.stable, samples.unstable)
+    u = u_unstable + mann_whitney_u(samples.stable, samples.no_contact)
+    contact_pairs = len(samples.stable) * len(samples.unstable)
+    pairs = contact_pairs + len(samples.stable) * len(samples.no_contact)
     return SampleMetrics(
         n=n,
         accuracy=percent(tp + tn, n),
         fdr=percent(fp, tp + fp),
         fpr=percent(fp, fp + tn),
         fnr=percent(fn, fn + tp),
-        auc=won / pairs if pairs else None,
-        auc_contact=won_unstable / contact_pairs if contact_pairs else None,
+        auc=u / pairs if pairs else None,
+        auc_contact=u_unstable / contact_pairs if contact_pairs else None,
         confusion=[[tn, fp], [fn, tp]],
-        brier=finite_or_none(tally.squared_error / n) if n else None,
-        n_undecided=tally.n_undecided,
+        brier=finite_or_none(samples.squared_error / n) if n else None,
+        n_undecided=samples.n_undecided,
     )
+
+
+def calibration_sums(decisions: Sequence[FingerDecisions]) -> Array:
+    """Return sums for the calibration of probabilities.
+
+    Args:
+        decisions: of any fingers; samples without a label or a decision are left out.
+
+    Returns:
+        (10, 3) for each bin of probabilities: their sum, the number of samples labelled stable, and
+        the number of all samples. The sums of several recordings can be added.
+    """
+    known = [(each, (each.labels != UNKNOWN) & (each.states != UNKNOWN)) for each in decisions]
+    score = np.concatenate([np.empty(0), *(each.stable_probability[rows] for each, rows in known)])
+    stable = np.concatenate([np.empty(0), *(each.labels[rows] == STABLE for each, rows in known)])
+    bins = np.clip((score * N_CALIBRATION_BINS).astype(int), 0, N_CALIBRATION_BINS - 1)
+    columns = (score, stable, np.ones(len(bins)))
+    sums = [np.bincount(bins, weights=each, minlength=N_CALIBRATION_BINS) for each in columns]
+    return np.column_stack(sums).astype(np.float64)  # without samples, bincount returns integers
 
 
 def _squared_error(score: Array, truth: npt.NDArray[np.bool_]) -> float:

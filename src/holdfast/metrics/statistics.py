@@ -1,4 +1,4 @@
-"""The few statistics that samples, events and intervals share."""
+"""Statistics that samples, events and intervals share."""
 
 import math
 
@@ -8,15 +8,15 @@ from holdfast.sensors.types import Array
 
 
 def percent(part: float, whole: float) -> float | None:
-    """100 part / whole [%]; None where the whole is 0."""
+    """Return 100 part / whole [%]; None if the whole is 0."""
     return 100.0 * part / whole if whole else None
 
 
-def pairs_won(positive: Array, negative: Array) -> float:
-    """How many pairs (positive, negative) the positive's score wins; a tie counts half.
+def mann_whitney_u(positive: Array, negative: Array) -> float:
+    """Return the Mann-Whitney statistic U.
 
-    This is the Mann-Whitney statistic U; the area under the ROC curve is U divided by the
-    number of pairs.
+    U is the number of pairs (positive, negative) in which the positive has the higher score; a
+    tie counts half. The area under the ROC curve is U divided by the number of pairs.
 
     Args:
         positive: (p,) scores, no NaN.
@@ -26,7 +26,7 @@ def pairs_won(positive: Array, negative: Array) -> float:
         U, from 0 to p q.
 
     Example:
-        >>> pairs_won(np.array([0.5, 0.9]), np.array([0.1, 0.5]))
+        >>> mann_whitney_u(np.array([0.5, 0.9]), np.array([0.1, 0.5]))
         3.5
     """
     upper, lower = np.sort(positive), np.sort(negative)
@@ -36,10 +36,10 @@ def pairs_won(positive: Array, negative: Array) -> float:
 
 
 def quantile(ordered: Array, q: float) -> float | None:
-    """The q-quantile of ordered values that may end in infinities.
+    """Return the q-quantile of ordered values, of which the last may be infinite.
 
-    Interpolated linearly as NumPy does: at place h = q (n - 1), between the values on either
-    side. It is infinite where a value with any weight is.
+    It is interpolated linearly as by NumPy, at the position h = q (n - 1) between two values. It
+    is infinite if one of them has a weight and is infinite.
 
     Args:
         ordered: (n,) ascending.
@@ -56,15 +56,15 @@ def quantile(ordered: Array, q: float) -> float | None:
     """
     if not len(ordered):
         return None
-    place = round(q * (len(ordered) - 1), 9)
-    lower = math.floor(place)
-    share = place - lower
+    position = round(q * (len(ordered) - 1), 9)
+    lower = math.floor(position)
+    fraction = position - lower
     value = float(ordered[lower])
-    if not share or not math.isfinite(value):
+    if not fraction or not math.isfinite(value):
         return value
-    return value + share * (float(ordered[lower + 1]) - value)
+    return value + fraction * (float(ordered[lower + 1]) - value)
 
 
 def finite_or_none(value: float | None) -> float | None:
-    """The value; None where it is infinite or NaN, which JSON cannot hold."""
+    """Return the value; None if it is infinite or NaN, which JSON cannot represent."""
     return value if value is not None and math.isfinite(value) else None

@@ -1,4 +1,4 @@
-"""The metrics of many recordings: per finger, pooled, per recording, by event."""
+"""Metrics of several recordings: per finger, pooled, per recording, by event."""
 
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
@@ -24,7 +24,13 @@ from holdfast.metrics.intervals import (
     quantile_of,
     ratio_of_sums,
 )
-from holdfast.metrics.samples import SampleMetrics, Tally, measure, pool_tallies, tally_samples
+from holdfast.metrics.samples import (
+    SampleMetrics,
+    ScoredSamples,
+    metrics_of_samples,
+    pool_samples,
+    score_samples,
+)
 
 
 class HandEventMetrics(msgspec.Struct, frozen=True):
@@ -35,7 +41,7 @@ class HandEventMetrics(msgspec.Struct, frozen=True):
 
 
 class RecordingMetrics(msgspec.Struct, frozen=True):
-    """The metrics of one recording."""
+    """Metrics of one recording."""
 
     name: str
     fingers: dict[str, SampleMetrics]
@@ -43,9 +49,10 @@ class RecordingMetrics(msgspec.Struct, frozen=True):
 
 
 class EventIntervals(msgspec.Struct, frozen=True):
-    """Intervals of the hand's event metrics, in their units; a delay's end may be infinite (null).
+    """Intervals of the event metrics of the hand, in their units.
 
-    An interval is None where no resample defines its figure.
+    An interval is None if no resample defines its metric. The end of the interval of a delay is
+    null if it is infinite.
     """
 
     missed: dict[str, Interval | None]
@@ -55,11 +62,11 @@ class EventIntervals(msgspec.Struct, frozen=True):
 
 
 class Intervals(msgspec.Struct, frozen=True):
-    """Intervals of the pooled sample metrics and of the hand's event metrics.
+    """Intervals of the pooled sample metrics and of the event metrics of the hand.
 
     Attributes:
-        n_recordings: how many recordings they rest on: those with labels.
-        level: share of the resamples within each interval.
+        n_recordings: number of recordings with labels.
+        level: fraction of the resamples within each interval.
         accuracy: [%].
         fdr: [%].
         fpr: [%].
@@ -67,7 +74,7 @@ class Intervals(msgspec.Struct, frozen=True):
         auc: stable against the rest.
         auc_contact: stable against unstable.
         brier: of the probabilities.
-        hand: of the events.
+        hand: of the event metrics.
     """
 
     n_recordings: int
@@ -83,15 +90,14 @@ class Intervals(msgspec.Struct, frozen=True):
 
 
 class Metrics(msgspec.Struct, frozen=True):
-    """How good decisions about recordings are; `msgspec.json.encode` gives the JSON.
+    """Metrics of decisions about recordings; `msgspec.json.encode` returns their JSON.
 
     Attributes:
         fingers: by sample, of each finger over all recordings.
         pooled: by sample, over all fingers and recordings.
         recordings: of each recording.
         events: by event, over all recordings.
-        intervals: by bootstrap over recordings; None with fewer than
-            two recordings that have labels.
+        intervals: by bootstrap over recordings; None with fewer than two labelled recordings.
     """
 
     fingers: dict[str, SampleMetrics]
@@ -102,14 +108,14 @@ class Metrics(msgspec.Struct, frozen=True):
 
 
 @dataclass(frozen=True, eq=False)
-class _Counted:
-    """What stays of a recording once its samples are let go.
+class _RecordingResults:
+    """Scores, events and alarms of a recording, without its samples.
 
-    Fingers, and the hand, without any label have no events and no false alarms.
+    A finger, or the hand, without labels has no events and no false alarms.
     """
 
     name: str
-    tallies: Mapping[str, Tally]
+    samples: Mapping[str, ScoredSamples]
     matches: Mapping[str, AlarmMatch]
     hand: Sequence[AlarmMatch]
 
@@ -117,19 +123,19 @@ class _Counted:
 def summarise(
     decisions: Iterable[Decisions], *, n_resamples: int = 1000, seed: int = 0, level: float = 0.95
 ) -> Metrics:
-    """The metrics of many recordings.
+    """Compute the metrics of several recordings.
 
-    Takes one recording at a time, and keeps of it the scores of labelled samples, counts,
-    events and alarms.
+    The recordings are read one at a time. Only the scores of labelled samples, counts, events
+    and alarms stay in memory.
 
     Args:
         decisions: of each recording.
-        n_resamples: of the bootstrap over recordings.
-        seed: of the same.
-        level: share of the resamples within each interval.
+        n_resamples: number of resamples of the bootstrap over recordings.
+        seed: of the bootstrap.
+        level: fraction of the resamples within each interval.
 
     Raises:
-        ValueError: a decided sample's probability is NaN.
+        ValueError: the probability of a decided sample is NaN.
 
     Example:
         >>> thumb = FingerDecisions([0.0, 0.01], [3, 2], [3, 2], [0.9, 0.2])
@@ -137,24 +143,26 @@ def summarise(
         >>> metrics.pooled.accuracy, metrics.events.hand.n_events, metrics.intervals
         (100.0, 0, None)
     """
-    counted = [_count(each) for each in decisions]
-    names = list(dict.fromkeys(name for each in counted for name in each.tallies))
-    tallies = [tally for each in counted for tally in each.tallies.values()]
+    results = [_evaluate(each) for each in decisions]
+    names = list(dict.fromkeys(name for each in results for name in each.samples))
+    every = [own for each in results for own in each.samples.values()]
     return Metrics(
         fingers={
-            name: measure(pool_tallies([c.tallies[name] for c in counted if name in c.tallies]))
+            name: metrics_of_samples(
+                pool_samples([each.samples[name] for each in results if name in each.samples])
+            )
             for name in names
         },
-        pooled=measure(pool_tallies(tallies)),
-        recordings=[_recording_metrics(each) for each in counted],
-        events=_event_metrics(counted, names),
-        intervals=_intervals([c for c in counted if c.matches], n_resamples, seed, level),
+        pooled=metrics_of_samples(pool_samples(every)),
+        recordings=[_recording_metrics(each) for each in results],
+        events=_event_metrics(results, names),
+        intervals=_intervals([each for each in results if each.matches], n_resamples, seed, level),
     )
 
 
-def _count(decisions: Decisions) -> _Counted:
-    tallies = {
-        name: tally_samples(finger.labels, finger.states, finger.stable_probability)
+def _evaluate(decisions: Decisions) -> _RecordingResults:
+    samples = {
+        name: score_samples(finger.labels, finger.states, finger.stable_probability)
         for name, finger in decisions.fingers.items()
     }
     matches = {
@@ -162,56 +170,61 @@ def _count(decisions: Decisions) -> _Counted:
     }
     hand = decisions.hand
     hand_matches = [] if hand is None or not hand.labels.any() else [_match(hand)]
-    return _Counted(decisions.name, tallies, matches, hand_matches)
+    return _RecordingResults(decisions.name, samples, matches, hand_matches)
 
 
 def _match(finger: FingerDecisions) -> AlarmMatch:
     return match_alarms(finger.times, finger.labels, finger.states)
 
 
-def _recording_metrics(counted: _Counted) -> RecordingMetrics:
-    fingers = {name: measure(tally) for name, tally in counted.tallies.items()}
-    return RecordingMetrics(counted.name, fingers, _event_metrics([counted], list(fingers)))
+def _recording_metrics(results: _RecordingResults) -> RecordingMetrics:
+    fingers = {name: metrics_of_samples(own) for name, own in results.samples.items()}
+    return RecordingMetrics(results.name, fingers, _event_metrics([results], list(fingers)))
 
 
-def _event_metrics(counted: Sequence[_Counted], names: Sequence[str]) -> HandEventMetrics:
+def _event_metrics(results: Sequence[_RecordingResults], names: Sequence[str]) -> HandEventMetrics:
     fingers = {
-        name: pool_events([c.matches[name] for c in counted if name in c.matches]) for name in names
+        name: pool_events([each.matches[name] for each in results if name in each.matches])
+        for name in names
     }
-    return HandEventMetrics(fingers, pool_events([match for c in counted for match in c.hand]))
+    return HandEventMetrics(
+        fingers, pool_events([match for each in results for match in each.hand])
+    )
 
 
-def _intervals(counted: Sequence[_Counted], n: int, seed: int, level: float) -> Intervals | None:
-    if len(counted) < 2:
+def _intervals(
+    results: Sequence[_RecordingResults], n: int, seed: int, level: float
+) -> Intervals | None:
+    if len(results) < 2:
         return None
-    interval = partial(bootstrap_interval, n_recordings=len(counted), n=n, seed=seed, level=level)
-    tallies = [pool_tallies(list(each.tallies.values())) for each in counted]
-    samples = {name: interval(each) for name, each in _sample_statistics(tallies).items()}
-    events = {name: interval(each) for name, each in _event_statistics(counted).items()}
+    interval = partial(bootstrap_interval, n_recordings=len(results), n=n, seed=seed, level=level)
+    samples = [pool_samples(list(each.samples.values())) for each in results]
+    by_sample = {name: interval(each) for name, each in _sample_statistics(samples).items()}
+    events = {name: interval(each) for name, each in _event_statistics(results).items()}
     missed = {str(post): events.pop(str(post)) for post in POST_DURATIONS}
     hand = EventIntervals(missed=missed, **events)
-    return Intervals(n_recordings=len(counted), level=level, hand=hand, **samples)
+    return Intervals(n_recordings=len(results), level=level, hand=hand, **by_sample)
 
 
-def _sample_statistics(tallies: Sequence[Tally]) -> dict[str, Statistic]:
-    """Of the pooled samples; a tally for each recording."""
-    tn, fp, fn, tp = np.array([tally.confusion.ravel() for tally in tallies]).T
+def _sample_statistics(samples: Sequence[ScoredSamples]) -> dict[str, Statistic]:
+    """Return the statistics of the sample metrics, given the samples of each recording."""
+    tn, fp, fn, tp = np.array([each.confusion.ravel() for each in samples]).T
     n = tn + fp + fn + tp
-    stable = [tally.stable for tally in tallies]
+    stable = [each.stable for each in samples]
     return {
         "accuracy": ratio_of_sums(100 * (tp + tn), n),
         "fdr": ratio_of_sums(100 * fp, tp + fp),
         "fpr": ratio_of_sums(100 * fp, fp + tn),
         "fnr": ratio_of_sums(100 * fn, fn + tp),
-        "auc": auc_of(stable, [tally.not_stable for tally in tallies]),
-        "auc_contact": auc_of(stable, [tally.unstable for tally in tallies]),
-        "brier": ratio_of_sums([tally.squared_error for tally in tallies], n),
+        "auc": auc_of(stable, [each.not_stable for each in samples]),
+        "auc_contact": auc_of(stable, [each.unstable for each in samples]),
+        "brier": ratio_of_sums([each.squared_error for each in samples], n),
     }
 
 
-def _event_statistics(counted: Sequence[_Counted]) -> dict[str, Statistic]:
-    """Of the hand's events; those missed are named by their `post`."""
-    matches = [match for each in counted for match in each.hand or [_NOTHING]]
+def _event_statistics(results: Sequence[_RecordingResults]) -> dict[str, Statistic]:
+    """Return the statistics of the hand's event metrics; missed events under their `post`."""
+    matches = [match for each in results for match in each.hand or [_NO_EVENTS]]
     n_events = [len(match.events) for match in matches]
     n_false = [len(match.false_alarms) for match in matches]
     minutes = [match.stable_seconds / 60 for match in matches]
@@ -227,5 +240,5 @@ def _event_statistics(counted: Sequence[_Counted]) -> dict[str, Statistic]:
     }
 
 
-_NOTHING = AlarmMatch((), (), 0.0)
-"""Stands for a recording whose hand has no labels or decisions, so that all count alike."""
+_NO_EVENTS = AlarmMatch((), (), 0.0)
+"""Events of a recording whose hand has no labels, so that every recording counts once."""

@@ -133,7 +133,7 @@ def test_a_threshold_has_nothing_to_search_and_calls_little_energy_stable(corpor
     pool = pool_samples(corpora["main"], 150.0, "index", 14, seed=0)
     train = pool.parts >= 5
     energy = pool.select(["energy"]).features[:, 0]
-    cut = best_cut(energy[train], pool.samples.stable[train], "below").place
+    cut = best_cut(energy[train], pool.samples.stable[train], "below").value
     right = (energy <= cut) == pool.samples.stable
     tn, _, _, tp = np.sum(cell.counts[HELD_OUT], axis=0)
     assert tn + tp == right[~train].sum()
