@@ -119,7 +119,7 @@ def test_probability_is_the_softmax_with_the_balance_taken_out():
 
 @deep
 def test_no_feature_no_probability():
-    network = Network(drawn(3), np.zeros(3), np.ones(3), n_steps=10, balance=1.0)
+    network = Network(drawn(3), np.zeros(3), np.ones(3), n_steps=10, class_ratio=1.0)
     rows = np.zeros((3, 30))
     rows[1, 7] = np.nan
     assert np.isnan(network.probability(rows)).tolist() == [False, True, False]
@@ -234,7 +234,7 @@ def test_without_torch_it_says_what_to_install(monkeypatch):
     assert str(raised.value) == (
         'this needs the package torch, which is not installed: pip install "holdfast[deep]"'
     )
-    network = Network(drawn(3), np.zeros(3), np.ones(3), n_steps=10, balance=1.0)
+    network = Network(drawn(3), np.zeros(3), np.ones(3), n_steps=10, class_ratio=1.0)
     with pytest.raises(MissingExtra):
         network.probability(np.zeros((1, 30)))
 

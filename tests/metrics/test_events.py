@@ -11,7 +11,7 @@ from holdfast.metrics import (
     match_alarms,
     pool_events,
 )
-from holdfast.metrics.events import _owners
+from holdfast.metrics.events import _event_of_alarms
 
 from . import naive
 
@@ -129,7 +129,7 @@ def test_a_false_alarm_has_the_label_at_its_time():
 def test_an_alarm_in_two_windows_belongs_to_the_later_event():
     onsets, ends = np.array([1.0, 1.2]), np.array([1.1, 1.3])
     alarms = np.array([0.5, 1.0, 1.17, 1.18, 1.55, 1.6])
-    assert _owners(alarms, onsets, ends).tolist() == [-1, 0, 0, 1, 1, -1]
+    assert _event_of_alarms(alarms, onsets, ends).tolist() == [-1, 0, 0, 1, 1, -1]
 
 
 def test_event_metrics_computed_by_hand():

@@ -6,7 +6,7 @@ from sklearn.metrics import brier_score_loss, confusion_matrix, roc_auc_score
 
 from holdfast.contact import NO_CONTACT, STABLE, UNKNOWN, UNSTABLE
 from holdfast.metrics import sample_metrics
-from holdfast.metrics.samples import measure, pool_samples, score_samples
+from holdfast.metrics.samples import metrics_of_samples, pool_samples, score_samples
 
 sample = st.tuples(st.integers(0, 3), st.integers(0, 3), st.sampled_from([0, 0.1, 0.5, 0.7, 1]))
 
@@ -99,7 +99,7 @@ def test_shapes_that_differ_are_refused():
 @given(st.lists(sample, min_size=1, max_size=60), st.integers(0, 60))
 def test_pooled_samples_equal_all_samples(samples, cut):
     parts = [part for part in (samples[:cut], samples[cut:]) if part]
-    pooled = measure(pool_samples([score_samples(*columns(part)) for part in parts]))
+    pooled = metrics_of_samples(pool_samples([score_samples(*columns(part)) for part in parts]))
     whole = sample_metrics(*columns(samples))
     assert pooled.confusion == whole.confusion
     assert (pooled.auc, pooled.auc_contact) == (whole.auc, whole.auc_contact)
