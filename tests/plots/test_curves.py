@@ -14,7 +14,7 @@ def drawn(figure):
     return figure
 
 
-def test_lines_bands_and_the_papers():
+def test_lines_have_bands_and_the_paper_is_black():
     curve = Curve(X, np.array([90.0, 91, 92]), np.array([89.0, 90, 91]), np.array([91.0, 92, 93]))
     figure = drawn(
         draw_lines(
@@ -33,14 +33,14 @@ def test_lines_bands_and_the_papers():
     assert texts == ["ours", "b", PAPER]
 
 
-def test_lines_over_many_values_on_a_logarithmic_axis():
+def test_many_values_on_a_logarithmic_axis():
     x = np.geomspace(0.01, 100, 30)
     axes = drawn(draw_lines({"y": {"a": Curve(x, x)}}, "x", log=True)).axes[0]
     assert axes.get_xscale() == "log"
     assert "0.01" in [label.get_text() for label in axes.get_xticklabels()]
 
 
-def test_alarms_without_a_false_one_stand_at_zero():
+def test_a_rate_of_zero_false_alarms_is_marked_zero():
     curve = Curve(np.array([0.0, 0.5, 10.0]), np.array([np.inf, 40.0, 5.0]), chosen=1)
     axes = drawn(draw_alarms({"missed [%]": {"a": curve}}, bar=1.0)).axes[0]
     line = next(each for each in axes.lines if len(each.get_xdata()) == 3)
@@ -52,13 +52,13 @@ def test_alarms_without_a_false_one_stand_at_zero():
     assert (chosen.get_xdata()[0], chosen.get_ydata()[0]) == (0.5, 40.0)
 
 
-def test_alarms_of_nothing():
+def test_alarms_without_curves():
     drawn(draw_alarms({}))
     drawn(draw_alarms({"missed": {}}))
     drawn(draw_alarms({"missed": {"a": Curve(np.zeros(2), np.zeros(2))}}))
 
 
-def test_reliability():
+def test_reliability_shows_bins_and_sample_counts():
     table = np.array([[0.1, 0.2, 30], [0.9, 0.8, 10]])
     figure = drawn(draw_reliability({"a": table, "b": np.empty((0, 3))}, {"a": "Brier 0.1"}))
     np.testing.assert_array_equal(figure.axes[0].lines[1].get_ydata(), table[:, 1])

@@ -39,7 +39,7 @@ def test_dots_are_sorted_by_the_first_panel():
     assert {line.get_ydata()[0] for line in right.lines} == {0, 2}
 
 
-def test_groups_stand_in_their_place():
+def test_groups_are_side_by_side():
     values = {"low": IntervalEstimate(5.0, 4.0, 6.0), "high": IntervalEstimate(9.0)}
     figure = drawn(
         draw_groups({"force": {"a": values, "b": {"high": IntervalEstimate(1.0)}}}, "wrong [%]")

@@ -51,7 +51,7 @@ def strips(axes):
     return found
 
 
-def test_forces_are_those_given():
+def test_forces_are_drawn_unchanged():
     given = series()
     axes = drawn(draw_forces(given)).axes[0]
     for column, name in enumerate(("F_x", "F_y", "F_z")):
@@ -61,7 +61,7 @@ def test_forces_are_those_given():
     assert axes.get_xlabel() == "time [s]"
 
 
-def test_phases_are_shaded_from_their_first_sample_to_the_next():
+def test_phases_are_shaded_until_the_next_phase():
     axes = drawn(draw_forces(series())).axes[0]
     spans = [
         (patch.get_x(), patch.get_x() + patch.get_width(), to_hex(patch.get_facecolor()))
@@ -75,7 +75,7 @@ def test_phases_are_shaded_from_their_first_sample_to_the_next():
     assert [text.get_text() for text in axes.texts] == ["free", "closing", "locked"]
 
 
-def test_a_narrow_phase_is_named_in_the_legend_alone():
+def test_a_narrow_phase_is_named_only_in_the_legend():
     phases = np.array(["locked"] * 195 + ["slipping"] * 5)
     figure = drawn(draw_forces(series(phases=phases)))
     assert [text.get_text() for text in figure.axes[0].texts] == ["locked"]
@@ -83,7 +83,7 @@ def test_a_narrow_phase_is_named_in_the_legend_alone():
     assert {"locked", "slipping"} <= texts
 
 
-def test_features_are_those_given():
+def test_features_are_drawn_unchanged():
     given = series(unit="N")
     forces, amplitude, sigma, labels = drawn(draw_features(given)).axes
     np.testing.assert_array_equal(amplitude.lines[0].get_ydata(), given.amplitude)
@@ -99,7 +99,7 @@ def test_features_are_those_given():
     }
 
 
-def test_predictions_are_drawn_below_each_other_with_their_share_right():
+def test_predictions_are_strips_with_their_accuracy():
     given = series()
     late = np.roll(given.labels, 10)
     late[:10] = UNKNOWN
@@ -125,7 +125,7 @@ def test_sigma_with_high_peaks_has_a_logarithmic_axis():
 
 
 @pytest.mark.parametrize("n", [0, 4])
-def test_a_series_of_nothing_is_drawn(n):
+def test_a_series_of_few_samples_is_drawn(n):
     given = series(n)
     for figure in (draw_forces(given), draw_features(given), draw_experiment(given, {})):
         drawn(figure)

@@ -29,7 +29,7 @@ def legend(figure):
     return [text.get_text() for text in figure.legends[0].get_texts()]
 
 
-def test_draws_forces_and_sigma(grasp):
+def test_forces_and_sigma_are_drawn_unchanged(grasp):
     figure = plot_recording(grasp)
     assert titles(figure) == ["thumb", "index"]
     assert [axes.get_ylabel() for axes in figure.axes] == ["force [counts]", "σ [counts]"] * 2
@@ -43,7 +43,7 @@ def test_draws_forces_and_sigma(grasp):
     np.testing.assert_array_equal(sigma, haar_features(force)[:, 5])
 
 
-def test_labels_are_shaded_and_explained(grasp):
+def test_labels_are_shaded_and_in_the_legend(grasp):
     figure = plot_recording(grasp)
     assert legend(figure)[4:] == ["stable", "unstable", "no contact"]
     assert len(figure.axes[0].patches) == len(grasp.modules["thumb"].labels)
@@ -59,7 +59,7 @@ def test_pads_are_left_out_where_there_are_fingertips(grasp):
     assert titles(plot_recording(pads)) == ["index/1", "palm/1"]
 
 
-def test_slip_where_it_is_known(grasp):
+def test_slip_is_drawn_if_it_is_known(grasp):
     times = grasp.modules["thumb"].times
     truth = Truth(times, {}, {"thumb": {"slip_speed": 0.001 * times}})
     figure = plot_recording(replace(grasp, truth=truth))
@@ -68,7 +68,7 @@ def test_slip_where_it_is_known(grasp):
     assert [text.get_text() for text in figure.axes[5].texts] == ["slip not known"]
 
 
-def test_a_gap_breaks_the_lines(grasp):
+def test_a_gap_interrupts_the_curves(grasp):
     thumb = grasp.modules["thumb"]
     times = thumb.times + np.where(np.arange(thumb.n_samples) < 700, 0, 1.0)
     gapped = replace(thumb, times=times, labels=())
@@ -106,7 +106,7 @@ def test_time_since_1970_counts_from_the_start(grasp):
     assert figure.axes[-1].get_xlabel() == "time since 1600000000.000 s [s]"
 
 
-def test_title_tells_the_tare(grasp):
+def test_the_title_names_the_tare(grasp):
     texts = {
         "0.5": "tare: first 0.5 s",
         "first": "tare: first sample",
@@ -129,7 +129,7 @@ def test_any_number_of_fingers(grasp, n_fingers, tmp_path):
 
 
 @pytest.mark.parametrize("readings", [np.full((1, 5, 3), 7.0), np.full((60, 5, 3), np.nan)])
-def test_odd_recordings_are_drawn(readings, tmp_path):
+def test_recordings_without_curves_are_drawn(readings, tmp_path):
     module = Tactile(sensor("anyskin"), np.arange(len(readings)) / 100, readings, "N")
     figure = plot_recording(Recording("odd", {"finger1": module}))
     assert figure.axes[0].get_ylabel() == "force [N]"

@@ -4,13 +4,13 @@ import sys
 from holdfast.plots.style import PAPER, series_styles
 
 
-def test_eighteen_methods_look_different():
+def test_eighteen_styles_are_different():
     styles = series_styles(f"method {k}" for k in range(18))
     assert len(set(styles.values())) == 19  # and the paper's
     assert series_styles(["a", PAPER, "b"])["b"] == series_styles(["a", "b"])["b"]
 
 
-def test_no_global_state_is_touched():
+def test_pyplot_is_not_imported():
     """pyplot keeps every figure that it makes until it is closed."""
     program = (
         "import sys; from holdfast.plots import curves, dots, experiment\n"

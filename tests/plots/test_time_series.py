@@ -9,7 +9,7 @@ from holdfast.sensors import sensor
 
 
 @pytest.mark.parametrize("n", [1, 10, 4000])
-def test_short_curves_stay(n):
+def test_short_curves_are_unchanged(n):
     times, values = np.arange(n) * 1.0, np.random.default_rng(0).normal(size=n)
     got = envelope(times, values)
     assert got[0] is times
@@ -29,7 +29,7 @@ def test_no_peak_is_lost(n):
     assert (short_times[0], short_times[-1]) == (times[0], times[-1])
 
 
-def test_long_stretches_of_nothing_stay_nothing():
+def test_long_stretches_of_nan_stay_nan():
     values = np.ones(100_000)
     values[30_000:40_000] = np.nan
     values[70_000] = np.nan

@@ -1,4 +1,4 @@
-"""Recordings whose truth is known: the synthetic ones, with a course of things made by hand."""
+"""Synthetic recordings for the tests of the study, with ground truth, and folders of them."""
 
 from dataclasses import replace
 
@@ -18,17 +18,17 @@ PHASES = (
     (9.5, Phase.RELEASED),
     (10.0, Phase.FREE),
 )
-"""As the schedule of the synthetic recordings has it [s]."""
+"""Phases of the synthetic recordings, with their start [s]."""
 SLIPS = ((5.6, 5.9), (6.0, 6.2))
-"""Sliding on the first finger [s]; the second rest is too short for another slip."""
+"""Slip on the first finger [s]; the pause before the second is too short for another slip."""
 GLITCH = 8.0
-"""The set point jumps [s]."""
+"""Jump of the set point [s]."""
 PUSH = (0.0, 0.0, -1.0)
 """Outside force of the disturbance [N]."""
 
 
 def truth_of(times, fingers):
-    """A truth for the schedule: 2 N on each finger while it is held, pushed down."""
+    """Ground truth of the schedule: 2 N on each finger during the hold, and a push downwards."""
     phase = np.array([str(name) for t in times for name in [phase_at(t)]])
     held = np.isin(phase, (Phase.LOCKED, Phase.DISTURBED))
     outside = np.outer(phase == Phase.DISTURBED, PUSH)
@@ -67,5 +67,12 @@ def save_all(folder, recordings):
 
 
 def save_synthetic(folder, seeds, fingers=("thumb", "index")):
-    """Recordings of three objects by turns, one for each seed."""
+    """Save one recording for each seed, of three objects in turn."""
     return save_all(folder, [synthetic_recording(f"grasp-{s}", s, fingers) for s in seeds])
+
+
+def recordings_of_cases(cases, start=0):
+    """A synthetic recording of each case, by its metadata; names begin with the case."""
+    for seed, case in enumerate(cases, start):
+        made = synthetic_recording(f"{case}-{seed}", seed, ("index", "thumb"))
+        yield replace(made, metadata={**made.metadata, "case": case})

@@ -130,17 +130,17 @@ def test_a_task_has_one_thread(tmp_path, engine):
     assert n_threads()[0] == before[0]
 
 
-def test_what_is_kept_is_not_done_again(tmp_path, log):
-    told = []
+def test_stored_results_are_reused(tmp_path, log):
+    messages = []
     first = TaskRunner(tmp_path).run(noted_tasks(log, 4))
-    again = TaskRunner(tmp_path, notify=told.append).run(noted_tasks(log, 6))
+    again = TaskRunner(tmp_path, notify=messages.append).run(noted_tasks(log, 6))
     assert set(calls(log).values()) == {1}
     assert again == {f"noted/{place}": place for place in range(6)}
     assert first.items() <= again.items()
-    assert told == ["4 of 6 tasks are already done"]
+    assert messages == ["4 of 6 tasks are already done"]
 
 
-def test_a_study_that_is_killed_does_only_what_is_missing(tmp_path, log):
+def test_a_killed_study_continues_with_the_missing_tasks(tmp_path, log):
     code = f"""if True:
         from pathlib import Path
         from holdfast.parallel import Engine
@@ -194,21 +194,21 @@ def test_no_flipped_bit_changes_a_result(tmp_path):
         assert TaskRunner(tmp_path).run(tasks(1)) == first
 
 
-def test_other_arguments_or_another_function_are_other_work(tmp_path):
+def test_other_arguments_or_another_function_are_another_result(tmp_path):
     TaskRunner(tmp_path).run([Task("a", figure, (1, 7), Figure)])
     TaskRunner(tmp_path).run([Task("a", figure, (1, 8), Figure)])
     TaskRunner(tmp_path).run([Task("a", max, (1, 7), int)])
     assert len(kept(tmp_path)) == 3
 
 
-def test_another_source_is_other_work(tmp_path, log, monkeypatch):
+def test_another_source_is_another_result(tmp_path, log, monkeypatch):
     TaskRunner(tmp_path).run(noted_tasks(log, 2))
     monkeypatch.setattr(work, "source_digest", lambda: "another")
     TaskRunner(tmp_path).run(noted_tasks(log, 2))
     assert set(calls(log).values()) == {2}
 
 
-def test_a_worker_with_another_source_is_refused(tmp_path, monkeypatch):
+def test_a_worker_with_another_source_is_rejected(tmp_path, monkeypatch):
     monkeypatch.setattr(work, "source_digest", lambda: "another")
     with pytest.raises(
         EngineError, match=r"^figure/\d: the version of holdfast of its worker diff"
@@ -216,7 +216,7 @@ def test_a_worker_with_another_source_is_refused(tmp_path, monkeypatch):
         TaskRunner(tmp_path, Engine(2)).run(tasks(2))
 
 
-def test_the_source_leaves_out_the_command_line(tmp_path, monkeypatch):
+def test_the_source_digest_ignores_the_command_line(tmp_path, monkeypatch):
     def digest(**files):
         for name, text in files.items():
             path = tmp_path / name.replace("__", "/")
@@ -235,19 +235,19 @@ def test_the_source_leaves_out_the_command_line(tmp_path, monkeypatch):
         source_digest.cache_clear()
 
 
-def test_the_same_work_under_two_names_is_done_once(tmp_path, log):
+def test_the_same_call_under_two_names_is_made_once(tmp_path, log):
     twins = [Task(name, noted, (1, str(log)), int) for name in "ab"]
     assert TaskRunner(tmp_path).run(twins) == {"a": 1, "b": 1}
     assert calls(log) == {"1": 1}
 
 
-def test_two_tasks_of_one_name_are_refused(tmp_path):
+def test_two_tasks_of_one_name_are_rejected(tmp_path):
     with pytest.raises(ValueError, match=r"^two tasks are called figure/0$"):
         TaskRunner(tmp_path).run(tasks(2) + tasks(1))
 
 
 @pytest.mark.parametrize("engine", ENGINES)
-def test_a_failure_names_its_task_and_the_rest_stays_kept(tmp_path, engine):
+def test_a_failure_names_its_task_and_other_results_stay_stored(tmp_path, engine):
     with pytest.raises(ValueError, match=r"^fail/2: no good$"):
         TaskRunner(tmp_path, engine).run([Task(f"fail/{n}", fail, (n,), int) for n in (0, 1, 2)])
     if engine.n_jobs == 1:
@@ -255,24 +255,24 @@ def test_a_failure_names_its_task_and_the_rest_stays_kept(tmp_path, engine):
 
 
 @pytest.mark.parametrize("engine", ENGINES)
-def test_a_failure_of_several_parts_is_noted(tmp_path, engine):
+def test_a_failure_of_several_arguments_has_a_note(tmp_path, engine):
     with pytest.raises(OSError, match="No space left") as failure:
         TaskRunner(tmp_path, engine).run([Task("fail/3", fail, (3,), int)])
     assert "in the task fail/3" in failure.value.__notes__
 
 
-def test_a_result_that_is_not_as_announced(tmp_path):
+def test_a_result_of_another_type(tmp_path):
     with pytest.raises(TypeError, match=r"^figure/0 returned no <class 'int'>: Expected `int`"):
         TaskRunner(tmp_path).run([Task("figure/0", figure, (0, 7), int)])
     assert kept(tmp_path) == []
 
 
-def test_a_result_that_cannot_be_kept(tmp_path):
+def test_a_result_that_cannot_be_stored(tmp_path):
     with pytest.raises(TypeError, match=r"^odd: a [a-zA-Z]*Path cannot be stored"):
         TaskRunner(tmp_path).run([Task("odd", Path, ("x",), str)])
 
 
-def test_long_ones_are_begun_first_and_weigh_more(tmp_path):
+def test_tasks_of_high_cost_start_first(tmp_path):
     seen = []
 
     def follow(items, what, total, cost):
@@ -288,21 +288,21 @@ def test_long_ones_are_begun_first_and_weigh_more(tmp_path):
     assert seen == [("working", 8.0), ("long", 5.0), ("middle", 2.0), ("short", 1.0)]
 
 
-def test_the_bar_of_the_command_line_follows(tmp_path, expected):
+def test_the_progress_bar_of_the_command_line(tmp_path, expected):
     assert TaskRunner(tmp_path, progress=progress).run(tasks()).keys() == expected.keys()
 
 
-def test_nothing_to_do(tmp_path):
+def test_no_tasks(tmp_path):
     assert TaskRunner(tmp_path).run([]) == {}
 
 
-def test_a_folder_that_cannot_be(tmp_path):
+def test_a_folder_that_cannot_be_made(tmp_path):
     (tmp_path / "work").touch()
     with pytest.raises(OutputError, match=r"^cannot write .*work: File exists$"):
         TaskRunner(tmp_path).run(tasks(1))
 
 
-def test_a_result_is_stored_before_the_next_is_awaited(tmp_path, log):
+def test_a_result_is_stored_before_the_next_task_ends(tmp_path, log):
     def follow(items, *_):
         for item in items:
             assert len(kept(tmp_path)) == len(calls(log))
@@ -311,7 +311,7 @@ def test_a_result_is_stored_before_the_next_is_awaited(tmp_path, log):
     TaskRunner(tmp_path, progress=follow).run(noted_tasks(log, 3))
 
 
-def test_an_interrupt_costs_what_was_being_done(tmp_path, log):
+def test_an_interrupt_keeps_finished_results(tmp_path, log):
     def follow(items, *_):
         for place, item in enumerate(items):
             if place == 2:

@@ -43,18 +43,18 @@ TWIN_NOTE = (
 OUTLINES = (
     SectionOutline(
         "The paper's tables",
-        """Each cell holds our value. In small print below it are its 95 % interval and, where the
-paper prints a value, the paper's value with the difference (ours minus the paper's). Values are
+        """Each cell holds our value. Below it, in small print, are its 95 % interval and, if the
+paper prints one, the paper's value with the difference (ours minus the paper's). Values are
 percentages of labelled samples. Stable (1) is the positive class.
 
 The paper splits samples at random. Nearly identical samples of one recording are then on both
-sides of the split. The lines here keep apart on which data a classifier was tested. "Training
+sides of the split. Here each line names the data on which a classifier was tested. "Training
 data" are the samples of the fit itself. "Cross-validated" and "held out" are other samples of the
 same recordings. Only "fresh recordings" (or "other recordings") and "other objects" are new data,
 as in actual use. Read those lines first.
 
-- FPR: fraction of the samples not stable that are called stable, a missed danger.
-- FNR: fraction of the stable samples that are called unstable, a needless alarm.
+- FPR: fraction of the unstable samples that are called stable (missed dangers).
+- FNR: fraction of the stable samples that are called unstable (needless alarms).
 - FDR: fraction of the samples called stable that are not stable.
 - N_w: number of samples in the window of the features; at 150 Hz, 14 samples are 93 ms.""",
         "paper",

@@ -45,7 +45,7 @@ def test_the_tables_of_the_paper(quick):
     assert all(table.title and table.note for table in quick.values())
 
 
-def test_every_figure_has_its_recordings_and_an_interval_around_it(quick):
+def test_every_value_has_a_number_of_recordings_and_an_interval(quick):
     for name in NAMES[:-1]:
         for row in quick[name].rows:
             assert row.n in (2, 4)
@@ -55,7 +55,7 @@ def test_every_figure_has_its_recordings_and_an_interval_around_it(quick):
                 assert row.ours <= high + 1e-9 <= 100 + 2e-9
 
 
-def test_confusion_keeps_apart_what_it_was_measured_on(quick):
+def test_confusion_has_a_line_for_each_kind_of_test_data(quick):
     table = quick["confusion"]
     on = list(dict.fromkeys(row.keys["on"] for row in table.rows))
     assert on == [
@@ -75,7 +75,7 @@ def test_confusion_keeps_apart_what_it_was_measured_on(quick):
             assert ours["TPR"] + ours["FNR"] == pytest.approx(100)
 
 
-def test_window_has_both_sets_of_features_beside_the_paper(quick):
+def test_window_has_both_feature_sets_and_the_paper(quick):
     table = quick["window"]
     for features in ("all six", "deployed"):
         for window in paper_tables.QUICK_WINDOWS:
@@ -96,7 +96,7 @@ def test_ablation_has_all_subsets_at_both_windows(quick):
             assert {row.keys["figure"]: row.paper for row in mine} == figures
 
 
-def test_one_classifier_has_the_same_figures_in_every_table(quick):
+def test_one_classifier_has_the_same_values_in_every_table(quick):
     def figure(table, **keys):
         (row,) = rows_of(quick[table], on="held out", figure="accuracy", **keys)
         return row.ours
@@ -121,7 +121,7 @@ def test_unseen_data_are_recordings_and_objects(quick):
     }
 
 
-def test_fingers_stand_beside_the_figures_of_the_paper(quick):
+def test_fingers_have_the_values_of_the_paper(quick):
     found = {
         (row.keys["finger"], row.keys["classifier"], row.keys["figure"]): row.paper
         for row in quick["fingers"].rows
@@ -138,7 +138,7 @@ def test_fingers_stand_beside_the_figures_of_the_paper(quick):
     }
 
 
-def test_zhang_stands_beside_the_method_of_the_paper(quick):
+def test_zhang_and_the_method_of_the_paper(quick):
     held = rows_of(quick["zhang"], on="held out")
     assert {(row.keys["method"], row.keys["figure"], row.paper) for row in held} == {
         ("energy of F_x (Zhang), SVM", "accuracy", 62.7),
@@ -151,7 +151,7 @@ def test_zhang_stands_beside_the_method_of_the_paper(quick):
     assert {row.keys["N_w"] for row in held} == set(paper_tables.QUICK_WINDOWS)
 
 
-def test_rows_go_into_json(quick):
+def test_rows_as_json(quick):
     first = to_json(quick["confusion"])[0]
     assert set(first) == {
         "classifier", "on", "figure", "ours", "paper", "difference", "n", "interval",
@@ -187,7 +187,7 @@ def test_each_classifier_is_fitted_once():
     assert len(kinds) == len(set(kinds)) == 2 * 2 + 8 * 4 - 1 + 2 * 9
 
 
-def test_the_first_finger_is_the_index_where_there_is_one():
+def test_the_first_finger_is_the_index_if_there_is_one():
     corpus = Corpus("main", "data", ("a", "b"), "digest", ("finger1", "finger2"), 150.0)
     assert paper_tables.first_finger(StudyPlan({"main": corpus})) == "finger1"
     named = msgspec.structs.replace(corpus, fingers=("thumb", "index"))

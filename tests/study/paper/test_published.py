@@ -41,7 +41,7 @@ def number(text):
     return float(text.replace(",", "."))
 
 
-def test_table_two_has_the_32_figures_of_the_paper():
+def test_table_two_has_the_32_values_of_the_paper():
     head, *lines = [line.split() for line in TABLE_II.split("\n") if line]
     expected = {
         int(window): {line[0]: number(line[1 + place]) for line in lines}
@@ -51,7 +51,7 @@ def test_table_two_has_the_32_figures_of_the_paper():
     assert sum(len(figures) for figures in WINDOW.values()) == 32
 
 
-def test_table_three_has_the_44_figures_of_the_paper_in_its_order():
+def test_table_three_has_the_44_values_of_the_paper_in_its_order():
     rows = [line.split() for line in TABLE_III.split("\n") if line]
     names = ("F_a", "F_tip", "m", "sigma")
     expected = [
@@ -65,7 +65,7 @@ def test_table_three_has_the_44_figures_of_the_paper_in_its_order():
     assert sum(len(figures) for figures in ABLATION.values()) == 44
 
 
-def test_the_figures_of_table_one_and_of_the_text():
+def test_the_values_of_table_one_and_of_the_text():
     assert CONFUSION == {
         "logreg": {"TNR": 95.1, "FPR": 4.9, "FNR": 4.5, "TPR": 95.5, "accuracy": 95.3},
         "svm": {"TNR": 96.2, "FPR": 3.8, "FNR": 3.5, "TPR": 96.5, "accuracy": 96.4},
@@ -80,7 +80,7 @@ def test_the_figures_of_table_one_and_of_the_text():
 
 
 @pytest.mark.parametrize("printed", [*WINDOW.values(), *ABLATION.values()])
-def test_each_row_of_the_paper_fits_together(printed):
+def test_each_row_of_the_paper_is_consistent(printed):
     """FPR, FNR and FDR fix the share of class 1, and with it the accuracy."""
     fpr, fnr, fdr, accuracy = (printed[k] / 100 for k in ("FPR", "FNR", "FDR", "accuracy"))
     odds = fdr / (1 - fdr) * (1 - fnr) / fpr
@@ -105,7 +105,7 @@ def test_the_discrepancies_that_follow_from_the_tables():
     assert gained["accuracy gained from 10 to 14"] == pytest.approx(accuracy[14] - accuracy[10])
 
 
-def test_the_shares_of_stable_data_that_the_figures_imply():
+def test_the_shares_of_stable_data_that_the_values_imply():
     index, middle, _ = (each.value for each in said("the classes"))
     odds = 5.4 / 94.6 * 95.3 / 5.2
     assert index == pytest.approx(100 / (1 + odds), abs=0.05)

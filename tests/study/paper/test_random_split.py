@@ -79,7 +79,7 @@ def test_counts_are_those_of_a_naive_fit(corpora, alone, on):
     assert alone[0].counts[on] == naive(corpora, on)
 
 
-def test_what_it_was_measured_on(corpora, alone):
+def test_kinds_of_test_data(corpora, alone):
     together = [TRAINING, VALIDATED, HELD_OUT, OTHER_RECORDINGS, OBJECTS]
     assert [list(cell.counts) for cell in alone] == [together] * 2
     light = evaluated({"main": corpora["main"]}, thorough=False)
@@ -97,7 +97,7 @@ def test_fresh_recordings_are_all_of_them(corpora):
     assert len(counts[OBJECTS]) == 2
 
 
-def test_the_split_is_reproducible_and_follows_the_seed(corpora, alone):
+def test_the_split_is_reproducible_and_depends_on_the_seed(corpora, alone):
     main = {"main": corpora["main"]}
     assert evaluated(main) == alone
     other = evaluated(main, seed=1)
@@ -105,14 +105,14 @@ def test_the_split_is_reproducible_and_follows_the_seed(corpora, alone):
     assert np.sum(other[0].counts[OTHER_RECORDINGS]) == np.sum(alone[0].counts[OTHER_RECORDINGS])
 
 
-def test_80_percent_train(alone):
+def test_80_percent_are_used_for_training(alone):
     counts = alone[0].counts
     total = np.sum(counts[OTHER_RECORDINGS])
     assert np.sum(counts[TRAINING]) == alone[0].n_fitted == pytest.approx(0.8 * total, rel=0.02)
     assert np.sum(counts[TRAINING]) + np.sum(counts[HELD_OUT]) == total
 
 
-def test_a_fit_takes_no_more_than_it_may(corpora):
+def test_a_fit_has_a_maximum_number_of_samples(corpora):
     cell = evaluated({"main": corpora["main"]}, thorough=False, budget=FitBudget(1, 500))[0]
     assert 400 < cell.n_fitted <= 500
 
@@ -175,7 +175,7 @@ def test_confusions_are_those_of_a_loop(rows):
     assert found.tolist() == count_one_by_one(features, stable, groups, 5)
 
 
-def test_figures_by_hand():
+def test_rates_by_hand():
     counts = [[8, 2, 1, 9], [0, 0, 0, 0], [6, 4, 3, 7]]
     found = dict(rate_rows(counts, CONFUSION_RATES, seed=0))
     assert {name: row.ours for name, row in found.items()} == pytest.approx(

@@ -1,4 +1,3 @@
-import json
 import re
 from collections import Counter
 from html.parser import HTMLParser
@@ -6,9 +5,7 @@ from html.parser import HTMLParser
 import pytest
 from matplotlib.figure import Figure
 
-from holdfast.errors import OutputError
 from holdfast.study.report import images
-from holdfast.study.report.folder import check_output_folder, write_study
 from holdfast.study.report.html_report import ReportFigure, Section, html_report
 from holdfast.study.report.result_tables import ResultTable, Row
 
@@ -78,7 +75,7 @@ def page(**facts):
     return html_report("Study <1>", facts, sections())
 
 
-def test_it_is_html_that_needs_nothing_else():
+def test_the_report_is_html_without_external_references():
     text = page(seed=0)
     assert text.startswith("<!DOCTYPE html>")
     assert not re.search(r"https?:|<script|<link|@import|xmlns", text)
@@ -87,7 +84,7 @@ def test_it_is_html_that_needs_nothing_else():
     assert all(target.startswith("#") for target in read.targets)
 
 
-def test_ids_are_unique_and_every_reference_is_met():
+def test_ids_are_unique_and_every_reference_exists():
     """Two figures that are drawn alike have the same ids in their own files."""
     read = Page(page())
     assert [name for name, n in Counter(read.ids).items() if n > 1] == []
@@ -106,7 +103,7 @@ def test_text_is_escaped_and_laid_out():
     assert "<dd>a &amp; b<br>c</dd>" in text and "<dd>0</dd>" in text
 
 
-def test_tables_and_figures_are_numbered_through_and_listed():
+def test_tables_and_figures_are_numbered_and_listed():
     text = page()
     for k, name in ((1, "first"), (2, "second")):
         assert (
@@ -117,17 +114,17 @@ def test_tables_and_figures_are_numbered_through_and_listed():
     assert '<span class="number">Figure 2.</span> Other' in text
 
 
-def test_it_is_the_same_every_time():
+def test_the_report_is_reproducible():
     assert page() == page()
 
 
-def test_a_large_figure_comes_as_png(monkeypatch):
+def test_a_large_figure_is_a_png(monkeypatch):
     monkeypatch.setattr(images, "MAX_INLINE_SVG", 1000)
     read = Page(page())
     assert [source[:22] for source in read.sources] == ["data:image/png;base64,"] * 2
 
 
-def test_names_are_used_once():
+def test_repeated_names_are_rejected():
     one, two = sections()
     with pytest.raises(ValueError, match=r"^two tables of the report are called 'first'$"):
         html_report("x", {}, [one, one._replace(figures=[])])
@@ -137,83 +134,3 @@ def test_names_are_used_once():
         ValueError, match=r"^a figure's name is letters, digits, - and _; 'a b' given$"
     ):
         html_report("x", {}, [Section("x", "", [], [ReportFigure("a b", "", drawn())])])
-
-
-def write(out, **options):
-    write_study(out, "Study", {"seed": 0}, sections(), {"seed": 0, "data": {}}, **options)
-
-
-def files(folder):
-    return sorted(str(path.relative_to(folder)) for path in folder.rglob("*") if path.is_file())
-
-
-def test_the_folder(tmp_path):
-    out = tmp_path / "out"
-    write(out)
-    assert files(out) == [
-        "figures/curve-2.png",
-        "figures/curve-2.svg",
-        "figures/curve.png",
-        "figures/curve.svg",
-        "report.html",
-        "study.json",
-        *(
-            f"tables/{name}.{kind}"
-            for name in ("first", "second")
-            for kind in ("csv", "json", "md", "tex")
-        ),
-    ]
-    told = json.loads((out / "study.json").read_text())
-    assert told["seed"] == 0
-    assert told["tables"]["first"][0] == {
-        "m": "a", "figure": "x", "ours": 1.0, "paper": 2.0, "difference": -1.0, "n": None,
-        "interval": None,
-    }  # fmt: skip
-    assert json.loads((out / "tables/first.json").read_text())["rows"] == told["tables"]["first"]
-    assert (out / "figures/curve.png").read_bytes()[:4] == b"\x89PNG"
-    assert (out / "figures/curve.svg").read_text().startswith("<?xml")
-
-
-def test_work_that_is_kept_from_a_stopped_study_stays(tmp_path):
-    (tmp_path / "out/work").mkdir(parents=True)
-    (tmp_path / "out/work/a.msgpack").write_bytes(b"x")
-    check_output_folder(tmp_path / "out")
-    write(tmp_path / "out")
-    assert (tmp_path / "out/work/a.msgpack").read_bytes() == b"x"
-
-
-def test_a_study_is_replaced_by_force_alone(tmp_path):
-    out = tmp_path / "out"
-    write(out)
-    (out / "tables/old.csv").touch()
-    (out / "notes.txt").write_text("mine")
-    with pytest.raises(
-        OutputError, match=r"already holds a study: choose another name, or give --force$"
-    ):
-        write(out)
-    write(out, force=True)
-    assert "tables/old.csv" not in files(out) and "notes.txt" in files(out)
-
-
-def test_a_folder_of_other_things_is_left_alone(tmp_path):
-    (tmp_path / "notes.txt").touch()
-    message = (
-        r"holds other files \(notes.txt, ...\) and no study: "
-        "choose a folder that is empty or does not exist$"
-    )
-    with pytest.raises(OutputError, match=message):
-        write(tmp_path, force=True)
-    with pytest.raises(OutputError, match=r"is a file; a study is written to a folder$"):
-        check_output_folder(tmp_path / "notes.txt", force=True)
-    with pytest.raises(OutputError, match=r"no does not exist$"):
-        check_output_folder(tmp_path / "no/out")
-
-
-def test_nothing_is_left_where_it_fails(tmp_path):
-    out = tmp_path / "out"
-    write(out)
-    before = {name: (out / name).read_bytes() for name in files(out)}
-    broken = [Section("x", "", [], [ReportFigure("a b", "", drawn())])]
-    with pytest.raises(ValueError, match="figure's name"):
-        write_study(out, "Other", {}, broken, {}, force=True)
-    assert {name: (out / name).read_bytes() for name in files(out)} == before

@@ -50,7 +50,7 @@ class Text(HTMLParser):
 
 
 @given(st.text(alphabet=st.characters(exclude_characters="\r\0", exclude_categories=["Cs"])))
-def test_html_reads_as_the_text_that_was_given(text):
+def test_html_is_parsed_to_the_original_text(text):
     parser = Text()
     parser.feed(escape_html(text.replace("_", "-").replace("sigma", "")))
     parser.close()
@@ -58,11 +58,11 @@ def test_html_reads_as_the_text_that_was_given(text):
     assert not parser.tags
 
 
-def test_html_sets_symbols():
+def test_html_has_symbols():
     assert escape_html("F_a < F_tip, sigma") == (
         "<i>F</i><sub>a</sub> &lt; <i>F</i><sub>tip</sub>, <i>σ</i>"
     )
 
 
-def test_markdown_keeps_a_cell_a_cell():
+def test_markdown_escapes_a_cell():
     assert escape_markdown("a|b\n*c* [x](y) <br> `z`") == r"a\|b \*c\* [x\](y) \<br\> \`z\`"

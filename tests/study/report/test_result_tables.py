@@ -27,7 +27,7 @@ def table(*rows, **options):
     return ResultTable("some", "Some table", "", list(rows), ("classifier",), **options)
 
 
-def test_lines_and_columns_stand_in_the_order_of_first_appearance():
+def test_lines_and_columns_are_in_the_order_of_first_appearance():
     grid = pivot(
         table(
             row(1, figure="z"), row(2, classifier="A"), row(3), row(4, figure="z", classifier="A")
@@ -38,7 +38,7 @@ def test_lines_and_columns_stand_in_the_order_of_first_appearance():
     assert [[cell.ours for cell in line.cells] for line in grid.lines] == [[1, 3], [4, 2]]
 
 
-def test_lines_that_begin_alike_stand_together():
+def test_lines_with_the_same_first_head_are_adjacent():
     rows = [Row({"on": on, "method": m, "figure": "x"}, 1.0) for m in "ab" for on in ("p", "q")]
     grid = pivot(ResultTable("some", "", "", rows, ("on", "method")))
     heads = [("p", "a"), ("p", "b"), ("q", "a"), ("q", "b")]
@@ -67,7 +67,7 @@ def test_numbers_as_keys():
         (math.nan, 0.1, None),
     ],
 )
-def test_difference_is_ours_less_the_papers(ours, paper, expected):
+def test_difference_is_ours_minus_the_papers(ours, paper, expected):
     assert row(ours, paper).difference == expected
 
 
@@ -76,11 +76,11 @@ def test_difference_is_ours_less_the_papers(ours, paper, expected):
     [(None, "–"), (math.nan, "–"), (math.inf, "infinite"), (-math.inf, "−infinite"),
      (-1.25, "−1.2"), (0.04, "0.0"), (-0.04, "0.0"), (1234.56, "1234.6")],
 )  # fmt: skip
-def test_numbers_for_people(value, text):
+def test_numbers_as_text(value, text):
     assert number_text(value, 1) == text
 
 
-def test_a_signed_number_says_its_sign():
+def test_a_signed_number_has_its_sign():
     assert [number_text(value, 1, signed=True) for value in (1.0, -1.0, 0.0, None)] == [
         "+1.0", "−1.0", "0.0", "–",
     ]  # fmt: skip
@@ -91,7 +91,7 @@ numbers = st.none() | st.floats(allow_nan=False)
 
 
 @given(st.lists(st.tuples(keys, numbers, numbers), unique_by=lambda each: each[0], min_size=1))
-def test_csv_holds_every_figure_to_the_last_digit(given_rows):
+def test_csv_holds_every_value_to_the_last_digit(given_rows):
     made = table(*(row(ours, paper, classifier=name) for name, ours, paper in given_rows))
     header, *lines = csv.reader(io.StringIO(to_csv(made), newline=""))
     assert header == ["classifier", "figure", "ours", "paper", "difference", "n", "low", "high"]
@@ -111,10 +111,10 @@ def test_csv_by_hand():
     )
 
 
-def test_json_is_strict_and_says_infinite():
+def test_json_is_strict_and_marks_infinite_values():
     made = table(row(math.inf, n=3, interval=(0.1, math.inf)), row(math.nan, figure="FDR"))
-    told = json.loads(json.dumps(to_json(made), allow_nan=False))
-    assert told == [
+    document = json.loads(json.dumps(to_json(made), allow_nan=False))
+    assert document == [
         {"classifier": "LogReg", "figure": "Acc", "ours": None, "paper": None, "difference": None,
          "n": 3, "interval": [0.1, None], "infinite": True},
         {"classifier": "LogReg", "figure": "FDR", "ours": None, "paper": None, "difference": None,
@@ -122,7 +122,7 @@ def test_json_is_strict_and_says_infinite():
     ]  # fmt: skip
 
 
-def test_a_table_comes_back_from_messagepack():
+def test_a_table_can_be_sent():
     made = table(row(math.inf, 95.3, n=60, interval=(None, 2.0)), digits_of={"Acc": 3})
     assert msgspec.msgpack.decode(msgspec.msgpack.encode(made), type=ResultTable) == made
 
@@ -146,7 +146,7 @@ def test_a_table_comes_back_from_messagepack():
         (lambda: table(row(1), row(2)), "table some: two rows for LogReg / Acc"),
     ],
 )
-def test_a_table_that_contradicts_itself_is_refused(build, message):
+def test_an_inconsistent_table_is_rejected(build, message):
     with pytest.raises(ValueError) as caught:
         build()
     assert str(caught.value) == message

@@ -105,7 +105,7 @@ def test_html_cells():
     assert "<all>" not in html and "&lt;all&gt; <i>N</i><sub>w</sub>" in html
 
 
-def test_what_the_columns_are_is_told_above_them():
+def test_columns_have_a_common_head():
     rows = [Row({"figure": "Acc", "N_w": n}, 95.0) for n in (4, 6)]
     made = ResultTable("window", "By window", "", rows, ("figure",), column="N_w")
     assert '<th colspan="2" scope="colgroup" class="over"><i>N</i><sub>w</sub></th>' in to_html(
@@ -116,7 +116,7 @@ def test_what_the_columns_are_is_told_above_them():
     assert notes(made) == []
 
 
-def test_recordings_get_a_column_where_they_differ():
+def test_the_number_of_recordings_has_a_column_if_it_varies():
     rows = [
         Row({"m": "a", "figure": "x"}, 1.0, n=60),
         Row({"m": "b", "figure": "x"}, 1.0, n=48),
@@ -135,7 +135,7 @@ def test_recordings_get_a_column_where_they_differ():
     assert r"\begin{tabular}{lrrr}" in to_latex(made)
 
 
-def test_an_interval_that_says_nothing_is_left_out():
+def test_an_unknown_interval_is_left_out():
     rows = [Row({"m": "a", "figure": "x"}, math.inf, interval=(math.inf, math.inf)),
             Row({"m": "a", "figure": "y"}, 1.0, interval=(None, None))]  # fmt: skip
     text = to_markdown(ResultTable("t", "T", "", rows, ("m",)))
@@ -157,7 +157,7 @@ def test_an_empty_table_is_laid_out():
     assert r"\begin{tabular}{l}" in to_latex(made)
 
 
-def test_a_figure_of_the_paper_alone_has_no_difference():
+def test_a_value_of_the_paper_alone_has_no_difference():
     rows = [Row({"where": "Table II", "figure": "printed"}, None, 95.3)]
     alone = ResultTable("said", "What is said", "", rows, ("where",))
     assert "| Table II | *paper 95.3* |" in to_markdown(alone)

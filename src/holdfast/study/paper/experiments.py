@@ -173,15 +173,15 @@ def _protocol_figures(series: FingerSeries) -> Iterator[ReportFigure]:
     chosen = "Chosen: the first recording with disturbances, by name."
     yield ReportFigure(
         "forces",
-        "Components of the fingertip force in one recording, with the phases of the experiment "
-        f"(the paper's figure of the phases). F_x is along the normal of the pad. {chosen}",
+        "Fingertip force in one recording. The shades are the phases of the experiment, as in the "
+        f"paper's figure of the phases. F_x is along the normal of the pad. {chosen}",
         draw_forces(series),
     )
     yield ReportFigure(
         "features",
-        "Features and labels of one experiment (the paper's figure of features and labels). From "
-        "top to bottom: components of the force; its amplitude F_a and mean m over the window; "
-        f"the instability sigma; the label, 1 = stable. {chosen}",
+        "Features and labels of one experiment, as in the paper. From top to bottom: components "
+        "of the force; its amplitude F_a and mean m over the window; the instability sigma; the "
+        f"label, 1 = stable. {chosen}",
         draw_features(series),
     )
 
