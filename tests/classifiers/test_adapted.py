@@ -1,4 +1,4 @@
-"""Between what a model knows and what the samples say."""
+"""Logistic regression between the prior and the samples."""
 
 from dataclasses import replace
 
@@ -61,7 +61,7 @@ def test_the_loss_is_that_of_the_docstring():
 
 
 @pytest.mark.parametrize("prior", [PRIOR, UNLIKE])
-def test_nearly_without_samples_the_decisions_of_the_prior_stay(prior):
+def test_with_few_samples_the_decisions_of_the_prior_stay(prior):
     found = adapted(1e-12, prior=prior)
     assert np.array_equal(decided(found), decided(prior))
     assert 0.1 < decided(prior).mean() < 0.9
@@ -75,13 +75,13 @@ def test_the_log_odds_of_a_prior_are_those_above_its_threshold():
 
 
 @pytest.mark.parametrize("threshold", [0.0, 1.0])
-def test_a_prior_that_always_says_the_same_can_be_adapted(threshold):
+def test_a_constant_prior_can_be_adapted(threshold):
     found = adapted(1e-12, prior=msgspec.structs.replace(PRIOR, threshold=threshold))
     assert decided(found).all() == (threshold == 0.0)
 
 
 @pytest.mark.parametrize("prior", [PRIOR, UNLIKE])
-def test_with_much_weight_it_is_scikit_learns(prior):
+def test_with_a_large_c_it_equals_scikit_learn(prior):
     scaled = (GIVEN.features - np.array(prior.mean)) / np.array(prior.scale)
     peer = LogisticRegression(C=1e6, class_weight="balanced", tol=1e-10, max_iter=1000)
     peer.fit(scaled, GIVEN.stable)
@@ -91,7 +91,7 @@ def test_with_much_weight_it_is_scikit_learns(prior):
     assert (found.mean, found.scale) == (prior.mean, prior.scale)
 
 
-def test_in_between_it_moves_from_the_one_to_the_other():
+def test_a_larger_c_moves_away_from_the_prior():
     far = [np.linalg.norm(rule_of(adapted(C)) - _log_odds(PRIOR)) for C in 10.0 ** np.arange(-7, 3)]
     assert far[0] < 1e-3
     assert far[-1] > 1.0
@@ -144,7 +144,7 @@ def test_another_number_of_features_is_refused():
 
 
 def test_every_prior_has_a_name_of_its_own():
-    """The journal of a search is kept by it."""
+    """The journal of a search depends on it."""
     near = msgspec.structs.replace(PRIOR, intercept=np.nextafter(0.6, 1))
     assert Adapted(PRIOR).name == replace(Adapted(PRIOR)).name
     assert len({Adapted(prior).name for prior in (PRIOR, UNLIKE, near)}) == 3

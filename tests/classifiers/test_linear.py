@@ -39,13 +39,13 @@ def test_the_equation():
     assert rule.n_features == 2
 
 
-def test_no_feature_no_probability():
+def test_nan_features_have_no_probability():
     rule = LinearClassifier((0.0,), (1.0,), (1.0,), 0.0)
     assert np.isnan(rule.probability([[np.nan], [0.0]])).tolist() == [True, False]
     assert rule.probability(np.empty((0, 1))).shape == (0,)
 
 
-def test_far_away_it_is_certain():
+def test_far_from_the_boundary_it_is_certain():
     rule = LinearClassifier((0.0,), (1.0,), (1.0,), 0.0)
     assert rule.probability([[1e9], [-1e9]]).tolist() == [1.0, 0.0]
 

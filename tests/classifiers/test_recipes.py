@@ -1,4 +1,4 @@
-"""What every way of fitting has to fulfil, and what each promises of its own."""
+"""Tests that every recipe passes, and tests of each recipe."""
 
 import numpy as np
 import pytest
@@ -82,7 +82,7 @@ def test_the_mean_probability_is_the_base_rate(name, weight, share):
 
 @pytest.mark.parametrize("weight", WEIGHTS)
 @pytest.mark.parametrize("share", [0.15, 0.85])
-def test_probabilities_say_how_often(name, weight, share):
+def test_probabilities_are_calibrated(name, weight, share):
     train, test = samples(6000, share, seed=0), samples(6000, share, seed=1)
     fitted = recipe(name).fit(train, parameters(name, weight), 0)
     found = fitted.probability(test.features)
@@ -100,7 +100,7 @@ def test_it_beats_the_base_rate_by_brier_score(name, weight):
     assert brier < 0.7 * test.stable.var()
 
 
-def test_a_constant_feature_has_no_say(name):
+def test_a_constant_feature_has_no_effect(name):
     given = samples()
     constant = given._replace(features=np.column_stack([given.features, np.full(2000, 0.1)]))
     fitted = recipe(name).fit(constant, recipe(name).reference, 0)
@@ -123,7 +123,7 @@ def test_logistic_regression_decides_as_scikit_learn(weight, share):
     assert np.array_equal(stable[clear], peer.predict(features)[clear])
 
 
-def test_logistic_regression_without_weights_is_scikit_learns():
+def test_logistic_regression_without_weights_equals_scikit_learn():
     given = samples(share=0.2)
     fitted = recipe("logreg").fit(given, parameters("logreg", None), 0)
     assert (fitted.slope, fitted.offset, fitted.threshold) == (1.0, 0.0, 0.5)

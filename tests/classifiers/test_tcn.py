@@ -79,14 +79,14 @@ def torch_scores(windows, weights):
 
 
 @pytest.mark.parametrize(("n_channels", "n_weights"), [(6, 9974), (3, 9650), (1, 9434)])
-def test_as_many_parameters_as_the_source(n_channels, n_weights):
+def test_the_number_of_parameters_is_that_of_the_source(n_channels, n_weights):
     assert sum(math.prod(shape) for shape in weight_shapes(n_channels).values()) == n_weights
 
 
 @deep
 @pytest.mark.parametrize("n_steps", [1, 2, 7, 33, 100, 101])
 @pytest.mark.parametrize("n_channels", [3, 6])
-def test_forward_is_the_slow_one(n_steps, n_channels):
+def test_forward_equals_the_slow_network(n_steps, n_channels):
     weights = drawn(n_channels)
     windows = np.random.default_rng(1).normal(size=(2, n_channels, n_steps))
     slow = [naive_scores(window, weights)[-1] for window in windows]
@@ -94,8 +94,8 @@ def test_forward_is_the_slow_one(n_steps, n_channels):
 
 
 @deep
-def test_no_step_knows_those_after_it():
-    """What comes out at a step of a long window is what the window that ends there gives."""
+def test_no_step_depends_on_later_steps():
+    """The result at a step of a long window is that of the window that ends there."""
     weights = drawn(3)
     window = np.random.default_rng(2).normal(size=(3, 60))
     at_each_step = naive_scores(window, weights)
@@ -105,10 +105,10 @@ def test_no_step_knows_those_after_it():
 
 
 @deep
-def test_probability_is_the_softmax_with_the_balance_taken_out():
+def test_probability_is_the_softmax_corrected_for_balancing():
     weights = drawn(3)
     mean, scale = np.array([1.0, 2.0, 3.0]), np.array([2.0, 1.0, 0.5])
-    network = Network(weights, mean, scale, n_steps=10, balance=3.0)
+    network = Network(weights, mean, scale, n_steps=10, class_ratio=3.0)
     rows = np.random.default_rng(3).normal(size=(4, 10, 3))
     scores = [naive_scores(((row - mean) / scale).T, weights)[-1] for row in rows]
     odds = np.exp([two - one for one, two in scores]) / 3.0
@@ -118,7 +118,7 @@ def test_probability_is_the_softmax_with_the_balance_taken_out():
 
 
 @deep
-def test_no_feature_no_probability():
+def test_nan_features_have_no_probability():
     network = Network(drawn(3), np.zeros(3), np.ones(3), n_steps=10, class_ratio=1.0)
     rows = np.zeros((3, 30))
     rows[1, 7] = np.nan
@@ -155,7 +155,7 @@ def test_a_seed_gives_the_same_network_and_leaves_torch_as_it_was():
 
 
 @deep
-def test_what_it_keeps_of_the_training():
+def test_mean_scale_and_shapes_after_training():
     given = waves(400, share=0.2)
     network = RECIPE.fit(given, SHORT, 0)
     steps = given.features.reshape(-1, 3).astype(float)
@@ -179,7 +179,7 @@ def test_an_epoch_has_as_many_of_either_class():
 
 
 @deep
-def test_what_is_left_out_is_whole_channels_and_made_up_for():
+def test_dropout_leaves_out_whole_channels_and_scales_the_others():
     import torch
 
     from holdfast.classifiers.tcn import _drop_channels
@@ -205,7 +205,7 @@ def test_kernels_begin_by_hes_rule():
 
 
 @deep
-def test_a_constant_channel_is_no_trouble():
+def test_a_constant_channel():
     given = waves(200)
     rows = given.features.reshape(200, -1, 3).copy()
     rows[:, :, 2] = 7.0
@@ -227,7 +227,7 @@ def test_refusals():
     )
 
 
-def test_without_torch_it_says_what_to_install(monkeypatch):
+def test_without_torch_the_error_names_the_extra(monkeypatch):
     monkeypatch.setitem(sys.modules, "torch", None)
     with pytest.raises(MissingExtra) as raised:
         RECIPE.fit(waves(50), SHORT, 0)

@@ -46,7 +46,7 @@ labelled = st.lists(st.tuples(st.integers(-20, 20), st.booleans()), min_size=2, 
 )
 
 
-def test_by_hand():
+def test_cuts_computed_by_hand():
     # Below 2.25 are 2 of 4 stable and 0 of 3 others: 2 x 3 - 0 x 4 = 6. Below 3.5: 3 x 3 - 1 x 4
     # = 5; below 5.5: 4 x 3 - 2 x 4 = 4.
     values = np.array([1.0, 2.0, 2.5, 3.0, 4.0, 5.0, 6.0])
@@ -105,7 +105,7 @@ def test_the_lowest_of_equal_cuts_is_taken():
     )
 
 
-def test_a_constant_feature_has_no_say():
+def test_a_constant_feature_has_no_effect():
     stable = np.arange(20) % 4 == 0
     assert best_cut(np.full(20, 0.1), stable) == (0.1, -1, 0)
     found = fit(samples(np.full(20, 0.1), stable)).probability(np.full((3, 1), 0.1))
@@ -122,7 +122,7 @@ def test_scale_and_place_do_not_matter():
     assert one.probability(rows) == pytest.approx(two.probability(rows * 1e6 - 3), abs=1e-6)
 
 
-def test_probabilities_say_how_often():
+def test_probabilities_are_calibrated():
     rng = np.random.default_rng(2)
     values = rng.normal(size=20000)
     stable = rng.random(20000) < 1 / (1 + np.exp(2 * values - 1))
@@ -142,7 +142,7 @@ def test_heavy_tails():
     )
 
 
-def test_nothing_to_set_and_deterministic():
+def test_no_parameters_and_deterministic():
     assert dict(Threshold().reference) == {}
     assert Threshold().suggest(None) == {}
     assert Threshold().name == "threshold"

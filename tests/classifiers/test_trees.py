@@ -11,7 +11,7 @@ RECIPE = GradientBoosting()
 
 
 def square(n=1500, seed=0, share=1.0):
-    """Stable inside a square in the middle: no line parts them. `share` of the stable are kept."""
+    """Stable inside a square in the middle: no line separates them. Keep `share` of the stable."""
     rng = np.random.default_rng(seed)
     features = rng.uniform(-1, 1, size=(n, 2))
     stable = (np.abs(features) < 0.7).all(axis=1)
@@ -23,7 +23,7 @@ def fitted(given, seed=0):
     return RECIPE.fit(given, RECIPE.reference, seed)
 
 
-def test_they_learn_what_no_line_parts():
+def test_they_learn_classes_that_no_line_separates():
     trees = fitted(square())
     assert trees.n_features == 2
     found = trees.probability([[0.0, 0.0], [0.5, -0.5], [0.9, 0.9], [-0.9, 0.0], [0.0, 0.95]])
@@ -32,7 +32,7 @@ def test_they_learn_what_no_line_parts():
     assert ((trees.probability(test.features) >= trees.threshold) == test.stable).mean() > 0.97
 
 
-def test_no_feature_no_probability():
+def test_nan_features_have_no_probability():
     trees = fitted(square())
     assert np.isnan(trees.probability([[np.nan, 0.0], [0.0, 0.0]])).tolist() == [True, False]
     assert np.isnan(trees.probability([[0.0, np.nan]])).all()

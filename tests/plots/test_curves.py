@@ -9,7 +9,7 @@ X = np.array([4.0, 8.0, 14.0])
 
 
 def drawn(figure):
-    """Drawing is where most warnings come from; they are errors here."""
+    """Drawing causes most warnings; they are errors here."""
     figure.savefig(io.BytesIO(), format="png", dpi=50)
     return figure
 

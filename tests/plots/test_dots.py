@@ -6,7 +6,7 @@ from holdfast.plots.dots import IntervalEstimate, draw_dots, draw_groups
 
 
 def drawn(figure):
-    """Drawing is where most warnings come from; they are errors here."""
+    """Drawing causes most warnings; they are errors here."""
     figure.savefig(io.BytesIO(), format="png", dpi=50)
     return figure
 

@@ -65,7 +65,7 @@ def test_no_global_state_is_touched():
     ],
     ids=["one", "many", "hand", "bare", "nothing", "some", "unlike", "none"],
 )
-def test_whatever_there_is_can_be_drawn(decisions):
+def test_incomplete_decisions_can_be_drawn(decisions):
     draw(decisions).savefig(io.BytesIO(), format="png")
 
 
@@ -87,7 +87,7 @@ def test_a_dot_stands_at_the_accuracy_of_its_finger():
         assert sorted(drawn.get_offsets()[:, 0]) == pytest.approx(expected)
 
 
-def test_the_curve_of_the_hand_reaches_the_share_of_events_told():
+def test_the_curve_of_the_hand_reaches_the_detected_fraction():
     """Alarms 0.05 s late in four of five recordings, never in the fifth."""
     decisions = example_decisions(4, delay=0.05)
     silent = finger(9)

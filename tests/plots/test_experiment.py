@@ -30,7 +30,7 @@ def series(n=200, seed=0, **options):
 
 
 def drawn(figure):
-    """Drawing is where most warnings come from; they are errors here."""
+    """Drawing causes most warnings; they are errors here."""
     figure.savefig(io.BytesIO(), format="png", dpi=50)
     return figure
 

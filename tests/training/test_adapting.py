@@ -1,4 +1,4 @@
-"""Beginning from a model: what is kept of it, what the data change, and what is warnings."""
+"""Adaptation of a model: what is kept, what the data change, and the warnings."""
 
 from dataclasses import replace
 
@@ -46,7 +46,7 @@ def accuracy(model, recordings):
     return evaluate(model, recordings).pooled.accuracy
 
 
-def test_it_keeps_what_the_model_has(known, few):
+def test_the_features_window_and_tare_of_the_model_are_kept(known, few):
     adapted, warnings = train_with_warnings(few, Setting.adapting(known, trials=0))
     assert set(adapted.fingers) == {"thumb", "index"}
     assert {part.features for part in adapted.fingers.values()} == {FEATURES}
@@ -57,14 +57,14 @@ def test_it_keeps_what_the_model_has(known, few):
     assert (adapted.name, warnings) == ("", [])
 
 
-def test_what_is_chosen_wins(known, few):
+def test_given_fields_replace_those_of_the_model(known, few):
     setting = Setting.adapting(known, trials=0, hold=0.3, tare=Tare.parse("first"), shared=True)
     adapted = train(few, setting).model
     assert set(adapted.fingers) == {ANY_FINGER}
     assert (adapted.tare, adapted.debounce) == ("first", Debounce(0.02, 0.05, 0.3))
 
 
-def test_with_few_samples_it_beats_training_from_nothing(known):
+def test_with_few_samples_adapting_is_better_than_training(known):
     """On other recordings of a hand where what is known before is right."""
     eager = msgspec.structs.replace(known, debounce=Debounce())
     rest = [tiny_recording(seed) for seed in range(60, 68)]
@@ -76,7 +76,7 @@ def test_with_few_samples_it_beats_training_from_nothing(known):
         assert accuracy(adapted, rest) > accuracy(nothing, rest) + 2.0
 
 
-def test_recordings_mend_what_the_model_has_wrong(known, few):
+def test_recordings_correct_a_wrong_model(known, few):
     part = known.fingers[ANY_FINGER]
     rule = msgspec.structs.replace(part.classifier, intercept=part.classifier.intercept + 4.0)
     wrong = msgspec.structs.replace(
@@ -89,7 +89,7 @@ def test_recordings_mend_what_the_model_has_wrong(known, few):
     assert accuracy(adapted, rest) > accuracy(wrong, rest) + 5.0
 
 
-def test_fingers_begin_each_from_its_own(known, few):
+def test_each_finger_is_adapted_from_its_own_classifier(known, few):
     own = by_finger(known)
     part = own.fingers["index"]
     other = msgspec.structs.replace(part.classifier, scale=(7.0,) * len(FEATURES))
@@ -102,7 +102,7 @@ def test_fingers_begin_each_from_its_own(known, few):
 
 
 def test_a_search_from_another_model_is_another_search(known, tmp_path):
-    """What the journal holds of one is not taken up by the other."""
+    """The trials of one search are not used by the other."""
     rng = np.random.default_rng(0)
     stable = rng.random(80) < 0.5
     rows = rng.normal(size=(80, len(FEATURES))) + stable[:, None]
@@ -125,7 +125,7 @@ def test_windows_are_meant_for_the_rate_of_the_model(known):
     assert train(fast, Setting.adapting(for_any, trials=0)).model.rate == pytest.approx(300.0)
 
 
-# --- what is warnings ----------------------------------------------------------------------------
+# --- warnings ------------------------------------------------------------------------------------
 
 
 def test_another_sensor_is_used_with_a_warning(known):

@@ -12,7 +12,7 @@ WIDE = replace(TINY, name="wide", positions=TINY.positions.repeat(2, 0),
                rotations=TINY.rotations.repeat(2, 0))  # fmt: skip
 
 
-def test_what_is_found(grasps):
+def test_names_sensors_and_counts(grasps):
     found = scan_dataset(iter(grasps))
     assert [entry.name for entry in found.recordings] == [each.name for each in grasps]
     assert [entry.digest for entry in found.recordings] == [each.digest for each in grasps]

@@ -28,7 +28,7 @@ def test_parameters_are_kept_as_given():
 
 
 @pytest.mark.parametrize("classifier", ["logreg", "svm"])
-def test_it_is_the_model_of_the_reference_setting(grasps, classifier):
+def test_the_model_is_that_of_the_reference_parameters(grasps, classifier):
     estimator = StabilityClassifier(classifier).fit(grasps)
     trained = train(grasps, Setting(classifier=classifier, trials=0)).model
     assert estimator.model_.fingers == trained.fingers
@@ -51,7 +51,7 @@ def test_parameters_reach_the_fit(grasps):
     assert all(other != plain for other in others)
 
 
-def test_it_predicts_what_the_detector_says(grasps):
+def test_predictions_are_those_of_the_detector(grasps):
     fast = tiny_recording(30, n=1200, rate=300.0)
     estimator = StabilityClassifier(window=6).fit(grasps)
     given = [*grasps[:2], fast]

@@ -19,7 +19,7 @@ def model(grasps):
     return train(grasps, Setting(trials=0, window=6)).model
 
 
-def test_decisions_are_the_detectors_beside_the_labels(model, grasps):
+def test_decisions_are_those_of_the_detector_with_the_labels(model, grasps):
     decisions = compute_decisions(model, grasps[0])
     detection = detect(model, grasps[0])
     assert decisions.name == "grasp-0"
@@ -47,7 +47,7 @@ def test_without_labels_nothing_is_counted(model):
     assert (metrics.pooled.n, metrics.pooled.accuracy) == (0, None)
 
 
-def test_one_recording_at_a_time_is_held(model):
+def test_one_recording_at_a_time_is_in_memory(model):
     alive = weakref.WeakSet()
 
     def lazy():

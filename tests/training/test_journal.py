@@ -12,7 +12,7 @@ ONE = {"C": 0.1 + 0.2, "class_weight": "balanced"}
 TWO = {"C": 1e-4, "class_weight": None}
 
 
-def test_what_is_kept_is_found_again_to_the_last_bit(tmp_path):
+def test_a_loss_is_found_again_to_the_last_bit(tmp_path):
     path = tmp_path / "search"
     journal = Journal(path, "a")
     assert not path.exists()
@@ -31,7 +31,7 @@ def test_another_search_finds_nothing(tmp_path):
 
 
 @pytest.mark.parametrize("cut", range(1, 70, 4))
-def test_a_line_that_was_cut_costs_one_trial(tmp_path, cut):
+def test_an_incomplete_line_loses_one_trial(tmp_path, cut):
     path = tmp_path / "search"
     journal = Journal(path, "a")
     journal.add(ONE, 0.25)
@@ -45,7 +45,7 @@ def test_a_line_that_was_cut_costs_one_trial(tmp_path, cut):
     assert (again.find(ONE), again.find(TWO)) == (0.25, 0.5)
 
 
-def test_what_is_no_journal_is_passed_over(tmp_path):
+def test_lines_that_are_not_trials_are_ignored(tmp_path):
     path = tmp_path / "search"
     path.write_bytes(b'\x00\xff junk\n{"search": 3}\n[1]\n')
     assert Journal(path, "a").find(ONE) is None
@@ -57,7 +57,7 @@ def fill(path, name):
         journal.add({"C": float(k), "class_weight": "balanced"}, k / 7)
 
 
-def test_searches_side_by_side_share_a_file(tmp_path):
+def test_parallel_searches_share_a_file(tmp_path):
     path = tmp_path / "search"
     list(map_ordered(fill, [(path, name) for name in "abcd"], n_jobs=2))
     for name in "abcd":
@@ -66,7 +66,7 @@ def test_searches_side_by_side_share_a_file(tmp_path):
         assert found == [k / 7 for k in range(50)]
 
 
-def test_the_key_is_of_content():
+def test_the_key_depends_on_the_content():
     array = np.arange(6.0)
     key = search_key(array, "logreg", 0)
     assert key == search_key(array.copy(), "logreg", 0)

@@ -1,4 +1,4 @@
-"""A dataset larger than memory trains: one recording is held at a time, and its features."""
+"""Training on a dataset larger than memory: one recording at a time is in memory."""
 
 import gc
 import os
@@ -37,7 +37,7 @@ class Lazy(Sequence):
 
 
 @pytest.mark.parametrize("split", ["recording", "random"])
-def test_one_recording_is_held_at_a_time(split):
+def test_one_recording_is_in_memory_at_a_time(split):
     recordings = Lazy(8)
     train(recordings, Setting(trials=0, split=split))
     assert recordings.most <= 2  # one, and the last until a loop moves on
@@ -82,7 +82,7 @@ def test_a_dataset_larger_than_a_limit_on_memory_trains(tmp_path):
 
 
 def _write_large(folder, n_recordings, n_samples):
-    """Recordings of 29 MB each, that compress well: most taxels say nothing."""
+    """Recordings of 29 MB each, that compress well: most taxels are constant."""
     import numpy as np
 
     from holdfast.contact import ContactState

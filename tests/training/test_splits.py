@@ -92,5 +92,5 @@ def test_inner_folds_leave_out_those_that_leave_one_class():
     assert masks == []
 
 
-def test_inner_folds_of_nothing():
+def test_inner_folds_without_samples():
     assert inner_folds(samples([], []), 5, 0) == []

@@ -1,4 +1,4 @@
-"""Training as a whole: who saw what, what comes out, and what is refused."""
+"""Training as a whole: held-out data, results and errors."""
 
 from dataclasses import replace
 
@@ -46,7 +46,7 @@ def fitted_by(recordings, setting, monkeypatch, **options):
 
 
 @pytest.mark.parametrize("split", ["recording", "object"])
-def test_no_model_of_the_figures_has_seen_what_it_judges(grasps, split, monkeypatch):
+def test_no_model_is_evaluated_on_its_training_samples(grasps, split, monkeypatch):
     setting = replace(QUICK, split=split)
     data_split = split_data(scan_dataset(grasps).recordings, split, 0)
     found = fitted_by(grasps, setting, monkeypatch)
@@ -57,7 +57,7 @@ def test_no_model_of_the_figures_has_seen_what_it_judges(grasps, split, monkeypa
 
 
 @pytest.mark.parametrize("split", ["recording", "object"])
-def test_no_search_for_the_figures_has_seen_what_they_judge(grasps, split, monkeypatch):
+def test_no_search_uses_the_units_that_are_evaluated(grasps, split, monkeypatch):
     """Parameters of a unit's model come from a search without that unit."""
     searched, evaluated = {}, {}
 
@@ -82,7 +82,7 @@ def test_no_search_for_the_figures_has_seen_what_they_judge(grasps, split, monke
             assert unit not in searched[token]
 
 
-def test_what_cannot_be_learnt_is_not_learnt():
+def test_random_labels_are_not_learnt():
     """Labels by the toss of a coin for each recording: only a leak would beat chance.
 
     Features tell recordings apart by their grip, so that a model which saw the recording that
@@ -99,8 +99,8 @@ def test_what_cannot_be_learnt_is_not_learnt():
     assert metrics.pooled.accuracy < 60
 
 
-def test_out_of_fold_figures_are_those_of_the_folds_own_models(grasps):
-    """Anew, from a model that was trained on the other recordings alone."""
+def test_cross_validation_equals_separate_trainings(grasps):
+    """Each recording is evaluated by a model that is trained on the others alone."""
     trained = train(grasps, SETTING)
     evaluated = []
     for place, recording in enumerate(grasps):
@@ -113,7 +113,7 @@ def test_out_of_fold_figures_are_those_of_the_folds_own_models(grasps):
 
 
 def test_a_random_sample_is_evaluated_by_the_model_without_it(grasps, monkeypatch):
-    """Every fold's classifier says another constant probability."""
+    """The classifier of every fold has another constant probability."""
     calls = []
 
     class Marked:
@@ -133,12 +133,12 @@ def test_a_random_sample_is_evaluated_by_the_model_without_it(grasps, monkeypatc
             )
 
     monkeypatch.setattr(Setting, "recipe_of", lambda self, finger: Marked())
-    warnings = []
+    given_decisions = []
     monkeypatch.setattr(
-        trainer, "summarise", lambda evaluated, seed: warnings.extend(evaluated) or _some()
+        trainer, "summarise", lambda each, seed: given_decisions.extend(each) or _some()
     )
     train(grasps, replace(SETTING, split="random"))
-    for place, decisions in enumerate(warnings):
+    for place, decisions in enumerate(given_decisions):
         units = split_data(scan_dataset(grasps).recordings, "random", 0).units_of(place, 400)
         for k, finger in enumerate(decisions.fingers.values()):
             number = 2 + 2 * units + k
@@ -156,14 +156,14 @@ def _some():
 # --- what comes out --------------------------------------------------------------------------
 
 
-def test_the_model_says_where_it_came_from(grasps):
+def test_the_model_has_its_provenance(grasps):
     trained = train(grasps, QUICK)
-    warnings = trained.model.training
-    assert warnings.recordings == {each.name: each.digest for each in grasps}
-    assert (warnings.split, warnings.seed) == ("recording", 0)
-    assert set(warnings.parameters) == {"thumb", "index"}
-    assert warnings.figures["auc"] == trained.cross_validation.pooled.auc
-    assert set(warnings.versions) == {"holdfast", "numpy", "scikit-learn"}
+    provenance = trained.model.training
+    assert provenance.recordings == {each.name: each.digest for each in grasps}
+    assert (provenance.split, provenance.seed) == ("recording", 0)
+    assert set(provenance.parameters) == {"thumb", "index"}
+    assert provenance.figures["auc"] == trained.cross_validation.pooled.auc
+    assert set(provenance.versions) == {"holdfast", "numpy", "scikit-learn"}
     assert trained.model.rate == pytest.approx(100.0)
     assert trained.model.sensors == {"tiny": TINY}
 
@@ -174,7 +174,7 @@ def test_the_same_seed_gives_the_same_model(grasps):
 
 
 @pytest.mark.parametrize("split", ["recording", "random"])
-def test_side_by_side_gives_the_same(grasps, split, tmp_path):
+def test_parallel_training_gives_the_same_model(grasps, split, tmp_path):
     setting, given = replace(QUICK, split=split), grasps[:3]
     alone = train(given, setting, journal=tmp_path / "alone")
     assert train(given, setting, journal=tmp_path / "together", n_jobs=2) == alone
@@ -215,7 +215,7 @@ def test_the_contact_threshold_of_the_model(grasps, asked, found):
     assert {finger.contact_threshold for finger in model.fingers.values()} == {found}
 
 
-def test_the_contact_threshold_of_a_fold_is_without_what_it_judges(grasps):
+def test_the_contact_threshold_of_a_fold_leaves_out_its_recordings(grasps):
     """One recording's tare stretch is far noisier; only its own fold may ignore that."""
     module = grasps[0].modules["thumb"]
     loud = module.readings.copy()
@@ -287,7 +287,7 @@ def test_a_finger_of_one_recording_is_trained_but_not_evaluated(grasps):
     assert set(by_name(trained.cross_validation)["grasp-22"].fingers) == {"thumb"}
 
 
-def test_a_recording_whose_fingers_nobody_else_has(grasps):
+def test_a_recording_whose_finger_no_other_recording_has(grasps):
     given = [*grasps[:3], tiny_recording(23, fingers=("ring",))]
     trained = train(given, SETTING, warn=lambda _: None)
     assert by_name(trained.cross_validation)["grasp-23"].fingers == {}
@@ -307,7 +307,7 @@ def test_recordings_with_one_class_help_those_with_both(grasps):
 
 
 @pytest.mark.parametrize("split", ["recording", "random"])
-def test_another_rate_is_evaluated_at_the_models(grasps, split):
+def test_another_rate_is_evaluated_at_the_rate_of_the_model(grasps, split):
     fast = tiny_recording(26, n=1200, rate=300.0)
     metrics = train([*grasps, fast], replace(SETTING, split=split)).cross_validation
     assert by_name(metrics)["grasp-26"].fingers["thumb"].n == pytest.approx(345, abs=3)
@@ -356,15 +356,15 @@ def test_a_window_longer_than_the_data(grasps):
     )
 
 
-def test_what_takes_long_can_be_followed(grasps):
-    warnings = []
+def test_long_steps_report_progress(grasps):
+    steps = []
 
     def progress(items, what, total):
-        warnings.append((what, total))
+        steps.append((what, total))
         return iter(items)
 
     train(grasps, QUICK, progress=progress)
-    assert warnings == [
+    assert steps == [
         ("reading", 6),
         ("features", 6),
         ("searching", 12),
@@ -373,7 +373,7 @@ def test_what_takes_long_can_be_followed(grasps):
     ]
 
 
-def test_much_that_stays_undecided_is_warnings(grasps, monkeypatch):
+def test_warn_of_many_undecided_samples(grasps, monkeypatch):
     warnings = []
     monkeypatch.setattr("holdfast.training.trainer.MAX_UNDECIDED_FRACTION", 0.0)
     train(grasps, Setting(trials=0), warn=warnings.append)

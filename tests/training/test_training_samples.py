@@ -1,4 +1,4 @@
-"""From recordings to training samples: what is kept, with which label, and what is at rest."""
+"""Training samples of recordings: rows, labels, groups and contact thresholds."""
 
 from dataclasses import replace
 
@@ -23,7 +23,7 @@ from .build import TINY, tiny_module, tiny_recording
 SETTING = Setting(window=6, features=parse_features("F_a,F_x,F_y,F_z,m,sigma", 6))
 
 
-def designs(recordings, setting=SETTING, split="recording"):
+def finger_samples(recordings, setting=SETTING, split="recording"):
     found = scan_dataset(recordings)
     return gather_samples(
         recordings, found, setting, split_data(found.recordings, split, setting.seed)
@@ -32,7 +32,7 @@ def designs(recordings, setting=SETTING, split="recording"):
 
 def test_rows_are_the_features_of_the_labelled_samples(grasps):
     """By force and Haar window of each recording alone: windows never cross a boundary."""
-    design = designs(grasps)["index"]
+    own = finger_samples(grasps)["index"]
     rows, stable, groups = [], [], []
     for place, recording in enumerate(grasps):
         module = recording.modules["index"]
@@ -42,32 +42,34 @@ def test_rows_are_the_features_of_the_labelled_samples(grasps):
         rows.append(features[usable])
         stable.append((module.label_states == STABLE)[usable])
         groups += [place] * usable.sum()
-    np.testing.assert_allclose(design.samples.features, np.concatenate(rows), atol=1e-9)
-    assert (design.samples.stable == np.concatenate(stable)).all()
-    assert design.samples.groups.tolist() == groups == design.units.tolist()
-    assert len(design.samples.stable) == 6 * (400 - 50 - 5)  # tare, then one sample short
+    np.testing.assert_allclose(own.samples.features, np.concatenate(rows), atol=1e-9)
+    assert (own.samples.stable == np.concatenate(stable)).all()
+    assert own.samples.groups.tolist() == groups == own.units.tolist()
+    assert len(own.samples.stable) == 6 * (400 - 50 - 5)  # tare, then one sample short
 
 
 def test_unlabelled_samples_are_left_out(grasps):
     states = (ContactState.NO_CONTACT, ContactState.STABLE, None, ContactState.UNSTABLE)
     given_recordings = [grasps[0], tiny_recording(7, states=states)]
-    groups = designs(given_recordings)["thumb"].samples.groups
+    groups = finger_samples(given_recordings)["thumb"].samples.groups
     assert np.bincount(groups).tolist() == [345, 245]
 
 
-def test_what_is_held_out_is_gone(grasps):
-    design = designs(grasps)["thumb"]
-    left = design.without({1, 4})
+def test_held_out_samples_are_left_out(grasps):
+    own = finger_samples(grasps)["thumb"]
+    left = own.without({1, 4})
     assert np.unique(left.groups).tolist() == [0, 2, 3, 5]
-    assert len(left.stable) == len(design.samples.stable) * 4 // 6
+    assert len(left.stable) == len(own.samples.stable) * 4 // 6
 
 
 @given(max_samples=st.integers(1, 3000), n=st.integers(2, 4))
 @settings(max_examples=20, deadline=None)
 def test_max_samples_bounds_rows_and_thins_evenly(max_samples, n):
     given_recordings = [tiny_recording(seed) for seed in range(n)]
-    whole = designs(given_recordings)["thumb"].samples
-    kept = designs(given_recordings, replace(SETTING, max_samples=max_samples))["thumb"].samples
+    whole = finger_samples(given_recordings)["thumb"].samples
+    kept = finger_samples(given_recordings, replace(SETTING, max_samples=max_samples))[
+        "thumb"
+    ].samples
     step = max(1, -(-400 * n // max_samples))
     assert len(kept.stable) <= max_samples
     np.testing.assert_array_equal(kept.features, whole.features[::step])
@@ -87,32 +89,32 @@ def rest_amplitudes(recordings, finger, seconds=0.5):
 
 def test_the_contact_threshold_is_mean_and_five_deviations_of_the_tare_stretches(grasps):
     amplitude = rest_amplitudes([grasps[k] for k in (0, 2, 3)], "index")
-    found = designs(grasps)["index"].contact_threshold([0, 2, 3])
+    found = finger_samples(grasps)["index"].contact_threshold([0, 2, 3])
     assert found == pytest.approx(amplitude.mean() + 5 * amplitude.std(), rel=1e-9)
 
 
 @pytest.mark.parametrize("tare", ["first", "none", "0.1:0.4"])
 def test_no_contact_threshold_where_the_tare_may_be_in_contact(grasps, tare):
-    design = designs(grasps, replace(SETTING, tare=Tare.parse(tare)))["index"]
-    assert design.contact_threshold(range(6)) is None
+    own = finger_samples(grasps, replace(SETTING, tare=Tare.parse(tare)))["index"]
+    assert own.contact_threshold(range(6)) is None
 
 
-def test_a_shared_design_pools_the_fingers(grasps):
-    apart = designs(grasps)
-    shared = designs(grasps, replace(SETTING, shared=True))
+def test_shared_samples_pool_the_fingers(grasps):
+    apart = finger_samples(grasps)
+    shared = finger_samples(grasps, replace(SETTING, shared=True))
     assert set(shared) == {ANY_FINGER}
-    design = shared[ANY_FINGER]
-    assert len(design.samples.stable) == sum(len(each.samples.stable) for each in apart.values())
+    own = shared[ANY_FINGER]
+    assert len(own.samples.stable) == sum(len(each.samples.stable) for each in apart.values())
     amplitude = np.concatenate([rest_amplitudes(grasps, f) for f in ("thumb", "index")])
     expected = amplitude.mean() + 5 * amplitude.std()
-    assert design.contact_threshold(range(6)) == pytest.approx(expected, rel=1e-9)
+    assert own.contact_threshold(range(6)) == pytest.approx(expected, rel=1e-9)
 
 
-def test_a_shared_design_needs_one_sensor():
+def test_shared_samples_need_one_sensor():
     other = replace(TINY, name="other")
     modules = {"thumb": tiny_module(0), "palm": tiny_module(1, sensor=other)}
     with pytest.raises(TrainingError) as refusal:
-        designs([Recording("both", modules)], replace(SETTING, shared=True), split="random")
+        finger_samples([Recording("both", modules)], replace(SETTING, shared=True), split="random")
     assert str(refusal.value) == (
         "one classifier for all fingers needs one sensor; given are thumb (tiny), palm (other)"
     )
@@ -121,21 +123,21 @@ def test_a_shared_design_needs_one_sensor():
 def test_recordings_at_another_rate_are_resampled(grasps):
     fast = tiny_recording(8, n=1200, rate=300.0)
     near = tiny_recording(9, n=440, rate=110.0)
-    groups = designs([*grasps, fast, near])["thumb"].samples.groups
+    groups = finger_samples([*grasps, fast, near])["thumb"].samples.groups
     n = np.bincount(groups)
     assert n[6] == pytest.approx(345, abs=2)  # four seconds at 100 Hz as well
     assert n[7] == 440 - 55 - 5  # within 20 %: as it is
 
 
-def test_recordings_may_lack_fingers_or_labels_or_life(grasps):
-    """Missing, empty and dead fingers and unlabelled recordings take no part, and do no harm."""
-    whole = designs(grasps)
+def test_recordings_may_lack_fingers_labels_or_finite_samples(grasps):
+    """Missing, empty and dead fingers and unlabelled recordings add no samples."""
+    whole = finger_samples(grasps)
     thumb_only = tiny_recording(10, fingers=("thumb",))
     dead = tiny_module(1)
     dead = replace(dead, readings=np.full_like(dead.readings, np.nan))
     half_dead = Recording("half dead", {"thumb": tiny_module(11), "index": dead})
     bare = tiny_recording(12, fingers=("ring",), states=[None] * 4)
-    found = designs([*grasps, thumb_only, half_dead, bare])
+    found = finger_samples([*grasps, thumb_only, half_dead, bare])
     assert len(found["index"].samples.stable) == len(whole["index"].samples.stable)
     assert len(found["thumb"].samples.stable) == len(whole["thumb"].samples.stable) + 2 * 345
     assert set(found) == {"thumb", "index"}
@@ -146,7 +148,7 @@ def test_recordings_may_lack_fingers_or_labels_or_life(grasps):
 def test_a_module_without_samples(grasps):
     nothing = replace(tiny_module(0), times=[], readings=np.empty((0, 1, 3)), labels=())
     hollow = Recording("hollow", {"thumb": tiny_module(13), "index": nothing})
-    found = designs([*grasps, hollow])
+    found = finger_samples([*grasps, hollow])
     assert np.bincount(found["thumb"].samples.groups, minlength=7)[6] == 345
     assert np.bincount(found["index"].samples.groups, minlength=7)[6] == 0
 

@@ -18,7 +18,7 @@ def blobs(seed=0, n=240, n_groups=6):
 
 
 class Spy:
-    """A way of fitting that notes what it is asked, and may stop like a killed process."""
+    """A recipe that records its calls, and can stop like a killed process."""
 
     def __init__(self, name="logreg", stops_after=None):
         self._recipe = recipe(name)
@@ -44,7 +44,7 @@ def run(spy, *, n_trials=8, seed=0, journal=None, samples=None):
 
 
 @pytest.mark.parametrize("name", ["logreg", "svm"])
-def test_the_same_seed_finds_the_same(name):
+def test_the_same_seed_finds_the_same_parameters(name):
     one, two = Spy(name), Spy(name)
     assert run(one) == run(two)
     assert one.asked == two.asked
@@ -64,7 +64,7 @@ def test_the_first_trial_is_the_reference_setting():
     assert spy.asked == [spy.reference] * 3
 
 
-def test_the_best_by_log_loss_is_taken():
+def test_the_parameters_with_the_least_log_loss_are_returned():
     """Compute the loss of every trial again, from its definition."""
     spy, samples = Spy(), blobs()
     best = run(spy, samples=samples)
@@ -104,7 +104,7 @@ def test_a_stopped_search_ends_where_it_would_have_ended(tmp_path, stops_after):
     assert rest.asked == whole.asked[3 * n_done :]
 
 
-def test_a_search_that_ended_is_not_done_again(tmp_path):
+def test_a_finished_search_is_not_repeated(tmp_path):
     expected = run(Spy(), journal=tmp_path / "search")
     again = Spy()
     assert run(again, journal=tmp_path / "search") == expected
@@ -117,7 +117,7 @@ def test_a_search_that_ended_is_not_done_again(tmp_path):
 @pytest.mark.parametrize(
     "other", [{"samples": blobs(1)}, {"seed": 1}, {"spy": Spy("svm")}], ids=["data", "seed", "svm"]
 )
-def test_a_journal_of_another_search_is_not_taken_up(tmp_path, other):
+def test_the_journal_of_another_search_is_not_used(tmp_path, other):
     run(Spy(), journal=tmp_path / "search")
     other = {"spy": Spy()} | other
     expected = run(Spy(other["spy"].name), **{k: v for k, v in other.items() if k != "spy"})

@@ -25,7 +25,7 @@ from holdfast.plots.style import (
 from holdfast.sensors.types import Array
 
 MAX_TICKS = 9
-"""Up to this many values of x are all named on the axis."""
+"""Maximum number of values of x that all get a tick."""
 
 
 class Curve(NamedTuple):
@@ -33,7 +33,7 @@ class Curve(NamedTuple):
 
     Attributes:
         x: (k,) values of the parameter.
-        y: (k,) values; NaN where there is none.
+        y: (k,) values; NaN if unknown.
         low: (k,) lower ends of their intervals; None without intervals.
         high: (k,) upper ends.
         chosen: index of the point that is in use; it is drawn larger.

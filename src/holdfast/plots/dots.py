@@ -27,7 +27,7 @@ from holdfast.sensors.types import Array
 
 
 class IntervalEstimate(NamedTuple):
-    """A value, its interval and the paper's value; NaN or None where there is none."""
+    """A value, its interval and the value of the paper; NaN or None if unknown."""
 
     value: float | None
     low: float | None = None

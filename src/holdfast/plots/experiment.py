@@ -84,7 +84,7 @@ def draw_experiment(
 
     Args:
         series: of the finger.
-        predicted: by title of the method: (n,) state codes, UNKNOWN where there is no decision.
+        predicted: by title of the method: (n,) state codes, UNKNOWN without a decision.
         span: the part to show [s]; everything by default.
     """
     strips = {LABEL_STRIP: series.labels, **predicted}

@@ -32,7 +32,7 @@ from holdfast.plots.time_series import (
 )
 from holdfast.recordings import Recording, Tactile
 
-MM = 1e3
+MM_PER_M = 1e3
 ROW_HEIGHTS = {"force": 1.75, "sigma": 0.9, "slip": 0.75}
 """Heights of the axes of a finger [inch]."""
 LEGEND_HEIGHT = 0.75
@@ -139,7 +139,7 @@ def _draw_finger(
 def _draw_slip(axes: Axes, series: FingerSeries) -> None:
     if series.slip is not None:
         times, speed = series.slip
-        draw_line(axes, times, MM * speed)
+        draw_line(axes, times, MM_PER_M * speed)
         add_labels(axes, y="slip [mm/s]")
         axes.set_ylim(bottom=0)
         return

@@ -1,4 +1,4 @@
-"""Figures of sensors and hands: where the taxels sit and where they look."""
+"""Figures of sensors and hands: positions and normals of the taxels."""
 
 import numpy as np
 import numpy.typing as npt
@@ -12,9 +12,9 @@ from mpl_toolkits.mplot3d import Axes3D  # type: ignore[import-untyped]
 from holdfast.sensors import Hand, HandModule, Sensor
 from holdfast.sensors.types import Array
 
-MM = 1e3
-FLAT = 1e-3
-"""Heights that differ by less than this are one height [mm]."""
+MM_PER_M = 1e3
+MIN_HEIGHT_RANGE = 1e-3
+"""A sensor whose taxel heights differ by less is drawn as flat [mm]."""
 
 AXIS_COLOURS = ("#c0392b", "#2e8b57", "#2b5ea8")
 PART_COLOURS = {
@@ -27,7 +27,7 @@ PART_COLOURS = {
 
 
 def plot_sensor(sensor: Sensor) -> Figure:
-    """The taxels of a sensor: in space with their normals, and numbered, seen from outside."""
+    """Draw the taxels of a sensor in space with their normals, and numbered from outside."""
     figure = Figure(figsize=(8.2, 4.2), dpi=160, layout="constrained")
     unit = "counts" if sensor.unit == "count" else "newtons"
     figure.suptitle(
@@ -35,13 +35,13 @@ def plot_sensor(sensor: Sensor) -> Figure:
         fontsize=10,
     )
     right, up = _view(sensor.normal)
-    height = sensor.positions @ sensor.normal * MM
+    height = sensor.positions @ sensor.normal * MM_PER_M
     scale = _height_scale(height)
     colours: Array = scale.to_rgba(height)
     _draw_space(figure.add_subplot(1, 2, 1, projection="3d"), sensor, colours, up)
     front = figure.add_subplot(1, 2, 2)
     _draw_front(front, sensor, colours, (right, up))
-    if np.ptp(height) > FLAT:
+    if np.ptp(height) > MIN_HEIGHT_RANGE:
         bar = figure.colorbar(scale, ax=front, shrink=0.6, aspect=25)
         bar.set_label(f"{_axis_name(sensor.normal)} [mm]", fontsize=7)
         bar.ax.tick_params(labelsize=6)
@@ -49,7 +49,7 @@ def plot_sensor(sensor: Sensor) -> Figure:
 
 
 def plot_hand(hand: Hand) -> Figure:
-    """The flat map of a hand: every taxel with its flat index, coloured by finger."""
+    """Draw the flat map of a hand: every taxel with its flat index, coloured by finger."""
     cells = np.concatenate([module.grid for module in hand.modules.values()])
     n_rows, n_columns = cells.max(axis=0) + 1
     figure = Figure(figsize=(0.3 * n_columns + 0.6, 0.3 * n_rows + 0.6), dpi=160)
@@ -69,7 +69,7 @@ def plot_hand(hand: Hand) -> Figure:
 
 
 def _draw_space(axes: Axes3D, sensor: Sensor, colours: Array, up: Array) -> None:
-    places = sensor.positions * MM
+    places = sensor.positions * MM_PER_M
     size = float(np.ptp(places, axis=0).max()) or 10.0
     normals = sensor.rotations[:, :, 2] * 0.16 * size
     axes.scatter(*places.T, c=colours, s=22, depthshade=False, edgecolors="black", linewidths=0.4)
@@ -80,7 +80,7 @@ def _draw_space(axes: Axes3D, sensor: Sensor, colours: Array, up: Array) -> None
 
 
 def _draw_frame(axes: Axes3D, places: Array, size: float) -> None:
-    """The axes of the fingertip frame, at its origin."""
+    """Draw the axes of the fingertip frame at its origin."""
     for axis, (name, colour) in enumerate(zip("xyz", AXIS_COLOURS, strict=True)):
         arrow = np.zeros(3)
         arrow[axis] = 0.3 * size
@@ -97,7 +97,7 @@ def _same_scale(axes: Axes3D, places: Array, size: float) -> None:
 
 
 def _look_from_outside(axes: Axes3D, normal: Array, up: Array) -> None:
-    """From a little above and beside the normal."""
+    """Set the view from outside, slightly above and beside the normal."""
     right = np.cross(up, normal)
     eye = normal + 0.6 * right + 0.45 * up
     elevation = np.degrees(np.arcsin(eye[2] / np.linalg.norm(eye)))
@@ -105,7 +105,7 @@ def _look_from_outside(axes: Axes3D, normal: Array, up: Array) -> None:
 
 
 def _draw_front(axes: Axes, sensor: Sensor, colours: Array, view: tuple[Array, Array]) -> None:
-    places = sensor.positions @ np.transpose(view) * MM
+    places = sensor.positions @ np.transpose(view) * MM_PER_M
     size = float(np.ptp(places, axis=0).max()) or 10.0
     for axis, length, colour in ((2, 0.13, "#444444"), (0, 0.07, AXIS_COLOURS[0])):
         arrows = sensor.rotations[:, :, axis] @ np.transpose(view) * length * size
@@ -154,7 +154,7 @@ def _label_module(axes: Axes, name: str, grid: npt.NDArray[np.int64], colour: st
 
 
 def _view(normal: Array) -> tuple[Array, Array]:
-    """Right and up as one sees them who looks at the sensor from outside."""
+    """Return the directions right and up in a view of the sensor from outside."""
     axis = np.array([0.0, 0.0, 1.0]) if abs(normal[2]) < 0.7 else np.array([0.0, 1.0, 0.0])
     right = np.cross(axis, normal)
     right /= np.linalg.norm(right)
@@ -162,10 +162,10 @@ def _view(normal: Array) -> tuple[Array, Array]:
 
 
 def _height_scale(height: Array) -> ScalarMappable:
-    """Colours for heights along the normal; one colour where the sensor is flat."""
+    """Return the colours of heights along the normal; one colour for a flat sensor."""
     low, high = float(height.min()), float(height.max())
-    room = 0.1 * (high - low) if high - low > FLAT else 1.0
-    return ScalarMappable(Normalize(low - room, high + room), "viridis")
+    margin = 0.1 * (high - low) if high - low > MIN_HEIGHT_RANGE else 1.0
+    return ScalarMappable(Normalize(low - margin, high + margin), "viridis")
 
 
 def _axis_name(direction: Array) -> str:

@@ -101,11 +101,11 @@ def finger_series(
 def envelope(times: Array, values: Array, n_stretches: int = 2000) -> tuple[Array, Array]:
     """Return the minimum and the maximum of each of `n_stretches` stretches of samples.
 
-    Drawn as a curve they look as all samples would. Short curves are returned unchanged.
+    A curve of them looks like the curve of all samples. Short curves are returned unchanged.
 
     Args:
         times: (n,) [s].
-        values: (n,) of any unit; NaN where there is none.
+        values: (n,) of any unit; NaN if unknown.
         n_stretches: number of stretches; each gives two points.
 
     Returns:

@@ -119,7 +119,7 @@ class Setting:
 
     @property
     def debounce(self) -> Debounce:
-        """Debouncing of the model: that of the adapted model, but for the hold."""
+        """Debouncing of the model: that of the adapted model, except for the hold time."""
         known = Debounce() if self.init is None else self.init.debounce
         return Debounce(known.min_duration, known.hysteresis, self.hold)
 
