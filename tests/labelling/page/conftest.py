@@ -1,25 +1,25 @@
 import pytest
 
-from labelling.page.desk import Desk
+from labelling.page.fake_service import FakeService
 
 
 @pytest.fixture(scope="session")
 def noted():
-    """What the browser itself notes of refusals and lost connections; no page can help it."""
+    """Messages of the browser about refusals and lost connections, which a page cannot prevent."""
     return r"Failed to load resource: .*(\b4(03|04|09|22)\b|\b50\d\b|ERR_CONNECTION)"
 
 
 @pytest.fixture
-def desk():
-    with Desk() as desk:
-        yield desk
+def service():
+    with FakeService() as service:
+        yield service
 
 
 @pytest.fixture(scope="module")
 def module(browser):
-    """A page whose modules are called one by one, as functions."""
-    with Desk() as desk:
+    """A page for calling functions of its JavaScript modules."""
+    with FakeService() as service:
         page = browser.new_page()
-        page.goto(desk.url)
+        page.goto(service.url)
         yield page
         page.close()

@@ -1,20 +1,20 @@
-"""The page as a whole, in a browser, against a service that is made up."""
+"""The whole labelling page in a browser, with a fake service."""
 
 import pytest
 
-from labelling.page.desk import FINGERS, Desk, Recording, label
-from labelling.page.hands import (
+from labelling.page.actions import (
     click,
     drag,
     labels,
-    place,
     point,
+    position,
     ready,
-    rough,
+    rounded,
     saved,
     shows,
     until,
 )
+from labelling.page.fake_service import FINGERS, FakeService, Recording, label
 
 SIZES = [(1280, 720), (1024, 768), (1920, 1080)]
 HOSTILE = "<img src=x onerror=alert(1)>"
@@ -22,8 +22,8 @@ HOSTILE = "<img src=x onerror=alert(1)>"
 
 @pytest.mark.parametrize("scheme", ["dark", "light"])
 @pytest.mark.parametrize("size", SIZES)
-def test_four_fingers_are_seen_without_scrolling(visit, desk, size, scheme):
-    page = visit(desk.url, size, scheme)
+def test_four_fingers_fit_without_scrolling(visit, service, size, scheme):
+    page = visit(service.url, size, scheme)
     ready(page)
     extent = "[document.documentElement.scrollWidth, document.documentElement.scrollHeight]"
     assert page.evaluate(extent) == list(size)
@@ -33,7 +33,7 @@ def test_four_fingers_are_seen_without_scrolling(visit, desk, size, scheme):
     assert rows == 4
     assert page.evaluate("holdfast.plot.height") == height
     clipped = page.evaluate(
-        """() => [...document.querySelectorAll("button, .gutter, .gutter *, select")]
+        """() => [...document.querySelectorAll("button, .finger-legend, .finger-legend *, select")]
           .filter((e) => e.offsetParent && e.scrollWidth > e.clientWidth + 1)
           .filter((e) => getComputedStyle(e).display !== "inline")
           .map((e) => `${e.className} ${e.textContent}`)"""
@@ -41,50 +41,50 @@ def test_four_fingers_are_seen_without_scrolling(visit, desk, size, scheme):
     assert clipped == []
     small = page.evaluate(
         """() => [...document.querySelectorAll("button, input, select")]
-          .filter((e) => e.offsetParent && !e.closest(".foot, .list"))
+          .filter((e) => e.offsetParent && !e.closest(".status-bar, .list"))
           .map((e) => e.getBoundingClientRect())
           .filter((r) => Math.min(r.width, r.height) < 43.9).length"""
     )
     assert small == 0
 
 
-def test_all_canvases_are_drawn(visit, desk):
-    page = visit(desk.url)
+def test_all_canvases_are_drawn(visit, service):
+    page = visit(service.url)
     ready(page)
-    inked = page.evaluate(
+    drawn = page.evaluate(
         """() => [...document.querySelectorAll("canvas")].map((c) => {
           const { data } = c.getContext("2d").getImageData(0, 0, c.width, c.height);
           return c.width > 500 && data.some((v) => v > 0);
         })"""
     )
-    assert inked[:3] == [True, True, True]
+    assert drawn[:3] == [True, True, True]
 
 
-def test_label_undo_redo_save_and_reload(visit, desk):
-    page = visit(desk.url)
+def test_label_undo_redo_save_and_reload(visit, service):
+    page = visit(service.url)
     ready(page)
     drag(page, "index", 8, 12)
     page.keyboard.press("2")
     page.keyboard.press("s")
     drag(page, "index", 14, 15)
     first, second = labels(page, "index")
-    assert rough([first, second]) == [(8, 12, "stable", None), (14, 15, "unstable", "slip")]
+    assert rounded([first, second]) == [(8, 12, "stable", None), (14, 15, "unstable", "slip")]
     page.keyboard.press("Control+z")
     assert labels(page, "index") == [first]
     page.keyboard.press("Control+z")
-    page.keyboard.press("Control+z")  # there is nothing more
+    page.keyboard.press("Control+z")  # nothing is left to undo
     assert labels(page, "index") == []
     page.keyboard.press("Control+Shift+z")
     page.keyboard.press("Control+y")
     assert labels(page, "index") == [first, second]
     saved(page)
-    mine = {"evidence": "hand", "confidence": 1, "author": "ada"}
-    assert desk.puts[-1] == {
+    by_hand = {"evidence": "hand", "confidence": 1, "author": "ada"}
+    assert service.saves[-1] == {
         "labels": {
             "thumb": [], "middle": [], "ring": [],
-            "index": [label(*first, **mine), label(*second, **mine)],
+            "index": [label(*first, **by_hand), label(*second, **by_hand)],
         },
-        "note": "", "author": "ada", "revision": f"r{len(desk.puts) - 1}",
+        "note": "", "author": "ada", "revision": f"r{len(service.saves) - 1}",
     }  # fmt: skip
     page.reload()
     ready(page)
@@ -92,48 +92,49 @@ def test_label_undo_redo_save_and_reload(visit, desk):
     shows(page, "#save-text", "saved by ada")
 
 
-def test_keys_change_the_label_that_was_clicked_and_else_the_next(visit, desk):
-    desk.recordings[0].save({"thumb": [label(5, 9, "stable")]})
-    page = visit(desk.url)
+def test_keys_change_the_clicked_label_or_the_next_label(visit, service):
+    service.recordings[0].save({"thumb": [label(5, 9, "stable")]})
+    page = visit(service.url)
     ready(page)
     page.keyboard.press("3")
-    shows(page, "#palette-of", "next")
-    assert rough(labels(page)) == [(5, 9, "stable", None)]
+    shows(page, "#edited-label", "next")
+    assert rounded(labels(page)) == [(5, 9, "stable", None)]
     click(page, "thumb", 7)
-    shows(page, "#palette-of", "this")
+    shows(page, "#edited-label", "this")
     page.keyboard.press("2")
     page.keyboard.press("d")
     assert labels(page) == [(5, 9, "unstable", "disturbance")]
-    page.keyboard.press("d")  # once more takes it away
+    page.keyboard.press("d")  # the same cause again removes it
     page.keyboard.press("1")
-    page.keyboard.press("l")  # a stable contact is not lost
+    page.keyboard.press("l")  # a cause makes a stable label unstable
     assert labels(page) == [(5, 9, "unstable", "lost")]
     page.keyboard.press("Escape")
     drag(page, "thumb", 20, 22)
-    assert rough(labels(page))[1] == (20, 22, "no_contact", None)
+    assert rounded(labels(page))[1] == (20, 22, "no_contact", None)
     click(page, "thumb", 7)
     page.keyboard.press("Delete")
-    assert rough(labels(page)) == [(20, 22, "no_contact", None)]
+    assert rounded(labels(page)) == [(20, 22, "no_contact", None)]
 
 
-def test_a_new_label_overwrites(visit, desk):
-    desk.recordings[0].save({"thumb": [label(4, 20, "stable", author="eve", evidence="seen")]})
-    page = visit(desk.url)
+def test_a_new_label_overwrites_others(visit, service):
+    service.recordings[0].save({"thumb": [label(4, 20, "stable", author="eve", evidence="seen")]})
+    page = visit(service.url)
     ready(page)
     page.click("#states button[data-value=unstable]")
     page.click("#causes button[data-value=slip]")
     drag(page, "thumb", 10, 11)
     parts = [(4, 10, "stable", None), (10, 11, "unstable", "slip"), (11, 20, "stable", None)]
-    assert rough(labels(page)) == parts
+    assert rounded(labels(page)) == parts
     saved(page)
-    assert [each["author"] for each in desk.puts[-1]["labels"]["thumb"]] == ["eve", "ada", "eve"]
+    authors = [each["author"] for each in service.saves[-1]["labels"]["thumb"]]
+    assert authors == ["eve", "ada", "eve"]
     page.click("#states button[data-value=stable]")
     drag(page, "thumb", 9, 12)
-    assert rough(labels(page)) == [(4, 20, "stable", None)]
+    assert rounded(labels(page)) == [(4, 20, "stable", None)]
 
 
-def test_one_label_for_all_fingers(visit, desk):
-    page = visit(desk.url)
+def test_one_label_for_all_fingers(visit, service):
+    page = visit(service.url)
     ready(page)
     drag(page, "ring", 8, 12)
     page.keyboard.press("a")
@@ -146,19 +147,19 @@ def test_one_label_for_all_fingers(visit, desk):
     assert [len(labels(page, finger)) for finger in FINGERS] == [1, 1, 1, 2]
 
 
-def test_edges_move_and_snap_to_change_points(visit, desk):
+def test_edges_move_and_snap_to_change_points(visit, service):
     around = [label(6, 9, "stable"), label(9, 12, "unstable", "slip")]
-    desk.recordings[0].save({"thumb": around})
-    (change, *_) = [each for each in desk.recordings[0].changes["thumb"] if each > 6.5]
-    page = visit(desk.url)
+    service.recordings[0].save({"thumb": around})
+    (change, *_) = [each for each in service.recordings[0].changes["thumb"] if each > 6.5]
+    page = visit(service.url)
     ready(page)
     drag(page, "thumb", 9, change + 0.1, zone="labels")
     assert labels(page) == [(6, change, "stable", None), (change, 12, "unstable", "slip")]
     drag(page, "thumb", change, change + 0.25, zone="labels", keys=["Alt"])
     (moved,) = {labels(page)[0][1], labels(page)[1][0]}
     assert 0.15 < moved - change < 0.35
-    drag(page, "thumb", moved, 30, zone="labels")  # far beyond the neighbour
-    assert rough(labels(page))[0][:1] == (6,)
+    drag(page, "thumb", moved, 30, zone="labels")  # beyond the neighbour
+    assert rounded(labels(page))[0][:1] == (6,)
     assert len(labels(page)) == 1
     page.keyboard.press("Control+z")
     page.keyboard.press("Control+z")
@@ -166,108 +167,108 @@ def test_edges_move_and_snap_to_change_points(visit, desk):
     assert labels(page) == [(6, 9, "stable", None), (9, 12, "unstable", "slip")]
 
 
-def test_proposals_are_accepted_and_rejected(visit, desk):
-    recording = desk.recordings[0]
-    sure = {"confidence": 0.9, "author": "rule:signal", "evidence": "grows"}
-    recording.words["proposals"] = {
-        "thumb": [label(5, 7, "unstable", "closing", **sure), label(7, 9, "stable", **sure)],
-        "index": [label(10, 11, "unstable", **{**sure, "confidence": 0.3})],
+def test_proposals_are_accepted_and_rejected(visit, service):
+    recording = service.recordings[0]
+    rule = {"confidence": 0.9, "author": "rule:signal", "evidence": "grows"}
+    recording.fields["proposals"] = {
+        "thumb": [label(5, 7, "unstable", "closing", **rule), label(7, 9, "stable", **rule)],
+        "index": [label(10, 11, "unstable", **{**rule, "confidence": 0.3})],
     }
-    page = visit(desk.url)
+    page = visit(service.url)
     ready(page)
     point(page, "thumb", 8)
-    shows(page, "#about", "proposed: stable[\\s\\S]*90[\\s\\S]*rule:signal · grows")
+    shows(page, "#item", "proposed: stable[\\s\\S]*90[\\s\\S]*rule:signal · grows")
     page.keyboard.press("Enter")
     assert labels(page) == [(7, 9, "stable", None)]
     saved(page)
     accepted = {"confidence": 1, "author": "ada", "evidence": "rule:signal, accepted, grows"}
-    assert desk.puts[-1]["labels"]["thumb"] == [label(7, 9, "stable", **accepted)]
-    shows(page, "#about", "index · 10.000")  # the next
+    assert service.saves[-1]["labels"]["thumb"] == [label(7, 9, "stable", **accepted)]
+    shows(page, "#item", "index · 10.000")  # the next proposal
     page.keyboard.press("x")
-    shows(page, "#open-proposals", "1 proposal open")
+    shows(page, "#open-proposals", "1 open proposal")
     page.keyboard.press("Enter")
     assert labels(page) == [(5, 7, "unstable", "closing"), (7, 9, "stable", None)]
     shows(page, "#open-proposals", "no open")
     page.keyboard.press("Control+z")
     page.keyboard.press("Control+z")
-    shows(page, "#open-proposals", "2 proposals open")
+    shows(page, "#open-proposals", "2 open proposals")
     page.keyboard.press("Control+Shift+z")
     page.reload()
     ready(page)
-    shows(page, "#open-proposals", "1 proposal open")  # what was rejected stays so
+    shows(page, "#open-proposals", "1 open proposal")  # rejected proposals stay rejected
 
 
-def test_all_confident_proposals_at_once_leave_work_alone(visit, desk):
-    recording = desk.recordings[0]
+def test_accepting_all_proposals_keeps_existing_labels(visit, service):
+    recording = service.recordings[0]
     recording.save({"thumb": [label(5, 6, "no_contact", author="eve")]})
     rule = {"author": "rule:signal"}
-    recording.offered = {
+    recording.rule_proposals = {
         "thumb": [label(4, 9, "stable", confidence=0.9, **rule),
                   label(9, 10, "unstable", confidence=0.7, **rule)],
         "ring": [label(1, 2, "no_contact", confidence=0.85, **rule)],
     }  # fmt: skip
-    page = visit(desk.url)
+    page = visit(service.url)
     ready(page)
     page.click("#propose")
-    shows(page, "#open-proposals", "3 proposals open")
-    assert desk.proposed == [{"rule": "", "parameters": {}}]
+    shows(page, "#open-proposals", "3 open proposals")
+    assert service.propose_requests == [{"rule": "", "parameters": {}}]
     page.keyboard.press("Shift+Enter")
     assert labels(page) == [
         (4, 5, "stable", None), (5, 6, "no_contact", None), (6, 9, "stable", None),
     ]  # fmt: skip
     assert labels(page, "ring") == [(1, 2, "no_contact", None)]
     saved(page)
-    authors = [each["author"] for each in desk.puts[-1]["labels"]["thumb"]]
+    authors = [each["author"] for each in service.saves[-1]["labels"]["thumb"]]
     assert authors == ["rule:signal", "eve", "rule:signal"]
     page.keyboard.press("Control+z")
     assert labels(page) == [(5, 6, "no_contact", None)]
 
 
-def test_a_rule_that_cannot_says_why(visit, desk):
-    page = visit(desk.url)
+def test_the_error_of_a_rule_is_shown(visit, service):
+    page = visit(service.url)
     ready(page)
     page.select_option("#rule", "tracking")
     page.click("#propose")
     shows(page, ".toast.bad", "there are no poses")
-    assert desk.proposed == [{"rule": "tracking", "parameters": {}}]
+    assert service.propose_requests == [{"rule": "tracking", "parameters": {}}]
 
 
-def test_nothing_is_accepted_unseen(visit, desk):
-    desk.recordings[0].words["proposals"] = {"thumb": [label(20, 21, "stable", confidence=0.9)]}
-    page = visit(desk.url)
+def test_a_proposal_outside_the_window_is_shown_before_it_is_accepted(visit, service):
+    service.recordings[0].fields["proposals"] = {"thumb": [label(20, 21, "stable", confidence=0.9)]}
+    page = visit(service.url)
     ready(page)
-    page.evaluate("holdfast.view.look(2, 4)")
+    page.evaluate("holdfast.view.setWindow(2, 4)")
     page.keyboard.press("Enter")
     assert labels(page) == []
-    assert page.evaluate("holdfast.view.sees({ start: 20, end: 21 })")
+    assert page.evaluate("holdfast.view.contains({ start: 20, end: 21 })")
     page.keyboard.press("Enter")
     assert labels(page) == [(20, 21, "stable", None)]
 
 
-def test_doubtful_stretches_one_after_the_other(visit, desk):
-    recording = desk.recordings[0]
+def test_items_to_review_one_after_the_other(visit, service):
+    recording = service.recordings[0]
     recording.save({"thumb": [label(2, 4, "stable", confidence=0.5), label(10, 14, "stable")]})
-    recording.words["proposals"] = {"index": [label(20, 21, "unstable", confidence=0.3)]}
-    recording.words["suspects"] = [
+    recording.fields["proposals"] = {"index": [label(20, 21, "unstable", confidence=0.3)]}
+    recording.fields["suspects"] = [
         {"finger": "thumb", "start": 11.0, "end": 12.0, "given": "stable",
          "expected": "unstable", "confidence": 0.95, "kind": "interval"},
     ]  # fmt: skip
-    page = visit(desk.url)
+    page = visit(service.url)
     ready(page)
-    shows(page, "#n-doubts", "^3$")
+    shows(page, "#n-review-items", "^3$")
     for text in ("audit expects unstable", "proposed: unstable", r"stable[\s\S]*50"):
         page.keyboard.press("g")
-        shows(page, "#about", text)
-    page.keyboard.press("Enter")  # confirms the label of little confidence
-    shows(page, "#n-doubts", "^2$")
+        shows(page, "#item", text)
+    page.keyboard.press("Enter")  # confirms the label of low confidence
+    shows(page, "#n-review-items", "^2$")
     click(page, "thumb", 13)
     page.keyboard.press("2")  # what the audit expects
-    shows(page, "#n-doubts", "^1$")
+    shows(page, "#n-review-items", "^1$")
     page.keyboard.press("g")
     page.keyboard.press("x")
-    shows(page, "#doubts", "^$")
+    shows(page, "#review-items", "^$")
     saved(page)
-    thumb = desk.puts[-1]["labels"]["thumb"]
+    thumb = service.saves[-1]["labels"]["thumb"]
     assert [(each["state"], each["confidence"]) for each in thumb] == [
         ("stable", 1), ("unstable", 1),
     ]  # fmt: skip
@@ -283,33 +284,33 @@ def test_doubtful_stretches_one_after_the_other(visit, desk):
         ((13.5, 14.0, "edge"), [(8, 13.5, None), (13.5, 16, "slip")]),
     ],
 )
-def test_what_an_audit_expects_is_put_where_it_expects_it(visit, desk, suspect, expected):
-    recording, (start, end, kind) = desk.recordings[0], suspect
+def test_a_label_is_corrected_as_the_audit_expects(visit, service, suspect, expected):
+    recording, (start, end, kind) = service.recordings[0], suspect
     held, slips = label(8, 14, "stable"), label(14, 16, "unstable", "slip")
     recording.save({"thumb": [held, slips]})
-    recording.words["suspects"] = [
+    recording.fields["suspects"] = [
         {"finger": "thumb", "start": start, "end": end, "given": "stable",
          "expected": "unstable", "confidence": 0.95, "kind": kind},
     ]  # fmt: skip
-    page = visit(desk.url)
+    page = visit(service.url)
     ready(page)
     page.keyboard.press("g")
-    shows(page, "#about", "Enter corrects it")
+    shows(page, "#item", "Enter corrects the label")
     page.keyboard.press("Enter")
     assert [(start, end, cause) for start, end, _, cause in labels(page)] == expected
-    shows(page, "#doubts", "^$")
+    shows(page, "#review-items", "^$")
 
 
 def test_the_next_recording(visit):
-    with Desk(Recording("one"), Recording("two", fingers=("left", "right"))) as desk:
-        page = visit(desk.url)
+    with FakeService(Recording("one"), Recording("two", fingers=("left", "right"))) as service:
+        page = visit(service.url)
         ready(page)
         drag(page, "thumb", 8, 12)
-        page.keyboard.press("n")  # at once: what was drawn is saved first
+        page.keyboard.press("n")  # the drawn label is saved first
         shows(page, "#name", "two")
         until(page, "holdfast.plot.rows.length === 2")
-        (sent,) = desk.puts[-1]["labels"]["thumb"]
-        assert rough([(sent["start"], sent["end"], sent["state"])]) == [(8, 12, "stable")]
+        (sent,) = service.saves[-1]["labels"]["thumb"]
+        assert rounded([(sent["start"], sent["end"], sent["state"])]) == [(8, 12, "stable")]
         shows(page, "#progress", "1 of 2 labelled")
         page.keyboard.press("n")
         shows(page, ".toast", "last recording")
@@ -318,13 +319,13 @@ def test_the_next_recording(visit):
         page.click("#recordings button[data-id='0']")
         shows(page, "#name", "one")
         until(page, "holdfast.editor.fingers.length === 4")
-        assert rough(labels(page)) == [(8, 12, "stable", None)]
+        assert rounded(labels(page)) == [(8, 12, "stable", None)]
 
 
-def test_read_only(visit, desk):
-    desk.recordings[0].save({"thumb": [label(5, 9, "stable")]})
-    desk.recordings[0].words["read_only"] = True
-    page = visit(desk.url)
+def test_read_only(visit, service):
+    service.recordings[0].save({"thumb": [label(5, 9, "stable")]})
+    service.recordings[0].fields["read_only"] = True
+    page = visit(service.url)
     ready(page)
     shows(page, "#alert", "Read-only")
     drag(page, "thumb", 12, 14)
@@ -335,10 +336,10 @@ def test_read_only(visit, desk):
     assert page.locator("#note").is_disabled()
     assert page.locator("#states button").first.is_disabled()
     page.wait_for_timeout(600)
-    assert desk.puts == []
+    assert service.saves == []
 
 
-def test_names_are_texts(visit):
+def test_names_are_shown_as_text(visit):
     rule = {"author": HOSTILE, "evidence": HOSTILE, "confidence": 0.3}
     hostile = Recording(
         HOSTILE, fingers=(HOSTILE, "thumb"), proposals={"thumb": [label(2, 3, "stable", **rule)]},
@@ -346,28 +347,29 @@ def test_names_are_texts(visit):
         media=[{"index": 0, "name": HOSTILE, "offset": 0, "missing": True}],
     )  # fmt: skip
     hostile.save({HOSTILE: [label(4, 5, "unstable", **rule)]}, note=HOSTILE, author=HOSTILE)
-    with Desk(hostile) as desk:
-        page = visit(desk.url)
+    with FakeService(hostile) as service:
+        page = visit(service.url)
         ready(page)
         page.keyboard.press("g")
-        for at in ("#name", ".gutter h3", "#recordings", "#save-text", "#film-problem", "#about"):
-            shows(page, at, "<img src=x onerror=alert")
+        named = ("#name", ".finger-legend h3", "#recordings")
+        for selector in (*named, "#save-text", "#video-problem", "#item"):
+            shows(page, selector, "<img src=x onerror=alert")
         assert page.locator("#note").input_value() == HOSTILE
         assert page.locator("img").count() == 0
 
 
 def test_a_recording_that_cannot_be_read(visit):
     class Broken(Recording):
-        def told(self, place):
+        def describe(self, index):
             raise ValueError("no")
 
-        def entry(self, place):
-            return super().entry(place) | {"error": "broken.parquet: damaged", "duration": None}
+        def entry(self, index):
+            return super().entry(index) | {"error": "broken.parquet: damaged", "duration": None}
 
-    with Desk(Recording("good"), Broken("broken")) as desk:
-        page = visit(desk.url)
+    with FakeService(Recording("good"), Broken("broken")) as service:
+        page = visit(service.url)
         ready(page)
-        shows(page, "#recordings li:nth-child(2)", "cannot be read")
+        shows(page, "#recordings li:nth-child(2)", "not readable")
         page.keyboard.press("n")
         shows(page, "#alert", "500")
         shows(page, "#name", "broken")
@@ -377,47 +379,47 @@ def test_a_recording_that_cannot_be_read(visit):
         assert page.locator("#alert").is_hidden()
 
 
-def test_the_note_is_saved(visit, desk):
-    page = visit(desk.url)
+def test_the_note_is_saved(visit, service):
+    page = visit(service.url)
     ready(page)
     page.keyboard.press("e")
-    page.keyboard.type("1 good grasp")  # letters are typed, not obeyed
+    page.keyboard.type("1 good grasp")  # letters are no shortcuts here
     page.keyboard.press("Escape")
     saved(page)
-    assert desk.puts[-1]["note"] == "1 good grasp"
-    assert desk.puts[-1]["labels"] == {finger: [] for finger in FINGERS}
+    assert service.saves[-1]["note"] == "1 good grasp"
+    assert service.saves[-1]["labels"] == {finger: [] for finger in FINGERS}
     page.keyboard.press("Control+z")
     assert page.locator("#note").input_value() == ""
 
 
-def test_help_holds_the_keys_back(visit, desk):
-    page = visit(desk.url)
+def test_shortcuts_are_off_while_the_help_is_open(visit, service):
+    page = visit(service.url)
     ready(page)
     page.keyboard.press("?")
-    shows(page, "#help-box", "accept the proposal under the cursor")
+    shows(page, "#help-box", "accept the proposal under the pointer")
     page.keyboard.press("3")
     page.keyboard.press("Escape")
     assert page.locator("#help-box").is_hidden()
-    assert page.evaluate("holdfast.editor.pen.state") == "stable"
+    assert page.evaluate("holdfast.editor.nextKind.state") == "stable"
 
 
-def test_fingers_draw_and_pinch_on_a_touch_screen(visit, desk):
-    page = visit(desk.url, has_touch=True)
+def test_draw_and_pinch_on_a_touch_screen(visit, service):
+    page = visit(service.url, has_touch=True)
     ready(page)
-    page.touchscreen.tap(*place(page, "thumb", 10))
+    page.touchscreen.tap(*position(page, "thumb", 10))
     assert labels(page) == []
     touch = page.context.new_cdp_session(page)
 
     def send(kind, *times):
-        points = [dict(zip("xy", place(page, "index", time), strict=True)) for time in times]
+        points = [dict(zip("xy", position(page, "index", time), strict=True)) for time in times]
         touch.send("Input.dispatchTouchEvent", {"type": kind, "touchPoints": points})
 
     send("touchStart", 8)
     send("touchMove", 10)
     send("touchMove", 12)
     send("touchEnd")
-    assert rough(labels(page, "index")) == [(8, 12, "stable", None)]
-    left, right = (place(page, "thumb", time) for time in (14, 16))
+    assert rounded(labels(page, "index")) == [(8, 12, "stable", None)]
+    left, right = (position(page, "thumb", time) for time in (14, 16))
     both = [dict(zip("xy", each, strict=True)) | {"id": k} for k, each in enumerate((left, right))]
     apart = [both[0] | {"x": left[0] - 60}, both[1] | {"x": right[0] + 60}]
     for kind, points in (("touchStart", both[:1]), ("touchStart", both), ("touchMove", apart),

@@ -1,191 +1,243 @@
-// What a person does to the labels of the open recording. Every change goes through here.
+// Labels of the open recording, and every change of them, with undo.
 
-import { History } from "./history.js";
-import { change, doubts, fill, moveEdge, nameOf, openProposals, overwrite, put, remove, tidy } from "./model.js";
+import { change, fillGaps, findReviewItems, itemKey, moveEdge, openProposals, overwrite, remove, replaceInterval, roundTime } from "./labels.js";
 
-const same = (a, b) => a && b && a.finger === b.finger && a.item.start === b.item.start && a.item.end === b.item.end;
+/**
+ * Undo history without a limit. States are never changed in place, so that each is kept as it is;
+ * unchanged parts are shared between states.
+ */
+export class History {
+  constructor(state) {
+    this.state = state;
+    this.past = [];
+    this.future = [];
+    this.tag = null;
+  }
+
+  /** Set a new state. Consecutive changes of the same tag are undone together. */
+  change(state, tag = null) {
+    if (tag === null || tag !== this.tag) this.past.push(this.state);
+    this.tag = tag;
+    this.future = [];
+    this.state = state;
+  }
+
+  /** Return to the state before. Return false if there is none. */
+  undo() {
+    return this.step(this.past, this.future);
+  }
+
+  redo() {
+    return this.step(this.future, this.past);
+  }
+
+  step(from, to) {
+    if (!from.length) return false;
+    to.push(this.state);
+    this.state = from.pop();
+    this.tag = null;
+    return true;
+  }
+}
+
+export const EMPTY_RECORDING = {
+  fingers: [], labels: {}, proposals: {}, suspects: [], start: 0, end: 1, rate: 1, note: "", read_only: true,
+};
+
+const sameItem = (a, b) => a && b && a.finger === b.finger && a.item.start === b.item.start && a.item.end === b.item.end;
 
 export class Editor {
-  /** @param changed is called with true where labels or note are others, else false. */
+  /** @param changed called with true if labels or note changed, else with false. */
   constructor(changed) {
     this.changed = changed;
-    this.pen = { state: "stable", cause: null };
-    this.open({ fingers: [], labels: {}, proposals: {}, suspects: [], start: 0, end: 1, rate: 1, note: "", read_only: true }, "", []);
+    this.nextKind = { state: "stable", cause: null }; // of the next label that is drawn
+    this.open(EMPTY_RECORDING, "", []);
   }
 
   open(recording, author, rejected) {
     this.recording = recording;
     this.author = author;
     this.readOnly = Boolean(recording.read_only);
-    const least = recording.rate > 0 ? 1 / recording.rate : 1e-3;
-    // The last sample is labelled too.
-    this.bounds = { low: recording.start, high: recording.end + least, least };
+    const period = recording.rate > 0 ? 1 / recording.rate : 1e-3;
+    // A label may end one sample period after the last sample, and then contains it.
+    this.bounds = { low: recording.start, high: recording.end + period, minDuration: period };
     const labels = Object.fromEntries(recording.fingers.map((finger) => [finger, recording.labels[finger] ?? []]));
     this.history = new History({ labels, note: recording.note ?? "", rejected: new Set(rejected) });
-    this.selected = null; // { finger, label, fresh }: fresh is drawn a moment ago, not chosen
-    this.focus = null; // { kind, finger, item } that Enter and X mean
-    this.preview = null; // { finger: labels } while something is dragged
+    this.selected = null; // { finger, label, fresh }; fresh: just drawn, not yet clicked
+    this.focus = null; // { kind, finger, item } that Enter and X act on
+    this.preview = null; // { finger: labels } during a drag
   }
 
   get state() { return this.history.state; }
   get fingers() { return this.recording.fingers; }
-  get proposals() { return this.found.proposals; }
-  get doubts() { return this.found.doubts; }
+  get proposals() { return this.openItems.proposals; }
+  get reviewItems() { return this.openItems.reviewItems; }
 
-  // Asked for at every drawing, so found once for each state.
-  get found() {
+  // Every redraw needs these lists, so they are computed once for each state.
+  get openItems() {
     const { state, recording: { proposals, suspects } } = this;
-    if (this.memo?.state !== state || this.memo.of !== proposals) {
-      this.memo = { state, of: proposals, proposals: openProposals(state, proposals), doubts: doubts(state, proposals, suspects ?? []) };
+    if (this.cache?.state !== state || this.cache.source !== proposals) {
+      this.cache = {
+        state, source: proposals,
+        proposals: openProposals(state, proposals), reviewItems: findReviewItems(state, proposals, suspects ?? []),
+      };
     }
-    return this.memo;
+    return this.cache;
   }
 
+  /** The selected label, unless it was just drawn. */
   get chosen() { return this.selected && !this.selected.fresh ? this.selected : null; }
 
-  isRejected(finger, item) { return this.state.rejected.has(nameOf(finger, item)); }
+  isRejected(finger, item) { return this.state.rejected.has(itemKey(finger, item)); }
 
-  /** Labels as they are to be drawn. */
+  /** Return the labels of a finger as they are drawn: during a drag, its preview. */
   labels(finger) { return this.preview?.[finger] ?? this.state.labels[finger]; }
 
-  edit(fields, tag = null) {
+  /** Change fields of the state, as one step of the undo history. */
+  apply(fields, tag = null) {
     if (this.readOnly) return;
     this.history.change({ ...this.state, ...fields }, tag);
     this.preview = null;
     this.changed(true);
   }
 
-  put(labels) { this.edit({ labels: { ...this.state.labels, ...labels } }); }
+  setLabels(labels) { this.apply({ labels: { ...this.state.labels, ...labels } }); }
+
+  setNote(note) {
+    if (note !== this.state.note) this.apply({ note }, "note");
+  }
+
+  setPreview(labels) {
+    this.preview = labels;
+    this.changed(false);
+  }
 
   select(finger, label, fresh = false) {
     this.selected = label ? { finger, label, fresh } : null;
     this.changed(false);
   }
 
-  point(focus) {
+  setFocus(focus) {
     this.focus = focus;
     this.changed(false);
   }
 
-  mine(fields) { return { evidence: "hand", confidence: 1, author: this.author, ...fields }; }
+  // Return the fields of a label that a person sets: full confidence, and the author.
+  byHand(fields) { return { evidence: "hand", confidence: 1, author: this.author, ...fields }; }
 
-  /** A label of the pen between two times, as it would be; null where that is too short. */
-  drawn(from, to) {
-    const { low, high, least } = this.bounds;
-    const [start, end] = [Math.min(from, to), Math.max(from, to)].map((time) => tidy(Math.max(low, Math.min(high, time))));
-    return end - start >= least ? this.mine({ start, end, ...this.pen }) : null;
+  /** Return a new label between two times, in any order; null if it is too short. */
+  newLabel(from, to) {
+    const { low, high, minDuration } = this.bounds;
+    const [start, end] = [Math.min(from, to), Math.max(from, to)].map((time) => roundTime(Math.max(low, Math.min(high, time))));
+    return end - start >= minDuration ? this.byHand({ start, end, ...this.nextKind }) : null;
   }
 
-  /** Shows what a drag would do, or does it. */
+  /** Draw a label on fingers, or only preview it unless `commit`. */
   draw(fingers, from, to, commit) {
-    const label = this.drawn(from, to);
-    if (!label || this.readOnly) { this.show(null); return; }
-    const found = fingers.map((finger) => [finger, overwrite(this.state.labels[finger], label, this.bounds.least)]);
-    const labels = Object.fromEntries(found.map(([finger, [own]]) => [finger, own]));
-    if (!commit) { this.show(labels); return; }
-    this.selected = { finger: fingers[0], label: found[0][1][1], fresh: true };
-    this.put(labels);
+    const label = this.newLabel(from, to);
+    if (!label || this.readOnly) { this.setPreview(null); return; }
+    const results = fingers.map((finger) => [finger, overwrite(this.state.labels[finger], label, this.bounds.minDuration)]);
+    const labels = Object.fromEntries(results.map(([finger, [own]]) => [finger, own]));
+    if (!commit) { this.setPreview(labels); return; }
+    this.selected = { finger: fingers[0], label: results[0][1][1], fresh: true };
+    this.setLabels(labels);
   }
 
-  move(finger, label, side, time, commit) {
+  /** Move an edge of a label, or only preview it unless `commit`. */
+  moveEdge(finger, label, side, time, commit) {
     if (this.readOnly) return;
-    const [labels, moved] = moveEdge(this.state.labels[finger], label, side, tidy(time), this.bounds);
-    if (!commit) { this.show({ [finger]: labels }); return; }
-    if (!differ(labels, this.state.labels[finger])) { this.show(null); return; }
-    const signed = { ...moved, ...this.mine() };
+    const [labels, moved] = moveEdge(this.state.labels[finger], label, side, roundTime(time), this.bounds);
+    if (!commit) { this.setPreview({ [finger]: labels }); return; }
+    if (!differInTime(labels, this.state.labels[finger])) { this.setPreview(null); return; }
+    const signed = { ...moved, ...this.byHand() };
     this.selected = { finger, label: signed, fresh: false };
-    this.put({ [finger]: labels.map((each) => (each === moved ? signed : each)) });
+    this.setLabels({ [finger]: labels.map((each) => (each === moved ? signed : each)) });
   }
 
-  show(labels) {
-    this.preview = labels;
-    this.changed(false);
-  }
-
-  /** A state or cause for the chosen label, else for the pen. */
-  name(fields) {
-    const now = this.chosen?.label ?? this.pen;
+  /** Set the state or the cause of the chosen label, or else of the next label. */
+  setKind(fields) {
+    const now = this.chosen?.label ?? this.nextKind;
     let next;
     if ("state" in fields) next = { state: fields.state, cause: null };
     else {
       const cause = now.cause === fields.cause ? null : fields.cause;
       next = { state: cause && now.state === "stable" ? "unstable" : now.state, cause };
     }
-    if (!this.chosen) { this.pen = next; this.changed(false); return; }
+    if (!this.chosen) { this.nextKind = next; this.changed(false); return; }
     if (this.readOnly) return;
     const { finger, label } = this.chosen;
-    const [labels, changed] = change(this.state.labels[finger], label, this.mine(next));
+    const [labels, changed] = change(this.state.labels[finger], label, this.byHand(next));
     this.selected = { finger, label: changed, fresh: false };
-    this.put({ [finger]: labels });
+    this.setLabels({ [finger]: labels });
   }
 
+  /** Delete the selected label. */
   remove() {
     if (!this.selected || this.readOnly) return;
     const { finger, label } = this.selected;
     this.selected = null;
-    this.put({ [finger]: remove(this.state.labels[finger], label) });
+    this.setLabels({ [finger]: remove(this.state.labels[finger], label) });
   }
 
-  /** The selected label for every other finger too. */
+  /** Copy the selected label to all other fingers. Return false if no label is selected. */
   copy() {
     if (!this.selected || this.readOnly) return false;
     const { finger, label } = this.selected, others = this.fingers.filter((name) => name !== finger);
-    this.put(Object.fromEntries(others.map((name) => [name, overwrite(this.state.labels[name], this.signed(label), this.bounds.least)[0]])));
+    const signed = { ...label, ...this.byHand() };
+    this.setLabels(Object.fromEntries(others.map((name) => [name, overwrite(this.state.labels[name], signed, this.bounds.minDuration)[0]])));
     return true;
   }
 
-  signed(label) { return { ...label, ...this.mine() }; }
-
-  /** Takes a proposal or what an audit expects, or confirms a label; what a person saw is certain. */
+  /** Accept a proposal, correct a label as the audit expects, or confirm a label. */
   accept({ kind, finger, item }) {
-    const own = this.state.labels[finger], evidence = [item.author, "accepted", item.evidence].filter(Boolean).join(", ");
-    const sure = this.mine({ evidence });
+    const labels = this.state.labels[finger], evidence = [item.author, "accepted", item.evidence].filter(Boolean).join(", ");
+    const confirmed = this.byHand({ evidence });
     if (kind === "suspect") {
       const { start, end, expected: state } = item;
-      // At an edge the neighbour is what should have gone on.
-      const beside = own.find((each) => each.state === state && each.start <= end && each.end >= start);
-      const label = this.mine({ start, end, state, cause: beside?.cause ?? null, evidence: "audit, accepted" });
+      // A suspect at an edge extends the neighbour of the expected state, and takes its cause.
+      const neighbour = labels.find((each) => each.state === state && each.start <= end && each.end >= start);
+      const label = this.byHand({ start, end, state, cause: neighbour?.cause ?? null, evidence: "audit, accepted" });
       this.selected = null;
-      this.put({ [finger]: overwrite(own, label, this.bounds.least)[0] });
+      this.setLabels({ [finger]: overwrite(labels, label, this.bounds.minDuration)[0] });
     } else if (kind === "label") {
-      const [labels, label] = change(own, item, sure);
+      const [changed, label] = change(labels, item, confirmed);
       this.selected = { finger, label, fresh: true };
-      this.put({ [finger]: labels });
+      this.setLabels({ [finger]: changed });
     } else {
       this.selected = null;
-      this.put({ [finger]: put(own, { ...item, ...sure }, this.bounds.least) });
+      this.setLabels({ [finger]: replaceInterval(labels, { ...item, ...confirmed }, this.bounds.minDuration) });
     }
   }
 
-  /** Takes all confident proposals where nothing is labelled, as their rule signed them. */
-  acceptAll(above) {
-    const taken = this.proposals.filter(({ item }) => item.confidence >= above);
-    if (!taken.length || this.readOnly) return 0;
+  /**
+   * Accept all open proposals of at least a confidence, where no label is; the rule stays their
+   * author. Return their number.
+   */
+  acceptAll(minConfidence) {
+    const accepted = this.proposals.filter(({ item }) => item.confidence >= minConfidence);
+    if (!accepted.length || this.readOnly) return 0;
     const labels = { ...this.state.labels };
-    for (const { finger, item } of taken) labels[finger] = fill(labels[finger], item, this.bounds.least);
-    this.put(labels);
-    return taken.length;
+    for (const { finger, item } of accepted) labels[finger] = fillGaps(labels[finger], item, this.bounds.minDuration);
+    this.setLabels(labels);
+    return accepted.length;
   }
 
+  /** Reject a proposal or a suspect. */
   reject({ finger, item }) {
-    this.edit({ rejected: new Set([...this.state.rejected, nameOf(finger, item)]) });
+    this.apply({ rejected: new Set([...this.state.rejected, itemKey(finger, item)]) });
   }
 
-  write(note) {
-    if (note !== this.state.note) this.edit({ note }, "note");
-  }
-
-  /** Everything of another state at once: what was rescued, or what somebody else saved. */
-  replace(labels, note) {
-    const whole = Object.fromEntries(this.fingers.map((finger) => [finger, labels[finger] ?? []]));
+  /** Replace all labels and the note, by restored ones or by those of the label file. */
+  replaceAll(labels, note) {
+    const all = Object.fromEntries(this.fingers.map((finger) => [finger, labels[finger] ?? []]));
     this.selected = null;
-    this.edit({ labels: whole, note });
+    this.apply({ labels: all, note });
   }
 
-  undo() { this.travel(() => this.history.undo()); }
-  redo() { this.travel(() => this.history.redo()); }
+  undo() { this.stepHistory(() => this.history.undo()); }
+  redo() { this.stepHistory(() => this.history.redo()); }
 
-  travel(step) {
+  stepHistory(step) {
     this.preview = null;
     if (this.readOnly || !step()) return;
     const { finger, label } = this.selected ?? {};
@@ -193,18 +245,19 @@ export class Editor {
     this.changed(true);
   }
 
-  /** The doubtful stretch after the one that was looked at last. */
-  nextDoubt() {
-    const all = this.doubts, key = (each) => [each.doubt, each.item.start, each.finger];
-    const after = this.lastDoubt && all.find((each) => !same(each, this.lastDoubt) && compare(key(each), key(this.lastDoubt)) > 0);
-    return (this.lastDoubt = after ?? all[0] ?? null);
+  /** Return the review item after the last reviewed one, or the first; null if there is none. */
+  nextReviewItem() {
+    const items = this.reviewItems, key = (each) => [each.trust, each.item.start, each.finger];
+    const next = this.lastReviewed && items.find((each) => !sameItem(each, this.lastReviewed) && compare(key(each), key(this.lastReviewed)) > 0);
+    return (this.lastReviewed = next ?? items[0] ?? null);
   }
 }
 
-const differ = (one, two) => one.length !== two.length
+const differInTime = (one, two) => one.length !== two.length
   || one.some((label, k) => label.start !== two[k].start || label.end !== two[k].end);
 
+// Compare two arrays by their first difference.
 function compare(a, b) {
-  const k = a.findIndex((value, place) => value !== b[place]);
+  const k = a.findIndex((value, index) => value !== b[index]);
   return k < 0 ? 0 : a[k] < b[k] ? -1 : 1;
 }

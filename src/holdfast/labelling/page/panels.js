@@ -1,18 +1,32 @@
-// Beside the plots: the recordings, and what is left to be looked at.
+// Panels beside the plots: the list of recordings, and the items to review.
 
-import { byId, make, shape, setText } from "../web/dom.js";
-import { labelWord, lengthWord, many, percent, stateKey, stateWord, timeWord } from "./words.js";
+import { byId, make, setText, shape } from "../web/dom.js";
+import { countOf, durationText, labelText, percent, stateKey, stateText, timeText } from "./format.js";
 
-const MOST = 60; // rows of doubtful stretches
+const MAX_REVIEW_ROWS = 60;
 
-// Not scrollIntoView: that would scroll the page as well where it is longer than the screen.
-function reveal(row, list) {
-  const [one, all] = [row, list].map((each) => each.getBoundingClientRect());
-  list.scrollTop += Math.min(0, one.top - all.top) + Math.max(0, one.bottom - all.bottom);
+// Scroll a list to a row. `scrollIntoView` would also scroll the page on small screens.
+function scrollToRow(row, list) {
+  const [inner, outer] = [row, list].map((each) => each.getBoundingClientRect());
+  list.scrollTop += Math.min(0, inner.top - outer.top) + Math.max(0, inner.bottom - outer.bottom);
 }
 
-/** The list of recordings with what is done of each. */
-export class Recordings {
+// Return how far a recording is labelled: "error", "saved", "inside" its file, or "none".
+function progressOf(entry) {
+  if (entry.error) return "error";
+  if (entry.labelled) return "saved";
+  return entry.n_labels ? "inside" : "none";
+}
+
+// Return the most important fact of a recording.
+function summaryOf(entry) {
+  if (entry.error) return "not readable";
+  if (entry.n_doubtful) return `${entry.n_doubtful} to review`;
+  return entry.n_labels ? countOf(entry.n_labels, "label") : durationText(entry.duration);
+}
+
+/** List of recordings, each with its progress. */
+export class RecordingList {
   constructor(choose) {
     this.choose = choose;
     this.all = [];
@@ -21,84 +35,93 @@ export class Recordings {
   open(recordings) {
     this.all = recordings;
     byId("recordings").replaceChildren(...recordings.map((entry) => {
-      const row = make("button", "recording", make("i", "done"), make("span", "name", entry.name), make("span", "count"));
+      const row = make("button", "recording", make("i", "progress-mark"), make("span", "name", entry.name), make("span", "summary"));
       row.type = "button";
       row.dataset.id = String(entry.id);
       row.addEventListener("click", () => this.choose(entry.id));
       return make("li", "", row);
     }));
-    recordings.forEach((entry) => this.tell(entry));
+    recordings.forEach((entry) => this.show(entry));
   }
 
-  tell(entry) {
+  show(entry) {
     const row = byId("recordings").querySelector(`[data-id="${entry.id}"]`);
     if (!row) return;
-    row.title = entry.error ?? [entry.name, lengthWord(entry.duration), many(entry.n_labels, "label"), `${many(entry.n_proposals, "proposal")} open`, `${entry.n_doubtful} doubtful`].join(" · ");
-    row.dataset.done = entry.error ? "bad" : entry.labelled ? "yes" : entry.n_labels ? "inside" : "no";
-    const count = entry.error ? "cannot be read" : entry.n_doubtful ? `${entry.n_doubtful} doubtful` : entry.n_labels ? many(entry.n_labels, "label") : lengthWord(entry.duration);
-    row.lastElementChild.replaceChildren(count);
+    row.title = entry.error ?? [
+      entry.name, durationText(entry.duration), countOf(entry.n_labels, "label"),
+      countOf(entry.n_proposals, "open proposal"), `${entry.n_doubtful} to review`,
+    ].join(" · ");
+    row.dataset.progress = progressOf(entry);
+    row.lastElementChild.replaceChildren(summaryOf(entry));
     row.lastElementChild.classList.toggle("warn", Boolean(entry.error || entry.n_doubtful));
-    this.progress();
+    this.showProgress();
   }
 
-  // After a save the list is right without asking for it.
+  /** Update the entry of a recording without a request to the service. */
   update(id, fields) {
     const entry = this.all.find((each) => each.id === id);
-    if (entry) this.tell(Object.assign(entry, fields));
+    if (entry) this.show(Object.assign(entry, fields));
   }
 
-  progress() {
-    const done = this.all.filter(({ labelled }) => labelled).length;
-    setText(byId("progress"), `${done} of ${this.all.length} labelled`);
-    byId("progress-bar").style.transform = `scaleX(${this.all.length ? done / this.all.length : 0})`;
+  showProgress() {
+    const n = this.all.filter(({ labelled }) => labelled).length;
+    setText(byId("progress"), `${n} of ${this.all.length} labelled`);
+    byId("progress-bar").style.transform = `scaleX(${this.all.length ? n / this.all.length : 0})`;
   }
 
-  mark(id) {
+  markCurrent(id) {
     for (const row of byId("recordings").querySelectorAll("button")) {
-      const here = row.dataset.id === String(id);
-      row.setAttribute("aria-current", String(here));
-      if (here) reveal(row, byId("recordings"));
+      const current = row.dataset.id === String(id);
+      row.setAttribute("aria-current", String(current));
+      if (current) scrollToRow(row, byId("recordings"));
     }
   }
 
-  /** The recording before (-1) or after (1) one, or undefined. */
-  next(id, by) {
-    const place = this.all.findIndex((each) => each.id === id);
-    return this.all[place + by];
+  /** Return the recording before (-1) or after (1) another; undefined at the ends of the list. */
+  neighbour(id, step) {
+    const index = this.all.findIndex((each) => each.id === id);
+    return this.all[index + step];
   }
 }
 
-/** What is doubtful, the most doubtful first, and how many proposals are open. */
-export class Checks {
-  constructor(editor, look) {
+const REVIEW_TITLES = {
+  suspect: "The audit contradicts this label", label: "This label has a low confidence",
+  proposal: "This proposal has a low confidence",
+};
+
+/** List of the items to review, those of the lowest trust first, and the number of open proposals. */
+export class ReviewList {
+  constructor(editor, choose) {
     this.editor = editor;
-    this.look = look;
+    this.choose = choose;
     this.shown = null;
   }
 
   show() {
-    const { doubts, proposals, focus } = this.editor;
-    setText(byId("open-proposals"), proposals.length ? `${many(proposals.length, "proposal")} open` : "no open proposals");
+    const { reviewItems, proposals, focus } = this.editor;
+    setText(byId("open-proposals"), proposals.length ? countOf(proposals.length, "open proposal") : "no open proposals");
     byId("accept-all").disabled = this.editor.readOnly || !proposals.length;
-    if (this.shown !== doubts) {
-      this.shown = doubts;
-      setText(byId("n-doubts"), doubts.length ? String(doubts.length) : "");
-      byId("doubts").replaceChildren(...doubts.slice(0, MOST).map((each) => this.row(each)));
+    if (this.shown !== reviewItems) {
+      this.shown = reviewItems;
+      setText(byId("n-review-items"), reviewItems.length ? String(reviewItems.length) : "");
+      byId("review-items").replaceChildren(...reviewItems.slice(0, MAX_REVIEW_ROWS).map((each) => this.row(each)));
     }
-    [...byId("doubts").children].forEach((row, k) => row.firstElementChild.setAttribute("aria-current", String(doubts[k]?.item === focus?.item && focus !== null)));
+    [...byId("review-items").children].forEach((row, k) => {
+      const current = focus !== null && reviewItems[k]?.item === focus.item;
+      row.firstElementChild.setAttribute("aria-current", String(current));
+    });
   }
 
   row(each) {
     const { kind, finger, item } = each;
     const state = kind === "suspect" ? item.expected : item.state;
-    const mark = shape(stateKey(state));
-    const text = kind === "suspect" ? `${stateWord(item.given)} → ${stateWord(item.expected)}?` : labelWord(item);
-    const button = make("button", "doubt", mark, make("span", "finger", finger), make("span", "what", text),
-      make("time", "", timeWord(item.start, 0.1)), make("b", "", percent(item.confidence)));
+    const text = kind === "suspect" ? `${stateText(item.given)} → ${stateText(item.expected)}?` : labelText(item);
+    const button = make("button", "review-item", shape(stateKey(state)), make("span", "finger", finger), make("span", "text", text),
+      make("time", "", timeText(item.start, 0.1)), make("b", "", percent(item.confidence)));
     button.type = "button";
     button.dataset.state = stateKey(state);
-    button.title = { suspect: "the audit contradicts this label", label: "a label of little confidence", proposal: "a proposal of little confidence" }[kind];
-    button.addEventListener("click", () => this.look(each));
+    button.title = REVIEW_TITLES[kind];
+    button.addEventListener("click", () => this.choose(each));
     return make("li", "", button);
   }
 }

@@ -1,209 +1,219 @@
-// The fingers one under the other. Three canvases lie on each other, so that what moves with the
-// pointer does not draw the signals anew: labels below, lines, and the cursor on top.
+// Plots of all fingers, one below the other. Each layer has its own canvas, so that a movement of
+// the pointer redraws only the cursor: labels at the bottom, then signals, then the cursor.
 
 import { byId } from "../web/dom.js";
 import { colours, font } from "../web/theme.js";
-import { grounds, meant, outlines, proposed, selection, strip, tints } from "./bands.js";
-import { Gutters } from "./gutters.js";
-import { axis, extent, forceLines, forceScale, series, sigmaScale } from "./lines.js";
-import { overview, timeAxis, timeGrid, STRIP, AXIS } from "./overview.js";
-import { line, penOf } from "./pen.js";
-import { rowsOf } from "./rows.js";
-import { LEFT, RIGHT } from "./view.js";
-import { timeWord, niceStep } from "./words.js";
+import { drawLine, prepareCanvas } from "./canvas.js";
+import { drawBackground, drawLabels, drawProposals, drawReviewItems, drawSelection, drawTarget, shadeStates } from "./draw_labels.js";
+import { drawAxis, drawSeries, forceLines, forceScale, sigmaScale, valueRange } from "./draw_signals.js";
+import { niceStep, timeText } from "./format.js";
+import { Legend } from "./legend.js";
+import { OVERVIEW_HEIGHT, drawOverview, drawTimeGrid } from "./overview.js";
+import { LEFT_MARGIN, RIGHT_MARGIN, rowLayout } from "./view.js";
 
-const LEAST = 120; // [px], a row; where there is less room the rows scroll
-const PARTS = ["head", "under", "lines", "over"];
+export const LAYERS = ["overview", "labels", "signals", "cursor"];
+
+const MIN_ROW_HEIGHT = 120; // [px], the rows scroll if they do not fit
 
 export class Plot {
   constructor(editor, view, signals) {
     Object.assign(this, { editor, view, signals });
-    this.canvas = Object.fromEntries(PARTS.map((part) => [part, byId(part)]));
-    this.gutters = new Gutters(byId("gutters"));
-    this.kind = "F_a";
-    this.close = false; // heights by what is in view, not by the whole recording
-    this.changes = {};
-    this.hover = this.playhead = this.snapped = this.aimed = null; // aimed: the proposal that the pointer went to
-    this.target = () => null; // what Enter means
+    this.canvases = Object.fromEntries(LAYERS.map((layer) => [layer, byId(`${layer}-canvas`)]));
+    this.legend = new Legend(byId("legend"));
+    this.force = "F_a"; // the series that is drawn, or "xyz"
+    this.scaleToWindow = false; // vertical axes fit the window, or else the whole recording
+    this.changePoints = {}; // times [s] by finger
+    this.hover = null; // what is under the pointer
+    this.hoveredProposal = null;
+    this.playTime = null; // [s]
+    this.snapTime = null; // time that the dragged edge snaps to [s]
+    this.target = () => null; // the item that Enter accepts
     this.rows = [];
-    this.arrived = false;
-    new ResizeObserver(() => this.fit()).observe(byId("rows"));
+    this.hasNewSignals = false;
+    new ResizeObserver(() => this.resize()).observe(byId("rows"));
   }
 
+  /** Show the recording of the editor. */
   open() {
-    this.changes = {};
-    this.hover = this.snapped = this.aimed = this.scales = null;
-    this.gutters.open(this.editor.recording, this.kind);
-    this.fit();
+    this.changePoints = {};
+    this.hover = this.snapTime = this.hoveredProposal = this.scales = null;
+    this.legend.open(this.editor.recording, this.force);
+    this.resize();
   }
 
-  fit() {
+  resize() {
     const { clientWidth, clientHeight } = byId("rows"), n = this.editor.fingers.length;
-    this.height = Math.max(clientHeight, n * LEAST);
-    this.view.width = Math.max(LEFT + RIGHT + 50, clientWidth - byId("gutters").offsetWidth);
-    this.rows = rowsOf(n, this.height);
-    byId("gutters").style.height = `${this.height}px`;
-    this.redraw(...PARTS);
+    this.height = Math.max(clientHeight, n * MIN_ROW_HEIGHT);
+    this.view.width = Math.max(LEFT_MARGIN + RIGHT_MARGIN + 50, clientWidth - byId("legend").offsetWidth);
+    this.rows = rowLayout(n, this.height);
+    byId("legend").style.height = `${this.height}px`;
+    this.redraw(...LAYERS);
     this.view.changed();
   }
 
-  show(kind) {
-    this.kind = kind;
+  showForce(force) {
+    this.force = force;
     this.scales = null;
-    this.gutters.open(this.editor.recording, kind);
-    this.redraw("lines", "over");
+    this.legend.open(this.editor.recording, force);
+    this.redraw("signals", "cursor");
   }
 
-  /** Data are here: what lies in them is to be drawn. */
-  data() {
-    this.arrived = true;
-    this.scales = this.close ? this.scales : null;
-    this.redraw("head", "lines", "over");
+  /** Draw signals that have arrived. */
+  updateSignals() {
+    this.hasNewSignals = true;
+    this.scales = this.scaleToWindow ? this.scales : null;
+    this.redraw("overview", "signals", "cursor");
   }
 
-  redraw(...parts) {
-    this.dirty = new Set([...(this.dirty ?? []), ...parts]);
-    this.asked ??= requestAnimationFrame(() => this.draw());
+  /** Redraw layers at the next frame of the browser. */
+  redraw(...layers) {
+    this.pending = new Set([...(this.pending ?? []), ...layers]);
+    this.frameRequest ??= requestAnimationFrame(() => this.draw());
   }
 
   draw() {
-    this.asked = null;
-    const parts = this.dirty;
-    this.dirty = null;
-    for (const part of parts) {
-      const height = part === "head" ? STRIP[1] + 2 + AXIS : this.height;
-      this[part](penOf(this.canvas[part], this.view.width, height));
+    this.frameRequest = null;
+    const layers = this.pending;
+    this.pending = null;
+    for (const layer of layers) {
+      const height = layer === "overview" ? OVERVIEW_HEIGHT : this.height;
+      this.drawLayer(layer, prepareCanvas(this.canvases[layer], this.view.width, height));
     }
-    if (!parts.has("lines") || !this.signals.whole) return;
-    // For tests and benchmarks: what came has been drawn.
+    if (!layers.has("signals") || !this.signals.coarse) return;
+    // Tests and benchmarks wait for these attributes.
     document.body.dataset.painted = "1";
-    if (this.arrived) document.body.dataset.drawn = String(Number(document.body.dataset.drawn ?? 0) + 1);
-    this.arrived = false;
+    if (this.hasNewSignals) document.body.dataset.drawn = String(Number(document.body.dataset.drawn ?? 0) + 1);
+    this.hasNewSignals = false;
   }
 
-  head(pen) {
-    overview(pen, this.view, this.editor, this.signals);
-    this.texts = timeAxis(pen, this.view, this.editor.recording.markers ?? []);
+  drawLayer(layer, context) {
+    if (layer === "overview") drawOverview(context, this.view, this.editor, this.signals);
+    else if (layer === "labels") this.drawLabels(context);
+    else if (layer === "signals") this.drawSignals(context);
+    else this.drawCursor(context);
   }
 
-  under(pen) {
-    const { editor, view } = this, todo = new Set(editor.proposals.map(({ item }) => item));
+  drawLabels(context) {
+    const { editor, view } = this, open = new Set(editor.proposals.map(({ item }) => item));
     this.rows.forEach((row, k) => {
       const finger = editor.fingers[k], labels = editor.labels(finger);
-      grounds(pen, view, row);
-      tints(pen, view, row, labels);
-      this.ticks(pen, row, finger);
-      strip(pen, view, row, labels);
-      const own = (editor.recording.proposals[finger] ?? []).filter((item) => !editor.isRejected(finger, item));
-      proposed(pen, view, row, own, todo);
+      drawBackground(context, view, row);
+      shadeStates(context, view, row, labels);
+      this.drawChangePoints(context, row, finger);
+      drawLabels(context, view, row, labels);
+      const proposals = (editor.recording.proposals[finger] ?? []).filter((item) => !editor.isRejected(finger, item));
+      drawProposals(context, view, row, proposals, open);
     });
   }
 
-  // Where edges snap to.
-  ticks(pen, row, finger) {
-    const shown = (this.changes[finger] ?? []).filter((time) => time > this.view.start && time < this.view.end);
-    if (shown.length > this.view.inner / 8) return;
-    for (const time of shown) {
-      const x = Math.round(this.view.x(time)) + 0.5;
-      line(pen, x, row.labels[0] - 5, x, row.labels[0], colours.muted, 1.5);
+  // Mark the change points, unless they are too dense to be distinguished.
+  drawChangePoints(context, row, finger) {
+    const visible = (this.changePoints[finger] ?? []).filter((time) => time > this.view.start && time < this.view.end);
+    if (visible.length > this.view.plotWidth / 8) return;
+    for (const time of visible) {
+      const x = this.pixel(time);
+      drawLine(context, x, row.labels[0] - 5, x, row.labels[0], colours.muted, 1.5);
     }
   }
 
-  lines(pen) {
+  drawSignals(context) {
     const { view } = this;
-    timeGrid(pen, view, this.rows.flatMap((row) => [row.force, row.sigma]));
+    drawTimeGrid(context, view, this.rows.flatMap((row) => [row.force, row.sigma]));
     this.rows.forEach((row, k) => {
-      const finger = this.editor.fingers[k], pieces = this.signals.pieces(finger, view.start, view.end);
-      const [force, sigma] = this.scale(finger, pieces);
-      const found = forceLines(this.kind, k);
-      axis(pen, view, force, row.force);
-      axis(pen, view, sigma, row.sigma);
-      for (const { key, colour } of found) series(pen, view, pieces, key, force, row.force, colour);
-      series(pen, view, pieces, "sigma", sigma, row.sigma, colours.muted);
-      this.caption(pen, row);
+      const finger = this.editor.fingers[k], segments = this.signals.segments(finger, view.start, view.end);
+      const [force, sigma] = this.scalesOf(finger, segments);
+      drawAxis(context, view, force, row.force);
+      drawAxis(context, view, sigma, row.sigma);
+      for (const { key, colour } of forceLines(this.force, k)) drawSeries(context, view, segments, key, force, row.force, colour);
+      drawSeries(context, view, segments, "sigma", sigma, row.sigma, colours.muted);
+      this.drawCaptions(context, row);
     });
   }
 
-  scale(finger, pieces) {
-    const keys = forceLines(this.kind, 0).map(({ key }) => key), from0 = this.kind === "F_a";
-    const of = (some) => [forceScale(extent(some, keys), from0), sigmaScale(extent(some, ["sigma"], true, 0.01))];
-    if (this.close) return of(pieces);
+  // Return the scales of force and sigma of a finger.
+  scalesOf(finger, segments) {
+    const keys = forceLines(this.force, 0).map(({ key }) => key), fromZero = this.force === "F_a";
+    const compute = (some) => [forceScale(valueRange(some, keys), fromZero), sigmaScale(valueRange(some, ["sigma"], true, 0.01))];
+    if (this.scaleToWindow) return compute(segments);
     this.scales ??= {};
-    const data = this.signals.whole?.fingers.get(finger);
-    return (this.scales[finger] ??= of(data ? [[data, -Infinity, Infinity]] : []));
+    const data = this.signals.coarse?.fingers.get(finger);
+    return (this.scales[finger] ??= compute(data ? [[data, -Infinity, Infinity]] : []));
   }
 
-  caption(pen, row) {
-    pen.font = font(10.5);
-    pen.textAlign = "right";
-    pen.textBaseline = "middle";
-    pen.fillStyle = colours.muted;
-    pen.fillText("labels", LEFT - 6, (row.labels[0] + row.labels[1]) / 2);
-    pen.fillText("proposed", LEFT - 6, (row.proposals[0] + row.proposals[1]) / 2);
-  }
-
-  over(pen) {
-    const { editor, view } = this, target = this.target();
-    this.rows.forEach((row, k) => {
-      const own = editor.doubts.filter(({ finger }) => finger === editor.fingers[k]);
-      outlines(pen, view, row, own, editor.focus);
-      if (target?.kind === "proposal" && target.finger === editor.fingers[k]) meant(pen, view, row, target.item);
-      const { selected } = editor;
-      if (selected?.finger === editor.fingers[k] && !editor.preview) selection(pen, view, row, selected.label, selected.fresh);
-    });
-    this.markers(pen);
-    this.vertical(pen, this.playhead, colours["finger-1"], 2, []);
-    this.vertical(pen, this.snapped, colours.focus, 2, [3, 3]);
-    if (this.hover) this.cursor(pen);
-    this.values();
-  }
-
-  markers(pen) {
-    pen.font = font(11, 600);
-    pen.textBaseline = "top";
-    pen.textAlign = "left";
-    for (const [time, text] of this.editor.recording.markers ?? []) {
-      if (!this.vertical(pen, time, colours.marker, 1.2, [2, 4])) continue;
-      const x = placeOf(this, time) + 4, width = pen.measureText(text).width;
-      pen.fillStyle = colours.panel;
-      pen.globalAlpha = 0.8;
-      pen.fillRect(x - 2, 2, width + 4, 14);
-      pen.globalAlpha = 1;
-      pen.fillStyle = colours.text;
-      pen.fillText(text, x, 3);
+  drawCaptions(context, row) {
+    context.font = font(10.5);
+    context.textAlign = "right";
+    context.textBaseline = "middle";
+    context.fillStyle = colours.muted;
+    for (const [text, [top, bottom]] of [["labels", row.labels], ["proposed", row.proposals]]) {
+      context.fillText(text, LEFT_MARGIN - 6, (top + bottom) / 2, LEFT_MARGIN - 8); // narrower if the font is wide
     }
   }
 
-  vertical(pen, time, colour, width, dash) {
+  drawCursor(context) {
+    const { editor, view } = this, target = this.target(), { selected } = editor;
+    this.rows.forEach((row, k) => {
+      const finger = editor.fingers[k];
+      drawReviewItems(context, view, row, editor.reviewItems.filter((each) => each.finger === finger), editor.focus);
+      if (target?.kind === "proposal" && target.finger === finger) drawTarget(context, view, row, target.item);
+      if (selected?.finger === finger && !editor.preview) drawSelection(context, view, row, selected.label, selected.fresh);
+    });
+    this.drawMarkers(context);
+    this.drawVerticalLine(context, this.playTime, colours["finger-1"], 2, []);
+    this.drawVerticalLine(context, this.snapTime, colours.focus, 2, [3, 3]);
+    if (this.hover) this.drawHover(context);
+    this.showValues();
+  }
+
+  drawMarkers(context) {
+    context.font = font(11, 600);
+    context.textBaseline = "top";
+    context.textAlign = "left";
+    for (const [time, text] of this.editor.recording.markers ?? []) {
+      if (!this.drawVerticalLine(context, time, colours.marker, 1.2, [2, 4])) continue;
+      const x = this.pixel(time) + 4, width = context.measureText(text).width;
+      context.fillStyle = colours.panel;
+      context.globalAlpha = 0.8;
+      context.fillRect(x - 2, 2, width + 4, 14);
+      context.globalAlpha = 1;
+      context.fillStyle = colours.text;
+      context.fillText(text, x, 3);
+    }
+  }
+
+  // Draw a line at a time; return false if the time is null or not visible.
+  drawVerticalLine(context, time, colour, width, dash) {
     if (time === null || time < this.view.start || time > this.view.end) return false;
-    const x = placeOf(this, time);
-    line(pen, x, 0, x, this.height, colour, width, dash);
+    const x = this.pixel(time);
+    drawLine(context, x, 0, x, this.height, colour, width, dash);
     return true;
   }
 
-  cursor(pen) {
+  // Draw the line under the pointer, with its time.
+  drawHover(context) {
     const { x, time, row } = this.hover;
-    if (x < LEFT || x > this.view.width - RIGHT) return;
-    line(pen, x, 0, x, this.height, colours.text, 1);
-    const text = `${timeWord(time, niceStep(this.view.perPixel))} s`, top = this.rows[row]?.force[0] ?? 0;
-    pen.font = font(12, 600);
-    const width = pen.measureText(text).width + 10;
+    if (x < LEFT_MARGIN || x > this.view.width - RIGHT_MARGIN) return;
+    drawLine(context, x, 0, x, this.height, colours.text, 1);
+    const text = `${timeText(time, niceStep(this.view.secondsPerPixel))} s`, top = this.rows[row]?.force[0] ?? 0;
+    context.font = font(12, 600);
+    const width = context.measureText(text).width + 10;
     const left = x + 8 + width > this.view.width ? x - 8 - width : x + 8;
-    pen.fillStyle = colours.text;
-    pen.fillRect(left, top, width, 18);
-    pen.fillStyle = colours.ground;
-    pen.textAlign = "left";
-    pen.textBaseline = "middle";
-    pen.fillText(text, left + 5, top + 9.5);
+    context.fillStyle = colours.text;
+    context.fillRect(left, top, width, 18);
+    context.fillStyle = colours.ground;
+    context.textAlign = "left";
+    context.textBaseline = "middle";
+    context.fillText(text, left + 5, top + 9.5);
   }
 
-  // At the cursor, else at the playhead.
-  values() {
-    const time = this.hover?.time ?? this.playhead;
+  // Show the values under the pointer, or else at the playing time, in the legend.
+  showValues() {
+    const time = this.hover?.time ?? this.playTime;
     for (const finger of this.editor.fingers) {
-      this.gutters.show(finger, time === null ? null : this.signals.at(finger, time));
+      this.legend.show(finger, time === null ? null : this.signals.valuesAt(finger, time));
     }
   }
-}
 
-const placeOf = (plot, time) => Math.round(plot.view.x(time)) + 0.5;
+  // Return the middle of the pixel of a time, for sharp vertical lines.
+  pixel(time) { return Math.round(this.view.x(time)) + 0.5; }
+}

@@ -1,147 +1,160 @@
-// Mouse, pen and fingers on the plots: labels are drawn, edges moved, and the window too.
+// Mouse, pen and touch on the plots: draw labels, move edges, and move the time window.
 
-import { at, snap } from "./model.js";
-import { rowAt, zoneAt } from "./rows.js";
-import { LEFT, RIGHT } from "./view.js";
+import { labelAt, snap } from "./labels.js";
+import { LEFT_MARGIN, RIGHT_MARGIN, rowAt, zoneAt } from "./view.js";
 
-const MOVED = 4; // [px] from which on a press is a drag
-const NEAR = { mouse: 6, pen: 8, touch: 16 }; // [px] to an edge
-const SNAP = 9; // [px]
+const MIN_DRAG_DISTANCE = 4; // [px], a shorter movement is a click
+const EDGE_REACH = { mouse: 6, pen: 8, touch: 16 }; // [px]
+const SNAP_DISTANCE = 9; // [px]
+const MIN_PINCH_DISTANCE = 8; // [px]
+const LINE_HEIGHT = 16, PAGE_HEIGHT = 400; // [px], of wheels that count in lines or pages
 
 export class Pointer {
-  /** @param seek is called with the time of a click, @param hovered with what is pointed at. */
+  /**
+   * @param seek called with the time of a click [s].
+   * @param hovered called when the pointer is over something else.
+   */
   constructor(canvas, plot, seek, hovered) {
     Object.assign(this, { canvas, plot, seek, hovered, editor: plot.editor, view: plot.view });
-    this.down = new Map(); // pointers that touch, by id
+    this.pressed = new Map(); // x of the pressed pointers [px], by id
     this.drag = null;
     const on = (name, act, options) => canvas.addEventListener(name, act.bind(this), options);
     on("pointerdown", this.press);
     on("pointermove", this.move);
     on("pointerup", this.release);
-    on("pointercancel", this.cancel);
+    on("pointercancel", this.pointerCancelled);
     on("pointerleave", this.leave);
     on("wheel", this.wheel, { passive: false });
-    on("dblclick", () => this.view.fit());
+    on("dblclick", () => this.view.showAll());
     on("contextmenu", (event) => event.preventDefault());
   }
 
-  /** What is under an event. */
+  /** Return finger, time, label, proposal and edge at the position of an event; null without fingers. */
   find(event) {
     const box = this.canvas.getBoundingClientRect(), x = event.clientX - box.left, y = event.clientY - box.top;
     const row = rowAt(this.plot.rows, y), finger = this.editor.fingers[row];
     if (finger === undefined) return null;
-    const time = this.view.time(Math.max(LEFT, Math.min(this.view.width - RIGHT, x)));
+    const time = this.view.time(Math.max(LEFT_MARGIN, Math.min(this.view.width - RIGHT_MARGIN, x)));
     const zone = zoneAt(this.plot.rows[row], y), labels = this.editor.state.labels[finger];
-    const label = at(labels, time);
+    const label = labelAt(labels, time);
     const proposal = this.editor.proposals.find((each) => each.finger === finger && each.item.start <= time && time < each.item.end);
-    const reach = (NEAR[event.pointerType] ?? 6) * (zone === "labels" ? 1.3 : 0.7);
-    const edge = zone === "proposals" ? null : this.edge(labels, label, x, reach);
+    const reach = (EDGE_REACH[event.pointerType] ?? EDGE_REACH.mouse) * (zone === "labels" ? 1.3 : 0.7);
+    const edge = zone === "proposals" ? null : this.nearestEdge(labels, label, x, reach);
     return { x, y, row, finger, time, zone, label, proposal, edge };
   }
 
-  // The edge next to a place; of two labels that share it, that of the one which is pointed at.
-  edge(labels, under, x, reach) {
-    let best = null;
+  // Return the nearest edge; of two labels that share it, the edge of the label under the pointer.
+  nearestEdge(labels, labelUnder, x, reach) {
+    let nearest = null;
     for (const label of labels) {
       for (const side of ["start", "end"]) {
-        const away = Math.abs(this.view.x(label[side]) - x) - (label === under ? 0.5 : 0);
-        if (away <= reach && away < (best?.away ?? Infinity)) best = { label, side, away };
+        const distance = Math.abs(this.view.x(label[side]) - x) - (label === labelUnder ? 0.5 : 0);
+        if (distance <= reach && distance < (nearest?.distance ?? Infinity)) nearest = { label, side, distance };
       }
     }
-    return best;
+    return nearest;
   }
 
-  /** A time, moved to a change point or an edge nearby; not where Alt is held. */
-  snapped(event, finger, time, without = null) {
+  /**
+   * Return the nearest change point or edge near a time, or else the time. Alt switches it off.
+   *
+   * @param moved label whose own edges are ignored.
+   */
+  snapped(event, finger, time, moved = null) {
     if (event.altKey) return time;
     const { low, high } = this.editor.bounds;
     const edges = Object.values(this.editor.state.labels).flat()
-      .filter((label) => label !== without).flatMap((label) => [label.start, label.end]);
-    const own = without ? edges.filter((edge) => edge !== without.start && edge !== without.end) : edges;
-    return snap(time, [low, high, ...own, ...(this.plot.changes[finger] ?? [])], SNAP * this.view.perPixel);
+      .filter((label) => label !== moved).flatMap((label) => [label.start, label.end]);
+    const others = moved ? edges.filter((edge) => edge !== moved.start && edge !== moved.end) : edges;
+    return snap(time, [low, high, ...others, ...(this.plot.changePoints[finger] ?? [])], SNAP_DISTANCE * this.view.secondsPerPixel);
   }
 
   press(event) {
     this.canvas.focus({ preventScroll: true });
-    this.down.set(event.pointerId, event.clientX);
+    this.pressed.set(event.pointerId, event.clientX);
     this.canvas.setPointerCapture(event.pointerId);
-    if (this.down.size === 2) { this.pinch(); return; }
+    if (this.pressed.size === 2) { this.startPinch(); return; }
     const found = this.find(event);
-    if (!found || this.down.size > 2) return;
-    const panning = event.shiftKey || event.button > 0 || this.editor.readOnly;
-    this.drag = { ...found, from: found.time, fromX: event.clientX, began: false, mode: panning ? "pan" : found.edge ? "edge" : "label", button: event.button };
-    if (this.drag.mode === "label") this.drag.from = this.snapped(event, found.finger, found.time);
+    if (!found || this.pressed.size > 2) return;
+    const pans = event.shiftKey || event.button > 0 || this.editor.readOnly;
+    const mode = pans ? "pan" : found.edge ? "edge" : "label";
+    this.drag = { ...found, mode, from: found.time, fromX: event.clientX, started: false, button: event.button };
+    if (mode === "label") this.drag.from = this.snapped(event, found.finger, found.time);
   }
 
-  // Two fingers: what is under them stays under them.
-  pinch() {
-    this.editor.show(null);
+  // With two fingers on a touch screen, the times under them stay under them.
+  startPinch() {
+    this.editor.setPreview(null);
     const left = this.canvas.getBoundingClientRect().left;
-    const held = [...this.down].map(([id, x]) => [id, this.view.time(x - left)]);
-    this.drag = { mode: "pinch", began: true, held };
+    const times = [...this.pressed].map(([id, x]) => [id, this.view.time(x - left)]);
+    this.drag = { mode: "pinch", started: true, times };
   }
 
-  /** The window has moved under the pointer, which itself did not. */
-  again() {
-    if (this.last && this.plot.hover && !this.drag) this.plot.hover = this.find(this.last);
+  /** Update what is under the pointer after the window has moved. */
+  windowMoved() {
+    if (this.lastEvent && this.plot.hover && !this.drag) this.plot.hover = this.find(this.lastEvent);
   }
 
   move(event) {
     const found = this.find(event), { drag } = this;
-    this.last = event;
+    this.lastEvent = event;
     if (!found) return;
-    this.plot.aimed = drag ? null : found.proposal ?? null;
-    const before = this.down.get(event.pointerId);
-    if (this.down.has(event.pointerId)) this.down.set(event.pointerId, event.clientX);
+    this.plot.hoveredProposal = drag ? null : found.proposal ?? null;
+    const lastX = this.pressed.get(event.pointerId);
+    if (this.pressed.has(event.pointerId)) this.pressed.set(event.pointerId, event.clientX);
     if (!drag) { this.hover(found); return; }
-    drag.began ||= Math.abs(event.clientX - drag.fromX) > MOVED;
-    if (!drag.began) return;
-    if (drag.mode === "pinch") this.pinched();
-    else if (drag.mode === "pan") this.view.pan((before - event.clientX) * this.view.perPixel);
+    drag.started ||= Math.abs(event.clientX - drag.fromX) > MIN_DRAG_DISTANCE;
+    if (!drag.started) return;
+    if (drag.mode === "pinch") this.pinch();
+    else if (drag.mode === "pan") this.view.pan((lastX - event.clientX) * this.view.secondsPerPixel);
     else {
-      this.reach(found.x);
-      this.apply(event, false);
+      this.panBeyondEdge(found.x);
+      this.applyDrag(event, false);
     }
-    this.hover({ ...found, time: this.plot.snapped ?? found.time, x: this.plot.snapped === null ? found.x : this.view.x(this.plot.snapped) });
+    const { snapTime } = this.plot;
+    this.hover({ ...found, time: snapTime ?? found.time, x: snapTime === null ? found.x : this.view.x(snapTime) });
   }
 
-  pinched() {
+  pinch() {
     const left = this.canvas.getBoundingClientRect().left;
-    const [[a, timeA], [b, timeB]] = this.drag.held;
-    const [xa, xb] = [a, b].map((id) => this.down.get(id) - left);
-    if (Math.abs(xa - xb) < 8 || timeA === timeB) return;
-    const perPixel = Math.abs((timeB - timeA) / (xb - xa));
-    const start = timeA - (xa - LEFT) * perPixel;
-    this.view.look(start, start + perPixel * this.view.inner);
+    const [[a, timeA], [b, timeB]] = this.drag.times;
+    const [xa, xb] = [a, b].map((id) => this.pressed.get(id) - left);
+    if (Math.abs(xa - xb) < MIN_PINCH_DISTANCE || timeA === timeB) return;
+    const secondsPerPixel = Math.abs((timeB - timeA) / (xb - xa));
+    const start = timeA - (xa - LEFT_MARGIN) * secondsPerPixel;
+    this.view.setWindow(start, start + secondsPerPixel * this.view.plotWidth);
   }
 
-  // A drag beyond the side of the plot takes the window along.
-  reach(x) {
-    const over = Math.min(0, x - LEFT) + Math.max(0, x - (this.view.width - RIGHT));
-    if (over) this.view.pan(0.3 * over * this.view.perPixel);
+  // A drag beyond the left or right edge of the plot moves the window.
+  panBeyondEdge(x) {
+    const beyond = Math.min(0, x - LEFT_MARGIN) + Math.max(0, x - (this.view.width - RIGHT_MARGIN));
+    if (beyond) this.view.pan(0.3 * beyond * this.view.secondsPerPixel);
   }
 
-  apply(event, commit) {
-    const { drag } = this, { time } = this.find(event);
-    if (drag.mode === "edge") {
-      const to = this.snapped(event, drag.finger, time, drag.edge.label);
-      this.plot.snapped = to === time ? null : to;
-      this.editor.move(drag.finger, drag.edge.label, drag.edge.side, to, commit);
-    } else if (drag.mode === "label") {
-      const to = this.snapped(event, drag.finger, time);
-      this.plot.snapped = to === time ? null : to;
-      const fingers = event.ctrlKey || event.metaKey ? [drag.finger, ...this.editor.fingers.filter((name) => name !== drag.finger)] : [drag.finger];
-      this.editor.draw(fingers, drag.from, to, commit);
+  // Change labels as the drag demands, or only preview it unless `commit`.
+  applyDrag(event, commit) {
+    const { mode, finger, edge, from } = this.drag, { time } = this.find(event);
+    if (mode === "edge" || mode === "label") {
+      const to = this.snapped(event, finger, time, edge?.label);
+      this.plot.snapTime = to === time ? null : to;
+      if (mode === "edge") this.editor.moveEdge(finger, edge.label, edge.side, to, commit);
+      else this.editor.draw(this.fingersOf(event, finger), from, to, commit);
     }
-    if (commit) this.plot.snapped = null;
+    if (commit) this.plot.snapTime = null;
+  }
+
+  // Return the finger of a drag; with Ctrl all fingers, this one first.
+  fingersOf(event, finger) {
+    if (!event.ctrlKey && !event.metaKey) return [finger];
+    return [finger, ...this.editor.fingers.filter((name) => name !== finger)];
   }
 
   release(event) {
     const { drag } = this;
-    this.down.delete(event.pointerId);
-    if (drag?.mode === "pinch" && this.down.size) return;
+    this.pressed.delete(event.pointerId);
+    if (drag?.mode === "pinch" && this.pressed.size) return;
     if (!drag) return;
-    if (drag.began) this.apply(event, true);
+    if (drag.started) this.applyDrag(event, true);
     else if (!drag.button) this.click(drag);
     this.drag = null;
     this.hover(event.pointerType === "touch" ? null : this.find(event));
@@ -149,31 +162,31 @@ export class Pointer {
 
   leave() {
     if (this.drag) return;
-    this.last = this.plot.aimed = null;
+    this.lastEvent = this.plot.hoveredProposal = null;
     this.hover(null);
   }
 
-  cancel(event) {
-    this.down.delete(event.pointerId);
-    this.stop();
+  pointerCancelled(event) {
+    this.pressed.delete(event.pointerId);
+    this.cancelDrag();
   }
 
-  /** Gives up what is being dragged. */
-  stop() {
-    const had = this.drag !== null;
+  /** Cancel a drag without changes. Return false if there is none. */
+  cancelDrag() {
+    const hadDrag = this.drag !== null;
     this.drag = null;
-    this.plot.snapped = null;
-    if (had) this.editor.show(null);
-    return had;
+    this.plot.snapTime = null;
+    if (hadDrag) this.editor.setPreview(null);
+    return hadDrag;
   }
 
   click({ finger, label, proposal, zone, time }) {
     if (zone === "proposals" && proposal) {
       this.editor.select(null, null);
-      this.editor.point({ kind: "proposal", ...proposal });
+      this.editor.setFocus({ kind: "proposal", ...proposal });
     } else {
       this.editor.select(finger, label);
-      this.editor.point(null);
+      this.editor.setFocus(null);
     }
     this.seek(time);
   }
@@ -182,17 +195,17 @@ export class Pointer {
     this.plot.hover = found;
     const edge = this.drag ? this.drag.mode === "edge" : found?.edge && !this.editor.readOnly;
     this.canvas.style.cursor = this.drag?.mode === "pan" ? "grabbing" : edge ? "col-resize" : "crosshair";
-    this.plot.redraw("over");
+    this.plot.redraw("cursor");
     this.hovered(found);
   }
 
+  // The wheel zooms; a sideways movement, or Shift, moves the window.
   wheel(event) {
-    // Over the rows the wheel zooms; sideways, or with Shift, it moves.
     event.preventDefault();
-    const unit = event.deltaMode === 1 ? 16 : event.deltaMode === 2 ? 400 : 1;
+    const unit = event.deltaMode === 1 ? LINE_HEIGHT : event.deltaMode === 2 ? PAGE_HEIGHT : 1;
     const sideways = event.shiftKey && !event.deltaX ? event.deltaY : event.deltaX;
     if (Math.abs(sideways) > Math.abs(event.shiftKey ? 0 : event.deltaY)) {
-      this.view.pan(sideways * unit * this.view.perPixel);
+      this.view.pan(sideways * unit * this.view.secondsPerPixel);
       return;
     }
     const found = this.find(event);

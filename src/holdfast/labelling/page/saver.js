@@ -1,15 +1,15 @@
-// Keeps the labels: in the browser at once, on the disk a moment later, and says how it stands.
+// Save the labels: in the browser at once, and with the service a moment later.
 
 import { callService } from "../web/api.js";
 
-const PAUSE = 300; // [ms] after the last change
-const RETRIES = [1000, 2000, 5000, 10000]; // [ms]
+const SAVE_DELAY = 300; // [ms] after the last change
+const RETRY_DELAYS = [1000, 2000, 5000, 10000]; // [ms]
 
-// One recording, whatever its place in the list.
-const keyOf = (recording) => `holdfast.label ${recording.name} ${recording.start} ${recording.end}`;
+// The key contains what identifies a recording; its position in the list may change.
+const storageKey = (recording) => `holdfast.label ${recording.name} ${recording.start} ${recording.end}`;
 
-/** A JSON value that the browser keeps; null where there is none or the browser keeps nothing. */
-export function kept(key) {
+/** Read a JSON value from the browser's storage; null if it is missing or the storage is off. */
+export function readStored(key) {
   try {
     return JSON.parse(window.localStorage.getItem(key));
   } catch {
@@ -17,23 +17,25 @@ export function kept(key) {
   }
 }
 
-export function keep(key, value) {
+/** Write a JSON value to the browser's storage; null removes it. Return false if that fails. */
+export function writeStored(key, value) {
   try {
     if (value === null) window.localStorage.removeItem(key);
     else window.localStorage.setItem(key, JSON.stringify(value));
     return true;
   } catch {
-    return false; // private windows, or no room
+    return false; // private window, or storage full
   }
 }
 
 export class Saver {
   /**
-   * @param tell is given the state (saved, saving, waiting, conflict, failed) and why.
-   * @param conflict is called once when somebody else has saved.
+   * @param report called with the state ("saved", "saving", "waiting", "conflict" or "failed"),
+   *   the reason of a failure, and author and time of a save.
+   * @param conflict called once if another page or program has changed the file.
    */
-  constructor(tell, conflict) {
-    this.tell = tell;
+  constructor(report, conflict) {
+    this.report = report;
     this.conflict = conflict;
     this.close();
     document.addEventListener("visibilitychange", () => { if (document.hidden) this.flush(); });
@@ -42,62 +44,62 @@ export class Saver {
   close() {
     clearTimeout(this.timer);
     this.recording = null;
-    this.state = this.stored = null; // what is to be saved, and what is on the disk
-    this.fails = 0;
-    this.stopped = false; // until somebody decides on a conflict
-    this.running = null;
+    this.state = this.savedState = null; // of the editor: now, and in the file
+    this.n_failures = 0;
+    this.stopped = false; // until a conflict is resolved
+    this.running = null; // promise of the request that is sent
   }
 
   open(recording, state, author) {
     this.close();
-    Object.assign(this, { recording, author, revision: recording.revision, state, stored: state });
-    this.key = keyOf(recording);
+    Object.assign(this, { recording, author, revision: recording.revision, state, savedState: state });
+    this.key = storageKey(recording);
   }
 
   get rejectedKey() { return `${this.key} rejected`; }
   get dirty() {
-    return this.recording !== null && (this.state.labels !== this.stored.labels || this.state.note !== this.stored.note);
+    return this.recording !== null && (this.state.labels !== this.savedState.labels || this.state.note !== this.savedState.note);
   }
 
-  /** What an earlier page could not save of a recording, if it differs from what is there. */
-  rescue(recording) {
-    const found = kept(keyOf(recording));
-    if (!found?.labels) return null;
-    const plain = (labels) => JSON.stringify(recording.fingers.map((finger) => labels[finger] ?? []));
-    const different = plain(found.labels) !== plain(recording.labels) || found.note !== recording.note;
-    if (!different) this.forget(recording);
-    return different ? found : null;
+  /** Return the labels that an earlier page could not save; null if there are none that differ. */
+  unsavedCopy(recording) {
+    const copy = readStored(storageKey(recording));
+    if (!copy?.labels) return null;
+    const toText = (labels) => JSON.stringify(recording.fingers.map((finger) => labels[finger] ?? []));
+    const differs = toText(copy.labels) !== toText(recording.labels) || copy.note !== recording.note;
+    if (!differs) this.discardCopy(recording);
+    return differs ? copy : null;
   }
 
-  forget(recording) { keep(keyOf(recording), null); }
+  discardCopy(recording) { writeStored(storageKey(recording), null); }
 
-  /** Something has changed. */
-  touch(state) {
+  /** Store a new state of the editor in the browser, and schedule a save. */
+  update(state) {
     if (!this.recording) return;
-    if (state.rejected !== this.state.rejected) keep(this.rejectedKey, [...state.rejected]);
+    if (state.rejected !== this.state.rejected) writeStored(this.rejectedKey, [...state.rejected]);
     this.state = state;
-    if (!this.dirty) { this.same(); return; }
+    if (!this.dirty) { this.unchanged(); return; }
     const { labels, note } = state;
-    keep(this.key, { labels, note, revision: this.revision, time: new Date().toISOString() });
+    writeStored(this.key, { labels, note, revision: this.revision, time: new Date().toISOString() });
     if (this.stopped) return;
-    this.tell("waiting");
-    this.later(PAUSE);
+    this.report("waiting");
+    this.schedule(SAVE_DELAY);
   }
 
-  // It has been undone to what is on the disk.
-  same() {
+  // Undo has restored what is in the file.
+  unchanged() {
     if (this.running || this.stopped) return;
     clearTimeout(this.timer);
-    keep(this.key, null);
-    this.tell("saved");
+    writeStored(this.key, null);
+    this.report("saved");
   }
 
-  later(pause) {
+  schedule(delay) {
     clearTimeout(this.timer);
-    this.timer = setTimeout(() => this.save(), pause);
+    this.timer = setTimeout(() => this.save(), delay);
   }
 
-  /** Saves now what is not saved; resolves when that is done or has failed. */
+  /** Save unsaved changes now; resolve when they are saved or have failed. */
   async flush() {
     clearTimeout(this.timer);
     await this.running;
@@ -115,41 +117,41 @@ export class Saver {
 
   async send(recording) {
     const state = this.state, { labels, note } = state;
-    this.tell("saving");
-    let answer, problem = null;
+    this.report("saving");
+    let reply, problem = null;
     try {
-      answer = await callService("PUT", `recordings/${recording.id}/labels`, { labels, note, author: this.author, revision: this.revision });
+      reply = await callService("PUT", `recordings/${recording.id}/labels`, { labels, note, author: this.author, revision: this.revision });
     } catch (error) {
       problem = error;
     }
-    if (this.recording !== recording) return; // another recording is open by now
+    if (this.recording !== recording) return; // another recording was opened
     if (problem) this.failed(problem);
-    else this.succeeded(state, answer);
+    else this.succeeded(state, reply);
   }
 
   succeeded(state, { revision, time }) {
-    Object.assign(this, { revision, stored: state, fails: 0 });
-    if (this.dirty) this.later(PAUSE);
-    else keep(this.key, null);
-    this.tell(this.dirty ? "waiting" : "saved", "", { author: this.author, time });
+    Object.assign(this, { revision, savedState: state, n_failures: 0 });
+    if (this.dirty) this.schedule(SAVE_DELAY);
+    else writeStored(this.key, null);
+    this.report(this.dirty ? "waiting" : "saved", "", { author: this.author, time });
   }
 
   failed(problem) {
     if (problem.status === 409) {
       this.stopped = true;
-      this.tell("conflict", problem.message);
+      this.report("conflict", problem.message);
       this.conflict();
       return;
     }
-    this.tell("failed", problem.message);
-    // What the service refuses it refuses again; what did not reach it may.
+    this.report("failed", problem.message);
+    // A refused save is not repeated. A save that did not reach the service, or met an error of it, is.
     if (problem.status && problem.status < 500) return;
-    this.later(RETRIES[Math.min(this.fails, RETRIES.length - 1)]);
-    this.fails += 1;
+    this.schedule(RETRY_DELAYS[Math.min(this.n_failures, RETRY_DELAYS.length - 1)]);
+    this.n_failures += 1;
   }
 
-  /** Goes on after a conflict, from what is on the disk: with these labels, or over them. */
-  decide(revision, stored) {
-    Object.assign(this, { revision, stored, stopped: false });
+  /** Continue after a conflict; `revision` and `state` are those of the file. */
+  resume(revision, state) {
+    Object.assign(this, { revision, savedState: state, stopped: false });
   }
 }

@@ -1,24 +1,27 @@
-// Signals of the recording: the whole of it coarsely, and what is looked at, finely, with a margin.
+// Signals of the recording from the service: the whole recording at low resolution, and the time
+// window with a margin at the resolution of the screen.
 
 import { callService } from "../web/api.js";
 
-export const SERIES = ["F_a", "F_x", "F_y", "F_z", "sigma"];
-const MARGIN = 0.4; // of the window, on either side
-const PAIRS = 0.75; // of extremes for each pixel: more are not seen, and take time to come
-const ENOUGH = 0.6; // pairs for each pixel, with which no finer data are asked for
-const PAUSE = 20; // [ms], so that a turn of the wheel is one question
+const SERIES = ["F_a", "F_x", "F_y", "F_z", "sigma"];
+const MARGIN = 0.4; // on either side, as a fraction of the window
+const PAIRS_PER_PIXEL = 0.75; // requested; each pair is a minimum and a maximum
+const MIN_PAIRS_PER_PIXEL = 0.6; // with fewer, finer data are requested
+const MIN_POINTS = 100, MAX_POINTS = 5000; // of one request
+const MIN_COARSE_POINTS = 600;
+const REQUEST_DELAY = 20; // [ms], so that one turn of the wheel makes one request
 
-const numbers = (values) => Float64Array.from(values, (v) => (v === null ? NaN : v));
+const toNumbers = (values) => Float64Array.from(values, (v) => (v === null ? NaN : v));
 
-function read(answer, points) {
-  const fingers = new Map(Object.entries(answer.fingers).map(([finger, own]) => [
-    finger, Object.fromEntries(["t", ...SERIES].map((key) => [key, numbers(own[key] ?? [])])),
+function decode(response, points) {
+  const fingers = new Map(Object.entries(response.fingers).map(([finger, own]) => [
+    finger, Object.fromEntries(["t", ...SERIES].map((key) => [key, toNumbers(own[key] ?? [])])),
   ]));
-  return { start: answer.start, end: answer.end, exact: answer.exact, points, fingers };
+  return { start: response.start, end: response.end, exact: response.exact, points, fingers };
 }
 
-/** The place of the first of some times that is not before `time`. */
-export function find(times, time) {
+/** Return the index of the first of the sorted times that is not before `time`. */
+export function indexAt(times, time) {
   let [low, high] = [0, times.length];
   while (low < high) {
     const middle = (low + high) >> 1;
@@ -29,91 +32,92 @@ export function find(times, time) {
 }
 
 export class Signals {
-  /** @param arrived is called with null after data came, or an error. */
+  /** @param arrived called with null after new data, or with an error. */
   constructor(arrived) {
     this.arrived = arrived;
-    this.turn = 0; // counts recordings: answers to questions of an earlier one are dropped
+    this.generation = 0; // counts recordings; responses for an earlier one are dropped
     this.close();
   }
 
   close() {
-    this.turn += 1;
-    this.whole = this.part = null;
-    this.asking = false;
-    this.wanted = null;
-    this.n_asked = 0;
-    this.timer = clearTimeout(this.timer); // none
+    this.generation += 1;
+    this.coarse = this.fine = null;
+    this.loading = false;
+    this.requested = null;
+    this.timer = clearTimeout(this.timer); // undefined
   }
 
   async open(id, start, end, width) {
     this.close();
     Object.assign(this, { id, start, end });
-    const turn = this.turn;
-    const answer = await this.ask(start, end, Math.max(600, Math.round(width)));
-    if (turn !== this.turn) return;
-    this.whole = answer;
+    const generation = this.generation;
+    const data = await this.fetch(start, end, Math.max(MIN_COARSE_POINTS, Math.round(width)));
+    if (generation !== this.generation) return;
+    this.coarse = data;
     this.arrived(null);
-    if (this.wanted) this.want(...this.wanted);
+    if (this.requested) this.request(...this.requested);
   }
 
-  async ask(start, end, points) {
-    this.n_asked += 1;
+  async fetch(start, end, points) {
     const query = new URLSearchParams({ start, end, points });
-    return read(await callService("GET", `recordings/${this.id}/signals?${query}`), points);
+    return decode(await callService("GET", `recordings/${this.id}/signals?${query}`), points);
   }
 
-  /** Asks for what a window needs, unless it is there: one question at a time, the newest next. */
-  want(start, end, width) {
-    this.wanted = [start, end, width];
-    if (!this.whole || this.asking || this.timer) return;
-    this.timer = setTimeout(() => { this.timer = null; this.fetch(); }, PAUSE);
+  /**
+   * Request the data of a window, unless they are loaded. One request runs at a time; after it,
+   * only the newest window is requested.
+   */
+  request(start, end, width) {
+    this.requested = [start, end, width];
+    if (!this.coarse || this.loading || this.timer) return;
+    this.timer = setTimeout(() => { this.timer = null; this.load(); }, REQUEST_DELAY);
   }
 
-  async fetch() {
-    const [start, end, width] = this.wanted, turn = this.turn;
-    if (this.enough(start, end, width)) return;
+  async load() {
+    const [start, end, width] = this.requested, generation = this.generation;
+    if (this.isFineEnough(start, end, width)) return;
     const margin = MARGIN * (end - start);
     const from = Math.max(this.start, start - margin), to = Math.min(this.end, end + margin);
-    const points = Math.min(5000, Math.round((PAIRS * width * (to - from)) / (end - start)));
-    this.asking = true;
+    const points = Math.min(MAX_POINTS, Math.round((PAIRS_PER_PIXEL * width * (to - from)) / (end - start)));
+    this.loading = true;
     let problem = null;
     try {
-      const answer = await this.ask(from, to, Math.max(100, points));
-      if (turn !== this.turn) return;
-      this.part = answer;
+      const data = await this.fetch(from, to, Math.max(MIN_POINTS, points));
+      if (generation !== this.generation) return;
+      this.fine = data;
     } catch (error) {
       problem = error;
     }
-    if (turn !== this.turn) return;
-    this.asking = false;
+    if (generation !== this.generation) return;
+    this.loading = false;
     this.arrived(problem);
-    if (!problem && this.wanted.some((value, k) => value !== [start, end, width][k])) this.want(...this.wanted);
+    if (!problem && this.requested.some((value, k) => value !== [start, end, width][k])) this.request(...this.requested);
   }
 
-  // Whether what is there is fine enough for a window of so many pixels.
-  enough(start, end, width) {
-    return [this.part, this.whole].some((data) => data && data.start <= start && data.end >= end
-      && (data.exact || data.points / (data.end - data.start) >= (ENOUGH * width) / (end - start)));
+  // Return whether the loaded data are fine enough for a window of this width [px].
+  isFineEnough(start, end, width) {
+    return [this.fine, this.coarse].some((data) => data && data.start <= start && data.end >= end
+      && (data.exact || data.points / (data.end - data.start) >= (MIN_PAIRS_PER_PIXEL * width) / (end - start)));
   }
 
-  /** What there is of a finger over a window, the finest: pieces of (data, from, to). */
-  pieces(finger, start, end) {
-    const whole = this.whole?.fingers.get(finger), part = this.part?.fingers.get(finger);
-    if (!whole) return [];
-    const { part: piece } = this;
-    if (!part || this.whole.exact || piece.end <= start || piece.start >= end) return [[whole, start, end]];
-    const found = [[part, Math.max(start, piece.start), Math.min(end, piece.end)]];
-    if (piece.start > start) found.unshift([whole, start, piece.start]);
-    if (piece.end < end) found.push([whole, piece.end, end]);
-    return found;
+  /** Return the finest loaded data of a finger over a window, as segments (data, from, to). */
+  segments(finger, start, end) {
+    const coarseData = this.coarse?.fingers.get(finger), fineData = this.fine?.fingers.get(finger);
+    if (!coarseData) return [];
+    const { fine } = this;
+    if (!fineData || this.coarse.exact || fine.end <= start || fine.start >= end) return [[coarseData, start, end]];
+    const segments = [[fineData, Math.max(start, fine.start), Math.min(end, fine.end)]];
+    if (fine.start > start) segments.unshift([coarseData, start, fine.start]);
+    if (fine.end < end) segments.push([coarseData, fine.end, end]);
+    return segments;
   }
 
-  /** The values of a finger at a time, by series; of the nearest sample that is there. */
-  at(finger, time) {
-    const [[data] = []] = this.pieces(finger, time, time + 1e-9);
+  /** Return the values of the loaded sample nearest to a time, by series; null without data. */
+  valuesAt(finger, time) {
+    const [[data] = []] = this.segments(finger, time, time + 1e-9);
     if (!data?.t.length) return null;
-    let place = Math.min(data.t.length - 1, find(data.t, time));
-    if (place > 0 && time - data.t[place - 1] < data.t[place] - time) place -= 1;
-    return Object.fromEntries(SERIES.map((key) => [key, data[key][place]]));
+    let index = Math.min(data.t.length - 1, indexAt(data.t, time));
+    if (index > 0 && time - data.t[index - 1] < data.t[index] - time) index -= 1;
+    return Object.fromEntries(SERIES.map((key) => [key, data[key][index]]));
   }
 }

@@ -1,58 +1,89 @@
-// The line below: how the saving stands, what is pointed at, and when.
+// Messages to the person who labels: alert, toasts, and the status bar.
 
-import { byId, make, shape, setText } from "../web/dom.js";
-import { labelWord, percent, spanWord, stateKey, stateWord, timeWord, whenWord } from "./words.js";
+import { byId, make, setText, shape } from "../web/dom.js";
+import { dateText, labelText, percent, spanText, stateKey, stateText, timeText } from "./format.js";
+import { LOW_CONFIDENCE } from "./labels.js";
 
-const SAVING = { saving: "saving …", waiting: "not saved yet …", conflict: "NOT SAVED: the file was changed by somebody else", none: "no labels yet" };
+const TOAST_DURATION = 6000; // [ms]
+const MAX_TOASTS = 4;
 
-/** How the saving stands; `by` is who saved last and when. */
-export class SaveState {
+/** Show a short message for a few seconds; `kind` is "good" or "bad". */
+export function showToast(text, kind) {
+  const box = make("p", `toast ${kind}`, text), toasts = byId("toasts");
+  toasts.append(box);
+  while (toasts.children.length > MAX_TOASTS) toasts.firstElementChild.remove();
+  setTimeout(() => box.remove(), TOAST_DURATION);
+}
+
+/** Show a line above the page until it is replaced; an empty text hides it. */
+export function showAlert(text) {
+  const box = byId("alert");
+  if (box.textContent !== text) box.textContent = text;
+  box.hidden = !text;
+}
+
+const SAVE_TEXTS = {
+  saving: "saving …", waiting: "not saved yet …", none: "no labels yet",
+  conflict: "NOT SAVED: the label file was changed by another page or program",
+};
+
+/** Save status: whether the labels are saved, and who saved them last. */
+export class SaveStatus {
   open({ author, time, origin, read_only }) {
-    this.by = { author, time };
-    if (origin === "file") this.tell("saved");
-    else this.tell("none", origin === "inside" ? "labels of the recording itself" : "");
-    if (read_only) setText(byId("save-text"), `read-only${author ? ` · by ${author}, ${whenWord(time)}` : ""}`);
+    this.lastSave = { author, time };
+    if (origin === "file") this.show("saved");
+    else this.show("none", origin === "inside" ? "labels from the recording file" : "");
+    if (read_only) setText(byId("save-text"), `read-only${author ? ` · by ${author}, ${dateText(time)}` : ""}`);
   }
 
-  tell(state, why = "", by = null) {
-    if (by) this.by = by;
-    const { author, time } = this.by ?? {};
-    const saved = author || time ? `saved${author ? ` by ${author}` : ""}${time ? `, ${whenWord(time)}` : ""}` : "no changes";
-    const words = { ...SAVING, saved, failed: `NOT SAVED: ${why}` };
+  /** @param lastSave author and time of the last save, if they are new. */
+  show(state, reason = "", lastSave = null) {
+    if (lastSave) this.lastSave = lastSave;
+    const { author, time } = this.lastSave ?? {};
+    const saved = author || time ? `saved${author ? ` by ${author}` : ""}${time ? `, ${dateText(time)}` : ""}` : "no changes";
+    const texts = { ...SAVE_TEXTS, saved, failed: `NOT SAVED: ${reason}` };
     byId("save").dataset.save = state;
-    setText(byId("save-text"), state === "none" && why ? why : words[state]);
-    byId("save").title = state === "saved" && time ? new Date(time).toLocaleString("en-GB") : why;
+    setText(byId("save-text"), state === "none" && reason ? reason : texts[state]);
+    byId("save").title = state === "saved" && time ? new Date(time).toLocaleString("en-GB") : reason;
   }
 }
 
-const hints = {
-  proposal: "Enter accepts, X rejects", suspect: "Enter corrects it, X if the label is right",
-  label: "Enter confirms it", fresh: "A copies it to all fingers",
+const HINTS = {
+  proposal: "Enter accepts, X rejects", suspect: "Enter corrects the label, X keeps it",
+  label: "Enter confirms the label", fresh: "A copies the label to all fingers",
 };
 
-/** What is selected, or else what is meant by Enter and X. */
-export function tellAbout(editor, target) {
-  const box = byId("about"), { selected } = editor;
-  const shown = selected && !(target && (selected.fresh || target.kind !== "proposal")) ? { kind: "own", finger: selected.finger, item: selected.label } : target;
+// Return the hint for an item of the status bar.
+function hintFor(kind, item, fresh) {
+  if (kind !== "selected") return HINTS[kind];
+  if (fresh) return HINTS.fresh;
+  return item.confidence < LOW_CONFIDENCE ? HINTS.label : "";
+}
+
+/** Show the selected label, or else the target of Enter and X, in the status bar. */
+export function showItem(editor, target) {
+  const box = byId("item"), { selected } = editor;
+  const showsTarget = !selected || (target && (selected.fresh || target.kind !== "proposal"));
+  const shown = showsTarget ? target : { kind: "selected", finger: selected.finger, item: selected.label };
   if (!shown) {
-    box.replaceChildren(make("span", "hint", editor.readOnly ? "" : "Drag over a finger to label it · ? for all keys"));
+    box.replaceChildren(make("span", "hint", editor.readOnly ? "" : "Drag over a finger to label it · ? shows all keys"));
     return;
   }
   const { kind, finger, item } = shown, audit = kind === "suspect";
-  const what = audit ? `${stateWord(item.given)}; the audit expects ${stateWord(item.expected)}` : labelWord(item);
-  const sure = audit || item.confidence < 1 ? percent(item.confidence) : "";
-  const mark = shape(stateKey(audit ? item.expected : item.state));
-  const facts = [finger, spanWord(item), sure, item.author, item.evidence].filter(Boolean).join(" · ");
-  const hint = kind === "own" ? (selected.fresh ? hints.fresh : item.confidence < 0.8 ? hints.label : "") : hints[kind];
-  box.replaceChildren(mark, make("b", "", `${kind === "proposal" ? "proposed: " : ""}${what}`), make("span", "facts", facts), make("span", "hint", editor.readOnly ? "" : hint));
-  box.dataset.state = stateKey(audit ? item.expected : item.state);
+  const text = audit ? `${stateText(item.given)}; the audit expects ${stateText(item.expected)}` : labelText(item);
+  const confidence = audit || item.confidence < 1 ? percent(item.confidence) : "";
+  const key = stateKey(audit ? item.expected : item.state);
+  const facts = [finger, spanText(item), confidence, item.author, item.evidence].filter(Boolean).join(" · ");
+  const hint = editor.readOnly ? "" : hintFor(kind, item, selected?.fresh);
+  box.replaceChildren(shape(key), make("b", "", `${kind === "proposal" ? "proposed: " : ""}${text}`), make("span", "facts", facts), make("span", "hint", hint));
+  box.dataset.state = key;
   box.title = facts;
 }
 
-/** The window, and whether each sample is drawn. */
-export function tellWindow(view, signals) {
-  const { part, whole } = signals, data = part && part.start <= view.start && part.end >= view.end ? part : whole;
-  const digits = view.span > 20 ? 0.1 : view.span > 2 ? 0.01 : 0.001;
-  const text = `${timeWord(view.start, digits)} – ${timeWord(view.end, digits)} s`;
+/** Show the time window, and whether every sample is drawn. */
+export function showWindow(view, signals) {
+  const { fine, coarse } = signals, data = fine && fine.start <= view.start && fine.end >= view.end ? fine : coarse;
+  const step = view.span > 20 ? 0.1 : view.span > 2 ? 0.01 : 0.001;
+  const text = `${timeText(view.start, step)} – ${timeText(view.end, step)} s`;
   setText(byId("window"), data?.exact ? `${text} · every sample` : text);
 }

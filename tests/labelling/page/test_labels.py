@@ -1,13 +1,14 @@
-"""model.js and history.js: arithmetic of labels, and undo, against slow and obvious twins."""
+"""labels.js and editor.js: operations on labels, and undo, compared with slow, simple versions."""
 
 import random
 
 import pytest
 
-MODEL = "async ([name, given]) => (await import('/page/model.js'))[name](...given)"
-# Runs operations on an editor of its own; gives the labels after each, and after undoing each.
+CALL = "async ([name, given]) => (await import('/page/labels.js'))[name](...given)"
+# Run operations on a new editor; check the labels after each, and undo and redo them all.
 SESSION = """async ([operations]) => {
-  const { Editor } = await import("/page/editor.js"), { sound } = await import("/page/model.js");
+  const { Editor } = await import("/page/editor.js");
+  const { areValid } = await import("/page/labels.js");
   const editor = new Editor(() => {});
   const fingers = ["a", "b"], labels = { a: [], b: [] };
   const proposals = { a: [], b: [] };
@@ -19,9 +20,9 @@ SESSION = """async ([operations]) => {
                 read_only: false }, "ada", []);
   const text = () => JSON.stringify([editor.state.labels, [...editor.state.rejected]]);
   const seen = [text()], bad = [];
-  const pick = (finger, share) => {
+  const pick = (finger, fraction) => {
     const own = editor.state.labels[finger];
-    return own[Math.floor(share * own.length)];
+    return own[Math.floor(fraction * own.length)];
   };
   for (const [what, finger, x, y, z] of operations) {
     const label = pick(finger, z), before = editor.state;
@@ -32,9 +33,9 @@ SESSION = """async ([operations]) => {
     }
     if (what === "all") editor.draw(fingers, 30 * x, 30 * y, true);
     const side = x < 0.5 ? "start" : "end", states = ["stable", "unstable", "no_contact"];
-    if (what === "edge" && label) editor.move(finger, label, side, 34 * y - 2, true);
-    if (what === "state") editor.name({ state: states[Math.floor(3 * x)] });
-    if (what === "cause") editor.name({ cause: ["slip", "closing"][Math.floor(2 * x)] });
+    if (what === "edge" && label) editor.moveEdge(finger, label, side, 34 * y - 2, true);
+    if (what === "state") editor.setKind({ state: states[Math.floor(3 * x)] });
+    if (what === "cause") editor.setKind({ cause: ["slip", "closing"][Math.floor(2 * x)] });
     if (what === "delete") editor.remove();
     if (what === "copy") editor.copy();
     if (what === "accept" && editor.proposals.length) {
@@ -45,7 +46,7 @@ SESSION = """async ([operations]) => {
     if (what === "fill") editor.acceptAll(x);
     for (const own of Object.values(editor.state.labels)) {
       const outside = own.some((each) => each.start < 0 || each.end > 30.01);
-      if (!sound(own) || outside) bad.push([what, own]);
+      if (!areValid(own) || outside) bad.push([what, own]);
     }
     if (editor.state !== before) seen.push(text());
   }
@@ -53,23 +54,25 @@ SESSION = """async ([operations]) => {
   while (editor.history.past.length) { editor.undo(); back.push(text()); }
   while (editor.history.future.length) { editor.redo(); forth.push(text()); }
   const n = Object.values(editor.state.labels).flat().length;
-  return { bad, n, kept: seen.length, undone: back.reverse().join() === seen.join(),
+  return { bad, n, n_states: seen.length, undone: back.reverse().join() === seen.join(),
            redone: forth.join() === seen.slice(1).join() };
 }"""
-WHAT = ("draw", "draw", "draw", "all", "edge", "edge", "edge", "state", "cause", "delete", "copy",
-        "accept", "reject", "fill")  # fmt: skip
+OPERATIONS = (
+    "draw", "draw", "draw", "all", "edge", "edge", "edge", "state", "cause", "delete", "copy",
+    "accept", "reject", "fill",
+)  # fmt: skip
 
 
 def call(page, name, *given):
-    return page.evaluate(MODEL, [name, list(given)])
+    return page.evaluate(CALL, [name, list(given)])
 
 
-def span(start, end, state="stable", cause=None, **words):
-    return {"start": start, "end": end, "state": state, "cause": cause, **words}
+def span(start, end, state="stable", cause=None, **fields):
+    return {"start": start, "end": end, "state": state, "cause": cause, **fields}
 
 
-def cells(labels, n=40):
-    """What is labelled, by tenths of a second: the slow twin of an interval."""
+def states_on_grid(labels, n=40):
+    """Return the labelled state of each tenth of a second, and check that none overlap."""
     found = [None] * n
     for each in labels:
         for k in range(round(10 * each["start"]), round(10 * each["end"])):
@@ -78,49 +81,50 @@ def cells(labels, n=40):
     return found
 
 
-def drawn(rng, n=40):
+def random_label(rng, n=40):
     start, end = sorted(rng.sample(range(n + 1), 2))
     return span(start / 10, end / 10, rng.choice(["stable", "unstable", "no_contact"]))
 
 
 @pytest.mark.parametrize("seed", range(5))
-def test_any_session_leaves_labels_in_order_and_undo_restores_them(module, seed):
+def test_random_operations_keep_labels_valid_and_can_be_undone(module, seed):
     rng = random.Random(seed)
     operations = [
-        (rng.choice(WHAT), rng.choice("ab"), *(rng.random() for _ in range(3))) for _ in range(200)
+        (rng.choice(OPERATIONS), rng.choice("ab"), *(rng.random() for _ in range(3)))
+        for _ in range(200)
     ]
     found = module.evaluate(SESSION, [operations])
     assert found["bad"] == []
-    assert found["kept"] > 80
+    assert found["n_states"] > 80
     assert found["n"] > 0
     assert found["undone"]
     assert found["redone"]
 
 
 @pytest.mark.parametrize("seed", range(5))
-def test_overwriting_is_painting(module, seed):
+def test_overwrite_replaces_the_states_of_its_interval(module, seed):
     rng, labels, painted = random.Random(seed), [], [None] * 40
     for _ in range(25):
-        new = drawn(rng)
-        labels, whole = call(module, "overwrite", labels, new)
+        new = random_label(rng)
+        labels, merged = call(module, "overwrite", labels, new)
         for k in range(round(10 * new["start"]), round(10 * new["end"])):
             painted[k] = new["state"]
-        assert cells(labels) == painted
-        assert whole in labels
-        # What meets is one: no label is next to another of its kind that was drawn there.
-        assert whole["start"] <= new["start"]
-        assert new["end"] <= whole["end"]
+        assert states_on_grid(labels) == painted
+        assert merged in labels
+        # The new label is merged with adjacent labels of the same state.
+        assert merged["start"] <= new["start"]
+        assert new["end"] <= merged["end"]
 
 
 @pytest.mark.parametrize("seed", range(5))
-def test_filling_paints_only_what_is_empty(module, seed):
+def test_fill_gaps_changes_only_unlabelled_times(module, seed):
     rng, labels, painted = random.Random(seed), [], [None] * 40
     for _ in range(12):
-        new = drawn(rng)
-        labels = call(module, "fill", labels, new)
+        new = random_label(rng)
+        labels = call(module, "fillGaps", labels, new)
         for k in range(round(10 * new["start"]), round(10 * new["end"])):
             painted[k] = painted[k] or new["state"]
-        assert cells(labels) == painted
+        assert states_on_grid(labels) == painted
 
 
 def test_a_label_within_another_splits_it(module):
@@ -134,13 +138,13 @@ def test_the_same_state_of_another_cause_stays_apart(module):
     assert labels == [span(0, 2, "unstable", "slip"), span(2, 5, "unstable", "closing")]
 
 
-def test_slivers_go(module):
-    labels = call(module, "clear", [span(0, 3)], 0.005, 2.995, 0.01)
+def test_remainders_shorter_than_the_minimum_are_dropped(module):
+    labels = call(module, "cut", [span(0, 3)], 0.005, 2.995, 0.01)
     assert labels == []
 
 
 @pytest.mark.parametrize(
-    ("place", "side", "time", "expected"),
+    ("index", "side", "time", "expected"),
     [
         (0, "end", 2, [(0, 2), (4, 6), (6, 9)]),
         (0, "end", 5, [(0, 5), (5, 6), (6, 9)]),
@@ -151,19 +155,20 @@ def test_slivers_go(module):
         (1, "end", 8, [(0, 3), (4, 8), (8, 9)]),
         (2, "start", 5, [(0, 3), (4, 5), (5, 9)]),
         (2, "start", 2, [(0, 2), (2, 9)]),
-        (1, "end", 2, [(0, 2), (2, 9)]),  # the same edge, pulled over its own label
+        (1, "end", 2, [(0, 2), (2, 9)]),  # the same edge, dragged across its own label
         (2, "start", 9.5, [(0, 3), (4, 9.5)]),
         (1, "start", 6, [(0, 3), (5.9, 6), (6, 9)]),
         (1, "start", -5, [(0, 6), (6, 9)]),
     ],
 )
-def test_edges(module, place, side, time, expected):
+def test_move_edge(module, index, side, time, expected):
     found = module.evaluate(
-        """async ([labels, place, side, time]) => {
-          const { moveEdge } = await import("/page/model.js");
-          return moveEdge(labels, labels[place], side, time, { low: 0, high: 10, least: 0.1 })[0];
+        """async ([labels, index, side, time]) => {
+          const { moveEdge } = await import("/page/labels.js");
+          const bounds = { low: 0, high: 10, minDuration: 0.1 };
+          return moveEdge(labels, labels[index], side, time, bounds)[0];
         }""",
-        [[span(0, 3), span(4, 6, "unstable"), span(6, 9, "no_contact")], place, side, time],
+        [[span(0, 3), span(4, 6, "unstable"), span(6, 9, "no_contact")], index, side, time],
     )
     edges = [edge for each in found for edge in (each["start"], each["end"])]
     assert edges == pytest.approx([edge for each in expected for edge in each])
@@ -172,13 +177,13 @@ def test_edges(module, place, side, time, expected):
 @pytest.mark.parametrize(
     ("time", "within", "expected"), [(2.2, 0.3, 2), (2.2, 0.1, 2.2), (2.9, 1, 3), (2.5, 0, 2.5)]
 )
-def test_snapping(module, time, within, expected):
+def test_snap(module, time, within, expected):
     assert call(module, "snap", time, [1, 2, 3], within) == expected
 
 
-def test_what_is_typed_in_a_row_is_undone_at_once(module):
+def test_consecutive_changes_of_one_tag_are_undone_together(module):
     found = module.evaluate("""async () => {
-      const { History } = await import("/page/history.js"), history = new History("");
+      const { History } = await import("/page/editor.js"), history = new History("");
       for (const text of ["a", "ab", "abc"]) history.change(text, "note");
       history.change("label");
       history.undo();

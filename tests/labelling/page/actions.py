@@ -1,17 +1,20 @@
-"""What a person does at the label page, and sees."""
+"""Mouse, keyboard and waiting for tests of the labelling page."""
 
 import re
 
-WHERE = """([finger, time, zone]) => {
+POSITION = """([finger, time, zone]) => {
   const { plot, view, editor } = holdfast, row = plot.rows[editor.fingers.indexOf(finger)];
-  const box = document.querySelector("#over").getBoundingClientRect();
+  const box = document.querySelector("#cursor-canvas").getBoundingClientRect();
   const [top, bottom] = row[zone];
   return [box.left + view.x(time), box.top + (top + bottom) / 2];
 }"""
 
 
 def until(page, script, arg=None):
-    """Waits until a script is true. (Playwright's own way evals, which the policy forbids.)"""
+    """Wait until a script returns true.
+
+    `page.wait_for_function` uses `eval`, which the security policy of the page forbids.
+    """
     for _ in range(600):
         if page.evaluate(script, arg):
             return
@@ -20,7 +23,7 @@ def until(page, script, arg=None):
 
 
 def shows(page, selector, text):
-    """Waits until the text of the first such element matches a pattern."""
+    """Wait until the text of the first matching element matches a pattern."""
     for _ in range(600):
         found = page.evaluate("(at) => document.querySelector(at)?.innerText ?? ''", selector)
         if re.search(text, found):
@@ -30,49 +33,49 @@ def shows(page, selector, text):
 
 
 def ready(page):
-    """Waits until signals are drawn, and change points are there."""
+    """Wait until the signals are drawn and the change points are loaded."""
     until(page, "document.body.dataset.painted === '1'")
-    until(page, "Object.keys(holdfast.plot.changes).length > 0")
+    until(page, "Object.keys(holdfast.plot.changePoints).length > 0")
 
 
-def place(page, finger, time, zone="force"):
-    """Where on the screen a time of a finger is."""
-    return page.evaluate(WHERE, [finger, time, zone])
+def position(page, finger, time, zone="force"):
+    """Return the position on the screen of a time in the row of a finger [px]."""
+    return page.evaluate(POSITION, [finger, time, zone])
 
 
 def point(page, finger, time, zone="force"):
-    page.mouse.move(*place(page, finger, time, zone))
+    page.mouse.move(*position(page, finger, time, zone))
 
 
 def click(page, finger, time, zone="force"):
-    page.mouse.click(*place(page, finger, time, zone))
+    page.mouse.click(*position(page, finger, time, zone))
 
 
 def drag(page, finger, start, end, zone="force", keys=()):
-    """Drags from one time to another."""
+    """Drag from one time to another while keys are pressed."""
     for key in keys:
         page.keyboard.down(key)
-    page.mouse.move(*place(page, finger, start, zone))
+    page.mouse.move(*position(page, finger, start, zone))
     page.mouse.down()
-    page.mouse.move(*place(page, finger, (start + end) / 2, zone))
-    page.mouse.move(*place(page, finger, end, zone))
+    page.mouse.move(*position(page, finger, (start + end) / 2, zone))
+    page.mouse.move(*position(page, finger, end, zone))
     page.mouse.up()
     for key in keys:
         page.keyboard.up(key)
 
 
 def labels(page, finger="thumb"):
-    """The labels of a finger on the page: (start, end, state, cause)."""
+    """Return the labels of a finger on the page: (start, end, state, cause)."""
     found = page.evaluate("(finger) => holdfast.editor.state.labels[finger]", finger)
     return [(each["start"], each["end"], each["state"], each["cause"]) for each in found]
 
 
-def rough(found):
-    """Labels with times to a tenth of a second: what a hand on a mouse can aim at."""
+def rounded(found):
+    """Round the times of labels to 0.1 s, which is more than a pixel."""
     return [(round(start, 1), round(end, 1), *rest) for start, end, *rest in found]
 
 
 def saved(page):
-    """Waits until all is on the disk."""
+    """Wait until all labels are saved."""
     until(page, "!holdfast.saver.dirty")
     shows(page, "#save-text", "^saved")

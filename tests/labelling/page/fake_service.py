@@ -1,6 +1,6 @@
-"""A service of the label page that is none: recordings in memory, and what a test wants of it.
+"""A fake service of the labelling page: its recordings are in memory, and a test controls it.
 
-By hand, to look at the page: `PYTHONPATH=tests python -m labelling.page.desk [PORT]`.
+To look at the page: `PYTHONPATH=tests python -m labelling.page.fake_service [PORT]`.
 """
 
 import asyncio
@@ -23,19 +23,19 @@ RATE = 150.0
 NOW = "2026-01-02T03:04:05+00:00"
 
 
-def label(start, end, state, cause=None, **words):
-    """A label as the contract has it."""
-    own = {"evidence": "", "confidence": 1.0, "author": ""}
-    return {"start": start, "end": end, "state": state, "cause": cause, **own, **words}
+def label(start, end, state, cause=None, **fields):
+    """Return a label as in the JSON of the service."""
+    defaults = {"evidence": "", "confidence": 1.0, "author": ""}
+    return {"start": start, "end": end, "state": state, "cause": cause, **defaults, **fields}
 
 
 def signals(n, seed):
-    """Times, and force and sigma: closes at a sixth of the time, is shaken half way, lets go."""
+    """Return times, and force and sigma of a finger that grasps, is disturbed, and releases."""
     rng = np.random.default_rng(seed)
     times = np.arange(n) / RATE
-    share = times / times[-1]
-    press = np.clip((share - 1 / 6) * 12, 0, 1) * (1 - np.clip((share - 5 / 6) * 24, 0, 1))
-    shake = np.exp(-(((share - 0.5) / 0.03) ** 2)) * np.sin(40 * times)
+    phase = times / times[-1]
+    press = np.clip((phase - 1 / 6) * 12, 0, 1) * (1 - np.clip((phase - 5 / 6) * 24, 0, 1))
+    shake = np.exp(-(((phase - 0.5) / 0.03) ** 2)) * np.sin(40 * times)
     force = np.stack([300 * press + 200 * shake, 200 * press, 2000 * press + 150 * shake])
     force += rng.normal(0, 4, force.shape)
     sigma = 3 + 100 * np.abs(shake) + rng.exponential(0.5, n)
@@ -43,16 +43,16 @@ def signals(n, seed):
 
 
 class Recording:
-    """One recording of the list, and the label file beside it.
+    """A recording with its label file.
 
     Args:
-        name: of the recording.
-        seconds: how long it is.
-        fingers: their names.
-        words: fields of what the page is told, to be other than usual.
+        name: name of the recording.
+        seconds: duration [s].
+        fingers: names of the fingers.
+        fields: fields of the reply to the page that replace the defaults.
     """
 
-    def __init__(self, name="grasp", seconds=30.0, fingers=FINGERS, **words):
+    def __init__(self, name="grasp", seconds=30.0, fingers=FINGERS, **fields):
         self.name, self.fingers = name, list(fingers)
         n = round(seconds * RATE)
         self.signals = {finger: signals(n, seed) for seed, finger in enumerate(fingers)}
@@ -65,67 +65,67 @@ class Recording:
             "origin": "none",
         }  # fmt: skip
         self.version = 0
-        self.words = {"proposals": {finger: [] for finger in fingers}, **words}
-        self.offered = {}  # what a rule will propose
+        self.fields = {"proposals": {finger: [] for finger in fingers}, **fields}
+        self.rule_proposals = {}  # reply to the next request for proposals
 
-    def told(self, place):
-        """What the page is told when it opens the recording."""
+    def describe(self, index):
+        """Return the reply to a page that opens the recording."""
         return {
-            "id": place, "name": self.name, "start": 0.0, "end": self.end, "rate": RATE,
+            "id": index, "name": self.name, "start": 0.0, "end": self.end, "rate": RATE,
             "fingers": self.fingers, "unit": dict.fromkeys(self.fingers, "count"),
             "suspects": [], "doubtful": [], "markers": [], "media": [], "read_only": False,
-            "revision": f"r{self.version}", **self.file, **self.words,
+            "revision": f"r{self.version}", **self.file, **self.fields,
         }  # fmt: skip
 
-    def entry(self, place):
-        """The recording in the list."""
+    def entry(self, index):
+        """Return the entry in the list of recordings."""
         n = sum(map(len, self.file["labels"].values()))
         return {
-            "id": place, "name": self.name, "duration": self.end, "fingers": self.fingers,
+            "id": index, "name": self.name, "duration": self.end, "fingers": self.fingers,
             "labelled": self.file["origin"] == "file", "n_labels": n, "n_proposals": 0,
             "n_doubtful": 0, "error": None,
         }  # fmt: skip
 
     def save(self, labels, note="", author="eve"):
-        """Writes the label file, as somebody else would."""
+        """Write the label file, as the page or another program does."""
         self.version += 1
         self.file = {"labels": labels, "note": note, "author": author, "time": NOW,
                      "origin": "file"}  # fmt: skip
         return {"revision": f"r{self.version}", "time": NOW}
 
-    def draw(self, start, end, points):
-        """The series between two times: every sample, or the least and the most of each few."""
+    def signals_between(self, start, end, points):
+        """Return the series between two times: every sample, or minima and maxima."""
         exact, fingers = True, {}
         for finger, (times, values) in self.signals.items():
             first = max(0, np.searchsorted(times, start) - 1)
             part = slice(first, np.searchsorted(times, end, side="right") + 1)
-            own, found = times[part], values[:, part]
-            if len(own) > 2 * points:
+            t, columns = times[part], values[:, part]
+            if len(t) > 2 * points:
                 exact = False
-                n = -(-len(own) // points)
-                edges = np.arange(0, len(own), n)
-                low = np.minimum.reduceat(found, edges, axis=1)
-                high = np.maximum.reduceat(found, edges, axis=1)
-                middles = own[np.minimum(edges + n // 2, len(own) - 1)]
-                own = np.stack([own[edges], middles], axis=1).ravel()
-                found = np.stack([low, high], axis=2).reshape(len(SERIES), -1)
-            columns = {name: row.tolist() for name, row in zip(SERIES, found, strict=True)}
-            fingers[finger] = {"t": own.tolist(), **columns}
+                n = -(-len(t) // points)
+                edges = np.arange(0, len(t), n)
+                low = np.minimum.reduceat(columns, edges, axis=1)
+                high = np.maximum.reduceat(columns, edges, axis=1)
+                middles = t[np.minimum(edges + n // 2, len(t) - 1)]
+                t = np.stack([t[edges], middles], axis=1).ravel()
+                columns = np.stack([low, high], axis=2).reshape(len(SERIES), -1)
+            lists = {name: row.tolist() for name, row in zip(SERIES, columns, strict=True)}
+            fingers[finger] = {"t": t.tolist(), **lists}
         return {"start": start, "end": end, "exact": exact, "fingers": fingers}
 
 
-class Desk:
-    """The service on a port of its own, in a thread of its own."""
+class FakeService:
+    """Fake service on its own port, in its own thread."""
 
     def __init__(self, *recordings, port=0, media=None):
         self.recordings = recordings or (Recording(),)
         self.port = port
-        self.media = media  # path of every video
-        self.puts = []  # bodies that the page sent
-        self.asked = []  # (start, end, points) of signals
-        self.proposed = []
-        self.refusal = None  # (status, text) that every save is answered with
-        self.delay = []  # seconds to wait before the next answers with signals
+        self.media = media  # path of the file that is sent for every video
+        self.saves = []  # bodies of the save requests
+        self.requests = []  # (start, end, points) of the requests for signals
+        self.propose_requests = []
+        self.refusal = None  # (status, text) of the reply to every save
+        self.delays = []  # delays of the next replies with signals [s]
 
     def __enter__(self):
         ready = threading.Event()
@@ -161,9 +161,9 @@ class Desk:
         app.router.add_get("/", self.index)
         app.router.add_get("/api/v1/recordings", self.list)
         app.router.add_get(one, self.open)
-        app.router.add_get(one + "/signals", self.draw)
-        app.router.add_get(one + "/changes", self.change)
-        app.router.add_put(one + "/labels", self.put)
+        app.router.add_get(one + "/signals", self.signals)
+        app.router.add_get(one + "/changes", self.changes)
+        app.router.add_put(one + "/labels", self.save)
         app.router.add_post(one + "/propose", self.propose)
         app.router.add_get(r"/media/{id:\d+}/{index:\d+}", self.video)
         return app
@@ -175,47 +175,47 @@ class Desk:
             answer.headers.update(SECURITY_HEADERS)
         return answer
 
-    def of(self, request):
+    def recording(self, request):
         return self.recordings[int(request.match_info["id"])]
 
     async def index(self, _):
         return web.FileResponse(PAGE / "index.html")
 
     async def list(self, _):
-        entries = [each.entry(place) for place, each in enumerate(self.recordings)]
+        entries = [each.entry(index) for index, each in enumerate(self.recordings)]
         answer = {"schema": "holdfast.label/1", "author": "ada", "recordings": entries}
         return web.json_response(answer)
 
     async def open(self, request):
-        return web.json_response(self.of(request).told(int(request.match_info["id"])))
+        return web.json_response(self.recording(request).describe(int(request.match_info["id"])))
 
-    async def draw(self, request):
+    async def signals(self, request):
         start, end, points = (float(request.query[key]) for key in ("start", "end", "points"))
-        self.asked.append((start, end, points))
-        if self.delay:
-            await asyncio.sleep(self.delay.pop(0))
-        return web.json_response(self.of(request).draw(start, end, int(points)))
+        self.requests.append((start, end, points))
+        if self.delays:
+            await asyncio.sleep(self.delays.pop(0))
+        return web.json_response(self.recording(request).signals_between(start, end, int(points)))
 
-    async def change(self, request):
-        return web.json_response({"fingers": self.of(request).changes})
+    async def changes(self, request):
+        return web.json_response({"fingers": self.recording(request).changes})
 
-    async def put(self, request):
-        recording, body = self.of(request), await request.json()
-        self.puts.append(body)
+    async def save(self, request):
+        recording, body = self.recording(request), await request.json()
+        self.saves.append(body)
         if self.refusal:
             status, text = self.refusal
             return web.json_response({"error": text}, status=status)
         if body["revision"] != f"r{recording.version}":
-            answer = {"error": "changed by somebody else", "revision": f"r{recording.version}"}
+            answer = {"error": "changed by another program", "revision": f"r{recording.version}"}
             return web.json_response(answer, status=409)
         return web.json_response(recording.save(body["labels"], body["note"], body["author"]))
 
     async def propose(self, request):
-        self.proposed.append(await request.json())
-        offered = self.of(request).offered
-        if not offered:
+        self.propose_requests.append(await request.json())
+        proposals = self.recording(request).rule_proposals
+        if not proposals:
             return web.json_response({"error": "there are no poses"}, status=422)
-        return web.json_response({"rule": "signal", "proposals": offered, "doubtful": []})
+        return web.json_response({"rule": "signal", "proposals": proposals, "doubtful": []})
 
     async def video(self, _):
         if self.media is None:
@@ -223,16 +223,16 @@ class Desk:
         return web.FileResponse(self.media)
 
 
-def scene():
-    """A recording with something of everything, to look at."""
+def example_recording():
+    """Return a recording with labels, proposals, a suspect and markers, to look at."""
     shown = Recording("can-case2-1", markers=[(5.0, "closing"), (7.5, "locked")])
     for finger in FINGERS:
         shown.file["labels"][finger] = [label(0, 5, "no_contact"), label(5, 7.5, "unstable")]
-        shown.words["proposals"][finger] = [
+        shown.fields["proposals"][finger] = [
             label(7.5, 14, "stable", confidence=0.95, author="rule:signal", evidence="settled"),
             label(14, 16, "unstable", "disturbance", confidence=0.6, author="rule:signal"),
         ]
-    shown.words["suspects"] = [
+    shown.fields["suspects"] = [
         {"finger": "index", "start": 2.0, "end": 3.0, "given": "no_contact",
          "expected": "unstable", "confidence": 0.93, "kind": "interval"},
     ]  # fmt: skip
@@ -241,7 +241,7 @@ def scene():
 
 if __name__ == "__main__":
     port = int(sys.argv[1]) if sys.argv[1:] else 8766
-    with Desk(scene(), Recording("can-case2-2"), port=port) as desk:
-        sys.stderr.write(f"{desk.url}\n")
+    with FakeService(example_recording(), Recording("can-case2-2"), port=port) as service:
+        sys.stderr.write(f"{service.url}\n")
         with contextlib.suppress(KeyboardInterrupt):
-            desk.thread.join()
+            service.thread.join()

@@ -1,0 +1,178 @@
+// Commands that keys and buttons run.
+
+import { callService } from "../web/api.js";
+import { byId } from "../web/dom.js";
+import { countOf } from "./format.js";
+import { keyBindings, listenToKeys } from "./keyboard.js";
+import { showToast } from "./status.js";
+
+const FORCES = ["F_a", "F_x", "F_y", "F_z", "xyz"];
+const READ_ONLY = "This recording is read-only";
+
+export class Commands {
+  constructor(page) {
+    this.page = page;
+    page.plot.target = () => this.target();
+    for (const part of ["editor", "view", "plot", "player", "saver", "recordings"]) this[part] = page[part];
+  }
+
+  listen() {
+    listenToKeys(keyBindings(this));
+    const on = (id, name, act) => byId(id).addEventListener(name, act);
+    on("previous-recording", "click", () => this.openNeighbour(-1));
+    on("next-recording", "click", () => this.openNeighbour(1));
+    on("force", "change", (event) => this.plot.showForce(event.target.value));
+    on("note", "input", (event) => this.editor.setNote(event.target.value));
+    on("help", "click", () => this.showHelp());
+    on("propose", "click", () => this.propose());
+    on("accept-all", "click", () => this.acceptAll());
+    on("next-item", "click", () => this.nextReviewItem());
+    on("toggle-side", "click", () => this.toggleSidePanel());
+  }
+
+  setKind(fields) { this.editor.setKind(fields); }
+  undo() { this.page.pointer.cancelDrag(); this.editor.undo(); }
+  redo() { this.page.pointer.cancelDrag(); this.editor.redo(); }
+  remove() { this.editor.remove(); }
+
+  copy() {
+    if (this.editor.copy()) return;
+    showToast(this.editor.readOnly ? READ_ONLY : "Draw or select a label first: A copies it to all fingers", "bad");
+  }
+
+  /**
+   * Return the item that Enter and X act on: the proposal under the pointer, else the selected
+   * label of low confidence, else the item in focus, else the next proposal; null if none is left.
+   */
+  target() {
+    const { editor } = this, { hoveredProposal } = this.plot;
+    if (hoveredProposal && editor.proposals.some(({ item }) => item === hoveredProposal.item)) {
+      return { kind: "proposal", ...hoveredProposal };
+    }
+    const { chosen, focus } = editor;
+    if (chosen && chosen.label.confidence < 1 && editor.reviewItems.some(({ item }) => item === chosen.label)) {
+      return { kind: "label", finger: chosen.finger, item: chosen.label };
+    }
+    const isFocus = (each) => each.item === focus?.item;
+    if (focus && (editor.reviewItems.some(isFocus) || editor.proposals.some(isFocus))) return focus;
+    return editor.proposals.length ? { kind: "proposal", ...editor.proposals[0] } : null;
+  }
+
+  accept() { this.decide((target) => this.editor.accept(target)); }
+  reject() { this.decide((target) => target.kind !== "label" && this.editor.reject(target)); }
+
+  // Run `act` on the target. A target outside the window is only shown first.
+  decide(act) {
+    const target = this.target();
+    if (!target) { showToast("No proposal is open", "good"); return; }
+    if (this.editor.readOnly) { showToast(READ_ONLY, "bad"); return; }
+    const hovered = this.plot.hoveredProposal?.item === target.item;
+    if (!this.view.contains(target.item) && !hovered) {
+      this.view.reveal(target.item);
+      this.editor.setFocus(target);
+      return;
+    }
+    const next = this.itemAfter(target);
+    act(target);
+    this.plot.hoveredProposal = null;
+    this.editor.setFocus(next);
+    if (next && !hovered && !this.view.contains(next.item)) this.view.reveal(next.item);
+  }
+
+  // Return the next review item if the target comes from the review list, else the next proposal in time.
+  itemAfter(target) {
+    const { editor } = this;
+    if (target.kind !== "proposal" || editor.lastReviewed?.item === target.item) {
+      return editor.reviewItems.find(({ item }) => item !== target.item) ?? null;
+    }
+    const index = editor.proposals.findIndex(({ item }) => item === target.item);
+    const next = editor.proposals[index + 1] ?? editor.proposals.find(({ item }) => item !== target.item);
+    return next ? { kind: "proposal", ...next } : null;
+  }
+
+  acceptAll() {
+    const minConfidence = Math.max(0, Math.min(1, byId("min-confidence").valueAsNumber / 100 || 0));
+    const n = this.editor.acceptAll(minConfidence), limit = `${Math.round(100 * minConfidence)} %`;
+    if (n) showToast(`${countOf(n, "proposal")} with a confidence of at least ${limit} accepted`, "good");
+    else showToast(`No open proposal has a confidence of at least ${limit}`, "bad");
+  }
+
+  nextReviewItem() {
+    const item = this.editor.nextReviewItem();
+    if (item) this.showReviewItem(item);
+    else showToast("No items are left to review", "good");
+  }
+
+  showReviewItem(reviewItem) {
+    const { editor } = this, { kind, finger, item } = reviewItem;
+    editor.lastReviewed = reviewItem;
+    this.plot.hoveredProposal = null;
+    this.view.reveal(item);
+    editor.select(finger, kind === "label" ? item : null);
+    editor.setFocus(reviewItem);
+    this.player.seek(item.start);
+  }
+
+  async propose() {
+    const { id, generation, editor } = this.page, button = byId("propose");
+    if (button.classList.contains("busy")) return;
+    button.classList.add("busy");
+    try {
+      const { proposals } = await callService("POST", `recordings/${id}/propose`, { rule: byId("rule").value, parameters: {} });
+      if (generation !== this.page.generation) return;
+      editor.recording.proposals = proposals;
+      // A new request shows all proposals again, also those that were rejected.
+      if (editor.state.rejected.size) editor.apply({ rejected: new Set() });
+      editor.focus = null;
+      this.page.editorChanged(false);
+      this.page.updateCounts();
+      showToast(`${countOf(Object.values(proposals).flat().length, "proposal")}: Enter accepts one, Shift-Enter accepts all of high confidence`, "good");
+    } catch (error) {
+      showToast(error.message, "bad");
+    } finally {
+      button.classList.remove("busy");
+    }
+  }
+
+  /** Open the previous (-1) or the next (1) recording. */
+  openNeighbour(step) {
+    const entry = this.recordings.neighbour(this.page.id, step);
+    if (entry) this.page.open(entry.id);
+    else showToast(step > 0 ? "This is the last recording" : "This is the first recording", "good");
+  }
+
+  /** Cancel a drag; without a drag, clear the selection. */
+  cancel() {
+    if (this.page.pointer.cancelDrag()) return;
+    this.editor.selected = null;
+    this.editor.setFocus(null);
+  }
+
+  nextForce() {
+    const force = FORCES[(FORCES.indexOf(this.plot.force) + 1) % FORCES.length];
+    byId("force").value = force;
+    this.plot.showForce(force);
+  }
+
+  toggleScaling() {
+    this.plot.scaleToWindow = !this.plot.scaleToWindow;
+    this.plot.scales = null;
+    this.plot.redraw("signals");
+    showToast(this.plot.scaleToWindow ? "Vertical axes fit the visible window" : "Vertical axes fit the whole recording", "good");
+  }
+
+  /** Zoom about the cursor, or about the middle of the window if there is no cursor. */
+  zoom(factor) {
+    const { start, end } = this.view;
+    this.view.zoom(factor, this.plot.hover?.time ?? (start + end) / 2);
+  }
+
+  pan(fraction) { this.view.pan(fraction * this.view.span); }
+  toggleSidePanel() { byId("toggle-side").setAttribute("aria-pressed", String(document.body.classList.toggle("is-side-hidden"))); }
+  showHelp() { byId("help-box").showModal(); }
+
+  editNote() {
+    document.body.classList.remove("is-side-hidden");
+    byId("note").focus();
+  }
+}
