@@ -77,6 +77,7 @@ class Cause(StrEnum):
     SLIP = "slip"
     LOST = "lost"
     RELEASED = "released"
+    GLITCH = "glitch"
 
 
 class Phase(StrEnum):
@@ -106,6 +107,8 @@ UNSTABLE_MARGIN = 0.1
 """Time by which an unstable interval is extended at both ends [s]."""
 MIN_CONTACT_DURATION = 0.1
 """A contact, or a loss of contact, that is shorter is not labelled [s]."""
+GLITCH_DURATION = 0.1
+"""Time after a glitch of the hand's controller in which what happens is caused by it [s]."""
 
 
 class ContactEstimate(msgspec.Struct, frozen=True, gc=False):

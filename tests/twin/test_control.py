@@ -7,7 +7,6 @@ from holdfast.twin.control import (
     DERIVATIVE,
     ENCODER_STEP,
     GLITCH_ERROR,
-    GLITCH_RATE,
     GLITCH_TICKS,
     PROPORTIONAL,
     TORQUE_LIMIT,
@@ -19,10 +18,11 @@ from holdfast.twin.control import (
 from holdfast.twin.hand import JOINTS, RATE, SUBSTEPS
 
 PERIOD = 1 / 350
+GLITCH_RATE = 0.12
 
 
 def draw(seed=0, duration=60.0):
-    return draw_controller(np.random.default_rng(seed), duration, PERIOD)
+    return draw_controller(np.random.default_rng(seed), duration, PERIOD, GLITCH_RATE)
 
 
 @pytest.fixture

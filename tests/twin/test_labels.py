@@ -14,7 +14,7 @@ RULE = LabelRule()
 N, U, S = ContactState.NO_CONTACT, ContactState.UNSTABLE, ContactState.STABLE
 
 
-def truth(*spans, force=None, slip=None, outside=None):
+def truth(*spans, force=None, slip=None, outside=None, glitch=None):
     """Spans of (seconds, phase, touching); the forces and slip are [(start, end, value)]."""
     phases, loads = [], []
     for seconds, phase, touching in spans:
@@ -28,10 +28,14 @@ def truth(*spans, force=None, slip=None, outside=None):
         for start, end, value in changes:
             column[(times > start - 1e-9) & (times < end - 1e-9)] = value
     vectors = forces[:, None] * [0.0, 0.6, 0.8]
+    errors = np.zeros(len(phases))
+    for start, end in glitch or ():
+        errors[(times > start - 1e-9) & (times < end - 1e-9)] = 0.08
     finger = {"contact_force": vectors, "slip_speed": speeds}
     hand = {
         "phase": np.array(phases, dtype=str),
         "outside_force": pushes[:, None] * [0.0, 0.0, -1.0],
+        "set_point_error": errors,
     }
     return Truth(times, hand, {"thumb": finger})
 
@@ -269,3 +273,27 @@ def test_laws(data):
         if label.cause in (Cause.SLIP, Cause.DISTURBANCE):
             held = np.isin(phase[inside], [Phase.LOCKED, Phase.DISTURBED, Phase.SLIPPING])
             assert held.all()
+
+
+class TestGlitch:
+    def test_is_unstable_until_the_hand_has_stopped_ringing(self):
+        rows = told(truth(*disturbed(), glitch=[(2.0, 2.02)]))
+        assert rows[1] == (2.0, pytest.approx(2.12, abs=0.011), U, Cause.GLITCH)
+        assert [row[2] for row in rows] == [S, U, S]
+
+    def test_a_slip_that_it_causes_is_part_of_it(self):
+        rows = told(truth(*disturbed(), glitch=[(2.0, 2.02)], slip=[(2.05, 2.3, 0.01)]))
+        assert [row[3] for row in rows] == [None, Cause.GLITCH, None]
+        assert rows[1][1] == pytest.approx(2.3, abs=0.011)
+
+    def test_in_a_disturbance_it_is_part_of_that(self):
+        rows = told(truth(*disturbed((2.0, 1.0)), glitch=[(2.5, 2.52)]))
+        assert [row[3] for row in rows] == [None, Cause.DISTURBANCE, None]
+
+    def test_is_not_labelled_where_the_rule_leaves_it_out(self):
+        rule = LabelRule(glitch=None)
+        assert len(told(truth(*disturbed(), glitch=[(2.0, 2.02)]), rule)) == 1
+
+    def test_with_an_empty_hand_it_is_nothing(self):
+        rows = told(truth(*GRASP, glitch=[(0.2, 0.3)]))
+        assert Cause.GLITCH not in [row[3] for row in rows]

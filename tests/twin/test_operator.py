@@ -9,6 +9,8 @@ from holdfast.twin.operator import (
     HOLD_STIFFNESS,
     HOLD_TURN_STIFFNESS,
     JERK,
+    MOVE,
+    MOVE_GRASP_TIME,
     PUSH,
     PUSH_GAP,
     PUSH_LIMIT,
@@ -17,6 +19,7 @@ from holdfast.twin.operator import (
     draw_pushes,
     draw_tremor,
     hold_wrench,
+    move_wrench,
     push_wrench,
     tremble,
 )
@@ -169,6 +172,51 @@ class TestPush:
         assert (np.diff(touching.astype(int)) == 1).sum() >= 3
 
 
+def move(given, elapsed=1.0, rms=0.0, depth=0.008, stiffness=500.0, duration=2.0):
+    wanted = numbers(depth=depth, stiffness=stiffness)
+    return np.array(move_wrench(given, body()[:12], wanted, duration, STILL, rms, elapsed))
+
+
+class TestMove:
+    def test_begins_and_ends_without_force(self):
+        for elapsed in (0.0, 2.0):
+            np.testing.assert_allclose(move(body(), elapsed), 0.0, atol=1e-9)
+
+    def test_pulls_to_both_sides_along_its_direction_only(self):
+        forces = np.array([move(body(), t) for t in np.linspace(0, 2, 401)])
+        np.testing.assert_allclose(forces[:, [0, 1, 3, 4, 5]], 0.0, atol=1e-12)
+        assert forces[:, 2].min() < -3.0
+        assert forces[:, 2].max() > 3.0
+        first = np.flatnonzero(np.abs(forces[:, 2]) > 1.0)[0]
+        assert forces[first, 2] < 0  # down first
+
+    def test_is_a_spring_of_its_stiffness_that_damps(self):
+        there, here = move(body((0.001, 0, 0))), move(body())
+        assert there[0] - here[0] == pytest.approx(-500.0 * 0.001)
+        assert move(body(velocity=(0.1, 0, 0, 0, 0, 0)))[0] < 0
+
+    def test_does_not_carry_the_weight(self):
+        quarter = 2.0 / 8 / 2  # a turning point of four cycles in two seconds
+        assert abs(move(body(), quarter, depth=0.0)[2]) < 1e-12
+
+    def test_closes_within_its_time(self):
+        half = move(body((0.001, 0, 0)), MOVE_GRASP_TIME / 2) - move(body(), MOVE_GRASP_TIME / 2)
+        assert half[0] == pytest.approx(-0.5 * 500.0 * 0.001)
+
+    def test_is_drawn_where_the_profile_has_it(self):
+        chosen = profile("reference")
+        many = [p for s in range(30) for p in draw_pushes(np.random.default_rng(s), chosen)]
+        moves = [p for p in many if p.style == MOVE]
+        assert 0.35 < len(moves) / len(many) < 0.65
+        for p in moves:
+            for value, span in zip(
+                [*p.numbers[6:], p.duration],
+                [chosen.move_depth, chosen.move_stiffness, chosen.move_rate, chosen.move_duration],
+                strict=True,
+            ):
+                assert span[0] <= value <= span[1]
+
+
 class TestPlan:
     @pytest.mark.parametrize("name", profiles())
     @pytest.mark.parametrize("seed", range(4))
@@ -183,11 +231,12 @@ class TestPlan:
         assert (rests >= chosen.rest[0]).all()
         assert (rests <= chosen.rest[1]).all()
         assert ends[-1] <= chosen.hold - 1.0
-        assert chosen.hold - ends[-1] < 1.0 + chosen.rest[1] + chosen.push_duration[1]
+        longest = max(chosen.push_duration[1], chosen.move_duration[1])
+        assert chosen.hold - ends[-1] < 1.0 + chosen.rest[1] + longest
         assert [p.direction for p in pushes[:4]] == ["down", "up", "left", "right"][: len(pushes)]
 
     def test_numbers_are_those_of_the_profile(self):
-        chosen = profile("reference")
+        chosen = profile("finger-reference")
         many = [p for s in range(30) for p in draw_pushes(np.random.default_rng(s), chosen)]
         assert {p.style for p in many} == set(STYLES)
         for p in many:

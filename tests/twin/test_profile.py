@@ -4,16 +4,18 @@ from msgspec.structs import asdict
 from holdfast.twin.profile import Profile, profile, profiles
 
 
-def test_three_profiles_come_along():
-    assert profiles() == ("gentle", "reference", "vigorous")
+def test_the_profiles_and_those_of_the_old_protocol():
+    new = ("gentle", "reference", "vigorous")
+    assert profiles() == tuple(sorted([*new, *(f"finger-{name}" for name in new)]))
 
 
-@pytest.mark.parametrize("name", ["gentle", "reference", "vigorous"])
+@pytest.mark.parametrize("name", profiles())
 def test_a_profile_is_a_possible_experiment(name):
     given = profile(name)
     assert given.name == name
-    for low, high in (value for value in asdict(given).values() if isinstance(value, tuple)):
-        assert 0 < low <= high
+    for name, span in asdict(given).items():
+        if isinstance(span, tuple) and (given.move_share or not name.startswith("move_")):
+            assert 0 < span[0] <= span[1]
     assert given.hold >= 10.0
     assert given.grip > 0
     assert given.tremor > 0
@@ -28,7 +30,9 @@ def test_profiles_disturb_in_their_order():
 
 @pytest.mark.parametrize("name", ["", "Reference", "../profile", "reference.toml"])
 def test_an_unknown_one_is_refused(name):
-    with pytest.raises(ValueError, match=r"unknown profile .*; there are gentle, reference"):
+    with pytest.raises(
+        ValueError, match=r"unknown profile .*; there are finger-gentle, finger-ref"
+    ):
         profile(name)
 
 
@@ -36,3 +40,18 @@ def test_a_profile_cannot_be_turned():
     with pytest.raises(AttributeError, match="immutable"):
         profile("reference").grip = 9.0
     assert isinstance(profile("reference"), Profile)
+
+
+@pytest.mark.parametrize("name", ["gentle", "reference", "vigorous"])
+def test_the_old_protocol_has_a_pushing_finger_only(name):
+    old, new = profile(f"finger-{name}"), profile(name)
+    assert (old.move_share, old.label_margin, old.label_glitches) == (0.0, 0.1, False)
+    assert old.drawn_as == name
+    assert (new.move_share, new.label_margin, new.label_glitches) == (0.5, 0.0, True)
+
+
+def test_the_reference_has_the_length_of_the_papers_grasps():
+    """250,000 samples of a fingertip at 150 Hz in 60 grasps; closing and release take about 3 s."""
+    reference = profile("reference")
+    seconds = sum(reference.idle) + reference.hold + 3.0
+    assert seconds == pytest.approx(250_000 / 150 / 60, abs=1.0)

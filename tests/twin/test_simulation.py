@@ -16,15 +16,16 @@ from holdfast.twin.simulation import Grasp, simulate
 from holdfast.twin.uskin_parameters import UskinParameters
 
 FINGERS = ("thumb", "index", "middle", "ring")
-SHORT = msgspec.structs.replace(profile("reference"), idle=(0.7, 0.8), hold=6.0)
+SHORT = msgspec.structs.replace(profile("finger-reference"), idle=(0.7, 0.8), hold=6.0)
+MOVED = msgspec.structs.replace(profile("reference"), idle=(0.7, 0.8), hold=9.0, move_share=1.0)
 GRAVITY = 9.81
 
 
 def made(grasp, chosen=SHORT, glitches=0.0, **modules):
     """A recording of a short grasp whose controller has so many glitches a second."""
     with pytest.MonkeyPatch.context() as patch:
+        chosen = msgspec.structs.replace(chosen, glitch_rate=glitches)
         patch.setattr(simulation, "profile", lambda _: chosen)
-        patch.setattr(control, "GLITCH_RATE", glitches)
         for place, value in modules.items():
             for module in (hand, world, simulation):
                 if hasattr(module, place):
@@ -40,6 +41,11 @@ def held():
 @pytest.fixture(scope="module")
 def pushed():
     return made(Grasp("box", 2, 1), msgspec.structs.replace(SHORT, hold=8.0))
+
+
+@pytest.fixture(scope="module")
+def moved():
+    return made(Grasp("box", 2, 1), MOVED)
 
 
 @pytest.fixture(scope="module")
@@ -316,8 +322,8 @@ class TestSeeds:
     def test_watching_changes_nothing(self, held):
         seen = []
         with pytest.MonkeyPatch.context() as patch:
-            patch.setattr(simulation, "profile", lambda _: SHORT)
-            patch.setattr(control, "GLITCH_RATE", 0.0)
+            quiet_hand = msgspec.structs.replace(SHORT, glitch_rate=0.0)
+            patch.setattr(simulation, "profile", lambda _: quiet_hand)
             watched = simulate(
                 Grasp("can", 1, 1), watch=lambda world, command: seen.append(command.phase)
             )
@@ -336,3 +342,55 @@ class TestSeeds:
 def test_what_there_is_not_is_refused(grasp, told):
     with pytest.raises(ValueError, match=told):
         simulate(grasp)
+
+
+class TestMovedByAHand:
+    def test_the_hand_never_loses_contact_in_a_disturbance(self, moved):
+        disturbed = np.isin(moved.truth.hand["phase"], ("disturbed", "slipping"))
+        force = np.linalg.norm(moved.truth.hand["outside_force"], axis=1)
+        assert disturbed.mean() > 0.15
+        assert (force[disturbed] > 0.05).mean() > 0.98
+
+    def test_the_object_goes_both_ways(self, moved):
+        """The first disturbance is the one called down: it goes down, then up."""
+        truth = moved.truth
+        disturbed = np.isin(truth.hand["phase"], ("disturbed", "slipping"))
+        first = int(np.argmax(disturbed))
+        last = first + int(np.argmin(disturbed[first:]))
+        height = truth.hand["object_pose"][first:last, 2] - truth.hand["object_pose"][first, 2]
+        assert height.min() < -5e-4
+        assert height.max() > 5e-4
+        assert np.argmin(height) < np.argmax(height)
+
+
+class TestGlitches:
+    def test_are_labelled_with_their_cause_and_followed_by_stable(self):
+        shaken = made(Grasp("can", 1, 1), MOVED, glitches=0.5)
+        glitched = shaken.truth.hand["set_point_error"] > 0
+        held = shaken.truth.hand["phase"] == "locked"
+        states = label_causes(shaken, "index")
+        alone = np.linalg.norm(shaken.truth.hand["outside_force"], axis=1) < 0.05
+        assert (glitched & held & alone).any()
+        assert set(states[glitched & held & alone]) <= {"glitch", "slip"}
+        assert (states == "glitch").any()
+
+    def test_the_old_profiles_do_not_label_them(self):
+        shaken = made(Grasp("can", 1, 1), SHORT, glitches=0.5)
+        assert not (label_causes(shaken, "index") == "glitch").any()
+
+    def test_a_grasp_can_have_its_own_rate_of_glitches(self, held):
+        none = made(replace(Grasp("can", 1, 1), glitch_rate=0.0), SHORT, glitches=0.5)
+        assert none.metadata["glitch_rate"] == 0.0
+        assert not none.truth.hand["set_point_error"].any()
+        wanted = held.modules["thumb"].readings
+        np.testing.assert_array_equal(none.modules["thumb"].readings, wanted)
+
+
+def label_causes(recording, finger):
+    """Return the cause of the label of each sample, "" without one."""
+    module = recording.modules[finger]
+    causes = np.full(len(module.times), "", dtype="U12")
+    for label in module.labels:
+        inside = (module.times >= label.start) & (module.times < label.end)
+        causes[inside] = label.cause or ""
+    return causes

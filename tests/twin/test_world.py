@@ -18,7 +18,7 @@ DOWN = Push(0.0, 1.0, "down", 0, np.array([0.0, 0, -1, 0, 0, 0, 0.006, 700, 4]))
 def world(seed=0, start=(0.0, 0.0, 0.0, 0.0)):
     random = np.random.default_rng(seed)
     item = thing("can")
-    controller = draw_controller(random, 5.0, EVERY * TIMESTEP)
+    controller = draw_controller(random, 5.0, EVERY * TIMESTEP, 0.12)
     calm = controller._replace(errors=np.zeros_like(controller.errors))
     tremors = np.stack([draw_tremor(random), draw_tremor(random)])
     return World(HandModel.build(item), item, PATH, calm, tremors, np.array(start))

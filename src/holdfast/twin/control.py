@@ -25,9 +25,9 @@ TORQUE_STEP, TORQUE_NOISE, TORQUE_LIMIT = 1e-3, 1.5e-3, 0.7
 vendor's ROS driver (0.225 N m at the end of the thumb) would let it press with 2 N at most."""
 COMPENSATION = (0.90, 1.05)
 """Share of gravity that is compensated; drawn once for each joint."""
-GLITCH_RATE, GLITCH_ERROR, GLITCH_TICKS = 0.12, 0.08, (2, 8)
-"""Glitches per second; standard deviation of the set-point's error [rad]; control steps. Own
-choices, after the spikes in the paper's figures."""
+GLITCH_ERROR, GLITCH_TICKS = 0.08, (2, 8)
+"""Of a glitch: standard deviation of the set-point's error [rad], and control steps that it lasts.
+Own choices, after the spikes in the paper's figures. How often they come is in the profile."""
 
 
 class Controller(NamedTuple):
@@ -46,11 +46,20 @@ class Controller(NamedTuple):
     last: Array
 
 
-def draw_controller(generator: np.random.Generator, duration: float, period: float) -> Controller:
-    """A controller for so long [s], in steps of `period` [s]."""
+def draw_controller(
+    generator: np.random.Generator, duration: float, period: float, glitch_rate: float
+) -> Controller:
+    """Draw what is random of a controller.
+
+    Args:
+        generator: of all that is drawn.
+        duration: for which it is needed [s].
+        period: of its steps [s].
+        glitch_rate: glitches per second [1/s].
+    """
     n_ticks = int(duration / period) + 1
     errors = np.zeros((n_ticks, N_JOINTS))
-    for _ in range(generator.poisson(GLITCH_RATE * duration)):
+    for _ in range(generator.poisson(glitch_rate * duration)):
         tick = int(generator.integers(n_ticks))
         ticks = int(generator.integers(*GLITCH_TICKS))
         first = list(JOINTS.values())[int(generator.integers(len(JOINTS)))]

@@ -11,6 +11,7 @@ import numpy.typing as npt
 
 from holdfast.contact import (
     CONTACT_FORCE,
+    GLITCH_DURATION,
     HELD_PHASES,
     MERGE_GAP,
     MIN_CONTACT_DURATION,
@@ -35,7 +36,9 @@ class LabelRule:
         merge: disturbances with a shorter rest between them are one; nor is a shorter rest
             between closing and the first of them stable [s].
         margin: by which a disturbance is drawn longer at both ends [s].
-        blip: contact or its loss for a shorter time is not told [s].
+        blip: contact, or its loss, that lasts less than this is ignored [s].
+        glitch: time after a glitch of the hand's controller in which what happens is caused by
+            it [s]: the hand rings at 6 to 8 Hz. None: glitches are not labelled.
     """
 
     contact: float = CONTACT_FORCE
@@ -43,6 +46,7 @@ class LabelRule:
     merge: float = MERGE_GAP
     margin: float = UNSTABLE_MARGIN
     blip: float = MIN_CONTACT_DURATION
+    glitch: float | None = GLITCH_DURATION
 
 
 def labels_from_truth(
@@ -52,12 +56,13 @@ def labels_from_truth(
 
     Stable while the object is locked, the finger touches it, nobody else does and it does not
     slide: the hand alone governs it, as the paper has it. So the hand-over at both ends is not
-    stable. Unstable while the hand closes or opens on it and during disturbances (cause
-    slip, where it slides in them); no contact otherwise.
+    stable. Unstable while the hand closes or opens on it, during disturbances (cause slip, where
+    it slides in them) and after a glitch of the hand's controller, with the slip that it causes
+    (cause glitch); no contact otherwise.
 
     Args:
-        truth: with `phase` and `outside_force` of the hand, and `contact_force` and `slip_speed`
-            of the finger.
+        truth: with `phase`, `outside_force` and, if known, `set_point_error` of the hand, and
+            `contact_force` and `slip_speed` of the finger.
         finger: whose labels.
         rule: thresholds and margins.
     """
@@ -70,6 +75,9 @@ def labels_from_truth(
     )
     held = np.isin(phase, HELD_PHASES)
     sliding = held & (arrays["slip_speed"] > rule.sliding)
+    glitched = held & glitches(truth, rule)
+    caused = runs_with(sliding, glitched)
+    glitched, sliding = glitched | caused, sliding & ~caused
     acted = held & (np.linalg.norm(truth.hand["outside_force"], axis=1) > rule.contact)
     troubled = np.isin(phase, (Phase.DISTURBED, Phase.SLIPPING)) | sliding | acted
     troubled = held & widen_runs(join_runs(troubled, times, rule.merge), times, rule.margin)
@@ -85,11 +93,29 @@ def labels_from_truth(
             slipped.tolist(),
             (phase == Phase.CLOSING).tolist(),
             lost.tolist(),
+            glitched.tolist(),
             strict=True,
         )
     ]
     period = float(np.median(np.diff(times)))
     return labels_from_samples(times, states, period=period, evidence="truth", author="twin")
+
+
+def glitches(truth: Truth, rule: LabelRule) -> Mask:
+    """Return where a glitch of the hand's controller acts, or has acted shortly before.
+
+    Args:
+        truth: with `set_point_error` of the hand, if it is known.
+        rule: says for how long a glitch acts.
+    """
+    error = truth.hand.get("set_point_error")
+    if rule.glitch is None or error is None:
+        return np.zeros(len(truth.times), dtype=bool)
+    found = error > 0
+    for _, end in runs(found):
+        last = np.searchsorted(truth.times, truth.times[end - 1] + rule.glitch, side="right")
+        found[end:last] = True
+    return np.asarray(found)
 
 
 def phases_as_felt(phase: npt.NDArray[np.str_], push: Array, touch: float) -> npt.NDArray[np.str_]:
@@ -113,12 +139,20 @@ def phases_as_felt(phase: npt.NDArray[np.str_], push: Array, touch: float) -> np
 
 
 def _state(
-    touching: bool, held: bool, troubled: bool, slipped: bool, closing: bool, lost: bool
+    touching: bool,
+    held: bool,
+    troubled: bool,
+    slipped: bool,
+    closing: bool,
+    lost: bool,
+    glitched: bool,
 ) -> tuple[ContactState, Cause | None]:
     if troubled:
         return ContactState.UNSTABLE, Cause.SLIP if slipped else Cause.DISTURBANCE
     if not touching:
         return ContactState.NO_CONTACT, Cause.LOST if lost else None
+    if glitched:
+        return ContactState.UNSTABLE, Cause.GLITCH
     if held:
         return ContactState.STABLE, None
     if closing:

@@ -1,7 +1,8 @@
-"""The person at the table: holds the object until it is locked, pushes it, takes it back.
+"""The operator: holds the object until it is locked, disturbs it, and takes it back.
 
-Both hands have finite stiffness and tremble. A pure force would drop every object at once; a
-finger that goes a few millimetres and yields does not.
+There are two kinds of disturbances. A hand grips the object and moves it there and back without
+losing contact, as in the paper. Or a finger approaches from outside, pushes and leaves. Hand and
+finger have finite stiffness and tremor: a pure force would drop every object at once.
 """
 
 import math
@@ -29,9 +30,12 @@ TREMOR_BAND = (6.0, 11.0)
 """Of physiological tremor [Hz]."""
 N_TREMORS = 8
 """Sinusoids that make up the tremor."""
+MOVE_GRASP_TIME = 0.15
+"""Time in which a hand that moves the object closes on it, and opens again [s]."""
 
-PUSH, JERK, SHAKE = range(3)
-"""Styles of a disturbance: there and back, a short blow, to and fro."""
+PUSH, JERK, SHAKE, MOVE = range(4)
+"""Styles of a disturbance: a finger pushes there and back, strikes, or shakes; a hand grips the
+object and moves it."""
 
 DIRECTIONS = {
     "down": (0.0, 0.0, -1.0),
@@ -49,9 +53,9 @@ class Push(NamedTuple):
         start: after the object was locked [s].
         duration: [s].
         direction: "down", "up", "left", "right" or "random".
-        style: PUSH, JERK or SHAKE.
-        numbers: (9,) unit vector of the direction, place on the object against the centre of
-            mass [m], depth [m], stiffness [N/m], rate of shaking [Hz].
+        style: PUSH, JERK, SHAKE or MOVE.
+        numbers: (9,) unit vector of the direction, point of contact relative to the centre of
+            mass [m], depth [m], stiffness [N/m], rate of shaking or moving [Hz].
     """
 
     start: float
@@ -182,6 +186,55 @@ def push_wrench(
 
 
 @compiled
+def move_wrench(
+    body: Array,
+    origin: Array,
+    numbers: Array,
+    duration: float,
+    tremor: Array,
+    rms: float,
+    elapsed: float,
+) -> tuple[float, float, float, float, float, float]:
+    """Compute force and torque of a hand that grips the object and moves it to and fro.
+
+    The hand is a damped spring to the pose in which it gripped the object, displaced along the
+    direction by depth * sin(2 pi n t / T), n whole cycles in the duration T. It does not carry
+    the weight of the object.
+
+    Args:
+        body: (18,) position, rotation, velocity and spin of the object in the world.
+        origin: (12,) position and rotation of the object when the hand gripped it.
+        numbers: of the `Push`; the point of contact is not used.
+        duration: of the disturbance [s].
+        tremor: of the hand.
+        rms: of the tremor [m].
+        elapsed: since the disturbance began [s].
+
+    Returns:
+        Force [N] and torque about the centre of mass [N m] in the world.
+    """
+    depth, stiffness, rate = numbers[6], numbers[7], numbers[8]
+    turning = 2 * math.pi * max(1.0, np.rint(rate * duration)) / duration
+    way = depth * math.sin(turning * elapsed)
+    speed = depth * turning * math.cos(turning * elapsed)
+    closed = min(elapsed, duration - elapsed) / MOVE_GRASP_TIME
+    gain = min(max(closed, 0.0), 1.0) * stiffness / HOLD_STIFFNESS
+    anchor = origin.copy()
+    for axis in range(3):
+        anchor[axis] += numbers[axis] * way
+    fx, fy, fz, tx, ty, tz = hold_wrench(body, anchor, gain, 0.0, tremor, rms, elapsed)
+    drag = gain * HOLD_DAMPING * speed
+    return (
+        fx + drag * numbers[0],
+        fy + drag * numbers[1],
+        fz + drag * numbers[2],
+        tx,
+        ty,
+        tz,
+    )
+
+
+@compiled
 def _aim(
     style: int, depth: float, rate: float, elapsed: float, duration: float
 ) -> tuple[float, float]:
@@ -222,5 +275,11 @@ def _draw_push(
     rate = generator.uniform(*profile.shake_rate)
     duration = float(generator.uniform(*profile.push_duration))
     style = int(generator.integers(3))
+    if profile.move_share > 0 and generator.random() < profile.move_share:
+        style = MOVE
+        depth = scale * generator.uniform(*profile.move_depth)
+        stiffness = generator.uniform(*profile.move_stiffness)
+        rate = generator.uniform(*profile.move_rate)
+        duration = float(generator.uniform(*profile.move_duration))
     numbers = np.array([*direction, *arm, depth, stiffness, rate])
     return Push(start, duration, name, style, numbers)

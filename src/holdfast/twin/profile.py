@@ -1,4 +1,9 @@
-"""How a grasp is done and disturbed: small files of numbers, fixed and named."""
+"""Profiles: how a grasp is done and disturbed, as small files of numbers, fixed and named.
+
+`reference`, `gentle` and `vigorous` follow the paper: a hand grips the object and moves it, and
+a finger pushes it. `finger-reference`, `finger-gentle` and `finger-vigorous` are the profiles
+of holdfast 0.1, in which only a finger pushes; they repeat its recordings and labels exactly.
+"""
 
 import tomllib
 from importlib import resources
@@ -28,6 +33,16 @@ class Profile(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=T
         shake_rate: of those disturbances that shake [Hz].
         idle: how long the hand is open before and after [s].
         hold: how long the object is locked [s].
+        move_share: probability that a disturbance is a hand that grips and moves the object;
+            the others are a pushing finger.
+        move_depth: amplitude of the hand's motion [m].
+        move_stiffness: of that hand [N/m].
+        move_rate: of its motion there and back [Hz].
+        move_duration: of such a disturbance [s].
+        glitch_rate: glitches of the hand's controller per second [1/s].
+        label_margin: time by which disturbances are labelled longer at both ends [s].
+        label_glitches: whether glitches are labelled, as unstable with their own cause.
+        drawn_as: name under which random numbers are drawn; by default that of the profile.
     """
 
     name: str
@@ -41,6 +56,15 @@ class Profile(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=T
     shake_rate: Span
     idle: Span
     hold: float
+    move_share: float = 0.0
+    move_depth: Span = (0.0, 0.0)
+    move_stiffness: Span = (0.0, 0.0)
+    move_rate: Span = (0.0, 0.0)
+    move_duration: Span = (0.0, 0.0)
+    glitch_rate: float = 0.12
+    label_margin: float = 0.0
+    label_glitches: bool = True
+    drawn_as: str = ""
 
 
 def profiles() -> tuple[str, ...]:
@@ -56,7 +80,7 @@ def profile(name: str) -> Profile:
         ValueError: there is none.
 
     Example:
-        >>> profile("reference").hold
+        >>> profile("finger-reference").hold
         12.0
     """
     if name not in profiles():

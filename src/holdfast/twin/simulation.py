@@ -6,6 +6,7 @@ from dataclasses import dataclass
 from functools import cache
 from pathlib import Path
 
+import msgspec
 import numpy as np
 
 from holdfast.contact import Phase
@@ -16,7 +17,7 @@ from holdfast.twin.contact import SHARE, SLIP
 from holdfast.twin.control import EVERY, draw_controller
 from holdfast.twin.grasp import ClosingPath, closing_path
 from holdfast.twin.hand import FINGERS, N_JOINTS, RATE, TIMESTEP, HandModel
-from holdfast.twin.labels import labels_from_truth, phases_as_felt
+from holdfast.twin.labels import LabelRule, labels_from_truth, phases_as_felt
 from holdfast.twin.objects import Thing
 from holdfast.twin.objects import thing as find_thing
 from holdfast.twin.operator import draw_pushes, draw_tremor
@@ -53,6 +54,7 @@ class Grasp:
         server: whether stamps are unsteady and packets repeat, as servers send them.
         table: another table of objects, like `OTHER_OBJECTS` or one's own; None for the one
             that is built in.
+        glitch_rate: glitches of the hand's controller per second [1/s]; None for the profile's.
     """
 
     object: str
@@ -63,6 +65,7 @@ class Grasp:
     attempt: int = 0
     server: bool = False
     table: str | Path | None = None
+    glitch_rate: float | None = None
 
     @property
     def thing(self) -> Thing:
@@ -85,7 +88,8 @@ class Grasp:
 
     def generator(self, part: str) -> np.random.Generator:
         """Random numbers of one part of it; parts do not disturb each other."""
-        key = f"{self.object}/{self.case}/{self.repeat}/{self.profile}/{self.attempt}/{part}"
+        drawn_as = profile(self.profile).drawn_as or self.profile
+        key = f"{self.object}/{self.case}/{self.repeat}/{drawn_as}/{self.attempt}/{part}"
         return _generator(self.seed, key)
 
 
@@ -111,8 +115,11 @@ def simulate(
     """
     if grasp.case not in CASES:
         raise ValueError(f"case 1 or 2 expected, {grasp.case} given")
-    plan = _draw_plan(grasp, profile(grasp.profile))
-    world = _world(grasp)
+    chosen = profile(grasp.profile)
+    if grasp.glitch_rate is not None:
+        chosen = msgspec.structs.replace(chosen, glitch_rate=grasp.glitch_rate)
+    plan = _draw_plan(grasp, chosen)
+    world = _world(grasp, chosen.glitch_rate)
     uskins = [_skin(grasp.seed, finger, parameters or UskinParameters()) for finger in FINGERS]
     protocol = Protocol(plan, 1 / RATE)
     log = _Log()
@@ -137,10 +144,17 @@ def simulate(
         counts, stamps = uskin.counts(np.array(pile), times, noise), times
         if grasp.server:
             stamps, counts = with_server_effects(times, counts, grasp.generator(f"server {finger}"))
-        labels = labels_from_truth(truth, finger)
+        labels = labels_from_truth(truth, finger, label_rule(chosen))
         modules[finger] = Tactile(uskin.sensor, stamps, counts, labels=labels)
     name = grasp.failed_name if protocol.failed else grasp.name
     return Recording(name, modules, _metadata(grasp, protocol), truth)
+
+
+def label_rule(chosen: Profile) -> LabelRule:
+    """Return the rule by which a profile's recordings are labelled."""
+    return LabelRule(
+        margin=chosen.label_margin, glitch=LabelRule.glitch if chosen.label_glitches else None
+    )
 
 
 def _draw_plan(grasp: Grasp, chosen: Profile) -> Plan:
@@ -157,10 +171,10 @@ def _draw_plan(grasp: Grasp, chosen: Profile) -> Plan:
     )
 
 
-def _world(grasp: Grasp) -> World:
+def _world(grasp: Grasp, glitch_rate: float) -> World:
     item = grasp.thing
     generator = grasp.generator("world")
-    controller = draw_controller(generator, LONGEST, EVERY * TIMESTEP)
+    controller = draw_controller(generator, LONGEST, EVERY * TIMESTEP, glitch_rate)
     tremors = np.stack([draw_tremor(generator), draw_tremor(generator)])
     start = generator.standard_normal(4) * [*[PLACE_SPREAD] * 3, TURN_SPREAD]
     return World(
@@ -248,6 +262,7 @@ def _metadata(grasp: Grasp, protocol: Protocol) -> dict[str, object]:
         "repeat": grasp.repeat,
         "attempt": grasp.attempt,
         "profile": grasp.profile,
+        **({} if grasp.glitch_rate is None else {"glitch_rate": grasp.glitch_rate}),
         "seed": grasp.seed,
         "server": grasp.server,
         "hand": "allegro-right",

@@ -10,7 +10,7 @@ from holdfast.twin.control import EVERY, Controller, control
 from holdfast.twin.grasp import ClosingPath, object_pose
 from holdfast.twin.hand import FINGERS, GRAVITY, N_JOINTS, SUBSTEPS, TIMESTEP, HandModel
 from holdfast.twin.objects import Thing
-from holdfast.twin.operator import hold_wrench, push_wrench
+from holdfast.twin.operator import MOVE, hold_wrench, move_wrench, push_wrench
 from holdfast.twin.protocol import OPEN, Command, Plan
 from holdfast.twin.surface import curved_fingertip
 
@@ -50,7 +50,7 @@ class World:
         self.set_point_error = 0.0
         self._wrench = np.zeros(6)
         self._numbers = np.zeros(9)
-        self._origin = np.zeros(3)
+        self._origin = np.zeros(12)
         self._push = -1
         self._tick = 0
         self._place(start, side)
@@ -72,7 +72,7 @@ class World:
         self.set_point_error = 0.0
         if command.push != self._push:
             self._push = command.push
-            self._origin[:] = self.bodies[-1, :3]
+            self._origin[:] = self.bodies[-1, :12]
         push = plan.pushes[command.push] if command.push >= 0 else None
         if push is not None:
             self._numbers[:] = push.numbers
@@ -143,7 +143,11 @@ def _operate(
         held = hold_wrench(body, anchor, hold, weight, tremors[0], rms, time)
         for k in range(6):
             outside[k] += held[k]
-    if style >= 0:
+    if style == MOVE:
+        moved = move_wrench(body, origin, numbers, duration, tremors[1], rms, elapsed)
+        for k in range(6):
+            outside[k] += moved[k]
+    elif style >= 0:
         pushed = push_wrench(body, origin, numbers, style, duration, tremors[1], rms, elapsed)
         for k in range(6):
             outside[k] += pushed[k]
