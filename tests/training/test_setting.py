@@ -28,6 +28,7 @@ def test_the_defaults_are_those_of_the_deployed_model():
             {"max_samples": 0},
             "trials of at least 0 and samples of at least 1 expected; 30 and 0 given",
         ),
+        ({"objective": "auc"}, "unknown objective 'auc'; there are error, log_loss"),
         ({"seed": -1}, "a seed from 0 to 2^32 - 1 expected, -1 given"),
         (
             {"contact_threshold": -1.0},
@@ -45,3 +46,16 @@ def test_refusals(given, message):
     with pytest.raises(ValueError) as refusal:
         Setting(**given)
     assert str(refusal.value) == message
+
+
+@pytest.mark.parametrize(
+    ("given", "objective"),
+    [
+        ({}, "log_loss"),
+        ({"classifier": "svm"}, "error"),
+        ({"objective": "error"}, "error"),
+        ({"classifier": "svm", "objective": "log_loss"}, "log_loss"),
+    ],
+)
+def test_the_objective_of_the_search(given, objective):
+    assert Setting(**given).search_objective == objective

@@ -37,10 +37,12 @@ class Spy:
         return self._recipe.fit(samples, parameters, seed)
 
 
-def run(spy, *, n_trials=8, seed=0, journal=None, samples=None):
+def run(spy, *, n_trials=8, seed=0, journal=None, samples=None, objective="log_loss"):
     samples = blobs() if samples is None else samples
     folds = inner_folds(samples, 3, seed)
-    return search(samples, folds, spy, n_trials=n_trials, seed=seed, journal=journal)
+    return search(
+        samples, folds, spy, n_trials=n_trials, seed=seed, objective=objective, journal=journal
+    )
 
 
 @pytest.mark.parametrize("name", ["logreg", "svm"])
@@ -82,6 +84,23 @@ def test_the_parameters_with_the_least_log_loss_are_returned():
     assert best == min(tried, key=loss)
 
 
+def test_the_best_by_error_is_taken():
+    """Computed from the definition for every parameter that was tried."""
+    spy, samples = Spy("svm"), blobs()
+    best = run(spy, samples=samples, objective="error")
+    tried = {repr(asked): asked for asked in spy.asked}.values()
+
+    def error(parameters):
+        wrong = 0
+        for held in inner_folds(samples, 3, 0):
+            fit = recipe("svm").fit(samples.take(~held), parameters, 0)
+            decided = fit.probability(samples.features[held]) >= fit.threshold
+            wrong += (decided != samples.stable[held]).sum()
+        return wrong
+
+    assert error(best) == min(map(error, tried))
+
+
 def test_no_fit_sees_the_group_that_it_is_scored_on():
     spy, samples = Spy(), blobs()
     run(spy, n_trials=2, samples=samples)
@@ -115,7 +134,9 @@ def test_a_finished_search_is_not_repeated(tmp_path):
 
 
 @pytest.mark.parametrize(
-    "other", [{"samples": blobs(1)}, {"seed": 1}, {"spy": Spy("svm")}], ids=["data", "seed", "svm"]
+    "other",
+    [{"samples": blobs(1)}, {"seed": 1}, {"spy": Spy("svm")}, {"objective": "error"}],
+    ids=["data", "seed", "svm", "objective"],
 )
 def test_the_journal_of_another_search_is_not_used(tmp_path, other):
     run(Spy(), journal=tmp_path / "search")

@@ -9,6 +9,7 @@ from holdfast.errors import ModelError
 from holdfast.features import DEFAULT_WINDOW, DEPLOYED_FEATURES, FeatureSpec, Tare, parse_features
 from holdfast.features.haar import check_window
 from holdfast.model import ANY_FINGER, Debounce, Model
+from holdfast.training.tuning import OBJECTIVES, Objective
 
 Split = Literal["recording", "object", "random"]
 SPLITS: tuple[Split, ...] = ("recording", "object", "random")
@@ -34,6 +35,9 @@ class Setting:
         split: unit that cross-validation leaves out: one `recording`, one `object`, or `random`
             samples. The random split repeats the paper's protocol; its metrics are too good.
         trials: of the search for hyper-parameters; 0 uses the reference parameters.
+        objective: loss that the search minimises: `error` (the share of wrong decisions, as in
+            the paper) or `log_loss`; None for that of the classifier: `error` for the SVM, which
+            has no probability of its own, else `log_loss`.
         seed: of all random numbers.
         shared: one classifier for all fingers instead of one for each.
         contact_threshold: F_a below it is no contact [unit of the readings]; None for the mean +
@@ -55,6 +59,7 @@ class Setting:
     tare: Tare = field(default_factory=lambda: Tare.parse(0.5))
     split: Split = "recording"
     trials: int = 30
+    objective: Objective | None = None
     seed: int = 0
     shared: bool = False
     contact_threshold: float | None = None
@@ -67,6 +72,10 @@ class Setting:
         check_window(self.window)
         if self.split not in SPLITS:
             raise ValueError(f"unknown split {self.split!r}; there are {', '.join(SPLITS)}")
+        if self.objective not in (None, *OBJECTIVES):
+            raise ValueError(
+                f"unknown objective {self.objective!r}; there are {', '.join(OBJECTIVES)}"
+            )
         if self.trials < 0 or self.max_samples < 1:
             raise ValueError(
                 f"trials of at least 0 and samples of at least 1 expected; "
@@ -116,6 +125,13 @@ class Setting:
         if self.init is not None:
             return Adapted(self.init.finger(finger).classifier)
         return recipe(self.classifier)
+
+    @property
+    def search_objective(self) -> Objective:
+        """The objective of the search."""
+        if self.objective is not None:
+            return self.objective
+        return "error" if self.init is None and self.classifier == "svm" else "log_loss"
 
     @property
     def debounce(self) -> Debounce:

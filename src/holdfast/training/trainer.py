@@ -228,6 +228,7 @@ def _search(
         setting.recipe_of(finger),
         n_trials=setting.trials,
         seed=setting.seed,
+        objective=setting.search_objective,
         journal=journal,
     ), ""
 

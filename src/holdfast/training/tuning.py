@@ -2,7 +2,7 @@
 
 from collections.abc import Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Literal
 
 import numpy as np
 import numpy.typing as npt
@@ -15,6 +15,9 @@ if TYPE_CHECKING:
 
 INNER_FOLDS = 5
 
+Objective = Literal["error", "log_loss"]
+OBJECTIVES: tuple[Objective, ...] = ("error", "log_loss")
+
 
 def search(
     samples: Samples,
@@ -23,9 +26,10 @@ def search(
     *,
     n_trials: int,
     seed: int,
+    objective: Objective = "log_loss",
     journal: Path | None = None,
 ) -> Parameters:
-    """The parameters with the least log loss over the held-out samples of the folds.
+    """Find the parameters with the least loss over the held-out samples of the folds.
 
     The first trial is the reference setting; the others are drawn by TPE. A search that was
     stopped is gone through again with the losses from its journal, so that it ends where it
@@ -37,6 +41,7 @@ def search(
         recipe: the way of fitting.
         n_trials: altogether, those in the journal included.
         seed: of the search.
+        objective: the loss: the share of wrong decisions, or the log loss of the probability.
         journal: file that keeps the trials, so that a stopped search can go on.
 
     Raises:
@@ -47,13 +52,13 @@ def search(
     optuna.logging.set_verbosity(optuna.logging.ERROR)  # its warnings are tracebacks
     known = None
     if journal is not None:
-        known = Journal(journal, search_key(*samples, *folds, recipe.name, seed))
+        known = Journal(journal, search_key(*samples, *folds, recipe.name, seed, objective))
 
     def loss(trial: "Trial") -> float:
         parameters = recipe.suggest(trial)
         found = None if known is None else known.find(parameters)
         if found is None:
-            found = _log_loss(samples, folds, recipe, parameters, seed)
+            found = _loss(samples, folds, recipe, parameters, seed, objective)
             if known is not None:
                 known.add(parameters, found)
         return found
@@ -64,20 +69,25 @@ def search(
     return dict(study.best_params)
 
 
-def _log_loss(
+def _loss(
     samples: Samples,
     folds: Sequence[npt.NDArray[np.bool_]],
     recipe: Recipe,
     parameters: Parameters,
     seed: int,
+    objective: Objective,
 ) -> float:
-    """The mean over held-out samples of -log of the probability of their class."""
+    """Compute the mean loss over held-out samples."""
     total = 0.0
     n = 0
     for held_out in folds:
         classifier = recipe.fit(samples.take(~held_out), parameters, seed)
         tested = samples.take(held_out)
-        probability = np.clip(classifier.probability(tested.features), 1e-12, 1 - 1e-12)
-        total -= float(np.log(np.where(tested.stable, probability, 1 - probability)).sum())
+        probability = classifier.probability(tested.features)
+        if objective == "error":
+            total += float(((probability >= classifier.threshold) != tested.stable).sum())
+        else:
+            bounded = np.clip(probability, 1e-12, 1 - 1e-12)
+            total -= float(np.log(np.where(tested.stable, bounded, 1 - bounded)).sum())
         n += len(tested.stable)
     return total / n
