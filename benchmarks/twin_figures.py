@@ -6,9 +6,10 @@
     python benchmarks/twin_figures.py truth twin           weight, creep, time of slip (reference)
     python benchmarks/twin_figures.py objects FILE.png     picture of every object in the hand
 
-`make` runs `holdfast simulate twin/PROFILE --profile PROFILE --seed 0`, the same with the other
-objects to twin/others, and with seed 1 to twin/fresh. `count`, `labels` and `truth` read these
-recordings. `holdfast study --twin` measures how well the methods work on such recordings.
+`make` runs `holdfast simulate twin/NAME --profile finger-NAME --seed 0` for the three profiles of
+holdfast 0.1, the same with the other objects to twin/others, and with seed 1 to twin/fresh.
+`count`, `labels` and `truth` read these recordings. `holdfast study --twin` measures how well the
+methods work on such recordings.
 """
 
 import argparse
@@ -28,15 +29,15 @@ from holdfast.metrics import Metrics
 from holdfast.recordings import Label, Recording, Truth, labels_from_samples
 from holdfast.training import Setting, train
 from holdfast.twin.labels import LabelRule, labels_from_truth
-from holdfast.twin.objects import OTHER_OBJECTS, load_things, thing
+from holdfast.twin.objects import OTHER_OBJECTS, load_objects, object_named
 from holdfast.twin.simulation import Grasp, simulate
 
 FOLDERS = {
-    "gentle": ("--profile", "gentle", "--seed", "0"),
-    "reference": ("--profile", "reference", "--seed", "0"),
-    "vigorous": ("--profile", "vigorous", "--seed", "0"),
-    "others": ("--profile", "reference", "--seed", "0", "--table", str(OTHER_OBJECTS)),
-    "fresh": ("--profile", "reference", "--seed", "1"),
+    "gentle": ("--profile", "finger-gentle", "--seed", "0"),
+    "reference": ("--profile", "finger-reference", "--seed", "0"),
+    "vigorous": ("--profile", "finger-vigorous", "--seed", "0"),
+    "others": ("--profile", "finger-reference", "--seed", "0", "--table", str(OTHER_OBJECTS)),
+    "fresh": ("--profile", "finger-reference", "--seed", "1"),
 }
 """Options of `holdfast simulate` for each folder."""
 RATE = 150
@@ -44,6 +45,8 @@ RATE = 150
 GRAVITY = 9.81
 MIN_CREEP_SPEED = 1e-6
 """Minimum slip speed that counts as creep [m/s]."""
+OLD_RULE = LabelRule(margin=0.1, glitch=None)
+"""Label rule of the `finger-` profiles."""
 MAX_SAMPLES = 20_000
 """Maximum number of training samples per finger (`--max-samples`)."""
 
@@ -158,11 +161,14 @@ def labels(arguments: argparse.Namespace) -> None:
     """Print metrics of the paper's classifier, trained and evaluated with one convention."""
     recordings = load(arguments.folder / "reference")
     conventions: dict[str, Callable[[Truth, str], tuple[Label, ...]]] = {
-        "intervals, margin 0.1 s, merged below 0.35 s (the default)": labels_from_truth,
-        "intervals, no margin": by_rule(LabelRule(margin=0.0)),
-        "intervals, margin 0.25 s": by_rule(LabelRule(margin=0.25)),
-        "intervals, no margin, none merged": by_rule(LabelRule(margin=0.0, merge=0.0)),
-        "intervals, merged below 1 s": by_rule(LabelRule(merge=1.0)),
+        "intervals, margin 0.1 s, merged below 0.35 s (the old profiles)": by_rule(OLD_RULE),
+        "intervals, no margin": by_rule(replace(OLD_RULE, margin=0.0)),
+        "intervals, no margin, glitches labelled (the new profiles)": by_rule(
+            LabelRule(margin=0.0)
+        ),
+        "intervals, margin 0.25 s": by_rule(replace(OLD_RULE, margin=0.25)),
+        "intervals, no margin, none merged": by_rule(replace(OLD_RULE, margin=0.0, merge=0.0)),
+        "intervals, merged below 1 s": by_rule(replace(OLD_RULE, merge=1.0)),
         "sample by sample: outside force above 0.05 N, or slip": sample_wise,
         "only slip is unstable; a push without slip is stable": only_slip,
     }
@@ -246,7 +252,7 @@ def truth(arguments: argparse.Namespace) -> None:
 def weight_table(recordings: Sequence[Recording]) -> None:
     """Print the forces on the object without outside force, from 1 s after the lock."""
     rows = []
-    for name, item in load_things().items():
+    for name, item in load_objects().items():
         some = [
             hold_samples(recording)
             for recording in recordings
@@ -343,7 +349,7 @@ def slip_table() -> None:
     from tests.twin.grip import Grip
     from tests.twin.test_contact import flat_patch
 
-    smooth = replace(thing("box"), texture_amplitude=0.0)
+    smooth = replace(object_named("box"), texture_amplitude=0.0)
     rows = []
     for depth in (1e-3, 2e-3):
         for rate in (1.0, 5.0, 20.0):
@@ -382,7 +388,7 @@ class _PictureTakenError(Exception):
 def objects(arguments: argparse.Namespace) -> None:
     from PIL import Image, ImageDraw, ImageFont
 
-    names = list(load_things())
+    names = list(load_objects())
     width, height = TILE
     sheet = Image.new("RGB", (3 * width, 2 * height), "white")
     font = ImageFont.load_default(20)
@@ -390,7 +396,7 @@ def objects(arguments: argparse.Namespace) -> None:
     for place, name in enumerate(names[:6]):
         left, top = place % 3 * width, place // 3 * height
         sheet.paste(Image.fromarray(held(name)), (left, top))
-        text = f"{name}, {1e3 * thing(name).mass:.0f} g"
+        text = f"{name}, {1e3 * object_named(name).mass:.0f} g"
         draw.text((left + 14, top + 10), text, fill="#222222", font=font)
     sheet.quantize(256, dither=Image.Dither.NONE).save(arguments.file, optimize=True)
 
@@ -402,7 +408,7 @@ def held(name: str) -> np.ndarray:
     taken = []
     locked = [0]
 
-    def watch(world, command) -> None:
+    def take(world, command) -> None:
         locked[0] += command.phase == Phase.LOCKED
         if locked[0] == 5 * 150:
             forces = np.column_stack([world.bodies[:-1, :3], world.contact.contact_force])
@@ -412,7 +418,7 @@ def held(name: str) -> np.ndarray:
             raise _PictureTakenError
 
     try:
-        simulate(Grasp(name, 1, 1), watch=watch)
+        simulate(Grasp(name, 1, 1), on_sample=take)
     except _PictureTakenError:
         return taken[0]
     raise SystemExit(f"{name} was not held for five seconds")

@@ -236,7 +236,7 @@ def test_an_own_object(tmp_path):
     table = tmp_path / "mine.toml"
     table.write_text(MUG)
     (grasp,) = plan_grasps("", "1", 1, "reference", 0, table=table)
-    assert (grasp.name, grasp.thing.mass) == ("mug-case1-1", 0.2)
+    assert (grasp.name, grasp.item.mass) == ("mug-case1-1", 0.2)
 
 
 def test_a_table_that_lacks_the_object(tmp_path, capsys):

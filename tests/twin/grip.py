@@ -8,7 +8,7 @@ from scipy.spatial.transform import Rotation
 
 from holdfast.sensors.types import Array
 from holdfast.twin.contact import Constants, Contact, constants_of, new_contact, touch
-from holdfast.twin.objects import Thing, solid
+from holdfast.twin.objects import GraspObject, solid
 from holdfast.twin.shapes import probe
 from holdfast.twin.surface import Surface, curved_fingertip
 
@@ -21,27 +21,27 @@ class Grip:
 
     def __init__(
         self,
-        thing: Thing,
+        item: GraspObject,
         depth: float = 1.5e-3,
         dt: float = 1 / 1050,
         angles: tuple[float, ...] = (0.0, np.pi),
         surface: Surface | None = None,
     ) -> None:
         surface = surface or curved_fingertip()
-        self.thing, self.dt, self.time = thing, dt, 0.0
-        self.constants: Constants = constants_of(surface, thing)
+        self.item, self.dt, self.time = item, dt, 0.0
+        self.constants: Constants = constants_of(surface, item)
         self.state: Contact = new_contact(surface, len(angles))
         self.bodies: Array = np.zeros((len(angles) + 1, 18))
         self.bodies[-1, 3:12] = np.eye(3).ravel()
         for body, angle in zip(self.bodies, angles, strict=False):
-            place(body, surface, solid(replace(thing, texture_amplitude=0.0)), angle, depth)
+            place(body, surface, solid(replace(item, texture_amplitude=0.0)), angle, depth)
 
     @property
     def mass(self) -> float:
-        return self.thing.mass
+        return self.item.mass
 
     @property
-    def thing_body(self) -> Array:
+    def object_body(self) -> Array:
         """Position, rotation, velocity and spin of the object, in place."""
         return self.bodies[-1]
 
@@ -49,16 +49,16 @@ class Grip:
         """One step with gravity and an outside force through the centre of mass [N]."""
         touch(self.state, self.constants, self.bodies, self.dt)
         push = self.state.object_force + np.asarray(force) - [0, 0, GRAVITY * self.mass]
-        body = self.thing_body
+        body = self.object_body
         body[12:15] += push / self.mass * self.dt
         if spin:
             body[15:18] += self._turning() * self.dt
         self._move()
 
     def _turning(self) -> Array:
-        rotation = self.thing_body[3:12].reshape(3, 3)
-        inertia = rotation @ np.diag(self.thing.inertia) @ rotation.T
-        spin = self.thing_body[15:18]
+        rotation = self.object_body[3:12].reshape(3, 3)
+        inertia = rotation @ np.diag(self.item.inertia) @ rotation.T
+        spin = self.object_body[15:18]
         return np.linalg.solve(inertia, self.state.object_torque - np.cross(spin, inertia @ spin))
 
     def _move(self) -> None:

@@ -9,7 +9,7 @@ from scipy.spatial.transform import Rotation
 
 from holdfast.sensors.types import Array
 from holdfast.twin.contact import Contact, constants_of, new_contact, touch
-from holdfast.twin.objects import Thing, load_things, solid, thing
+from holdfast.twin.objects import GraspObject, load_objects, object_named, solid
 from holdfast.twin.shapes import probe, relief
 from holdfast.twin.skin import Skin
 from holdfast.twin.surface import Surface, curved_fingertip
@@ -17,9 +17,9 @@ from holdfast.twin.surface import Surface, curved_fingertip
 from .grip import GRAVITY, Grip
 from .naive_contact import NaiveFinger
 
-NAMES = sorted(load_things())
+NAMES = sorted(load_objects())
 SAMPLE = 1 / 150  # [s]
-BOX = thing("box")
+BOX = object_named("box")
 SMOOTH = replace(BOX, texture_amplitude=0.0)
 
 seeds = st.integers(0, 2**32 - 1)
@@ -56,12 +56,12 @@ def world_forces(grip: Grip, tip: int) -> Array:
 
 @pytest.mark.parametrize("name", NAMES)
 def test_same_as_the_naive_twin(name: str) -> None:
-    grip = Grip(thing(name), angles=(0.3, 3.0))
-    twins = [NaiveFinger(curved_fingertip(), thing(name)) for _ in range(2)]
+    grip = Grip(object_named(name), angles=(0.3, 3.0))
+    twins = [NaiveFinger(curved_fingertip(), object_named(name)) for _ in range(2)]
 
     def compare() -> None:
         for tip, twin in enumerate(twins):
-            twin.touch(grip.bodies[tip], grip.thing_body, grip.dt)
+            twin.touch(grip.bodies[tip], grip.object_body, grip.dt)
             np.testing.assert_allclose(world_forces(grip, tip), twin.forces, atol=2e-6)
             load = twin.loads.sum()
             assert grip.state.load[tip] == pytest.approx(load, abs=2e-6)
@@ -77,7 +77,7 @@ def test_same_as_the_naive_twin(name: str) -> None:
 @settings(max_examples=15, deadline=None)
 @given(seed=seeds, name=st.sampled_from(NAMES))
 def test_nodes_add_up_and_momentum_is_kept(seed: int, name: str) -> None:
-    grip = Grip(thing(name), angles=(0.0, 2.5, 3.7))
+    grip = Grip(object_named(name), angles=(0.0, 2.5, 3.7))
 
     def check() -> None:
         state, bodies = grip.state, grip.bodies
@@ -100,15 +100,15 @@ def test_nodes_add_up_and_momentum_is_kept(seed: int, name: str) -> None:
 @settings(max_examples=15, deadline=None)
 @given(seed=seeds, name=st.sampled_from(NAMES))
 def test_coulomb_is_never_passed_and_nothing_pulls(seed: int, name: str) -> None:
-    grip = Grip(thing(name), depth=2e-3)
-    mu = thing(name).mu_static
+    grip = Grip(object_named(name), depth=2e-3)
+    mu = object_named(name).mu_static
 
     def check() -> None:
-        back = grip.thing_body[3:12].reshape(3, 3)
+        back = grip.object_body[3:12].reshape(3, 3)
         for tip in range(2):
             forces = world_forces(grip, tip)
             arms = curved_fingertip().nodes @ grip.bodies[tip, 3:12].reshape(3, 3).T
-            points = (arms + grip.bodies[tip, :3] - grip.thing_body[:3]) @ back
+            points = (arms + grip.bodies[tip, :3] - grip.object_body[:3]) @ back
             normals = np.array([probe(grip.constants.solid, *p)[1:] for p in points]) @ back.T
             pressed = (forces * normals).sum(axis=1)
             friction = np.linalg.norm(forces - pressed[:, None] * normals, axis=1)
@@ -122,7 +122,7 @@ def test_coulomb_is_never_passed_and_nothing_pulls(seed: int, name: str) -> None
 def test_shaking_slides_so_that_the_limit_is_tried(name: str) -> None:
     slipped = []
     for seed in range(8):
-        grip = Grip(thing(name), depth=2e-3)
+        grip = Grip(object_named(name), depth=2e-3)
         shaken(grip, seed, 30, lambda grip=grip: slipped.append(grip.state.slip_speed.max()))
     assert max(slipped) > 1e-5
 
@@ -133,7 +133,7 @@ def test_the_world_may_be_turned_shifted_and_moved(seed: int, name: str) -> None
     rng = np.random.default_rng(seed)
     turn = Rotation.random(random_state=seed % 2**31).as_matrix()
     shift, drift, spin = rng.normal(size=(3, 3))
-    here, there = Grip(thing(name)), Grip(thing(name))
+    here, there = Grip(object_named(name)), Grip(object_named(name))
 
     def check() -> None:
         there.bodies[:] = here.bodies
@@ -158,14 +158,14 @@ def test_the_world_may_be_turned_shifted_and_moved(seed: int, name: str) -> None
 
 def test_same_bits_twice() -> None:
     def run() -> bytes:
-        grip = Grip(thing("can"), depth=2e-3)
+        grip = Grip(object_named("can"), depth=2e-3)
         grip.settle(0.3)
         return b"".join(part.tobytes() for part in (*grip.state, grip.bodies))
 
     assert run() == run()
 
 
-def test_a_fingertip_that_leaves_forgets() -> None:
+def test_a_fingertip_that_leaves_has_no_state() -> None:
     grip = Grip(BOX)
     grip.settle(0.2)
     assert grip.state.bristles.any()
@@ -177,7 +177,7 @@ def test_a_fingertip_that_leaves_forgets() -> None:
         assert not part.any()
 
 
-def test_a_node_that_leaves_forgets_what_others_keep() -> None:
+def test_a_node_that_leaves_has_no_state_and_others_keep_theirs() -> None:
     grip = Grip(SMOOTH, depth=2e-3)
     grip.settle(0.2)
     touched = grip.state.node_forces[0].any(axis=1)
@@ -191,14 +191,14 @@ def test_a_node_that_leaves_forgets_what_others_keep() -> None:
 
 @pytest.mark.parametrize("name", NAMES)
 def test_held_at_rest_without_creep(name: str) -> None:
-    grip = Grip(thing(name), depth=2.2e-3)
+    grip = Grip(object_named(name), depth=2.2e-3)
     grip.settle(2.0)
-    before, slip = grip.thing_body[:3].copy(), []
+    before, slip = grip.object_body[:3].copy(), []
     for _ in range(2000):
         grip.step()
         slip.append(grip.state.slip_speed.max())
     assert max(slip) < 1e-6
-    assert np.linalg.norm(grip.thing_body[:3] - before) / (2000 * grip.dt) < 1e-6
+    assert np.linalg.norm(grip.object_body[:3] - before) / (2000 * grip.dt) < 1e-6
     weight = [0.0, 0.0, GRAVITY * grip.mass]
     np.testing.assert_allclose(grip.state.object_force, weight, atol=1e-3)
 
@@ -206,12 +206,12 @@ def test_held_at_rest_without_creep(name: str) -> None:
 def test_a_push_within_friction_springs_back() -> None:
     grip = Grip(SMOOTH, depth=2e-3)
     grip.settle(1.0)
-    rest, weight = grip.thing_body[2], grip.mass * GRAVITY
+    rest, weight = grip.object_body[2], grip.mass * GRAVITY
     push = 0.3 * SMOOTH.mu_kinetic * grip.state.load.sum() - weight
     for force in (push, 0.0):
         for _ in range(1500):
             grip.step((0.0, 0.0, -force), spin=False)
-        moved = rest - grip.thing_body[2]
+        moved = rest - grip.object_body[2]
         assert (moved > 1e-4) == (force > 0)
     assert abs(moved) < 2e-5
 
@@ -233,7 +233,7 @@ def test_a_flat_pad_slips_within_a_sample_of_what_theory_says(rate: float, depth
 
 @pytest.mark.parametrize("name", NAMES)
 def test_a_fingertip_slips_from_its_edge_and_lets_go_between_the_frictions(name: str) -> None:
-    grip = Grip(thing(name), depth=2.2e-3)
+    grip = Grip(object_named(name), depth=2.2e-3)
     for _ in range(1000):
         grip.step(spin=False)
     start, shares, pull = grip.time, [0.0], 0.0
@@ -242,7 +242,7 @@ def test_a_fingertip_slips_from_its_edge_and_lets_go_between_the_frictions(name:
         grip.step((0.0, 0.0, -pull), spin=False)
         shares.append(float(grip.state.slipping_share.min()))
     total = (pull + grip.mass * GRAVITY) / grip.state.load.sum()
-    assert thing(name).mu_kinetic < total < 1.15 * thing(name).mu_static
+    assert object_named(name).mu_kinetic < total < 1.15 * object_named(name).mu_static
     assert 0.05 < shares[len(shares) * 4 // 5] < 0.95
 
 
@@ -250,11 +250,11 @@ def test_sliding_friction_is_kinetic_and_texture_makes_it_tremble() -> None:
     trembling = {}
     for amplitude in (0.0, 40e-6):
         grip = Grip(replace(BOX, texture_amplitude=amplitude))
-        grip.thing_body[14] = -0.02
+        grip.object_body[14] = -0.02
         forces = []
         for _ in range(1000):
             touch(grip.state, grip.constants, grip.bodies, grip.dt)
-            grip.thing_body[:3] += grip.thing_body[12:15] * grip.dt
+            grip.object_body[:3] += grip.object_body[12:15] * grip.dt
             forces.append(grip.state.tip_force[0].copy())
         assert grip.state.slip_speed[0] == pytest.approx(0.02, rel=0.05)
         assert grip.state.slipping_share[0] == 1.0
@@ -270,9 +270,9 @@ def test_sliding_friction_is_kinetic_and_texture_makes_it_tremble() -> None:
 def test_a_slow_pull_sticks_and_slips_where_friction_drops(kinetic: float, sticks: bool) -> None:
     grip = Grip(replace(SMOOTH, mu_kinetic=kinetic))
     grip.settle(0.3)
-    rest, start, slip = grip.thing_body[2], grip.time, []
+    rest, start, slip = grip.object_body[2], grip.time, []
     for _ in range(2000):
-        pull = 800.0 * (0.01 * (grip.time - start) - (grip.thing_body[2] - rest))
+        pull = 800.0 * (0.01 * (grip.time - start) - (grip.object_body[2] - rest))
         grip.step((0.0, 0.0, pull), spin=False)
         slip.append(grip.state.slip_speed[0])
     late = np.array(slip[1300:])
@@ -283,16 +283,16 @@ def test_a_slow_pull_sticks_and_slips_where_friction_drops(kinetic: float, stick
 @pytest.mark.parametrize("name", NAMES)
 def test_half_the_step_gives_the_same(name: str) -> None:
     """A push of which the edge slips, and rest: forces, way and slid distance within 2 %."""
-    runs = [_pushed(thing(name), dt) for dt in (1e-3, 0.5e-3)]
+    runs = [_pushed(object_named(name), dt) for dt in (1e-3, 0.5e-3)]
     for one, other in zip(*runs, strict=True):
         assert np.abs(one - other).max() < 0.02 * np.abs(other).max()
 
 
-def _pushed(thing: Thing, dt: float) -> tuple[Array, Array, Array]:
-    grip, forces, way, slid = Grip(thing, 2.2e-3, dt), [], [], 0.0
+def _pushed(item: GraspObject, dt: float) -> tuple[Array, Array, Array]:
+    grip, forces, way, slid = Grip(item, 2.2e-3, dt), [], [], 0.0
     for _ in range(round(0.4 / dt)):
         grip.step(spin=False)
-    limit, weight = thing.mu_static * grip.state.load.sum(), thing.mass * GRAVITY
+    limit, weight = item.mu_static * grip.state.load.sum(), item.mass * GRAVITY
     push = 0.6 * np.sqrt(limit**2 - weight**2)
     for k in range(round(0.4 / dt)):
         time = (k + 0.5) * dt
@@ -301,7 +301,7 @@ def _pushed(thing: Thing, dt: float) -> tuple[Array, Array, Array]:
         slid += float(grip.state.slip_speed[0]) * dt
         if (k + 1) % round(0.01 / dt) == 0:
             forces.append(grip.state.contact_force.ravel())
-            way.append(grip.thing_body[:3].copy())
+            way.append(grip.object_body[:3].copy())
     return np.array(forces), np.array(way), np.array([slid])
 
 

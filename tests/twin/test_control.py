@@ -37,12 +37,12 @@ def torques(controller, joints, target, bias=0.0, tick=0):
     wide = np.broadcast_to(np.asarray(joints, dtype=float), 16).copy()
     wanted = np.broadcast_to(np.asarray(target, dtype=float), 16).copy()
     control(controller, tick, wide, np.full(16, bias), wanted, PERIOD, out)
-    assert (out[16:] == 7.0).all()  # the object's are not ours
+    assert (out[16:] == 7.0).all()  # the object's are not written
     return out[:16]
 
 
 def test_runs_fast_enough_for_the_hand():
-    assert RATE * SUBSTEPS / module.EVERY >= 300
+    assert RATE * SUBSTEPS / module.STEPS_PER_CONTROL >= 300
 
 
 def test_the_same_seed_gives_the_same_controller():
@@ -89,14 +89,14 @@ def test_angles_come_in_steps_of_the_encoder(plain):
     np.testing.assert_allclose(plain.last, ENCODER_STEP)
 
 
-def test_noise_has_the_size_that_is_told():
+def test_noise_has_the_documented_size():
     drawn = draw()
     assert drawn.noise.std() == pytest.approx(TORQUE_NOISE, rel=0.02)
     assert drawn.noise.mean() == pytest.approx(0.0, abs=0.02 * TORQUE_NOISE)
 
 
 class TestGlitches:
-    def test_are_as_frequent_short_and_large_as_told(self):
+    def test_are_as_frequent_short_and_large_as_documented(self):
         errors = draw(0, 3000.0).errors
         struck = errors.any(axis=1)
         edges = np.flatnonzero(np.diff(np.concatenate([[False], struck, [False]]).astype(int)))
@@ -124,5 +124,5 @@ class TestGlitches:
         assert not got[:4].any()
         assert not got[8:].any()
 
-    def test_after_the_end_of_what_was_drawn_it_goes_on(self, plain):
+    def test_after_the_end_of_the_drawn_errors_the_last_row_holds(self, plain):
         torques(plain, 0.0, 0.01, tick=10**6)

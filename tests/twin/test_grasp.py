@@ -3,18 +3,18 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from holdfast.twin.grasp import DEPTHS, PLACE, closing_path, object_pose
+from holdfast.twin.grasp import MIDDLE_PLACE, PATH_GAPS, closing_path, object_pose
 from holdfast.twin.grasp import _aims as aims
 from holdfast.twin.hand import FINGERS, JOINTS, MIRRORED, HandModel
-from holdfast.twin.objects import OTHER_OBJECTS, distance_to, load_things, thing
+from holdfast.twin.objects import OTHER_OBJECTS, distance_to, load_objects, object_named
 
-OBJECTS = tuple(load_things())
-OTHERS = tuple(load_things(OTHER_OBJECTS))
+OBJECTS = tuple(load_objects())
+OTHERS = tuple(load_objects(OTHER_OBJECTS))
 
 
 @pytest.fixture(scope="module")
 def can():
-    return closing_path(thing("can"))
+    return closing_path(object_named("can"))
 
 
 @pytest.mark.parametrize(
@@ -22,7 +22,7 @@ def can():
     [(name, None, 0.002) for name in OBJECTS] + [(name, OTHER_OBJECTS, 0.004) for name in OTHERS],
 )
 def test_every_object_can_be_grasped(name, table, miss):
-    item = thing(name, table)
+    item = object_named(name, table)
     path = closing_path(item)
     assert path.misses.max() < miss
     assert path.cosines.min() > 0.9  # 25 degrees
@@ -37,7 +37,7 @@ def test_every_object_can_be_grasped(name, table, miss):
 @pytest.mark.parametrize("side", ["right", "left"])
 @pytest.mark.parametrize("name", OBJECTS)
 def test_pads_aim_at_the_surface_of_the_object_where_it_stands(name, side):
-    item = replace(thing(name), texture_amplitude=0.0)
+    item = replace(object_named(name), texture_amplitude=0.0)
     place, turn = object_pose(item, side)
     c, s = np.cos(turn), np.sin(turn)
     mirror = 1 if side == "right" else -1
@@ -46,20 +46,20 @@ def test_pads_aim_at_the_surface_of_the_object_where_it_stands(name, side):
         world = points @ [[1, 0, 0], [0, 0, 1], [0, -1, 0]] * [1, mirror, 1] - place
         own = world @ [[c, -s, 0], [s, c, 0], [0, 0, 1]]
         far = distance_to(item, own)
-        touch = np.abs(DEPTHS).argmin()
+        touch = np.abs(PATH_GAPS).argmin()
         assert far[touch] == pytest.approx(0.0, abs=3e-4)
         assert (np.diff(far[:touch]) < 0).all()
         assert push @ push == pytest.approx(1.0)
 
 
 def test_the_left_hand_does_what_the_right_one_does(can):
-    left = closing_path(thing("can"), "left")
+    left = closing_path(object_named("can"), "left")
     np.testing.assert_allclose(left.targets(np.zeros(4)), MIRRORED * can.targets(np.zeros(4)))
 
 
 def test_another_side_is_refused():
     with pytest.raises(ValueError, match="side 'right' or 'left' expected, 'both' given"):
-        closing_path(thing("can"), "both")
+        closing_path(object_named("can"), "both")
 
 
 def test_targets_go_along_the_path(can):
@@ -92,7 +92,7 @@ def test_beyond_its_ends_the_path_stands_still(can):
 
 @pytest.mark.parametrize("radius", [0.08, 0.020, 0.002])
 def test_an_object_of_another_size_is_refused_in_one_line(radius):
-    item = replace(thing("can"), name="tub", size=(radius, 0.05, 0.001))
+    item = replace(object_named("can"), name="tub", size=(radius, 0.05, 0.001))
     with pytest.raises(ValueError, match=r"^the object 'tub' cannot be grasped: .*$") as refusal:
         closing_path(item)
     assert "\n" not in str(refusal.value)
@@ -101,12 +101,12 @@ def test_an_object_of_another_size_is_refused_in_one_line(radius):
 
 @pytest.mark.parametrize("radius", [0.024, 0.045])
 def test_objects_of_the_told_sizes_are_grasped(radius):
-    closing_path(replace(thing("can"), size=(radius, 0.058, 0.003)))
+    closing_path(replace(object_named("can"), size=(radius, 0.058, 0.003)))
 
 
 @pytest.mark.parametrize("name", OBJECTS)
 def test_the_middle_of_the_object_stands_where_the_pads_meet(name):
-    item = thing(name)
+    item = object_named(name)
     place, _ = object_pose(item)
     middle = place + item.foot + [0, 0, item.half_height]
-    np.testing.assert_allclose(middle, [PLACE[0], -PLACE[2], PLACE[1]])
+    np.testing.assert_allclose(middle, [MIDDLE_PLACE[0], -MIDDLE_PLACE[2], MIDDLE_PLACE[1]])

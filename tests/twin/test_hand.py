@@ -16,7 +16,7 @@ from holdfast.twin.hand import (
     HandModel,
     hand_xml,
 )
-from holdfast.twin.objects import load_things, thing
+from holdfast.twin.objects import load_objects, object_named
 
 VENDOR_TIPS = {
     "index": (0.0, 0.05531, 0.13344),
@@ -43,7 +43,7 @@ def side(request):
 
 @pytest.fixture
 def hand(side):
-    return HandModel.build(thing("can"), side)
+    return HandModel.build(object_named("can"), side)
 
 
 def moving(hand, seed=0):
@@ -78,7 +78,7 @@ def test_fingertips_at_the_zero_pose_are_where_the_vendor_says(hand, side):
 
 
 def test_total_mass_is_the_vendors_with_skins_for_rubber_tips(hand):
-    mass = hand.model.body_mass.sum() - thing("can").mass
+    mass = hand.model.body_mass.sum() - object_named("can").mass
     assert mass == pytest.approx(0.955 + 4 * (TIP_MASS - RUBBER_TIP), abs=2e-4)
 
 
@@ -91,7 +91,7 @@ def test_masses_lie_within_the_boxes_they_belong_to(hand):
 
 
 def test_the_left_hand_has_the_vendors_places_and_axes():
-    model = HandModel.build(thing("can"), "left").model
+    model = HandModel.build(object_named("can"), "left").model
     for number, (place, axis) in LEFT.items():
         joint = model.joint(f"joint_{number}")
         np.testing.assert_allclose(joint.axis, axis, atol=1e-12)
@@ -99,7 +99,7 @@ def test_the_left_hand_has_the_vendors_places_and_axes():
 
 
 def test_the_left_hand_is_the_mirror_image_of_the_right():
-    right, left = (HandModel.build(thing("can"), side) for side in ("right", "left"))
+    right, left = (HandModel.build(object_named("can"), side) for side in ("right", "left"))
     joints = np.random.default_rng(1).uniform(*right.limits().T)
     right.data.qpos[:N_JOINTS], left.data.qpos[:N_JOINTS] = joints, joints * MIRRORED
     for hand in (right, left):
@@ -139,11 +139,11 @@ def test_joints_stop_at_their_limits(hand):
 @pytest.mark.parametrize("seed", range(5))
 def test_velocities_are_those_that_mujoco_gives(hand, seed):
     bodies = moving(hand, seed)
-    told = np.zeros(6)
+    velocities = np.zeros(6)
     kind = mujoco.mjtObj.mjOBJ_XBODY
-    for row, body in zip(bodies, [*hand.tips, hand.thing], strict=True):
-        mujoco.mj_objectVelocity(hand.model, hand.data, kind, body, told, 0)
-        spin, velocity = told[:3], told[3:]
+    for row, body in zip(bodies, [*hand.tips, hand.object_body], strict=True):
+        mujoco.mj_objectVelocity(hand.model, hand.data, kind, body, velocities, 0)
+        spin, velocity = velocities[:3], velocities[3:]
         expected = velocity + np.cross(spin, row[:3] - hand.data.xpos[body])
         np.testing.assert_allclose(row[12:15], expected, atol=1e-12)
         np.testing.assert_allclose(row[15:], spin, atol=1e-12)
@@ -164,7 +164,7 @@ def test_fingertip_frames_are_the_mounts_on_the_last_links(hand):
         turn = hand.data.xmat[body].reshape(3, 3)
         np.testing.assert_allclose(row[:3], hand.data.xpos[body] + turn @ mount, atol=1e-15)
         np.testing.assert_allclose(row[3:12].reshape(3, 3), turn, atol=1e-15)
-    np.testing.assert_allclose(bodies[-1, :3], hand.data.xipos[hand.thing], atol=1e-15)
+    np.testing.assert_allclose(bodies[-1, :3], hand.data.xipos[hand.object_body], atol=1e-15)
 
 
 def test_applied_forces_do_what_mujoco_computes(hand):
@@ -173,7 +173,9 @@ def test_applied_forces_do_what_mujoco_computes(hand):
     tips, item = draw.normal(size=(4, 6)), draw.normal(size=6)
     hand.apply(tips, item, bodies)
     expected = np.zeros(hand.model.nv)
-    for body, wrench, row in zip([*hand.tips, hand.thing], [*tips, item], bodies, strict=True):
+    for body, wrench, row in zip(
+        [*hand.tips, hand.object_body], [*tips, item], bodies, strict=True
+    ):
         force, torque, point = wrench[:3], wrench[3:], row[:3].copy()
         mujoco.mj_applyFT(hand.model, hand.data, force, torque, point, body, expected)
     without = hand.data.qfrc_smooth.copy()
@@ -181,9 +183,9 @@ def test_applied_forces_do_what_mujoco_computes(hand):
     np.testing.assert_allclose(hand.data.qfrc_smooth - without, expected, atol=1e-12)
 
 
-@pytest.mark.parametrize("name", list(load_things()))
+@pytest.mark.parametrize("name", list(load_objects()))
 def test_the_object_weighs_what_the_table_says_and_falls_freely(name):
-    item = thing(name)
+    item = object_named(name)
     hand = HandModel.build(item)
     assert hand.model.body("object").mass[0] == pytest.approx(item.mass)
     np.testing.assert_allclose(hand.model.body("object").inertia, item.inertia)

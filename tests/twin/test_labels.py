@@ -7,7 +7,7 @@ from hypothesis import strategies as st
 
 from holdfast.contact import Cause, ContactState, Phase
 from holdfast.recordings import Truth, label_states
-from holdfast.twin.labels import LabelRule, labels_from_truth, phases_as_felt
+from holdfast.twin.labels import LabelRule, labels_from_truth, phases_from_touch
 
 RATE = 150
 RULE = LabelRule()
@@ -22,8 +22,8 @@ def truth(*spans, force=None, slip=None, outside=None, glitch=None):
         phases += [phase] * n
         loads += [2.0 * touching] * n
     times = np.arange(len(phases)) / RATE
-    forces, speeds, pushes = np.array(loads, dtype=float), *np.zeros((2, len(phases)))
-    changed = ((forces, force or ()), (speeds, slip or ()), (pushes, outside or ()))
+    forces, speeds, outside_forces = np.array(loads, dtype=float), *np.zeros((2, len(phases)))
+    changed = ((forces, force or ()), (speeds, slip or ()), (outside_forces, outside or ()))
     for column, changes in changed:
         for start, end, value in changes:
             column[(times > start - 1e-9) & (times < end - 1e-9)] = value
@@ -34,7 +34,7 @@ def truth(*spans, force=None, slip=None, outside=None, glitch=None):
     finger = {"contact_force": vectors, "slip_speed": speeds}
     hand = {
         "phase": np.array(phases, dtype=str),
-        "outside_force": pushes[:, None] * [0.0, 0.0, -1.0],
+        "outside_force": outside_forces[:, None] * [0.0, 0.0, -1.0],
         "set_point_error": errors,
     }
     return Truth(times, hand, {"thumb": finger})
@@ -51,16 +51,16 @@ GRASP = (
 )
 
 
-def disturbed(*pushes, phase=Phase.DISTURBED, hold=6.0):
+def disturbed(*disturbances, phase=Phase.DISTURBED, hold=6.0):
     """Locked for so long with disturbances at (start, seconds) in it."""
     spans, at = [], 0.0
-    for start, seconds in pushes:
+    for start, seconds in disturbances:
         spans += [(start - at, Phase.LOCKED, True), (seconds, phase, True)]
         at = start + seconds
     return (*spans, (hold - at, Phase.LOCKED, True))
 
 
-def told(data, rule=None):
+def label_rows(data, rule=None):
     return [
         (round(label.start, 2), round(label.end, 2), label.state, label.cause)
         for label in labels_from_truth(data, "thumb", rule)
@@ -68,7 +68,7 @@ def told(data, rule=None):
 
 
 def test_a_grasp_without_disturbance():
-    assert told(truth(*GRASP)) == [
+    assert label_rows(truth(*GRASP)) == [
         (0.0, 1.5, N, None),
         (1.5, 2.0, U, Cause.CLOSING),
         (2.0, 5.0, S, None),
@@ -77,9 +77,9 @@ def test_a_grasp_without_disturbance():
     ]
 
 
-def test_while_somebody_else_holds_the_object_it_is_not_stable():
+def test_an_object_held_by_the_operator_is_not_stable():
     handed_over = truth(*GRASP, outside=[(0.0, 2.3, 3.0), (4.8, 6.7, 3.0)])
-    assert told(handed_over) == [
+    assert label_rows(handed_over) == [
         (0.0, 1.5, N, None),
         (1.5, 2.0, U, Cause.CLOSING),
         (2.0, pytest.approx(2.4, abs=0.011), U, Cause.DISTURBANCE),
@@ -91,16 +91,16 @@ def test_while_somebody_else_holds_the_object_it_is_not_stable():
 
 
 def test_a_force_too_small_to_be_contact_does_not_count():
-    assert told(truth(*GRASP, outside=[(2.5, 3.0, 0.04)])) == told(truth(*GRASP))
+    assert label_rows(truth(*GRASP, outside=[(2.5, 3.0, 0.04)])) == label_rows(truth(*GRASP))
 
 
-def test_labels_tell_where_they_come_from():
+def test_labels_have_author_and_evidence():
     for label in labels_from_truth(truth(*GRASP), "thumb"):
         assert (label.author, label.evidence, label.confidence) == ("twin", "truth", 1.0)
 
 
 def test_a_disturbance_is_an_interval_with_margins():
-    assert told(truth(*disturbed((2.0, 1.0)))) == [
+    assert label_rows(truth(*disturbed((2.0, 1.0)))) == [
         (0.0, 1.9, S, None),
         (1.9, pytest.approx(3.1, abs=0.011), U, Cause.DISTURBANCE),
         (pytest.approx(3.1, abs=0.011), 6.0, S, None),
@@ -110,18 +110,18 @@ def test_a_disturbance_is_an_interval_with_margins():
 @pytest.mark.parametrize(("gap", "n_intervals"), [(0.3, 1), (0.5, 2)])
 def test_disturbances_soon_after_each_other_are_one(gap, n_intervals):
     data = truth(*disturbed((1.0, 0.5), (1.5 + gap, 0.5)))
-    assert [row[2] for row in told(data)].count(U) == n_intervals
+    assert [row[2] for row in label_rows(data)].count(U) == n_intervals
 
 
 def slipped_after_the_lock(rest):
-    """What slides so long after the hand has closed, beyond the margin."""
+    """Return a grasp with a slip that long after closing, beyond the margin."""
     start = 2.0 + rest + RULE.margin
     return truth(*GRASP, slip=[(start, start + 0.05, 0.01)])
 
 
 @pytest.mark.parametrize("rest", [0.0, 0.04, 0.15, 0.3])
-def test_a_short_rest_between_closing_and_the_first_trouble_is_not_stable(rest):
-    rows = told(slipped_after_the_lock(rest))
+def test_a_short_gap_between_closing_and_the_first_slip_is_not_stable(rest):
+    rows = label_rows(slipped_after_the_lock(rest))
     assert rows[1:3] == [
         (1.5, 2.0, U, Cause.CLOSING),
         (2.0, pytest.approx(2.25 + rest, abs=0.02), U, Cause.SLIP),
@@ -129,18 +129,18 @@ def test_a_short_rest_between_closing_and_the_first_trouble_is_not_stable(rest):
     assert rows[3][2] == S
 
 
-def test_a_longer_rest_between_closing_and_the_first_trouble_is_stable():
-    rows = told(slipped_after_the_lock(0.4))
+def test_a_longer_gap_between_closing_and_the_first_slip_is_stable():
+    rows = label_rows(slipped_after_the_lock(0.4))
     assert [row[2] for row in rows] == [N, U, S, U, S, U, N]
     assert rows[2][1] - rows[2][0] == pytest.approx(0.4, abs=0.01)
 
 
-def test_what_is_never_troubled_is_stable_from_the_lock_on():
-    assert told(truth(*GRASP), LabelRule(merge=100.0))[2] == (2.0, 5.0, S, None)
+def test_an_undisturbed_hold_is_stable_from_the_lock_on():
+    assert label_rows(truth(*GRASP), LabelRule(merge=100.0))[2] == (2.0, 5.0, S, None)
 
 
 @pytest.mark.parametrize(
-    ("push", "felt"),
+    ("push", "touched"),
     [
         ("......", "LLLLLL"),  # it never touches
         (".xx...", "LDDLLL"),
@@ -148,52 +148,52 @@ def test_what_is_never_troubled_is_stable_from_the_lock_on():
         ("xxxxxx", "DDDDDD"),
     ],
 )
-def test_a_disturbance_lasts_from_its_first_touch_to_its_last(push, felt):
-    words = {"L": Phase.LOCKED, "D": Phase.DISTURBED, ".": 0.04, "x": 0.06}
+def test_a_disturbance_lasts_from_its_first_touch_to_its_last(push, touched):
+    meanings = {"L": Phase.LOCKED, "D": Phase.DISTURBED, ".": 0.04, "x": 0.06}
     plan = [Phase.LOCKED] * 2 + [Phase.DISTURBED] * 6 + [Phase.LOCKED]
-    forces = np.array([1.0, 0.0, *(words[mark] for mark in push), 1.0])
-    wanted = [Phase.LOCKED] * 2 + [words[mark] for mark in felt] + [Phase.LOCKED]
-    assert phases_as_felt(np.array(plan, dtype=str), forces, 0.05).tolist() == wanted
+    forces = np.array([1.0, 0.0, *(meanings[mark] for mark in push), 1.0])
+    wanted = [Phase.LOCKED] * 2 + [meanings[mark] for mark in touched] + [Phase.LOCKED]
+    assert phases_from_touch(np.array(plan, dtype=str), forces, 0.05).tolist() == wanted
 
 
-def test_each_disturbance_is_felt_by_itself_and_keeps_its_slips():
+def test_each_disturbance_is_limited_to_its_touches_and_keeps_its_slips():
     plan = [Phase.DISTURBED, Phase.SLIPPING, Phase.LOCKED, Phase.SLIPPING, Phase.DISTURBED]
-    felt = phases_as_felt(np.array(plan, dtype=str), np.array([0.0, 1, 1, 1, 0]), 0.05)
-    assert felt.tolist() == [
+    touched = phases_from_touch(np.array(plan, dtype=str), np.array([0.0, 1, 1, 1, 0]), 0.05)
+    assert touched.tolist() == [
         Phase.LOCKED, Phase.SLIPPING, Phase.LOCKED, Phase.SLIPPING, Phase.LOCKED
     ]  # fmt: skip
 
 
 def test_a_disturbance_in_which_the_finger_slides_is_a_slip_as_a_whole():
     data = truth(*disturbed((1.0, 1.0), (4.0, 1.0)), slip=[(1.4, 1.45, 0.02)])
-    causes = [row[3] for row in told(data) if row[2] == U]
+    causes = [row[3] for row in label_rows(data) if row[2] == U]
     assert causes == [Cause.SLIP, Cause.DISTURBANCE]
 
 
-def test_what_slides_while_nobody_pushes_is_a_slip():
+def test_sliding_without_a_push_is_a_slip():
     data = truth(*disturbed(), slip=[(2.0, 2.1, 0.002)])
-    assert told(data)[1][2:] == (U, Cause.SLIP)
-    assert told(data)[1][0] == 1.9
-    assert told(truth(*disturbed(), slip=[(2.0, 2.1, 0.0009)])) == [(0.0, 6.0, S, None)]
+    assert label_rows(data)[1][2:] == (U, Cause.SLIP)
+    assert label_rows(data)[1][0] == 1.9
+    assert label_rows(truth(*disturbed(), slip=[(2.0, 2.1, 0.0009)])) == [(0.0, 6.0, S, None)]
 
 
 def test_a_shake_does_not_flicker():
-    """The finger that pushes is off the object every other moment: still one interval."""
-    pushes = [(1.0 + 0.2 * k, 0.1) for k in range(10)]
-    data = truth(*disturbed(*pushes), slip=[(s, s + 0.02, 0.05) for s, _ in pushes])
-    assert [row[2] for row in told(data)] == [S, U, S]
+    """The pushing finger leaves the object again and again: still one interval."""
+    disturbances = [(1.0 + 0.2 * k, 0.1) for k in range(10)]
+    data = truth(*disturbed(*disturbances), slip=[(s, s + 0.02, 0.05) for s, _ in disturbances])
+    assert [row[2] for row in label_rows(data)] == [S, U, S]
 
 
 @pytest.mark.parametrize("seconds", [0.02, 0.08])
-def test_a_blip_of_contact_is_not_told(seconds):
+def test_a_very_short_contact_is_ignored(seconds):
     spans = ((3.0, Phase.FREE, False),)
-    assert told(truth(*spans, force=[(1.0, 1.0 + seconds, 1.0)])) == [(0.0, 3.0, N, None)]
+    assert label_rows(truth(*spans, force=[(1.0, 1.0 + seconds, 1.0)])) == [(0.0, 3.0, N, None)]
     lifted = truth(*disturbed(), force=[(1.0, 1.0 + seconds, 0.0)])
-    assert told(lifted) == [(0.0, 6.0, S, None)]
+    assert label_rows(lifted) == [(0.0, 6.0, S, None)]
 
 
 def test_a_finger_that_leaves_for_long_has_no_contact():
-    rows = told(truth(*disturbed(), force=[(1.0, 2.0, 0.0)]))
+    rows = label_rows(truth(*disturbed(), force=[(1.0, 2.0, 0.0)]))
     assert [row[2] for row in rows] == [S, N, S]
     assert rows[1][:2] == (1.0, 2.0)
     assert rows[1][3] is None
@@ -207,7 +207,7 @@ def test_an_object_that_falls_is_lost():
         (1.0, Phase.RELEASED, False),
         (1.0, Phase.FREE, False),
     )
-    assert told(data) == [
+    assert label_rows(data) == [
         (0.0, 2.0, S, None),
         (2.0, 2.5, U, Cause.LOST),
         (2.5, 3.5, N, Cause.LOST),
@@ -216,18 +216,18 @@ def test_an_object_that_falls_is_lost():
 
 
 def test_a_grasp_never_locked_is_never_stable():
-    rows = told(truth((2.0, Phase.CLOSING, True), (0.5, Phase.RELEASED, True)))
+    rows = label_rows(truth((2.0, Phase.CLOSING, True), (0.5, Phase.RELEASED, True)))
     assert rows == [(0.0, 2.0, U, Cause.CLOSING), (2.0, 2.5, U, Cause.RELEASED)]
 
 
 def test_thresholds_can_be_chosen():
     rule = LabelRule(contact=3.0)
-    assert {row[2] for row in told(truth(*GRASP), rule)} == {N}
+    assert {row[2] for row in label_rows(truth(*GRASP), rule)} == {N}
     wide = LabelRule(margin=0.3)
-    assert told(truth(*disturbed((2.0, 1.0))), wide)[0][1] == 1.7
+    assert label_rows(truth(*disturbed((2.0, 1.0))), wide)[0][1] == 1.7
     merged = LabelRule(merge=1.0)
-    pushes = disturbed((1.0, 0.5), (2.2, 0.5))
-    assert len(told(truth(*pushes), merged)) < len(told(truth(*pushes)))
+    disturbances = disturbed((1.0, 0.5), (2.2, 0.5))
+    assert len(label_rows(truth(*disturbances), merged)) < len(label_rows(truth(*disturbances)))
 
 
 @st.composite
@@ -251,7 +251,7 @@ def grasps(draw):
 def test_laws(data):
     labels = labels_from_truth(data, "thumb")
     times = data.times
-    assert (label_states(labels, times) > 0).all()  # every sample has one
+    assert (label_states(labels, times) > 0).all()  # every sample has a label
     assert labels[0].start == times[0]
     assert all(a.end == b.start for a, b in pairwise(labels))
     whole = times[-1] - times[0] + 1 / RATE
@@ -259,8 +259,8 @@ def test_laws(data):
     assert all((a.state, a.cause) != (b.state, b.cause) for a, b in pairwise(labels))
     phase = data.hand["phase"]
     for before, label, after in zip(labels, labels[1:], labels[2:], strict=False):
-        troubled = after.cause in (Cause.SLIP, Cause.DISTURBANCE)
-        if before.cause == Cause.CLOSING and label.state == S and troubled:
+        unstable = after.cause in (Cause.SLIP, Cause.DISTURBANCE)
+        if before.cause == Cause.CLOSING and label.state == S and unstable:
             assert label.end - label.start >= RULE.merge - 1e-9
     for label in labels:
         inside = (times >= label.start) & (times < label.end)
@@ -277,23 +277,23 @@ def test_laws(data):
 
 class TestGlitch:
     def test_is_unstable_until_the_hand_has_stopped_ringing(self):
-        rows = told(truth(*disturbed(), glitch=[(2.0, 2.02)]))
+        rows = label_rows(truth(*disturbed(), glitch=[(2.0, 2.02)]))
         assert rows[1] == (2.0, pytest.approx(2.12, abs=0.011), U, Cause.GLITCH)
         assert [row[2] for row in rows] == [S, U, S]
 
     def test_a_slip_that_it_causes_is_part_of_it(self):
-        rows = told(truth(*disturbed(), glitch=[(2.0, 2.02)], slip=[(2.05, 2.3, 0.01)]))
+        rows = label_rows(truth(*disturbed(), glitch=[(2.0, 2.02)], slip=[(2.05, 2.3, 0.01)]))
         assert [row[3] for row in rows] == [None, Cause.GLITCH, None]
         assert rows[1][1] == pytest.approx(2.3, abs=0.011)
 
     def test_in_a_disturbance_it_is_part_of_that(self):
-        rows = told(truth(*disturbed((2.0, 1.0)), glitch=[(2.5, 2.52)]))
+        rows = label_rows(truth(*disturbed((2.0, 1.0)), glitch=[(2.5, 2.52)]))
         assert [row[3] for row in rows] == [None, Cause.DISTURBANCE, None]
 
     def test_is_not_labelled_where_the_rule_leaves_it_out(self):
         rule = LabelRule(glitch=None)
-        assert len(told(truth(*disturbed(), glitch=[(2.0, 2.02)]), rule)) == 1
+        assert len(label_rows(truth(*disturbed(), glitch=[(2.0, 2.02)]), rule)) == 1
 
-    def test_with_an_empty_hand_it_is_nothing(self):
-        rows = told(truth(*GRASP, glitch=[(0.2, 0.3)]))
+    def test_with_an_empty_hand_it_is_not_labelled(self):
+        rows = label_rows(truth(*GRASP, glitch=[(0.2, 0.3)]))
         assert Cause.GLITCH not in [row[3] for row in rows]

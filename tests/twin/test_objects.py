@@ -10,29 +10,29 @@ from hypothesis import strategies as st
 
 from holdfast.sensors.types import Array
 from holdfast.twin.objects import (
+    BUILT_IN_OBJECTS,
     OTHER_OBJECTS,
-    TABLE,
-    Thing,
+    GraspObject,
     distance_to,
-    load_things,
+    load_objects,
+    object_named,
     solid,
-    thing,
 )
-from holdfast.twin.shapes import MOST_RELIEF, probe, relief
+from holdfast.twin.shapes import MAX_RELIEF, probe, relief
 
-THINGS = load_things()
-SMOOTH = {name: replace(one, texture_amplitude=0.0) for name, one in THINGS.items()}
+OBJECTS = load_objects()
+SMOOTH = {name: replace(one, texture_amplitude=0.0) for name, one in OBJECTS.items()}
 LINE = (
     'mug = {shape = "cylinder", size = [0.035, 0.05, 0.003], mass = 0.2, friction = [0.7, 0.6], '
     "texture = [1e-5, 2e-3], finger_height = 0.02, yaw = 0.1}"
 )
 
-names = st.sampled_from(sorted(THINGS))
+names = st.sampled_from(sorted(OBJECTS))
 coordinates = st.floats(-0.08, 0.08)
 points = st.tuples(coordinates, coordinates, coordinates)
 
 
-def middle_of(one: Thing) -> float:
+def middle_of(one: GraspObject) -> float:
     """Height of the middle in the object's frame [m]."""
     return one.foot[2] + one.half_height
 
@@ -55,7 +55,7 @@ def upright(flat: float, tall: float) -> float:
     return float(np.hypot(max(flat, 0), max(tall, 0)))
 
 
-def naive_distance(one: Thing, point: tuple[float, float, float]) -> float:
+def naive_distance(one: GraspObject, point: tuple[float, float, float]) -> float:
     x, y, z = point[0], point[1], point[2] - middle_of(one)
     q, size = float(np.hypot(x, y)), one.size
     if one.shape in ("sphere", "capsule"):
@@ -91,7 +91,7 @@ def test_same_as_the_naive_distance(name: str, point: tuple[float, float, float]
 @given(name=names, point=points, other=points)
 def test_it_is_a_distance(name: str, point: tuple[float, ...], other: tuple[float, ...]) -> None:
     """It changes by no more than one moves, and going back along the gradient ends on it."""
-    packed = solid(THINGS[name])
+    packed = solid(OBJECTS[name])
     d, *gradient = probe(packed, *point)
     assert abs(probe(packed, *other)[0] - d) <= np.linalg.norm(np.subtract(point, other)) + 1e-12
     if d > 0:
@@ -109,7 +109,7 @@ def test_the_gradient_is_that_of_the_distance(
     name: str, angle: float, height: float, d: float
 ) -> None:
     """Near the surface, where fingertips are: inside by less than the rounding too."""
-    one, packed = THINGS[name], solid(THINGS[name])
+    one, packed = OBJECTS[name], solid(OBJECTS[name])
     point = np.array([np.cos(angle), np.sin(angle), 0.0]) * 0.06
     point[2] = height * one.half_height + middle_of(one)
     far, *normal = probe(packed, *point)
@@ -122,7 +122,7 @@ def test_the_gradient_is_that_of_the_distance(
     np.testing.assert_allclose(gradient, numeric, atol=1e-3)
 
 
-@pytest.mark.parametrize("name", sorted(THINGS))
+@pytest.mark.parametrize("name", sorted(OBJECTS))
 def test_sizes_are_where_the_surface_is(name: str) -> None:
     one = SMOOTH[name]
     middle = middle_of(one)
@@ -144,13 +144,13 @@ def test_a_frustum_is_as_wide_as_the_table_says() -> None:
         assert float(distance_to(one, point)) == pytest.approx(0, abs=1e-12)
 
 
-@pytest.mark.parametrize("name", sorted(THINGS))
+@pytest.mark.parametrize("name", sorted(OBJECTS))
 def test_texture_is_bounded_and_has_no_seam(name: str) -> None:
-    one = THINGS[name]
+    one = OBJECTS[name]
     packed = solid(one)
     heights = np.linspace(-0.03, 0.03, 200)
     deep = np.array([relief(packed, -0.03, 0.01 * np.sin(900 * h), h) for h in heights])
-    assert np.abs(deep).max() <= MOST_RELIEF * one.texture_amplitude
+    assert np.abs(deep).max() <= MAX_RELIEF * one.texture_amplitude
     assert np.abs(deep).max() > one.texture_amplitude
     for h in heights[::10]:
         left, right = relief(packed, -0.03, 1e-12, h), relief(packed, -0.03, -1e-12, h)
@@ -161,7 +161,7 @@ def test_texture_is_bounded_and_has_no_seam(name: str) -> None:
     assert relief(solid(SMOOTH[name]), *point) == 0
 
 
-@pytest.mark.parametrize("name", sorted(THINGS))
+@pytest.mark.parametrize("name", sorted(OBJECTS))
 def test_inertia_by_random_points(name: str) -> None:
     """Another quadrature, and the centre of mass is the origin."""
     one = SMOOTH[name]
@@ -175,10 +175,10 @@ def test_inertia_by_random_points(name: str) -> None:
 
 
 def test_inertia_of_shapes_with_a_formula(tmp_path: Path) -> None:
-    def made(shape: str, size: list[float]) -> Thing:
+    def made(shape: str, size: list[float]) -> GraspObject:
         text = LINE.replace("cylinder", shape).replace("[0.035, 0.05, 0.003]", str(size))
         (tmp_path / "t.toml").write_text(text.replace("mass = 0.2", "mass = 1.0"))
-        return load_things(tmp_path / "t.toml")["mug"]
+        return load_objects(tmp_path / "t.toml")["mug"]
 
     ball = made("sphere", [0.03])
     np.testing.assert_allclose(ball.inertia, [0.4 * 0.03**2] * 3, rtol=2e-3)
@@ -196,11 +196,11 @@ def test_inertia_of_shapes_with_a_formula(tmp_path: Path) -> None:
 
 
 def test_the_built_in_table() -> None:
-    assert len(THINGS) == 6
-    assert len({one.shape for one in THINGS.values()}) == 6
-    for name, one in THINGS.items():
+    assert len(OBJECTS) == 6
+    assert len({one.shape for one in OBJECTS.values()}) == 6
+    for name, one in OBJECTS.items():
         assert one.name == name
-        assert thing(name) is one
+        assert object_named(name) is one
         assert 0.05 <= one.mass <= 0.35
         assert 0.03 <= one.radius <= 0.034
         assert 6e-6 <= one.texture_amplitude <= 60e-6
@@ -210,11 +210,11 @@ def test_the_built_in_table() -> None:
         assert not one.inertia.flags.writeable
 
 
-def test_other_objects_are_others() -> None:
-    others = load_things(OTHER_OBJECTS)
+def test_other_objects_differ_from_the_built_in_ones() -> None:
+    others = load_objects(OTHER_OBJECTS)
     assert len(others) == 6
-    assert not set(others) & set(THINGS)
-    looks = {(one.shape, one.size, one.mass) for one in THINGS.values()}
+    assert not set(others) & set(OBJECTS)
+    looks = {(one.shape, one.size, one.mass) for one in OBJECTS.values()}
     for one in others.values():
         assert (one.shape, one.size, one.mass) not in looks
         assert 0.05 <= one.mass <= 0.35
@@ -222,26 +222,29 @@ def test_other_objects_are_others() -> None:
         assert one.finger_height < one.half_height
 
 
-def test_things_travel() -> None:
-    for again in (pickle.loads(pickle.dumps(thing("can"))), copy.deepcopy(thing("can"))):
+def test_objects_can_be_pickled_and_copied() -> None:
+    for again in (
+        pickle.loads(pickle.dumps(object_named("can"))),
+        copy.deepcopy(object_named("can")),
+    ):
         assert again.name == "can"
-        assert again.inertia.tobytes() == thing("can").inertia.tobytes()
+        assert again.inertia.tobytes() == object_named("can").inertia.tobytes()
         assert not again.inertia.flags.writeable
 
 
 def test_a_line_makes_a_new_object(tmp_path: Path) -> None:
     path = tmp_path / "more.toml"
-    path.write_text(TABLE.read_text("utf-8") + LINE, "utf-8")
-    things = load_things(path)
-    assert list(things) == [*THINGS, "mug"]
-    assert (things["mug"].radius, things["mug"].half_height) == (0.035, 0.05)
-    assert things["mug"].yaw == 0.1
-    assert things["can"].inertia.tobytes() == THINGS["can"].inertia.tobytes()
+    path.write_text(BUILT_IN_OBJECTS.read_text("utf-8") + LINE, "utf-8")
+    objects = load_objects(path)
+    assert list(objects) == [*OBJECTS, "mug"]
+    assert (objects["mug"].radius, objects["mug"].half_height) == (0.035, 0.05)
+    assert objects["mug"].yaw == 0.1
+    assert objects["can"].inertia.tobytes() == OBJECTS["can"].inertia.tobytes()
 
 
 def test_an_unknown_object() -> None:
     with pytest.raises(ValueError) as caught:
-        thing("cup")
+        object_named("cup")
     assert str(caught.value) == "no object 'cup'; there are ball, box, can, bottle, prism, flask"
 
 
@@ -274,16 +277,16 @@ COLUMNS = "shape, size, mass, friction, texture, finger_height, yaw"
          "size: half height 0.03 is less than the radius 0.035"),
     ],
 )  # fmt: skip
-def test_what_a_line_may_not_say(tmp_path: Path, old: str, new: str, message: str) -> None:
+def test_an_invalid_line_is_refused(tmp_path: Path, old: str, new: str, message: str) -> None:
     path = tmp_path / "t.toml"
     assert old in LINE
     path.write_text(LINE.replace(old, new), "utf-8")
     with pytest.raises(ValueError) as caught:
-        load_things(path)
+        load_objects(path)
     assert str(caught.value) == f"{path}: mug: {message}"
 
 
-def test_what_is_no_table(tmp_path: Path) -> None:
+def test_a_file_that_is_not_a_table_is_refused(tmp_path: Path) -> None:
     path = tmp_path / "t.toml"
     for text, message in (
         ("mug = ", f"{path} is no TOML table of objects: "),
@@ -292,11 +295,11 @@ def test_what_is_no_table(tmp_path: Path) -> None:
     ):
         path.write_text(text, "utf-8")
         with pytest.raises(ValueError) as caught:
-            load_things(path)
+            load_objects(path)
         assert str(caught.value).startswith(message)
         assert "\n" not in str(caught.value)
     path.write_bytes(b"\xff\xfe")
     with pytest.raises(ValueError, match="is no TOML table of objects"):
-        load_things(path)
+        load_objects(path)
     with pytest.raises(FileNotFoundError):
-        load_things(tmp_path / "none.toml")
+        load_objects(tmp_path / "none.toml")

@@ -16,12 +16,12 @@ from holdfast.twin.operator import (
     PUSH_LIMIT,
     SHAKE,
     TREMOR_BAND,
-    draw_pushes,
+    draw_disturbances,
     draw_tremor,
     hold_wrench,
     move_wrench,
     push_wrench,
-    tremble,
+    tremor_at,
 )
 from holdfast.twin.operator import _aim as aim
 from holdfast.twin.profile import profile, profiles
@@ -36,13 +36,13 @@ def body(place=(0.0, 0.0, 0.0), turn=(0.0, 0.0, 0.0), velocity=(0.0,) * 6):
     return np.array([*place, *rotation, *velocity], dtype=float)
 
 
-def numbers(direction=(0.0, 0.0, -1.0), arm=(0.0, 0.0, 0.0), depth=0.006, stiffness=700.0):
+def parameters(direction=(0.0, 0.0, -1.0), arm=(0.0, 0.0, 0.0), depth=0.006, stiffness=700.0):
     return np.array([*direction, *arm, depth, stiffness, 4.0])
 
 
-def push(given, told=None, style=PUSH, rms=0.0, elapsed=0.4, duration=0.8):
-    told = numbers() if told is None else told
-    out = push_wrench(given, np.zeros(3), told, style, duration, STILL, rms, elapsed)
+def push(given, drawn=None, style=PUSH, rms=0.0, elapsed=0.4, duration=0.8):
+    drawn = parameters() if drawn is None else drawn
+    out = push_wrench(given, np.zeros(3), drawn, style, duration, STILL, rms, elapsed)
     return np.array(out)
 
 
@@ -55,13 +55,13 @@ class TestTremor:
     def test_has_an_rms_of_one(self):
         times = np.arange(0, 60, 1 / 150)
         for axis in range(3):
-            places = [tremble(STILL, time, axis)[0] for time in times]
+            places = [tremor_at(STILL, time, axis)[0] for time in times]
             assert np.std(places) == pytest.approx(1.0, rel=0.02)
             assert np.mean(places) == pytest.approx(0.0, abs=0.02)
 
     def test_keeps_to_its_band(self):
         times = np.arange(0, 60, 1 / 150)
-        places = np.array([tremble(STILL, time, 0)[0] for time in times])
+        places = np.array([tremor_at(STILL, time, 0)[0] for time in times])
         power = np.abs(np.fft.rfft(places * np.hanning(len(places)))) ** 2
         rates = np.fft.rfftfreq(len(places), 1 / 150)
         band = (rates > TREMOR_BAND[0] - 0.1) & (rates < TREMOR_BAND[1] + 0.1)
@@ -70,8 +70,10 @@ class TestTremor:
     def test_its_speed_is_the_slope_of_its_place(self):
         step = 1e-6
         for time in (0.0, 0.3, 7.7):
-            before, after = tremble(STILL, time - step, 1)[0], tremble(STILL, time + step, 1)[0]
-            assert tremble(STILL, time, 1)[1] == pytest.approx((after - before) / (2 * step), 1e-5)
+            before, after = tremor_at(STILL, time - step, 1)[0], tremor_at(STILL, time + step, 1)[0]
+            assert tremor_at(STILL, time, 1)[1] == pytest.approx(
+                (after - before) / (2 * step), 1e-5
+            )
 
     def test_seeds(self):
         same, other = draw_tremor(np.random.default_rng(0)), draw_tremor(np.random.default_rng(1))
@@ -133,8 +135,8 @@ class TestPush:
         direction = random.normal(size=3)
         direction /= np.linalg.norm(direction)
         arm = np.cross(direction, random.normal(0, 0.006, 3))
-        told = numbers(direction, arm)
-        out = push(body(place, velocity=velocity), told, style, rms, elapsed)
+        drawn = parameters(direction, arm)
+        out = push(body(place, velocity=velocity), drawn, style, rms, elapsed)
         along = out[:3] @ direction
         assert 0.0 <= along <= PUSH_LIMIT + 1e-9
         np.testing.assert_allclose(out[:3], along * direction, atol=1e-9)
@@ -147,8 +149,8 @@ class TestPush:
 
     @pytest.mark.parametrize("style", STYLES)
     def test_goes_there_and_back(self, style):
-        times, told = course(style)
-        places, speeds = told.T
+        times, motion = course(style)
+        places, speeds = motion.T
         assert places[0] == pytest.approx(0.0, abs=1e-12)
         assert places[-1] == pytest.approx(0.0, abs=1e-12)
         assert places.min() >= -1e-12
@@ -173,7 +175,7 @@ class TestPush:
 
 
 def move(given, elapsed=1.0, rms=0.0, depth=0.008, stiffness=500.0, duration=2.0):
-    wanted = numbers(depth=depth, stiffness=stiffness)
+    wanted = parameters(depth=depth, stiffness=stiffness)
     return np.array(move_wrench(given, body()[:12], wanted, duration, STILL, rms, elapsed))
 
 
@@ -205,12 +207,12 @@ class TestMove:
 
     def test_is_drawn_where_the_profile_has_it(self):
         chosen = profile("reference")
-        many = [p for s in range(30) for p in draw_pushes(np.random.default_rng(s), chosen)]
+        many = [p for s in range(30) for p in draw_disturbances(np.random.default_rng(s), chosen)]
         moves = [p for p in many if p.style == MOVE]
         assert 0.35 < len(moves) / len(many) < 0.65
         for p in moves:
             for value, span in zip(
-                [*p.numbers[6:], p.duration],
+                [*p.parameters[6:], p.duration],
                 [chosen.move_depth, chosen.move_stiffness, chosen.move_rate, chosen.move_duration],
                 strict=True,
             ):
@@ -222,10 +224,10 @@ class TestPlan:
     @pytest.mark.parametrize("seed", range(4))
     def test_pushes_fill_the_hold(self, name, seed):
         chosen = profile(name)
-        pushes = draw_pushes(np.random.default_rng(seed), chosen)
-        starts = np.array([p.start for p in pushes])
-        ends = starts + [p.duration for p in pushes]
-        assert len(pushes) >= 3
+        disturbances = draw_disturbances(np.random.default_rng(seed), chosen)
+        starts = np.array([p.start for p in disturbances])
+        ends = starts + [p.duration for p in disturbances]
+        assert len(disturbances) >= 3
         assert starts[0] >= 1.0  # the operator's hand is off by then
         rests = starts[1:] - ends[:-1]
         assert (rests >= chosen.rest[0]).all()
@@ -233,20 +235,22 @@ class TestPlan:
         assert ends[-1] <= chosen.hold - 1.0
         longest = max(chosen.push_duration[1], chosen.move_duration[1])
         assert chosen.hold - ends[-1] < 1.0 + chosen.rest[1] + longest
-        assert [p.direction for p in pushes[:4]] == ["down", "up", "left", "right"][: len(pushes)]
+        assert [p.direction for p in disturbances[:4]] == ["down", "up", "left", "right"][
+            : len(disturbances)
+        ]
 
     def test_numbers_are_those_of_the_profile(self):
         chosen = profile("finger-reference")
-        many = [p for s in range(30) for p in draw_pushes(np.random.default_rng(s), chosen)]
+        many = [p for s in range(30) for p in draw_disturbances(np.random.default_rng(s), chosen)]
         assert {p.style for p in many} == set(STYLES)
         for p in many:
-            direction, arm = p.numbers[:3], p.numbers[3:6]
+            direction, arm = p.parameters[:3], p.parameters[3:6]
             assert direction @ direction == pytest.approx(1.0)
             assert arm @ direction == pytest.approx(0.0, abs=1e-12)
             if p.direction != "random":
                 assert tuple(direction) == DIRECTIONS[p.direction]
             for value, span in zip(
-                [*p.numbers[6:], p.duration],
+                [*p.parameters[6:], p.duration],
                 [chosen.push_depth, chosen.push_stiffness, chosen.shake_rate, chosen.push_duration],
                 strict=True,
             ):
@@ -254,8 +258,8 @@ class TestPlan:
 
     def test_a_calmer_person_pushes_less_far_but_the_same(self):
         chosen = profile("reference")
-        whole = draw_pushes(np.random.default_rng(5), chosen)
-        calm = draw_pushes(np.random.default_rng(5), chosen, 0.5)
+        whole = draw_disturbances(np.random.default_rng(5), chosen)
+        calm = draw_disturbances(np.random.default_rng(5), chosen, 0.5)
         for one, other in zip(whole, calm, strict=True):
             assert one[:4] == other[:4]
-            assert other.numbers[6] == pytest.approx(0.5 * one.numbers[6])
+            assert other.parameters[6] == pytest.approx(0.5 * one.parameters[6])

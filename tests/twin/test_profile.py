@@ -36,7 +36,7 @@ def test_an_unknown_one_is_refused(name):
         profile(name)
 
 
-def test_a_profile_cannot_be_turned():
+def test_a_profile_is_immutable():
     with pytest.raises(AttributeError, match="immutable"):
         profile("reference").grip = 9.0
     assert isinstance(profile("reference"), Profile)

@@ -3,18 +3,18 @@ import pytest
 from msgspec.structs import replace
 
 from holdfast.contact import Phase
-from holdfast.twin.operator import Push
+from holdfast.twin.operator import Disturbance
 from holdfast.twin.profile import profile
 from holdfast.twin.protocol import (
-    CLOSED,
-    HAND_OVER,
+    CLOSED_GAP,
+    CLOSING_TIMEOUT,
+    GRIP_CONFIRM_TIME,
+    HAND_OVER_TIME,
+    LOST_CONTACT_TIME,
     LOST_DISTANCE,
-    LOST_SECONDS,
-    OPEN,
+    OPEN_GAP,
     OPENING_SPEED,
-    PATIENCE,
-    PERSISTENCE,
-    SETTLE,
+    SETTLE_TIME,
     Plan,
     Protocol,
 )
@@ -23,27 +23,27 @@ PERIOD = 1 / 150
 BEFORE, AFTER, HOLD, SPEED = 0.5, 0.4, 2.0, 0.02
 SHORT = replace(profile("reference"), hold=HOLD)
 GRIPS = np.array([3.6, 2.0, 2.0, 2.0])
-PUSH = Push(1.0, 0.5, "down", 0, np.zeros(9))
+PUSH = Disturbance(1.0, 0.5, "down", 0, np.zeros(9))
 TOUCHED = 0.001  # depth at which the pads of this hand touch [m]
 
 
 class Table:
-    """A protocol on a table where loads go with depths, 4 N/mm; the rest is told."""
+    """A protocol on a table where loads go with depths, 4 N/mm; the slip is given."""
 
-    def __init__(self, pushes=(), grips=GRIPS, before=BEFORE):
-        self.protocol = Protocol(Plan(SHORT, grips, SPEED, before, AFTER, pushes), PERIOD)
-        self.thing = np.zeros(18)
-        self.thing[3:12] = np.eye(3).ravel()
+    def __init__(self, disturbances=(), grips=GRIPS, before=BEFORE):
+        self.protocol = Protocol(Plan(SHORT, grips, SPEED, before, AFTER, disturbances), PERIOD)
+        self.item = np.zeros(18)
+        self.item[3:12] = np.eye(3).ravel()
         self.times, self.commands = [], []
 
     def run(self, loads=lambda time, depths: 4000 * (TOUCHED - depths), slip=0.0, limit=40.0):
-        depths = np.full(4, OPEN)
+        depths = np.full(4, OPEN_GAP)
         for k in range(round(limit / PERIOD)):
             time = k * PERIOD
-            if self.protocol.over(time):
+            if self.protocol.is_over(time):
                 break
             forces = np.maximum(0.0, loads(time, depths))
-            command = self.protocol.command(time, forces, slip, self.thing)
+            command = self.protocol.command(time, forces, slip, self.item)
             depths = command.depths.copy()
             self.times.append(time)
             self.commands.append(command._replace(depths=depths))
@@ -51,10 +51,10 @@ class Table:
 
     def phases(self):
         """Each phase with when it begins, in order."""
-        told = [command.phase for command in self.commands]
+        phases = [command.phase for command in self.commands]
         return [
             (phase, time)
-            for phase, before, time in zip(told, [None, *told], self.times, strict=False)
+            for phase, before, time in zip(phases, [None, *phases], self.times, strict=False)
             if phase != before
         ]
 
@@ -72,7 +72,7 @@ def test_phases_come_in_their_order():
     assert table.phases()[1][1] == pytest.approx(BEFORE, abs=PERIOD)
     assert phases[Phase.LOCKED] == pytest.approx(table.protocol.locked_at + PERIOD)
     held = phases[Phase.RELEASED] - table.protocol.locked_at
-    assert held == pytest.approx(HOLD + HAND_OVER, abs=2 * PERIOD)
+    assert held == pytest.approx(HOLD + HAND_OVER_TIME, abs=2 * PERIOD)
     assert table.times[-1] - phases[Phase.RELEASED] == pytest.approx(AFTER, abs=2 * PERIOD)
     assert not table.protocol.failed
     assert table.protocol.lost_at is None
@@ -85,12 +85,12 @@ def test_each_finger_stops_at_its_grip_and_all_settle_before_the_lock():
     locked = table.times.index(table.protocol.locked_at)
     np.testing.assert_allclose(depths[locked], expected, atol=2 * SPEED * PERIOD)
     still = (np.abs(np.diff(depths, axis=0)) == 0).all(axis=1)
-    settled = int((SETTLE + PERSISTENCE) / PERIOD)
+    settled = int((SETTLE_TIME + GRIP_CONFIRM_TIME) / PERIOD)
     assert still[locked - settled : locked].all()
     assert not still[locked - settled - 3 : locked - settled].all()
 
 
-@pytest.mark.parametrize("seconds", [PERIOD, 0.9 * PERSISTENCE])
+@pytest.mark.parametrize("seconds", [PERIOD, 0.9 * GRIP_CONFIRM_TIME])
 def test_a_spike_of_load_stops_no_finger(seconds):
     def loads(time, depths):
         spike = 5.0 if 1.0 <= time < 1.0 + seconds else 0.0
@@ -103,16 +103,16 @@ def test_a_spike_of_load_stops_no_finger(seconds):
 
 
 def test_a_finger_over_its_grip_waits_and_has_stopped_once_that_lasts():
-    over = 1.0 + 2 * PERSISTENCE
+    over = 1.0 + 2 * GRIP_CONFIRM_TIME
 
     def loads(time, depths):
         return np.full(4, 5.0 if 1.0 <= time < over else 0.0)
 
     table = Table().run(loads)
     times, depths = np.array(table.times), table.column("depths")
-    halted = depths[(times >= 1.0) & (times < BEFORE + PATIENCE)]
+    halted = depths[(times >= 1.0) & (times < BEFORE + CLOSING_TIMEOUT)]
     assert (halted == halted[0]).all()
-    assert (halted > CLOSED).all()
+    assert (halted > CLOSED_GAP).all()
 
 
 def test_fingers_close_and_open_at_their_speeds():
@@ -121,8 +121,8 @@ def test_fingers_close_and_open_at_their_speeds():
     steps = np.diff(depths) / PERIOD
     np.testing.assert_allclose(steps[steps < 0], -SPEED, rtol=1e-9)
     np.testing.assert_allclose(steps[steps > 1e-9][:-1], OPENING_SPEED, rtol=1e-9)
-    assert depths[0] == OPEN
-    assert depths.min() >= CLOSED - SPEED * PERIOD
+    assert depths[0] == OPEN_GAP
+    assert depths.min() >= CLOSED_GAP - SPEED * PERIOD
 
 
 def test_the_operator_lets_go_and_takes_back_in_ramps():
@@ -130,31 +130,33 @@ def test_the_operator_lets_go_and_takes_back_in_ramps():
     times, hold = np.array(table.times), table.column("hold")
     locked = table.protocol.locked_at
     held_for = times - locked
-    released = locked + HOLD + HAND_OVER
+    released = locked + HOLD + HAND_OVER_TIME
     assert (hold[held_for <= 0] == 1.0).all()
-    going = (held_for > 0) & (held_for < HAND_OVER)
-    np.testing.assert_allclose(hold[going], 1 - held_for[going] / HAND_OVER)
-    assert (hold[(held_for > HAND_OVER + PERIOD) & (held_for < HOLD - PERIOD)] == 0.0).all()
+    going = (held_for > 0) & (held_for < HAND_OVER_TIME)
+    np.testing.assert_allclose(hold[going], 1 - held_for[going] / HAND_OVER_TIME)
+    assert (hold[(held_for > HAND_OVER_TIME + PERIOD) & (held_for < HOLD - PERIOD)] == 0.0).all()
     coming = (held_for > HOLD + PERIOD) & (times < released - PERIOD)
     assert (np.diff(hold[coming]) > 0).all()
-    np.testing.assert_allclose(np.diff(hold[coming]), PERIOD / HAND_OVER, rtol=1e-6)
+    np.testing.assert_allclose(np.diff(hold[coming]), PERIOD / HAND_OVER_TIME, rtol=1e-6)
     assert (hold[times > released + PERIOD] == 1.0).all()
     assert ((hold >= 0) & (hold <= 1)).all()
 
 
-def test_what_never_grips_is_given_up():
+def test_a_grasp_that_never_grips_times_out():
     table = Table().run(loads=lambda time, depths: np.array([4.0, 2.5, 2.5, 0.0]))
     assert table.protocol.failed
     assert table.protocol.locked_at is None
     phases = table.column("phase")
     assert Phase.LOCKED not in phases
     assert Phase.RELEASED in phases
-    assert table.times[-1] == pytest.approx(BEFORE + PATIENCE + HAND_OVER + AFTER, abs=3 * PERIOD)
+    assert table.times[-1] == pytest.approx(
+        BEFORE + CLOSING_TIMEOUT + HAND_OVER_TIME + AFTER, abs=3 * PERIOD
+    )
     assert (table.column("hold") == 1.0).all()
 
 
-def test_a_grip_that_comes_too_late_locks_no_more():
-    late = BEFORE + PATIENCE + 0.1
+def test_a_grip_after_the_timeout_does_not_lock():
+    late = BEFORE + CLOSING_TIMEOUT + 0.1
     table = Table().run(
         loads=lambda time, _: np.array([4.0, 2.5, 2.5, 2.5 if time > late else 0.0])
     )
@@ -170,7 +172,7 @@ def test_an_object_that_moves_far_is_lost():
         locked = table.protocol.locked_at
         if locked is not None and time > locked + 1.0 and not moved:
             moved.append(time)
-            table.thing[2] -= 1.01 * LOST_DISTANCE
+            table.item[2] -= 1.01 * LOST_DISTANCE
         return 4000 * (TOUCHED - depths)
 
     table.run(loads)
@@ -179,11 +181,11 @@ def test_an_object_that_moves_far_is_lost():
     after = [c for c, t in zip(table.commands, table.times, strict=True) if t >= moved[0]]
     assert all(c.hold == 0.0 for c in after)  # it is not caught
     assert after[0].phase == Phase.FREE
-    assert all(c.push == -1 for c in after)
+    assert all(c.disturbance == -1 for c in after)
 
 
 @pytest.mark.parametrize("n_left", [0, 1, 2])
-@pytest.mark.parametrize("seconds", [0.5 * LOST_SECONDS, 2 * LOST_SECONDS])
+@pytest.mark.parametrize("seconds", [0.5 * LOST_CONTACT_TIME, 2 * LOST_CONTACT_TIME])
 def test_an_object_on_one_finger_for_long_is_lost(n_left, seconds):
     table = Table()
 
@@ -194,20 +196,20 @@ def test_an_object_on_one_finger_for_long_is_lost(n_left, seconds):
         return 4000 * (TOUCHED - depths)
 
     table.run(loads)
-    if n_left == 2 or seconds < LOST_SECONDS:
+    if n_left == 2 or seconds < LOST_CONTACT_TIME:
         assert table.protocol.lost_at is None
         assert not table.protocol.failed
     else:
-        wanted = table.protocol.locked_at + 0.8 + LOST_SECONDS
+        wanted = table.protocol.locked_at + 0.8 + LOST_CONTACT_TIME
         assert table.protocol.lost_at == pytest.approx(wanted, abs=3 * PERIOD)
 
 
 @pytest.mark.parametrize(("slip", "phase"), [(0.0, Phase.DISTURBED), (0.01, Phase.SLIPPING)])
-def test_a_push_is_told_with_its_time(slip, phase):
+def test_a_disturbance_has_its_index_and_time(slip, phase):
     table = Table([PUSH]).run(slip=slip)
-    times, pushes = np.array(table.times), table.column("push")
+    times, disturbances = np.array(table.times), table.column("disturbance")
     locked = table.protocol.locked_at
-    under_way = pushes == 0
+    under_way = disturbances == 0
     assert times[under_way][0] - locked == pytest.approx(PUSH.start, abs=PERIOD)
     assert under_way.sum() == pytest.approx(PUSH.duration / PERIOD, abs=1)
     np.testing.assert_allclose(
@@ -220,15 +222,15 @@ def test_a_push_is_told_with_its_time(slip, phase):
     assert (table.column("hold")[under_way] == 0.0).all()
 
 
-def test_the_operator_wants_the_object_where_it_was():
+def test_the_operator_holds_the_object_where_it_was():
     table = Table()
-    table.thing[:3] = 1.0, 2.0, 3.0
+    table.item[:3] = 1.0, 2.0, 3.0
     places = []
 
     def loads(time, depths):
         places.append(table.protocol.anchor[:3].copy())
         if table.protocol.locked_at is not None and len(table.protocol.anchor):
-            table.thing[0] = 1.01
+            table.item[0] = 1.01
         return 4000 * (TOUCHED - depths)
 
     table.run(loads)

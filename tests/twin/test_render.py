@@ -1,4 +1,4 @@
-"""Pictures show what is there; films keep their pictures; what cannot be is said in one line."""
+"""Pictures show hand, object and forces; films keep their pictures; errors are one line."""
 
 import os
 import shutil
@@ -15,16 +15,16 @@ from holdfast.errors import OutputError
 from holdfast.twin import render as module
 from holdfast.twin.grasp import closing_path, object_pose
 from holdfast.twin.hand import N_JOINTS, HandModel
-from holdfast.twin.objects import load_things, thing
-from holdfast.twin.render import Camera, Studio, check_film, render, save_picture, save_video
+from holdfast.twin.objects import load_objects, object_named
+from holdfast.twin.render import Camera, Renderer, check_film, render, save_picture, save_video
 
-BLUE, ORANGE, RED = (0.36, 0.62, 0.80), (0.95, 0.55, 0.18), module.GLOW[:3]
+BLUE, ORANGE, RED = (0.36, 0.62, 0.80), (0.95, 0.55, 0.18), module.ARROW_COLOUR[:3]
 
 
 def held(name="can"):
-    hand = HandModel.build(thing(name))
-    hand.data.qpos[:N_JOINTS] = closing_path(thing(name)).targets(np.zeros(4))
-    hand.data.qpos[N_JOINTS : N_JOINTS + 3], turn = object_pose(thing(name))
+    hand = HandModel.build(object_named(name))
+    hand.data.qpos[:N_JOINTS] = closing_path(object_named(name)).targets(np.zeros(4))
+    hand.data.qpos[N_JOINTS : N_JOINTS + 3], turn = object_pose(object_named(name))
     hand.data.qpos[N_JOINTS + 3 :] = np.cos(turn / 2), 0, 0, np.sin(turn / 2)
     mujoco.mj_forward(hand.model, hand.data)
     return hand
@@ -36,13 +36,13 @@ def hand():
 
 
 @pytest.fixture(scope="module")
-def studio(hand):
+def renderer(hand):
     try:
-        studio = Studio(hand.model, 160, 120)
+        renderer = Renderer(hand.model, 160, 120)
     except OutputError as cause:
         pytest.skip(str(cause))
-    yield studio
-    studio.close()
+    yield renderer
+    renderer.close()
 
 
 def share(picture, colour):
@@ -62,8 +62,8 @@ def films():
 
 
 class TestPictures:
-    def test_show_object_and_fingertips_before_a_light_background(self, studio, hand):
-        picture = studio.picture(hand.data)
+    def test_show_object_and_fingertips_before_a_light_background(self, renderer, hand):
+        picture = renderer.picture(hand.data)
         assert picture.shape == (120, 160, 3)
         assert picture.dtype == np.uint8
         assert (picture[:4] > 220).all()
@@ -71,25 +71,25 @@ class TestPictures:
         assert 0.01 < share(picture, ORANGE) < 0.2
         assert share(picture, RED) == 0.0
 
-    @pytest.mark.parametrize("name", [name for name in load_things() if name != "can"])
-    def test_show_every_shape(self, studio, name):
+    @pytest.mark.parametrize("name", [name for name in load_objects() if name != "can"])
+    def test_show_every_shape(self, renderer, name):
         other = held(name)
         picture = render(other.model, other.data, 160, 120)
         assert 0.03 < share(picture, BLUE) < 0.4
 
-    def test_of_the_same_state_are_the_same(self, studio, hand):
-        pictures = [studio.picture(hand.data) for _ in range(2)]
+    def test_of_the_same_state_are_the_same(self, renderer, hand):
+        pictures = [renderer.picture(hand.data) for _ in range(2)]
         np.testing.assert_array_equal(*pictures)
         np.testing.assert_array_equal(pictures[0], render(hand.model, hand.data, 160, 120))
 
-    def test_stand_upright(self, studio, hand):
+    def test_stand_upright(self, renderer, hand):
         low = Camera((0.108, -0.021, 0.1), 0.4, 162.0, 0.0)  # looks above the object
         picture = render(hand.model, hand.data, 160, 120, low)
         assert share(picture[60:], BLUE) > 10 * share(picture[:60], BLUE)
 
-    def test_show_forces_as_arrows_that_end_at_their_points(self, studio, hand):
+    def test_show_forces_as_arrows_that_end_at_their_points(self, renderer, hand):
         view = Camera((0.3, 0.0, 0.0), 0.3, 180.0, 0.0)  # looks along -x, right is y
-        force = 0.05 / module.NEWTON
+        force = 0.05 / module.ARROW_LENGTH_PER_NEWTON
         forces = np.array([[0.3, 0.04, 0.0, 0.0, force, 0.0]])
         before = render(hand.model, hand.data, 160, 120, view)
         after = render(hand.model, hand.data, 160, 120, view, forces)
@@ -99,14 +99,16 @@ class TestPictures:
         assert places.max() == pytest.approx(0.04, abs=0.004)
         assert places.min() == pytest.approx(-0.01, abs=0.004)
 
-    def test_leave_out_forces_that_are_none(self, studio, hand):
+    def test_leave_out_forces_of_zero_or_nan(self, renderer, hand):
         nothing = np.array([[0.1, 0, 0, 0, 0, 0.01], [0.1, 0, 0, 0, np.nan, 0]])
-        np.testing.assert_array_equal(studio.picture(hand.data, nothing), studio.picture(hand.data))
+        np.testing.assert_array_equal(
+            renderer.picture(hand.data, nothing), renderer.picture(hand.data)
+        )
 
     @pytest.mark.parametrize("size", [(0, 10), (10, -1), (5000, 100)])
-    def test_have_a_size_that_can_be(self, hand, size):
+    def test_of_an_invalid_size_are_refused(self, hand, size):
         with pytest.raises(ValueError, match=r"^a picture of 1 x 1 to 1280 x 960 pixels expected"):
-            Studio(hand.model, *size)
+            Renderer(hand.model, *size)
 
     def test_are_saved(self, tmp_path):
         picture = films()[1]
@@ -128,12 +130,16 @@ class TestFilms:
 
     @pytest.mark.parametrize("name", ["film.avi", "film", "film.png.txt"])
     def test_of_no_format_are_refused(self, tmp_path, name):
-        with pytest.raises(ValueError, match=r"a film ends in .gif, .png, .webp, .mp4; 'film"):
+        with pytest.raises(
+            ValueError, match=r"^a film with the suffix .gif, .png, .webp, .mp4 expected, 'film"
+        ):
             save_video(films(), tmp_path / name, 20.0)
         assert not list(tmp_path.iterdir())
 
     def test_of_no_pictures_are_refused(self, tmp_path):
-        with pytest.raises(ValueError, match=r"^a film of no pictures$"):
+        with pytest.raises(
+            ValueError, match=r"^a film of at least one picture expected, none given$"
+        ):
             save_video([], tmp_path / "film.gif", 20.0)
 
     def test_as_mp4_need_ffmpeg(self, monkeypatch):
@@ -147,10 +153,10 @@ class TestFilms:
         save_video(films(), tmp_path / "film.mp4", 20.0)
         assert (tmp_path / "film.mp4").read_bytes() == b"".join(f.tobytes() for f in films())
 
-    def test_that_ffmpeg_refuses_tell_why(self, tmp_path, monkeypatch):
+    def test_have_the_error_of_ffmpeg(self, tmp_path, monkeypatch):
         stand_in(tmp_path, monkeypatch, "echo first >&2; echo no space >&2; exit 1")
         big = [np.zeros((400, 400, 3), dtype=np.uint8)] * 3  # more than a pipe holds
-        with pytest.raises(OutputError, match=r"^cannot write film.mp4: ffmpeg says no space$"):
+        with pytest.raises(OutputError, match=r"^cannot write film.mp4: ffmpeg reports no space$"):
             save_video(big, tmp_path / "film.mp4", 20.0)
 
     @pytest.mark.skipif(shutil.which("ffmpeg") is None, reason="ffmpeg is not installed")
@@ -171,18 +177,18 @@ class TestNoRenderer:
     CODE = """
 from holdfast.errors import OutputError
 from holdfast.twin.hand import HandModel
-from holdfast.twin.objects import thing
-from holdfast.twin.render import Studio
+from holdfast.twin.objects import object_named
+from holdfast.twin.render import Renderer
 try:
-    Studio(HandModel.build(thing("can")).model)
+    Renderer(HandModel.build(object_named("can")).model)
 except OutputError as refusal:
     print(refusal)
 """
 
-    def test_is_told_in_one_line(self):
+    def test_is_an_error_of_one_line(self):
         environment = os.environ | {"MUJOCO_GL": "osmesa", "PYOPENGL_PLATFORM": "egl"}
         command = [sys.executable, "-c", self.CODE]
         run = subprocess.run(command, env=environment, capture_output=True, text=True, check=True)
-        assert run.stdout.startswith("no pictures here: the renderer 'osmesa' does not start (")
-        assert run.stdout.endswith("or choose one by MUJOCO_GL=egl, osmesa or glfw\n")
+        assert run.stdout.startswith("cannot render: MuJoCo's back end 'osmesa' does not start (")
+        assert run.stdout.endswith("or choose one with MUJOCO_GL=egl, osmesa or glfw\n")
         assert run.stdout.count("\n") == 1

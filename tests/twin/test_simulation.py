@@ -9,9 +9,9 @@ from holdfast.contact import Cause, ContactState, Phase
 from holdfast.features import fingertip_force
 from holdfast.io import load_recording, save_recording
 from holdfast.twin import control, hand, simulation, world
-from holdfast.twin.objects import OTHER_OBJECTS, load_things, thing
+from holdfast.twin.objects import OTHER_OBJECTS, load_objects, object_named
 from holdfast.twin.profile import profile
-from holdfast.twin.protocol import TOUCH
+from holdfast.twin.protocol import CONTACT_LOAD
 from holdfast.twin.simulation import Grasp, simulate
 from holdfast.twin.uskin_parameters import UskinParameters
 
@@ -22,7 +22,7 @@ GRAVITY = 9.81
 
 
 def made(grasp, chosen=SHORT, glitches=0.0, **modules):
-    """A recording of a short grasp whose controller has so many glitches a second."""
+    """A recording of a short grasp whose controller has that many glitches per second."""
     with pytest.MonkeyPatch.context() as patch:
         chosen = msgspec.structs.replace(chosen, glitch_rate=glitches)
         patch.setattr(simulation, "profile", lambda _: chosen)
@@ -71,12 +71,12 @@ def on_object(recording, span):
 class TestHeldObject:
     @pytest.mark.parametrize(
         ("name", "table"),
-        [(name, table) for table in (None, OTHER_OBJECTS) for name in load_things(table)],
+        [(name, table) for table in (None, OTHER_OBJECTS) for name in load_objects(table)],
     )
     def test_its_weight_is_the_sum_of_the_contact_forces(self, name, table):
         recording = made(Grasp(name, 1, 1, table=table))
         weight = GRAVITY * recording.metadata["object_mass"]
-        assert recording.metadata["object_mass"] == thing(name, table).mass
+        assert recording.metadata["object_mass"] == object_named(name, table).mass
         total = on_object(recording, quiet(recording)).mean(axis=0)
         np.testing.assert_allclose(total, [0, 0, weight], atol=0.02 * weight)
 
@@ -97,7 +97,7 @@ class TestHeldObject:
             drift = np.linalg.norm(seen[-1] - seen[0]) / (times[-1] - times[0])
             assert drift < 1e-5
 
-    def test_nobody_else_touches_it(self, held):
+    def test_no_outside_force_acts(self, held):
         assert not held.truth.hand["outside_force"][quiet(held)].any()
 
     def test_the_operator_carries_it_before(self, held):
@@ -110,7 +110,7 @@ class TestHeldObject:
             Grasp("can", 1, 1),
             SUBSTEPS=2 * hand.SUBSTEPS,
             TIMESTEP=hand.TIMESTEP / 2,
-            EVERY=2 * control.EVERY,
+            STEPS_PER_CONTROL=2 * control.STEPS_PER_CONTROL,
         )
         loads = [
             {
@@ -150,7 +150,7 @@ class TestTruth:
     def any_recording(self, request):
         return request.getfixturevalue(request.param)
 
-    def test_has_all_that_is_promised(self, any_recording):
+    def test_has_all_documented_arrays(self, any_recording):
         truth, n = any_recording.truth, len(any_recording.truth.times)
         assert {name: array.shape for name, array in truth.hand.items()} == {
             "phase": (n,), "outside_force": (n, 3), "object_pose": (n, 7), "joints": (n, 16),
@@ -167,7 +167,7 @@ class TestTruth:
             np.testing.assert_array_equal(module.times, truth.times)
 
     def test_is_possible(self, any_recording):
-        truth, item = any_recording.truth, thing(any_recording.metadata["object"])
+        truth, item = any_recording.truth, object_named(any_recording.metadata["object"])
         assert set(truth.hand["phase"]) <= set(Phase)
         poses = truth.hand["object_pose"]
         np.testing.assert_allclose(np.linalg.norm(poses[:, 3:], axis=1), 1.0, atol=1e-9)
@@ -183,7 +183,7 @@ class TestTruth:
 
     def test_friction_keeps_to_coulombs_limit(self, held):
         """On a can all normals of a fingertip lie within its patch, near that of its middle."""
-        span, mu = quiet(held), thing("can").mu_static
+        span, mu = quiet(held), object_named("can").mu_static
         poses = held.truth.hand["object_pose"][span]
         for finger in held.truth.fingers.values():
             force = turns(poses).inv().apply(finger["contact_force"][span])
@@ -214,26 +214,26 @@ class TestTruth:
             given = force[k : k + 299].sum(axis=0) / 150
             np.testing.assert_allclose(gained, given, atol=0.02)
 
-    def test_outside_forces_act_while_somebody_holds_or_pushes(self, pushed):
+    def test_outside_forces_act_only_while_the_operator_holds_or_pushes(self, pushed):
         phase = pushed.truth.hand["phase"]
         force = np.linalg.norm(pushed.truth.hand["outside_force"], axis=1)
-        troubled = np.isin(phase, [Phase.DISTURBED, Phase.SLIPPING])
-        assert force[troubled].max() > 0.5
+        disturbed = np.isin(phase, [Phase.DISTURBED, Phase.SLIPPING])
+        assert force[disturbed].max() > 0.5
         since = pushed.truth.times - pushed.metadata["locked_at"]
         alone = (phase == Phase.LOCKED) & (since > 0.3) & (since < 7.9)
-        assert force[alone].max() < TOUCH
+        assert force[alone].max() < CONTACT_LOAD
 
     def test_a_disturbance_lasts_from_its_first_touch_to_its_last(self, pushed):
         phase = pushed.truth.hand["phase"]
         force = np.linalg.norm(pushed.truth.hand["outside_force"], axis=1)
-        troubled = np.isin(phase, [Phase.DISTURBED, Phase.SLIPPING]).astype(int)
-        edges = np.diff(np.concatenate([[0], troubled, [0]]))
+        disturbed = np.isin(phase, [Phase.DISTURBED, Phase.SLIPPING]).astype(int)
+        edges = np.diff(np.concatenate([[0], disturbed, [0]]))
         starts, ends = np.flatnonzero(edges > 0), np.flatnonzero(edges < 0)
         assert len(starts) >= 2
-        assert (force[starts] > TOUCH).all()
-        assert (force[ends - 1] > TOUCH).all()
-        assert (force[starts - 1] <= TOUCH).all()
-        assert (force[ends] <= TOUCH).all()
+        assert (force[starts] > CONTACT_LOAD).all()
+        assert (force[ends - 1] > CONTACT_LOAD).all()
+        assert (force[starts - 1] <= CONTACT_LOAD).all()
+        assert (force[ends] <= CONTACT_LOAD).all()
 
 
 class TestRecording:
@@ -246,7 +246,7 @@ class TestRecording:
         assert held.metadata["lost_at"] is None
         assert held.metadata["source"] == "twin"
 
-    def test_a_failed_grasp_says_so(self, dropped):
+    def test_a_failed_grasp_has_the_case_failed(self, dropped):
         assert dropped.name == "bottle-case1-1-failed1"
         assert (dropped.metadata["case"], dropped.metadata["planned_case"]) == ("failed", 1)
         lost = dropped.metadata["lost_at"]
@@ -276,9 +276,9 @@ class TestRecording:
         n_pushed = 0
         phase = pushed.truth.hand["phase"]
         for module in pushed.modules.values():
-            troubled = np.isin(phase, [Phase.DISTURBED, Phase.SLIPPING])
-            assert troubled.any()
-            assert (module.label_states[troubled] == ContactState.UNSTABLE.code).all()
+            disturbed = np.isin(phase, [Phase.DISTURBED, Phase.SLIPPING])
+            assert disturbed.any()
+            assert (module.label_states[disturbed] == ContactState.UNSTABLE.code).all()
             causes = [label.cause for label in module.labels]
             n_pushed += causes.count(Cause.DISTURBANCE) + causes.count(Cause.SLIP)
         assert n_pushed >= 4
@@ -319,28 +319,28 @@ class TestSeeds:
         assert (thumb.n_repeats > 0) == ("server" in change)
         assert (np.ptp(np.diff(thumb.times)) > 1e-6) == ("server" in change)
 
-    def test_watching_changes_nothing(self, held):
+    def test_a_callback_changes_nothing(self, held):
         seen = []
         with pytest.MonkeyPatch.context() as patch:
             quiet_hand = msgspec.structs.replace(SHORT, glitch_rate=0.0)
             patch.setattr(simulation, "profile", lambda _: quiet_hand)
             watched = simulate(
-                Grasp("can", 1, 1), watch=lambda world, command: seen.append(command.phase)
+                Grasp("can", 1, 1), on_sample=lambda world, command: seen.append(command.phase)
             )
         assert watched.digest == held.digest
         assert seen == list(held.truth.hand["phase"])
 
 
 @pytest.mark.parametrize(
-    ("grasp", "told"),
+    ("grasp", "message"),
     [
         (Grasp("cup", 1, 1), "no object 'cup'; there are ball, box"),
         (Grasp("can", 3, 1), "case 1 or 2 expected, 3 given"),
         (Grasp("can", 1, 1, "rough"), "unknown profile 'rough'"),
     ],
 )
-def test_what_there_is_not_is_refused(grasp, told):
-    with pytest.raises(ValueError, match=told):
+def test_an_unknown_object_case_or_profile_is_refused(grasp, message):
+    with pytest.raises(ValueError, match=message):
         simulate(grasp)
 
 

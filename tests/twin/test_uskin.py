@@ -56,7 +56,7 @@ def test_shares_are_a_partition_of_unity():
     assert shares.shape == (len(SKIN.nodes), 30)
     assert (shares >= 0).all()
     np.testing.assert_allclose(shares.sum(axis=1), 1.0, atol=1e-14)
-    assert (shares.sum(axis=0) > 1.0).all()  # every taxel sees some nodes
+    assert (shares.sum(axis=0) > 1.0).all()  # every taxel has some nodes
 
 
 def test_a_node_on_a_taxel_is_mostly_its_own_and_walls_do_not_couple():
@@ -87,7 +87,7 @@ def test_taxel_forces_sum_to_the_force_on_the_object(seed, scale):
 
 
 def test_a_pressed_pad_reads_positive():
-    """The object pushes the pad's middle inwards, against x; the reading says +z and +F_x."""
+    """The object pushes the pad's middle inwards, against x; the readings are +z and +F_x."""
     pad = np.linalg.norm(SKIN.nodes - [0.0257, 0.0, 0.0168], axis=1) < 3e-3
     forces = np.zeros((2, len(SKIN.nodes), 3))
     forces[1, pad, 0] = -2.0 / pad.sum()
@@ -343,7 +343,7 @@ def test_another_sensor_does_as_well():
         (np.zeros((2, 30, 3)), [0], r"\(2, 30, 3\) and \(1,\) given"),
         (np.full((2, 30, 3), np.nan), [0, 1], "finite taxel forces and times expected"),
         (np.zeros((2, 30, 3)), [0, np.inf], "finite taxel forces and times expected"),
-        (np.zeros((2, 30, 3)), [1, 1], "times that increase expected"),
+        (np.zeros((2, 30, 3)), [1, 1], "increasing times expected"),
     ],
 )
 def test_bad_samples_are_refused(forces, times, message):
@@ -354,7 +354,7 @@ def test_bad_samples_are_refused(forces, times, message):
 def test_time_that_runs_back_between_pieces_is_refused():
     run = tip().readout()
     run.counts(np.zeros((1, 30, 3)), [1.0])
-    with pytest.raises(ValueError, match="times that increase expected"):
+    with pytest.raises(ValueError, match="increasing times expected"):
         run.counts(np.zeros((1, 30, 3)), [1.0])
 
 

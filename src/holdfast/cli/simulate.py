@@ -138,11 +138,11 @@ def plan_grasps(
     Raises:
         ValueError: an unknown object, case or profile, or a number out of range.
     """
-    from holdfast.twin.objects import load_things
+    from holdfast.twin.objects import load_objects
     from holdfast.twin.profile import profile as check_profile
     from holdfast.twin.simulation import CASES, Grasp
 
-    names = [name.strip() for name in objects.split(",")] if objects else list(load_things(table))
+    names = [name.strip() for name in objects.split(",")] if objects else list(load_objects(table))
     check_profile(profile)
     if not {case.strip() for case in cases.split(",")} <= {str(case) for case in CASES}:
         raise ValueError(f"--cases 1, 2 or 1,2 expected, {cases!r} given")
@@ -157,7 +157,7 @@ def plan_grasps(
         for name, case, repeat in product(names, chosen, range(1, repeats + 1))
     ]
     for grasp in grasps:
-        grasp.thing  # noqa: B018 (raises for an unknown object before the simulation starts)
+        grasp.item  # noqa: B018 (raises for an unknown object before the simulation starts)
     return grasps
 
 
@@ -208,7 +208,7 @@ def _remove_others(grasp: "Grasp", out: Path, names: "Sequence[str]") -> None:
 
 def _write_video(grasp: "Grasp", video: Path, force: bool) -> None:
     from holdfast.files import whole_file
-    from holdfast.twin.film import film
+    from holdfast.twin.render import film
 
     print_message(f"rendering {grasp.name}: about a minute")
     with whole_file(video, force=force) as part:

@@ -137,7 +137,7 @@ def grasp_of(address: Address) -> Grasp:
     )
     try:
         profile(grasp.profile)
-        grasp.thing  # noqa: B018 (refuses an unknown object)
+        grasp.item  # noqa: B018 (refuses an unknown object)
     except ValueError as cause:
         raise ValueError(f"{address.text}: {cause}") from cause
     if grasp.case not in CASES or grasp.repeat < 1:

@@ -1,1 +1,1 @@
-"""A physical twin of the experiment: deterministic physics, from a seed, without a clock."""
+"""Simulation of the experiment: deterministic physics from a seed, without a clock."""

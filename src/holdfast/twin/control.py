@@ -1,7 +1,7 @@
-"""The position controller of the hand: a plain PD with what a real one adds to it.
+"""Position controller of the hand: PD control with the imperfections of a real controller.
 
-Encoders and torques have steps, torques have noise and limits, gravity is compensated almost,
-and now and then a set-point jumps for a moment, the glitches that the paper reports.
+Encoders and torques are quantised, torques have noise and limits, and gravity is compensated
+only in part. Now and then a set-point jumps for a moment: the glitches that the paper reports.
 """
 
 from typing import NamedTuple
@@ -12,32 +12,32 @@ from holdfast.compiled import compiled
 from holdfast.sensors.types import Array
 from holdfast.twin.hand import JOINTS, N_JOINTS
 
-EVERY = 3
-"""Steps of the physics between two of the controller: 350 Hz; the real one runs at 333 Hz."""
+STEPS_PER_CONTROL = 3
+"""Physics steps per control step, which gives 350 Hz; the real controller runs at 333 Hz."""
 PROPORTIONAL = np.tile([2.2, 2.6, 2.0, 1.5], 4)
-"""By joint of a finger [N m/rad]; between the gains that the vendor's two drivers ship."""
+"""Gain of each joint [N m/rad], between the gains of the vendor's two drivers."""
 DERIVATIVE = 0.03
-"""[N m s/rad]: rings a little at 6 to 8 Hz, as the real hand does."""
+"""Gain of each joint [N m s/rad]; the hand rings a little at 6 to 8 Hz, like the real one."""
 ENCODER_STEP = 333.3 / 65536 * np.pi / 180
-"""Of the joint angles [rad], by the hand's protocol."""
+"""Resolution of the joint angles [rad], from the hand's protocol."""
 TORQUE_STEP, TORQUE_NOISE, TORQUE_LIMIT = 1e-3, 1.5e-3, 0.7
-"""[N m]: step of the PWM, own choice of its noise, and the hand's nominal limit. The clamps of the
-vendor's ROS driver (0.225 N m at the end of the thumb) would let it press with 2 N at most."""
+"""Step of the PWM, noise (own choice) and nominal limit of the hand [N m]. With the limits of the
+vendor's ROS driver (0.225 N m at the end of the thumb) it could press with at most 2 N."""
 COMPENSATION = (0.90, 1.05)
-"""Share of gravity that is compensated; drawn once for each joint."""
+"""Range of the compensated share of gravity, drawn once for each joint."""
 GLITCH_ERROR, GLITCH_TICKS = 0.08, (2, 8)
-"""Of a glitch: standard deviation of the set-point's error [rad], and control steps that it lasts.
-Own choices, after the spikes in the paper's figures. How often they come is in the profile."""
+"""Standard deviation of the set-point's error in a glitch [rad], and its duration in control steps.
+Own choices, after the spikes in the paper's figures. The profile has the rate of glitches."""
 
 
 class Controller(NamedTuple):
-    """What was drawn for a grasp, and what the controller remembers.
+    """Random numbers of the controller for one grasp, and its state.
 
     Attributes:
-        compensation: (16,) share of gravity.
-        noise: (n, 16) of the torques [N m], used in turn.
-        errors: (n_ticks, 16) of the set-points [rad]: the glitches.
-        last: (16,) joint angles at the step before [rad].
+        compensation: (16,) compensated share of gravity.
+        noise: (n, 16) noise of the torques [N m], used in turn.
+        errors: (n_ticks, 16) errors of the set-points in glitches, 0 otherwise [rad].
+        last: (16,) joint angles at the previous step [rad].
     """
 
     compensation: Array
@@ -49,12 +49,12 @@ class Controller(NamedTuple):
 def draw_controller(
     generator: np.random.Generator, duration: float, period: float, glitch_rate: float
 ) -> Controller:
-    """Draw what is random of a controller.
+    """Draw the random numbers of a controller.
 
     Args:
-        generator: of all that is drawn.
-        duration: for which it is needed [s].
-        period: of its steps [s].
+        generator: random number generator.
+        duration: time for which the controller is needed [s].
+        period: period of its steps [s].
         glitch_rate: glitches per second [1/s].
     """
     n_ticks = int(duration / period) + 1
@@ -82,27 +82,27 @@ def control(
     period: float,
     torques: Array,
 ) -> None:
-    """One step: tau = k_p e - k_d dq/dt + gravity, in steps, with noise, within limits.
+    """Compute one step: tau = k_p e - k_d dq/dt + gravity, quantised, with noise and limits.
 
     Args:
-        controller: its last angles are written.
+        controller: the controller; its last angles are written.
         tick: number of the step.
-        joints: (16 or more,) angles [rad].
-        bias: (16 or more,) what gravity and motion need [N m].
+        joints: (16 or more,) joint angles [rad].
+        bias: (16 or more,) torques that balance gravity and motion [N m].
         target: (16,) set-points [rad].
-        period: of the steps [s].
-        torques: (16 or more,) first 16 are filled [N m].
+        period: period of the steps [s].
+        torques: (16 or more,) the first 16 are written [N m].
     """
-    late = min(tick, len(controller.errors) - 1)
-    turn = tick % len(controller.noise)
+    row = min(tick, len(controller.errors) - 1)
+    noise_row = tick % len(controller.noise)
     for j in range(N_JOINTS):
         angle = ENCODER_STEP * np.rint(joints[j] / ENCODER_STEP)
         speed = (angle - controller.last[j]) / period
         if np.isnan(speed):
             speed = 0.0
         controller.last[j] = angle
-        error = target[j] + controller.errors[late, j] - angle
+        error = target[j] + controller.errors[row, j] - angle
         torque = PROPORTIONAL[j] * error - DERIVATIVE * speed
         torque += controller.compensation[j] * bias[j]
-        torque = TORQUE_STEP * np.rint(torque / TORQUE_STEP) + controller.noise[turn, j]
+        torque = TORQUE_STEP * np.rint(torque / TORQUE_STEP) + controller.noise[noise_row, j]
         torques[j] = min(max(torque, -TORQUE_LIMIT), TORQUE_LIMIT)

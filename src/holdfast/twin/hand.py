@@ -1,7 +1,7 @@
-"""The Allegro hand v4 and the object it holds, for MuJoCo: boxes and capsules, no contacts.
+"""Model of the Allegro hand v4 and the object for MuJoCo: boxes and capsules without contacts.
 
-MuJoCo does the dynamics of the bodies. What happens between skin and object is
-`holdfast.twin.contact`, whose forces are applied from outside.
+MuJoCo integrates the motion of the bodies. `holdfast.twin.contact` computes the forces between
+skin and object, which are applied as external forces.
 """
 
 import csv
@@ -13,66 +13,67 @@ import numpy as np
 
 from holdfast.compiled import compiled
 from holdfast.sensors.types import Array
-from holdfast.twin.objects import Thing
+from holdfast.twin.objects import GraspObject
 from holdfast.twin.surface import AXIS
 
 RATE = 150.0
 """Samples per second [Hz]."""
 SUBSTEPS = 7
-"""Steps of the physics a sample."""
+"""Physics steps per sample."""
 TIMESTEP = 1 / (RATE * SUBSTEPS)
 
 GRAVITY = 9.81
-"""[m/s^2]"""
+"""Gravitational acceleration [m/s^2]."""
 FINGERS = ("thumb", "index", "middle", "ring")
-"""The order of fingertips in all arrays of the twin."""
+"""Order of the fingertips in all arrays of the twin."""
 N_JOINTS = 16
-"""Joints 0 to 3 index, 4 to 7 middle, 8 to 11 ring, 12 to 15 thumb, as the driver orders them."""
+"""Number of joints. The driver's order: index (0 to 3), middle, ring, thumb (12 to 15)."""
 JOINTS = {"thumb": 12, "index": 0, "middle": 4, "ring": 8}
 """First joint of each finger."""
 MOUNTS = np.array([[-0.013, 0.0, 0.0315], *[[-0.013, 0.0, 0.016]] * 3])
-"""(4, 3) origin of each fingertip frame in its last link [m], as XELA mounts the tips."""
+"""Origin of each fingertip frame in its last link, (4, 3) [m], as XELA mounts the tips."""
 
 ARMATURE, DAMPING, FRICTION = 6e-4, 0.012, 0.012
-"""Of a joint: inertia of the gear [kg m^2], viscous [N m s/rad] and dry friction [N m]. Own
-choices: small gear motors that can be pushed back by hand."""
+"""Gear inertia [kg m^2], viscous damping [N m s/rad] and dry friction [N m] of a joint. Own
+choices: small gear motors that can be turned back by hand."""
 PALM_MASS, PALM_SIDES, PALM_MIDDLE = 0.4154, (0.0408, 0.113, 0.095), (-0.0093, 0.0, -0.0475)
-"""[kg] and [m]. The vendor's table puts the centre of mass outside of the palm's box: here it is
-in its middle. All inertias are those of the boxes, for the vendor's are not physical."""
+"""Mass [kg], sides and middle [m] of the palm. The vendor's table has the centre of mass outside
+the box of the palm; here it is in its middle. All inertias are those of the boxes, because the
+vendor's are not physical."""
 TIP_MASS = 0.0266
-"""Of the skin [kg], by XELA; it takes the place of a rubber tip of 16.8 g."""
+"""Mass of the skin [kg], from XELA; it replaces a rubber tip of 16.8 g."""
 TIP_RADIUS, TIP_BEGIN, TIP_END = 0.0136, 0.006, 0.022
-"""The capsule that shows the skin: radius, and its ends in the fingertip frame [m]."""
+"""Radius and ends, in the fingertip frame, of the capsule that is drawn for the skin [m]."""
 MIRRORED = np.array([-1.0, 1.0, 1.0, 1.0] * 3 + [1.0] * 4)
-"""Turns joints of one hand into those of the other in the mirrored pose: the vendor's left hand
-spreads its fingers about the same axis as the right one."""
-HINGE = (0.0106, 0.0142)
-"""Radius and half length of the motors that are drawn [m]."""
-SHELL, FRAME, SKIN, THING = ".74 .75 .78 1", ".25 .27 .31 1", ".95 .55 .18 1", ".36 .62 .80 1"
-"""Colours."""
+"""Signs that turn joint angles of one hand into those of the other in the mirrored pose. The
+vendor's left hand spreads its fingers about the same axis as the right hand."""
+MOTOR_SIZE = (0.0106, 0.0142)
+"""Radius and half length of the drawn motors [m]."""
+SHELL_COLOUR, FRAME_COLOUR = ".74 .75 .78 1", ".25 .27 .31 1"
+SKIN_COLOUR, OBJECT_COLOUR = ".95 .55 .18 1", ".36 .62 .80 1"
 
 Rows = list[dict[str, str]]
 
 
-def hand_xml(side: str = "right", thing: Thing | None = None) -> str:
-    """The hand on its side, palm fixed, as an MJCF; with an object where one is given.
+def hand_xml(side: str = "right", item: GraspObject | None = None) -> str:
+    """Return the MJCF of the hand, on its side with the palm fixed, and of the object.
 
-    Palm and world share the x axis. The index finger is on top: the right hand's fingers point
-    along the world's -y, those of the left, its mirror image, along y. They curl about a vertical
-    axis, and gravity pulls along all pads.
+    Palm and world share the x axis. The index finger is on top. The fingers of the right hand
+    point along the world's -y, those of the left hand, its mirror image, along y. They curl
+    about a vertical axis, and gravity acts along all pads.
 
     Args:
-        side: "right", or "left", which is its mirror image.
-        thing: that floats before the hand.
+        side: "right" or "left".
+        item: object that floats before the hand; None for none.
 
     Raises:
-        ValueError: another side.
+        ValueError: the side is neither of the two.
     """
     if side not in ("right", "left"):
         raise ValueError(f"side 'right' or 'left' expected, {side!r} given")
     rows = [_mirrored(row) if side == "left" else row for row in _table()]
     turn = np.pi / 2 if side == "right" else -np.pi / 2
-    body = "" if thing is None else _object_xml(thing)
+    body = "" if item is None else _object_xml(item)
     return f"""<mujoco model="allegro {side}">
   <compiler angle="radian" eulerseq="XYZ"/>
   <option timestep="{TIMESTEP!r}" integrator="implicitfast" gravity="0 0 {-GRAVITY}"/>
@@ -81,7 +82,7 @@ def hand_xml(side: str = "right", thing: Thing | None = None) -> str:
     <headlight ambient=".42 .42 .42" diffuse=".35 .35 .35" specular=".1 .1 .1"/>
   </visual>
   <default>
-    <geom contype="0" conaffinity="0" rgba="{SHELL}"/>
+    <geom contype="0" conaffinity="0" rgba="{SHELL_COLOUR}"/>
     <joint armature="{ARMATURE}" damping="{DAMPING}" frictionloss="{FRICTION}" limited="true"/>
   </default>
   <asset>
@@ -102,48 +103,53 @@ def hand_xml(side: str = "right", thing: Thing | None = None) -> str:
 
 @dataclass(frozen=True)
 class HandModel:
-    """A compiled hand and object, and where their parts are in MuJoCo's arrays.
+    """MuJoCo model of hand and object, with the indices of their bodies.
 
     Attributes:
-        model: of MuJoCo.
-        data: of MuJoCo; changes as time goes on.
+        model: MuJoCo's model.
+        data: MuJoCo's state, which changes with time.
         tips: (4,) bodies of the last links, in the order of `FINGERS`.
-        thing: body of the object.
+        object_body: body of the object.
     """
 
     model: mujoco.MjModel
     data: mujoco.MjData
     tips: np.ndarray
-    thing: int
+    object_body: int
 
     @classmethod
-    def build(cls, thing: Thing, side: str = "right") -> "HandModel":
-        """The hand before that object."""
-        model = mujoco.MjModel.from_xml_string(hand_xml(side, thing))
+    def build(cls, item: GraspObject, side: str = "right") -> "HandModel":
+        """Build the model of the hand before an object."""
+        model = mujoco.MjModel.from_xml_string(hand_xml(side, item))
         last = [model.body(f"link_{JOINTS[f] + 3}.0").id for f in FINGERS]
         return cls(model, mujoco.MjData(model), np.array(last), model.body("object").id)
 
     def limits(self) -> Array:
-        """(16, 2) of the joints [rad]."""
+        """Return the limits of the joints, (16, 2) [rad]."""
         return np.array(self.model.jnt_range[:N_JOINTS])
 
     def bodies(self, out: Array) -> None:
-        """Fills (5, 18) with the fingertip frames and the object: pose and motion in the world."""
+        """Write pose and motion of the fingertip frames and the object in the world, (5, 18)."""
         data = self.data
         _bodies(
             data.xpos, data.xmat, data.xipos, data.ximat, data.cvel, data.subtree_com,
-            self.tips, self.thing, self.model.body_rootid, MOUNTS, out,
+            self.tips, self.object_body, self.model.body_rootid, MOUNTS, out,
         )  # fmt: skip
 
-    def apply(self, tips: Array, thing: Array, bodies: Array) -> None:
-        """Puts force and torque on fingertips (about their frames) and object into MuJoCo.
+    def apply(self, tips: Array, object_wrench: Array, bodies: Array) -> None:
+        """Apply force and torque on fingertips and object in MuJoCo.
 
         Args:
-            tips: (4, 6 or more) force [N] and torque [N m] on the fingertips, world.
-            thing: (6,) force and torque about its centre of mass on the object, world.
-            bodies: as `bodies` fills them.
+            tips: (4, 6 or more) force [N] and torque about the frame's origin [N m] on the
+                fingertips in the world frame.
+            object_wrench: (6,) force [N] and torque about the centre of mass [N m] on the object
+                in the world frame.
+            bodies: poses as `bodies` writes them.
         """
-        _apply(tips, thing, bodies, self.data.xipos, self.tips, self.thing, self.data.xfrc_applied)
+        _apply(
+            tips, object_wrench, bodies, self.data.xipos, self.tips, self.object_body,
+            self.data.xfrc_applied,
+        )  # fmt: skip
 
 
 @compiled
@@ -155,7 +161,7 @@ def _bodies(
     cvel: Array,
     subtree_com: Array,
     tips: Array,
-    thing: int,
+    object_body: int,
     roots: Array,
     mounts: Array,
     out: Array,
@@ -168,18 +174,18 @@ def _bodies(
                 place += xmat[b, 3 * r + c] * mounts[i, c]
                 out[i, 3 + 3 * r + c] = xmat[b, 3 * r + c]
             out[i, r] = place
-        _move(cvel[b], subtree_com[roots[b]], out[i])
+        _fill_motion(cvel[b], subtree_com[roots[b]], out[i])
     last = len(tips)
     for r in range(3):
-        out[last, r] = xipos[thing, r]
+        out[last, r] = xipos[object_body, r]
         for c in range(3):
-            out[last, 3 + 3 * r + c] = ximat[thing, 3 * r + c]
-    _move(cvel[thing], subtree_com[roots[thing]], out[last])
+            out[last, 3 + 3 * r + c] = ximat[object_body, 3 * r + c]
+    _fill_motion(cvel[object_body], subtree_com[roots[object_body]], out[last])
 
 
 @compiled
-def _move(cvel: Array, com: Array, row: Array) -> None:
-    """Velocity of a point from MuJoCo's, which is that of the body at its tree's centre of mass."""
+def _fill_motion(cvel: Array, com: Array, row: Array) -> None:
+    """Write the velocity of a point from MuJoCo's, which refers to the tree's centre of mass."""
     wx, wy, wz = cvel[0], cvel[1], cvel[2]
     x, y, z = row[0] - com[0], row[1] - com[1], row[2] - com[2]
     row[12] = cvel[3] + wy * z - wz * y
@@ -190,7 +196,13 @@ def _move(cvel: Array, com: Array, row: Array) -> None:
 
 @compiled
 def _apply(
-    tips: Array, thing: Array, bodies: Array, xipos: Array, ids: Array, thing_id: int, out: Array
+    tips: Array,
+    object_wrench: Array,
+    bodies: Array,
+    xipos: Array,
+    ids: Array,
+    object_body: int,
+    out: Array,
 ) -> None:
     for i in range(len(ids)):
         b = ids[i]
@@ -203,7 +215,7 @@ def _apply(
         out[b, 4] = tips[i, 4] + z * fx - x * fz
         out[b, 5] = tips[i, 5] + x * fy - y * fx
     for k in range(6):
-        out[thing_id, k] = thing[k]
+        out[object_body, k] = object_wrench[k]
 
 
 def _table() -> Rows:
@@ -213,9 +225,9 @@ def _table() -> Rows:
 
 
 def _mirrored(row: dict[str, str]) -> dict[str, str]:
-    """The same link of the other hand: y to -y. Turns about x and z change their sense.
+    """Return the link of the other hand: y becomes -y, and turns about x and z change sign.
 
-    But for `MIRRORED` joints, whose limits are symmetric: there the axis stays.
+    The axis of `MIRRORED` joints, whose limits are symmetric, stays.
     """
     names = ["y", "roll", "yaw", "middle_y"]
     if MIRRORED[_number(row)] > 0:
@@ -237,23 +249,24 @@ def _link_xml(row: dict[str, str], rows: Rows) -> str:
       euler="{row["roll"]} {row["pitch"]} {row["yaw"]}">
       <joint name="joint_{number}" axis="{row["axis_x"]} {row["axis_y"]} {row["axis_z"]}"
         range="{row["lower"]} {row["upper"]}"/>
-      {_box_xml(sides, middle, float(row["mass"]))}{_hinge_xml(row)}{tip}{children}</body>"""
+      {_box_xml(sides, middle, float(row["mass"]))}{_motor_xml(row)}{tip}{children}</body>"""
 
 
-def _hinge_xml(row: dict[str, str]) -> str:
-    """The motor of a joint, for the looks."""
-    x, y, z = (HINGE[1] * float(row[f"axis_{a}"]) for a in "xyz")
+def _motor_xml(row: dict[str, str]) -> str:
+    """Return the motor of a joint, which is only drawn."""
+    x, y, z = (MOTOR_SIZE[1] * float(row[f"axis_{a}"]) for a in "xyz")
     ends = f"{-x:.6g} {-y:.6g} {-z:.6g} {x:.6g} {y:.6g} {z:.6g}"
-    return f'<geom type="cylinder" fromto="{ends}" size="{HINGE[0]}" mass="0" rgba="{FRAME}"/>'
+    size = MOTOR_SIZE[0]
+    return f'<geom type="cylinder" fromto="{ends}" size="{size}" mass="0" rgba="{FRAME_COLOUR}"/>'
 
 
 def _tip_xml(number: int) -> str:
-    """The skin: its mass, and a capsule much like its shape."""
+    """Return the skin: its mass, and a capsule of about its shape."""
     x, _, z = MOUNTS[0 if number >= JOINTS["thumb"] else 1]
     x += AXIS
     return (
         f'<geom type="capsule" fromto="{x:.6g} 0 {z + TIP_BEGIN:.6g} {x:.6g} 0 {z + TIP_END:.6g}" '
-        f'size="{TIP_RADIUS}" mass="{TIP_MASS}" rgba="{SKIN}"/>'
+        f'size="{TIP_RADIUS}" mass="{TIP_MASS}" rgba="{SKIN_COLOUR}"/>'
     )
 
 
@@ -263,32 +276,32 @@ def _box_xml(sides: tuple[float, ...], middle: tuple[float, ...], mass: float) -
     return f'<geom type="box" size="{half}" pos="{place}" mass="{mass}"/>'
 
 
-def _object_xml(thing: Thing) -> str:
-    inertia = " ".join(f"{value:.9g}" for value in thing.inertia)
+def _object_xml(item: GraspObject) -> str:
+    inertia = " ".join(f"{value:.9g}" for value in item.inertia)
     return f"""<body name="object"><freejoint/>
-      <inertial pos="0 0 0" mass="{thing.mass}" diaginertia="{inertia}"/>
-      {_looks_xml(thing)}</body>"""
+      <inertial pos="0 0 0" mass="{item.mass}" diaginertia="{inertia}"/>
+      {_drawn_object_xml(item)}</body>"""
 
 
-def _looks_xml(thing: Thing) -> str:
-    colour = f'rgba="{THING}"'
-    half, size = thing.half_height, thing.size
-    middle = float(thing.foot[2]) + half
-    if thing.shape == "sphere":
+def _drawn_object_xml(item: GraspObject) -> str:
+    colour = f'rgba="{OBJECT_COLOUR}"'
+    half, size = item.half_height, item.size
+    middle = float(item.foot[2]) + half
+    if item.shape == "sphere":
         return f'<geom type="sphere" size="{size[0]}" {colour} mass="0"/>'
-    if thing.shape == "box":
+    if item.shape == "box":
         return f'<geom type="box" size="{size[0]} {size[1]} {size[2]}" {colour} mass="0"/>'
-    if thing.shape == "capsule":
+    if item.shape == "capsule":
         return f'<geom type="capsule" size="{size[0]} {half - size[0]}" {colour} mass="0"/>'
-    if thing.shape == "hexagon":
+    if item.shape == "hexagon":
         width = size[0] / np.sqrt(3)
         return "".join(  # faces of equal height would flicker through one another
             f'<geom type="box" size="{size[0]} {width} {half - 1e-4 * k}" '
             f'euler="0 0 {k * np.pi / 3!r}" {colour} mass="0"/>'
             for k in range(3)
         )
-    n_slices = 24 if thing.shape == "frustum" else 1
-    foot, top = (size[0], size[1]) if thing.shape == "frustum" else (size[0], size[0])
+    n_slices = 24 if item.shape == "frustum" else 1
+    foot, top = (size[0], size[1]) if item.shape == "frustum" else (size[0], size[0])
     thick = half / n_slices
     return "".join(
         f'<geom type="cylinder" size="{foot + (top - foot) * (k + 0.5) / n_slices} {thick}" '

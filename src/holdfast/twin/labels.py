@@ -1,7 +1,7 @@
-"""Labels out of the truth, by intervals, as a careful person would draw them.
+"""Labels from the truth, as intervals like those that a careful person draws.
 
-Sample by sample, "an outside force acts" flickers inside a shake, for the finger that pushes
-leaves the object three to eight times a second. A person labels the shake as a whole.
+A finger that shakes the object leaves it three to eight times a second, so "an outside force
+acts" changes often within one shake. A person labels the shake as a whole, and so does this.
 """
 
 from dataclasses import dataclass
@@ -28,68 +28,72 @@ from holdfast.sensors.types import Array
 
 @dataclass(frozen=True)
 class LabelRule:
-    """What counts as contact, as sliding, and how intervals are drawn.
+    """Thresholds of contact and slip, and the rule by which intervals are formed.
 
     Attributes:
-        contact: force on the object from which on a finger touches it [N].
-        sliding: slip speed from which on a held contact slips [m/s].
-        merge: disturbances with a shorter rest between them are one; nor is a shorter rest
-            between closing and the first of them stable [s].
-        margin: by which a disturbance is drawn longer at both ends [s].
-        blip: contact, or its loss, that lasts less than this is ignored [s].
-        glitch: time after a glitch of the hand's controller in which what happens is caused by
-            it [s]: the hand rings at 6 to 8 Hz. None: glitches are not labelled.
+        contact: minimum force of a finger that touches the object [N].
+        sliding: minimum slip speed of a held contact that slips [m/s].
+        merge: disturbances with a shorter gap between them are one, and a shorter gap between
+            closing and the first disturbance is not stable [s].
+        margin: time by which a disturbance is extended at both ends [s].
+        min_contact: a shorter contact, or loss of contact, is ignored [s].
+        glitch: time after a glitch of the hand's controller in which instability is attributed
+            to it [s]; the hand rings at 6 to 8 Hz. None: glitches are not labelled.
     """
 
     contact: float = CONTACT_FORCE
     sliding: float = SLIP_SPEED
     merge: float = MERGE_GAP
     margin: float = UNSTABLE_MARGIN
-    blip: float = MIN_CONTACT_DURATION
+    min_contact: float = MIN_CONTACT_DURATION
     glitch: float | None = GLITCH_DURATION
 
 
 def labels_from_truth(
     truth: Truth, finger: str, rule: LabelRule | None = None
 ) -> tuple[Label, ...]:
-    """The labels of one finger.
+    """Return the labels of one finger.
 
-    Stable while the object is locked, the finger touches it, nobody else does and it does not
-    slide: the hand alone governs it, as the paper has it. So the hand-over at both ends is not
-    stable. Unstable while the hand closes or opens on it, during disturbances (cause slip, where
-    it slides in them) and after a glitch of the hand's controller, with the slip that it causes
-    (cause glitch); no contact otherwise.
+    Stable: the object is locked, the finger touches it without sliding, and no outside force
+    acts, so the hand alone governs the object, as in the paper. The hand-over at both ends is
+    therefore not stable.
+
+    Unstable: while the hand closes or opens on the object; during disturbances (cause slip if
+    the finger slides in them); and after a glitch of the hand's controller, together with the
+    slip that it causes (cause glitch).
+
+    No contact: otherwise.
 
     Args:
-        truth: with `phase`, `outside_force` and, if known, `set_point_error` of the hand, and
-            `contact_force` and `slip_speed` of the finger.
-        finger: whose labels.
-        rule: thresholds and margins.
+        truth: truth with `phase`, `outside_force` and, if known, `set_point_error` of the hand,
+            and `contact_force` and `slip_speed` of the finger.
+        finger: name of the finger.
+        rule: thresholds and margins; by default `LabelRule()`.
     """
     rule = rule or LabelRule()
     times = truth.times
     arrays = truth.fingers[finger]
     phase = truth.hand["phase"]
-    touching = _steady(
-        np.linalg.norm(arrays["contact_force"], axis=1) > rule.contact, times, rule.blip
+    touching = _without_short_runs(
+        np.linalg.norm(arrays["contact_force"], axis=1) > rule.contact, times, rule.min_contact
     )
     held = np.isin(phase, HELD_PHASES)
     sliding = held & (arrays["slip_speed"] > rule.sliding)
     glitched = held & glitches(truth, rule)
-    caused = runs_with(sliding, glitched)
-    glitched, sliding = glitched | caused, sliding & ~caused
-    acted = held & (np.linalg.norm(truth.hand["outside_force"], axis=1) > rule.contact)
-    troubled = np.isin(phase, (Phase.DISTURBED, Phase.SLIPPING)) | sliding | acted
-    troubled = held & widen_runs(join_runs(troubled, times, rule.merge), times, rule.margin)
-    troubled = held & _bridged(phase == Phase.CLOSING, troubled, times, rule.merge)
-    lost = _since(held) & ~_since(phase == Phase.RELEASED) & (phase == Phase.FREE)
-    slipped = runs_with(troubled, sliding)
+    slip_of_glitch = runs_with(sliding, glitched)
+    glitched, sliding = glitched | slip_of_glitch, sliding & ~slip_of_glitch
+    pushed = held & (np.linalg.norm(truth.hand["outside_force"], axis=1) > rule.contact)
+    unstable = np.isin(phase, (Phase.DISTURBED, Phase.SLIPPING)) | sliding | pushed
+    unstable = held & widen_runs(join_runs(unstable, times, rule.merge), times, rule.margin)
+    unstable = held & _joined_to(phase == Phase.CLOSING, unstable, times, rule.merge)
+    lost = _from_first(held) & ~_from_first(phase == Phase.RELEASED) & (phase == Phase.FREE)
+    slipped = runs_with(unstable, sliding)
     states = [
         _state(*row)
         for row in zip(
             touching.tolist(),
             held.tolist(),
-            troubled.tolist(),
+            unstable.tolist(),
             slipped.tolist(),
             (phase == Phase.CLOSING).tolist(),
             lost.tolist(),
@@ -105,8 +109,8 @@ def glitches(truth: Truth, rule: LabelRule) -> Mask:
     """Return where a glitch of the hand's controller acts, or has acted shortly before.
 
     Args:
-        truth: with `set_point_error` of the hand, if it is known.
-        rule: says for how long a glitch acts.
+        truth: truth with `set_point_error` of the hand; without it there are no glitches.
+        rule: rule with the duration of a glitch.
     """
     error = truth.hand.get("set_point_error")
     if rule.glitch is None or error is None:
@@ -118,36 +122,38 @@ def glitches(truth: Truth, rule: LabelRule) -> Mask:
     return np.asarray(found)
 
 
-def phases_as_felt(phase: npt.NDArray[np.str_], push: Array, touch: float) -> npt.NDArray[np.str_]:
-    """Phases in which every disturbance lasts from its first touch to its last.
+def phases_from_touch(
+    phase: npt.NDArray[np.str_], push: Array, touch: float
+) -> npt.NDArray[np.str_]:
+    """Return phases in which every disturbance lasts from its first touch to its last.
 
-    The finger that pushes comes from afar and may leave the object well before it has done:
-    nobody can feel its plan.
+    A pushing finger starts off the object and may leave it well before its planned end. No
+    sensor of the hand can detect that plan.
 
     Args:
-        phase: (n,) as planned.
-        push: (n,) force of the finger that pushes [N].
-        touch: force from which on it touches [N].
+        phase: (n,) planned phases.
+        push: (n,) force of the operator on the object [N].
+        touch: minimum force that counts as a touch [N].
     """
     planned = np.isin(phase, (Phase.DISTURBED, Phase.SLIPPING))
-    felt = np.zeros_like(planned)
+    touched = np.zeros_like(planned)
     for start, end in runs(planned):
         touches = start + np.flatnonzero(push[start:end] > touch)
         if len(touches):
-            felt[touches[0] : touches[-1] + 1] = True
-    return np.where(planned & ~felt, Phase.LOCKED.value, phase)
+            touched[touches[0] : touches[-1] + 1] = True
+    return np.where(planned & ~touched, Phase.LOCKED.value, phase)
 
 
 def _state(
     touching: bool,
     held: bool,
-    troubled: bool,
+    unstable: bool,
     slipped: bool,
     closing: bool,
     lost: bool,
     glitched: bool,
 ) -> tuple[ContactState, Cause | None]:
-    if troubled:
+    if unstable:
         return ContactState.UNSTABLE, Cause.SLIP if slipped else Cause.DISTURBANCE
     if not touching:
         return ContactState.NO_CONTACT, Cause.LOST if lost else None
@@ -160,21 +166,21 @@ def _state(
     return ContactState.UNSTABLE, Cause.LOST if lost else Cause.RELEASED
 
 
-def _bridged(before: Mask, mask: Mask, times: Array, gap: float) -> Mask:
-    """The mask, from the end of `before` on where it begins less than `gap` later."""
-    bridged = mask.copy()
+def _joined_to(before: Mask, mask: Mask, times: Array, gap: float) -> Mask:
+    """Extend the mask back to the end of a run of `before` that is less than `gap` earlier."""
+    joined = mask.copy()
     for _, end in runs(before):
         start = end + int(np.argmax(mask[end:])) if mask[end:].any() else end
         if start > end and times[start] - times[end] < gap:
-            bridged[end:start] = True
-    return bridged
+            joined[end:start] = True
+    return joined
 
 
-def _steady(mask: Mask, times: Array, blip: float) -> Mask:
-    """The mask without rests and then without runs that are shorter than `blip`."""
-    return ~join_runs(~join_runs(mask, times, blip), times, blip)
+def _without_short_runs(mask: Mask, times: Array, min_contact: float) -> Mask:
+    """Return the mask without gaps, and then without runs, shorter than `min_contact`."""
+    return ~join_runs(~join_runs(mask, times, min_contact), times, min_contact)
 
 
-def _since(mask: Mask) -> Mask:
-    """True from the first True on."""
+def _from_first(mask: Mask) -> Mask:
+    """Return a mask that is True from the first True on."""
     return np.logical_or.accumulate(mask)

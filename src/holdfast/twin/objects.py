@@ -1,4 +1,4 @@
-"""The objects that the twin grasps: a table, and the mass and inertia of what is in it."""
+"""Objects that the twin grasps: tables of objects, their shape, mass and inertia."""
 
 import math
 import tomllib
@@ -21,7 +21,7 @@ from holdfast.twin.shapes import (
     HEXAGON,
     MU_KINETIC,
     MU_STATIC,
-    N_SOLID,
+    N_OBJECT_NUMBERS,
     REVOLVED,
     ROUNDING,
     SIDE_LENGTH,
@@ -30,10 +30,10 @@ from holdfast.twin.shapes import (
     distances,
 )
 
-TABLE = Path(__file__).with_name("objects.toml")
-"""The objects that are built in: what models are trained on."""
+BUILT_IN_OBJECTS = Path(__file__).with_name("objects.toml")
+"""Table of the built-in objects, on which models are trained."""
 OTHER_OBJECTS = Path(__file__).with_name("other_objects.toml")
-"""Other objects, for tests with what a model has never seen."""
+"""Table of other objects, for tests with objects that no model has seen."""
 
 SHAPES = {
     "sphere": ("radius",),
@@ -43,7 +43,7 @@ SHAPES = {
     "hexagon": ("radius", "half height", "rounding"),
     "frustum": ("radius at the foot", "radius at the top", "half height", "rounding"),
 }
-"""What the sizes of each shape are, in order [m]."""
+"""Meaning of the sizes of each shape, in order [m]."""
 
 LIMITS = {
     "size": (0.001, 0.2),
@@ -53,32 +53,33 @@ LIMITS = {
     "finger_height": (0.0, 0.06),
     "yaw": (-math.pi, math.pi),
 }
-"""Smallest and largest value of every column, in its unit."""
+"""Minimum and maximum of every column, in its unit."""
 
-GRASP = (0.02, 0.045)
-"""Half widths that fit the hand [m]; between thumb and fingers the path to them decides."""
+GRASPABLE_HALF_WIDTH = (0.02, 0.045)
+"""Minimum and maximum half width of an object [m]. `closing_path` checks whether the pads reach."""
 
 N_GRID = 96
-"""Points of the quadrature of mass along the longest side."""
+"""Grid points along the longest side in the quadrature of the mass."""
 
 
 @dataclass(frozen=True, eq=False)
-class Thing:
-    """An object: what it is shaped like, weighs and feels like. Its frame is that of its mass.
+class GraspObject:
+    """Shape, mass and friction of an object. The origin of its frame is the centre of mass.
 
     Attributes:
-        name: what it is called.
+        name: name of the object.
         shape: a key of `SHAPES`.
-        size: its sizes, as `SHAPES` orders them [m].
-        mass: [kg].
-        inertia: (3,) about the axes through the centre of mass [kg m^2].
+        size: its sizes, in the order of `SHAPES` [m].
+        mass: its mass [kg].
+        inertia: (3,) moments about the axes through the centre of mass [kg m^2].
         mu_static: coefficient of friction at rest.
         mu_kinetic: coefficient of friction while it slides.
-        texture_amplitude: of the longest wave of its surface [m].
-        texture_wavelength: of that wave [m].
-        finger_height: index and ring finger grasp it so far above and below its middle [m].
-        yaw: about its z axis, so that flat faces meet the pads [rad].
-        foot: (3,) where its bottom is in its frame [m].
+        texture_amplitude: amplitude of the longest wave of its surface [m].
+        texture_wavelength: length of that wave [m].
+        finger_height: height of the index finger above its middle, and depth of the ring finger
+            below it [m].
+        yaw: turn about its z axis, so that flat faces meet the pads [rad].
+        foot: (3,) middle of its bottom in its frame [m].
     """
 
     name: str
@@ -103,45 +104,47 @@ class Thing:
 
     @property
     def radius(self) -> float:
-        """Its half width, at its middle where it tapers [m]."""
+        """Half width, of a frustum at half height [m]."""
         return sum(self.size[:2]) / 2 if self.shape == "frustum" else self.size[0]
 
     @property
     def half_height(self) -> float:
-        """Half of its height along z [m]."""
+        """Half of the height along z [m]."""
         return self.size[_height(self.shape)]
 
 
 @cache
-def _built_in() -> dict[str, Thing]:
-    return load_things(TABLE)
+def _built_in() -> dict[str, GraspObject]:
+    return load_objects(BUILT_IN_OBJECTS)
 
 
-def thing(name: str, table: str | Path | None = None) -> Thing:
-    """The object of that name from a table, by default the built-in one.
+def object_named(name: str, table: str | Path | None = None) -> GraspObject:
+    """Return the object of that name from a table, by default the built-in one.
 
     Raises:
-        ValueError: there is none; the message lists what there is.
+        ValueError: the table has no such object; the message lists its objects.
+        OSError: the table cannot be read.
 
     Example:
-        >>> thing("can").mass
+        >>> object_named("can").mass
         0.24
     """
-    things = load_things(table)
-    if name not in things:
-        raise ValueError(f"no object {name!r}; there are {', '.join(things)}")
-    return things[name]
+    objects = load_objects(table)
+    if name not in objects:
+        raise ValueError(f"no object {name!r}; there are {', '.join(objects)}")
+    return objects[name]
 
 
-def load_things(path: str | Path | None = None) -> dict[str, Thing]:
-    """The objects of a table, by name, in its order.
+def load_objects(path: str | Path | None = None) -> dict[str, GraspObject]:
+    """Read a table of objects, by name, in the order of the file.
 
     Args:
-        path: a TOML file with a line per object, like `objects.toml`; by default that one.
+        path: TOML file with one line per object, like `objects.toml`, which is the default.
 
     Raises:
-        ValueError: it is no such table: an unknown field or shape, a number out of range.
-        OSError: it cannot be read.
+        ValueError: the file is not such a table, for instance because of an unknown field or
+            shape, or a number out of range.
+        OSError: the file cannot be read.
     """
     if path is None:
         return dict(_built_in())
@@ -151,22 +154,22 @@ def load_things(path: str | Path | None = None) -> dict[str, Thing]:
         raise ValueError(f"{path} is no TOML table of objects: {cause}") from cause
     if not table:
         raise ValueError(f"{path} has no objects")
-    things = {}
+    objects = {}
     for name, row in table.items():
         try:
-            things[name] = _thing(name, row)
+            objects[name] = _object(name, row)
         except ValueError as cause:
             raise ValueError(f"{path}: {name}: {cause}") from cause
-    return things
+    return objects
 
 
-def _thing(name: str, row: object) -> Thing:
+def _object(name: str, row: object) -> GraspObject:
     shape, numbers = _read(row)
     size, friction, texture = (numbers[key] for key in ("size", "friction", "texture"))
     _check(shape, size, friction, texture)
     volume, centre, moments = _mass_of(_core(shape, size))
     (mass,) = numbers["mass"]
-    return Thing(
+    return GraspObject(
         name=name,
         shape=shape,
         size=size,
@@ -183,7 +186,7 @@ def _thing(name: str, row: object) -> Thing:
 
 
 def _read(row: object) -> tuple[str, dict[str, tuple[float, ...]]]:
-    """Shape and numbers of a line of the table, by column."""
+    """Return shape and numbers of a line of the table, by column."""
     columns = ("shape", *LIMITS)
     if not isinstance(row, dict):
         raise ValueError(f"a line of fields expected ({', '.join(columns)})")
@@ -203,16 +206,16 @@ def _read(row: object) -> tuple[str, dict[str, tuple[float, ...]]]:
 
 
 def _numbers(row: dict[str, Any], key: str, names: tuple[str, ...]) -> tuple[float, ...]:
-    given = row[key] if isinstance(row[key], list) else [row[key]]
+    values = row[key] if isinstance(row[key], list) else [row[key]]
     low, high = LIMITS[key]
-    if len(given) != len(names):
-        wanted = ", ".join(names) or "one number"
-        raise ValueError(f"{key}: {wanted} expected, {len(given)} numbers given")
-    for value in given:
+    if len(values) != len(names):
+        expected = ", ".join(names) or "one number"
+        raise ValueError(f"{key}: {expected} expected, {len(values)} numbers given")
+    for value in values:
         number = isinstance(value, int | float) and not isinstance(value, bool)
         if not (number and low <= value <= high):
             raise ValueError(f"{key}: numbers from {low:g} to {high:g} expected, {value!r} given")
-    return tuple(float(value) for value in given)
+    return tuple(float(value) for value in values)
 
 
 def _check(
@@ -231,27 +234,29 @@ def _check(
         raise ValueError(f"size: a rounding below the other sizes expected, {rounding:g} given")
     if shape == "capsule" and size[1] < size[0]:
         raise ValueError(f"size: half height {size[1]:g} is less than the radius {size[0]:g}")
+    low, high = GRASPABLE_HALF_WIDTH
     for width in size[: max(height, 1)]:
-        if not GRASP[0] <= width <= GRASP[1]:
+        if not low <= width <= high:
             raise ValueError(
-                f"size: it cannot be grasped: half widths from {GRASP[0]:g} to {GRASP[1]:g} m "
-                f"fit the hand, {width:g} given"
+                f"size: it cannot be grasped: half widths from {low:g} to {high:g} m fit the hand, "
+                f"{width:g} given"
             )
 
 
 def _height(shape: str) -> int:
+    """Return the place of the half height in the sizes of a shape."""
     return {"sphere": 0, "capsule": 1, "cylinder": 1, "hexagon": 1}.get(shape, 2)
 
 
 def shape_code(shape: str) -> int:
-    """The core of a shape: REVOLVED, BOX, HEXAGON or CAPSULE."""
+    """Return the core of a shape: REVOLVED, BOX, HEXAGON or CAPSULE."""
     codes = {"box": BOX, "hexagon": HEXAGON, "sphere": CAPSULE, "capsule": CAPSULE}
     return codes.get(shape, REVOLVED)
 
 
 def _core(shape: str, size: tuple[float, ...]) -> Array:
-    """(N_SOLID,) the smooth shape as numbers: its centre of mass at the middle, no texture."""
-    core = np.zeros(N_SOLID)
+    """Pack the smooth shape, (N_OBJECT_NUMBERS,), with its centre of mass at the middle."""
+    core = np.zeros(N_OBJECT_NUMBERS)
     core[CODE] = shape_code(shape)
     if shape in ("sphere", "capsule"):
         core[1], core[ROUNDING] = size[_height(shape)] - size[0], size[0]
@@ -268,7 +273,7 @@ def _core(shape: str, size: tuple[float, ...]) -> Array:
 
 
 def _revolve(core: Array, foot: float, top: float, half_height: float, rounding: float) -> None:
-    """The core's side runs parallel to the frustum's, one rounding inside."""
+    """Write a core whose side is parallel to the frustum's, one rounding inside."""
     slope = (top - foot) / (2 * half_height)
     steep = math.hypot(1.0, slope)
     height = half_height - rounding
@@ -278,52 +283,52 @@ def _revolve(core: Array, foot: float, top: float, half_height: float, rounding:
     core[SIDE_LENGTH] = 2 * height * steep
 
 
-def solid(thing: Thing) -> Array:
-    """The object's shape and surface as numbers, for compiled code.
+def solid(item: GraspObject) -> Array:
+    """Pack shape and surface of an object as numbers for compiled code.
 
     Returns:
-        (N_SOLID,) code, core, texture, static and kinetic friction.
+        (N_OBJECT_NUMBERS,) array: code, core, texture, static and kinetic friction.
     """
-    packed = _core(thing.shape, thing.size)
-    packed[CENTRE] = -thing.half_height - thing.foot[2]
-    packed[AMPLITUDE : AROUND_2 + 1] = _texture(thing)
-    packed[MU_STATIC], packed[MU_KINETIC] = thing.mu_static, thing.mu_kinetic
+    packed = _core(item.shape, item.size)
+    packed[CENTRE] = -item.half_height - item.foot[2]
+    packed[AMPLITUDE : AROUND_2 + 1] = _texture(item)
+    packed[MU_STATIC], packed[MU_KINETIC] = item.mu_static, item.mu_kinetic
     return packed
 
 
-def _texture(thing: Thing) -> list[float]:
-    """Waves about the axis are whole, so that the texture has no seam."""
-    wave = 2 * math.pi / thing.texture_wavelength
+def _texture(item: GraspObject) -> list[float]:
+    """Return the texture, with a whole number of waves about the axis, so that it has no seam."""
+    wave = 2 * math.pi / item.texture_wavelength
     short = wave / 0.37
-    around = [round(wave * thing.radius), round(short * thing.radius)]
-    return [thing.texture_amplitude, wave, 0.6 * short, *around]
+    around = [round(wave * item.radius), round(short * item.radius)]
+    return [item.texture_amplitude, wave, 0.6 * short, *around]
 
 
-def distance_to(thing: Thing, points: npt.ArrayLike) -> Array:
-    """How far points are from the object's textured surface, negative inside.
+def distance_to(item: GraspObject, points: npt.ArrayLike) -> Array:
+    """Compute distances of points from the object's textured surface, negative inside.
 
     Args:
-        thing: the object.
-        points: (..., 3) in its frame [m].
+        item: the object.
+        points: (..., 3) points in the object's frame [m].
 
     Returns:
-        (...) [m].
+        (...) signed distances [m].
 
     Example:
-        >>> round(float(distance_to(thing("ball"), [0.0, 0.0, 0.043])), 3)
+        >>> round(float(distance_to(object_named("ball"), [0.0, 0.0, 0.043])), 3)
         0.01
     """
     given = np.asarray(points, dtype=np.float64)
     flat = np.ascontiguousarray(given.reshape(-1, 3))
-    far: Array = distances(solid(thing), flat)
-    return far.reshape(given.shape[:-1])
+    signed: Array = distances(solid(item), flat)
+    return signed.reshape(given.shape[:-1])
 
 
 def _mass_of(core: Array) -> tuple[float, float, Array]:
-    """Volume [m^3], height of the centre [m], second moments (3,) [m^5] about it.
+    """Compute volume [m^3], height of the centre [m] and second moments (3,) [m^5] about it.
 
-    A grid over a quarter of the body (all shapes are mirrored in x and y); a cell on its
-    surface counts by the part of it that lies inside.
+    The grid covers a quarter of the body, because all shapes are symmetric in x and y. A cell on
+    the surface counts by the part of it that is inside.
     """
     wide, tall = _extent(core)
     step = max(wide, 2 * tall) / N_GRID
@@ -339,7 +344,7 @@ def _mass_of(core: Array) -> tuple[float, float, Array]:
 
 
 def _extent(core: Array) -> tuple[float, float]:
-    """Half width and half height of the box that holds a core and its rounding [m]."""
+    """Return half width and half height of the box around a core and its rounding [m]."""
     code, rounding = int(core[CODE]), float(core[ROUNDING])
     if code == CAPSULE:
         return rounding, float(core[1]) + rounding

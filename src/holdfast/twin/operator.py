@@ -1,8 +1,8 @@
 """The operator: holds the object until it is locked, disturbs it, and takes it back.
 
-There are two kinds of disturbances. A hand grips the object and moves it there and back without
-losing contact, as in the paper. Or a finger approaches from outside, pushes and leaves. Hand and
-finger have finite stiffness and tremor: a pure force would drop every object at once.
+There are two kinds of disturbances. A hand grips the object and moves it to and fro without losing
+contact, as in the paper. Or a finger approaches from outside, pushes and leaves. Hand and finger
+have finite stiffness and tremor, because a pure force would make every object fall at once.
 """
 
 import math
@@ -15,27 +15,27 @@ from holdfast.sensors.types import Array
 from holdfast.twin.profile import Profile
 
 HOLD_STIFFNESS, HOLD_DAMPING = 250.0, 10.0
-"""Of the hand that holds the object [N/m, N s/m]: a relaxed human hand and arm."""
+"""Stiffness [N/m] and damping [N s/m] of the hand that holds the object: a relaxed human arm."""
 HOLD_TURN_STIFFNESS, HOLD_TURN_DAMPING = 0.25, 0.01
-"""The same against turning [N m/rad, N m s/rad]."""
+"""Stiffness [N m/rad] and damping [N m s/rad] of that hand in rotation."""
 PUSH_DAMPING = 8.0
-"""Of the pushing finger [N s/m]."""
+"""Damping of the pushing finger [N s/m]."""
 PUSH_LIMIT = 14.0
-"""Most that the pushing finger gives [N]."""
+"""Maximum force of the pushing finger [N]."""
 PUSH_GAP = 0.002
-"""How far off the pushing finger starts [m]."""
-ARM = 0.006
-"""Standard deviation of the place where the finger pushes about the centre of mass [m]."""
+"""Distance from the object at which the pushing finger starts [m]."""
+ARM_SPREAD = 0.006
+"""Standard deviation of the place where the finger pushes, about the centre of mass [m]."""
 TREMOR_BAND = (6.0, 11.0)
-"""Of physiological tremor [Hz]."""
+"""Frequencies of physiological tremor [Hz]."""
 N_TREMORS = 8
-"""Sinusoids that make up the tremor."""
+"""Number of sinusoids in the tremor."""
 MOVE_GRASP_TIME = 0.15
 """Time in which a hand that moves the object closes on it, and opens again [s]."""
 
 PUSH, JERK, SHAKE, MOVE = range(4)
-"""Styles of a disturbance: a finger pushes there and back, strikes, or shakes; a hand grips the
-object and moves it."""
+"""Styles of a disturbance: a finger pushes, strikes or shakes; a hand grips the object and moves
+it."""
 
 DIRECTIONS = {
     "down": (0.0, 0.0, -1.0),
@@ -43,50 +43,52 @@ DIRECTIONS = {
     "left": (0.0, -1.0, 0.0),
     "right": (0.0, 1.0, 0.0),
 }
-"""Of the disturbances with a name, in the world; the others go anywhere."""
+"""Directions with a name, in the world; the other disturbances have a random direction."""
 
 
-class Push(NamedTuple):
+class Disturbance(NamedTuple):
     """One disturbance.
 
     Attributes:
-        start: after the object was locked [s].
-        duration: [s].
+        start: time after the object was locked [s].
+        duration: duration [s].
         direction: "down", "up", "left", "right" or "random".
         style: PUSH, JERK, SHAKE or MOVE.
-        numbers: (9,) unit vector of the direction, point of contact relative to the centre of
-            mass [m], depth [m], stiffness [N/m], rate of shaking or moving [Hz].
+        parameters: (9,) unit vector of the direction, point of contact relative to the centre
+            of mass [m], depth [m], stiffness [N/m], rate of shaking or moving [Hz].
     """
 
     start: float
     duration: float
     direction: str
     style: int
-    numbers: Array
+    parameters: Array
 
 
-def draw_pushes(generator: np.random.Generator, profile: Profile, scale: float = 1.0) -> list[Push]:
-    """Disturbances that fill the hold: every named direction and some random ones, in turn.
+def draw_disturbances(
+    generator: np.random.Generator, profile: Profile, scale: float = 1.0
+) -> list[Disturbance]:
+    """Draw disturbances that fill the hold: all named directions and two random ones, in turn.
 
     Args:
-        generator: of all that is drawn.
-        profile: that it is drawn from.
-        scale: of the depths.
+        generator: random number generator.
+        profile: profile with the ranges of all values.
+        scale: factor of the depths.
     """
     names = [*DIRECTIONS, "random", "random"]
-    pushes: list[Push] = []
+    disturbances: list[Disturbance] = []
     start = float(generator.uniform(1.0, 1.5))
     while True:
-        name = names[len(pushes) % len(names)]
-        push = _draw_push(generator, profile, start, name, scale)
+        name = names[len(disturbances) % len(names)]
+        push = _draw_disturbance(generator, profile, start, name, scale)
         if push.start + push.duration + 1.0 > profile.hold:
-            return pushes
-        pushes.append(push)
+            return disturbances
+        disturbances.append(push)
         start = push.start + push.duration + float(generator.uniform(*profile.rest))
 
 
 def draw_tremor(generator: np.random.Generator) -> Array:
-    """(3, N_TREMORS, 3) amplitude, angular rate [rad/s] and phase of each axis: rms 1."""
+    """Draw amplitudes, angular rates [rad/s] and phases of a tremor of rms 1, (3, N_TREMORS, 3)."""
     tremor = np.empty((3, N_TREMORS, 3))
     weights = generator.uniform(0.5, 1.0, size=(3, N_TREMORS))
     tremor[:, :, 0] = weights * np.sqrt(2.0 / (weights**2).sum(axis=1, keepdims=True))
@@ -96,8 +98,8 @@ def draw_tremor(generator: np.random.Generator) -> Array:
 
 
 @compiled
-def tremble(tremor: Array, time: float, axis: int) -> tuple[float, float]:
-    """Deflection and speed of an axis, for a tremor of rms 1."""
+def tremor_at(tremor: Array, time: float, axis: int) -> tuple[float, float]:
+    """Return displacement and speed of a tremor of rms 1 along an axis."""
     place = speed = 0.0
     for k in range(tremor.shape[1]):
         amplitude, rate, phase = tremor[axis, k]
@@ -110,23 +112,26 @@ def tremble(tremor: Array, time: float, axis: int) -> tuple[float, float]:
 def hold_wrench(
     body: Array, anchor: Array, gain: float, weight: float, tremor: Array, rms: float, time: float
 ) -> tuple[float, float, float, float, float, float]:
-    """Force and torque about the centre of mass of the hand that holds the object.
+    """Compute force and torque of the hand that holds the object.
 
     Args:
         body: (18,) position, rotation, velocity and spin of the object in the world.
-        anchor: (12,) position and rotation where the hand wants it.
-        gain: from 0 (let go) to 1.
-        weight: of the object, which the hand carries [N].
-        tremor: of the hand.
-        rms: of the tremor [m].
-        time: [s].
+        anchor: (12,) position and rotation to which the hand pulls the object.
+        gain: from 0 (released) to 1.
+        weight: weight of the object, which the hand carries [N].
+        tremor: tremor of the hand.
+        rms: rms of the tremor [m].
+        time: time [s].
+
+    Returns:
+        Force [N] and torque about the centre of mass [N m] in the world.
     """
     force = np.zeros(3)
     for axis in range(3):
-        place, speed = tremble(tremor, time, axis)
+        place, speed = tremor_at(tremor, time, axis)
         stretch = anchor[axis] + rms * place - body[axis]
         force[axis] = HOLD_STIFFNESS * stretch + HOLD_DAMPING * (rms * speed - body[12 + axis])
-    turn = np.zeros(3)  # of the rotation from here to the anchor, small angles: sum of r x r_wanted
+    turn = np.zeros(3)  # rotation to the anchor, small angles: half the sum of r x r_anchor
     for column in range(3):
         x, y, z = body[3 + column], body[6 + column], body[9 + column]
         u, v, w = anchor[3 + column], anchor[6 + column], anchor[9 + column]
@@ -148,28 +153,31 @@ def hold_wrench(
 def push_wrench(
     body: Array,
     origin: Array,
-    numbers: Array,
+    parameters: Array,
     style: int,
     duration: float,
     tremor: Array,
     rms: float,
     elapsed: float,
 ) -> tuple[float, float, float, float, float, float]:
-    """Force and torque about the centre of mass of the pushing finger; it never pulls.
+    """Compute force and torque of the pushing finger, which never pulls.
 
     Args:
         body: (18,) position, rotation, velocity and spin of the object in the world.
-        origin: (3,) where the centre of mass was when the push began.
-        numbers: of the `Push`.
+        origin: (3,) position of the centre of mass when the push began [m].
+        parameters: parameters of the `Disturbance`.
         style: PUSH, JERK or SHAKE.
-        duration: of the push [s].
-        tremor: of the finger.
-        rms: of the tremor [m].
-        elapsed: since the push began [s].
+        duration: duration of the push [s].
+        tremor: tremor of the finger.
+        rms: rms of the tremor [m].
+        elapsed: time since the push began [s].
+
+    Returns:
+        Force [N] and torque about the centre of mass [N m] in the world.
     """
-    ux, uy, uz, ax, ay, az, depth, stiffness, rate = numbers
+    ux, uy, uz, ax, ay, az, depth, stiffness, rate = parameters
     aim, aim_speed = _aim(style, depth, rate, elapsed, duration)
-    place, speed = tremble(tremor, elapsed, 0)
+    place, speed = tremor_at(tremor, elapsed, 0)
     aim += rms * place - PUSH_GAP
     aim_speed += rms * speed
     along = ux * (body[0] - origin[0]) + uy * (body[1] - origin[1]) + uz * (body[2] - origin[2])
@@ -189,7 +197,7 @@ def push_wrench(
 def move_wrench(
     body: Array,
     origin: Array,
-    numbers: Array,
+    parameters: Array,
     duration: float,
     tremor: Array,
     rms: float,
@@ -204,16 +212,16 @@ def move_wrench(
     Args:
         body: (18,) position, rotation, velocity and spin of the object in the world.
         origin: (12,) position and rotation of the object when the hand gripped it.
-        numbers: of the `Push`; the point of contact is not used.
-        duration: of the disturbance [s].
-        tremor: of the hand.
-        rms: of the tremor [m].
-        elapsed: since the disturbance began [s].
+        parameters: parameters of the `Disturbance`; the point of contact is not used.
+        duration: duration of the disturbance [s].
+        tremor: tremor of the hand.
+        rms: rms of the tremor [m].
+        elapsed: time since the disturbance began [s].
 
     Returns:
         Force [N] and torque about the centre of mass [N m] in the world.
     """
-    depth, stiffness, rate = numbers[6], numbers[7], numbers[8]
+    depth, stiffness, rate = parameters[6], parameters[7], parameters[8]
     turning = 2 * math.pi * max(1.0, np.rint(rate * duration)) / duration
     way = depth * math.sin(turning * elapsed)
     speed = depth * turning * math.cos(turning * elapsed)
@@ -221,13 +229,13 @@ def move_wrench(
     gain = min(max(closed, 0.0), 1.0) * stiffness / HOLD_STIFFNESS
     anchor = origin.copy()
     for axis in range(3):
-        anchor[axis] += numbers[axis] * way
+        anchor[axis] += parameters[axis] * way
     fx, fy, fz, tx, ty, tz = hold_wrench(body, anchor, gain, 0.0, tremor, rms, elapsed)
     drag = gain * HOLD_DAMPING * speed
     return (
-        fx + drag * numbers[0],
-        fy + drag * numbers[1],
-        fz + drag * numbers[2],
+        fx + drag * parameters[0],
+        fy + drag * parameters[1],
+        fz + drag * parameters[2],
         tx,
         ty,
         tz,
@@ -238,14 +246,14 @@ def move_wrench(
 def _aim(
     style: int, depth: float, rate: float, elapsed: float, duration: float
 ) -> tuple[float, float]:
-    """Where the finger wants to be along its direction, and how fast that moves."""
+    """Return the set-point of the pushing finger along its direction [m] and its speed [m/s]."""
     pulse = math.pi / duration
-    if style == PUSH:  # there and back, as smooth as a raised cosine
+    if style == PUSH:  # a raised cosine, there and back
         return (
             0.5 * (depth + PUSH_GAP) * (1 - math.cos(2 * pulse * elapsed)),
             (depth + PUSH_GAP) * pulse * math.sin(2 * pulse * elapsed),
         )
-    if style == JERK:  # a sharper blow: the fourth power of a half wave
+    if style == JERK:  # a sharper blow: the fourth power of a half sine
         wave = math.sin(pulse * elapsed)
         return (
             (depth + PUSH_GAP) * wave**4,
@@ -263,12 +271,12 @@ def _aim(
     )
 
 
-def _draw_push(
+def _draw_disturbance(
     generator: np.random.Generator, profile: Profile, start: float, name: str, scale: float
-) -> Push:
+) -> Disturbance:
     drawn = generator.normal(size=3)
     direction = np.array(DIRECTIONS.get(name, tuple(drawn / np.linalg.norm(drawn))))
-    arm = generator.normal(0.0, ARM, size=3)
+    arm = generator.normal(0.0, ARM_SPREAD, size=3)
     arm -= direction * (arm @ direction)
     depth = scale * generator.uniform(*profile.push_depth)
     stiffness = generator.uniform(*profile.push_stiffness)
@@ -281,5 +289,5 @@ def _draw_push(
         stiffness = generator.uniform(*profile.move_stiffness)
         rate = generator.uniform(*profile.move_rate)
         duration = float(generator.uniform(*profile.move_duration))
-    numbers = np.array([*direction, *arm, depth, stiffness, rate])
-    return Push(start, duration, name, style, numbers)
+    parameters = np.array([*direction, *arm, depth, stiffness, rate])
+    return Disturbance(start, duration, name, style, parameters)

@@ -1,8 +1,8 @@
-"""Profiles: how a grasp is done and disturbed, as small files of numbers, fixed and named.
+"""Profiles: named sets of numbers that describe a grasp and its disturbances, one file each.
 
 `reference`, `gentle` and `vigorous` follow the paper: a hand grips the object and moves it, and
-a finger pushes it. `finger-reference`, `finger-gentle` and `finger-vigorous` are the profiles
-of holdfast 0.1, in which only a finger pushes; they repeat its recordings and labels exactly.
+a finger disturbances it. `finger-reference`, `finger-gentle` and `finger-vigorous` are the profiles
+of holdfast 0.1, in which only a finger disturbances; they repeat its recordings and labels exactly.
 """
 
 import tomllib
@@ -12,36 +12,36 @@ from typing import Any
 import msgspec
 
 ATTEMPTS = 4
-"""A grasp that fails is tried again, a little calmer, so often at the most."""
+"""Maximum number of attempts of a grasp; later ones are disturbed less."""
 
 Span = tuple[float, float]
-"""Smallest and largest of what is drawn for each grasp."""
+"""Minimum and maximum of a number that is drawn for each grasp."""
 
 
 class Profile(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
-    """How a grasp is done and disturbed.
+    """Numbers that describe a grasp and its disturbances.
 
     Attributes:
-        name: of the profile.
+        name: name of the profile.
         grip: normal force at which index, middle and ring stop closing [N].
-        closing_speed: of the fingertips along their closing path [m/s].
-        tremor: of the operator's hand, rms [m].
-        push_depth: how far a pushing finger goes [m].
-        push_stiffness: of the pushing finger [N/m].
-        push_duration: of a disturbance [s].
-        rest: between two disturbances [s].
-        shake_rate: of those disturbances that shake [Hz].
-        idle: how long the hand is open before and after [s].
-        hold: how long the object is locked [s].
+        closing_speed: speed of the fingertips along their closing path [m/s].
+        tremor: rms tremor of the operator's hand [m].
+        push_depth: depth to which a pushing finger goes [m].
+        push_stiffness: stiffness of the pushing finger [N/m].
+        push_duration: duration of a push [s].
+        rest: time between two disturbances [s].
+        shake_rate: rate of the pushes that shake [Hz].
+        idle: time with an open hand before and after the grasp [s].
+        hold: time for which the object is locked [s].
         move_share: probability that a disturbance is a hand that grips and moves the object;
             the others are a pushing finger.
         move_depth: amplitude of the hand's motion [m].
-        move_stiffness: of that hand [N/m].
-        move_rate: of its motion there and back [Hz].
-        move_duration: of such a disturbance [s].
+        move_stiffness: stiffness of that hand [N/m].
+        move_rate: rate of its motion to and fro [Hz].
+        move_duration: duration of such a disturbance [s].
         glitch_rate: glitches of the hand's controller per second [1/s].
         label_margin: time by which disturbances are labelled longer at both ends [s].
-        label_glitches: whether glitches are labelled, as unstable with their own cause.
+        label_glitches: whether glitches are labelled, as unstable with the cause glitch.
         drawn_as: name under which random numbers are drawn; by default that of the profile.
     """
 
@@ -68,16 +68,16 @@ class Profile(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=T
 
 
 def profiles() -> tuple[str, ...]:
-    """Names of the profiles that come with holdfast."""
+    """Return the names of the profiles that come with holdfast."""
     files = resources.files("holdfast.twin").joinpath("profiles").iterdir()
     return tuple(sorted(f.name.removesuffix(".toml") for f in files if f.name.endswith(".toml")))
 
 
 def profile(name: str) -> Profile:
-    """The profile of that name.
+    """Load the profile of that name.
 
     Raises:
-        ValueError: there is none.
+        ValueError: there is no such profile; the message lists the names.
 
     Example:
         >>> profile("finger-reference").hold

@@ -1,7 +1,7 @@
-"""What fingers and operator do, sample by sample: close until locked, hold, disturb, release.
+"""Course of a grasp, sample by sample: close until locked, hold, disturb, release.
 
-A state machine without physics: it sees the load of every fingertip and where the object is,
-and says where the fingers shall go and what the operator does.
+This is a state machine without physics. Its inputs are the loads of the fingertips and the pose
+of the object. Its outputs are set-points of the fingers and actions of the operator.
 """
 
 from collections.abc import Sequence
@@ -11,44 +11,44 @@ import numpy as np
 
 from holdfast.contact import Phase
 from holdfast.sensors.types import Array
-from holdfast.twin.operator import Push
+from holdfast.twin.operator import Disturbance
 from holdfast.twin.profile import Profile
 
-OPEN, CLOSED = 0.035, -0.025
-"""Ends of the closing path: gap between a pad and the object as planned [m]."""
+OPEN_GAP, CLOSED_GAP = 0.035, -0.025
+"""Planned gap between a pad and the object at both ends of the closing path [m]."""
 THUMB_SHARE = 0.6
-"""The thumb stops at this share of what the three fingers press together: the rest comes when
-they do."""
-SETTLE = 0.3
-"""So long all fingers have stopped before the object counts as locked [s]."""
-PERSISTENCE = 0.05
-"""So long a finger's load is over its grip before it has stopped: one spike is no grip [s]."""
-PATIENCE = 8.0
-"""A grasp that is not locked after so long of closing has failed [s]."""
-HAND_OVER = 0.25
-"""In which the operator lets go, or takes the object again [s]."""
+"""Load at which the thumb stops, as a share of the load of all three fingers. The rest comes when
+the fingers press."""
+SETTLE_TIME = 0.3
+"""Time for which all fingers have stopped before the object counts as locked [s]."""
+GRIP_CONFIRM_TIME = 0.05
+"""Time that a finger's load exceeds its grip before it stops; shorter spikes are ignored [s]."""
+CLOSING_TIMEOUT = 8.0
+"""Time of closing after which a grasp that is not locked has failed [s]."""
+HAND_OVER_TIME = 0.25
+"""Time in which the operator releases the object, or takes it again [s]."""
 OPENING_SPEED = 0.05
-"""Of the fingertips when they release [m/s]."""
+"""Speed of the fingertips when they release [m/s]."""
 LOST_DISTANCE = 0.04
-"""The object is lost when it has moved so far since it was locked [m]."""
-LOST_SECONDS = 0.1
-"""... or when fewer than two fingertips have touched it for so long [s]."""
-TOUCH = 0.05
-"""Load from which on a fingertip touches [N]."""
-SLIDING = 0.001
-"""Slip speed of a fingertip from which on the object slips in a disturbance [m/s]."""
+"""Distance from its place at the lock beyond which the object is lost [m]."""
+LOST_CONTACT_TIME = 0.1
+"""Time of contact with fewer than two fingertips after which the object is lost [s]."""
+CONTACT_LOAD = 0.05
+"""Minimum load of a fingertip in contact [N]."""
+SLIPPING_SPEED = 0.001
+"""Minimum slip speed of a fingertip at which the object slips in a disturbance [m/s]."""
 
 
 class Plan(NamedTuple):
-    """What was drawn for a grasp before it began.
+    """Random numbers of a grasp, drawn before it begins.
 
     Attributes:
-        profile: that it was drawn from.
+        profile: profile from which they were drawn.
         grips: (4,) load at which each finger stops: thumb, index, middle, ring [N].
-        speed: of closing [m/s].
-        before: how long the hand is open before [s].
-        after: how long it is watched after the release [s].
-        pushes: disturbances, in order of time since the lock.
+        speed: speed of closing [m/s].
+        before: time with an open hand before the grasp [s].
+        after: time after the release until the end [s].
+        disturbances: disturbances in order of time.
     """
 
     profile: Profile
@@ -56,38 +56,38 @@ class Plan(NamedTuple):
     speed: float
     before: float
     after: float
-    pushes: Sequence[Push]
+    disturbances: Sequence[Disturbance]
 
 
 class Command(NamedTuple):
-    """What fingers and operator do until the next sample.
+    """Set-points of the fingers and action of the operator until the next sample.
 
     Attributes:
-        depths: (4,) where each fingertip shall be on its closing path [m].
-        hold: from 0 (the operator has let go) to 1.
-        push: place of the disturbance under way in the plan; -1 for none.
-        elapsed: since it began [s].
-        phase: what the experiment is doing; a push counts from its planned start to its end.
+        depths: (4,) set-point of each fingertip on its closing path [m].
+        hold: grip of the operator on the object, from 0 (released) to 1.
+        disturbance: index of the current disturbance in the plan; -1 for none.
+        elapsed: time since it began [s].
+        phase: phase of the experiment; a disturbance lasts from its planned start to its end.
     """
 
     depths: Array
     hold: float
-    push: int
+    disturbance: int
     elapsed: float
     phase: Phase
 
 
 class Protocol:
-    """The state machine of one grasp.
+    """State machine of one grasp.
 
     Args:
-        plan: of the grasp.
-        period: of its steps [s].
+        plan: plan of the grasp.
+        period: period of its steps [s].
 
     Attributes:
-        locked_at: when the object was locked [s]; None while it is not.
-        lost_at: when it was lost [s]; None while it is not.
-        anchor: (12,) position and rotation where the operator wants the object.
+        locked_at: time at which the object was locked [s]; None before.
+        lost_at: time at which the object was lost [s]; None if it was not.
+        anchor: (12,) position and rotation at which the operator holds the object.
     """
 
     def __init__(self, plan: Plan, period: float) -> None:
@@ -96,12 +96,12 @@ class Protocol:
         self.lost_at: float | None = None
         self.anchor = np.zeros(12)
         self._period = period
-        self._depths = np.full(4, OPEN)
-        self._over = np.zeros(4)
+        self._depths = np.full(4, OPEN_GAP)
+        self._over_grip_for = np.zeros(4)
         self._stopped = np.zeros(4, dtype=np.bool_)
         self._all_stopped_at = np.inf
         self._released_at = np.inf
-        self._alone = 0.0
+        self._untouched_for = 0.0
         self._locked_place = np.zeros(3)
 
     @property
@@ -109,78 +109,82 @@ class Protocol:
         """Whether the object was never locked, or lost."""
         return self.locked_at is None or self.lost_at is not None
 
-    def over(self, time: float) -> bool:
-        """Whether everything has been done."""
+    def is_over(self, time: float) -> bool:
+        """Return whether the grasp is complete."""
         return time > self._released_at + self.plan.after
 
-    def command(self, time: float, loads: Array, slip: float, thing: Array) -> Command:
-        """What to do next.
+    def command(self, time: float, loads: Array, slip: float, body: Array) -> Command:
+        """Return the command until the next sample.
 
         Args:
-            time: of this sample [s].
-            loads: (4,) of the fingertips [N].
-            slip: largest slip speed of a fingertip that touches [m/s].
-            thing: (18,) the object's position, rotation, velocity and spin.
+            time: time of this sample [s].
+            loads: (4,) loads of the fingertips [N].
+            slip: largest slip speed of a fingertip in contact [m/s].
+            body: (18,) position, rotation, velocity and spin of the object.
         """
         if time == 0.0:
-            self.anchor[:] = thing[:12]
+            self.anchor[:] = body[:12]
         if time >= self._released_at:
             return self._release(time, loads)
         if self.locked_at is not None:
-            return self._hold(time, loads, slip, thing)
+            return self._hold(time, loads, slip, body)
         if time < self.plan.before:
-            return self._say(1.0, Phase.FREE)
-        return self._close(time, loads, thing)
+            return self._new_command(1.0, Phase.FREE)
+        return self._close(time, loads, body)
 
-    def _close(self, time: float, loads: Array, thing: Array) -> Command:
-        gripping = loads >= self.plan.grips  # such a finger waits, and goes on if that was a spike
-        self._over = np.where(gripping, self._over + self._period, 0.0)
-        self._stopped |= (self._over > PERSISTENCE) | (self._depths <= CLOSED)
+    def _close(self, time: float, loads: Array, body: Array) -> Command:
+        gripping = loads >= self.plan.grips  # such a finger waits, and continues after a spike
+        self._over_grip_for = np.where(gripping, self._over_grip_for + self._period, 0.0)
+        self._stopped |= (self._over_grip_for > GRIP_CONFIRM_TIME) | (self._depths <= CLOSED_GAP)
         self._depths[~self._stopped & ~gripping] -= self.plan.speed * self._period
         if self._stopped.all() and time < self._all_stopped_at:
             self._all_stopped_at = min(self._all_stopped_at, time)
-        if self._released_at < np.inf:  # given up
-            return self._say(1.0, Phase.CLOSING)
-        gripped = (loads > TOUCH).all()
-        if gripped and time - self._all_stopped_at >= SETTLE:
+        if self._released_at < np.inf:  # closing has timed out
+            return self._new_command(1.0, Phase.CLOSING)
+        gripped = (loads > CONTACT_LOAD).all()
+        if gripped and time - self._all_stopped_at >= SETTLE_TIME:
             self.locked_at = time
-            self._locked_place = thing[:3].copy()
-        elif time - self.plan.before > PATIENCE:
-            self._released_at = time + HAND_OVER
-        return self._say(1.0, Phase.CLOSING)
+            self._locked_place = body[:3].copy()
+        elif time - self.plan.before > CLOSING_TIMEOUT:
+            self._released_at = time + HAND_OVER_TIME
+        return self._new_command(1.0, Phase.CLOSING)
 
-    def _hold(self, time: float, loads: Array, slip: float, thing: Array) -> Command:
+    def _hold(self, time: float, loads: Array, slip: float, body: Array) -> Command:
         held_for = time - float(self.locked_at or 0.0)
-        if self.lost_at is None and self._is_lost(loads, thing):
+        if self.lost_at is None and self._is_lost(loads, body):
             self.lost_at = time
         if held_for >= self.plan.profile.hold and self._released_at == np.inf:
-            self._released_at = time + HAND_OVER
-            self.anchor[:] = thing[:12]
+            self._released_at = time + HAND_OVER_TIME
+            self.anchor[:] = body[:12]
         if self.lost_at is not None:
-            return self._say(0.0, Phase.FREE)
-        push, elapsed = self._pushing(held_for)
+            return self._new_command(0.0, Phase.FREE)
+        disturbance, elapsed = self._disturbance_at(held_for)
         phase = Phase.LOCKED
-        if push >= 0:
-            phase = Phase.SLIPPING if slip > SLIDING else Phase.DISTURBED
-        letting_go = 1.0 - held_for / HAND_OVER
-        taking = 1.0 - (self._released_at - time) / HAND_OVER
-        return self._say(max(0.0, letting_go, taking), phase, push, elapsed)
+        if disturbance >= 0:
+            phase = Phase.SLIPPING if slip > SLIPPING_SPEED else Phase.DISTURBED
+        releasing = 1.0 - held_for / HAND_OVER_TIME
+        taking = 1.0 - (self._released_at - time) / HAND_OVER_TIME
+        return self._new_command(max(0.0, releasing, taking), phase, disturbance, elapsed)
 
     def _release(self, time: float, loads: Array) -> Command:
-        self._depths = np.minimum(self._depths + OPENING_SPEED * self._period, OPEN)
-        phase = Phase.RELEASED if (loads > TOUCH).any() else Phase.FREE
-        return self._say(1.0 if self.lost_at is None else 0.0, phase)
+        self._depths = np.minimum(self._depths + OPENING_SPEED * self._period, OPEN_GAP)
+        phase = Phase.RELEASED if (loads > CONTACT_LOAD).any() else Phase.FREE
+        return self._new_command(1.0 if self.lost_at is None else 0.0, phase)
 
-    def _is_lost(self, loads: Array, thing: Array) -> bool:
-        self._alone = self._alone + self._period if (loads > TOUCH).sum() < 2 else 0.0
-        moved = float(np.linalg.norm(thing[:3] - self._locked_place))
-        return moved > LOST_DISTANCE or self._alone >= LOST_SECONDS
+    def _is_lost(self, loads: Array, body: Array) -> bool:
+        self._untouched_for = (
+            self._untouched_for + self._period if (loads > CONTACT_LOAD).sum() < 2 else 0.0
+        )
+        moved = float(np.linalg.norm(body[:3] - self._locked_place))
+        return moved > LOST_DISTANCE or self._untouched_for >= LOST_CONTACT_TIME
 
-    def _pushing(self, held_for: float) -> tuple[int, float]:
-        for place, push in enumerate(self.plan.pushes):
-            if push.start <= held_for < push.start + push.duration:
-                return place, held_for - push.start
+    def _disturbance_at(self, held_for: float) -> tuple[int, float]:
+        for place, disturbance in enumerate(self.plan.disturbances):
+            if disturbance.start <= held_for < disturbance.start + disturbance.duration:
+                return place, held_for - disturbance.start
         return -1, 0.0
 
-    def _say(self, hold: float, phase: Phase, push: int = -1, elapsed: float = 0.0) -> Command:
-        return Command(self._depths, hold, push, elapsed, phase)
+    def _new_command(
+        self, hold: float, phase: Phase, disturbance: int = -1, elapsed: float = 0.0
+    ) -> Command:
+        return Command(self._depths, hold, disturbance, elapsed, phase)

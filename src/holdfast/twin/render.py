@@ -1,4 +1,4 @@
-"""Pictures and films of the twin, rendered without a screen."""
+"""Pictures and films of the twin, rendered without a display."""
 
 import shutil
 import subprocess
@@ -17,30 +17,36 @@ import numpy.typing as npt
 
 from holdfast.errors import OutputError
 from holdfast.sensors.types import Array
+from holdfast.twin.hand import RATE
+from holdfast.twin.protocol import Command
+from holdfast.twin.simulation import Grasp, simulate
+from holdfast.twin.world import World
 
 Picture = npt.NDArray[np.uint8]
 """(height, width, 3) red, green, blue."""
 
-STILLS = (".gif", ".png", ".webp")
-"""Films that need nothing but Pillow, which comes with matplotlib; `.png` is an animated one."""
-FILMS = (*STILLS, ".mp4")
-"""All films; `.mp4` needs the program ffmpeg."""
-NEWTON = 0.012
-"""Length of the arrow of a force of one newton [m]."""
-ARROW = 0.002
+ANIMATION_SUFFIXES = (".gif", ".png", ".webp")
+"""Suffixes of films that need only Pillow, which comes with matplotlib; `.png` is animated."""
+FILM_SUFFIXES = (*ANIMATION_SUFFIXES, ".mp4")
+"""Suffixes of all films; `.mp4` needs the program ffmpeg."""
+ARROW_LENGTH_PER_NEWTON = 0.012
+"""Length of the arrow for a force of one newton [m]."""
+ARROW_HALF_WIDTH = 0.002
 """Half width of an arrow [m]."""
-GLOW = (0.80, 0.10, 0.16, 1.0)
+ARROW_COLOUR = (0.80, 0.10, 0.16, 1.0)
 """Colour of the arrows."""
+SAMPLES_PER_PICTURE = 12
+"""Samples between two pictures of a film, which gives 12.5 pictures per second."""
 
 
 class Camera(NamedTuple):
-    """Where the picture is taken from.
+    """View of a picture.
 
     Attributes:
-        target: (3,) the point in its middle [m].
-        distance: from there [m].
-        azimuth: direction of view about the vertical [degrees]; 90 looks along y.
-        elevation: of the direction of view [degrees]; negative looks down.
+        target: (3,) point in the middle of the picture [m].
+        distance: distance of the camera from it [m].
+        azimuth: direction of view about the vertical [degrees]; 90 is along y.
+        elevation: elevation of the direction of view [degrees]; negative is downwards.
     """
 
     target: tuple[float, float, float] = (0.07, -0.014, 0.006)
@@ -50,25 +56,25 @@ class Camera(NamedTuple):
 
 
 class _Context(Protocol):
-    """What MuJoCo's back ends have in common."""
+    """Common interface of MuJoCo's back ends."""
 
     def make_current(self) -> None: ...
 
     def free(self) -> None: ...
 
 
-class Studio:
-    """Takes pictures of a model, many from one studio. A context manager: it holds a renderer.
+class Renderer:
+    """Renderer of many pictures of one model. Use it as a context manager, or call `close`.
 
     Args:
-        model: of MuJoCo.
-        width: of the pictures [pixels].
-        height: of the pictures [pixels].
-        camera: where they are taken from.
+        model: MuJoCo's model.
+        width: width of the pictures [pixels].
+        height: height of the pictures [pixels].
+        camera: view of the pictures; by default `Camera()`.
 
     Raises:
-        OutputError: no renderer is at hand.
-        ValueError: no pixels, or more than the model's buffer has (1280 x 960).
+        OutputError: no back end of MuJoCo works here.
+        ValueError: the size is zero, or larger than the model's buffer (1280 x 960).
     """
 
     def __init__(
@@ -88,24 +94,25 @@ class Studio:
         self._canvas = mujoco.MjrContext(model, mujoco.mjtFontScale.mjFONTSCALE_150.value)
         mujoco.mjr_setBuffer(mujoco.mjtFramebuffer.mjFB_OFFSCREEN.value, self._canvas)
 
-    def __enter__(self) -> "Studio":
+    def __enter__(self) -> "Renderer":
         return self
 
     def __exit__(self, *_: object) -> None:
         self.close()
 
     def close(self) -> None:
-        """Gives the renderer back."""
+        """Free the resources of the back end."""
         self._context.make_current()
         self._canvas.free()
         self._context.free()
 
     def picture(self, data: mujoco.MjData, forces: Array | None = None) -> Picture:
-        """What it looks like now.
+        """Render a picture of the current state.
 
         Args:
-            data: of MuJoCo, positions of the bodies computed.
-            forces: (n, 6) points [m] and forces [N] in the world, drawn as arrows that end there.
+            data: MuJoCo's state, with computed positions of the bodies.
+            forces: (n, 6) points [m] and forces [N] in the world, drawn as arrows that end at
+                the points.
         """
         self._context.make_current()
         mujoco.mjv_updateScene(
@@ -128,51 +135,52 @@ def render(
     camera: Camera | None = None,
     forces: Array | None = None,
 ) -> Picture:
-    """One picture. For more than one use a `Studio`.
+    """Render one picture. For more than one, use a `Renderer`.
 
     Args:
-        model: of MuJoCo.
-        data: of MuJoCo, positions of the bodies computed.
-        width: [pixels].
-        height: [pixels].
-        camera: where it is taken from.
-        forces: (n, 6) points [m] and forces [N] in the world, drawn as arrows that end there.
+        model: MuJoCo's model.
+        data: MuJoCo's state, with computed positions of the bodies.
+        width: width of the picture [pixels].
+        height: height of the picture [pixels].
+        camera: view of the picture; by default `Camera()`.
+        forces: (n, 6) points [m] and forces [N] in the world, drawn as arrows that end at the
+            points.
 
     Returns:
         (height, width, 3) red, green, blue.
 
     Raises:
-        OutputError: no renderer is at hand.
+        OutputError: no back end of MuJoCo works here.
     """
-    with Studio(model, width, height, camera) as studio:
-        return studio.picture(data, forces)
+    with Renderer(model, width, height, camera) as renderer:
+        return renderer.picture(data, forces)
 
 
 def save_picture(picture: Picture, path: str | Path) -> None:
-    """Writes a picture; Pillow chooses the format by the suffix."""
+    """Write a picture in the format of its suffix."""
     from PIL import Image
 
     Image.fromarray(picture).save(path)
 
 
 def save_video(frames: Iterable[Picture], path: str | Path, fps: float) -> None:
-    """Writes a film, in the format of its suffix: .gif, .png (animated), .webp or .mp4.
+    """Write a film in the format of its suffix: .gif, .png (animated), .webp or .mp4.
 
     Args:
         frames: pictures of one size.
-        path: of the film.
+        path: path of the film.
         fps: pictures per second.
 
     Raises:
-        ValueError: another suffix, or no pictures.
-        OutputError: .mp4, and ffmpeg is not installed, or fails.
+        ValueError: the suffix is none of these, or there are no pictures.
+        OutputError: the film is an .mp4, and ffmpeg is not installed or fails.
     """
     path = Path(path)
     check_film(path)
     pictures = iter(frames)
     first = next(pictures, None)
     if first is None:
-        raise ValueError("a film of no pictures")
+        raise ValueError("a film of at least one picture expected, none given")
     frames = chain([first], pictures)
     if path.suffix.lower() == ".mp4":
         _save_mp4(frames, path, fps)
@@ -181,20 +189,57 @@ def save_video(frames: Iterable[Picture], path: str | Path, fps: float) -> None:
 
 
 def check_film(path: str | Path) -> None:
-    """Whether a film of that name can be written here; to be known before it is rendered.
+    """Check whether a film of that name can be written here, before it is rendered.
 
     Raises:
-        ValueError: a suffix that is no film's.
-        OutputError: .mp4, and ffmpeg is not installed.
+        ValueError: the suffix is not that of a film.
+        OutputError: the film is an .mp4, and ffmpeg is not installed.
     """
     suffix = Path(path).suffix.lower()
-    if suffix not in FILMS:
-        raise ValueError(f"a film ends in {', '.join(FILMS)}; {Path(path).name!r} given")
+    if suffix not in FILM_SUFFIXES:
+        raise ValueError(
+            f"a film with the suffix {', '.join(FILM_SUFFIXES)} expected, {Path(path).name!r} given"
+        )
     if suffix == ".mp4" and shutil.which("ffmpeg") is None:
         raise OutputError(
             "an .mp4 needs the program ffmpeg, which is not installed; "
-            f"{', '.join(STILLS)} need nothing"
+            f"{', '.join(ANIMATION_SUFFIXES)} work without it"
         )
+
+
+def film(grasp: Grasp, path: Path) -> None:
+    """Simulate a grasp and write its film in real time, with fingertip forces as arrows.
+
+    Args:
+        grasp: the grasp.
+        path: path of the film; its suffix is its format.
+
+    Raises:
+        OutputError: no back end of MuJoCo works here, or the format needs a program that is not
+            installed.
+        ValueError: the suffix is not that of a film, or an object or profile is unknown.
+    """
+    frames: list[Picture] = []
+    renderers: list[Renderer] = []
+    n_samples = 0
+
+    def take_picture(world: World, command: Command) -> None:
+        nonlocal n_samples
+        del command
+        n_samples += 1
+        if not renderers:
+            renderers.append(Renderer(world.hand.model))
+        if n_samples % SAMPLES_PER_PICTURE == 0:
+            places = world.bodies[:-1, :3]
+            arrows = np.column_stack([places, world.contact.contact_force])
+            frames.append(renderers[0].picture(world.hand.data, arrows))
+
+    try:
+        simulate(grasp, on_sample=take_picture)
+    finally:
+        for renderer in renderers:
+            renderer.close()
+    save_video(frames, path, RATE / SAMPLES_PER_PICTURE)
 
 
 def _check_size(model: mujoco.MjModel, width: int, height: int) -> None:
@@ -220,9 +265,13 @@ def _draw_arrow(scene: mujoco.MjvScene, point: Array, force: Array) -> None:
         return
     geom = scene.geoms[scene.ngeom]
     kind = mujoco.mjtGeom.mjGEOM_ARROW.value
-    mujoco.mjv_initGeom(geom, kind, np.zeros(3), np.zeros(3), np.zeros(9), np.array(GLOW, "f4"))
-    tail = point - NEWTON * force
-    mujoco.mjv_connector(geom, kind, ARROW, tail, tail + 2 * NEWTON * force)  # half of it is drawn
+    mujoco.mjv_initGeom(
+        geom, kind, np.zeros(3), np.zeros(3), np.zeros(9), np.array(ARROW_COLOUR, "f4")
+    )
+    tail = point - ARROW_LENGTH_PER_NEWTON * force
+    mujoco.mjv_connector(
+        geom, kind, ARROW_HALF_WIDTH, tail, tail + 2 * ARROW_LENGTH_PER_NEWTON * force
+    )  # half of the length is drawn
     scene.ngeom += 1
 
 
@@ -231,17 +280,17 @@ def _context(width: int, height: int) -> "_Context":
     try:
         context: _Context = import_module(f"mujoco.{name}").GLContext(width, height)
         context.make_current()
-    except Exception as cause:  # every back end fails in its own way
+    except Exception as cause:  # each back end raises its own exceptions
         reason = str(cause).strip().split("\n")[0] or type(cause).__name__
         raise OutputError(
-            f"no pictures here: the renderer {name!r} does not start ({reason}); install libegl1 "
-            "or libosmesa6, or choose one by MUJOCO_GL=egl, osmesa or glfw"
+            f"cannot render: MuJoCo's back end {name!r} does not start ({reason}); install libegl1 "
+            "or libosmesa6, or choose one with MUJOCO_GL=egl, osmesa or glfw"
         ) from cause
     return context
 
 
 def _back_end() -> str:
-    """The name of MuJoCo's back end that most likely works without a screen."""
+    """Return the name of MuJoCo's back end that most likely works without a display."""
     if sys.platform == "darwin":
         return "cgl"
     if sys.platform == "win32":
@@ -253,7 +302,7 @@ def _save_animation(frames: Iterable[Picture], path: Path, fps: float) -> None:
     from PIL import Image
 
     images = (Image.fromarray(frame) for frame in frames)
-    if path.suffix.lower() != ".webp":  # 256 colours keep a film small, and its memory too
+    if path.suffix.lower() != ".webp":  # 256 colours need less space and memory
         images = (image.quantize(256, dither=Image.Dither.NONE) for image in images)
     first, *others = images
     first.save(path, save_all=True, append_images=others, duration=1000 / fps, loop=0)
@@ -264,22 +313,22 @@ def _save_mp4(frames: Iterable[Picture], path: Path, fps: float) -> None:
     first = next(pictures)
     command = _ffmpeg(first.shape, path, fps)
     with subprocess.Popen(command, stdin=subprocess.PIPE, stderr=subprocess.PIPE) as process:
-        talk = _feed(process, chain([first], pictures))
+        messages = _feed(process, chain([first], pictures))
     if process.returncode:
-        told = talk.decode(errors="replace").strip().split("\n")[-1]
-        raise OutputError(f"cannot write {path.name}: ffmpeg says {told or 'nothing'}")
+        last_line = messages.decode(errors="replace").strip().split("\n")[-1]
+        raise OutputError(f"cannot write {path.name}: ffmpeg reports {last_line or 'nothing'}")
 
 
 def _ffmpeg(shape: tuple[int, ...], path: Path, fps: float) -> list[str]:
-    """The command that makes a film of raw pictures."""
+    """Return the command that makes a film of raw pictures."""
     source = ["-f", "rawvideo", "-pix_fmt", "rgb24", "-s", f"{shape[1]}x{shape[0]}"]
     even = ["-pix_fmt", "yuv420p", "-vf", "pad=ceil(iw/2)*2:ceil(ih/2)*2"]
-    talk = ["ffmpeg", "-y", "-loglevel", "error"]
-    return [*talk, *source, "-r", f"{fps:g}", "-i", "-", *even, str(path)]
+    program = ["ffmpeg", "-y", "-loglevel", "error"]
+    return [*program, *source, "-r", f"{fps:g}", "-i", "-", *even, str(path)]
 
 
 def _feed(process: "subprocess.Popen[bytes]", frames: Iterable[Picture]) -> bytes:
-    """What ffmpeg says to the pictures; it may stop before it has seen all of them."""
+    """Write pictures to ffmpeg and return its messages. It may stop before the last picture."""
     pipe = cast("IO[bytes]", process.stdin)
     try:
         for frame in frames:

@@ -1,7 +1,7 @@
-"""How far a point is from an object, and in which direction its surface lies. Compiled.
+"""Signed distance of a point from an object, and its gradient, compiled.
 
-An object is a row of numbers. Its shape is a core grown by a rounding, so that near the surface
-distances are exact and smooth, and so are their gradients.
+An object is an array of numbers. Its shape is a core that is extended on all sides by a rounding,
+so that distances and their gradients near the surface are exact and smooth.
 """
 
 import math
@@ -12,43 +12,43 @@ from holdfast.compiled import compiled
 from holdfast.sensors.types import Array
 
 REVOLVED, BOX, HEXAGON, CAPSULE = range(4)
-"""The cores: a frustum (a cylinder too), a box, a hexagonal prism, a line (a point too)."""
+"""Cores: a frustum (or cylinder), a box, a hexagonal prism, a line (or point)."""
 
-# Columns of a packed object. Sizes of a core are in 1 to 3 [m]; of a frustum they are the radii
-# and half height, and its side's normal (outward, upward) and length [m] stand beside them.
+# Columns of a packed object. Columns 1 to 3 are the sizes of the core [m]. For a frustum these are
+# the radii and the half height, followed by normal (outward, upward) and length [m] of its side.
 CODE = 0
 SIDE_OUT, SIDE_UP, SIDE_LENGTH = 4, 5, 6
-ROUNDING = 7  # by which the core is grown [m]
-CENTRE = 8  # height of the centre of mass over the middle [m]
+ROUNDING = 7  # extension of the core on all sides [m]
+CENTRE = 8  # height of the centre of mass above the middle [m]
 N_CORE = 9
 AMPLITUDE, WAVE, WAVE_2, AROUND, AROUND_2 = range(9, 14)  # [m], [rad/m], [rad/m], [1], [1]
 MU_STATIC, MU_KINETIC = 14, 15
-N_SOLID = 16
-MOST_RELIEF = 2.5
-"""Amplitudes by which the three waves of a texture reach out at most."""
+N_OBJECT_NUMBERS = 16
+MAX_RELIEF = 2.5
+"""Maximum height of a texture's three waves together, in amplitudes."""
 
 
 @compiled
 def distances(solid: Array, points: Array) -> Array:
-    """(n,) signed distances of points (n, 3) in the object's frame [m]."""
-    far = np.empty(len(points))
+    """Compute signed distances (n,) of points (n, 3) in the object's frame [m]."""
+    signed = np.empty(len(points))
     for i in range(len(points)):
-        far[i] = signed_distance(solid, points[i, 0], points[i, 1], points[i, 2])
-    return far
+        signed[i] = signed_distance(solid, points[i, 0], points[i, 1], points[i, 2])
+    return signed
 
 
 @compiled
 def signed_distance(solid: Array, x: float, y: float, z: float) -> float:
-    """The distance of a point in the object's frame from its textured surface [m]."""
+    """Compute the distance of a point in the object's frame from its textured surface [m]."""
     return probe(solid, x, y, z)[0] + relief(solid, x, y, z)
 
 
 @compiled
 def relief(solid: Array, x: float, y: float, z: float) -> float:
-    """How deep the texture is at a point of the object's frame [m].
+    """Compute the depth of the texture at a point in the object's frame [m].
 
-    Three waves: A (sin a z + 0.7 sin(0.6 b z + b s + 1) + 0.8 sin(a s + 0.3)) with s the arc
-    about the axis, a = 2 pi / L and b = a / 0.37 (own choice).
+    The sum of three waves: A (sin a z + 0.7 sin(0.6 b z + b s + 1) + 0.8 sin(a s + 0.3)), where s
+    is the arc about the axis, a = 2 pi / L and b = a / 0.37 (own choice).
     """
     if solid[AMPLITUDE] == 0.0:
         return 0.0
@@ -56,16 +56,16 @@ def relief(solid: Array, x: float, y: float, z: float) -> float:
     waves = math.sin(solid[WAVE] * z)
     waves += 0.7 * math.sin(solid[WAVE_2] * z + solid[AROUND_2] * angle + 1.0)
     waves += 0.8 * math.sin(solid[AROUND] * angle + 0.3)
-    deep: float = solid[AMPLITUDE] * waves
-    return deep
+    depth: float = solid[AMPLITUDE] * waves
+    return depth
 
 
 @compiled
 def probe(solid: Array, x: float, y: float, z: float) -> tuple[float, float, float, float]:
-    """The distance of a point from the smooth object, and the gradient of it.
+    """Compute the distance of a point from the smooth object, and its gradient.
 
     Returns:
-        The distance [m], negative inside, and the outward unit vector of its gradient.
+        The distance [m], negative inside, and its gradient, an outward unit vector.
     """
     z += solid[CENTRE]
     code = int(solid[CODE])
@@ -112,7 +112,7 @@ def _box(
 def _hexagon(
     inner: float, height: float, x: float, y: float, z: float
 ) -> tuple[float, float, float, float]:
-    """Six faces, the first across x; in the sector of a face that face is the nearest."""
+    """Return distance and gradient for six faces; the normal of the first is x."""
     nx, ny = 1.0, 0.0
     if abs(y) * math.sqrt(3.0) > abs(x):
         nx, ny = 0.5, math.sqrt(0.75)
@@ -139,7 +139,7 @@ def _hexagon(
 
 @compiled
 def _meridian(solid: Array, q: float, z: float) -> tuple[float, float, float]:
-    """The distance of (radius, height) from a trapezium about the axis, and its gradient."""
+    """Return distance and gradient of (radius, height) from a trapezium about the axis."""
     foot, top, height = solid[1], solid[2], solid[3]
     nq, nz, length = solid[SIDE_OUT], solid[SIDE_UP], solid[SIDE_LENGTH]
     side = (q - foot) * nq + (z + height) * nz

@@ -1,4 +1,4 @@
-"""From a seed to a recording of one grasp, with exact truth: deterministic, without a clock."""
+"""Simulate a grasp from a seed: a recording with exact truth, without a clock."""
 
 import zlib
 from collections.abc import Callable
@@ -13,47 +13,45 @@ from holdfast.contact import Phase
 from holdfast.recordings import Recording, Tactile, Truth
 from holdfast.sensors import sensor
 from holdfast.sensors.types import Array
-from holdfast.twin.contact import SHARE, SLIP
-from holdfast.twin.control import EVERY, draw_controller
+from holdfast.twin.contact import SLIP, SLIPPING_SHARE
+from holdfast.twin.control import STEPS_PER_CONTROL, draw_controller
 from holdfast.twin.grasp import ClosingPath, closing_path
 from holdfast.twin.hand import FINGERS, N_JOINTS, RATE, TIMESTEP, HandModel
-from holdfast.twin.labels import LabelRule, labels_from_truth, phases_as_felt
-from holdfast.twin.objects import Thing
-from holdfast.twin.objects import thing as find_thing
-from holdfast.twin.operator import draw_pushes, draw_tremor
+from holdfast.twin.labels import LabelRule, labels_from_truth, phases_from_touch
+from holdfast.twin.objects import GraspObject, object_named
+from holdfast.twin.operator import draw_disturbances, draw_tremor
 from holdfast.twin.profile import Profile, profile
-from holdfast.twin.protocol import THUMB_SHARE, TOUCH, Command, Plan, Protocol
+from holdfast.twin.protocol import CONTACT_LOAD, THUMB_SHARE, Command, Plan, Protocol
 from holdfast.twin.surface import curved_fingertip
 from holdfast.twin.uskin import Uskin, with_server_effects
 from holdfast.twin.uskin_parameters import UskinParameters
 from holdfast.twin.world import World
 
-CALMER = 0.75
-"""After a failed grasp a person disturbs the next one less: depths of pushes go down by it."""
+RETRY_DEPTH_FACTOR = 0.75
+"""Factor of the depths of disturbances after a failed grasp, as a person disturbs the next less."""
 CASES = (1, 2)
 """1: close, hold, release. 2: the same with disturbances while the object is locked."""
-LONGEST = 60.0
-"""No grasp lasts longer [s]."""
+MAX_DURATION = 60.0
+"""Time for which random numbers of the controller are drawn, longer than any grasp [s]."""
 PLACE_SPREAD, TURN_SPREAD = 0.002, 0.05
-"""Standard deviations of how a person places the object [m] and [rad]."""
+"""Standard deviations of the object's position [m] and turn [rad], as a person places it."""
 GRIP_SPREAD = 0.1
-"""Of the logarithm of the load at which a finger stops: it differs from grasp to grasp."""
+"""Standard deviation, over grasps, of the logarithm of the load at which the fingers stop."""
 
 
 @dataclass(frozen=True)
 class Grasp:
-    """Which grasp it is: everything that a recording is made from.
+    """Description of a grasp, from which its recording is made.
 
     Attributes:
         object: name of the object.
-        case: 1 or 2.
-        repeat: from 1 on.
+        case: 1 (undisturbed) or 2 (disturbed).
+        repeat: number of the repeat, from 1.
         profile: name of the profile.
-        seed: of the whole protocol.
-        attempt: from 0 on; after a failed grasp the same is tried again.
-        server: whether stamps are unsteady and packets repeat, as servers send them.
-        table: another table of objects, like `OTHER_OBJECTS` or one's own; None for the one
-            that is built in.
+        seed: seed of the whole protocol.
+        attempt: number of the attempt, from 0; a failed grasp is tried again.
+        server: whether stamps are unsteady and packets repeat, as a server sends them.
+        table: path of another table of objects, like `OTHER_OBJECTS`; None for the built-in one.
         glitch_rate: glitches of the hand's controller per second [1/s]; None for the profile's.
     """
 
@@ -68,50 +66,52 @@ class Grasp:
     glitch_rate: float | None = None
 
     @property
-    def thing(self) -> Thing:
+    def item(self) -> GraspObject:
         """The object.
 
         Raises:
-            ValueError: the table has none of that name.
+            ValueError: the table has no object of that name.
         """
-        return _thing(self.object, self.table)
+        return _object(self.object, self.table)
 
     @property
     def name(self) -> str:
-        """What its recording is called where it does not fail."""
+        """Name of the recording if the grasp does not fail."""
         return f"{self.object}-case{self.case}-{self.repeat}"
 
     @property
     def failed_name(self) -> str:
-        """What its recording is called where it fails."""
+        """Name of the recording if the grasp fails."""
         return f"{self.name}-failed{self.attempt + 1}"
 
     def generator(self, part: str) -> np.random.Generator:
-        """Random numbers of one part of it; parts do not disturb each other."""
+        """Return the random number generator of one part, which is independent of other parts."""
         drawn_as = profile(self.profile).drawn_as or self.profile
         key = f"{self.object}/{self.case}/{self.repeat}/{drawn_as}/{self.attempt}/{part}"
         return _generator(self.seed, key)
 
 
-Watch = Callable[[World, Command], None]
+SampleCallback = Callable[[World, Command], None]
 
 
 def simulate(
-    grasp: Grasp, parameters: UskinParameters | None = None, watch: Watch | None = None
+    grasp: Grasp,
+    parameters: UskinParameters | None = None,
+    on_sample: SampleCallback | None = None,
 ) -> Recording:
-    """The recording of one grasp, with truth and labels.
+    """Simulate one grasp and return its recording with truth and labels.
 
     Args:
-        grasp: which one.
-        parameters: of the skin.
-        watch: is called after each sample; may draw a picture.
+        grasp: the grasp.
+        parameters: parameters of the skin; by default `UskinParameters()`.
+        on_sample: function that is called after each sample, for instance to draw a picture.
 
     Returns:
-        Counts of four fingertips at 150 Hz. A grasp that was never locked, or lost its object,
-        has the case "failed" in its metadata.
+        Recording of four fingertips in counts at 150 Hz. The metadata of a grasp that was never
+        locked, or lost its object, have the case "failed".
 
     Raises:
-        ValueError: an unknown object, profile or case, or an object that cannot be grasped.
+        ValueError: object, profile or case is unknown, or the object cannot be grasped.
     """
     if grasp.case not in CASES:
         raise ValueError(f"case 1 or 2 expected, {grasp.case} given")
@@ -122,26 +122,26 @@ def simulate(
     world = _world(grasp, chosen.glitch_rate)
     uskins = [_skin(grasp.seed, finger, parameters or UskinParameters()) for finger in FINGERS]
     protocol = Protocol(plan, 1 / RATE)
-    log = _Log()
+    truth_log = _TruthLog()
     taxel_forces: list[list[Array]] = [[] for _ in FINGERS]
     k = 0
-    while not protocol.over(k / RATE):
+    while not protocol.is_over(k / RATE):
         command = protocol.command(k / RATE, world.loads, world.slip, world.bodies[-1])
         world.advance(command, plan, protocol.anchor)
-        log.add(world, command)
-        for pile, uskin, forces in zip(
+        truth_log.add(world, command)
+        for collected, uskin, forces in zip(
             taxel_forces, uskins, world.contact.node_forces, strict=True
         ):
-            pile.append(uskin.taxel_forces(forces[None])[0])
-        if watch is not None:
-            watch(world, command)
+            collected.append(uskin.taxel_forces(forces[None])[0])
+        if on_sample is not None:
+            on_sample(world, command)
         k += 1
     times = np.arange(k) / RATE
-    truth = log.truth(times)
+    truth = truth_log.truth(times)
     modules = {}
-    for finger, uskin, pile in zip(FINGERS, uskins, taxel_forces, strict=True):
+    for finger, uskin, collected in zip(FINGERS, uskins, taxel_forces, strict=True):
         noise = grasp.generator(f"skin {finger}")
-        counts, stamps = uskin.counts(np.array(pile), times, noise), times
+        counts, stamps = uskin.counts(np.array(collected), times, noise), times
         if grasp.server:
             stamps, counts = with_server_effects(times, counts, grasp.generator(f"server {finger}"))
         labels = labels_from_truth(truth, finger, label_rule(chosen))
@@ -151,7 +151,7 @@ def simulate(
 
 
 def label_rule(chosen: Profile) -> LabelRule:
-    """Return the rule by which a profile's recordings are labelled."""
+    """Return the rule that labels the recordings of a profile."""
     return LabelRule(
         margin=chosen.label_margin, glitch=LabelRule.glitch if chosen.label_glitches else None
     )
@@ -167,14 +167,16 @@ def _draw_plan(grasp: Grasp, chosen: Profile) -> Plan:
         speed=float(generator.uniform(*chosen.closing_speed)),
         before=float(generator.uniform(*chosen.idle)),
         after=float(generator.uniform(*chosen.idle)),
-        pushes=draw_pushes(generator, chosen, CALMER**grasp.attempt) if grasp.case == 2 else (),
+        disturbances=draw_disturbances(generator, chosen, RETRY_DEPTH_FACTOR**grasp.attempt)
+        if grasp.case == 2
+        else (),
     )
 
 
 def _world(grasp: Grasp, glitch_rate: float) -> World:
-    item = grasp.thing
+    item = grasp.item
     generator = grasp.generator("world")
-    controller = draw_controller(generator, LONGEST, EVERY * TIMESTEP, glitch_rate)
+    controller = draw_controller(generator, MAX_DURATION, STEPS_PER_CONTROL * TIMESTEP, glitch_rate)
     tremors = np.stack([draw_tremor(generator), draw_tremor(generator)])
     start = generator.standard_normal(4) * [*[PLACE_SPREAD] * 3, TURN_SPREAD]
     return World(
@@ -184,28 +186,28 @@ def _world(grasp: Grasp, glitch_rate: float) -> World:
 
 @cache
 def _skin(seed: int, finger: str, parameters: UskinParameters) -> Uskin:
-    """The skin of a finger: a seed is a hand, and has the same gains in all its grasps."""
+    """Return the skin of a finger: one seed is one hand, with the same gains in all its grasps."""
     nodes = curved_fingertip().nodes
     return Uskin(parameters, sensor("uskin-curved"), nodes, _generator(seed, f"skin/{finger}"))
 
 
 def _generator(seed: int, key: str) -> np.random.Generator:
-    """Random numbers of their own for every key, whatever else is drawn."""
+    """Return a random number generator for a key, independent of other keys."""
     return np.random.default_rng([seed, zlib.crc32(key.encode())])
 
 
 @cache
-def _thing(name: str, table: str | Path | None) -> Thing:
-    return find_thing(name, table)
+def _object(name: str, table: str | Path | None) -> GraspObject:
+    return object_named(name, table)
 
 
 @cache
 def _path(name: str, table: str | Path | None) -> ClosingPath:
-    return closing_path(_thing(name, table))
+    return closing_path(_object(name, table))
 
 
-class _Log:
-    """Collects what is true, sample by sample."""
+class _TruthLog:
+    """Collector of the truth, sample by sample."""
 
     def __init__(self) -> None:
         self._phase: list[Phase] = []
@@ -233,19 +235,19 @@ class _Log:
             finger: {
                 "contact_force": -tips[:, place, :3],
                 "slip_speed": tips[:, place, SLIP],
-                "slipping_share": tips[:, place, SHARE],
+                "slipping_share": tips[:, place, SLIPPING_SHARE],
                 "tip_pose": _poses(bodies[:, place]),
             }
             for place, finger in enumerate(FINGERS)
         }
         hand = {name: np.array(rows) for name, rows in self._rows.items()}
-        push = np.linalg.norm(hand["outside_force"], axis=1)  # no one else touches it meanwhile
-        phase = phases_as_felt(np.array(self._phase, dtype=str), push, TOUCH)
+        push = np.linalg.norm(hand["outside_force"], axis=1)  # the only other contact then
+        phase = phases_from_touch(np.array(self._phase, dtype=str), push, CONTACT_LOAD)
         return Truth(times, {"phase": phase, **hand}, fingers)
 
 
 def _poses(bodies: Array) -> Array:
-    """(n, 7) position and quaternion w x y z."""
+    """Return positions [m] and quaternions w, x, y, z, (n, 7)."""
     from scipy.spatial.transform import Rotation
 
     turns = Rotation.from_matrix(bodies[:, 3:12].reshape(-1, 3, 3)).as_quat()
@@ -253,7 +255,7 @@ def _poses(bodies: Array) -> Array:
 
 
 def _metadata(grasp: Grasp, protocol: Protocol) -> dict[str, object]:
-    item = grasp.thing
+    item = grasp.item
     return {
         "object": grasp.object,
         "object_mass": item.mass,

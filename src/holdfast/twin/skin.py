@@ -1,9 +1,8 @@
-"""What one node of a soft skin does: it presses, and it holds on by a bristle until it slides.
+"""Contact law of one node of a soft skin: normal force, and friction by a bristle.
 
-The skin is a Winkler foundation: every node is a spring of its own that stands on the
-fingertip. Along the surface it holds on by a bristle that stretches until Coulomb's limit and
-then slides. At rest a bristle is a spring, so that nothing creeps, and how fast each node
-slides is known.
+The skin is a Winkler foundation: every node is a separate spring on the fingertip. Along the
+surface each node has a bristle, which stretches up to Coulomb's limit and then slides. At rest a
+bristle is a spring, so nothing creeps, and the slip speed of each node is known.
 """
 
 import math
@@ -15,36 +14,36 @@ from holdfast.twin.shapes import MU_KINETIC, MU_STATIC
 from holdfast.twin.vectors import Nine, Three, add, apply, apply_transposed, dot, scaled
 
 # Columns of bristles.
-BX, BY, BZ = 0, 1, 2  # by which the node is stretched along the surface, fingertip frame [m]
-SLIDING = 3  # its plastic slip speed, low-pass [m/s]
+BX, BY, BZ = 0, 1, 2  # stretch of the node along the surface, fingertip frame [m]
+SLIDING = 3  # its plastic slip speed, low-pass filtered [m/s]
 N_BRISTLE = 4
 
-# Columns of a packed skin: the fields of Skin in their order, and the ball round all nodes.
+# Columns of a packed skin: the fields of Skin in their order, and the ball around all nodes.
 STIFFNESS, HARDENING, DAMPING, SHEAR, ENGAGEMENT, SHEAR_TIME, STRIBECK, MEMORY, SLIPPING = range(9)
 BALL = 9
 
-_FORGOTTEN = 1e-12  # a slip speed [m/s] below which it is none: no denormal numbers
+_MIN_SLIP_SPEED = 1e-12  # slower slip [m/s] is set to zero, to avoid denormal numbers
 
 
 class Skin(NamedTuple):
-    """What the skin is made of.
+    """Material of the skin.
 
     Attributes:
-        stiffness: of the foundation for small depths [N/m^3]. Silicone of 50 kPa (Ecoflex 00-30
-            and its like), 5 mm thick: a fingertip yields 0.9 mm at 1 N, 1.8 mm at 4 N.
-        hardening: relative growth of the stiffness with depth [1/m]: twice at 2.5 mm, half of
-            the silicone's thickness.
+        stiffness: stiffness of the foundation at small depths [N/m^3]. Silicone of 50 kPa (like
+            Ecoflex 00-30), 5 mm thick: a fingertip is indented by 0.9 mm at 1 N, 1.8 mm at 4 N.
+        hardening: relative growth of the stiffness with depth [1/m]. It doubles at 2.5 mm, half
+            of the silicone's thickness.
         damping: relative growth of the pressure with the speed of approach [s/m]
             (Hunt and Crossley). Own choice: 1 % at 10 mm/s.
-        shear: stiffness along the surface over that across it: 0.7, as for bodies of a
-            Poisson's ratio near 0.5 (Mindlin: 2 (1 - nu) / (2 - nu) = 0.67).
-        engagement: depth at which half of the shear stiffness acts [m]: asperities meet one
-            after the other. Own choice.
-        shear_time: viscous part of the shear stiffness [s]. Own choice: damps what a bristle
-            and a finger make together.
-        stribeck: slip speed over which friction falls from static to kinetic [m/s]. Own
-            choice, of the order measured on rubber (1 to 10 mm/s).
-        memory: time over which a node's slip speed is smoothed [s]. Own choice, under a sample.
+        shear: ratio of the stiffness along the surface to that across it. 0.7, as for bodies
+            with a Poisson's ratio near 0.5 (Mindlin: 2 (1 - nu) / (2 - nu) = 0.67).
+        engagement: depth at which half of the shear stiffness acts [m], because asperities come
+            into contact one after the other. Own choice.
+        shear_time: viscous part of the shear stiffness [s]. Own choice: it damps the oscillation
+            of a bristle with a finger.
+        stribeck: slip speed at which friction falls from static to kinetic [m/s]. Own choice,
+            of the order measured on rubber (1 to 10 mm/s).
+        memory: time constant that smooths a node's slip speed [s]. Own choice, below a sample.
         slipping: slip speed above which a node counts as slipping [m/s]. Own choice.
     """
 
@@ -61,19 +60,19 @@ class Skin(NamedTuple):
 
 @compiled
 def elastic(skin: Array, stiffness: float, depth: float) -> float:
-    """The pressing force of a node at rest: N(d) = k d (1 + h d) [N]."""
+    """Compute the normal force of a node at rest, N(d) = k d (1 + h d) [N]."""
     force: float = stiffness * depth * (1.0 + skin[HARDENING] * depth)
     return force
 
 
 @compiled
 def pressure(skin: Array, stiffness: float, depth: float, leaving: float) -> float:
-    """The pressing force of a node that moves: N(d) (1 - c v_n), never less than 0 [N].
+    """Compute the normal force of a moving node, N(d) (1 - c v_n), at least 0 [N].
 
     Args:
-        skin: packed.
-        stiffness: of the node for small depths [N/m].
-        depth: of the node under the surface, above 0 [m].
+        skin: the packed skin.
+        stiffness: stiffness of the node at small depths [N/m].
+        depth: depth of the node below the surface, above 0 [m].
         leaving: speed along the outward normal [m/s].
     """
     force: float = elastic(skin, stiffness, depth) * max(1.0 - skin[DAMPING] * leaving, 0.0)
@@ -92,32 +91,32 @@ def friction(
     node: Three,
     dt: float,
 ) -> Three:
-    """Friction on a node; its bristle moves on.
+    """Compute friction on a node and advance its bristle.
 
-    The bristle b follows the motion along the surface, T = -k_t (b + tau v_t) with
-    k_t = shear N(d) / (d + d_0), and |T| is at most mu N. Beyond mu N / k_t the bristle is cut
-    back to that (return mapping), and the node slides by what was cut. Friction falls with the
-    slip speed: mu = mu_k + (mu_s - mu_k) exp(-v_f / v_s) (Stribeck).
+    The bristle b follows the motion along the surface. The friction is T = -k_t (b + tau v_t)
+    with k_t = shear N(d) / (d + d_0), and |T| is at most mu N. A bristle longer than mu N / k_t
+    is shortened to that length (return mapping), and the node slides by the difference. Friction
+    falls with the slip speed: mu = mu_k + (mu_s - mu_k) exp(-v_f / v_s) (Stribeck).
 
     Args:
-        solid: the object, packed.
-        skin: packed.
-        bristles: (n_nodes, 4) of the fingertip; row i is written.
-        i: the node.
-        rotation: from the fingertip frame to the object's.
-        normal: of the object.
-        sliding: velocity along the surface [m/s].
-        node: its depth [m], stiffness for small depths [N/m] and pressing force [N].
-        dt: since the last step [s].
+        solid: the packed object.
+        skin: the packed skin.
+        bristles: (n_nodes, 4) bristles of the fingertip; row i is written.
+        i: index of the node.
+        rotation: rotation from the fingertip frame to the object's.
+        normal: normal of the object, in its frame.
+        sliding: velocity along the surface in the object's frame [m/s].
+        node: its depth [m], stiffness at small depths [N/m] and normal force [N].
+        dt: time since the last step [s].
 
     Returns:
-        The force on the node [N]; this, normal and velocity in the object's frame.
+        The force on the node in the object's frame [N].
     """
     depth, stiffness, pressed = node
     kt = skin[SHEAR] * elastic(skin, stiffness, depth) / (depth + skin[ENGAGEMENT])
     limit = pressed * _coefficient(solid, skin, bristles[i, SLIDING])
     b = apply(rotation, (bristles[i, BX], bristles[i, BY], bristles[i, BZ]))
-    b = flat(add(b, scaled(sliding, dt)), normal)
+    b = tangential(add(b, scaled(sliding, dt)), normal)
     length = math.sqrt(dot(b, b))
     slip = 0.0
     if length * kt > limit:
@@ -141,14 +140,14 @@ def _coefficient(solid: Array, skin: Array, slip: float) -> float:
 
 @compiled
 def _smoothed(skin: Array, before: float, slip: float, dt: float) -> float:
-    """The slip speed of a node after a low-pass of first order [m/s]."""
+    """Return the slip speed of a node after a first-order low-pass filter [m/s]."""
     if before == slip:
         return slip
     after = slip + (before - slip) * math.exp(-dt / skin[MEMORY])
-    return after if after > _FORGOTTEN else 0.0
+    return after if after > _MIN_SLIP_SPEED else 0.0
 
 
 @compiled
-def flat(v: Three, normal: Three) -> Three:
-    """The part of a vector along the surface."""
+def tangential(v: Three, normal: Three) -> Three:
+    """Return the part of a vector along the surface."""
     return add(v, scaled(normal, -dot(v, normal)))

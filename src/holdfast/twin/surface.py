@@ -1,7 +1,7 @@
-"""The skin of the curved fingertip as a quadrature: nodes, normals and the area of each.
+"""Skin of the curved fingertip as a quadrature: nodes, normals and areas.
 
-The tables of the sensor give 30 taxels and no surface. The skin is taken to be the smooth
-surface through them: a capsule (a half cylinder that ends in a dome) whose radius varies.
+The tables of the sensor have 30 taxels and no surface. The skin is assumed to be the smooth
+surface through the taxels: a capsule (a half cylinder that ends in a dome) of varying radius.
 """
 
 from functools import cache
@@ -15,30 +15,30 @@ from holdfast.sensors import sensor
 from holdfast.sensors.types import Array
 
 AXIS = 0.01254
-"""Palmar coordinate of the capsule's axis [m]: the outer walls' taxels sit beside it."""
+"""Palmar coordinate of the capsule's axis [m]; the taxels of the outer walls are beside it."""
 SHOULDER = 0.022
-"""Distal coordinate where the cylinder ends and the dome begins [m]. Own choice: taxels of the
-dome lie 12.5 to 13.3 mm from the point of the axis there, as on a ball."""
+"""Distal coordinate where the cylinder ends and the dome begins [m]. Own choice: from the point of
+the axis there, taxels of the dome are 12.5 to 13.3 mm away, as on a ball."""
 BASE = 0.0005
 """Distal coordinate where the skin begins [m]: half a pitch before the first row of taxels."""
-MARGIN = 0.003
-"""By which the skin goes round the outer walls' taxels to its edge [m]: half a pitch."""
+EDGE_MARGIN = 0.003
+"""Width of the skin beyond the taxels of the outer walls [m]: half a pitch."""
 PITCH = 0.0033
-"""Distance of neighbouring nodes [m]: half a taxel's pitch, so that a taxel sees about four."""
+"""Distance of neighbouring nodes [m]: half the taxels' pitch, about four nodes per taxel."""
 N_PARTS = 6
-"""An element is cut into N_PARTS x N_PARTS to measure its area and mean normal."""
+"""An element is divided into N_PARTS x N_PARTS to compute its area and mean normal."""
 
 _RADIUS = 0.0135  # between the cylinder's 14 mm and the dome's 13, for lengths along the skin
-_DIGITS = 9  # nanometres: so the table does not depend on the linear algebra of the machine
+_DIGITS = 9  # nanometres: the table must not depend on the linear algebra of the machine
 
 
 class Surface(NamedTuple):
-    """A quadrature of a skin, in the fingertip frame (x palmar, z distal).
+    """Quadrature of a skin in the fingertip frame (x palmar, z distal).
 
     Attributes:
-        nodes: (n, 3) centres of its elements [m].
-        normals: (n, 3) their outward unit normals.
-        areas: (n,) their areas [m^2].
+        nodes: (n, 3) centres of the elements [m].
+        normals: (n, 3) outward unit normals of the elements.
+        areas: (n,) areas of the elements [m^2].
     """
 
     nodes: Array
@@ -48,14 +48,14 @@ class Surface(NamedTuple):
 
 @cache
 def curved_fingertip() -> Surface:
-    """The skin of a `uskin-curved` fingertip: elements of about 10 mm^2.
+    """Compute the skin of a `uskin-curved` fingertip, with elements of about 10 mm^2.
 
-    Rows of elements lie along the finger and over the tip; every row is cut into elements of
-    about PITCH x PITCH. Nodes are rounded to a nanometre, so that they are the same bits on
-    every machine.
+    Rows of elements follow each other along the finger and over the tip. Every row is divided
+    into elements of about PITCH x PITCH. Nodes are rounded to a nanometre, so that they are the
+    same bits on every machine.
 
     Returns:
-        The quadrature; its arrays are read-only.
+        The quadrature, with read-only arrays.
 
     Example:
         >>> skin = curved_fingertip()
@@ -77,9 +77,9 @@ def curved_fingertip() -> Surface:
 
 
 def _radius() -> RBFInterpolator:
-    """The distance from the capsule's axis, by thin-plate splines over the unit capsule.
+    """Interpolate the distance from the capsule's axis by thin-plate splines on the unit capsule.
 
-    There every point, the dome's pole too, is like every other, which no pair of angles gives.
+    The unit capsule has no singular point, while a pair of angles has one at the dome's pole.
     """
     offsets = sensor("uskin-curved").positions - [AXIS, 0.0, 0.0]
     foot = np.zeros_like(offsets)
@@ -90,15 +90,15 @@ def _radius() -> RBFInterpolator:
 
 
 def _edges() -> list[tuple[float, float]]:
-    """Where rows begin and end: length along the skin from the base to the pole [m]."""
+    """Return begin and end of each row, as length along the skin from the base to the pole [m]."""
     straight, bent = SHOULDER - BASE, np.pi / 2 * _RADIUS
     parts = round((straight + bent) / PITCH)
     return list(pairwise(np.linspace(BASE, SHOULDER + bent, parts + 1).tolist()))
 
 
 def _row(radius: RBFInterpolator, begin: float, end: float) -> tuple[Array, Array]:
-    """Nodes and area vectors of the elements between two lengths along the skin."""
-    angle = np.pi / 2 + MARGIN / _RADIUS
+    """Return nodes and area vectors of the elements between two lengths along the skin."""
+    angle = np.pi / 2 + EDGE_MARGIN / _RADIUS
     elevation = max((begin + end) / 2 - SHOULDER, 0.0) / _RADIUS
     n = max(round(2 * angle * _RADIUS * np.cos(elevation) / PITCH), 2)
     lengths = np.linspace(begin, end, N_PARTS + 1)
@@ -112,7 +112,7 @@ def _row(radius: RBFInterpolator, begin: float, end: float) -> tuple[Array, Arra
 
 
 def _points(radius: RBFInterpolator, lengths: Array, angles: Array) -> Array:
-    """Points of the skin by length along it [m] and angle about its axis [rad]."""
+    """Return points of the skin by length along it [m] and angle about its axis [rad]."""
     elevation = np.maximum(lengths - SHOULDER, 0.0) / _RADIUS
     level = np.cos(elevation)
     direction = np.stack([level * np.cos(angles), level * np.sin(angles), np.sin(elevation)], -1)

@@ -1,8 +1,7 @@
-"""The uSkin fingertip: from the forces on the nodes of its skin to the counts that it sends.
+"""Model of a uSkin fingertip: from the forces on the nodes of its skin to counts.
 
-Silicone spreads a force over the taxels and follows it late; the field of a displaced magnet
-mixes the axes and ends at a range; temperature moves the baseline; noise and a step of one
-count come last.
+Silicone spreads a force over the taxels and delays part of it. Magnets mix the axes and saturate.
+Temperature moves the baseline. Noise and rounding to whole counts come last.
 """
 
 from typing import Any
@@ -15,24 +14,24 @@ from holdfast.sensors.types import Array
 from holdfast.twin.uskin_parameters import UskinParameters
 from holdfast.twin.uskin_readout import Counts, Readout, Taxels
 
-STRAY = 0.45
-"""Part of a period that a packet's stamp strays at most: stamps keep their order."""
+MAX_STAMP_SHIFT = 0.45
+"""Maximum shift of a packet's stamp, in periods; below a half, so stamps keep their order."""
 
 
 def taxel_shares(nodes: npt.ArrayLike, taxels: npt.ArrayLike, spread: float) -> Array:
-    """How the force on each node is shared among the taxels: rows sum to 1.
+    """Compute the shares of the taxels in the force on each node; each row sums to 1.
 
-    A bell over the distance, made a partition of unity so that no force is lost or gained:
+    A Gaussian of the distance, normalised so that no force is lost or gained:
     w_ni = exp(-|p_n - p_i|^2 / (2 s^2)) / sum_j exp(-|p_n - p_j|^2 / (2 s^2)). The outer walls
-    of the fingertip are ten spreads apart: nothing crosses.
+    of the fingertip are ten standard deviations apart, so no force passes between them.
 
     Args:
         nodes: (n, 3) positions of the nodes [m].
         taxels: (n_taxels, 3) positions of the taxels in the same frame [m].
-        spread: standard deviation of the bell [m].
+        spread: standard deviation of the Gaussian [m].
 
     Returns:
-        (n, n_taxels).
+        Shares, (n, n_taxels).
 
     Example:
         >>> taxel_shares([[1e-3, 0, 0]], [[0, 0, 0], [2e-3, 0, 0]], 2.8e-3).tolist()
@@ -46,13 +45,13 @@ def taxel_shares(nodes: npt.ArrayLike, taxels: npt.ArrayLike, spread: float) -> 
 
 
 class Uskin:
-    """One fingertip: gains, cross-talk, baselines and thermal behaviour of each taxel are fixed.
+    """One fingertip, with fixed gains, cross-talk, baselines and thermal behaviour of each taxel.
 
     Attributes:
-        parameters: what it was made from.
-        sensor: where its taxels are.
-        shares: (n_nodes, n_taxels) of the force on a node.
-        taxels: what is fixed of each taxel.
+        parameters: parameters of this kind of sensor.
+        sensor: sensor with the poses of the taxels.
+        shares: (n_nodes, n_taxels) shares of the taxels in the force on a node.
+        taxels: fixed properties of the taxels.
     """
 
     def __init__(
@@ -62,35 +61,35 @@ class Uskin:
         nodes: npt.ArrayLike,
         generator: np.random.Generator,
     ) -> None:
-        """Draw the properties of its taxels.
+        """Draw the properties of the taxels.
 
         Args:
-            parameters: of the kind of sensor.
-            sensor: poses of the taxels.
-            nodes: (n_nodes, 3) of the skin in the fingertip frame [m].
-            generator: of all that is drawn; the same state gives the same sensor and counts.
+            parameters: parameters of this kind of sensor.
+            sensor: sensor with the poses of the taxels.
+            nodes: (n_nodes, 3) nodes of the skin in the fingertip frame [m].
+            generator: random number generator; the same state gives the same sensor and counts.
         """
         self.parameters = parameters
         self.sensor = sensor
         self.shares = taxel_shares(nodes, sensor.positions, parameters.spread)
-        self.taxels = _drawn(parameters, sensor.n_taxels, generator)
+        self.taxels = _draw_taxels(parameters, sensor.n_taxels, generator)
         self._generator = generator
 
     def taxel_forces(self, node_forces: npt.ArrayLike) -> Array:
-        """The true force of each taxel, in its own frame, positive when pressed.
+        """Compute the true force of each taxel in its own frame, positive when pressed.
 
-        f_i = -R_i^T sum_n w_ni F_n. F_n acts on the fingertip: where it is pressed it points
-        inwards, against the taxel's outward z, and the minus makes f_z positive. So
+        f_i = -R_i^T sum_n w_ni F_n. F_n acts on the fingertip. Under pressure it points inwards,
+        against the taxel's outward z, so the minus sign makes f_z positive, and
         sum_i R_i f_i = -sum_n F_n is the force of the finger on the object.
 
         Args:
-            node_forces: (n_samples, n_nodes, 3) on the skin, in the fingertip frame [N].
+            node_forces: (n_samples, n_nodes, 3) forces on the skin in the fingertip frame [N].
 
         Returns:
-            (n_samples, n_taxels, 3) [N].
+            Forces, (n_samples, n_taxels, 3) [N].
 
         Raises:
-            ValueError: another number of nodes or axes.
+            ValueError: the array has another number of nodes or axes.
         """
         forces = np.asarray(node_forces, dtype=np.float64)
         if forces.ndim != 3 or forces.shape[1:] != (len(self.shares), 3):
@@ -104,10 +103,10 @@ class Uskin:
         return result
 
     def readout(self, generator: np.random.Generator | None = None) -> Readout:
-        """A run of the sensor from rest, to be fed in pieces of any size.
+        """Start a run of the sensor from rest, which takes samples in chunks of any size.
 
         Args:
-            generator: of noise and warming; by default the one that drew the sensor.
+            generator: generator of noise and warming; by default that of the sensor.
         """
         return Readout(self.parameters, self.taxels, generator or self._generator)
 
@@ -117,27 +116,27 @@ class Uskin:
         times: npt.ArrayLike,
         generator: np.random.Generator | None = None,
     ) -> Counts:
-        """What the fingertip sends for the true forces of its taxels, from first to last.
+        """Compute the counts that the fingertip sends for the true forces of its taxels.
 
-        The silicone begins at rest under the first sample's force.
+        At the start the silicone is at rest under the first sample's force.
 
         Args:
-            taxel_forces: (n, n_taxels, 3) in taxel frames [N].
-            times: (n,) increasing [s].
-            generator: of noise and warming; by default the one that drew the sensor.
+            taxel_forces: (n, n_taxels, 3) forces in taxel frames [N].
+            times: (n,) increasing times [s].
+            generator: generator of noise and warming; by default that of the sensor.
 
         Returns:
-            (n, n_taxels, 3).
+            Counts, (n, n_taxels, 3).
 
         Raises:
-            ValueError: shapes contradict each other, a force or time is not finite, or times
-                do not increase.
+            ValueError: the shapes do not agree, a force or time is not finite, or the times do
+                not increase.
         """
         return self.readout(generator).counts(taxel_forces, times)
 
 
-def _drawn(parameters: UskinParameters, n: int, generator: np.random.Generator) -> Taxels:
-    """The fixed properties of `n` taxels; gains of median 1."""
+def _draw_taxels(parameters: UskinParameters, n: int, generator: np.random.Generator) -> Taxels:
+    """Draw the fixed properties of `n` taxels, with gains of median 1."""
     gains = np.exp(parameters.gain_spread * generator.standard_normal(n))
     axes = parameters.cross_talk * generator.standard_normal((n, 3, 3))
     axes[:, range(3), range(3)] = 1.0
@@ -156,26 +155,26 @@ def with_server_effects(
     jitter: float = 1.0e-3,
     repeat_share: float = 0.075,
 ) -> tuple[Array, npt.NDArray[Any]]:
-    """Stamps and readings as a real server gives them: unsteady, some packets sent twice.
+    """Return stamps and readings like a real server's: unsteady, with repeated packets.
 
-    Every stamp strays on its own, by a Laplace distribution, within 0.45 of a period; a packet
-    that is repeated takes the place of its successor, and never thrice in a row. Defaults are
-    those of five recordings of a uSkin server at 60 Hz (6 to 9 % of rows repeat one, none
-    twice; steps of 3 to 24 ms, their standard deviation 1.2 to 1.5 ms).
+    Every stamp is shifted independently, by a Laplace distribution limited to 0.45 of a period.
+    A repeated packet replaces its successor; no packet comes three times in a row. The defaults
+    are from five recordings of a uSkin server at 60 Hz (6 to 9 % of the packets repeat the one
+    before, none twice; steps of 3 to 24 ms, standard deviation 1.2 to 1.5 ms).
 
     Args:
-        times: (n,) strictly increasing [s].
-        readings: (n, ...) at these times; stack fingers that come in one packet.
-        generator: of what is drawn.
+        times: (n,) strictly increasing times [s].
+        readings: (n, ...) readings at these times; stack fingers that come in one packet.
+        generator: random number generator.
         jitter: standard deviation of a stamp [s].
-        repeat_share: of the packets that repeat the one before, under a half.
+        repeat_share: share of packets that repeat the one before, below 0.5.
 
     Returns:
-        (n,) strictly increasing times [s], of which the first stays; (n, ...) readings.
+        Strictly increasing times (n,) [s], the first unchanged, and readings (n, ...).
 
     Raises:
-        ValueError: a jitter below 0, a share outside [0, 0.5), times that do not increase, or
-            another number of readings.
+        ValueError: the jitter is below 0, the share is not in [0, 0.5), the times do not
+            increase, or their number is not that of the readings.
 
     Example:
         >>> import numpy as np
@@ -195,11 +194,13 @@ def with_server_effects(
         raise ValueError(f"{len(readings)} increasing times expected, shape {clock.shape} given")
     if len(clock) < 2:
         return clock, readings.copy()
-    stray = generator.laplace(0.0, jitter / np.sqrt(2), len(clock))
+    shift = generator.laplace(0.0, jitter / np.sqrt(2), len(clock))
     chosen = generator.random(len(clock)) < repeat_share / (1 - repeat_share)
-    stray[0], chosen[0] = 0.0, False
+    shift[0], chosen[0] = 0.0, False
     room = np.minimum(np.append(steps, steps[-1]), np.insert(steps, 0, steps[0]))
-    clock += np.clip(stray, -STRAY * room, STRAY * room)
+    clock += np.clip(shift, -MAX_STAMP_SHIFT * room, MAX_STAMP_SHIFT * room)
     index = np.arange(len(clock))
-    run = index - np.maximum.accumulate(np.where(chosen, 0, index))  # place in a run, from 1
+    run = index - np.maximum.accumulate(
+        np.where(chosen, 0, index)
+    )  # position in a run of repeats, from 1
     return clock, readings[index - run % 2]

@@ -1,4 +1,4 @@
-"""What a uSkin fingertip does to a force, in numbers, and where each number comes from."""
+"""Parameters of the model of a uSkin fingertip, with the source of each."""
 
 from dataclasses import dataclass, fields
 
@@ -9,41 +9,42 @@ Three = tuple[float, float, float]
 
 @dataclass(frozen=True)
 class UskinParameters:
-    """What a uSkin fingertip does to a force.
+    """Parameters of the model of a uSkin fingertip.
 
     Nothing is published on the curved fingertip. "Data sheet" is that of the flat uSPa46 (July
-    2025, high sensitivity); "packets" are the two of whole Allegro hands, 368 taxels each.
+    2025, high sensitivity). "Packets" are two packets of whole Allegro hands, 368 taxels each.
 
     Attributes:
-        spread: of a force in the silicone, standard deviation [m]. Own choice: under half of
-            the taxels' pitch of 6.4 mm.
-        gain_spread: of the taxels' gains, standard deviation of their logarithm. Own choice;
-            XELA sells a calibration of every taxel against that of the model.
-        cross_talk: standard deviation of the six ratios by which an axis of a taxel reads
+        spread: standard deviation of the spread of a force in the silicone [m]. Own choice:
+            less than half of the taxels' pitch of 6.4 mm.
+        gain_spread: standard deviation of the logarithm of the taxels' gains. Own choice; XELA
+            sells a calibration of each taxel in place of the general one.
+        cross_talk: standard deviation of the six ratios by which one axis of a taxel reads
             another. Own choice.
-        limits: the force by axis that a reading never passes [N]. Data sheet: the range.
-        lag_shares: parts of a force that the silicone shows late. Own choice, as silicones do;
-            with `lag_times` a cycle of 20 s up and 20 s down leaves a loop of 1 % of its
-            height (data sheet: hysteresis 1.06 % on z, its cycle not told).
-        lag_times: the time constant of each part [s]. Own choice.
-        counts_per_newton: by axis [count/N]. Data sheet: 0.000628, 0.000628, 0.000729 N/count.
-        baseline: mean reading at rest by axis [count]. Packets.
-        baseline_spread: its standard deviation over taxels [count]. Packets.
-        thermal_counts: by which a degree moves the baseline, by axis [count/K]. Data sheet: 120
-            counts on z for 3.5 degrees.
-        thermal_spread: standard deviation of that over taxels, every axis [count/K]. Own
-            choice: a fifth of it.
+        limits: limit of the readings of each axis [N]. Data sheet: the range.
+        lag_shares: shares of a force that the silicone shows with delay. Own choice, typical of
+            silicones. With `lag_times`, a cycle of 20 s up and 20 s down has a hysteresis of
+            1 % of its height (data sheet: 1.06 % on z; its cycle is not published).
+        lag_times: time constant of each share [s]. Own choice.
+        counts_per_newton: scale of each axis [count/N]. Data sheet: 0.000628, 0.000628,
+            0.000729 N/count.
+        baseline: mean reading of each axis at rest [count]. Packets.
+        baseline_spread: standard deviation of the baseline over taxels [count]. Packets.
+        thermal_counts: drift of the baseline of each axis [count/K]. Data sheet: 120 counts on z
+            for 3.5 degrees.
+        thermal_spread: standard deviation of that drift over taxels, every axis [count/K]. Own
+            choice: a fifth of the drift.
         warming: standard deviation of the temperature's change over `warming_time` [K]. Data
-            sheet: its test; how a hand warms is an own choice.
-        warming_time: the time that `warming` is told for [s]. Data sheet: 50 minutes.
-        thermal_time: over which the rate of warming keeps its direction [s]. Own choice: 5 mm
-            of silicone conduct heat in about 100 s; so the walk is smooth at a sample's scale.
-        noise_counts: rms of a reading at rest, rounding included [count]. Data sheet: mean
+            sheet: its test. The course of the temperature is an own choice.
+        warming_time: time of the change `warming` [s]. Data sheet: 50 minutes.
+        thermal_time: correlation time of the rate of warming [s]. Own choice: 5 mm of silicone
+            conduct heat in about 100 s, so the temperature is smooth from sample to sample.
+        noise_counts: rms noise of a reading at rest, with rounding [count]. Data sheet: mean
             square 0.8 (x, y) and 0.9 (z).
 
     Raises:
-        ValueError: numbers are missing, not finite or negative; limits, scales or times are not
-            above 0; the lag takes more than the whole force.
+        ValueError: a parameter has another number of values, is not finite or is negative; a
+            limit, scale or time is 0; or the lag shares add up to more than 1.
     """
 
     spread: float = 2.8e-3
@@ -81,8 +82,8 @@ class UskinParameters:
     def warming_rate(self) -> float:
         """Standard deviation of the rate of warming [K/s].
 
-        The rate is an Ornstein-Uhlenbeck process; its integral over t has the variance
-        2 (rate tau)^2 (t / tau - 1 + exp(-t / tau)), tau the thermal time.
+        The rate is an Ornstein-Uhlenbeck process. Its integral over t has the variance
+        2 (rate tau)^2 (t / tau - 1 + exp(-t / tau)), where tau is the thermal time.
         """
         periods = self.warming_time / self.thermal_time
         walk = np.sqrt(2 * (periods - 1 + np.exp(-periods)))

@@ -1,4 +1,4 @@
-"""One run of a uSkin fingertip: silicone, magnets, temperature, noise and whole counts."""
+"""Readout of a uSkin fingertip: silicone, magnets, temperature, noise and whole counts."""
 
 import math
 from typing import NamedTuple
@@ -12,18 +12,18 @@ from holdfast.twin.uskin_parameters import UskinParameters
 
 Counts = npt.NDArray[np.uint16]
 
-ROUNDING = 1 / 12
+ROUNDING_VARIANCE = 1 / 12
 """Variance of rounding to whole counts [count^2]."""
 UINT16_MAX = 65535.0
 
 
 class Taxels(NamedTuple):
-    """What is fixed of each taxel of one fingertip.
+    """Fixed properties of the taxels of one fingertip.
 
     Attributes:
-        mixing: (n_taxels, 3, 3) from a force to a reading by axis: gain and cross-talk.
+        mixing: (n_taxels, 3, 3) gain and cross-talk, from a force to a reading by axis.
         baseline: (n_taxels, 3) reading at rest [count].
-        thermal: (n_taxels, 3) by which a degree moves it [count/K].
+        thermal: (n_taxels, 3) drift of the baseline [count/K].
     """
 
     mixing: Array
@@ -32,10 +32,10 @@ class Taxels(NamedTuple):
 
 
 class Readout:
-    """A run of one fingertip: the state of its silicone and its temperature.
+    """Run of one fingertip, with the state of its silicone and its temperature.
 
     Attributes:
-        warmth: above the temperature at the start [K].
+        warmth: temperature above that at the start [K].
     """
 
     def __init__(
@@ -46,21 +46,21 @@ class Readout:
         self._taxels = taxels
         self._generator = generator
         self._rate = 0.0
-        self._last: tuple[float, Array, Array] | None = None  # time, force and late parts
+        self._last: tuple[float, Array, Array] | None = None  # time, force and delayed parts
 
     def counts(self, taxel_forces: npt.ArrayLike, times: npt.ArrayLike) -> Counts:
-        """The next samples; arguments, result and errors as of `Uskin.counts`."""
+        """Compute the next samples; arguments, result and errors are those of `Uskin.counts`."""
         forces, clock = self._checked(taxel_forces, times)
         if not len(clock):
             return np.zeros(forces.shape, dtype=np.uint16)
         parameters = self._parameters
         drawn = self._generator.standard_normal((len(clock), 1 + self._taxels.baseline.size))
-        warmth = self._warm(clock, drawn[:, 0])
-        passed = self._late(forces, clock)
-        white = np.sqrt(max(parameters.noise_counts**2 - ROUNDING, 0.0))
+        warmth = self._temperature(clock, drawn[:, 0])
+        passed = self._delayed(forces, clock)
+        white = np.sqrt(max(parameters.noise_counts**2 - ROUNDING_VARIANCE, 0.0))
         limits, scales = np.array(parameters.limits), np.array(parameters.counts_per_newton)
         counts = np.empty(forces.shape, dtype=np.uint16)
-        _count(passed, warmth, white * drawn[:, 1:], self._taxels, limits, scales, counts)
+        _write_counts(passed, warmth, white * drawn[:, 1:], self._taxels, limits, scales, counts)
         return counts
 
     def _checked(self, taxel_forces: npt.ArrayLike, times: npt.ArrayLike) -> tuple[Array, Array]:
@@ -76,13 +76,13 @@ class Readout:
             raise ValueError("finite taxel forces and times expected, NaN or infinity given")
         before = [] if self._last is None else [self._last[0]]
         if not (np.diff(clock, prepend=before) > 0).all():
-            raise ValueError("times that increase expected")
+            raise ValueError("increasing times expected")
         return forces, clock
 
-    def _late(self, forces: Array, clock: Array) -> Array:
-        """The forces as the silicone passes them on: parts of them late.
+    def _delayed(self, forces: Array, clock: Array) -> Array:
+        """Return the forces after the silicone, which delays parts of them.
 
-        Exact for forces that are linear between samples.
+        The result is exact for forces that are linear between samples.
         """
         shares = np.array(self._parameters.lag_shares)
         taus = np.array(self._parameters.lag_times)
@@ -91,12 +91,12 @@ class Readout:
             self._last = (float(clock[0]), forces[0], state)
         last, force, state = self._last
         passed = np.empty_like(forces)
-        _follow(forces, np.diff(clock, prepend=last), force, state, shares, taus, passed)
+        _low_pass(forces, np.diff(clock, prepend=last), force, state, shares, taus, passed)
         self._last = (float(clock[-1]), forces[-1].copy(), state)
         return passed
 
-    def _warm(self, clock: Array, drawn: Array) -> Array:
-        """(n,) the temperature above that at the start [K]: a rate that wanders, summed up."""
+    def _temperature(self, clock: Array, drawn: Array) -> Array:
+        """Return the temperature above that at the start, (n,) [K]: an integrated random rate."""
         parameters = self._parameters
         spread = parameters.warming_rate
         warmth = np.empty(len(clock))
@@ -106,31 +106,31 @@ class Readout:
             start = self._last[0]
         steps = np.diff(clock, prepend=start)
         state = np.array([self._rate, self.warmth])
-        _wander(steps, drawn, spread, parameters.thermal_time, state, warmth)
+        _advance_warming(steps, drawn, spread, parameters.thermal_time, state, warmth)
         self._rate, self.warmth = state.tolist()
         return warmth
 
 
 @compiled
 def saturated(newtons: float, limit: float) -> float:
-    """A reading that bends towards its range: x / (1 + (x / limit)^4)^(1/4).
+    """Return a reading that saturates at a limit: x / (1 + (x / limit)^4)^(1/4).
 
-    Down to 85 % of its slope at 4.5 N of 7.35 N, and to 48 % at 7 N: where the data sheet sees
-    the slope change.
+    With a limit of 7.35 N the slope falls to 85 % at 4.5 N and to 48 % at 7 N, where the data
+    sheet shows a change of slope.
 
     Args:
-        newtons: unlimited [N].
-        limit: that is never passed [N].
+        newtons: reading without a limit [N].
+        limit: limit of the reading [N].
 
     Returns:
-        The reading [N].
+        The saturated reading [N].
     """
     square = (newtons / limit) ** 2
     return newtons / math.sqrt(math.sqrt(1.0 + square * square))
 
 
 @compiled
-def _count(
+def _write_counts(
     forces: Array,
     warmth: Array,
     noise: Array,
@@ -139,7 +139,7 @@ def _count(
     scales: Array,
     counts: Counts,
 ) -> None:
-    """Cross-talk and gain, range, baseline, temperature, noise, and whole counts."""
+    """Write counts: cross-talk and gain, range, baseline, temperature, noise, rounding."""
     n, n_taxels, n_axes = forces.shape
     for k in range(n):
         for i in range(n_taxels):
@@ -154,7 +154,7 @@ def _count(
 
 
 @compiled
-def _follow(
+def _low_pass(
     forces: Array,
     steps: Array,
     before: Array,
@@ -163,7 +163,7 @@ def _follow(
     taus: Array,
     passed: Array,
 ) -> None:
-    """The sum of a prompt part and low-pass parts; `state` (n_lags, n_taxels, 3) is written.
+    """Write the sum of a prompt part and low-pass parts; advance `state` (n_lags, n_taxels, 3).
 
     Over a step h of a force from u to v: y <- e y + (g - e) u + (1 - g) v, with
     e = exp(-h / tau) and g = (1 - e) tau / h.
@@ -186,10 +186,10 @@ def _follow(
 
 
 @compiled
-def _wander(
+def _advance_warming(
     steps: Array, drawn: Array, spread: float, tau: float, state: Array, warmth: Array
 ) -> None:
-    """Rate [K/s] and temperature [K] in `state`, which is written; the first step may be 0."""
+    """Advance rate [K/s] and temperature [K] in `state`; the first step may be 0."""
     for k in range(len(steps)):
         keep = np.exp(-steps[k] / tau)
         rate = keep * state[0] + np.sqrt(1 - keep * keep) * spread * drawn[k]
