@@ -1,7 +1,7 @@
 """Measure how much a few own recordings improve a model: table of docs/training.md, as Markdown.
 
-    holdfast simulate twin/vigorous --profile vigorous --seed 0
-    holdfast simulate twin/gentle --profile gentle --seed 0
+    holdfast simulate twin/vigorous --profile finger-vigorous --seed 0
+    holdfast simulate twin/gentle --profile finger-gentle --seed 0
     python benchmarks/adaptation.py twin/vigorous twin/gentle
 
 For each folder, N of its recordings are drawn at random. builtin:twin is adapted to them
@@ -152,7 +152,7 @@ def count(model: Model, recording: Recording) -> Counts:
 
 def without_margin(decisions: Decisions, recording: Recording) -> Decisions:
     """Return the decisions with labels without margin."""
-    rule = LabelRule(margin=0.0)
+    rule = LabelRule(margin=0.0, glitch=None)
     fingers = {
         name: replace(
             finger,

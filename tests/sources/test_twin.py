@@ -191,8 +191,8 @@ def test_metadata_are_plain(monkeypatch):
         ("twin:?object=brick", "twin:?object=brick: no object 'brick'; there are ball, "),
         (
             "twin:?profile=wild",
-            "twin:?profile=wild: unknown profile 'wild'; there are finger-gentle, finger-reference, "
-            "finger-vigorous, gentle, reference, vigorous",
+            "twin:?profile=wild: unknown profile 'wild'; there are finger-gentle, "
+            "finger-reference, finger-vigorous, gentle, reference, vigorous",
         ),
         (
             "twin:?case=3",
