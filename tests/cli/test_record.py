@@ -252,7 +252,7 @@ def test_bad_arguments_are_refused(capsys, device, grasp, tmp_path):
         (
             ("xela://fake", tmp_path / "a.parquet"),
             f"{tmp_path}/a.parquet: NAME.mcap expected "
-            "(holdfast import converts it to other formats)",
+            "(holdfast import converts recordings to .parquet)",
         ),
         (
             ("xela://fake", tmp_path / "no" / "a.mcap"),

@@ -40,11 +40,11 @@ def when_served(monkeypatch):
 
         real = verb.print_json
 
-        def tell(document):
+        def print_and_start(document):
             real(document)
             threading.Thread(target=run, args=(document,)).start()
 
-        monkeypatch.setattr(verb, "print_json", tell)
+        monkeypatch.setattr(verb, "print_json", print_and_start)
         return found
 
     return arrange

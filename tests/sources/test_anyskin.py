@@ -80,7 +80,7 @@ def test_pieces_of_any_size_give_the_same(rows, piece, temperature):
 )
 def test_garbage_gives_the_same_in_pieces_of_any_size(parts, piece):
     data = b"".join(parts)
-    tail = b"".join(map(packet, some(30, 2)))  # long enough to tell what was before
+    tail = b"".join(map(packet, some(30, 2)))  # long enough to resynchronise
     whole = decoded(data + tail, 2)
     pieces = decoded(data + tail, 2, piece)
     np.testing.assert_array_equal(whole[0], pieces[0])

@@ -83,10 +83,10 @@ def test_no_search_uses_the_units_that_are_evaluated(grasps, split, monkeypatch)
 
 
 def test_random_labels_are_not_learnt():
-    """Labels by the toss of a coin for each recording: only a leak would beat chance.
+    """Test random labels, one for each recording: only a leak gives more than chance.
 
-    Features tell recordings apart by their grip, so that a model which saw the recording that
-    it judges knows its labels by heart.
+    The grip differs between recordings, and so do the features. A model that was trained on the
+    evaluated recording would therefore reproduce its label.
     """
     rng = np.random.default_rng(3)
     stable, not_stable = ContactState.STABLE, ContactState.UNSTABLE

@@ -34,10 +34,10 @@ Task = Callable[[], object]
 
 def bench(
     samples: Annotated[
-        int, typer.Option(help="Samples of one finger for the batch features.")
+        int, typer.Option(help="Number of samples of one finger for the batch features.")
     ] = 10_000_000,
     updates: Annotated[
-        int, typer.Option(help="Updates of a hand for the time per update.")
+        int, typer.Option(help="Number of updates of a hand for the time per update.")
     ] = 20_000,
     as_json: JsonOption = False,
 ) -> None:

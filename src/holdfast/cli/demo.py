@@ -52,7 +52,7 @@ def demo(
     Example:
       holdfast demo
       holdfast demo --no-browser
-      holdfast demo tried/ --speed 0 --json
+      holdfast demo results/ --speed 0 --json
     """
     from holdfast.files import refuse_overwrite
     from holdfast.io import load_dataset

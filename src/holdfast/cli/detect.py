@@ -51,7 +51,9 @@ def detect(
         float | None, typer.Option(help="Stop a live source after this time [s].")
     ] = None,
     ignore: IgnoreOption = "",
-    as_json: Annotated[bool, typer.Option("--json", help="Print the summary as JSON too.")] = False,
+    as_json: Annotated[
+        bool, typer.Option("--json", help="With --summary: print JSON, not a table.")
+    ] = False,
 ) -> None:
     """Detect the contact state of every finger at every sample.
 

@@ -1,4 +1,4 @@
-"""`holdfast doctor`: what is installed, and whether it works."""
+"""`holdfast doctor`: check the installation and the live sources."""
 
 import os
 import platform

@@ -39,7 +39,7 @@ def record(
     speed: SpeedOption = 1.0,
     object_name: Annotated[str, typer.Option("--object", help="Name of the object.")] = "",
     case: Annotated[str, typer.Option(help="Case of the experiment.")] = "",
-    note: Annotated[str, typer.Option(help="Any other text.")] = "",
+    note: Annotated[str, typer.Option(help="Note about the recording.")] = "",
     settings: Annotated[
         list[str] | None,
         typer.Option("--set", metavar="KEY=VALUE", help="Other metadata; may be repeated."),
@@ -143,7 +143,7 @@ def _output_path(source: str, out: Path, object_name: str, *, force: bool) -> Pa
         path = out / f"{_recording_name(source, object_name)}{_SUFFIX}"
     elif out.suffix != _SUFFIX:
         raise ValueError(
-            f"{out}: NAME{_SUFFIX} expected (holdfast import converts it to other formats)"
+            f"{out}: NAME{_SUFFIX} expected (holdfast import converts recordings to .parquet)"
         )
     if path.exists() and Path(source).exists() and path.samefile(source):
         raise ValueError(f"{path} is the source: choose another name")

@@ -162,7 +162,7 @@ def plan_grasps(
 
 
 def _is_finished(grasp: "Grasp", out: Path) -> bool:
-    """Return whether the recording exists, or that of the last failed attempt."""
+    """Return whether the recording of the grasp, or of its last failed attempt, exists."""
     last_failed = f"{grasp.name}-failed{ATTEMPTS}"
     return any(_exists(grasp, out / f"{name}.parquet") for name in (grasp.name, last_failed))
 
@@ -199,7 +199,10 @@ def _list(settings: "dict[str, object]") -> str:
 
 
 def _remove_others(grasp: "Grasp", out: Path, names: "Sequence[str]") -> None:
-    """Remove older recordings of the grasp: another seed fails at other attempts."""
+    """Remove older recordings of the grasp that were not overwritten.
+
+    With another seed, other attempts fail.
+    """
     failed = [f"{grasp.name}-failed{attempt + 1}" for attempt in range(ATTEMPTS)]
     for name in (grasp.name, *failed):
         if name not in names:

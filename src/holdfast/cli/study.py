@@ -87,10 +87,10 @@ def study(
 ) -> None:
     """Repeat the experiments of the paper, and run further ones.
 
-    Write OUT/report.html, every table as CSV, JSON and LaTeX, every figure as SVG and PNG, and
-    study.json. Finished tasks are kept in OUT/work and simulated recordings in OUT/data, so the
-    same command continues a study that was stopped. Real recordings are read from HOLDFAST_DATA,
-    or from ../shared/data, if they exist.
+    Write OUT/report.html, every table as CSV, JSON, LaTeX and Markdown, every figure as SVG and
+    PNG, and study.json. Finished tasks are kept in OUT/work and simulated recordings in OUT/data,
+    so the same command continues a study that was stopped. Real recordings are read from
+    HOLDFAST_DATA, or from ../shared/data, if they exist.
 
     Example:
       holdfast study --twin --quick --out quick/

@@ -83,7 +83,7 @@ def _compare_each(
             one, other = (labels_of(recording) for labels_of in both)
             if not (any(one.values()) and any(other.values())):
                 side = "B" if any(one.values()) else "A"
-                yield recording.name, f"{side} has no labels of it"
+                yield recording.name, f"{side} has no labels of this recording"
                 continue
             times = {name: module.times for name, module in recording.modules.items()}
             yield recording.name, compare(one, other, times, recording.name)
@@ -123,7 +123,7 @@ def _recordings_to_compare(a: Path, b: Path) -> list[Path]:
         if not _is_rule(place) and (found := _recordings_beside(place)):
             return found
     raise RecordingError(
-        f"no recordings beside the labels in {a} or {b}; their sample times are needed"
+        f"no recordings beside the labels in {a} or {b}; recordings give the sample times"
     )
 
 

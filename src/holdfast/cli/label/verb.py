@@ -44,19 +44,19 @@ def label(
         bool, typer.Option("--page", help="With --audit: show the contradicted labels on the page.")
     ] = False,
     poses: Annotated[
-        Path | None, typer.Option(help="Poses for the rule tracking: a CSV file or a bag.")
+        Path | None, typer.Option(help="Poses for the rule tracking: a CSV file or a ROS bag.")
     ] = None,
     tracks: Annotated[
         list[str] | None,
         typer.Option(
             "--track",
             metavar="BODY=NAME",
-            help="Topic or frame of a body in the bag; BODY: object, thumb, ...",
+            help="Topic or frame of a body in the bag; BODY is object or a finger.",
         ),
     ] = None,
     parameters: Annotated[
         list[str] | None,
-        typer.Option("--set", metavar="NAME=VALUE", help="Parameter of the rule."),
+        typer.Option("--set", metavar="NAME=VALUE", help="Parameter of the rule; may be repeated."),
     ] = None,
     tare: TareOption = "0.5",
     author: Annotated[
@@ -85,7 +85,7 @@ def label(
 
     Without a mode, open the labelling page: draw labels with the mouse, set states with keys,
     undo changes, and accept the proposals of a rule. Every change is saved at once. Labels are
-    stored in NAME.labels.json beside the recording, which is never changed.
+    stored in NAME.labels.json beside the recording. The recording itself is never changed.
 
     --auto writes the labels that a rule proposes, and prints those with low confidence. Labels
     of a person are overwritten only with --force. --compare prints Cohen's kappa and onset
@@ -97,7 +97,7 @@ def label(
       holdfast label --auto signal recordings/ --dry-run
       holdfast label --auto tracking grasp.parquet --poses markers.csv
       holdfast label --auto tracking grasp.mcap --poses run.bag --track object=/aruco/pose
-      holdfast label --compare recordings/ eve/ --json
+      holdfast label --compare recordings/ labels-of-ann/ --json
       holdfast label --compare recordings/ signal
       holdfast label --audit recordings/ --page
       holdfast label --export label-studio studio/ recordings/

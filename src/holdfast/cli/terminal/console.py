@@ -10,7 +10,7 @@ def print_message(text: str) -> None:
 
 
 def print_error(text: str) -> None:
-    """Print on stderr, in one line, why there is no result."""
+    """Print an error message on stderr, in one line."""
     print_message(f"holdfast: {' '.join(text.split())}")
 
 

@@ -19,7 +19,7 @@ MESSAGE_INTERVAL = 10.0
 
 
 class StatusLine:
-    """Status of a recorder: one line that is updated on a terminal, elsewhere a line at times.
+    """Status of a recorder: on a terminal one updated line, elsewhere one line every 10 s.
 
     Args:
         recorder: a recorder that is open.
@@ -60,7 +60,7 @@ class StatusLine:
                 print_message(text)
 
     def update(self) -> None:
-        """Print the status if its interval is over."""
+        """Print the status if the time for the next update has come."""
         now = time.monotonic()
         if now < self._next_update:
             return
