@@ -175,7 +175,7 @@ class TestCluster:
         calls = [(place, 2) for place in range(6)]
         with (
             two_workers(**{"distributed.scheduler.allowed-failures": 0}) as cluster,
-            pytest.raises(EngineError, match=r"^2: its worker died again and again"),
+            pytest.raises(EngineError, match=r"^2: its worker died each time"),
         ):
             list(engine_of(cluster).map_ordered(die_at, calls))
 

@@ -189,8 +189,8 @@ def _on_cluster(
 ) -> Iterator[tuple[K, T]]:
     """Make calls on a Dask cluster, which repeats the calls of a worker that died.
 
-    Dask counts a death against every call that the worker held (decision 0006). So a call that
-    Dask gives up is made again alone.
+    If a worker dies, Dask counts a failure of every call that the worker held (decision 0006).
+    So a call that Dask cancels is repeated alone.
     """
     with _client(scheduler) as client:
         suspects: list[Call[K]] = []
@@ -200,7 +200,7 @@ def _on_cluster(
             yield from _submit(client, function, [call], failed)
             if failed:
                 raise EngineError(
-                    f"{call[0]}: its worker died again and again, killed or out of memory"
+                    f"{call[0]}: its worker died each time, killed or out of memory"
                 )
 
 

@@ -171,7 +171,7 @@ def _correct_by_force(timeline: StateTimeline, finger: FingerForce, commanded: M
 
 def _evidence(state: ContactState, cause: Cause | None, ratio: float) -> str:
     word = cause or ("locked" if state is ContactState.STABLE else "free, or no force")
-    return f"marker: {word}" if ratio > 1 else f"marker: {word}; the force speaks against it"
+    return f"marker: {word}" if ratio > 1 else f"marker: {word}; the force contradicts it"
 
 
 def _shown(recording: Recording) -> str:
