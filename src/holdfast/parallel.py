@@ -199,9 +199,7 @@ def _on_cluster(
             failed: list[Call[K]] = []
             yield from _submit(client, function, [call], failed)
             if failed:
-                raise EngineError(
-                    f"{call[0]}: its worker died each time, killed or out of memory"
-                )
+                raise EngineError(f"{call[0]}: its worker died each time, killed or out of memory")
 
 
 def _submit(

@@ -1,1 +1,1 @@
-"""The detector at work: fed from a source, recorded, shown on a page, published."""
+"""Live detection: detect, record and publish the samples of a source."""

@@ -224,7 +224,7 @@ class Recorder:
         self.close()
 
     def _run(self) -> None:
-        """Write until the recorder closes; `close` raises what goes wrong."""
+        """Write until the recorder closes; `close` raises the error, if there is one."""
         try:
             while not self._closing:
                 self._wake.wait(FLUSH_INTERVAL)

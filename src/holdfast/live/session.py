@@ -91,7 +91,7 @@ class Session:
         self.source.close()
 
     def restart_tare(self) -> None:
-        """Forget the tare, and take a new one from the next samples.
+        """Discard the tare, and take a new one from the next samples.
 
         Raises:
             StreamError: a finger is in contact.
