@@ -1,6 +1,6 @@
 """Measure which wrong labels an audit finds: the table of docs/labels.md, as Markdown.
 
-    holdfast simulate twin/reference --seed 0
+    holdfast simulate twin/reference --profile finger-reference --seed 0
     python benchmarks/label_audit.py twin/reference --recordings 24
 
 The labels of the twin are correct. Errors are added to them, with the seeds 0, 1 and 2: either

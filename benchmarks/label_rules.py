@@ -1,8 +1,8 @@
 """Measure the quality of labels by rules, and of models trained on them: tables of docs/labels.md.
 
-    holdfast simulate twin/reference --profile reference --seed 0
-    holdfast simulate twin/vigorous --profile vigorous --seed 0
-    holdfast simulate twin/gentle --profile gentle --seed 0
+    holdfast simulate twin/reference --profile finger-reference --seed 0
+    holdfast simulate twin/vigorous --profile finger-vigorous --seed 0
+    holdfast simulate twin/gentle --profile finger-gentle --seed 0
     holdfast import uskin_pick_move real
     python benchmarks/label_rules.py --folder twin/reference --folder twin/vigorous \
         --folder twin/gentle --real real

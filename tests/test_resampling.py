@@ -221,12 +221,10 @@ def test_live_refuses_times_that_do_not_go_forward(time, after):
     resampler.push(0.5, np.ones((1, 3)))
     with pytest.raises(StreamError) as raised:
         resampler.push(time, np.ones((1, 3)))
-    assert str(raised.value) == (
-        f"time {time} s given{after}; finite times that go forward expected"
-    )
+    assert str(raised.value) == (f"time {time} s given{after}; finite, increasing times expected")
     with pytest.raises(StreamError) as raised:
         Resampler(100.0, 150.0).push(np.nan, np.ones((1, 3)))
-    assert str(raised.value) == "time nan s given; finite times that go forward expected"
+    assert str(raised.value) == "time nan s given; finite, increasing times expected"
 
 
 @pytest.mark.parametrize("rates", [(0.0, 100.0), (np.nan, 100.0), (100.0, -1.0)])

@@ -21,7 +21,7 @@ class HoldfastError(Exception):
 
 
 class RecordingError(HoldfastError):
-    """A recording cannot be read, is damaged, or contradicts itself: use another file."""
+    """A recording cannot be read, is damaged, or is inconsistent: use another file."""
 
 
 class ModelError(HoldfastError):

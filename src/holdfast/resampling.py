@@ -125,14 +125,12 @@ class Resampler:
             Time [s] and reading of each new sample that is complete now, oldest first.
 
         Raises:
-            StreamError: the time does not go forward.
+            StreamError: the time does not increase.
         """
         time = float(time)
         if not self._last < time < np.inf:
             after = "" if self._last == -np.inf else f" after {self._last:.15g} s"
-            raise StreamError(
-                f"time {time:.15g} s given{after}; finite times that go forward expected"
-            )
+            raise StreamError(f"time {time:.15g} s given{after}; finite, increasing times expected")
         values = np.array(reading, dtype=np.float64)
         if time - self._last > self._gap:
             self._start, self._step, self._n_summed = time, 1, 0

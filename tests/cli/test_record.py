@@ -51,7 +51,7 @@ def grasp(tmp_path_factory):
 
 
 class Device(Source):
-    """Source that gives the arrivals of a list, then falls silent, or ends."""
+    """Source that gives the arrivals of a list, then sends nothing more, or ends."""
 
     name = "xela://fake"
     paced = False

@@ -230,5 +230,5 @@ class TestRefusals:
         with pytest.raises(StreamError) as raised:
             detector.run(recording(index=tactile(20, start=1.1)))
         assert str(raised.value) == (
-            "time 1.1 s given after 1.19 s; finite times that go forward expected"
+            "time 1.1 s given after 1.19 s; finite, increasing times expected"
         )

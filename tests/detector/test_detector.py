@@ -294,11 +294,11 @@ REFUSED = {
              "thumb: a sample of shape (2, 2) given, (2, 3) expected (tiny)"),
     "list": ({"thumb": [1, 2, 3]}, 1.0,
              "thumb: a sample of shape (3,) given, (2, 3) expected (tiny)"),
-    "back": ({}, 0.25, "time 0.25 s given after 0.49 s; finite times that go forward expected"),
-    "still": ({}, 0.49, "time 0.49 s given after 0.49 s; finite times that go forward expected"),
-    "nan": ({}, np.nan, "time nan s given after 0.49 s; finite times that go forward expected"),
+    "back": ({}, 0.25, "time 0.25 s given after 0.49 s; finite, increasing times expected"),
+    "still": ({}, 0.49, "time 0.49 s given after 0.49 s; finite, increasing times expected"),
+    "nan": ({}, np.nan, "time nan s given after 0.49 s; finite, increasing times expected"),
     "infinite": ({}, np.inf,
-                 "time inf s given after 0.49 s; finite times that go forward expected"),
+                 "time inf s given after 0.49 s; finite, increasing times expected"),
 }  # fmt: skip
 
 
@@ -320,7 +320,7 @@ def test_a_refused_update_changes_nothing(samples, time, message):
 def test_refuses_a_first_time_that_is_not_finite(time):
     with pytest.raises(StreamError) as raised:
         Detector(model()).update({}, time)
-    assert str(raised.value) == f"time {time} s given; finite times that go forward expected"
+    assert str(raised.value) == f"time {time} s given; finite, increasing times expected"
 
 
 @pytest.mark.parametrize("time", [1, np.float32(1), np.int64(1)])

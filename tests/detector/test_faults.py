@@ -280,7 +280,7 @@ class TestTaxelsBeyondAMask:
 
 class TestTareDrift:
     def crept(self, seconds, height=400.0, n=2000, start=500):
-        """F_a that rises to `height` in so many seconds, and stays."""
+        """F_a that rises to `height` in a number of seconds, and remains there."""
         ramp = np.clip((np.arange(n) - start) / (seconds * RATE), 0, 1) * height
         values = white(n, sensor(1), level=5.0)
         values[:, 0] += np.rint(ramp)[:, None] * sensor(1).rotations[0].T[:, 0]

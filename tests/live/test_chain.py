@@ -100,7 +100,7 @@ def test_the_page_shows_what_a_server_sends(tmp_path):
             page.on("console", lambda m: complaints.append(m.text) if m.type == "error" else None)
             page.on("pageerror", lambda error: complaints.append(str(error)))
             page.goto(server["url"])
-            # What the eye sees; on a busy machine some packets are late, and UNKNOWN for a while.
+            # Main states only: on a busy machine late packets make fingers UNKNOWN for a while.
             for words in ("STABLE|NO CONTACT", "thumb[^]*index[^]*middle[^]*ring"):
                 seen = f"() => /{words}/.test(document.body.innerText)"
                 page.wait_for_function(seen, timeout=90_000)

@@ -147,13 +147,13 @@ class TestDiagnostics:
     def test_a_healthy_hand(self):
         found = self.of(thumb=finger())
         assert [s.level for s in found.values()] == [OK, OK, OK]
-        assert found["hand"].message == "all fingers are well"
+        assert found["hand"].message == "no problems"
         assert found["thumb"].message == "well"
 
     def test_a_finger_with_a_fault_but_with_a_state(self):
         found = self.of()
         assert (found["thumb"].level, found["thumb"].message) == (WARN, "dead")
-        assert (found["hand"].level, found["hand"].message) == (WARN, "look at thumb")
+        assert (found["hand"].level, found["hand"].message) == (WARN, "problem of thumb")
 
     @pytest.mark.parametrize(
         ("reason", "faults", "published"),
@@ -166,7 +166,7 @@ class TestDiagnostics:
         blind = finger(ContactState.UNKNOWN, reason=reason, faults=faults)
         found = self.of(**{"index/1": blind})
         assert (found["index/1"].level, found["index/1"].message) == (ERROR, published)
-        assert (found["hand"].level, found["hand"].message) == (ERROR, "look at index/1")
+        assert (found["hand"].level, found["hand"].message) == (ERROR, "problem of index/1")
 
     def test_a_finger_during_the_tare(self):
         found = self.of(thumb=finger(ContactState.UNKNOWN, reason=Reason.TARE))

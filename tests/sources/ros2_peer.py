@@ -1,4 +1,4 @@
-"""Another process on ROS 2's wire, that knows nothing of holdfast: plain Cyclone DDS.
+"""Another process that sends ROS 2 messages with plain Cyclone DDS, without holdfast.
 
 python ros2_peer.py publish DOMAIN N    sends N messages of XELA at 150 Hz
 python ros2_peer.py read DOMAIN         prints what comes on holdfast's topics, as JSON lines

@@ -1,4 +1,4 @@
-"""Messages for the tests, written by rosbags: a program that knows nothing of ours."""
+"""Messages for the tests, written by rosbags, an independent program."""
 
 import numpy as np
 from hypothesis import strategies as st

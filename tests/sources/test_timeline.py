@@ -63,7 +63,7 @@ def test_a_burst_after_a_stall_is_late_and_no_jump():
 
 
 def test_a_gap_after_a_stall_is_no_jump():
-    """The reader stalls for 9 s; what was buffered comes, then what is new."""
+    """The reader stalls for 9 s; buffered samples arrive first, then new ones."""
     pairs = steady(150)
     buffered = [(1001.0 + k * PERIOD, 60.0) for k in range(1, 100)]
     new = [(1010.0 + k * PERIOD, 60.0 + k * PERIOD) for k in range(1, 100)]

@@ -29,7 +29,10 @@ def simulate(
     cases: Annotated[str, typer.Option(help="1: hold; 2: hold and disturb; or 1,2.")] = "1,2",
     repeats: Annotated[int, typer.Option(help="Number of grasps of each object and case.")] = 5,
     profile: Annotated[
-        str, typer.Option(help="Profile of grip and disturbances: gentle, reference, vigorous.")
+        str,
+        typer.Option(
+            help="Profile of grip and disturbances: gentle, reference, vigorous, finger-gentle, ..."
+        ),
     ] = "reference",
     seed: Annotated[int, typer.Option(help="Seed; the same seed gives the same bytes.")] = 0,
     server: Annotated[

@@ -121,7 +121,7 @@ class Detector:
         fast_step(self._table, 0.0)
 
     def _use(self, stream: FeatureStream) -> None:
-        """Begin with a stream, and with no decision."""
+        """Set a new feature stream, and an empty decision memory."""
         self._stream = stream
         self._decision = new_decision_memory(len(stream.plan.fingers))
         arrays = StepArrays(
@@ -148,7 +148,7 @@ class Detector:
         return self._stream.baselines()
 
     def reset(self) -> None:
-        """Forget all samples, events and the tare."""
+        """Discard all samples, events and the tare."""
         self._use(FeatureStream(self._stream.plan))
 
     def update(self, samples: Mapping[str, npt.ArrayLike], time: float) -> HandEstimate:
@@ -164,7 +164,7 @@ class Detector:
 
         Raises:
             StreamError: an unknown finger, another number of taxels or axes, or a time that
-                does not go forward. The detector has not changed then.
+                does not increase. The detector has not changed then.
         """
         time = float(time)
         if not self._last_time < time < inf:
@@ -209,7 +209,7 @@ class Detector:
 
     def _refuse_time(self, time: float) -> None:
         after = "" if self._last_time == -inf else f" after {self._last_time:.15g} s"
-        raise StreamError(f"time {time:.15g} s given{after}; finite times that go forward expected")
+        raise StreamError(f"time {time:.15g} s given{after}; finite, increasing times expected")
 
     def _check_recording(self, recording: Recording) -> None:
         modules = {f: recording.modules[f] for f in self._slots if f in recording.modules}

@@ -67,7 +67,7 @@ skin to neighbouring taxels."""
 LOUD_RATIO = 100.0
 """A taxel is noisy when it exceeds its least possible noise by this factor."""
 MIN_TAXELS = 4
-"""Number of taxels from which one may count as noisy; of fewer, one alone may feel a touch."""
+"""Number of taxels from which one may count as noisy; of fewer, one may be touched alone."""
 N_MASK_BITS = 63
 """Number of taxels that a mask can hold."""
 LOADED_SECONDS = 0.25
@@ -189,7 +189,7 @@ def _find_taxel_faults(
         readings, memory.previous, taxels, first, last, n_changes, long, share
     )
     if after_gap:
-        _forget_noise(taxels, first, last)
+        _reset_noise(taxels, first, last)
     counts[f, TAXEL_FAULTS] = counts[f, FAULTY_TAXELS] = 0
     if any_still:
         low, high, ignored = constants[f, LOW_LIMIT], constants[f, HIGH_LIMIT], layout.ignored
@@ -247,7 +247,7 @@ def _update_taxels(
         )
         if square > 0.0:
             if (n_changes - taxels[i, CHANGED_AT]) * share > 1.0:  # jumps follow faster
-                _forget_change(taxels, i)
+                _reset_change(taxels, i)
             if _has_reading(readings, i) and _has_reading(previous, i):
                 dx = x - taxels[i, LAST_CHANGE]
                 dy = y - taxels[i, LAST_CHANGE + 1]
@@ -258,7 +258,7 @@ def _update_taxels(
                 taxels[i, LAST_CHANGE + 1] = y
                 taxels[i, LAST_CHANGE + 2] = z
             else:
-                _forget_change(taxels, i)
+                _reset_change(taxels, i)
             taxels[i, N_CHANGED] += 1.0
             taxels[i, CHANGED_AT] = n_changes
         elif n_changes - taxels[i, CHANGED_AT] >= long:
@@ -277,15 +277,15 @@ def _has_reading(readings: Array, i: int) -> bool:
 
 
 @compiled
-def _forget_change(taxels: Array, i: int) -> None:
+def _reset_change(taxels: Array, i: int) -> None:
     taxels[i, LAST_CHANGE] = taxels[i, LAST_CHANGE + 1] = taxels[i, LAST_CHANGE + 2] = 0.0
 
 
 @compiled
-def _forget_noise(taxels: Array, first: int, last: int) -> None:
-    """Forget the noise of the taxels after a gap, over which a change is no noise."""
+def _reset_noise(taxels: Array, first: int, last: int) -> None:
+    """Reset the noise of the taxels after a gap, over which a change is no noise."""
     for i in range(first, last):
-        _forget_change(taxels, i)
+        _reset_change(taxels, i)
         taxels[i, FIRST_POWER] = taxels[i, SECOND_POWER] = 0.0
 
 

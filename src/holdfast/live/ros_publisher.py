@@ -254,7 +254,7 @@ def diagnostics_of(newest: tuple[HandEstimate, float] | None, now: float) -> lis
     fingers = [_diagnostic(name, finger) for name, finger in estimate.fingers.items()]
     worst = max((status.level for status in fingers), default=OK)
     faulty = [status.name for status in fingers if status.level == worst] if worst else []
-    text = f"look at {', '.join(faulty)}" if faulty else "all fingers are well"
+    text = f"problem of {', '.join(faulty)}" if faulty else "no problems"
     hand = DiagnosticStatus("hand", worst, text, (("state", str(estimate.state)),))
     return [hand, *fingers]
 

@@ -174,7 +174,7 @@ class ArrivalDetector:
         return [StreamEstimate(self._with_stream_faults(self._last), tuple(self.fingers))]
 
     def restart_tare(self) -> None:
-        """Forget the tare, and take a new one from the next samples.
+        """Discard the tare, and take a new one from the next samples.
 
         Raises:
             StreamError: a finger is in contact.
@@ -371,7 +371,7 @@ class StreamDetector:
         return self._update(None, self._detector.finish())
 
     def restart_tare(self) -> None:
-        """Forget the tare, and take a new one from the next samples.
+        """Discard the tare, and take a new one from the next samples.
 
         Raises:
             StreamError: a finger is in contact.

@@ -1,8 +1,8 @@
 """Profiles: named sets of numbers that describe a grasp and its disturbances, one file each.
 
 `reference`, `gentle` and `vigorous` follow the paper: a hand grips the object and moves it, and
-a finger disturbances it. `finger-reference`, `finger-gentle` and `finger-vigorous` are the profiles
-of holdfast 0.1, in which only a finger disturbances; they repeat its recordings and labels exactly.
+a finger disturbs it. `finger-reference`, `finger-gentle` and `finger-vigorous` are the profiles
+of holdfast 0.1, in which only a finger disturbs; they repeat its recordings and labels exactly.
 """
 
 import tomllib

@@ -1,1 +1,1 @@
-"""What the web pages of holdfast share: access control, server, scripts and styles."""
+"""Parts that the web pages of holdfast share: access control, server, scripts and styles."""

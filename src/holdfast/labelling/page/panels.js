@@ -89,7 +89,7 @@ const REVIEW_TITLES = {
   proposal: "This proposal has a low confidence",
 };
 
-/** List of the items to review, those of the lowest trust first, and the number of open proposals. */
+/** List of the items to review, those of the lowest confidence first, and the number of open proposals. */
 export class ReviewList {
   constructor(editor, choose) {
     this.editor = editor;

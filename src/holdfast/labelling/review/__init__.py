@@ -1,4 +1,4 @@
-"""Review of labels: audit by a classifier, comparison of two labellings, low confidence."""
+"""Review of labels: audit by a classifier, comparison of two sets of labels, low confidence."""
 
 from holdfast.labelling.review.spans import doubtful
 

@@ -1,4 +1,4 @@
-"""What all rules share: states over time, the labels made from them, checks of parameters."""
+"""Parts that all rules share: states over time, the labels made from them, checks of parameters."""
 
 import math
 from collections.abc import Callable
