@@ -83,9 +83,10 @@ def label(
 ) -> None:
     """Label recordings on a page or by a rule, and check labels.
 
-    Without a mode, open the labelling page: draw labels with the mouse, set states with keys,
-    undo changes, and accept the proposals of a rule. Every change is saved at once. Labels are
-    stored in NAME.labels.json beside the recording. The recording itself is never changed.
+    Without --auto, --compare, --audit, --export and --import, open the labelling page: draw labels
+    with the mouse, set states with keys, undo changes, and accept the proposals of a rule. Every
+    change is saved at once. Labels are stored in NAME.labels.json beside the recording. The
+    recording itself is never changed.
 
     --auto writes the labels that a rule proposes, and prints those with low confidence. Labels
     of a person are overwritten only with --force. --compare prints Cohen's kappa and onset
