@@ -260,7 +260,7 @@ def test_a_killed_search_goes_on_to_the_same_end(capsys, data, model, tmp_path):
 def test_an_interrupt_names_resume(capsys, data, model, monkeypatch):
     from holdfast.training import tuning
 
-    losses = tuning._log_loss
+    losses = tuning._loss
     n_trials = []
 
     def stops(*given):
@@ -269,7 +269,7 @@ def test_an_interrupt_names_resume(capsys, data, model, monkeypatch):
             raise KeyboardInterrupt
         return losses(*given)
 
-    monkeypatch.setattr(tuning, "_log_loss", stops)
+    monkeypatch.setattr(tuning, "_loss", stops)
     code, out, err = run(capsys, data, "-o", model, "--trials", 4)
     assert (code, out) == (130, "")
     assert err == (

@@ -215,12 +215,12 @@ def test_regions_of_other_types_are_ignored(tmp_path):
         (
             [region(0.0, 1.0, "Run")],
             "unknown label 'Run'; there are STABLE, UNSTABLE, NO_CONTACT, alone or with a cause "
-            "in brackets (closing, disturbance, slip, lost, released)",
+            "in brackets (closing, disturbance, slip, lost, released, glitch)",
         ),
         (
             [region(0.0, 1.0, "STABLE (wind)")],
             "unknown label 'STABLE (wind)'; there are STABLE, UNSTABLE, NO_CONTACT, alone or "
-            "with a cause in brackets (closing, disturbance, slip, lost, released)",
+            "with a cause in brackets (closing, disturbance, slip, lost, released, glitch)",
         ),
         ([region(2.0, 1.0)], "a label ends after its start; [2.0, 1.0) s given"),
         ([region(2.0, 2.0)], "an instant at 2 s given, an interval expected"),

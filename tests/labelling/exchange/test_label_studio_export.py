@@ -125,7 +125,7 @@ def test_the_config_has_labels_that_are_in_use_and_escapes_names():
     names = [label.get("value") for label in root.iter("Label")]
     assert names[:3] == ["STABLE", "UNSTABLE", "NO_CONTACT"]
     assert names[-1] == "NO_CONTACT (lost)"
-    assert len(names) == len(set(names)) == 9
+    assert len(names) == len(set(names)) == 10
 
 
 @pytest.fixture

@@ -246,7 +246,7 @@ def test_two_pages_at_the_same_instant(tmp_path):
         ),
         (
             labels({**HELD, "cause": "magic"}),
-            "thumb, [3, 4) s: cause closing, disturbance, slip, lost, released or none "
+            "thumb, [3, 4) s: cause closing, disturbance, slip, lost, released, glitch or none "
             "expected, 'magic' given",
         ),
         (labels({**HELD, "end": 50.0}), "thumb: label [3, 50) s lies outside the recording"),

@@ -194,7 +194,7 @@ def test_labels_that_contradict(bare, labels, text):
         (LabelInput(1, 2, "unknown"), r"'unknown' given$"),
         (
             LabelInput(1, 2, "unstable", "magic"),
-            r"^thumb, \[1, 2\) s: cause closing, disturbance, slip, lost, released or none "
+            r"^thumb, \[1, 2\) s: cause closing, disturbance, slip, lost, released, glitch or none "
             r"expected, 'magic' given$",
         ),
         (LabelInput(2, 1, "stable"), r"^thumb: a label ends after its start; \[2, 1\) s given$"),

@@ -5,7 +5,10 @@ import { MINUS, NO_VALUE, withSpaces } from "../web/text.js";
 export * from "../web/text.js";
 
 export const STATES = ["stable", "unstable", "no_contact"]; // in the order of their keys 1, 2, 3
-export const CAUSES = ["closing", "disturbance", "slip", "lost", "released"]; // their first letters are their keys
+export const CAUSES = ["closing", "disturbance", "slip", "lost", "released", "glitch"];
+
+/** Return the key of a cause: its first letter; k for a glitch, because g goes to the next item. */
+export const causeKey = (cause) => (cause === "glitch" ? "k" : cause[0]);
 
 /** Return the key of a state in class names, shapes and colours: "no-contact". */
 export const stateKey = (state) => (STATES.includes(state) ? state.replace("_", "-") : "unknown");

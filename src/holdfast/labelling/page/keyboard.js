@@ -1,11 +1,11 @@
 // Keyboard shortcuts: which key runs which command. The help in index.html lists the same keys.
 
-import { CAUSES, STATES } from "./format.js";
+import { CAUSES, causeKey, STATES } from "./format.js";
 
 /** Return the actions of the shortcuts, by key name: "Control-z", "Shift-Enter", "a". */
 export function keyBindings(commands) {
   const states = STATES.map((state, k) => [String(k + 1), () => commands.setKind({ state })]);
-  const causes = CAUSES.map((cause) => [cause[0], () => commands.setKind({ cause })]);
+  const causes = CAUSES.map((cause) => [causeKey(cause), () => commands.setKind({ cause })]);
   return {
     ...Object.fromEntries([...states, ...causes]),
     "Control-z": () => commands.undo(), "Control-Shift-z": () => commands.redo(), "Control-y": () => commands.redo(),

@@ -1,9 +1,14 @@
 // Toolbar above the plots: buttons for states, causes and edits.
 
 import { byId, make, shape } from "../web/dom.js";
-import { CAUSES, STATES, stateKey, stateText } from "./format.js";
+import { CAUSES, causeKey, STATES, stateKey, stateText } from "./format.js";
 
 const EDITS = ["undo", "redo", "copy", "remove"]; // names of commands, and ids of their buttons
+
+/** Return a cause with its key underlined, if the key is its first letter. */
+const causeText = (cause) => cause.startsWith(causeKey(cause))
+  ? make("span", "", make("u", "", cause[0]), cause.slice(1))
+  : make("span", "", cause);
 
 export class Toolbar {
   /** @param run called with the name of a command and its argument. */
@@ -11,9 +16,8 @@ export class Toolbar {
     this.editor = editor;
     this.states = STATES.map((state, k) => this.button(byId("states"), state, run, { state }, String(k + 1),
       [shape(stateKey(state)), make("span", "", stateText(state)), make("kbd", "", String(k + 1))]));
-    // The underlined first letter is the key.
-    this.causes = CAUSES.map((cause) => this.button(byId("causes"), cause, run, { cause }, cause[0].toUpperCase(),
-      [make("span", "", make("u", "", cause[0]), cause.slice(1))]));
+    this.causes = CAUSES.map((cause) => this.button(byId("causes"), cause, run, { cause },
+      causeKey(cause).toUpperCase(), [causeText(cause)]));
     for (const name of EDITS) byId(name).addEventListener("click", () => run(name));
   }
 
