@@ -143,11 +143,6 @@ class TestBadInput:
             assert message in refusal(capsys, folder, "--out", tmp_path / "out")
         assert not (tmp_path / "out").exists()
 
-    def test_fingers(self, capsys, tmp_path):
-        recordings = [synthetic_recording(f"g-{k}", k, ["index"]) for k in range(2)]
-        folder = written(tmp_path / "one", recordings)
-        assert "which need at least two" in refusal(capsys, folder, "--out", tmp_path / "out")
-
     def test_engine(self, capsys, data, tmp_path, monkeypatch):
         out = ("--out", tmp_path / "out")
         assert refusal(capsys, data, *out, "--engine", "spark") == (

@@ -1,16 +1,20 @@
 import json
 import shutil
 import subprocess
+from dataclasses import replace
 from pathlib import Path
 
 import pytest
 
-from holdfast.errors import OutputError, TrainingError
+from holdfast.contact import ContactState
+from holdfast.errors import OutputError
 from holdfast.parallel import Engine
 from holdfast.study import run
+from holdfast.study.comparison import all_methods, costs, jobs, sample_tables, sensitivity
+from holdfast.study.methods import METHODS
 from holdfast.study.paper import experiments, paper_tables
 from holdfast.study.plan import StudyPlan, scan_corpus
-from holdfast.study.run import check_plan, run_study
+from holdfast.study.run import run_study, whole_hand_note
 from holdfast.synthetic import synthetic_recording
 
 from .example_recordings import recordings_of_cases, save_all, save_synthetic
@@ -107,14 +111,45 @@ def test_a_browser_shows_the_report(done):
     assert shown.count("<svg") + shown.count("<img") == 5
 
 
-def test_hands_of_one_finger_are_rejected(tmp_path):
-    main = scan_corpus("main", save_synthetic(tmp_path / "main", range(2), fingers=("thumb",)))
-    message = (
-        r"one finger with labels of both classes given \(thumb\); the study compares classifiers "
-        "of whole hands, which need at least two$"
-    )
-    with pytest.raises(TrainingError, match=message):
-        check_plan(StudyPlan({"main": main}))
-    with pytest.raises(TrainingError, match=message):
-        run_study(StudyPlan({"main": main}), tmp_path / "out")
-    assert not (tmp_path / "out").exists()
+class TestOneFinger:
+    def test_methods_of_whole_hands_are_left_out_and_named(self, tmp_path):
+        folder = save_synthetic(tmp_path / "main", range(2), fingers=("thumb",))
+        plan = StudyPlan({"main": scan_corpus("main", folder)}, quick=True)
+        assert not [n for n in jobs.method_titles(plan) if METHODS[n].whole_hand]
+        (note,) = whole_hand_note(plan)
+        assert "LogReg, global (James & Lepora)" in note
+        assert note.endswith("because only the thumb has labels of both classes.")
+
+    def test_two_fingers_have_them_all(self, plan):
+        assert whole_hand_note(plan) == []
+        assert "jl_global_logreg" in jobs.method_titles(plan)
+
+    def test_a_study_of_short_stable_stretches_has_every_table(self, tmp_path, monkeypatch):
+        """Nothing is stable for the half second that an event needs: no events, no failure."""
+        recordings = (_short(synthetic_recording(f"g-{k}", k, ("thumb",))) for k in range(4))
+        corpus = scan_corpus("main", save_all(tmp_path / "main", recordings))
+        few = {name: METHODS[name] for name in ("logreg", "zhang", "holdfast")}
+        for module in (jobs, sample_tables, all_methods, sensitivity):
+            monkeypatch.setattr(module, "METHODS", few)
+        monkeypatch.setattr(costs, "N_UPDATES", 50)
+        monkeypatch.setattr(paper_tables, "QUICK_WINDOWS", (14,))
+        monkeypatch.setattr(paper_tables, "ABLATION_WINDOWS", (14,))
+        made = run_study(StudyPlan({"main": corpus}, quick=True), tmp_path / "out")
+        tables = {table.name: table for table in made}
+        missed = [
+            row for row in tables["events"].rows if row.keys["figure"] == "missed at 50 ms [%]"
+        ]
+        assert missed and all(row.ours is None and row.n == 0 for row in missed)
+        assert {"methods", "hands", "slips", *PAPER} <= set(tables)
+        report = (tmp_path / "out" / "report.html").read_text()
+        assert "only the thumb has labels of both classes" in report
+
+
+def _short(recording):
+    """The recording with stable labels of 0.4 s, and no label between them."""
+    labels = {
+        name: [replace(each, end=min(each.end, each.start + 0.4))
+               if each.state is ContactState.STABLE else each for each in module.labels]
+        for name, module in recording.modules.items()
+    }  # fmt: skip
+    return recording.with_labels(labels)

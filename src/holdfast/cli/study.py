@@ -170,14 +170,12 @@ def _plan(
 ) -> "tuple[StudyPlan, list[str]]":
     """Return the plan and what is left out; simulate the recordings if there is no `data`."""
     from holdfast.study.plan import StudyPlan, scan_corpus
-    from holdfast.study.run import check_plan
 
     if data is None:
         folder = out / "data" / "quick" if quick else out / "data"
         corpora = twin_corpora(folder, seed, quick=quick, jobs=jobs, tare=tare)
     else:
         corpora = {"main": scan_corpus("main", data, tare)}
-    check_plan(StudyPlan(corpora))
     real, left_out = real_corpus(out / "data" / "real")
     return StudyPlan(corpora, real, quick, seed), left_out
 

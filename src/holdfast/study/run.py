@@ -5,10 +5,10 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any, Protocol
 
-from holdfast.errors import TrainingError
 from holdfast.parallel import Engine
 from holdfast.study import environment
 from holdfast.study.comparison import all_methods, real_recordings, sensitivity
+from holdfast.study.methods import METHODS
 from holdfast.study.paper import experiments, paper_tables
 from holdfast.study.plan import StudyPlan
 from holdfast.study.report.folder import check_output_folder, write_study
@@ -77,11 +77,10 @@ def run_study(
 
     Raises:
         OutputError: as `check_output_folder`.
-        TrainingError: as `check_plan`, or the data are not enough to train a method.
+        TrainingError: the data are not enough to train a method.
         EngineError: as `TaskRunner.run`.
     """
     check_output_folder(out, force=force)
-    check_plan(plan)
     start = time.perf_counter()
     tasks = [task for part in PARTS.values() for task in part.tasks(plan)]
     results = TaskRunner(Path(out), engine, progress, notify).run(tasks)
@@ -91,24 +90,18 @@ def run_study(
         for name, part in PARTS.items()
     }
     seconds = {"data": made_in, "study": time.perf_counter() - start}
-    summary = _summary(plan, seconds, len(tasks), left_out)
+    summary = _summary(plan, seconds, len(tasks), [*left_out, *whole_hand_note(plan)])
     sections = report_sections(outputs, environment.run_notes(summary), twin=_is_twin(plan))
     write_study(out, TITLE, environment.report_facts(summary), sections, summary, force=force)
     return [table for section in sections for table in section.tables]
 
 
-def check_plan(plan: StudyPlan) -> None:
-    """Check that all methods can be compared on the recordings of a plan.
-
-    Raises:
-        TrainingError: there are fewer fingers than a method for whole hands needs.
-    """
-    fingers = plan.main.fingers
-    if len(fingers) < 2:
-        raise TrainingError(
-            f"{plan.main.folder}: one finger with labels of both classes given ({fingers[0]}); "
-            "the study compares classifiers of whole hands, which need at least two"
-        )
+def whole_hand_note(plan: StudyPlan) -> list[str]:
+    """Return a sentence on the methods that a study of one finger leaves out, else nothing."""
+    if len(plan.main.fingers) > 1:
+        return []
+    titles = ", ".join(method.title for method in METHODS.values() if method.whole_hand)
+    return [f"{titles}, because only the {plan.main.fingers[0]} has labels of both classes."]
 
 
 def _is_twin(plan: StudyPlan) -> bool:

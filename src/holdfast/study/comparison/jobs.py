@@ -49,9 +49,17 @@ Results = Mapping[str, Any]
 
 
 def method_titles(plan: StudyPlan) -> dict[str, str]:
-    """Return the titles of the compared methods, by name."""
+    """Return the titles of the compared methods, by name.
+
+    Methods for whole hands are left out if there is one finger.
+    """
     left_out = SLOW_METHODS if plan.quick else () if is_torch_installed() else (NETWORK,)
-    return {name: each.title for name, each in METHODS.items() if name not in left_out}
+    one_finger = len(plan.main.fingers) < 2
+    return {
+        name: each.title
+        for name, each in METHODS.items()
+        if name not in left_out and not (each.whole_hand and one_finger)
+    }
 
 
 def is_torch_installed() -> bool:
