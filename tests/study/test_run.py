@@ -19,6 +19,7 @@ from holdfast.synthetic import synthetic_recording
 
 from .example_recordings import recordings_of_cases, save_all, save_synthetic
 
+ALL_PARTS = run.PARTS
 PAPER = ("confusion", "window", "ablation", "unseen", "fingers", "zhang")
 
 
@@ -131,6 +132,7 @@ class TestOneFinger:
         few = {name: METHODS[name] for name in ("logreg", "zhang", "holdfast")}
         for module in (jobs, sample_tables, all_methods, sensitivity):
             monkeypatch.setattr(module, "METHODS", few)
+        monkeypatch.setattr(run, "PARTS", ALL_PARTS)
         monkeypatch.setattr(costs, "N_UPDATES", 50)
         monkeypatch.setattr(paper_tables, "QUICK_WINDOWS", (14,))
         monkeypatch.setattr(paper_tables, "ABLATION_WINDOWS", (14,))

@@ -2,6 +2,7 @@
 
 import os
 import time
+from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, NamedTuple
 
@@ -39,19 +40,27 @@ class TwinCorpus(NamedTuple):
         profile: profile of the twin.
         seed_offset: number that is added to the seed.
         other_objects: use another set of objects.
+        glitch_rate: glitches of the hand's controller per second [1/s]; None for the profile's.
+        repeats: grasps of each object and case in a full study; None for `N_REPEATS`.
+        noise: rms of a reading at rest [count]; None for that of the sensor.
     """
 
     profile: str = "reference"
     seed_offset: int = 0
     other_objects: bool = False
+    glitch_rate: float | None = None
+    repeats: int | None = None
+    noise: float | None = None
 
 
 TWIN_CORPORA = {
     "main": TwinCorpus(),
     "fresh": TwinCorpus(seed_offset=1),
     "others": TwinCorpus(other_objects=True),
-    "gentle": TwinCorpus("gentle"),
-    "vigorous": TwinCorpus("vigorous"),
+    "gentle": TwinCorpus("gentle", repeats=3),
+    "vigorous": TwinCorpus("vigorous", repeats=3),
+    "finger": TwinCorpus("finger-reference", repeats=2),
+    "noiseless": TwinCorpus(noise=0.0, repeats=2),
 }
 QUICK_CORPORA = {name: TWIN_CORPORA[name] for name in ("main", "others")}
 N_REPEATS = 5
@@ -197,7 +206,7 @@ def _print_result_table(table: "ResultTable") -> None:
 
 def _printed_rows(table: "ResultTable") -> "ResultTable":
     """Return the table with the rows to print: one split, and each method's own threshold."""
-    from msgspec.structs import replace
+    from msgspec import structs
 
     columns = PRINTED_COLUMNS[table.name]
     n_rows = {on: sum(row.keys.get("on") == on for row in table.rows) for on in PRINTED_SPLITS}
@@ -209,7 +218,7 @@ def _printed_rows(table: "ResultTable") -> "ResultTable":
         and (not n_rows[chosen] or row.keys["on"] == chosen)
         and row.keys.get("threshold", "own") == "own"
     ]
-    return replace(table, rows=rows)
+    return structs.replace(table, rows=rows)
 
 
 def _texts(line: "TableLine", digits: list[int]) -> list[str]:
@@ -238,7 +247,7 @@ def twin_corpora(out: Path, seed: int, *, quick: bool, jobs: int, tare: str) -> 
     settings = QUICK_CORPORA if quick else TWIN_CORPORA
     for number, (name, corpus) in enumerate(settings.items(), 1):
         print_message(f"recordings of the twin, {number} of {len(settings)}: {name}")
-        repeats = QUICK_REPEATS[name] if quick else N_REPEATS
+        repeats = QUICK_REPEATS[name] if quick else corpus.repeats or N_REPEATS
         _simulate(out / name, corpus, seed, repeats, jobs)
         corpora[name] = scan_corpus(name, out / name, tare)
     return corpora
@@ -250,7 +259,10 @@ def _simulate(folder: Path, corpus: TwinCorpus, seed: int, repeats: int, jobs: i
 
     table = OTHER_OBJECTS if corpus.other_objects else None
     seed += corpus.seed_offset
-    grasps = plan_grasps("", "1,2", repeats, corpus.profile, seed, table=table)
+    grasps = [
+        replace(grasp, glitch_rate=corpus.glitch_rate, noise=corpus.noise)
+        for grasp in plan_grasps("", "1,2", repeats, corpus.profile, seed, table=table)
+    ]
     folder.mkdir(parents=True, exist_ok=True)
     try:
         simulate_grasps(grasps, folder, jobs=jobs, force=False)

@@ -21,6 +21,8 @@ ROLES = {
     "others": "objects that are not used for training",
     "gentle": "a gentler profile of the twin",
     "vigorous": "a more vigorous profile of the twin",
+    "finger": "the protocol of holdfast 0.1, in which only a finger pushes",
+    "noiseless": "the first grasps of main with whole counts and no other noise",
     "real": "recordings of a real gripper",
 }
 """What the recordings of each role are."""

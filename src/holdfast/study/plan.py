@@ -65,7 +65,7 @@ class StudyPlan(msgspec.Struct, frozen=True):
     Attributes:
         corpora: by role: "main" always, and of the following those that exist: "fresh" (the same
             objects, other seeds), "others" (other objects), "gentle" and "vigorous" (other
-            profiles).
+            profiles), "finger" (the protocol of holdfast 0.1), "noiseless" (no noise but rounding).
         real: recordings of a real hand; None if there are none.
         quick: fewer windows, methods and trials.
         seed: of all random numbers.

@@ -9,7 +9,14 @@ from holdfast.parallel import Engine
 from holdfast.study import environment
 from holdfast.study.comparison import all_methods, real_recordings, sensitivity
 from holdfast.study.methods import METHODS
-from holdfast.study.paper import experiments, paper_tables
+from holdfast.study.paper import (
+    attribution,
+    claims,
+    experiments,
+    label_tables,
+    paper_tables,
+    verdicts,
+)
 from holdfast.study.plan import StudyPlan
 from holdfast.study.report.folder import check_output_folder, write_study
 from holdfast.study.report.html_report import ReportFigure
@@ -39,6 +46,10 @@ class StudyPart(Protocol):
 PARTS: Mapping[str, StudyPart] = {
     "paper": paper_tables,
     "experiments": experiments,
+    "verdicts": verdicts,
+    "labels": label_tables,
+    "attribution": attribution,
+    "claims": claims,
     "comparison": all_methods,
     "sensitivity": sensitivity,
     "real": real_recordings,

@@ -2,7 +2,7 @@
 
 import zlib
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cache
 from pathlib import Path
 
@@ -53,6 +53,8 @@ class Grasp:
         server: whether stamps are unsteady and packets repeat, as a server sends them.
         table: path of another table of objects, like `OTHER_OBJECTS`; None for the built-in one.
         glitch_rate: glitches of the hand's controller per second [1/s]; None for the profile's.
+        noise: rms of a reading at rest [count]; rounding to whole counts remains. None for that
+            of the sensor.
     """
 
     object: str
@@ -64,6 +66,7 @@ class Grasp:
     server: bool = False
     table: str | Path | None = None
     glitch_rate: float | None = None
+    noise: float | None = None
 
     @property
     def item(self) -> GraspObject:
@@ -120,7 +123,10 @@ def simulate(
         chosen = msgspec.structs.replace(chosen, glitch_rate=grasp.glitch_rate)
     plan = _draw_plan(grasp, chosen)
     world = _world(grasp, chosen.glitch_rate)
-    uskins = [_skin(grasp.seed, finger, parameters or UskinParameters()) for finger in FINGERS]
+    chosen_skin = parameters or UskinParameters()
+    if grasp.noise is not None:
+        chosen_skin = replace(chosen_skin, noise_counts=grasp.noise)
+    uskins = [_skin(grasp.seed, finger, chosen_skin) for finger in FINGERS]
     protocol = Protocol(plan, 1 / RATE)
     truth_log = _TruthLog()
     taxel_forces: list[list[Array]] = [[] for _ in FINGERS]
@@ -265,6 +271,7 @@ def _metadata(grasp: Grasp, protocol: Protocol) -> dict[str, object]:
         "attempt": grasp.attempt,
         "profile": grasp.profile,
         **({} if grasp.glitch_rate is None else {"glitch_rate": grasp.glitch_rate}),
+        **({} if grasp.noise is None else {"noise": grasp.noise}),
         "seed": grasp.seed,
         "server": grasp.server,
         "hand": "allegro-right",

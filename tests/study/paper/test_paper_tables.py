@@ -65,8 +65,13 @@ def test_confusion_has_a_line_for_each_kind_of_test_data(quick):
         "fresh recordings",
         "other objects",
     ]
-    assert len(table.rows) == 2 * 5 * 5
-    for classifier, name in (("LogReg", "logreg"), ("SVM", "svm")):
+    assert len(table.rows) == 4 * 5 * 5
+    for classifier, name in (
+        ("LogReg", "logreg"),
+        ("SVM", "svm"),
+        ("LogReg, balanced classes", "logreg"),
+        ("SVM, balanced classes", "svm"),
+    ):
         for where in on:
             found = rows_of(table, classifier=classifier, on=where)
             assert {row.keys["figure"]: row.paper for row in found} == published.CONFUSION[name]
@@ -114,10 +119,10 @@ def test_one_classifier_has_the_same_values_in_every_table(quick):
 def test_unseen_data_are_recordings_and_objects(quick):
     found = {(row.keys["classifier"], row.keys["on"]): row.paper for row in quick["unseen"].rows}
     assert found == {
-        ("LogReg", "fresh recordings"): 95.64,
-        ("LogReg", "other objects"): 95.64,
-        ("SVM", "fresh recordings"): 96.2,
-        ("SVM", "other objects"): 96.2,
+        (classifier + weights, on): paper
+        for classifier, paper in (("LogReg", 95.64), ("SVM", 96.2))
+        for weights in ("", ", balanced classes")
+        for on in ("fresh recordings", "other objects")
     }
 
 
@@ -172,7 +177,13 @@ def test_the_full_plan_has_every_window(corpora):
     names = [task.name for task in paper_tables.tasks(StudyPlan(corpora))]
     windows = [f"paper/window/{n}" for n in published.WINDOWS]
     fingers = ["paper/fingers/index", "paper/fingers/thumb"]
-    assert names == [*fingers, *windows, "paper/subsets/14", "paper/subsets/18"]
+    assert names == [
+        *fingers,
+        "paper/balanced/index",
+        *windows,
+        "paper/subsets/14",
+        "paper/subsets/18",
+    ]
     full, quick = (paper_tables.tasks(StudyPlan(corpora, quick=q))[0].cost for q in (False, True))
     assert full > quick
 
@@ -184,7 +195,7 @@ def test_each_classifier_is_fitted_once():
         for task in paper_tables.tasks(StudyPlan({"main": corpus}))
         for kind in task.arguments[3]
     ]
-    assert len(kinds) == len(set(kinds)) == 2 * 2 + 8 * 4 - 1 + 2 * 9
+    assert len(kinds) == len(set(kinds)) == 2 * 2 + 2 + 8 * 4 - 1 + 2 * 9
 
 
 def test_the_first_finger_is_the_index_if_there_is_one():

@@ -4,12 +4,14 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from holdfast.classifiers import LinearClassifier, Samples, recipe
+from holdfast.classifiers import LinearClassifier, Samples
+from holdfast.classifiers.logreg import LogisticRegression
 from holdfast.classifiers.threshold import best_cut
 from holdfast.features import DEPLOYED_FEATURES
 from holdfast.study.paper.pooled_samples import pool_samples
 from holdfast.study.paper.random_split import (
     CONFUSION_RATES,
+    FIT_RECIPES,
     FRESH,
     HELD_OUT,
     OBJECTS,
@@ -65,7 +67,7 @@ def naive(corpora, on):
         ],
     }[on]
     counts = [[0, 0, 0, 0] for _ in range(5)]
-    how = recipe("logreg")
+    how = FIT_RECIPES["logreg"]
     for fitted, tested in folds:
         rule = how.fit(Samples(*(part[fitted] for part in data)), how.reference, 0)
         called = rule.probability(data.features[tested]) >= rule.threshold
@@ -118,11 +120,26 @@ def test_a_fit_has_a_maximum_number_of_samples(corpora):
 
 
 def test_a_search_tries_more_than_the_reference(corpora, alone):
-    reference = recipe("logreg").reference
+    reference = FIT_RECIPES["logreg"].reference
     assert alone[0].parameters == reference
-    cell = evaluated({"main": corpora["main"]}, thorough=False, budget=FitBudget(4, 500))[0]
+    drawn = []
+    fit = LogisticRegression.fit
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(
+            LogisticRegression, "fit", lambda *given: drawn.append(given[2]) or fit(*given)
+        )
+        cell = evaluated({"main": corpora["main"]}, thorough=False, budget=FitBudget(4, 500))[0]
     assert set(cell.parameters) == set(reference)
-    assert cell.parameters != reference
+    assert len({each["C"] for each in drawn}) == 4
+
+
+def test_class_weights_are_fixed_whatever_the_search_draws(corpora):
+    for name, weight in (("logreg", None), ("logreg_balanced", "balanced")):
+        kinds = [(name, DEPLOYED_FEATURES)]
+        main = {"main": corpora["main"]}
+        budget = FitBudget(4, 500)
+        (cell,) = evaluate_variants(main, "index", 14, kinds, budget, 0, thorough=False)
+        assert cell.parameters["class_weight"] == weight
 
 
 def test_a_threshold_has_nothing_to_search_and_calls_little_energy_stable(corpora):

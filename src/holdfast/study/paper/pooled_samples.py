@@ -9,14 +9,18 @@ from dataclasses import dataclass
 from functools import lru_cache
 from typing import NamedTuple
 
+import msgspec
 import numpy as np
 import numpy.typing as npt
 
 from holdfast.classifiers import Samples
 from holdfast.features import FEATURE_NAMES, Tare, haar_features
+from holdfast.recordings import Recording
 from holdfast.sensors.types import Array
+from holdfast.study.evaluation.variation import Variation
 from holdfast.study.methods import FingerSignal, hand_signal
 from holdfast.study.methods.wavelets import detail_energy
+from holdfast.study.paper.label_sources import LabelSource, relabelled
 from holdfast.study.plan import Corpus
 from holdfast.training.training_samples import (
     concatenate,
@@ -54,7 +58,33 @@ class SamplePool:
         return self.samples._replace(features=self.samples.features[:, columns])
 
 
-def pool_samples(corpus: Corpus, rate: float, finger: str, window: int, seed: int) -> SamplePool:
+class Treatment(msgspec.Struct, frozen=True):
+    """A change of all recordings, in training and in test. The default changes nothing.
+
+    Attributes:
+        labels: where labels come from.
+        noise: standard deviation of white noise added to every reading [unit of the readings].
+    """
+
+    labels: LabelSource = "recording"
+    noise: float = 0.0
+
+    def apply(self, recording: Recording, tare: str) -> Recording:
+        """Return the changed recording; labels are made from the readings without added noise."""
+        return Variation(noise=self.noise).apply(relabelled(recording, self.labels, tare))
+
+
+UNTREATED = Treatment()
+
+
+def pool_samples(
+    corpus: Corpus,
+    rate: float,
+    finger: str,
+    window: int,
+    seed: int,
+    treatment: Treatment = UNTREATED,
+) -> SamplePool:
     """Return the labelled samples of a finger in a corpus.
 
     Args:
@@ -63,10 +93,11 @@ def pool_samples(corpus: Corpus, rate: float, finger: str, window: int, seed: in
         finger: name of the finger.
         window: N_w [samples].
         seed: of the parts.
+        treatment: of the recordings.
     """
     samples = [Samples(np.empty((0, len(COLUMNS))), np.empty(0, bool), np.empty(0, np.int64))]
     parts = [np.empty(0, dtype=np.int64)]
-    forces = _corpus_forces(corpus, rate)
+    forces = _corpus_forces(corpus, rate, treatment)
     for number, recording in enumerate(forces):
         if finger not in recording.fingers:
             continue
@@ -88,14 +119,16 @@ class _RecordingForces(NamedTuple):
 
 
 @lru_cache(maxsize=4)
-def _corpus_forces(corpus: Corpus, rate: float) -> tuple[_RecordingForces, ...]:
+def _corpus_forces(
+    corpus: Corpus, rate: float, treatment: Treatment
+) -> tuple[_RecordingForces, ...]:
     """Return the forces of all recordings; a worker reads a corpus once for all its tasks."""
-    return tuple(_read_forces(corpus, rate))
+    return tuple(_read_forces(corpus, rate, treatment))
 
 
-def _read_forces(corpus: Corpus, rate: float) -> Iterator[_RecordingForces]:
+def _read_forces(corpus: Corpus, rate: float, treatment: Treatment) -> Iterator[_RecordingForces]:
     for given in corpus.load():
-        recording = resample_if_needed(given, rate)
+        recording = resample_if_needed(treatment.apply(given, corpus.tare), rate)
         hand = hand_signal(recording, Tare.parse(corpus.tare))
         fingers = {
             name: (_without_readings(signal), recording.modules[name].label_states)

@@ -6,6 +6,7 @@ training, in five folds of four parts.
 
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
 import msgspec
 import numpy as np
@@ -15,13 +16,22 @@ from holdfast.classifiers import RECIPES, Classifier, Parameters, Recipe, Sample
 from holdfast.metrics import bootstrap_interval, ratio_of_sums
 from holdfast.metrics.intervals import Interval
 from holdfast.metrics.statistics import percent
-from holdfast.study.paper.pooled_samples import Integers, SamplePool, pool_samples
+from holdfast.study.paper.pooled_samples import (
+    UNTREATED,
+    Integers,
+    SamplePool,
+    Treatment,
+    pool_samples,
+)
 from holdfast.study.plan import Corpus
 from holdfast.study.report.result_tables import Row
 from holdfast.training.setting import SEARCH_SAMPLES
 from holdfast.training.splits import inner_folds
 from holdfast.training.training_samples import thin, thinning_step
 from holdfast.training.tuning import search
+
+if TYPE_CHECKING:
+    from optuna import Trial
 
 N_FOLDS = 5
 N_HELD_OUT_PARTS = 5
@@ -35,8 +45,51 @@ OBJECTS = "other objects"
 TEST_DATA = (TRAINING, VALIDATED, HELD_OUT, FRESH, OTHER_RECORDINGS, OBJECTS)
 """Data on which a classifier may be tested, in the order of the tables."""
 
-FIT_RECIPES: dict[str, Recipe] = {**RECIPES, "threshold": Threshold(side="below")}
-"""How each classifier is fitted; a threshold calls samples below it stable."""
+
+@dataclass(frozen=True)
+class FixedWeights:
+    """A recipe whose class weights are fixed, and not found by the search.
+
+    Attributes:
+        recipe: that fits the classifier.
+        class_weight: "balanced", or None to weight all samples alike.
+    """
+
+    recipe: Recipe
+    class_weight: str | None
+
+    @property
+    def name(self) -> str:
+        """Name of the recipe."""
+        return self.recipe.name
+
+    @property
+    def reference(self) -> Parameters:
+        """Reference parameters, with the fixed weights."""
+        return self.fixed(self.recipe.reference)
+
+    def suggest(self, trial: "Trial") -> Parameters:
+        """Draw parameters; the weights are overridden in the fit."""
+        return self.recipe.suggest(trial)
+
+    def fit(self, samples: Samples, parameters: Parameters, seed: int) -> Classifier:
+        """Fit a classifier with the fixed weights."""
+        return self.recipe.fit(samples, self.fixed(parameters), seed)
+
+    def fixed(self, parameters: Parameters) -> Parameters:
+        """Return the parameters with the fixed weights."""
+        return {**parameters, "class_weight": self.class_weight}
+
+
+FIT_RECIPES: dict[str, Recipe] = {
+    **{name: FixedWeights(recipe, None) for name, recipe in RECIPES.items()},
+    **{f"{name}_balanced": FixedWeights(each, "balanced") for name, each in RECIPES.items()},
+    "threshold": Threshold(side="below"),
+}
+"""How each classifier is fitted; a threshold calls samples below it stable.
+
+`logreg` and `svm` weight all samples alike, as the paper's toolbox does.
+"""
 Variant = tuple[str, tuple[str, ...]]
 """Name of a classifier, and its features."""
 
@@ -92,6 +145,7 @@ def evaluate_variants(
     budget: FitBudget,
     seed: int,
     thorough: bool,
+    treatment: Treatment = UNTREATED,
 ) -> list[VariantResult]:
     """Evaluate classifiers on one finger and window, by the protocol of the paper.
 
@@ -104,15 +158,17 @@ def evaluate_variants(
         seed: of split and search.
         thorough: test also on the training data, by cross-validation, and, without "others", by
             leaving one object out.
+        treatment: of all recordings.
 
     Raises:
         TrainingError: the finger has labels of one class only.
     """
     rate = corpora["main"].rate
-    main = pool_samples(corpora["main"], rate, finger, window, seed)
+    main = pool_samples(corpora["main"], rate, finger, window, seed, treatment)
     roles = {role: on for role, on in (("fresh", FRESH), ("others", OBJECTS)) if role in corpora}
     tests = {
-        on: pool_samples(corpora[role], rate, finger, window, seed) for role, on in roles.items()
+        on: pool_samples(corpora[role], rate, finger, window, seed, treatment)
+        for role, on in roles.items()
     }
     return [_evaluate(main, tests, variant, budget, seed, thorough) for variant in variants]
 
@@ -221,13 +277,17 @@ def _substitute_folds(
 
 
 def _search(train: Samples, folds: Integers, recipe: Recipe, trials: int, seed: int) -> Parameters:
-    """Return hyper-parameters by Bayesian optimisation over random folds, as in the paper."""
+    """Return hyper-parameters by Bayesian optimisation of the error over random folds.
+
+    The paper minimises the classification error in this way.
+    """
     if not recipe.reference:
         return {}
     few = _ungrouped(thin(train, SEARCH_SAMPLES))
     step = thinning_step(len(folds), SEARCH_SAMPLES)
     masks = [folds[::step] == fold for fold in range(N_FOLDS)]
-    return search(few, masks, recipe, n_trials=trials, seed=seed)
+    found = search(few, masks, recipe, n_trials=trials, seed=seed, objective="error")
+    return recipe.fixed(found) if isinstance(recipe, FixedWeights) else found
 
 
 def _percent(interval: Interval | None) -> Interval | None:

@@ -1,0 +1,93 @@
+"""Labels of the same recordings by other conventions: exact, as a person draws them, sliding only.
+
+A person draws labels from the plot of the force; the rule `signal` does it in the same way.
+"""
+
+from dataclasses import replace
+from typing import Literal
+
+import numpy as np
+
+from holdfast.contact import HELD_PHASES, SLIP_SPEED, UNSTABLE, ContactState
+from holdfast.features import Tare
+from holdfast.labelling.rules import signal
+from holdfast.metrics.masks import Mask
+from holdfast.recordings import Recording, Tactile, Truth, label_states, labels_from_samples
+from holdfast.twin.labels import LabelRule, labels_from_truth
+
+LabelSource = Literal["recording", "exact", "drawn", "sliding"]
+"""Where labels come from.
+
+`recording`: those of the recording. `exact`: from the truth without margin. `drawn`: by the rule
+`signal` from the force alone. `sliding`: from the truth, but in a held contact only sliding is
+unstable; disturbances without sliding and glitches are stable.
+"""
+
+HAND_TRUTH = {"phase", "outside_force"}
+FINGER_TRUTH = {"contact_force", "slip_speed"}
+"""Names in the truth that labels need."""
+
+
+def has_truth(recording: Recording) -> bool:
+    """Return whether exact labels can be made for all fingers of a recording."""
+    truth = recording.truth
+    return (
+        truth is not None
+        and set(truth.hand) >= HAND_TRUTH
+        and all(set(truth.fingers.get(name, ())) >= FINGER_TRUTH for name in recording.modules)
+    )
+
+
+def relabelled(recording: Recording, source: LabelSource, tare: str) -> Recording:
+    """Return the recording with labels from another source.
+
+    Without a truth, `exact` and `sliding` keep the labels of the recording.
+
+    Args:
+        recording: to label.
+        source: of the labels.
+        tare: how the baseline is found, for labels from the force.
+    """
+    if source == "drawn":
+        return recording.with_labels(signal.propose(recording, Tare.parse(tare)))
+    truth = recording.truth
+    if source == "recording" or truth is None or not has_truth(recording):
+        return recording
+    rule = LabelRule(margin=0.0)
+    modules = {
+        name: replace(module, labels=labels_from_truth(truth, name, rule))
+        for name, module in recording.modules.items()
+    }
+    if source == "sliding":
+        modules = {name: _only_sliding(module, truth, name) for name, module in modules.items()}
+    return replace(recording, modules=modules)
+
+
+def _only_sliding(module: Tactile, truth: Truth, finger: str) -> Tactile:
+    """Return a module in which a held contact is unstable only while it slides."""
+    held, sliding = held_and_sliding(truth, finger)
+    at_sample = np.clip(
+        np.searchsorted(truth.times, module.times, side="right") - 1, 0, len(truth.times) - 1
+    )
+    quiet = (held & ~sliding)[at_sample] & (label_states(module.labels, module.times) == UNSTABLE)
+    labels = iter(module.labels)
+    label = next(labels, None)
+    states = []
+    for time, is_quiet in zip(module.times.tolist(), quiet.tolist(), strict=True):
+        while label is not None and time >= label.end:
+            label = next(labels, None)
+        known = label is not None and label.start <= time
+        if is_quiet:
+            states.append((ContactState.STABLE, None))
+        else:
+            states.append((label.state, label.cause) if known and label is not None else None)
+    made = labels_from_samples(
+        module.times, states, period=module.period, evidence="truth", author="twin"
+    )
+    return replace(module, labels=made)
+
+
+def held_and_sliding(truth: Truth, finger: str) -> tuple[Mask, Mask]:
+    """Return (n,) where the hand holds the object, and where it slides on the finger."""
+    held = np.isin(truth.hand["phase"], HELD_PHASES)
+    return np.asarray(held), np.asarray(held & (truth.fingers[finger]["slip_speed"] > SLIP_SPEED))
