@@ -24,7 +24,7 @@ from holdfast.study.methods.wavelets import detail_energy
 from holdfast.study.paper.label_sources import has_truth
 from holdfast.study.plan import Corpus, StudyPlan
 from holdfast.study.report.html_report import ReportFigure
-from holdfast.study.report.result_tables import ResultTable, Row
+from holdfast.study.report.result_tables import Key, ResultTable, Row
 from holdfast.study.tasks import Task
 from holdfast.twin.labels import LabelRule, glitches
 
@@ -117,7 +117,7 @@ def tables(plan: StudyPlan, results: Mapping[str, Any]) -> list[ResultTable]:
     for expectation in (GRIP, SETTLES):
         for role, data in [("all", every), *found.items()]:
             effect, interval, n = _effect(expectation, data, plan.seed)
-            about = {
+            about: dict[str, Key] = {
                 "claim": expectation.claim,
                 "effect": expectation.effect,
                 "recordings of": role,

@@ -8,7 +8,7 @@ from typing import Literal
 
 import numpy as np
 
-from holdfast.contact import HELD_PHASES, SLIP_SPEED, UNSTABLE, ContactState
+from holdfast.contact import HELD_PHASES, SLIP_SPEED, UNSTABLE, Cause, ContactState
 from holdfast.features import Tare
 from holdfast.labelling.rules import signal
 from holdfast.metrics.masks import Mask
@@ -72,7 +72,7 @@ def _only_sliding(module: Tactile, truth: Truth, finger: str) -> Tactile:
     quiet = (held & ~sliding)[at_sample] & (label_states(module.labels, module.times) == UNSTABLE)
     labels = iter(module.labels)
     label = next(labels, None)
-    states = []
+    states: list[tuple[ContactState, Cause | None] | None] = []
     for time, is_quiet in zip(module.times.tolist(), quiet.tolist(), strict=True):
         while label is not None and time >= label.end:
             label = next(labels, None)

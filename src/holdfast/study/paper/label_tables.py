@@ -118,7 +118,7 @@ def evaluate_labels(
     metrics = {}
     for trained in SOURCES:
         training = gather_training_samples(by_source[trained], max_samples)
-        decided: dict[str, dict[int, Decisions]] = {source: {} for source in SOURCES}
+        decided: dict[LabelSource, dict[int, Decisions]] = {source: {} for source in SOURCES}
         for held in held_out_folds(objects, "recording", n_folds, seed):
             fitted = FittedMethod.fit(method, training, set(range(n)) - held, seed)
             for place in held:

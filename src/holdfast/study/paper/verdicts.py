@@ -352,7 +352,7 @@ def _disturbed_rows(keys: Keys, chosen: Sequence[GraspVerdict], seed: int) -> It
 def _single_table(found: Mapping[str, Sequence[GraspVerdict]], seed: int) -> ResultTable:
     del seed
     rows: list[Row] = []
-    digits = {}
+    digits: dict[str, int] = {}
     for name, verdicts in found.items():
         short = METHODS[name].title.split(" (", maxsplit=1)[0]
         detected, delay = f"{short}: detected", f"{short}: delay [s]"

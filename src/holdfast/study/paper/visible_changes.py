@@ -69,9 +69,12 @@ def count_hidden(corpus: Corpus, window: int) -> list[HiddenCounts]:
     rest: dict[str, list[Array]] = {}
     for each in (changes for recording in found for changes in recording):
         rest.setdefault(each.finger, []).append(each.values[each.at_rest])
-    limits = {finger: noise_limits(parts) for finger, parts in rest.items()}
-    if any(limit is None for limit in limits.values()):
-        return []
+    limits = {}
+    for finger, parts in rest.items():
+        limit = noise_limits(parts)
+        if limit is None:
+            return []
+        limits[finger] = limit
     return [_count(recording, limits) for recording in found]
 
 
@@ -136,7 +139,7 @@ def label_kinds(module: Tactile) -> list[str]:
     return kinds
 
 
-def _count(fingers: Sequence[_Changes], limits: Mapping[str, Array | None]) -> HiddenCounts:
+def _count(fingers: Sequence[_Changes], limits: Mapping[str, Array]) -> HiddenCounts:
     samples: dict[str, int] = {}
     hidden: dict[str, int] = {}
     n_labelled = 0

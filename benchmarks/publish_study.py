@@ -1,0 +1,248 @@
+"""Publish the results of a study in docs/, and write the pages that quote them.
+
+    python benchmarks/publish_study.py publish STUDY     copy the results of a run, write the pages
+    python benchmarks/publish_study.py render            write the pages again
+
+`publish` copies `study.json` and all tables as CSV from the folder of a finished study to
+docs/study/, in place of the old ones. The pages docs/study.md and docs/study-changes.md are
+written from templates in docs/study/ (`*.md.j2`). Change the templates, not the pages: every
+figure in them is taken from `study.json`, and tests/test_docs_study.py renders them again.
+"""
+
+import argparse
+import json
+import math
+import shutil
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from typing import Any
+
+from jinja2 import Environment, FileSystemLoader, StrictUndefined
+
+DOCS = Path(__file__).parents[1] / "docs"
+PAGES = ("study.md", "study-changes.md")
+MISSING = "–"
+OWN_FIELDS = ("ours", "paper", "difference", "n", "interval", "infinite")
+
+Row = dict[str, Any]
+Where = Mapping[str, object]
+
+
+class Figures:
+    """The figures of a published study, as the templates use them.
+
+    A condition selects rows: `{"method": "holdfast", "figure": "AUC"}`. A key that the rows of a
+    table do not have selects nothing and excludes nothing.
+
+    Args:
+        summary: contents of `study.json`.
+    """
+
+    def __init__(self, summary: Mapping[str, Any]) -> None:
+        self.tables: Mapping[str, list[Row]] = summary["tables"]
+
+    def rows(self, table: str, where: Where) -> list[Row]:
+        """Return the rows of a table that meet a condition; none if there is no such table."""
+        return [
+            row
+            for row in self.tables.get(table, [])
+            if all(str(row.get(key, value)) == str(value) for key, value in where.items())
+        ]
+
+    def has(self, table: str, where: Where | None = None) -> bool:
+        """Return whether a table has a row that meets a condition."""
+        return bool(self.rows(table, where or {}))
+
+    def value(self, table: str, where: Where, field: str = "ours") -> float | None:
+        """Return a number of the one row that meets a condition; None if it has none.
+
+        Raises:
+            LookupError: no row, or several rows, meet the condition.
+        """
+        found = self.rows(table, where)
+        if len(found) != 1:
+            raise LookupError(f"{table}: one row expected for {dict(where)}, {len(found)} found")
+        if field == "ours" and found[0].get("infinite"):
+            return math.inf
+        number = found[0][field]
+        return None if number is None else float(number)
+
+    def cell(
+        self,
+        table: str,
+        where: Where,
+        digits: int = 1,
+        *,
+        interval: bool = False,
+        field: str = "ours",
+    ) -> str:
+        """Return a number as text, with its interval if wanted; a dash without such a table.
+
+        Raises:
+            LookupError: the table has rows, but not exactly one that meets the condition.
+        """
+        if table not in self.tables:
+            return MISSING
+        text = number_text(self.value(table, where, field), digits)
+        ends = self.rows(table, where)[0]["interval"]
+        return text + (interval_text(ends, digits) if interval else "")
+
+    def any_cell(self, table: str, where: Where, digits: int = 1, *, interval: bool = False) -> str:
+        """Return as `cell`, but a dash if no row meets the condition."""
+        if not self.has(table, where):
+            return MISSING
+        return self.cell(table, where, digits, interval=interval)
+
+    def grid(
+        self,
+        table: str,
+        where: Where,
+        lines: Sequence[str],
+        column: str = "figure",
+        columns: Sequence[str] = (),
+        digits: int = 1,
+        digits_of: Mapping[str, int] | None = None,
+    ) -> str:
+        """Return rows of a table as Markdown, with intervals and the paper's values.
+
+        Args:
+            table: name of the table.
+            where: condition of the rows.
+            lines: keys that name a line.
+            column: key whose values are the columns.
+            columns: the values that are shown, in this order; all by default.
+            digits: after the decimal point.
+            digits_of: the same of single columns.
+        """
+        found = self.rows(table, where)
+        if not found:
+            return f"(The run has no rows for this table: {table}.)"
+        shown = list(columns) or list(dict.fromkeys(str(row[column]) for row in found))
+        cells: dict[tuple[str, ...], dict[str, str]] = {}
+        for row in found:
+            head = tuple(str(row.get(key, "")) for key in lines)
+            places = (digits_of or {}).get(str(row[column]), digits)
+            cells.setdefault(head, {}).setdefault(str(row[column]), _cell_text(row, places))
+        table_lines = [[*lines, *shown], ["---"] * len(lines) + ["--:"] * len(shown)]
+        table_lines += [
+            [*head, *(by_column.get(each, MISSING) for each in shown)]
+            for head, by_column in cells.items()
+        ]
+        return "\n".join(f"| {' | '.join(map(_escape, each))} |" for each in table_lines)
+
+    def ratio(self, table: str, first: Where, second: Where, digits: int = 2) -> str:
+        """Return the ratio of two shares of errors, 100 minus an accuracy [%]."""
+        if not (self.has(table, first) and self.has(table, second)):
+            return MISSING
+        one, other = self.value(table, first), self.value(table, second)
+        if one is None or other is None or other == 100:
+            return MISSING
+        return number_text((100 - one) / (100 - other), digits)
+
+
+def number_text(value: float | None, digits: int) -> str:
+    """Return a number as text.
+
+    Example:
+        >>> number_text(91.25, 1), number_text(-0.5, 1), number_text(None, 1)
+        ('91.2', '−0.5', '–')
+    """
+    if value is None or math.isnan(value):
+        return MISSING
+    if math.isinf(value):
+        return "infinite"
+    return f"{value:.{digits}f}".replace("-", "−")
+
+
+def interval_text(interval: Sequence[float | None] | None, digits: int) -> str:
+    """Return an interval as text in brackets; empty if there is none."""
+    if interval is None:
+        return ""
+    low, high = (number_text(math.inf if end is None else end, digits) for end in interval)
+    return f" ({low} to {high})"
+
+
+def render(summary: Mapping[str, Any], templates: Path) -> dict[str, str]:
+    """Return the text of each page.
+
+    Args:
+        summary: contents of `study.json`.
+        templates: folder of the templates.
+    """
+    environment = Environment(
+        loader=FileSystemLoader(templates),
+        undefined=StrictUndefined,
+        trim_blocks=True,
+        lstrip_blocks=True,
+        keep_trailing_newline=True,
+    )
+    figures = Figures(summary)
+    names = {name: getattr(figures, name) for name in ("cell", "any_cell", "grid", "has", "ratio")}
+    return {
+        page: environment.get_template(f"{page}.j2").render(study=summary, **names)
+        for page in PAGES
+    }
+
+
+def publish(run: Path, docs: Path) -> None:
+    """Copy `study.json` and the tables of a run to docs/study/, in place of the old ones.
+
+    Raises:
+        FileNotFoundError: the folder has no finished study.
+    """
+    summary = json.loads((run / "study.json").read_text("utf-8"))
+    target = docs / "study"
+    for old in [*target.glob("*.csv"), *target.glob("*.md")]:
+        old.unlink()
+    for name in summary["tables"]:
+        shutil.copyfile(run / "tables" / f"{name}.csv", target / f"{name}.csv")
+    (target / "study.json").write_text(_compact(summary), encoding="utf-8")
+
+
+def write_pages(docs: Path) -> None:
+    """Write the pages from the published results."""
+    summary = json.loads((docs / "study" / "study.json").read_text("utf-8"))
+    for page, text in render(summary, docs / "study").items():
+        (docs / page).write_text(text, encoding="utf-8")
+
+
+def _compact(summary: Mapping[str, Any]) -> str:
+    """Return the summary as JSON with one row of a table a line."""
+    tables = ",\n".join(
+        f"{json.dumps(name)}: [\n"
+        + ",\n".join(json.dumps(row, ensure_ascii=False) for row in rows)
+        + "\n]"
+        for name, rows in summary["tables"].items()
+    )
+    rest = {name: value for name, value in summary.items() if name != "tables"}
+    body = "".join(
+        f",\n{json.dumps(name)}: {json.dumps(value, ensure_ascii=False)}"
+        for name, value in rest.items()
+    )
+    return f'{{"tables": {{\n{tables}\n}}{body}}}\n'
+
+
+def _cell_text(row: Row, digits: int) -> str:
+    value = math.inf if row.get("infinite") else row["ours"]
+    text = number_text(value, digits) + interval_text(row["interval"], digits)
+    return text if row["paper"] is None else f"{text}; paper {number_text(row['paper'], digits)}"
+
+
+def _escape(text: str) -> str:
+    return text.replace("|", r"\|").replace("_", r"\_")
+
+
+def main() -> None:
+    """Run the command line."""
+    parser = argparse.ArgumentParser(description="Publish a study in docs/.")
+    commands = parser.add_subparsers(dest="command", required=True)
+    commands.add_parser("publish").add_argument("run", type=Path)
+    commands.add_parser("render")
+    given = parser.parse_args()
+    if given.command == "publish":
+        publish(given.run, DOCS)
+    write_pages(DOCS)
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,129 @@
+"""The figures in docs/study.md and docs/study-changes.md are those of the published study."""
+
+import csv
+import importlib.util
+import json
+import math
+from pathlib import Path
+
+import pytest
+
+ROOT = Path(__file__).parents[1]
+PUBLISHED = ROOT / "docs" / "study"
+
+
+def load_script():
+    spec = importlib.util.spec_from_file_location(
+        "publish_study", ROOT / "benchmarks" / "publish_study.py"
+    )
+    module = importlib.util.module_from_spec(spec)
+    spec.loader.exec_module(module)
+    return module
+
+
+script = load_script()
+
+
+@pytest.fixture(scope="module")
+def summary():
+    return json.loads((PUBLISHED / "study.json").read_text("utf-8"))
+
+
+class TestPublished:
+    def test_the_pages_are_what_the_templates_give(self, summary):
+        for page, text in script.render(summary, PUBLISHED).items():
+            assert (ROOT / "docs" / page).read_text("utf-8") == text, (
+                f"docs/{page} differs: run python benchmarks/publish_study.py render"
+            )
+
+    def test_there_is_a_csv_of_each_table_and_nothing_else(self, summary):
+        assert {path.stem for path in PUBLISHED.glob("*.csv")} == set(summary["tables"])
+        templates = {f"{page}.j2" for page in script.PAGES}
+        others = {p.name for p in PUBLISHED.iterdir() if p.suffix != ".csv"}
+        assert others == {"study.json", *templates}
+
+    def test_csv_and_json_have_the_same_values(self, summary):
+        for name, rows in summary["tables"].items():
+            text = (PUBLISHED / f"{name}.csv").read_text("utf-8").splitlines()
+            lines = list(csv.DictReader(text))
+            assert len(lines) == len(rows)
+            for line, row in zip(lines, rows, strict=True):
+                value = math.inf if row.get("infinite") else row["ours"]
+                assert (float(line["ours"]) if line["ours"] else None) == value
+                assert all(
+                    line[key] == str(row[key]) for key in row if key not in script.OWN_FIELDS
+                )
+
+    def test_the_links_of_the_pages_exist(self, summary):
+        for text in script.render(summary, PUBLISHED).values():
+            for target in text.split("](")[1:]:
+                path = target.split(")")[0].split("#")[0]
+                known = path.removeprefix("study/").removesuffix(".csv")
+                if path.startswith("study/") and path.endswith(".csv"):
+                    assert known in summary["tables"] or summary["quick"], path
+                else:
+                    assert (ROOT / "docs" / path).exists(), path
+
+
+ROWS = [
+    {"method": "a", "figure": "x", "ours": 91.25, "paper": 95.0, "difference": -3.75, "n": 2,
+     "interval": [90.0, None]},
+    {"method": "b", "figure": "x", "ours": None, "paper": None, "difference": None, "n": 2,
+     "interval": None, "infinite": True},
+    {"method": "b", "figure": "y_z", "ours": 98.25, "paper": None, "difference": None, "n": 2,
+     "interval": [-1.0, 2.0]},
+]  # fmt: skip
+
+
+class TestFigures:
+    figures = script.Figures({"tables": {"t": ROWS}})
+
+    def test_a_cell(self):
+        a = {"method": "a"}
+        assert self.figures.cell("t", a) == "91.2"
+        assert self.figures.cell("t", a, 2, interval=True) == "91.25 (90.00 to infinite)"
+        assert self.figures.cell("t", a, 0, field="paper") == "95"
+        assert self.figures.cell("t", {"method": "b", "figure": "x"}) == "infinite"
+        assert self.figures.cell("no such table", a) == "–"
+
+    def test_a_cell_must_be_one_row(self):
+        with pytest.raises(LookupError, match=r"t: one row expected for .*, 2 found"):
+            self.figures.cell("t", {"method": "b"})
+        with pytest.raises(LookupError, match="0 found"):
+            self.figures.cell("t", {"method": "c"})
+        assert self.figures.any_cell("t", {"method": "c"}) == "–"
+
+    def test_a_key_that_rows_do_not_have_excludes_nothing(self):
+        assert self.figures.cell("t", {"method": "a", "on": "unseen"}) == "91.2"
+
+    def test_a_grid(self):
+        assert self.figures.grid("t", {}, ["method"], digits_of={"x": 2}) == (
+            "| method | x | y\\_z |\n"
+            "| --- | --: | --: |\n"
+            "| a | 91.25 (90.00 to infinite); paper 95.00 | – |\n"
+            "| b | infinite | 98.2 (−1.0 to 2.0) |"
+        )
+        assert "no rows" in self.figures.grid("u", {}, ["method"])
+
+    def test_a_ratio_of_errors(self):
+        b = {"method": "b", "figure": "y_z"}
+        assert self.figures.ratio("t", b, {"method": "a"}) == "0.20"
+        assert self.figures.ratio("t", b, {"method": "c"}) == "–"
+
+
+def test_publishing_replaces_the_old_tables(tmp_path):
+    run, docs = tmp_path / "run", tmp_path / "docs"
+    (run / "tables").mkdir(parents=True)
+    (docs / "study").mkdir(parents=True)
+    (docs / "study" / "old.csv").write_text("")
+    (docs / "study" / "old.md").write_text("")
+    summary = {"tables": {"t": ROWS, "empty": []}, "seed": 0}
+    (run / "study.json").write_text(json.dumps(summary))
+    for name in summary["tables"]:
+        (run / "tables" / f"{name}.csv").write_text(name)
+    script.publish(run, docs)
+    names = {path.name for path in (docs / "study").iterdir()}
+    assert names == {"study.json", "t.csv", "empty.csv"}
+    assert json.loads((docs / "study" / "study.json").read_text()) == summary
+    with pytest.raises(FileNotFoundError):
+        script.publish(tmp_path / "none", docs)
