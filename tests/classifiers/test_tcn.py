@@ -8,7 +8,13 @@ import numpy as np
 import pytest
 
 from holdfast.classifiers import Samples
-from holdfast.classifiers.tcn import Network, TemporalConvolution, weight_shapes
+from holdfast.classifiers.tcn import (
+    EarlyStopping,
+    Network,
+    TemporalConvolution,
+    validation_rows,
+    weight_shapes,
+)
 from holdfast.errors import MissingExtra, TrainingError
 
 RECIPE = TemporalConvolution()
@@ -128,6 +134,44 @@ def test_nan_features_have_no_probability():
     with pytest.raises(ValueError) as raised:
         network.probability(np.zeros((2, 31)))
     assert str(raised.value) == "features of shape (n, 30) expected, (2, 31) given"
+
+
+def test_a_fifth_of_the_recordings_finds_the_end_of_training():
+    samples = waves(600)
+    held = validation_rows(samples, seed=0)
+    assert len(set(samples.groups[held])) == 1
+    assert not set(samples.groups[held]) & set(samples.groups[~held])
+    assert {tuple(validation_rows(samples, seed)) for seed in range(9)} != {tuple(held)}
+
+
+def test_both_classes_are_on_both_sides_of_the_validation():
+    """Only group 3 has both classes, and it alone can be held out."""
+    groups = np.repeat([0, 1, 2, 3], 10)
+    stable = np.repeat([True, False, True, True], 10)
+    stable[35:] = False
+    samples = Samples(np.zeros((40, 3)), stable, groups)
+    for seed in range(4):
+        assert set(groups[validation_rows(samples, seed)]) == {3}
+    assert not validation_rows(samples.take(groups < 3), 0).any()
+    assert not validation_rows(samples.take(groups == 3), 0).any()
+
+
+def test_training_is_over_when_the_loss_has_stopped_falling():
+    stopping = EarlyStopping(patience=3)
+    losses = [5.0, 4.0, 4.5, 4.2, 3.0, 3.5, 3.5, 3.0]
+    assert [stopping.update(loss) for loss in losses] == [
+        True, True, False, False, True, False, False, False,
+    ]  # fmt: skip
+    assert stopping.is_over
+
+
+@deep
+def test_the_weights_of_the_smallest_loss_are_kept():
+    """A patience of one epoch with steps that are far too large ends training early."""
+    wild = {"n_epochs": 40, "learning_rate": 1.0, "dropout": 0.0, "patience": 1}
+    one, two = (RECIPE.fit(waves(600), {**wild, "n_epochs": n}, 0) for n in (40, 39))
+    for name, array in one.weights.items():
+        assert np.array_equal(array, two.weights[name])
 
 
 @deep

@@ -191,3 +191,21 @@ def test_only_one_split_and_few_columns_are_printed(capsys):
         "by recording  c       –              -",
         "",
     ]
+
+
+def test_corpora_of_three_rates_of_glitches():
+    rates = {
+        name: 60 * corpus.glitch_rate
+        for name, corpus in verb.TWIN_CORPORA.items()
+        if corpus.glitch_rate is not None
+    }
+    assert rates == {"glitch-0": 0, "glitch-1": 1, "glitch-7": pytest.approx(7)}
+    assert not set(rates) & set(verb.QUICK_CORPORA)
+
+
+def test_the_rate_of_glitches_reaches_the_grasps(monkeypatch, tmp_path):
+    given = []
+    monkeypatch.setattr(verb, "simulate_grasps", lambda grasps, *_, **__: given.extend(grasps))
+    verb._simulate(tmp_path / "one", verb.TWIN_CORPORA["glitch-1"], 5, 1, 1)
+    assert {grasp.glitch_rate for grasp in given} == {1 / 60}
+    assert {grasp.seed for grasp in given} == {7}

@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 import numpy.typing as npt
+from scipy.special import expit
 
 from holdfast.classifiers.fitting import (
     Parameters,
@@ -65,7 +66,7 @@ class LinearSVM:
             intercept=intercept,
             slope=slope,
             offset=offset,
-            threshold=float(1.0 / (1.0 + np.exp(-offset))),
+            threshold=float(expit(offset)),
         )
 
 

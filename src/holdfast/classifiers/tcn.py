@@ -38,6 +38,8 @@ EPSILON = 1e-3
 BATCH_SIZE = 256
 PREDICTION_CHUNK_SIZE = 4096
 """Number of rows whose probabilities are computed at a time."""
+VALIDATION_SHARE = 0.2
+"""Share of the groups that are held out to find the end of training."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -97,7 +99,9 @@ class TemporalConvolution:
     It is fitted by Adam with cross entropy. Every epoch uses all samples of the rarer class and
     the same number of the other class, drawn again for each epoch. This multiplies the odds by a
     factor. The probability is corrected by it; the decision is not changed by the correction.
-    The fit uses one thread, so that a seed gives the same network on the same machine and
+    With a `patience` above 0, a fifth of the groups (recordings) is held out, and training stops
+    when their loss has not fallen for that many epochs; the weights with the smallest loss are
+    kept. The fit uses one thread, so that a seed gives the same network on the same machine and
     version of torch.
 
     Attributes:
@@ -107,13 +111,19 @@ class TemporalConvolution:
     n_channels: int = 3
     name: str = "tcn"
     reference: Parameters = field(
-        default_factory=lambda: {"n_epochs": 20, "learning_rate": 2e-3, "dropout": 0.2}
+        default_factory=lambda: {
+            "n_epochs": 200,
+            "patience": 15,
+            "learning_rate": 2e-3,
+            "dropout": 0.2,
+        }
     )
 
     def suggest(self, trial: "Trial") -> Parameters:
         """Draw the number of epochs, the learning rate and the dropout."""
         return {
-            "n_epochs": trial.suggest_int("n_epochs", 4, 40, log=True),
+            "n_epochs": trial.suggest_int("n_epochs", 4, 200, log=True),
+            "patience": trial.suggest_int("patience", 5, 40, log=True),
             "learning_rate": trial.suggest_float("learning_rate", 2e-4, 1e-2, log=True),
             "dropout": trial.suggest_float("dropout", 0.0, 0.5),
         }
@@ -138,7 +148,7 @@ class TemporalConvolution:
         scale[np.ptp(steps, axis=0) == 0] = 1.0
         windows = torch.from_numpy(_windows(samples.features, mean, scale))
         with _one_thread(torch):
-            weights = _train(torch, windows, samples.stable, parameters, seed)
+            weights = _train(torch, windows, samples, parameters, seed)
         n_steps = n_features // self.n_channels
         return Network(weights, mean, scale, n_steps, class_ratio(samples.stable))
 
@@ -209,29 +219,102 @@ def _convolve(values: Tensor, weights: Mapping[str, Tensor], name: str) -> Tenso
     return functional.selu(found.transpose(1, 2))
 
 
+class EarlyStopping:
+    """Memory of the smallest validation loss, which ends training once the loss stops falling.
+
+    Args:
+        patience: epochs without a smaller loss after which training is over.
+
+    Example:
+        >>> stopping = EarlyStopping(patience=2)
+        >>> [stopping.update(loss) for loss in (3.0, 2.0, 2.5)], stopping.is_over
+        ([True, True, False], False)
+        >>> stopping.update(2.0), stopping.is_over
+        (False, True)
+    """
+
+    def __init__(self, patience: int) -> None:
+        self._patience = patience
+        self._smallest = math.inf
+        self._n_since = 0
+
+    @property
+    def is_over(self) -> bool:
+        """Whether the loss has not fallen for `patience` epochs."""
+        return self._n_since >= self._patience
+
+    def update(self, loss: float) -> bool:
+        """Add the loss of an epoch. Return whether it is the smallest so far."""
+        is_smallest = loss < self._smallest
+        self._n_since = 0 if is_smallest else self._n_since + 1
+        self._smallest = min(loss, self._smallest)
+        return is_smallest
+
+
+def validation_rows(samples: Samples, seed: int) -> npt.NDArray[np.bool_]:
+    """Return which samples are held out to find the end of training, (n,).
+
+    They are those of a fifth of the groups, drawn at random. No sample is held out if there is
+    no such choice that leaves both classes on both sides.
+    """
+    groups = np.random.default_rng(seed).permutation(np.unique(samples.groups))
+    n_held = max(1, round(VALIDATION_SHARE * len(groups)))
+    for start in range(len(groups) if len(groups) > n_held else 0):
+        held = np.isin(samples.groups, np.roll(groups, -start)[:n_held])
+        if not samples.take(held).one_class and not samples.take(~held).one_class:
+            return held
+    return np.zeros(len(samples.stable), dtype=np.bool_)
+
+
 def _train(
-    torch: ModuleType,
-    windows: Tensor,
-    stable: npt.NDArray[np.bool_],
-    parameters: Parameters,
-    seed: int,
+    torch: ModuleType, windows: Tensor, samples: Samples, parameters: Parameters, seed: int
 ) -> Weights:
     generator = torch.Generator().manual_seed(seed)
     weights = {
         n: _initial_weights(generator, n, s) for n, s in weight_shapes(windows.shape[1]).items()
     }
     optimiser = torch.optim.Adam(weights.values(), lr=parameters["learning_rate"])
-    classes = torch.from_numpy(stable.astype(np.int64))
+    classes = torch.from_numpy(samples.stable.astype(np.int64))
     rng = np.random.default_rng(seed)
     dropout = partial(_drop_channels, fraction=parameters["dropout"], generator=generator)
+    patience = parameters.get("patience", 0)
+    held = validation_rows(samples, seed) if patience else np.zeros(len(samples.stable), bool)
+    fitted, stopping = np.flatnonzero(~held), EarlyStopping(patience)
+    best = _copied(weights)
     for _ in range(parameters["n_epochs"]):
-        order = torch.from_numpy(_balanced_rows(stable, rng))
+        order = torch.from_numpy(fitted[_balanced_rows(samples.stable[fitted], rng)])
         for rows in order.split(BATCH_SIZE):
             optimiser.zero_grad()
             scores = forward(windows[rows], weights, dropout)
             torch.nn.functional.cross_entropy(scores, classes[rows]).backward()
             optimiser.step()
-    return {name: tensor.detach().numpy() for name, tensor in weights.items()}
+        if not held.any() or stopping.update(_loss(torch, windows, classes, weights, held)):
+            best = _copied(weights)
+        if held.any() and stopping.is_over:
+            break
+    return best
+
+
+def _copied(weights: Mapping[str, Tensor]) -> Weights:
+    return {name: tensor.detach().numpy().copy() for name, tensor in weights.items()}
+
+
+def _loss(
+    torch: ModuleType,
+    windows: Tensor,
+    classes: Tensor,
+    weights: Mapping[str, Tensor],
+    held: npt.NDArray[np.bool_],
+) -> float:
+    """Return the mean cross entropy of the held-out windows, with both classes weighing alike."""
+    rows = torch.from_numpy(np.flatnonzero(held))
+    with torch.no_grad():
+        scores = torch.cat(
+            [forward(windows[part], weights) for part in rows.split(PREDICTION_CHUNK_SIZE)]
+        )
+    losses = torch.nn.functional.cross_entropy(scores, classes[rows], reduction="none")
+    stable = classes[rows] == 1
+    return float((losses[stable].mean() + losses[~stable].mean()) / 2)
 
 
 def _drop_channels(values: Tensor, fraction: float, generator: TorchGenerator) -> Tensor:

@@ -176,7 +176,7 @@ def match_alarms(times: npt.ArrayLike, labels: npt.ArrayLike, states: npt.ArrayL
     check_times(time)
     stable = _spans(label == STABLE, time)
     onsets, ends = _events(_spans(_not_stable(label), time), stable)
-    alarms = np.flatnonzero((state[:-1] == STABLE) & _not_stable(state[1:])) + 1
+    alarms = alarm_places(state)
     event_of = _event_of_alarms(time[alarms], onsets, ends)
     false = alarms[event_of < 0]
     return AlarmMatch(
@@ -184,6 +184,16 @@ def match_alarms(times: npt.ArrayLike, labels: npt.ArrayLike, states: npt.ArrayL
         tuple(FalseAlarm(float(time[k]), _STATES[label[k]]) for k in false),
         float((stable[:, 1] - stable[:, 0]).sum()),
     )
+
+
+def alarm_places(states: Codes) -> npt.NDArray[np.intp]:
+    """Return the samples at which alarms come: not stable, right after a stable sample.
+
+    Example:
+        >>> alarm_places(np.array([STABLE, UNSTABLE, UNSTABLE, STABLE, NO_CONTACT])).tolist()
+        [1, 4]
+    """
+    return np.flatnonzero((states[:-1] == STABLE) & _not_stable(states[1:])) + 1
 
 
 def pool_events(matches: Sequence[AlarmMatch]) -> EventMetrics:

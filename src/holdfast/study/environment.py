@@ -23,6 +23,9 @@ ROLES = {
     "vigorous": "a more vigorous profile of the twin",
     "finger": "the protocol of holdfast 0.1, in which only a finger pushes",
     "noiseless": "the first grasps of main with whole counts and no other noise",
+    "glitch-0": "other objects, without glitches of the hand's controller",
+    "glitch-1": "other objects, with 1 glitch a minute",
+    "glitch-7": "other objects, with 7 glitches a minute",
     "real": "recordings of a real gripper",
 }
 """What the recordings of each role are."""

@@ -65,7 +65,9 @@ class StudyPlan(msgspec.Struct, frozen=True):
     Attributes:
         corpora: by role: "main" always, and of the following those that exist: "fresh" (the same
             objects, other seeds), "others" (other objects), "gentle" and "vigorous" (other
-            profiles), "finger" (the protocol of holdfast 0.1), "noiseless" (no noise but rounding).
+            profiles), "finger" (the protocol of holdfast 0.1), "noiseless" (no noise but rounding),
+            "glitch-0", "glitch-1" and "glitch-7" (other objects, with so many glitches of the
+            hand's controller a minute).
         real: recordings of a real hand; None if there are none.
         quick: fewer windows, methods and trials.
         seed: of all random numbers.

@@ -125,7 +125,7 @@ on these data, even if the intervals of the two methods overlap. A method for fi
 for the whole hand solve different tasks. The table of hands evaluates all of them on the same
 task.""",
         "comparison",
-        ("methods", "hands", "cost"),
+        ("strongest", "methods", "hands", "cost"),
     ),
     SectionOutline(
         "Events: detection delay and false alarms",
@@ -136,7 +136,7 @@ minute of undisturbed hold. A threshold with fewer missed events has more false 
 methods at similar rates of false alarms. All thresholds are chosen on training recordings
 only.""",
         "",
-        ("events", "slips", "alarms"),
+        ("events", "slips", "glitches", "alarms"),
     ),
     SectionOutline(
         "Where the errors are",

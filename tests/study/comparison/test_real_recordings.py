@@ -68,6 +68,15 @@ def test_each_recording_is_evaluated_by_a_fit_to_the_others(corpus, monkeypatch)
     found = {(row.keys["recording"], row.keys["finger"]) for row in table.rows}
     fingers = ("finger1", "finger2", "hand")
     assert found == {(f"pick-{k}", finger) for k in (0, 1) for finger in fingers}
+    for name in ("stable samples", "other samples"):
+        n = {}
+        for row in table.rows:
+            if row.keys["figure"] == name and row.keys["finger"] != "hand":
+                n.setdefault((row.keys["recording"], row.keys["finger"]), set()).add(row.ours)
+        assert n and all(len(each) == 1 for each in n.values())
+    assert {row.ours > 0 for row in table.rows if row.keys["figure"] == "without estimate [%]"} == {
+        True
+    }
     areas = [row.ours for row in table.rows if row.keys["figure"] == "AUC contact"]
     assert all(0 <= area <= 1 for area in areas)
     sigma = [r for r in table.rows if r.keys["method"] == METHODS["zhang"].title]

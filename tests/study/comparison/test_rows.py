@@ -10,8 +10,10 @@ from holdfast.study.comparison.rows import (
     count_row,
     difference_row,
     quantile_row,
+    quotient_row,
     ratio_row,
     sample_rows,
+    without_estimate_row,
 )
 from holdfast.study.evaluation.evaluate_method import MethodEvaluation
 
@@ -92,3 +94,27 @@ def test_the_calibration_error_by_hand():
     assert calibration_row({}, evaluation, seed=0).ours == pytest.approx((3 + 2) / 40)
     both = MethodEvaluation(["a", "b"], None, metrics, [], [], [], [], [], [table, table])
     assert calibration_row({}, both, seed=0).interval == pytest.approx((0.125, 0.125))
+
+
+def test_a_quotient_of_error_shares_is_paired():
+    """Ours: 10 of 200 wrong, 5 %. The baseline: 30 of 200, 15 %. In each recording three times."""
+    base, ours = np.array([[24, 100], [6, 100]]), np.array([[8, 100], [2, 100]])
+    row = quotient_row({"figure": "ratio"}, base, ours, seed=0)
+    assert row.ours == pytest.approx(3.0)
+    assert row.interval == (pytest.approx(3.0), pytest.approx(3.0))
+    assert row.n == 2
+
+
+def test_a_quotient_without_errors_of_ours_is_infinite():
+    base, none = np.array([[3, 10], [4, 10]]), np.array([[0, 10], [0, 10]])
+    row = quotient_row({"figure": "ratio"}, base, none, seed=0)
+    assert (row.ours, row.interval) == (np.inf, (None, None))
+    assert quotient_row({"figure": "ratio"}, none, none, seed=0).ours is None
+    empty = quotient_row({"figure": "ratio"}, 0 * base, 0 * base, seed=0)
+    assert (empty.ours, empty.n, empty.interval) == (None, 0, None)
+
+
+def test_the_share_without_an_estimate():
+    row = without_estimate_row({"method": "one"}, [(100, 10), (300, 10)], seed=0)
+    assert row.keys == {"method": "one", "figure": "without estimate [%]"}
+    assert row.ours == pytest.approx(5.0)

@@ -4,7 +4,7 @@ import msgspec
 import numpy as np
 import pytest
 
-from holdfast.contact import STABLE, ContactState
+from holdfast.contact import STABLE, UNKNOWN, ContactState
 from holdfast.metrics import event_metrics
 from holdfast.recordings import Label
 from holdfast.study.evaluation.evaluate_method import (
@@ -19,6 +19,7 @@ from holdfast.study.evaluation.evaluate_method import (
     held_out_folds,
     score_splits,
 )
+from holdfast.study.evaluation.glitch_readings import READINGS
 from holdfast.study.evaluation.variation import Variation
 from holdfast.study.plan import scan_corpus
 from study.example_recordings import recording_with_truth, save_all, save_synthetic
@@ -118,15 +119,17 @@ def test_a_job_has_a_result_for_each_split_and_each_corpus(evaluations, corpus):
 
 def test_without_a_truth_there_are_no_slips_and_no_phases(evaluations):
     others = evaluations["others"]
-    assert all(alarms.slip_delays == [] for alarms in others.alarms)
+    assert all(alarms.slip_delays == [] for alarms in others.alarms.own)
+    assert all(glitches.n == 0 for glitches in others.glitches)
     assert all(not each.phases for each in others.breakdown)
-    assert all(len(alarms.slip_delays) == 1 for alarms in evaluations["recording"].alarms)
+    assert all(len(alarms.slip_delays) == 1 for alarms in evaluations["recording"].alarms.own)
+    assert all(glitches.n == 1 for glitches in evaluations["recording"].glitches)
 
 
 def test_events_are_counted_by_exact_labels(evaluations, corpus):
     """Equal to `event_metrics` of the hand, by labels without margin."""
     _, scored = next(score_splits(EvaluationJob("logreg", corpus, effort=EFFORT)))
-    for case, alarms in zip(scored, evaluations["recording"].alarms, strict=True):
+    for case, alarms in zip(scored, evaluations["recording"].alarms.own, strict=True):
         labels = case.recording.hand_labels(case.recording.exact_labels).labels
         score = case.scores.hand(case.recording)
         known = event_metrics(score.times, labels, score.states())
@@ -139,15 +142,28 @@ def test_events_are_counted_by_exact_labels(evaluations, corpus):
         )
 
 
-def test_more_false_alarms_find_more_slips(evaluations):
-    curve = evaluations["recording"].alarms_by_rate
+def test_more_false_alarms_call_less_stable(evaluations):
+    curve = evaluations["recording"].alarms.by_rate
     assert len(curve) == len(FALSE_ALARM_RATES)
-    found = [sum(alarms.n_slips_found(0.2) for alarms in point) for point in curve]
-    assert found == sorted(found)
+    not_stable = [sum(alarms.n_not_called_stable for alarms in point) for point in curve]
+    assert not_stable == sorted(not_stable)
+
+
+def test_glitches_are_counted_in_three_ways(evaluations):
+    """The jump of the recordings is an event, a false alarm if detected, or left out."""
+    readings = evaluations["recording"].readings
+    assert tuple(readings) == READINGS
+    own = {name: each.own for name, each in readings.items()}
+    for event, false, left_out in zip(*(own[name] for name in READINGS), strict=True):
+        assert len(event.delays) == len(false.delays) + 1 == len(left_out.delays) + 1
+        assert event.stable_seconds == pytest.approx(false.stable_seconds - 0.1, abs=0.02)
+        assert left_out.stable_seconds == pytest.approx(false.stable_seconds - 0.37, abs=0.03)
+        assert false.n_under_stable >= left_out.n_under_stable
+        assert left_out.n_of_glitch == 0
 
 
 def test_held_states_give_fewer_alarms(evaluations):
-    bare, held = evaluations["recording"].alarms, evaluations["recording"].held_alarms
+    bare, held = evaluations["recording"].alarms.own, evaluations["recording"].alarms.held
     assert sum(h.n_false_alarms for h in held) <= sum(h.n_false_alarms for h in bare)
     assert sum(h.n_not_called_stable for h in held) >= sum(h.n_not_called_stable for h in bare)
 
@@ -212,3 +228,23 @@ def test_a_random_split_evaluates_every_sample_once(corpus):
     assert counts.shape == (6, 4)
     assert counts.sum() == honest.pooled.n
     assert evaluate_pooled(job) == counts.tolist()
+
+
+def test_methods_are_scored_where_all_of_them_have_an_estimate(corpus):
+    """Differences exist after one sample, the paper's features after 13."""
+    alone = EvaluationJob("difference", corpus, effort=EFFORT)
+    both = EvaluationJob("difference", corpus, effort=EFFORT, compared=("logreg", "difference"))
+    paper = EvaluationJob("logreg", corpus, effort=EFFORT, compared=("logreg", "difference"))
+    single, joint, known = (evaluate_method(job)["recording"] for job in (alone, both, paper))
+    assert joint.fingers.pooled.n == known.fingers.pooled.n < single.fingers.pooled.n
+    for _, scored in score_splits(paper):
+        for case in scored:
+            labels = case.recording.scored_labels
+            for name, finger in case.scores.decide(case.recording, labels).fingers.items():
+                assert (finger.states[labels[name] != UNKNOWN] != UNKNOWN).all()
+    assert joint.without_estimate == single.without_estimate
+    for (n, n_without), (n_paper, n_without_paper) in zip(
+        joint.without_estimate, known.without_estimate, strict=True
+    ):
+        assert n == n_paper
+        assert n_without < n_without_paper

@@ -16,7 +16,7 @@ from study.example_recordings import save_synthetic
 
 def recording_at(times):
     empty = {name: np.zeros(len(own), dtype=np.int8) for name, own in times.items()}
-    return RecordingFeatures("one", None, None, times, {}, empty, empty, {}, {})
+    return RecordingFeatures("one", None, None, times, {}, empty, empty, empty, {}, {}, {})
 
 
 def state_of_finger(margin, in_contact, shift):
@@ -126,7 +126,7 @@ def test_a_hand_without_a_finger_is_unknown_to_a_whole_hand_method(corpus):
     method = METHODS["jl_global_logreg"]
     recordings = corpus_features(method, corpus, Variation())
     lacking = without(recordings[3], "index")
-    narrow = {HAND: lacking.features[HAND][:, :90]}
+    narrow = {HAND: lacking.features[HAND][:, :36]}
     lacking = replace(lacking, features=narrow)
     fitted = FittedMethod.fit(
         method, gather_training_samples([*recordings[:3], lacking]), {0, 1, 2, 3}, 0

@@ -90,3 +90,14 @@ def test_ignored_alarms_do_not_count():
     ignored = np.arange(6) == 4
     assert threshold_shift([FalseAlarmRanges.of(score, labels)], 0.0) == -2.0
     assert threshold_shift([FalseAlarmRanges.of(score, labels, ignored)], 0.0) == -1.0
+
+
+def test_ignored_samples_count_neither_as_alarms_nor_as_time():
+    """Of 3000 samples at 150 Hz, all labelled stable, the first half is ignored."""
+    score, _ = cases(0)[0]
+    labels = np.full(3000, STABLE, dtype=np.int8)
+    ignored = np.arange(3000) < 1500
+    every, late = (FalseAlarmRanges.of(score, labels, each) for each in (None, ignored))
+    assert every.minutes == pytest.approx(20 / 60)
+    assert late.minutes == pytest.approx(10 / 60)
+    assert 0 < len(late.lower) < len(every.lower)

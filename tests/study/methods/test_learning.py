@@ -11,10 +11,11 @@ from holdfast.sensors import Sensor
 from holdfast.study.methods import HAND, METHODS, hand_signal
 from holdfast.study.methods.learning import (
     N_STEPS,
-    hand_differences,
+    hand_motion,
     last_second,
+    motion_features,
     shear_statistics,
-    taxel_differences,
+    taxel_motion,
 )
 from training.build import tiny_module, tiny_recording
 
@@ -69,64 +70,72 @@ THUMB = finger(
         [[2, 4, 0], [0, 6, 9]],
     ],
 )
-INDEX = finger(
-    [0.005, 0.013, 0.023],
-    [
-        [[0, 0, 0], [0, 0, 0]],
-        [[1, 0, 0], [0, 2, 0]],
-        [[1, 3, 0], [0, 2, 4]],
-    ],
-)
+INDEX = finger([0.005, 0.013, 0.023], np.zeros((3, 2, 3)))
 
 
-def test_differences_taxel_by_taxel():
-    rows = taxel_differences(hand(thumb=THUMB))["thumb"]
-    assert np.isnan(rows[0]).all()
-    assert rows[1:].tolist() == [[0, 2, 0, -4, 0, 1], [1, 0, -3, 0, 1, 2]]
+def test_features_of_motions_by_hand():
+    """Two taxels move along x and y, by 3 and 4: the mean is (1.5, 2), of length 2.5."""
+    (row,) = motion_features(np.array([[[3.0, 0.0], [0.0, 4.0]]]))
+    mean_unit = np.hypot(0.5, 0.5)
+    assert row == pytest.approx([3.5, 0.5, 2.5, 0.6, 0.8, 1 - mean_unit, 3.0, 4.0])
 
 
-def test_differences_do_not_depend_on_the_tare():
-    one, two = (taxel_differences(hand(tare, thumb=THUMB))["thumb"] for tare in ("none", "first"))
+def test_opposite_motions_do_not_cancel():
+    """Their mean is 0, but their magnitudes and their spread remain."""
+    (row,) = motion_features(np.array([[[2.0, 0.0], [-2.0, 0.0]]]))
+    assert row == pytest.approx([2.0, 0.0, 0.0, 0.0, 0.0, 1.0, 2.0, 2.0])
+    (still,) = motion_features(np.zeros((1, 2, 2)))
+    assert still == pytest.approx([0, 0, 0, 0, 0, 1, 0, 0])
+
+
+def test_a_motion_is_the_change_of_the_shear_over_a_sixtieth_of_a_second():
+    """At 100 Hz these are 2 samples: of 0 and 0.02 s, (1, 2) to (2, 4) and (4, 5) to (0, 6)."""
+    rows = taxel_motion(hand(thumb=THUMB))["thumb"]
+    assert np.isnan(rows[:2]).all()
+    assert rows[2] == pytest.approx(motion_features(np.array([[[1.0, 2.0], [-4.0, 1.0]]]))[0])
+
+
+def test_motions_do_not_depend_on_the_tare():
+    one, two = (taxel_motion(hand(tare, thumb=THUMB))["thumb"] for tare in ("none", "first"))
     assert np.array_equal(one, two, equal_nan=True)
 
 
-def test_no_difference_across_a_gap_or_a_lost_sample():
-    readings = np.arange(8.0)[:, None, None] * np.ones((8, 2, 3))
+def test_no_motion_across_a_gap_or_a_lost_sample():
+    readings = np.arange(10.0)[:, None, None] * np.ones((10, 2, 3))
     readings[2, 1, 0] = np.nan
-    times = [0.0, 0.01, 0.02, 0.03, 0.04, 0.09, 0.10, 0.11]
-    rows = taxel_differences(hand(thumb=finger(times, readings)))["thumb"]
-    assert np.isfinite(rows).all(axis=1).tolist() == [
-        False, True, False, False, True, False, True, True,
-    ]  # fmt: skip
-    assert (rows[[1, 4, 6, 7]] == 1).all()
+    times = [0.0, 0.01, 0.02, 0.03, 0.04, 0.05, 0.10, 0.11, 0.12, 0.13]
+    rows = taxel_motion(hand(thumb=finger(times, readings)))["thumb"]
+    assert np.flatnonzero(np.isfinite(rows).all(axis=1)).tolist() == [5, 8, 9]
+    assert rows[[5, 8, 9], 0] == pytest.approx(2 * np.sqrt(2))
 
 
 def test_a_finger_without_a_reading_has_the_same_width():
     dead = finger([0.0, 0.01], np.full((2, 2, 3), np.nan))
-    rows = taxel_differences(hand(thumb=dead))["thumb"]
-    assert rows.shape == (2, 6)
+    rows = taxel_motion(hand(thumb=dead))["thumb"]
+    assert rows.shape == (2, 8)
     assert np.isnan(rows).all()
 
 
-def test_differences_of_a_hand_are_at_the_times_of_the_first_finger():
-    """At 0.01 s the index has its sample of 0.005 s, at 0.02 s that of 0.013 s."""
-    found = hand_differences(hand(thumb=THUMB, index=INDEX))
+def test_motions_of_a_hand_are_at_the_times_of_the_first_finger():
+    """At 0.03 s the thumb has its own sample, the index that of 0.023 s."""
+    times, readings = np.arange(5) * 0.01, np.arange(5.0)[:, None, None] * np.ones((5, 2, 3))
+    thumb, index = finger(times, readings), finger(times + 0.003, 2 * readings)
+    found = hand_motion(hand(thumb=thumb, index=index))
     assert list(found) == [HAND]
     rows = found[HAND]
-    assert rows.shape == (3, 12)
-    assert np.isnan(rows[:2, 6:]).all()
-    assert rows[1, :6].tolist() == [0, 2, 0, -4, 0, 1]
-    assert rows[2].tolist() == [1, 0, -3, 0, 1, 2, 1, 0, 0, 0, 2, 0]
+    assert rows.shape == (5, 16)
+    assert np.isfinite(rows).all(axis=1).tolist() == [False, False, False, True, True]
+    assert rows[3, [0, 8]] == pytest.approx([2 * np.sqrt(2), 4 * np.sqrt(2)])
 
 
-def test_a_finger_without_new_samples_has_no_differences():
+def test_a_finger_without_new_samples_has_no_motion():
     times = np.arange(10) * 0.01
     readings = np.arange(10.0)[:, None, None] * np.ones((10, 2, 3))
     thumb, index = finger(times, readings), finger(times[:5], readings[:5])
-    rows = hand_differences(hand(thumb=thumb, index=index))[HAND]
-    assert np.isfinite(rows[1:8]).all()
-    assert np.isfinite(rows[8:, :6]).all()
-    assert np.isnan(rows[8:, 6:]).all()
+    rows = hand_motion(hand(thumb=thumb, index=index))[HAND]
+    assert np.isfinite(rows[2:8]).all()
+    assert np.isfinite(rows[8:, :8]).all()
+    assert np.isnan(rows[8:, 8:]).all()
 
 
 @pytest.mark.parametrize("name", ["jl_global_logreg", "jl_global_svm"])
@@ -191,4 +200,6 @@ def test_the_last_second_is_causal(rate):
 def test_description_of_the_network():
     method = METHODS["tcn"]
     assert (method.name, method.category, method.recipe.name) == ("tcn", "learning", "tcn")
-    assert dict(method.reference) == {"n_epochs": 20, "learning_rate": 2e-3, "dropout": 0.2}
+    assert dict(method.reference) == {
+        "n_epochs": 200, "patience": 15, "learning_rate": 2e-3, "dropout": 0.2,
+    }  # fmt: skip

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from holdfast.features import FEATURE_NAMES, Tare, haar_features
-from holdfast.study.methods import METHODS, hand_signal
+from holdfast.study.methods import METHODS, PAPER_FAMILY, hand_signal
 from holdfast.study.methods.wavelets import CUTS, detail_energy, detail_sigma, normal_energy
 from holdfast.synthetic import synthetic_recording
 from training.build import tiny_recording
@@ -99,3 +99,33 @@ def test_description_of_the_trees():
     method = METHODS["trees"]
     assert (method.name, method.category, method.recipe.name) == ("trees", "learning", "trees")
     assert not method.whole_hand
+
+
+def test_two_features_on_logarithmic_scales():
+    hand = hand_signal(tiny_recording(0), Tare.parse("0.5"))
+    for name, rows in METHODS["log_two"].features(hand).items():
+        force = hand.fingers[name].force
+        six = haar_features(force[np.isfinite(force).all(axis=1)], 14)[13:]
+        expected = np.log10(six[:, [FEATURE_NAMES.index("F_a"), FEATURE_NAMES.index("sigma")]])
+        assert rows[-len(six) :] == pytest.approx(expected)
+
+
+def test_the_energy_keeps_the_mean_of_the_details():
+    """A slope of 3 a sample: every detail is -3 / sqrt(2), so E = 7 x 9 / 2 and sigma = 0."""
+    hand = pressed(along_normal(100 + 3.0 * np.arange(30)))
+    energy = METHODS["energy"].features(hand)["index"][13:, 0]
+    assert energy == pytest.approx(np.full(17, np.log10(31.5)))
+    sigma = METHODS["log_two"].features(hand)["index"][13:, 1]
+    assert (sigma < -5).all()
+
+
+def test_the_classifiers_of_the_paper_with_and_without_class_weights():
+    for name in ("logreg", "svm"):
+        balanced, unweighted = METHODS[name], METHODS[f"{name}_unweighted"]
+        assert balanced.reference == {"C": 1.0, "class_weight": "balanced"}
+        assert unweighted.reference == {"C": 1.0, "class_weight": None}
+        assert balanced.features is unweighted.features
+        assert balanced.recipe is unweighted.recipe
+    assert PAPER_FAMILY == (
+        "logreg", "logreg_unweighted", "svm", "svm_unweighted", "log_two", "energy",
+    )  # fmt: skip

@@ -8,7 +8,7 @@ from holdfast.metrics.events import POST_DURATIONS
 from holdfast.plots.curves import Curve, draw_alarms, draw_reliability
 from holdfast.plots.dots import IntervalEstimate, draw_dots, draw_groups
 from holdfast.sensors.types import Array
-from holdfast.study.comparison import costs, error_tables, event_tables, sample_tables
+from holdfast.study.comparison import costs, error_tables, event_tables, sample_tables, strongest
 from holdfast.study.comparison.jobs import (
     DEFAULT_SECONDS,
     METHOD_SECONDS,
@@ -35,10 +35,13 @@ from holdfast.study.report.result_tables import ResultTable, Row
 from holdfast.study.tasks import Task
 
 TABLES = (
+    strongest.table,
     sample_tables.methods,
     sample_tables.hands,
     event_tables.events,
     event_tables.slips,
+    event_tables.glitches,
+    event_tables.glitch_rates,
     sample_tables.splits,
     error_tables.phases,
     error_tables.force,
@@ -70,8 +73,9 @@ def _pooled_task(plan: StudyPlan, name: str) -> Task:
 
 
 def tables(plan: StudyPlan, results: Results) -> list[ResultTable]:
-    """Return all tables of the comparison."""
-    return [make(plan, results) for make in TABLES]
+    """Return all tables of the comparison that have rows."""
+    made = [make(plan, results) for make in TABLES]
+    return [table for table in made if table.rows]
 
 
 def figures(plan: StudyPlan, results: Results) -> list[ReportFigure]:
@@ -111,7 +115,7 @@ def _alarm_figure(plan: StudyPlan, results: Results) -> ReportFigure:
     post = f"{1000 * POST_DURATIONS[0]:.0f} ms"
     groups: dict[str, dict[str, Curve]] = {
         f"events missed at {post} [%]": {},
-        f"slips not found within {post} [%]": {},
+        f"slips not detected within {post} [%]": {},
     }
     for title, evaluation in _by_recording(plan, results, ALARM_CURVES).items():
         for group, curve in zip(groups.values(), _alarm_curves(evaluation), strict=True):
@@ -121,19 +125,19 @@ def _alarm_figure(plan: StudyPlan, results: Results) -> ReportFigure:
         "training recordings for false alarms under a stable label of "
         f"{', '.join(f'{rate:g}' for rate in FALSE_ALARM_RATES)} per minute; the figure shows "
         "the rates that result on the other recordings. Large marks: chosen for "
-        f"{COMPARED_RATE:g} per minute."
+        f"{COMPARED_RATE:g} per minute. A glitch of the hand's controller is an event here."
     )
     return ReportFigure("alarms", caption, draw_alarms(groups, bar=COMPARED_RATE))
 
 
 def _alarm_curves(evaluation: MethodEvaluation) -> tuple[Curve, Curve]:
-    """Return missed events, and slips not found, over false alarms under a stable label."""
-    by_rate = evaluation.alarms_by_rate
+    """Return missed events, and slips not detected, over false alarms under a stable label."""
+    by_rate = evaluation.alarms.by_rate
     rates = np.array([_false_alarms_per_minute(alarms) for alarms in by_rate])
     missed = np.array([_missed_share(alarms) for alarms in by_rate])
-    not_found = 100 - np.array([_slips_found_share(alarms) for alarms in by_rate])
+    not_detected = 100 - np.array([_slips_detected_share(alarms) for alarms in by_rate])
     chosen = FALSE_ALARM_RATES.index(COMPARED_RATE)
-    return Curve(rates, missed, chosen=chosen), Curve(rates, not_found, chosen=chosen)
+    return Curve(rates, missed, chosen=chosen), Curve(rates, not_detected, chosen=chosen)
 
 
 def _false_alarms_per_minute(alarms: Sequence[AlarmStatistics]) -> float:
@@ -146,7 +150,7 @@ def _missed_share(alarms: Sequence[AlarmStatistics]) -> float:
     return _percent(sum(each.n_missed(POST_DURATIONS[0]) for each in alarms), n_events)
 
 
-def _slips_found_share(alarms: Sequence[AlarmStatistics]) -> float:
+def _slips_detected_share(alarms: Sequence[AlarmStatistics]) -> float:
     n_slips = sum(len(each.slip_delays) for each in alarms)
     return _percent(sum(each.n_slips_found(POST_DURATIONS[0]) for each in alarms), n_slips)
 

@@ -12,20 +12,27 @@ from holdfast.study.evaluation.evaluate_method import (
     evaluate_method,
 )
 from holdfast.study.evaluation.variation import Variation
-from holdfast.study.methods import METHODS
+from holdfast.study.methods import METHODS, PAPER_FAMILY
 from holdfast.study.plan import StudyPlan
 from holdfast.study.tasks import Task
 
 REFERENCE_METHOD = "logreg"
 """The paper's method, which all others are compared with."""
-MAIN_METHODS = ("logreg", "svm", "zhang", "trees", "holdfast")
+MAIN_METHODS = (*PAPER_FAMILY, "zhang", "trees", "holdfast")
 """Methods that are evaluated on every corpus."""
-QUICK_METHODS = ("logreg", "holdfast")
+QUICK_METHODS = (*PAPER_FAMILY, "holdfast")
 """Those of them that a quick study evaluates on every corpus."""
 NETWORK = "tcn"
 SLOW_METHODS = ("jl_local_svm", "jl_global_svm", NETWORK)
 """Methods that a quick study leaves out."""
-METHOD_SECONDS = {"trees": 300.0, "jl_local_svm": 150.0, "jl_global_svm": 230.0, NETWORK: 1500.0}
+METHOD_SECONDS = {
+    "svm": 60.0,
+    "svm_unweighted": 60.0,
+    "trees": 300.0,
+    "jl_local_svm": 150.0,
+    "jl_global_svm": 230.0,
+    NETWORK: 6000.0,
+}
 """Approximate duration of the slow evaluations [s]."""
 DEFAULT_SECONDS = 30.0
 """Approximate duration of the other evaluations [s]."""
@@ -41,8 +48,13 @@ SPLIT_TITLES = {
     "fresh": "other seeds",
     "gentle": "gentle profile",
     "vigorous": "vigorous profile",
+    "glitch-0": "no glitches",
+    "glitch-1": "1 glitch a minute",
+    "glitch-7": "7 glitches a minute",
 }
 """Titles of splits and corpora in tables, by name. The first two are splits of "main"."""
+GLITCH_RATE_SPLITS = ("glitch-0", "glitch-1", "glitch-7")
+"""Corpora of the same objects that differ in the rate of glitches."""
 
 Results = Mapping[str, Any]
 """Results of the tasks of the study, by name of the task."""
@@ -76,7 +88,8 @@ def network_note(plan: StudyPlan) -> str:
     effort = NETWORK_EFFORT
     return (
         f"The TCN is evaluated at a smaller size: {effort.folds} folds, {effort.max_samples:,} "
-        f"windows of a finger to train, every {effort.stride}rd sample evaluated."
+        f"windows of a finger to train, every {effort.stride}rd sample evaluated. It is trained "
+        "until the loss of held-out training recordings has stopped falling."
     )
 
 
@@ -103,11 +116,23 @@ def method_job(plan: StudyPlan, method: str) -> EvaluationJob:
     """Return the complete evaluation job of a method."""
     tests = tuple(plan.corpora[role] for role in _test_roles(plan, method))
     splits: tuple[Split, ...] = ("recording", "object")
-    if method == NETWORK or (plan.quick and method not in QUICK_METHODS):
+    if plan.quick and method not in QUICK_METHODS:
         splits = ("recording",)
     return EvaluationJob(
-        method, plan.main, splits, tests, Variation(), method_effort(plan, method), plan.seed
+        method,
+        plan.main,
+        splits,
+        tests,
+        Variation(),
+        method_effort(plan, method),
+        plan.seed,
+        compared_methods(plan),
     )
+
+
+def compared_methods(plan: StudyPlan) -> tuple[str, ...]:
+    """Return the names of the methods that are compared on the same samples."""
+    return tuple(method_titles(plan))
 
 
 def method_effort(plan: StudyPlan, method: str) -> EvaluationEffort:

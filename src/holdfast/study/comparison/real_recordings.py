@@ -3,7 +3,16 @@
 from typing import Any
 
 from holdfast.metrics import RecordingMetrics
-from holdfast.study.comparison.jobs import NETWORK, Results, evaluation_task, method_titles
+from holdfast.study.comparison.jobs import (
+    NETWORK,
+    Results,
+    compared_methods,
+    evaluation_task,
+    method_titles,
+)
+from holdfast.study.comparison.rows import PERCENT, WITHOUT_ESTIMATE
+from holdfast.study.comparison.sample_tables import SAME_SAMPLES_NOTE
+from holdfast.study.evaluation.error_breakdown import Count
 from holdfast.study.evaluation.evaluate_method import (
     EvaluationEffort,
     EvaluationJob,
@@ -46,12 +55,14 @@ def tables(plan: StudyPlan, results: Results) -> list[ResultTable]:
     rows: list[Row] = []
     for name, title in method_titles(plan).items():
         evaluation: MethodEvaluation = results[f"real/{name}"]["recording"]
-        for recording in evaluation.metrics.recordings:
-            rows += _recording_rows(title, recording)
+        for recording, counts in zip(
+            evaluation.metrics.recordings, evaluation.without_estimate, strict=True
+        ):
+            rows += _recording_rows(title, recording, counts)
     rows.sort(key=lambda row: (str(row.keys["recording"]), str(row.keys["finger"])))
-    note = f"Leave one recording out. {CAVEAT}"
+    note = f"Leave one recording out. {SAME_SAMPLES_NOTE} {CAVEAT}"
     lines = ("recording", "finger", "method")
-    digits = {"stable samples": 0, "other samples": 0}
+    digits = {"stable samples": 0, "other samples": 0, WITHOUT_ESTIMATE: 1}
     title = "Real recordings: AUC"
     return [ResultTable("real", title, note, rows, lines, digits=2, digits_of=digits)]
 
@@ -62,8 +73,14 @@ def figures(plan: StudyPlan, results: Results) -> list[ReportFigure]:
     return []
 
 
-def _recording_rows(title: str, recording: RecordingMetrics) -> list[Row]:
-    """Return the rows of the fingers that have both classes."""
+def _recording_rows(title: str, recording: RecordingMetrics, counts: Count) -> list[Row]:
+    """Return the rows of the fingers that have both classes.
+
+    Args:
+        title: of the method.
+        recording: its metrics.
+        counts: labelled samples of all fingers, and those of them without an estimate.
+    """
     rows = []
     for finger, metrics in recording.fingers.items():
         if metrics.auc is None:
@@ -74,6 +91,7 @@ def _recording_rows(title: str, recording: RecordingMetrics) -> list[Row]:
             "AUC contact": metrics.auc_contact,
             "stable samples": sum(metrics.confusion[1]),
             "other samples": sum(metrics.confusion[0]),
+            WITHOUT_ESTIMATE: PERCENT * counts[1] / max(counts[0], 1),
         }
         rows += [Row(keys | {"figure": figure}, value) for figure, value in values.items()]
     return rows
@@ -81,7 +99,8 @@ def _recording_rows(title: str, recording: RecordingMetrics) -> list[Row]:
 
 def _job(plan: StudyPlan, real: Corpus, name: str) -> EvaluationJob:
     effort = EvaluationEffort(folds=min(len(real.recordings), MAX_FOLDS), inner=2)
-    return EvaluationJob(name, real, ("recording",), (), Variation(), effort, plan.seed)
+    compared = compared_methods(plan)
+    return EvaluationJob(name, real, ("recording",), (), Variation(), effort, plan.seed, compared)
 
 
 def _cost(name: str) -> float:

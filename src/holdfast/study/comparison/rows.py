@@ -15,6 +15,7 @@ from holdfast.study.report.result_tables import Key, Row
 Keys = Mapping[str, Key]
 
 PERCENT = 100.0
+WITHOUT_ESTIMATE = "without estimate [%]"
 
 SAMPLE_METRICS = {
     "accuracy [%]": "accuracy",
@@ -53,6 +54,31 @@ def ratio_row(
     ours = float(part.sum() / whole.sum()) if n else None
     interval = bootstrap_interval(ratio_of_sums(part, whole), n, seed=seed) if n else None
     return Row(dict(keys), ours, paper, n, interval)
+
+
+def quotient_row(keys: Keys, base: Array, ours: Array, seed: int) -> Row:
+    """Return the share of errors of a baseline divided by ours; infinite if we have none.
+
+    The interval is paired: a resample draws the same recordings for both.
+
+    Args:
+        keys: of the row.
+        base: (n_recordings, 2) errors, and all samples or events, of the baseline.
+        ours: the same of our method, for the same recordings.
+        seed: of the bootstrap.
+    """
+    counts = np.column_stack([base, ours]).astype(np.float64)
+    counts = counts[(counts[:, 1] > 0) & (counts[:, 3] > 0)]
+
+    def statistic(draws: Array) -> Array:
+        wrong, n, our_wrong, our_n = (draws @ counts).T
+        with np.errstate(divide="ignore", invalid="ignore"):
+            return np.asarray((wrong / n) / (our_wrong / our_n))
+
+    n = len(counts)
+    value = float(statistic(np.ones((1, n)))[0]) if n else None
+    interval = bootstrap_interval(statistic, n, seed=seed)
+    return Row(dict(keys), None if value is None or np.isnan(value) else value, None, n, interval)
 
 
 def quantile_row(keys: Keys, values: Sequence[Sequence[float]], q: float, seed: int) -> Row:
@@ -104,6 +130,18 @@ def sample_rows(
 
 def _has_samples(metrics: SampleMetrics) -> bool:
     return metrics.n > 0
+
+
+def without_estimate_row(keys: Keys, counts: Sequence[tuple[int, int]], seed: int) -> Row:
+    """Return the share of labelled samples without an estimate [%].
+
+    Args:
+        keys: of the row, but for its figure.
+        counts: labelled samples, and those of them without an estimate, of each recording.
+        seed: of the bootstrap.
+    """
+    n, n_without = np.array(counts, dtype=np.float64).reshape(-1, 2).T
+    return ratio_row({**keys, "figure": WITHOUT_ESTIMATE}, n_without, n, seed)
 
 
 def correct_and_all(metrics: Metrics) -> dict[str, tuple[int, int]]:

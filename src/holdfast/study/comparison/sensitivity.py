@@ -14,7 +14,6 @@ from holdfast.metrics.events import POST_DURATIONS
 from holdfast.plots.curves import Curve, draw_lines
 from holdfast.study.comparison.event_tables import FALSE_ALARMS_UNDER_STABLE
 from holdfast.study.comparison.jobs import (
-    QUICK_METHODS,
     SPLIT_TITLES,
     Results,
     evaluation_task,
@@ -30,8 +29,11 @@ from holdfast.study.plan import StudyPlan
 from holdfast.study.report.html_report import ReportFigure
 from holdfast.study.report.result_tables import Key, ResultTable, Row
 from holdfast.study.tasks import Task
+from holdfast.twin.profile import profile, profiles
 
 VARIED_METHODS = ("logreg", "zhang", "trees", "holdfast")
+QUICK_VARIED_METHODS = ("logreg", "holdfast")
+"""Those of them that a quick study varies."""
 SLOW_VARIED_METHODS = ("trees",)
 """Methods that are evaluated at every other value only."""
 NOISE_LEVELS = (0.0, 1.0, 2.0, 4.0, 8.0)
@@ -39,21 +41,21 @@ NOISE_LEVELS = (0.0, 1.0, 2.0, 4.0, 8.0)
 SAMPLE_STEPS = (1, 2, 3, 5)
 """Numbers n of which every n-th sample is kept."""
 MARGINS = (0.0, 0.05, UNSTABLE_MARGIN, 0.2)
-"""Margins of labels [s]. The labels of the twin have `UNSTABLE_MARGIN`."""
+"""Margins of labels [s]."""
 PROFILES = ("recording", "gentle", "vigorous")
 
 NOISE = "noise"
 MARGIN = "margin [s]"
 RATE = "rate [Hz]"
 SAMPLE_FIGURES = ("accuracy [%]", "FDR [%]", "AUC contact")
-SLIPS_FOUND = f"slips found within {1000 * POST_DURATIONS[0]:.0f} ms [%]"
+SLIPS_DETECTED = f"slips detected within {1000 * POST_DURATIONS[0]:.0f} ms [%]"
 ACCURACY_DIFFERENCE = "accuracy less sigma's [points]"
-CURVES = ("accuracy [%]", "AUC contact", SLIPS_FOUND)
+CURVES = ("accuracy [%]", "AUC contact", SLIPS_DETECTED)
 """Figures of the tables that are drawn as curves."""
 NOTE = (
-    "By recording. Slips and false alarms ('in vain'): at the threshold for "
+    "By recording. Slips and false alarms: at the threshold for "
     f"{COMPARED_RATE:g} false alarm per minute under a stable label in training, chosen for each "
-    "value separately."
+    "value separately. A slip without an alarm is missed; a glitch of the controller is an event."
 )
 
 Keys = dict[str, Key]
@@ -111,7 +113,7 @@ def figures(plan: StudyPlan, results: Results) -> list[ReportFigure]:
 
 def varied_methods(plan: StudyPlan) -> list[str]:
     """Return the names of the methods that are evaluated under variations."""
-    names = QUICK_METHODS if plan.quick else VARIED_METHODS
+    names = QUICK_VARIED_METHODS if plan.quick else VARIED_METHODS
     return [name for name in names if name in METHODS]
 
 
@@ -157,15 +159,16 @@ def _steps(plan: StudyPlan) -> tuple[int, ...]:
 def _margins(plan: StudyPlan) -> dict[float, Variation]:
     """Return the variations by margin; none without a truth.
 
-    The recordings have labels with `UNSTABLE_MARGIN` already.
+    The margin that the labels of the recordings have already is no variation.
     """
-    truth = plan.main.load()[0].truth
-    if truth is None or "phase" not in truth.hand:
+    first = plan.main.load()[0]
+    if first.truth is None or "phase" not in first.truth.hand:
         return {}
+    known = str(first.metadata.get("profile"))
+    own = profile(known).label_margin if known in profiles() else UNSTABLE_MARGIN
     margins = (0.0, UNSTABLE_MARGIN) if plan.quick else MARGINS
     return {
-        margin: Variation() if margin == UNSTABLE_MARGIN else Variation(margin=margin)
-        for margin in margins
+        margin: Variation() if margin == own else Variation(margin=margin) for margin in margins
     }
 
 
@@ -195,7 +198,10 @@ def _job(plan: StudyPlan, method: str, variation: Variation) -> EvaluationJob:
     if method in METHODS and variation == Variation():
         return method_job(plan, method)
     effort = method_effort(plan, method)
-    return EvaluationJob(method, plan.main, ("recording",), (), variation, effort, plan.seed)
+    compared = tuple(varied_methods(plan)) if method in METHODS else tuple(CUTS)
+    return EvaluationJob(
+        method, plan.main, ("recording",), (), variation, effort, plan.seed, compared
+    )
 
 
 def _sweep_table(plan: StudyPlan, results: Results, sweep: Sweep) -> ResultTable:
@@ -255,11 +261,11 @@ def _sigma_energy_table(plan: StudyPlan, results: Results) -> ResultTable:
 
 def _rows(keys: Keys, evaluation: MethodEvaluation, seed: int) -> Iterator[Row]:
     yield from sample_rows(keys, evaluation.metrics, SAMPLE_FIGURES)
-    alarms = evaluation.compared_alarms
+    alarms = evaluation.alarms.compared
     n_slips = [len(each.slip_delays) for each in alarms]
     if sum(n_slips):
         found = [each.n_slips_found(POST_DURATIONS[0]) for each in alarms]
-        yield ratio_row(keys | {"figure": SLIPS_FOUND}, found, n_slips, seed)
+        yield ratio_row(keys | {"figure": SLIPS_DETECTED}, found, n_slips, seed)
     minutes = [each.stable_seconds / 60 for each in alarms]
     n_false = [each.n_under_stable for each in alarms]
     figure = keys | {"figure": FALSE_ALARMS_UNDER_STABLE}

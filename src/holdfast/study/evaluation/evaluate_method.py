@@ -14,15 +14,16 @@ import numpy as np
 import numpy.typing as npt
 
 from holdfast.contact import STABLE, UNKNOWN
-from holdfast.metrics import Decisions, Metrics, summarise
+from holdfast.metrics import Decisions, FingerDecisions, Metrics, summarise
 from holdfast.metrics.masks import Mask
 from holdfast.study.evaluation.alarm_statistics import (
     AlarmStatistics,
     alarm_statistics,
-    find_slips,
-    is_after_jump,
+    near_glitch,
 )
+from holdfast.study.evaluation.common_samples import find_method, longest_warm_up
 from holdfast.study.evaluation.error_breakdown import (
+    Count,
     ErrorBreakdown,
     break_down_errors,
     calibration_counts,
@@ -33,12 +34,13 @@ from holdfast.study.evaluation.fitted_method import (
     TrainingSamples,
     gather_training_samples,
 )
+from holdfast.study.evaluation.glitch_readings import EVENT, READINGS, labels_by_reading
 from holdfast.study.evaluation.recording_features import RecordingFeatures, corpus_features
 from holdfast.study.evaluation.scores import RecordingScores
+from holdfast.study.evaluation.slips import GlitchCount, Slip, count_glitches, find_slips
 from holdfast.study.evaluation.thresholds import FalseAlarmRanges, threshold_shift
 from holdfast.study.evaluation.variation import Variation
-from holdfast.study.methods import HAND, METHODS, Method
-from holdfast.study.methods.wavelets import CUTS
+from holdfast.study.methods import HAND, Method
 from holdfast.study.plan import Corpus
 from holdfast.training.splits import RANDOM_FOLDS
 
@@ -82,6 +84,7 @@ class EvaluationJob(msgspec.Struct, frozen=True):
         variation: of the recordings of all corpora.
         effort: size of the evaluation.
         seed: of all random numbers.
+        compared: names of the methods that must have an estimate too where this one is scored.
     """
 
     method: str
@@ -91,6 +94,31 @@ class EvaluationJob(msgspec.Struct, frozen=True):
     variation: Variation = Variation()
     effort: EvaluationEffort = EvaluationEffort()
     seed: int = 0
+    compared: tuple[str, ...] = ()
+
+    @property
+    def warm_up(self) -> float:
+        """Time at the start of every stretch that is not scored [s]."""
+        return longest_warm_up(self.compared, self.train.rate / self.variation.every)
+
+
+class ReadingAlarms(msgspec.Struct, frozen=True):
+    """Alarms of the hand under one reading of glitches. Lists have one entry per recording.
+
+    Attributes:
+        own: at the method's own threshold.
+        held: the same, with decisions held for `HOLD_TIME`.
+        by_rate: the same, held, at the threshold chosen for each of `FALSE_ALARM_RATES`.
+    """
+
+    own: list[AlarmStatistics]
+    held: list[AlarmStatistics]
+    by_rate: list[list[AlarmStatistics]]
+
+    @property
+    def compared(self) -> list[AlarmStatistics]:
+        """Alarms at the threshold at which methods are compared."""
+        return self.by_rate[FALSE_ALARM_RATES.index(COMPARED_RATE)]
 
 
 class MethodEvaluation(msgspec.Struct, frozen=True):
@@ -100,11 +128,11 @@ class MethodEvaluation(msgspec.Struct, frozen=True):
         names: of the evaluated recordings.
         fingers: metrics by sample at the method's own threshold; None for a whole-hand method.
         hand: the same for the hand.
-        alarms: of the hand, by exact labels, at the method's own threshold.
-        held_alarms: the same, with decisions held for `HOLD_TIME`.
-        alarms_by_rate: the same, held, at the threshold chosen for each of `FALSE_ALARM_RATES`.
-        alarms_without_jumps: the same, held, at the threshold chosen for `COMPARED_RATE` when
-            alarms right after a jump of the controller's set point are not counted.
+        without_estimate: labelled samples of what the method decides for, and those of them
+            that have no estimate; before the samples are restricted to those of all methods.
+        hand_without_estimate: the same for the hand.
+        readings: alarms of the hand, by exact labels, for each of `READINGS`.
+        glitches: of the hand's controller.
         breakdown: of the errors at the method's own threshold.
         calibration: (10, 3) sum of probabilities, stable samples and all samples of each bin.
     """
@@ -112,10 +140,10 @@ class MethodEvaluation(msgspec.Struct, frozen=True):
     names: list[str]
     fingers: Metrics | None
     hand: Metrics
-    alarms: list[AlarmStatistics]
-    held_alarms: list[AlarmStatistics]
-    alarms_by_rate: list[list[AlarmStatistics]]
-    alarms_without_jumps: list[AlarmStatistics]
+    without_estimate: list[Count]
+    hand_without_estimate: list[Count]
+    readings: dict[str, ReadingAlarms]
+    glitches: list[GlitchCount]
     breakdown: list[ErrorBreakdown]
     calibration: list[list[list[float]]]
 
@@ -125,9 +153,9 @@ class MethodEvaluation(msgspec.Struct, frozen=True):
         return self.fingers or self.hand
 
     @property
-    def compared_alarms(self) -> list[AlarmStatistics]:
-        """Alarms at the threshold at which methods are compared."""
-        return self.alarms_by_rate[FALSE_ALARM_RATES.index(COMPARED_RATE)]
+    def alarms(self) -> ReadingAlarms:
+        """Alarms in the paper's reading: a glitch is an event."""
+        return self.readings[EVENT]
 
 
 class FittedFold(NamedTuple):
@@ -135,12 +163,11 @@ class FittedFold(NamedTuple):
 
     Attributes:
         fitted: to all training recordings.
-        shifts: of the threshold for each of `FALSE_ALARM_RATES`, then the one for
-            `COMPARED_RATE` without alarms after jumps.
+        shifts: of the threshold for each of `FALSE_ALARM_RATES`, for each of `READINGS`.
     """
 
     fitted: FittedMethod
-    shifts: Sequence[float]
+    shifts: Mapping[str, Sequence[float]]
 
 
 class ScoredRecording(NamedTuple):
@@ -148,7 +175,7 @@ class ScoredRecording(NamedTuple):
 
     recording: RecordingFeatures
     scores: RecordingScores
-    shifts: Sequence[float]
+    shifts: Mapping[str, Sequence[float]]
 
 
 def evaluate_method(job: EvaluationJob) -> dict[str, MethodEvaluation]:
@@ -168,7 +195,7 @@ def evaluate_method(job: EvaluationJob) -> dict[str, MethodEvaluation]:
 def score_splits(job: EvaluationJob) -> Iterator[tuple[str, list[ScoredRecording]]]:
     """Yield the scored recordings of each split and of each other corpus, in order."""
     method = find_method(job.method)
-    recordings = corpus_features(method, job.train, job.variation, job.effort.stride)
+    recordings = _corpus_features(job, method, job.train)
     training = gather_training_samples(recordings, job.effort.max_samples)
     everything = frozenset(range(len(recordings)))
     for split in job.splits:
@@ -180,13 +207,12 @@ def score_splits(job: EvaluationJob) -> Iterator[tuple[str, list[ScoredRecording
     if job.tests:
         fold = _fit_fold(job, method, training, recordings, everything)
         for corpus in job.tests:
-            tested = corpus_features(method, corpus, job.variation, job.effort.stride)
+            tested = _corpus_features(job, method, corpus)
             yield corpus.name, [_score(fold, recording) for recording in tested]
 
 
-def find_method(name: str) -> Method:
-    """Return the method of that name, of `METHODS` or of `CUTS`."""
-    return METHODS[name] if name in METHODS else CUTS[name]
+def _corpus_features(job: EvaluationJob, method: Method, corpus: Corpus) -> list[RecordingFeatures]:
+    return corpus_features(method, corpus, job.variation, job.effort.stride, job.warm_up)
 
 
 def held_out_folds(
@@ -237,7 +263,7 @@ def _fit_fold(
     objects = [training.objects[place] for place in ordered]
     n_inner = min(job.effort.inner, len(ordered))
     folds = held_out_folds(objects, "recording", n_inner, job.seed + 1) if n_inner > 1 else ()
-    ranges: list[tuple[FalseAlarmRanges, FalseAlarmRanges]] = []
+    ranges: list[dict[str, FalseAlarmRanges]] = []
     for fold in folds:
         held = {ordered[k] for k in fold}
         fitted = FittedMethod.fit(method, training, places - held, job.seed)
@@ -247,20 +273,27 @@ def _fit_fold(
 
 def _false_alarm_ranges(
     fitted: FittedMethod, recording: RecordingFeatures
-) -> tuple[FalseAlarmRanges, FalseAlarmRanges]:
-    """Return the ranges of all false alarms, and of those that no jump explains."""
+) -> dict[str, FalseAlarmRanges]:
+    """Return the ranges of the false alarms for each reading of glitches."""
     scores = fitted.scores(recording).hand(recording).hold(HOLD_TIME)
-    labels = recording.hand_labels(recording.exact_labels).labels
-    after_jump = is_after_jump(scores.times, recording.truth)
-    return FalseAlarmRanges.of(scores, labels), FalseAlarmRanges.of(scores, labels, after_jump)
+    return {
+        reading: FalseAlarmRanges.of(
+            scores,
+            hand.labels,
+            near_glitch(scores.times, hand.glitch) if hand.without_glitches else None,
+        )
+        for reading, hand in labels_by_reading(recording).items()
+    }
 
 
-def _shifts(ranges: Sequence[tuple[FalseAlarmRanges, FalseAlarmRanges]]) -> list[float]:
+def _shifts(ranges: Sequence[Mapping[str, FalseAlarmRanges]]) -> dict[str, list[float]]:
     if not ranges:
-        return [0.0] * (len(FALSE_ALARM_RATES) + 1)
-    every, without_jumps = zip(*ranges, strict=True)
-    shifts = [threshold_shift(every, rate) for rate in FALSE_ALARM_RATES]
-    return [*shifts, threshold_shift(without_jumps, COMPARED_RATE)]
+        return {reading: [0.0] * len(FALSE_ALARM_RATES) for reading in READINGS}
+    return {
+        reading: [threshold_shift([each[reading] for each in ranges], rate)
+                  for rate in FALSE_ALARM_RATES]
+        for reading in READINGS
+    }  # fmt: skip
 
 
 def _score(fold: FittedFold, recording: RecordingFeatures) -> ScoredRecording:
@@ -271,32 +304,68 @@ def _score(fold: FittedFold, recording: RecordingFeatures) -> ScoredRecording:
 
 def summarise_recordings(scored: Sequence[ScoredRecording]) -> MethodEvaluation:
     """Return the results of a method on scored recordings."""
-    decisions = [each.scores.decide(each.recording, each.recording.labels) for each in scored]
-    alarms = [list(_alarms(each)) for each in scored]
+    decisions = [
+        each.scores.decide(each.recording, each.recording.scored_labels) for each in scored
+    ]
+    every = [each.scores.decide(each.recording, each.recording.labels) for each in scored]
+    alarms = [_alarms(each) for each in scored]
     pairs = zip(scored, decisions, strict=True)
     return MethodEvaluation(
         names=[each.recording.name for each in scored],
         fingers=summarise(decisions) if any(each.fingers for each in decisions) else None,
         hand=summarise(_hands(decisions)),
-        alarms=[each[0] for each in alarms],
-        held_alarms=[each[1] for each in alarms],
-        alarms_by_rate=[[each[2 + k] for each in alarms] for k in range(len(FALSE_ALARM_RATES))],
-        alarms_without_jumps=[each[-1] for each in alarms],
+        without_estimate=[_n_without_estimate(decided_units(each).values()) for each in every],
+        hand_without_estimate=[_n_without_estimate([each.hand]) for each in every],
+        readings={reading: _pooled([each[reading] for each in alarms]) for reading in READINGS},
+        glitches=[count_glitches(each.recording.truth) for each in scored],
         breakdown=[break_down_errors(each.recording.truth, decided) for each, decided in pairs],
         calibration=[calibration_counts(each) for each in decisions],
     )
 
 
-def _alarms(scored: ScoredRecording) -> Iterator[AlarmStatistics]:
-    """Yield the alarms at the own threshold; held at it; held at each chosen threshold."""
+def _n_without_estimate(units: Iterable[FingerDecisions | None]) -> Count:
+    """Return the number of labelled samples, and of those of them without an estimate."""
+    n = n_without = 0
+    for unit in units:
+        if unit is not None:
+            labelled = unit.labels != UNKNOWN
+            n += int(labelled.sum())
+            n_without += int((labelled & (unit.states == UNKNOWN)).sum())
+    return n, n_without
+
+
+def _alarms(scored: ScoredRecording) -> dict[str, list[AlarmStatistics]]:
+    """Return the alarms for each reading: at the own threshold, held at it, at each chosen one."""
     recording = scored.recording
     scores = scored.scores.hand(recording)
-    labels = recording.hand_labels(recording.exact_labels).labels
-    slips = find_slips(recording.truth)
-    yield alarm_statistics(scores.decide(labels), recording.truth, slips)
     held = scores.hold(HOLD_TIME)
-    for shift in (0.0, *scored.shifts):
-        yield alarm_statistics(held.decide(labels, shift), recording.truth, slips)
+    slips = [slip for slip in find_slips(recording.truth) if _is_scored(slip, recording)]
+    found = {}
+    for reading, hand in labels_by_reading(recording).items():
+        decided = [scores.decide(hand.labels)]
+        decided += [held.decide(hand.labels, s) for s in (0.0, *scored.shifts[reading])]
+        left_out = hand.without_glitches
+        found[reading] = [
+            alarm_statistics(each, slips, hand.glitch, without_glitches=left_out)
+            for each in decided
+        ]
+    return found
+
+
+def _is_scored(slip: Slip, recording: RecordingFeatures) -> bool:
+    """Return whether all compared methods can have an estimate of the hand at the onset."""
+    hand = recording.hand_labels(recording.exact_labels)
+    place = int(np.searchsorted(hand.times, slip.onset + 1e-6)) - 1
+    return place >= 0 and bool(hand.labels[place] != UNKNOWN)
+
+
+def _pooled(alarms: Sequence[Sequence[AlarmStatistics]]) -> ReadingAlarms:
+    """Return the alarms of all recordings, by threshold."""
+    return ReadingAlarms(
+        own=[each[0] for each in alarms],
+        held=[each[1] for each in alarms],
+        by_rate=[[each[2 + k] for each in alarms] for k in range(len(FALSE_ALARM_RATES))],
+    )
 
 
 def _hands(decisions: Iterable[Decisions]) -> Iterator[Decisions]:
@@ -316,7 +385,7 @@ def evaluate_pooled(job: EvaluationJob) -> list[list[int]]:
         job: gives the method, the training corpus, the variation, the effort and the seed.
     """
     method = find_method(job.method)
-    recordings = corpus_features(method, job.train, job.variation, job.effort.stride)
+    recordings = _corpus_features(job, method, job.train)
     generator = np.random.default_rng(job.seed)
     folds = [
         {
@@ -337,7 +406,7 @@ def evaluate_pooled(job: EvaluationJob) -> list[list[int]]:
             tested = _with_features_of(
                 recording, {unit: each == fold for unit, each in own.items()}
             )
-            counts[place] += _confusion(fitted.scores(tested).decide(tested, tested.labels))
+            counts[place] += _confusion(fitted.scores(tested).decide(tested, tested.scored_labels))
     return [[int(n) for n in row] for row in counts]
 
 

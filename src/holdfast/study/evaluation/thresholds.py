@@ -17,6 +17,7 @@ from holdfast.metrics.events import EARLY_TOLERANCE, LATE_TOLERANCE, TIME_TOLERA
 from holdfast.metrics.masks import Mask
 from holdfast.sensors.types import Array
 from holdfast.study.evaluation.scores import HandScores
+from holdfast.study.evaluation.slips import sample_durations
 
 
 class FalseAlarmRanges(NamedTuple):
@@ -40,7 +41,7 @@ class FalseAlarmRanges(NamedTuple):
         Args:
             scores: of the hand.
             labels: (n,) label codes of the hand.
-            ignored: (n,) samples at which an alarm is not counted.
+            ignored: (n,) samples at which neither an alarm nor the time is counted.
         """
         match = match_alarms(scores.times, labels, labels)
         counted = labels == STABLE
@@ -48,13 +49,15 @@ class FalseAlarmRanges(NamedTuple):
             counted &= (scores.times < event.onset - EARLY_TOLERANCE - TIME_TOLERANCE) | (
                 scores.times > event.end + LATE_TOLERANCE + TIME_TOLERANCE
             )
+        seconds = match.stable_seconds
         if ignored is not None:
             counted &= ~ignored
+            seconds -= float(sample_durations(scores.times)[(labels == STABLE) & ignored].sum())
         lost = scores.known & ~scores.held
         after = np.where(lost, -np.inf, scores.margin)
         before = np.where(scores.known & scores.held, scores.margin, -np.inf)
         rows = np.flatnonzero(counted[1:] & (before[:-1] > after[1:]))
-        return cls(after[rows + 1], before[rows], match.stable_seconds / 60)
+        return cls(after[rows + 1], before[rows], seconds / 60)
 
 
 def threshold_shift(ranges: Sequence[FalseAlarmRanges], per_minute: float) -> float:

@@ -12,13 +12,26 @@ from holdfast.study.methods.method import (
     stretchwise,
 )
 from holdfast.study.methods.vibration import SLIP_SERVO, SPECTRUM
-from holdfast.study.methods.wavelets import LOGREG, SVM, TREES, ZHANG
+from holdfast.study.methods.wavelets import (
+    ENERGY,
+    LOG_TWO,
+    LOGREG,
+    LOGREG_UNWEIGHTED,
+    SVM,
+    SVM_UNWEIGHTED,
+    TREES,
+    ZHANG,
+)
 
 METHODS: dict[str, Method] = {
     each.name: each
     for each in (
         LOGREG,
+        LOGREG_UNWEIGHTED,
         SVM,
+        SVM_UNWEIGHTED,
+        LOG_TWO,
+        ENERGY,
         HOLDFAST,
         ZHANG,
         FRICTION,
@@ -34,9 +47,13 @@ METHODS: dict[str, Method] = {
 }
 """All methods by name, in the order of the tables."""
 
+PAPER_FAMILY = tuple(name for name, each in METHODS.items() if each.category == "paper")
+"""Names of the paper's method and of its variants. Ours is compared with the best of them."""
+
 __all__ = [
     "HAND",
     "METHODS",
+    "PAPER_FAMILY",
     "FingerSignal",
     "HandSignal",
     "Method",

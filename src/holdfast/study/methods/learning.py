@@ -30,14 +30,22 @@ SHEAR_WINDOW = 10
 """Samples in the window of the AnySkin features."""
 
 JAMES_LEPORA_SOURCE = (
-    "James & Lepora 2020 (arXiv 2010.01928), by its abstract: differences of taxel readings in "
-    "place of those of the pins of optical fingertips; classifiers and training are the paper's"
+    "James & Lepora 2020 (arXiv 2010.01928). Of the publication only the abstract could be read. "
+    "So this is a port of its idea, the motion of the pins of an optical fingertip between two "
+    "images: magnitude and direction of the change of the shear of every taxel over 1/60 s, and "
+    "their spread over the fingertip. The features and the time between two images are our own "
+    "choice; classifiers and training are the paper's"
 )
+MOTION_STEP = 1 / 60
+"""Time over which a motion of taxels is measured [s]: between two images of a usual camera."""
+SUMMARY_FEATURES = 6
+"""Features of the motion of a whole fingertip, see `taxel_motion`."""
 
 GROVER_SOURCE = (
     "Grover et al. 2022, by the released configuration: the network and its "
-    "training, but the three axes of the fingertip force in place of six barometers, no "
-    "augmentation, and few epochs"
+    "training, but the three axes of the fingertip force in place of six barometers, and no "
+    "augmentation. Training ends when the loss of a fifth of the training recordings, which are "
+    "held out, has not fallen for 15 epochs"
 )
 N_STEPS = 100
 """Time steps of the network's window."""
@@ -82,17 +90,24 @@ def _sum_of_deviations(windows: Array) -> Array:
     return np.asarray(windows.std(axis=-1).sum(axis=(1, 2))[:, None])
 
 
-def taxel_differences(hand: HandSignal) -> dict[str, Array]:
-    """Return x_k - x_(k-1) of every taxel and axis of every finger, (n, 3 n_taxels).
+def taxel_motion(hand: HandSignal) -> dict[str, Array]:
+    """Return magnitudes and directions of the motion of the taxels of every finger.
 
-    NaN at the start of a stretch. James & Lepora use optical sensors and the differences of the
-    positions of their pins; here they are differences of taxel readings.
+    The motion of a taxel is the change of its two tangential readings over `MOTION_STEP`. James
+    & Lepora use optical sensors and the motion of their pins; here the shear of a taxel stands
+    for the displacement of a pin.
+
+    Returns:
+        (n, 6 + n_taxels): mean and standard deviation of the magnitudes over the fingertip;
+        magnitude of the mean motion; its direction, as cosine and sine; the circular spread of
+        the directions from 0 (all alike) to 1; then the magnitude of every taxel. Magnitudes
+        are in the unit of the readings. NaN until `MOTION_STEP` after the start of a stretch.
     """
-    return stretchwise(hand, _taxel_differences)
+    return stretchwise(hand, _motion_of_finger)
 
 
-def hand_differences(hand: HandSignal) -> dict[str, Array]:
-    """Return the taxel differences of all fingers side by side, at the times of the first.
+def hand_motion(hand: HandSignal) -> dict[str, Array]:
+    """Return the taxel motions of all fingers side by side, at the times of the first.
 
     Another finger contributes its last sample that is not later. If that is more than three
     sample periods old, its values are NaN.
@@ -109,14 +124,44 @@ def hand_differences(hand: HandSignal) -> dict[str, Array]:
     max_age = GAP_LIMIT_PERIODS / hand.rate
     parts = [
         _latest_rows(hand.fingers[name].times, rows, times, max_age)
-        for name, rows in taxel_differences(hand).items()
+        for name, rows in taxel_motion(hand).items()
     ]
     return {HAND: np.hstack(parts)}
 
 
-def _taxel_differences(finger: FingerSignal) -> Array:
-    flat = finger.readings.reshape(len(finger.times), 3 * finger.sensor.n_taxels)
-    return np.diff(flat, axis=0, prepend=np.full((1, flat.shape[1]), np.nan))
+def _motion_of_finger(finger: FingerSignal) -> Array:
+    n_samples = max(1, round(MOTION_STEP * finger.rate))
+    found = np.full((len(finger.times), SUMMARY_FEATURES + finger.sensor.n_taxels), np.nan)
+    shear = finger.readings[:, :, :2]
+    if len(shear) > n_samples:
+        found[n_samples:] = motion_features(shear[n_samples:] - shear[:-n_samples])
+    return found
+
+
+def motion_features(motion: Array) -> Array:
+    """Return the features of (n, n_taxels, 2) motions, see `taxel_motion`.
+
+    The circular spread is 1 - R, where R is the length of the mean of the unit vectors of the
+    directions. A taxel that does not move has no direction; if none moves, the spread is 1.
+
+    Example:
+        >>> motion_features(np.array([[[3.0, 4.0], [3.0, 4.0]]])).round(2).tolist()
+        [[5.0, 0.0, 5.0, 0.6, 0.8, 0.0, 5.0, 5.0]]
+    """
+    magnitudes = np.linalg.norm(motion, axis=2)
+    mean_motion = motion.mean(axis=1)
+    common = np.linalg.norm(mean_motion, axis=1)
+    direction = _unit(mean_motion, common)
+    units = _unit(motion, magnitudes)
+    n_moving = np.maximum((magnitudes > 0).sum(axis=1), 1)
+    spread = 1.0 - np.linalg.norm(units.sum(axis=1), axis=1) / n_moving
+    summary = [magnitudes.mean(axis=1), magnitudes.std(axis=1), common, *direction.T, spread]
+    return np.column_stack([*summary, magnitudes])
+
+
+def _unit(vectors: Array, lengths: Array) -> Array:
+    """Return vectors of length 1; 0 for a vector of length 0."""
+    return vectors / np.where(lengths > 0, lengths, 1.0)[..., None]
 
 
 def _latest_rows(source: Array, rows: Array, times: Array, max_age: float) -> Array:
@@ -154,7 +199,7 @@ def _james_lepora(scope: str, classifier: str, title: str) -> Method:
         f"{title}, {scope} (James & Lepora)",
         "learning",
         JAMES_LEPORA_SOURCE,
-        hand_differences if scope == "global" else taxel_differences,
+        hand_motion if scope == "global" else taxel_motion,
         recipe(classifier),
         whole_hand=scope == "global",
     )

@@ -1,6 +1,9 @@
 """Methods on the details of the Haar window: the paper's own, Zhang's and single features.
 
-- `LOGREG`, `SVM`: the paper's method, a linear classifier of the force and of sigma.
+- `LOGREG`, `SVM`: the paper's method, a linear classifier of the force and of sigma, with
+  balanced classes; `LOGREG_UNWEIGHTED`, `SVM_UNWEIGHTED`: without class weights.
+- `LOG_TWO`: the same idea with two features, log F_a and log sigma.
+- `ENERGY`: a threshold on the energy of the details of F_a, without their mean taken out.
 - `TREES`: boosted trees on the paper's six features, as an upper limit of what they hold.
 - `ZHANG`: the energy of the details of the normal force.
 - `CUTS`: one feature and one threshold, sigma against energies.
@@ -25,6 +28,17 @@ from holdfast.study.methods.method import (
 )
 
 PAPER_SOURCE = "Kitouni, Khoramshahi and Perdereau: the deployed features, without m, at N_w = 14"
+UNWEIGHTED_SOURCE = (
+    f"{PAPER_SOURCE}; classes are not weighted, as in the toolbox that the paper used"
+)
+LOG_TWO_SOURCE = (
+    "no paper: the two quantities of Kitouni et al., F_a and sigma at N_w = 14, on logarithmic "
+    "scales, by logistic regression with balanced classes"
+)
+ENERGY_SOURCE = (
+    "the rival of sigma in Kitouni et al.: sum d^2 of the Haar details of F_a at N_w = 14, whose "
+    "mean is not taken out, and the exact best threshold"
+)
 TREES_SOURCE = (
     f"no paper: all six features of Kitouni et al. at N_w = {DEFAULT_WINDOW}, without a linear rule"
 )
@@ -123,16 +137,39 @@ def _six_features(hand: HandSignal) -> Mapping[str, Array]:
     return paper_features(hand, FEATURE_NAMES)
 
 
+def _log_force_and_sigma(hand: HandSignal) -> Mapping[str, Array]:
+    """Return log10 of F_a and of sigma of every finger, (n, 2)."""
+    return {
+        name: np.log10(np.maximum(rows, MIN_LOG_ARGUMENT))
+        for name, rows in paper_features(hand, ("F_a", "sigma")).items()
+    }
+
+
 def _normal_energy(hand: HandSignal) -> Mapping[str, Array]:
     return normal_energy(hand)
 
 
+UNWEIGHTED = {"C": 1.0, "class_weight": None}
+"""Parameters of a classifier whose classes are not weighted."""
+
 LOGREG = Method(
     "logreg", "LogReg (the paper)", "paper", PAPER_SOURCE, _deployed_features, recipe("logreg")
 )
+LOGREG_UNWEIGHTED = Method(
+    "logreg_unweighted", "LogReg, classes unweighted (the paper)", "paper", UNWEIGHTED_SOURCE,
+    _deployed_features, recipe("logreg"), UNWEIGHTED,
+)  # fmt: skip
 SVM = Method(
     "svm", "Linear SVM (the paper)", "paper", PAPER_SOURCE, _deployed_features, recipe("svm")
 )
+SVM_UNWEIGHTED = Method(
+    "svm_unweighted", "Linear SVM, classes unweighted (the paper)", "paper", UNWEIGHTED_SOURCE,
+    _deployed_features, recipe("svm"), UNWEIGHTED,
+)  # fmt: skip
+LOG_TWO = Method(
+    "log_two", "LogReg of log F_a and log sigma", "paper", LOG_TWO_SOURCE,
+    _log_force_and_sigma, recipe("logreg"),
+)  # fmt: skip
 TREES = Method(
     "trees", "Boosted trees, 6 features", "learning", TREES_SOURCE, _six_features,
     GradientBoosting(),
@@ -165,6 +202,10 @@ def _log_feature(
     )
 
 
+ENERGY = Method(
+    "energy", "Haar energy of F_a", "paper", ENERGY_SOURCE,
+    partial(_log_feature, _amplitude, detail_energy), Threshold("below"),
+)  # fmt: skip
 CUTS = {
     name: Method(
         name,
