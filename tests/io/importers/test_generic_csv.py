@@ -88,7 +88,8 @@ def test_the_sensor_can_be_given(tmp_path):
             ["# sensor: anyskin"],
             ["time", *ONE, "label", "cause"],
             [0, *[1] * 15, "unstable", "wind"],
-            "row 3: cause 'wind' given; closing, disturbance, slip, lost, released, glitch are known",
+            "row 3: cause 'wind' given; closing, disturbance, slip, lost, released, glitch are "
+            "known",
         ),
         (
             ["# sensor: anyskin"],
