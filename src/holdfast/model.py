@@ -36,6 +36,8 @@ class FingerModel(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_on
         contact_threshold: F_a below it is no contact [unit of the readings]; None for none.
         contact_noise: the same as a multiple of the noise during the tare, used if
             `contact_threshold` is None.
+        contact_load: threshold of contact on the load, as a multiple of the noise of the stream,
+            for relative features; used instead of the others if it is given.
 
     Raises:
         ModelError: the fields contradict each other.
@@ -46,14 +48,17 @@ class FingerModel(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_on
     sensor: str | None = None
     contact_threshold: float | None = None
     contact_noise: float | None = None
+    contact_load: float | None = None
 
     def __post_init__(self) -> None:
+        if self.contact_load is not None and not any(spec.seconds for spec in self.features):
+            raise ModelError("contact_load given; it needs at least one relative feature")
         if len(self.features) != self.classifier.n_features:
             raise ModelError(
                 f"{len(self.features)} features given, the classifier expects "
                 f"{self.classifier.n_features}"
             )
-        for value in (self.contact_threshold, self.contact_noise):
+        for value in (self.contact_threshold, self.contact_noise, self.contact_load):
             if value is not None and not (math.isfinite(value) and value >= 0):
                 raise ModelError(f"a contact threshold of at least 0 expected, {value} given")
 

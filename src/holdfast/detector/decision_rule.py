@@ -16,6 +16,7 @@ from holdfast.features.arrays import (
     FAULTS,
     MEAN,
     NOISE,
+    NOISE_NOW,
     READY,
     REASON,
     SIGMA,
@@ -29,6 +30,7 @@ from holdfast.features.arrays import (
     Memory,
     Output,
 )
+from holdfast.features.arrays import LOAD as MOTION_LOAD
 from holdfast.features.faults import TARE_DRIFT
 from holdfast.features.stream import StreamPlan
 from holdfast.model import ANY_FINGER, Model
@@ -45,7 +47,8 @@ _is_held = compiled(contact.is_held)
 # Columns of DecisionRule.limits.
 THRESHOLD = 0  # of the probability
 CONTACT, CONTACT_NOISE = 1, 2  # of F_a: absolute, and as a multiple of the noise; NaN for none
-LIMITS_WIDTH = 3
+CONTACT_LOAD = 3  # of the load, as a multiple of its noise; NaN for none
+LIMITS_WIDTH = 4
 
 # Columns of DecisionMemory.codes.
 STATE = 0  # the state that is reported, as a code of holdfast.contact
@@ -64,6 +67,8 @@ DECIDED_WIDTH = 5
 
 DRIFT_SECONDS = 1.0
 """A touch brings F_a over the threshold of contact in less time than this; a drift does not [s]."""
+CONTACT_RELEASE_RATIO = 0.7
+"""Share of the threshold of contact on the load below which a contact ends."""
 CALM_RATIO = 3.0
 """A finger is calm while sigma is at most this many times the sigma of noise alone."""
 
@@ -121,7 +126,13 @@ def rule_of(model: Model, plan: StreamPlan) -> DecisionRule:
     for row, part in zip(weights, parts, strict=True):
         row[: part.classifier.n_features + 1] = part.classifier.weights()
     limits = [
-        (part.classifier.threshold, part.contact_threshold, part.contact_noise) for part in parts
+        (
+            part.classifier.threshold,
+            part.contact_threshold,
+            part.contact_noise,
+            part.contact_load,
+        )
+        for part in parts
     ]
     any_finger = ANY_FINGER in model.fingers
     return DecisionRule(
@@ -172,7 +183,8 @@ def step(
         noise, values = memory.levels[finger, NOISE], output.values[finger]
         threshold = _contact_threshold(noise, rule.limits[finger])
         ready = output.status[finger, REASON] == READY
-        if ready and present[finger]:
+        by_load = not math.isnan(rule.limits[finger, CONTACT_LOAD])
+        if ready and present[finger] and not by_load:
             quiet = kernel.noise_sigma(noise, layout.windows[finger, SIGMA_WINDOW])
             if _has_drifted(values, codes, decided, threshold, quiet, time, layout.period):
                 output.status[finger, REASON] = FAULT
@@ -182,7 +194,11 @@ def step(
             codes[STATE] = codes[CANDIDATE] = UNKNOWN
             decided[PROBABILITY] = decided[LAST_UNSTABLE] = math.nan
         elif present[finger]:
-            if values[AMPLITUDE] < threshold:
+            if by_load and _is_unloaded(memory.motion[finger], rule.limits[finger], codes[STATE]):
+                weights = rule.weights[finger, : rule.n_weights[finger]]
+                decided[PROBABILITY] = linear_probability(output.features[finger], weights)
+                state = NO_CONTACT
+            elif values[AMPLITUDE] < threshold:
                 decided[PROBABILITY] = 0.0
                 state = NO_CONTACT
             else:
@@ -238,6 +254,15 @@ def _contact_threshold(noise: float, limits: Array) -> float:
     if math.isnan(limits[CONTACT]):
         return float(limits[CONTACT_NOISE] * noise)
     return float(limits[CONTACT])
+
+
+@compiled
+def _is_unloaded(motion: Array, limits: Array, reported: int) -> bool:
+    """Return whether the load is below its threshold, which is lower while in contact."""
+    threshold = limits[CONTACT_LOAD] * motion[NOISE_NOW]
+    if reported in (STABLE, UNSTABLE):
+        threshold *= CONTACT_RELEASE_RATIO
+    return bool(motion[MOTION_LOAD] < threshold)
 
 
 @compiled

@@ -67,8 +67,9 @@ class StepArrays(NamedTuple):
             [layout.tare_seconds, layout.period, rule.hysteresis, rule.min_duration, rule.hold]
         )
         arrays = [
-            integers, floats, *layout[:7], *self.memory, *self.output, *rule[:3], *self.decision,
-            self.readings, self.present, self.report,
+            integers, floats, *layout[:7], *self.memory[:7], *self.output, *rule[:3],
+            *self.decision, self.readings, self.present, self.report, *layout[11:],
+            *self.memory[7:],
         ]  # fmt: skip
         return table_of(arrays), arrays
 
@@ -157,11 +158,12 @@ def fast_step(table: Integers, time: float) -> int:
     layout = Layout(
         integers1(table, 2), floats3(table, 3), floats2(table, 4), integers3(table, 5),
         floats2(table, 6), integers2(table, 7), flags1(table, 8), kind[2] != 0, kind[0],
-        numbers[0], numbers[1],
+        numbers[0], numbers[1], integers1(table, 27), floats2(table, 28), floats2(table, 29),
     )  # fmt: skip
     memory = Memory(
         floats2(table, 9), floats2(table, 10), floats2(table, 11), floats3(table, 12),
-        integers2(table, 13), floats2(table, 14), floats2(table, 15),
+        integers2(table, 13), floats2(table, 14), floats2(table, 15), floats3(table, 30),
+        floats3(table, 31), floats2(table, 32), floats3(table, 33),
     )  # fmt: skip
     output = Output(floats2(table, 16), floats2(table, 17), integers2(table, 18))
     rule = DecisionRule(

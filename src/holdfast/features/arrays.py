@@ -60,6 +60,7 @@ KIND, WINDOW, TRANSFORM, SCOPE, SAME_AS = range(5)
 
 # Columns of Layout.windows.
 SIGMA_WINDOW, LONGEST_WINDOW = 0, 1
+READY_WINDOW = 2  # samples of a stretch from which on all features are known
 
 # Columns of Output.values: F_tip, then
 AMPLITUDE, MEAN, SIGMA = 3, 4, 5  # F_a, and m and sigma over the reported window
@@ -68,6 +69,29 @@ VALUES_WIDTH = 6
 # Kinds of features, in the order of holdfast.features.specs.KINDS.
 FIRST_WINDOWED = 4  # the kinds before it need one sample: they are the channels of the history
 SIGMA_XYZ, CHANGE = 6, 7
+FIRST_RELATIVE = 8  # the kinds from it on look back by a lag in seconds
+
+# Rows of Memory.relative: kinds from FIRST_RELATIVE on.
+FORCE_CHANGE, SHEAR_CHANGE, RESIDUAL, SHEAR_RESIDUAL = range(4)
+PRESSURE_SHIFT, MOMENT_CHANGE, PATH, LOAD_TO_NOISE = range(4, 8)
+N_RELATIVE = 8
+
+# Rows of Memory.track: F_tip, then
+TRACK_PRESSURE = 3  # centre of pressure, in radii of the patch, in three axes
+TRACK_MOMENT = 6  # moment about the normal, divided by the radius
+TRACK_PATH = 7  # length of the way of F_tip in this stretch
+TRACK_WIDTH = 8
+
+# Columns of Memory.motion.
+LEAST_NORMAL = 0  # least normal force since the start, at most 0
+LOAD = 1  # force beyond it
+TAXEL_LOAD = 2  # root of the sum of squares of the taxel forces
+PEAK_LOAD, PEAK_TAXEL_LOAD = 3, 4  # the largest so far, slowly forgotten
+NOISE_NOW, TAXEL_NOISE_NOW = 5, 6  # of F_tip and of all taxels, standard deviation of the norm
+LEAST_NOISE, LEAST_TAXEL_NOISE = 7, 8  # of the blocks that are complete; infinite before
+BLOCK_SQUARES, BLOCK_TAXEL_SQUARES, BLOCK_STEPS = 9, 10, 11  # of the block that is not
+BLOCK_START = 12  # time [s]; NaN before the first sample
+MOTION_WIDTH = 13
 
 # Columns of Output.status.
 REASON, FAULTS = 0, 1
@@ -83,12 +107,15 @@ class Layout(NamedTuple):
     constants: Array  # (n_fingers, CONSTANTS_WIDTH)
     specs: Integers  # (n_fingers, n_features, 5), see `spec_codes`
     floors: Array  # (n_fingers, n_features)
-    windows: Integers  # (n_fingers, 2) samples in the reported window and in the longest
+    windows: Integers  # (n_fingers, 3) samples in the reported window, the longest, and to be ready
     ignored: Flags  # (n_taxels,) taxels that contribute nothing
     alike: bool  # whether all fingers have the same features
     tare_kind: int
     tare_seconds: float
     period: float
+    lags: Integers  # (n_lags,) of relative features [samples], ascending; empty without any
+    places: Array  # (n_taxels, 3) from the centroid of the used taxels, in radii of the patch
+    normals: Array  # (n_fingers, 3)
 
 
 class Memory(NamedTuple):
@@ -101,6 +128,10 @@ class Memory(NamedTuple):
     counts: Integers  # (n_fingers, COUNTS_WIDTH)
     levels: Array  # (n_fingers, LEVELS_WIDTH)
     own: Array  # (n_fingers, n_features) values of each finger, before the maximum of the hand
+    taxel_forces: Array  # (longest lag + 1, n_taxels, 3) in the fingertip frame, a ring
+    track: Array  # (n_fingers, TRACK_WIDTH, longest lag + 1), a ring
+    motion: Array  # (n_fingers, MOTION_WIDTH)
+    relative: Array  # (n_fingers, N_RELATIVE, n_lags) relative features of the last sample
 
 
 class Output(NamedTuple):

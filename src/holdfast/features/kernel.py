@@ -17,6 +17,7 @@ from holdfast.features.arrays import (
     FAULT,
     FAULTS,
     FAULTY_TAXELS,
+    FIRST_RELATIVE,
     FIRST_TIME,
     FIRST_WINDOWED,
     GAP,
@@ -24,7 +25,6 @@ from holdfast.features.arrays import (
     HISTORY_END,
     KIND,
     LAST_TIME,
-    LONGEST_WINDOW,
     LOW_LIMIT,
     MAX_AMPLITUDE,
     MEAN,
@@ -37,6 +37,7 @@ from holdfast.features.arrays import (
     N_UNCHANGED,
     NOISE,
     READY,
+    READY_WINDOW,
     REASON,
     SAME_AS,
     SCOPE,
@@ -75,6 +76,7 @@ from holdfast.features.faults import (
 )
 from holdfast.features.force import sum_taxels
 from holdfast.features.haar import haar_window
+from holdfast.features.motion import update_motion
 from holdfast.features.tare import update_baseline
 
 GAP_LIMIT_PERIODS = 3.0003
@@ -105,6 +107,7 @@ def advance(
         if time - memory.levels[f, LAST_TIME] > GAP_LIMIT_PERIODS * layout.period:
             counts[f, N_STRETCH] = counts[f, N_UNCHANGED] = counts[f, N_PULLED] = 0
             _clear(memory.own, f)
+            memory.relative[f] = math.nan
             counts[f, AFTER_GAP] = 1
             status[f, REASON], status[f, FAULTS], status[f, TAXELS] = GAP, 0, 0
             _clear(output.values, f)
@@ -203,6 +206,8 @@ def _process_force(
     first, last = layout.offsets[f], layout.offsets[f + 1]
     x, y, z, normal = sum_taxels(readings, memory.baseline, layout.rotations, first, last)
     _append(memory.history, counts, values, f, x, y, z)
+    if len(layout.lags):
+        update_motion(layout, memory, readings, f, levels[f, LAST_TIME])
     if is_stuck(counts, f, layout.period):
         faults |= STUCK
     if faults & SERIOUS:
@@ -216,7 +221,7 @@ def _process_force(
         faults |= TARE_LOADED
     if faults:
         return FAULT, faults, bits
-    if counts[f, N_STRETCH] < windows[f, LONGEST_WINDOW]:
+    if counts[f, N_STRETCH] < windows[f, READY_WINDOW]:
         return GAP if counts[f, AFTER_GAP] else WARM_UP, 0, 0
     counts[f, AFTER_GAP] = 0
     return READY, 0, 0
@@ -244,13 +249,15 @@ def _append(
 def _compute_own(layout: Layout, memory: Memory, output: Output, f: int) -> None:
     """Compute the features of a finger by itself; NaN where its stretch is too short."""
     specs, floors, reported = layout.specs, layout.floors, layout.windows[f, SIGMA_WINDOW]
-    _, _, _, history, counts, levels, own = memory
+    history, counts, levels, own = memory.history, memory.counts, memory.levels, memory.own
     for place in range(specs.shape[1]):
         kind, window = specs[f, place, KIND], specs[f, place, WINDOW]
         if kind < 0:
             own[f, place] = 0.0  # padding
         elif specs[f, place, SAME_AS] < place:
             own[f, place] = own[f, specs[f, place, SAME_AS]]
+        elif kind >= FIRST_RELATIVE:
+            own[f, place] = memory.relative[f, kind - FIRST_RELATIVE, window]
         elif counts[f, N_STRETCH] < max(window, 1):
             own[f, place] = math.nan
         else:
@@ -285,6 +292,8 @@ def _fill_features(layout: Layout, memory: Memory, output: Output, f: int) -> fl
 def _feature_of_other(layout: Layout, memory: Memory, f: int, place: int, other: int) -> float:
     """Return a feature of finger f for another finger; NaN where its stretch is too short."""
     kind, window = layout.specs[f, place, KIND], layout.specs[f, place, WINDOW]
+    if kind >= FIRST_RELATIVE:
+        return float(memory.relative[other, kind - FIRST_RELATIVE, window])
     if memory.counts[other, N_STRETCH] < max(window, 1):
         return math.nan
     value = _feature(kind, window, memory.history, memory.counts, other)

@@ -9,12 +9,26 @@ import numpy.typing as npt
 
 from holdfast.features.haar import DEFAULT_WINDOW, FEATURE_NAMES, check_window
 
-KINDS = (*FEATURE_NAMES, "sigma_xyz", "change")
-TRANSFORMS = ("none", "log", "noise")
+RELATIVE_KINDS = (
+    "force_change",
+    "shear_change",
+    "residual",
+    "shear_residual",
+    "pressure_shift",
+    "moment_change",
+    "path",
+    "load_to_noise",
+)
+"""Kinds that look back by a lag in seconds, relative to the load; see `features.motion`."""
+KINDS = (*FEATURE_NAMES, "sigma_xyz", "change", *RELATIVE_KINDS)
+TRANSFORMS = ("none", "log", "noise", "relative")
 SCOPES = ("finger", "hand")
 
 WINDOWED = ("m", "sigma", "sigma_xyz", "change")
 """Kinds that are computed over a window; the others need one sample."""
+
+MAX_LAG_SECONDS = 2.0
+"""Longest lag of a relative feature [s]."""
 
 DEPLOYED_FEATURES = ("F_a", "F_x", "F_y", "F_z", "sigma")
 """Features of the paper's deployed model, which leaves out m."""
@@ -26,10 +40,18 @@ class FeatureSpec(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     Attributes:
         kind: `F_a`, `F_x`, `F_y`, `F_z`, `m` or `sigma`, as in the paper; `sigma_xyz`, the root
             of the sum of squares of the sigmas of the three components; or `change`, the norm
-            of the difference of F_tip between the last and the first sample of the window.
+            of the difference of F_tip between the last and the first sample of the window. Or a
+            relative kind, over a lag of `seconds`: `force_change` and `shear_change`, the change
+            of F_tip and its part across the normal; `residual` and `shear_residual`, how far the
+            taxels move against their mean; `pressure_shift`, how far the centre of pressure
+            moves; `moment_change`, the change of the moment about the normal; `path`, the way of
+            F_tip per second; `load_to_noise`, the load itself.
         window: number of samples in the window, for the last four kinds; 0 for the others.
+        seconds: lag of a relative kind [s]; while a stretch is shorter, the longest that there
+            is, from two samples on.
         transform: `none`; `log`, log(sqrt(value^2 + floor^2)); or `noise`, the logarithm of the
-            ratio of sigma to the sigma of the sensor's noise alone.
+            ratio of sigma to the sigma of the sensor's noise alone; or, for the relative kinds
+            only, `relative`, the logarithm of the ratio to the load.
         scope: `finger`; or `hand`, the largest value of all fingers of the hand.
         floor: value that keeps the logarithm of `log` finite [unit of the readings].
 
@@ -37,13 +59,44 @@ class FeatureSpec(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
         ValueError: the fields contradict each other.
     """
 
-    kind: Literal["F_a", "F_x", "F_y", "F_z", "m", "sigma", "sigma_xyz", "change"]
+    kind: Literal[
+        "F_a",
+        "F_x",
+        "F_y",
+        "F_z",
+        "m",
+        "sigma",
+        "sigma_xyz",
+        "change",
+        "force_change",
+        "shear_change",
+        "residual",
+        "shear_residual",
+        "pressure_shift",
+        "moment_change",
+        "path",
+        "load_to_noise",
+    ]
     window: int = 0
-    transform: Literal["none", "log", "noise"] = "none"
+    transform: Literal["none", "log", "noise", "relative"] = "none"
     scope: Literal["finger", "hand"] = "finger"
     floor: float = 0.0
+    seconds: float = 0.0
 
     def __post_init__(self) -> None:
+        if (self.kind in RELATIVE_KINDS) != (self.transform == "relative"):
+            raise ValueError(
+                f"the transform 'relative' is for {', '.join(RELATIVE_KINDS)}, and they for it; "
+                f"{self.kind} with {self.transform!r} given"
+            )
+        if not (np.isfinite(self.seconds) and 0 <= self.seconds <= MAX_LAG_SECONDS):
+            raise ValueError(
+                f"a lag from 0 to {MAX_LAG_SECONDS:g} s expected, {self.seconds} given"
+            )
+        if (self.kind in RELATIVE_KINDS) != (self.seconds > 0):
+            raise ValueError(
+                f"{self.kind} with a lag of {self.seconds} s given; only relative kinds have one"
+            )
         if self.kind in WINDOWED:
             check_window(self.window)
         elif self.window != 0:
@@ -61,6 +114,7 @@ class FeatureSpec(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
 
     def __str__(self) -> str:
         text = f"{self.kind}[{self.window}]" if self.window else str(self.kind)
+        text = f"{text}[{self.seconds:g} s]" if self.seconds else text
         text = text if self.transform == "none" else f"{self.transform}({text})"
         return text if self.scope == "finger" else f"hand {text}"
 
@@ -84,6 +138,24 @@ HOLDFAST_FEATURES = (
 """The project's own features, named `holdfast`: see `holdfast.study.methods.holdfast`."""
 
 
+ANY_LAGS = (0.017, 0.067, 0.133, 0.267, 0.533)
+"""Lags of the features for any hand [s]."""
+
+ANY_FEATURES = (
+    *(
+        FeatureSpec(kind, transform="relative", seconds=seconds)  # type: ignore[arg-type]
+        for kind in RELATIVE_KINDS[:-1]
+        for seconds in ANY_LAGS
+    ),
+    FeatureSpec("load_to_noise", transform="relative", seconds=ANY_LAGS[0]),
+)
+"""Features that carry over between hands, sensors, units and rates, named `any`."""
+
+
+NAMED_FEATURES = {"holdfast": HOLDFAST_FEATURES, "any": ANY_FEATURES}
+"""Lists of features by name."""
+
+
 def parse_features(
     names: str | Sequence[str], window: int = DEFAULT_WINDOW
 ) -> tuple[FeatureSpec, ...]:
@@ -92,7 +164,7 @@ def parse_features(
     Args:
         names: names from `FEATURE_NAMES`, as a list or separated by commas. `F_tip` stands for
             F_x, F_y, F_z. `holdfast` alone stands for the project's own features, which have
-            their own windows.
+            their own windows; `any` alone for the relative features of any hand.
         window: N_w, number of samples.
 
     Raises:
@@ -102,8 +174,8 @@ def parse_features(
         >>> [str(feature) for feature in parse_features("F_a,sigma")]
         ['F_a', 'sigma[14]']
     """
-    if names == "holdfast":
-        return HOLDFAST_FEATURES
+    if names in NAMED_FEATURES:
+        return NAMED_FEATURES[str(names)]
     given = names.split(",") if isinstance(names, str) else list(names)
     wanted: list[str] = []
     for name in (name.strip() for name in given):
@@ -112,7 +184,7 @@ def parse_features(
         known = ", ".join(FEATURE_NAMES)
         raise ValueError(
             f"unknown feature {unknown[0]!r}; there are {known}, F_tip for F_x, F_y and F_z, and "
-            "holdfast alone for the project's own features"
+            "holdfast or any alone for the project's own features"
         )
     if len(set(wanted)) < len(wanted):
         raise ValueError(f"a feature is given twice in {','.join(wanted)}")
@@ -120,23 +192,26 @@ def parse_features(
     return tuple(FeatureSpec(n, window if n in WINDOWED else 0) for n in wanted)  # type: ignore[arg-type]
 
 
-def spec_codes(specs: Sequence[FeatureSpec], width: int) -> npt.NDArray[np.int64]:
+def spec_codes(
+    specs: Sequence[FeatureSpec], width: int, lags: Sequence[float] = ()
+) -> npt.NDArray[np.int64]:
     """Return the features as numbers, for the kernel.
 
     Args:
         specs: features of a finger.
         width: number of rows, at least the number of features.
+        lags: of all relative features of the stream, in seconds.
 
     Returns:
-        (width, 5) kind, window, transform, scope, and the first feature that is the same except
-        for its scope; -1 is padding.
+        (width, 5) kind, window (or place of the lag), transform, scope, and the first feature
+        that is the same except for its scope; -1 is padding.
     """
     codes = np.full((width, 5), -1, dtype=np.int64)
-    own = [(spec.kind, spec.window, spec.transform, spec.floor) for spec in specs]
+    own = [(spec.kind, spec.window, spec.transform, spec.floor, spec.seconds) for spec in specs]
     for row, spec, alike in zip(codes, specs, own, strict=False):
         row[:] = (
             KINDS.index(spec.kind),
-            spec.window,
+            lags.index(spec.seconds) if spec.seconds else spec.window,
             TRANSFORMS.index(spec.transform),
             SCOPES.index(spec.scope),
             own.index(alike),

@@ -12,12 +12,17 @@ from holdfast.compiled import compiled
 from holdfast.features import kernel
 from holdfast.features.arrays import (
     AMPLITUDE,
+    BLOCK_START,
     CHANGED_AT,
     COUNTS_WIDTH,
     FIRST_TIME,
     LAST_TIME,
+    LEAST_NOISE,
+    LEAST_TAXEL_NOISE,
     LEVELS_WIDTH,
     LONGEST_WINDOW,
+    MOTION_WIDTH,
+    N_RELATIVE,
     N_TARED,
     NOISE,
     REASON,
@@ -28,6 +33,7 @@ from holdfast.features.arrays import (
     TARE_NONE,
     TARE_SECONDS,
     TAXELS_WIDTH,
+    TRACK_WIDTH,
     VALUES_WIDTH,
     WARM_UP,
     Array,
@@ -256,6 +262,11 @@ def _layout(plan: StreamPlan) -> Layout:
     features = [plan.features[finger] for finger in plan.fingers]
     width = max(1, *(len(specs) for specs in features))
     longest = [max([plan.window, *(spec.window for spec in specs)]) for specs in features]
+    lags = sorted({spec.seconds for specs in features for spec in specs if spec.seconds})
+    ready = [
+        2 if all(spec.seconds for spec in specs) else most
+        for specs, most in zip(features, longest, strict=True)
+    ]
     floors = np.zeros((len(sensors), width))
     for row, specs in zip(floors, features, strict=True):
         row[: len(specs)] = [spec.floor for spec in specs]
@@ -268,15 +279,30 @@ def _layout(plan: StreamPlan) -> Layout:
         offsets=np.cumsum([0, *(sensor.n_taxels for sensor in sensors)]),
         rotations=np.concatenate(rotations),
         constants=np.array(constants),
-        specs=np.stack([spec_codes(specs, width) for specs in features]),
+        specs=np.stack([spec_codes(specs, width, lags) for specs in features]),
         floors=floors,
-        windows=np.array([(plan.window, most) for most in longest], dtype=np.int64),
+        windows=np.array(
+            [(plan.window, *pair) for pair in zip(longest, ready, strict=True)], dtype=np.int64
+        ),
         ignored=np.concatenate(ignored),
         alike=len({tuple(specs) for specs in features}) == 1,
         tare_kind=TARE_KINDS[plan.tare.kind],
         tare_seconds=plan.tare.seconds,
         period=1.0 / plan.rate,
+        lags=np.array([max(1, round(lag * plan.rate)) for lag in lags], dtype=np.int64),
+        places=np.concatenate([_places(s, i) for s, i in zip(sensors, ignored, strict=True)]),
+        normals=np.array([sensor.normal for sensor in sensors], dtype=np.float64),
     )
+
+
+def _places(sensor: Sensor, ignored: Flags) -> Array:
+    """Return the taxels' places about their centroid, in root mean square distances from it."""
+    used = sensor.positions[~ignored]
+    if not len(used):
+        return np.zeros_like(sensor.positions)
+    places = sensor.positions - used.mean(axis=0)
+    radius = float(np.sqrt((places[~ignored] ** 2).sum(axis=1).mean()))
+    return places / radius if radius > 0 else np.zeros_like(places)
 
 
 def _ignored(plan: StreamPlan, finger: str) -> Flags:
@@ -298,6 +324,10 @@ def _memory(layout: Layout) -> Memory:
     longest = int(layout.windows[:, LONGEST_WINDOW].max())
     levels = np.zeros((n_fingers, LEVELS_WIDTH))
     levels[:, [FIRST_TIME, LAST_TIME, NOISE]] = np.nan
+    length = int(layout.lags.max()) + 1 if len(layout.lags) else 1
+    motion = np.zeros((n_fingers, MOTION_WIDTH))
+    motion[:, [LEAST_NOISE, LEAST_TAXEL_NOISE]] = np.inf
+    motion[:, BLOCK_START] = np.nan
     taxels = np.zeros((n_taxels, TAXELS_WIDTH))
     taxels[layout.ignored, CHANGED_AT] = np.inf  # never long ago
     return Memory(
@@ -308,6 +338,10 @@ def _memory(layout: Layout) -> Memory:
         counts=np.zeros((n_fingers, COUNTS_WIDTH), dtype=np.int64),
         levels=levels,
         own=np.full((n_fingers, layout.specs.shape[1]), np.nan),
+        taxel_forces=np.zeros((length, n_taxels, 3)),
+        track=np.zeros((n_fingers, TRACK_WIDTH, length)),
+        motion=motion,
+        relative=np.full((n_fingers, N_RELATIVE, len(layout.lags)), np.nan),
     )
 
 

@@ -1,0 +1,239 @@
+"""Relative features: how force and taxels move, as a share of the load. Compiled, no objects.
+
+They look back by a lag in seconds, and have no unit: counts, newtons, gains and grips cancel, so
+that they carry over from one hand to another. `docs/training.md` has the equations.
+"""
+
+import math
+
+from holdfast.compiled import compiled
+from holdfast.features.arrays import (
+    BLOCK_SQUARES,
+    BLOCK_START,
+    BLOCK_STEPS,
+    BLOCK_TAXEL_SQUARES,
+    FORCE_CHANGE,
+    LEAST_NOISE,
+    LEAST_NORMAL,
+    LEAST_TAXEL_NOISE,
+    LOAD,
+    LOAD_TO_NOISE,
+    MIN_NOISE,
+    MOMENT_CHANGE,
+    N_STRETCH,
+    N_UNCHANGED,
+    N_USED,
+    NOISE_NOW,
+    PATH,
+    PEAK_LOAD,
+    PEAK_TAXEL_LOAD,
+    PRESSURE_SHIFT,
+    RESIDUAL,
+    SHEAR_CHANGE,
+    SHEAR_RESIDUAL,
+    TAXEL_LOAD,
+    TAXEL_NOISE_NOW,
+    TRACK_MOMENT,
+    TRACK_PATH,
+    TRACK_PRESSURE,
+    Array,
+    Integers,
+    Layout,
+    Memory,
+)
+
+LOAD_DECAY_SECONDS = 5.0
+"""Time constant with which the largest load so far is forgotten [s]."""
+NOISE_BLOCK_SECONDS, MIN_BLOCK_STEPS = 0.2, 5
+"""A block over which noise is measured has at least this duration [s] and these steps."""
+NOISE_WEIGHT = 8.0
+"""Share of the noise in the denominator: a load below it counts as nothing."""
+PRESSURE_FLOOR = 1e-3
+"""Least shift of the centre of pressure, in radii of the patch."""
+TWO_AXES = math.sqrt(2.0 / 3.0)
+"""Noise of two of three axes, as a share of that of all."""
+
+
+@compiled
+def update_motion(layout: Layout, memory: Memory, readings: Array, f: int, time: float) -> None:
+    """Take a sample of a finger, and compute its relative features.
+
+    The sample is already counted in N_STRETCH and has a force in the history.
+
+    Args:
+        layout: of the stream.
+        memory: is changed; `memory.relative` holds the features.
+        readings: (n_taxels, 3) of all fingers.
+        f: the finger.
+        time: of the sample [s].
+    """
+    n, length = memory.counts[f, N_STRETCH], len(memory.taxel_forces)
+    now = (n - 1) % length
+    _append_sample(layout, memory, readings, f, now, n > 1)
+    _update_load(layout, memory, f, now)
+    _update_noise(layout, memory.motion, memory.counts, f, time)
+    if n < 2:
+        for kind in range(memory.relative.shape[1]):
+            for lag in range(len(layout.lags)):
+                memory.relative[f, kind, lag] = math.nan
+        return
+    for lag in range(len(layout.lags)):
+        back = min(layout.lags[lag], n - 1)
+        _fill_lag(layout, memory, f, now, (n - 1 - back) % length, back, lag)
+
+
+@compiled
+def _append_sample(
+    layout: Layout, memory: Memory, readings: Array, f: int, now: int, has_previous: bool
+) -> None:
+    """Append taxel forces, centre of pressure, moment and path of a sample to the history."""
+    first, last = layout.offsets[f], layout.offsets[f + 1]
+    forces, track = memory.taxel_forces, memory.track
+    nx, ny, nz = layout.normals[f, 0], layout.normals[f, 1], layout.normals[f, 2]
+    length = len(forces)
+    before = (now - 1) % length
+    fx, fy, fz, weight, squares, moved = 0.0, 0.0, 0.0, 0.0, 0.0, 0.0
+    cx, cy, cz, moment = 0.0, 0.0, 0.0, 0.0
+    for i in range(first, last):
+        x = readings[i, 0] - memory.baseline[i, 0]
+        y = readings[i, 1] - memory.baseline[i, 1]
+        z = readings[i, 2] - memory.baseline[i, 2]
+        turn = layout.rotations[i]
+        gx = turn[0, 0] * x + turn[0, 1] * y + turn[0, 2] * z
+        gy = turn[1, 0] * x + turn[1, 1] * y + turn[1, 2] * z
+        gz = turn[2, 0] * x + turn[2, 1] * y + turn[2, 2] * z
+        if has_previous:
+            sx, sy, sz = forces[before, i, 0], forces[before, i, 1], forces[before, i, 2]
+            moved += (gx - sx) * (gx - sx) + (gy - sy) * (gy - sy) + (gz - sz) * (gz - sz)
+        forces[now, i, 0], forces[now, i, 1], forces[now, i, 2] = gx, gy, gz
+        px, py, pz = layout.places[i, 0], layout.places[i, 1], layout.places[i, 2]
+        pressed = abs(gx * nx + gy * ny + gz * nz)
+        fx, fy, fz, weight = fx + gx, fy + gy, fz + gz, weight + pressed
+        squares += gx * gx + gy * gy + gz * gz
+        cx, cy, cz = cx + pressed * px, cy + pressed * py, cz + pressed * pz
+        moment += nx * (py * gz - pz * gy) + ny * (pz * gx - px * gz) + nz * (px * gy - py * gx)
+    weight = max(weight, 1e-300)
+    step = 0.0
+    if has_previous:
+        dx, dy, dz = fx - track[f, 0, before], fy - track[f, 1, before], fz - track[f, 2, before]
+        step = dx * dx + dy * dy + dz * dz
+    track[f, 0, now], track[f, 1, now], track[f, 2, now] = fx, fy, fz
+    track[f, TRACK_PRESSURE, now] = cx / weight
+    track[f, TRACK_PRESSURE + 1, now] = cy / weight
+    track[f, TRACK_PRESSURE + 2, now] = cz / weight
+    track[f, TRACK_MOMENT, now] = moment
+    track[f, TRACK_PATH, now] = math.sqrt(step)
+    if has_previous:
+        track[f, TRACK_PATH, now] += track[f, TRACK_PATH, before]
+    motion = memory.motion
+    motion[f, TAXEL_LOAD] = math.sqrt(squares)
+    if memory.counts[f, N_UNCHANGED] == 0 and has_previous:
+        motion[f, BLOCK_SQUARES] += step
+        motion[f, BLOCK_TAXEL_SQUARES] += moved
+        motion[f, BLOCK_STEPS] += 1.0
+    elif not has_previous:
+        motion[f, BLOCK_SQUARES] = motion[f, BLOCK_TAXEL_SQUARES] = motion[f, BLOCK_STEPS] = 0.0
+        motion[f, BLOCK_START] = math.nan
+
+
+@compiled
+def _update_load(layout: Layout, memory: Memory, f: int, now: int) -> None:
+    """Update the load: the force beyond the least normal force since the start.
+
+    A skin can only be pressed. A negative normal force says that the tare was taken under load.
+    """
+    track, motion = memory.track, memory.motion
+    nx, ny, nz = layout.normals[f, 0], layout.normals[f, 1], layout.normals[f, 2]
+    x, y, z = track[f, 0, now], track[f, 1, now], track[f, 2, now]
+    motion[f, LEAST_NORMAL] = min(motion[f, LEAST_NORMAL], x * nx + y * ny + z * nz)
+    least = motion[f, LEAST_NORMAL]
+    x, y, z = x - least * nx, y - least * ny, z - least * nz
+    keep = math.exp(-layout.period / LOAD_DECAY_SECONDS)
+    motion[f, LOAD] = math.sqrt(x * x + y * y + z * z)
+    motion[f, PEAK_LOAD] = max(motion[f, LOAD], keep * motion[f, PEAK_LOAD])
+    motion[f, PEAK_TAXEL_LOAD] = max(motion[f, TAXEL_LOAD], keep * motion[f, PEAK_TAXEL_LOAD])
+
+
+@compiled
+def _update_noise(layout: Layout, motion: Array, counts: Integers, f: int, time: float) -> None:
+    """Update the noise: the least mean square step over blocks, halved, and its root."""
+    if math.isnan(motion[f, BLOCK_START]):
+        motion[f, BLOCK_START] = time
+    floor = math.sqrt(3.0) * layout.constants[f, MIN_NOISE]
+    steps = motion[f, BLOCK_STEPS]
+    if steps == 0.0:
+        if math.isinf(motion[f, LEAST_NOISE]):
+            motion[f, NOISE_NOW] = motion[f, TAXEL_NOISE_NOW] = floor
+        return
+    force = max(math.sqrt(motion[f, BLOCK_SQUARES] / (2.0 * steps)), floor)
+    taxels = max(math.sqrt(motion[f, BLOCK_TAXEL_SQUARES] / (2.0 * steps)), floor)
+    if time - motion[f, BLOCK_START] >= NOISE_BLOCK_SECONDS and steps >= MIN_BLOCK_STEPS:
+        motion[f, LEAST_NOISE] = min(motion[f, LEAST_NOISE], force)
+        motion[f, LEAST_TAXEL_NOISE] = min(motion[f, LEAST_TAXEL_NOISE], taxels)
+        motion[f, BLOCK_SQUARES] = motion[f, BLOCK_TAXEL_SQUARES] = motion[f, BLOCK_STEPS] = 0.0
+        motion[f, BLOCK_START] = time
+    known = not math.isinf(motion[f, LEAST_NOISE])
+    motion[f, NOISE_NOW] = motion[f, LEAST_NOISE] if known else force
+    motion[f, TAXEL_NOISE_NOW] = motion[f, LEAST_TAXEL_NOISE] if known else taxels
+
+
+@compiled
+def _fill_lag(
+    layout: Layout, memory: Memory, f: int, now: int, then: int, n_steps: int, lag: int
+) -> None:
+    """Fill the relative features over one lag."""
+    track, motion, out = memory.track, memory.motion, memory.relative
+    nx, ny, nz = layout.normals[f, 0], layout.normals[f, 1], layout.normals[f, 2]
+    noise, taxel_noise = motion[f, NOISE_NOW], motion[f, TAXEL_NOISE_NOW]
+    load = motion[f, PEAK_LOAD] + NOISE_WEIGHT * noise
+    taxel_load = motion[f, PEAK_TAXEL_LOAD] + NOISE_WEIGHT * taxel_noise
+    x = track[f, 0, now] - track[f, 0, then]
+    y = track[f, 1, now] - track[f, 1, then]
+    z = track[f, 2, now] - track[f, 2, then]
+    across = x * nx + y * ny + z * nz
+    square = x * x + y * y + z * z
+    out[f, FORCE_CHANGE, lag] = _relative(square, noise, load)
+    out[f, SHEAR_CHANGE, lag] = _relative(
+        max(square - across * across, 0.0), TWO_AXES * noise, load
+    )
+    n_used = layout.constants[f, N_USED]
+    moved, pressed = _residual(layout, memory, f, now, then, x / n_used, y / n_used, z / n_used)
+    out[f, RESIDUAL, lag] = _relative(moved, taxel_noise, taxel_load)
+    out[f, SHEAR_RESIDUAL, lag] = _relative(
+        max(moved - pressed, 0.0), TWO_AXES * taxel_noise, taxel_load
+    )
+    shift = 0.0
+    for axis in range(3):
+        delta = track[f, TRACK_PRESSURE + axis, now] - track[f, TRACK_PRESSURE + axis, then]
+        shift += delta * delta
+    out[f, PRESSURE_SHIFT, lag] = math.log(math.sqrt(shift) + PRESSURE_FLOOR)
+    turned = track[f, TRACK_MOMENT, now] - track[f, TRACK_MOMENT, then]
+    out[f, MOMENT_CHANGE, lag] = _relative(turned * turned, taxel_noise, load)
+    path = track[f, TRACK_PATH, now] - track[f, TRACK_PATH, then]
+    out[f, PATH, lag] = math.log((path + noise) / (n_steps * layout.period * load))
+    out[f, LOAD_TO_NOISE, lag] = math.log(load / noise)
+
+
+@compiled
+def _residual(
+    layout: Layout, memory: Memory, f: int, now: int, then: int, mx: float, my: float, mz: float
+) -> tuple[float, float]:
+    """Return the squared motion of the taxels against their mean, and its part along the normal."""
+    forces = memory.taxel_forces
+    nx, ny, nz = layout.normals[f, 0], layout.normals[f, 1], layout.normals[f, 2]
+    moved, pressed = 0.0, 0.0
+    for i in range(layout.offsets[f], layout.offsets[f + 1]):
+        if not layout.ignored[i]:
+            x = forces[now, i, 0] - forces[then, i, 0] - mx
+            y = forces[now, i, 1] - forces[then, i, 1] - my
+            z = forces[now, i, 2] - forces[then, i, 2] - mz
+            along = x * nx + y * ny + z * nz
+            moved += x * x + y * y + z * z
+            pressed += along * along
+    return moved, pressed
+
+
+@compiled
+def _relative(square: float, floor: float, load: float) -> float:
+    """Return log(sqrt(v^2 + floor^2) / load)."""
+    return math.log(math.sqrt(square + floor * floor) / load)
