@@ -6,7 +6,7 @@ that they carry over from one hand to another. `docs/training.md` has the equati
 
 import math
 
-from holdfast.compiled import compiled
+from holdfast.compiled import compiled, inlined
 from holdfast.features.arrays import (
     BLOCK_SQUARES,
     BLOCK_START,
@@ -54,7 +54,7 @@ TWO_AXES = math.sqrt(2.0 / 3.0)
 """Noise of two of three axes, as a share of that of all."""
 
 
-@compiled
+@inlined
 def update_motion(layout: Layout, memory: Memory, readings: Array, f: int, time: float) -> None:
     """Take a sample of a finger, and compute its relative features.
 
@@ -82,7 +82,7 @@ def update_motion(layout: Layout, memory: Memory, readings: Array, f: int, time:
         _fill_lag(layout, memory, f, now, (n - 1 - back) % length, back, lag)
 
 
-@compiled
+@inlined
 def _append_sample(
     layout: Layout, memory: Memory, readings: Array, f: int, now: int, has_previous: bool
 ) -> None:
@@ -136,7 +136,7 @@ def _append_sample(
         motion[f, BLOCK_START] = math.nan
 
 
-@compiled
+@inlined
 def _update_load(layout: Layout, memory: Memory, f: int, now: int) -> None:
     """Update the load: the force beyond the least normal force since the start.
 
@@ -154,7 +154,7 @@ def _update_load(layout: Layout, memory: Memory, f: int, now: int) -> None:
     motion[f, PEAK_TAXEL_LOAD] = max(motion[f, TAXEL_LOAD], keep * motion[f, PEAK_TAXEL_LOAD])
 
 
-@compiled
+@inlined
 def _update_noise(layout: Layout, motion: Array, counts: Integers, f: int, time: float) -> None:
     """Update the noise: the least mean square step over blocks, halved, and its root."""
     if math.isnan(motion[f, BLOCK_START]):
@@ -177,7 +177,7 @@ def _update_noise(layout: Layout, motion: Array, counts: Integers, f: int, time:
     motion[f, TAXEL_NOISE_NOW] = motion[f, LEAST_TAXEL_NOISE] if known else taxels
 
 
-@compiled
+@inlined
 def _fill_lag(
     layout: Layout, memory: Memory, f: int, now: int, then: int, n_steps: int, lag: int
 ) -> None:
@@ -214,7 +214,7 @@ def _fill_lag(
     out[f, LOAD_TO_NOISE, lag] = math.log(load / noise)
 
 
-@compiled
+@inlined
 def _residual(
     layout: Layout, memory: Memory, f: int, now: int, then: int, mx: float, my: float, mz: float
 ) -> tuple[float, float]:
