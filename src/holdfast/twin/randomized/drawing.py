@@ -1,0 +1,177 @@
+"""A hand, a sensor, an object and a hold, drawn from ranges: what one recording is made from."""
+
+import math
+import tomllib
+from dataclasses import dataclass, replace
+from functools import cache
+from importlib import resources
+from typing import Any
+
+import numpy as np
+
+from holdfast.sensors import Sensor, sensor
+from holdfast.sensors.values import Array
+from holdfast.twin.objects import SHAPES, Thing, make_thing
+from holdfast.twin.randomized.gripper import Drives, PadLayout, flat_patch, pad_layout
+from holdfast.twin.randomized.palm import Span
+from holdfast.twin.skin import Skin
+from holdfast.twin.surface import curved_fingertip
+from holdfast.twin.uskin_parameters import UskinParameters
+
+PAD = (0.0261, 0.0, 0.016)
+"""The middle of a curved fingertip's pad, in the fingertip frame [m]."""
+SENSOR_KINDS = ("uskin-curved", "uskin-4x4", "uskin-4x6", "anyskin", "papillarray", "grid-3x3")
+"""Sensors of randomized hands."""
+_PITCH = {"uskin-4x4": 4.7e-3, "uskin-4x6": 7.2e-3, "anyskin": 7e-3, "papillarray": 7e-3}
+_SPREAD = {"uskin-4x4": 2.4e-3, "uskin-4x6": 3.0e-3, "anyskin": 6e-3, "papillarray": 1.5e-3}
+"""How far a force spreads in the silicone, standard deviation [m]: the magnetic skins are thick
+beside their pitch; pillars stand alone."""
+
+
+@dataclass(frozen=True)
+class SensorDraw:
+    """The sensor of a hand.
+
+    Attributes:
+        sensor: layout, rate and unit.
+        parameters: of the readout.
+        drift: scale of thermal drift.
+    """
+
+    sensor: Sensor
+    parameters: UskinParameters
+
+
+@cache
+def ranges() -> dict[str, dict[str, Any]]:
+    """Return the ranges of `ranges.toml`, by section."""
+    text = resources.files("holdfast.twin.randomized").joinpath("ranges.toml").read_text("utf-8")
+    return tomllib.loads(text)
+
+
+def uniform(generator: np.random.Generator, span: Span) -> float:
+    """Draw between the ends of a range."""
+    return float(generator.uniform(*span))
+
+
+def log_uniform(generator: np.random.Generator, span: Span) -> float:
+    """Draw between the ends of a range, evenly on a logarithmic scale."""
+    return float(math.exp(generator.uniform(math.log(span[0]), math.log(span[1]))))
+
+
+def draw_sensor(generator: np.random.Generator, kind: str) -> SensorDraw:
+    """Draw a sensor of a kind: rate, unit, gains, cross-talk, noise, lag and drift."""
+    span = ranges()["sensor"]
+    known = _sensor(kind)
+    newtons = kind == "papillarray" or generator.random() < span["newtons"]
+    rate = round(log_uniform(generator, span["rate"]), 1)
+    scale = log_uniform(generator, span["scale"])
+    base = UskinParameters()
+    lags = (uniform(generator, span["lag_share"]), 0.5 * uniform(generator, span["lag_share"]))
+    drift = uniform(generator, span["drift"])
+    parameters = replace(
+        base,
+        spread=_SPREAD.get(kind, 2.8e-3),
+        gain_spread=uniform(generator, span["gain_spread"]),
+        cross_talk=uniform(generator, span["cross_talk"]),
+        counts_per_newton=tuple(scale * value for value in base.counts_per_newton),
+        limits=(2.5, 2.5, 12.0) if kind in ("anyskin", "papillarray") else base.limits,
+        lag_shares=lags,
+        lag_times=(uniform(generator, span["lag_time"]), 2.0),
+        thermal_counts=tuple(drift * scale * value for value in base.thermal_counts),
+        noise_counts=log_uniform(generator, span["noise"]) * base.noise_counts,
+    )
+    limits = None if newtons else known.limits
+    made = replace(known, rate=rate, unit="N" if newtons else "count", limits=limits)
+    return SensorDraw(made, parameters)
+
+
+def _sensor(kind: str) -> Sensor:
+    if kind != "grid-3x3":
+        return sensor(kind)
+    x, y = (grid.ravel() for grid in np.meshgrid([-1.0, 0, 1], [1.0, 0, -1]))
+    positions = 6e-3 * np.column_stack([x, y, np.zeros(9)])
+    return Sensor(
+        "grid-3x3", positions, np.tile(np.eye(3), (9, 1, 1)), np.array([0.0, 0.0, 1.0]), rate=100.0
+    )
+
+
+def draw_drives(generator: np.random.Generator) -> Drives:
+    """Draw the drives of a hand."""
+    span = ranges()["hand"]
+    return Drives(
+        stiffness=log_uniform(generator, span["drive_stiffness"]),
+        side_stiffness=log_uniform(generator, span["side_stiffness"]),
+        damping_ratio=uniform(generator, span["damping_ratio"]),
+        mass=uniform(generator, span["pad_mass"]),
+        noise=uniform(generator, span["drive_noise"]),
+        glitch_rate=uniform(generator, span["glitch_rate"]),
+        glitch_size=uniform(generator, span["glitch_size"]),
+    )
+
+
+def draw_skin(generator: np.random.Generator) -> Skin:
+    """Draw the stiffness of the skin."""
+    stiffness = log_uniform(generator, ranges()["hand"]["skin_stiffness"])
+    return Skin(stiffness=stiffness)
+
+
+def draw_object(generator: np.random.Generator, grip: float, n_opposite: int) -> Thing:
+    """Draw an object that the grip can hold: its friction holds three times its weight or more.
+
+    Args:
+        generator: of all that is drawn.
+        grip: of each finger opposite the thumb [N].
+        n_opposite: such fingers.
+    """
+    span = ranges()["object"]
+    static = uniform(generator, span["friction"])
+    largest = 2 * static * grip * n_opposite / (3 * 9.81)
+    low, high = span["mass"]
+    mass = log_uniform(generator, (low, max(min(high, largest), 1.01 * low)))
+    shape = str(generator.choice(list(SHAPES)))
+    wide, tall = uniform(generator, span["size"]), uniform(generator, span["height"])
+    other = float(np.clip(wide * generator.uniform(0.85, 1.2), *span["size"]))
+    sizes = {
+        "sphere": [wide],
+        "box": [wide, other, tall, 0.003],
+        "cylinder": [wide, tall, 0.003],
+        "capsule": [wide, max(tall, wide)],
+        "hexagon": [wide, tall, 0.003],
+        "frustum": [wide, other, tall, 0.003],
+    }
+    row = {
+        "shape": shape,
+        "size": sizes[shape],
+        "mass": mass,
+        "friction": [static, static * float(generator.uniform(0.7, 1.0))],
+        "texture": [log_uniform(generator, span["texture"]), float(generator.uniform(1e-3, 3e-3))],
+        "finger_height": 0.0,
+        "yaw": 0.0,
+    }
+    return make_thing(shape, row)
+
+
+def draw_layout(generator: np.random.Generator, kind: str, thing: Thing, n_pads: int) -> PadLayout:
+    """Place the pads round the object, at a height over its centre of mass.
+
+    Raises:
+        ValueError: a pad does not reach the object.
+    """
+    if kind == "uskin-curved":
+        surface, normal, point = curved_fingertip(), np.array([1.0, 0.0, 0.0]), np.array(PAD)
+    else:
+        known = _sensor(kind)
+        surface = flat_patch(known.positions, _PITCH.get(kind, 6e-3))
+        normal, point = np.array([0.0, 0.0, 1.0]), np.zeros(3)
+    room = max(thing.half_height - (0.012 if n_pads == 2 else 0.034), 0.0)
+    middle = float(thing.foot[2]) + thing.half_height
+    height = middle + room * uniform(generator, ranges()["object"]["off_centre"])
+    return pad_layout(surface, normal, point, n_pads, thing, height)
+
+
+def random_rotation(generator: np.random.Generator) -> Array:
+    """Draw a rotation matrix, uniformly."""
+    from scipy.spatial.transform import Rotation
+
+    return np.asarray(Rotation.random(random_state=generator).as_matrix())

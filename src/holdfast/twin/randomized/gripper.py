@@ -1,0 +1,348 @@
+"""A hand of two to four soft pads on compliant drives, and the object between them.
+
+Two opposite pads are a parallel gripper; with more, one pad (the thumb) faces the others. Every
+pad closes along a straight line on a drive of finite stiffness, and yields sideways. MuJoCo
+moves the bodies; skin and object meet in `holdfast.twin.contact`.
+"""
+
+from dataclasses import dataclass
+
+import mujoco
+import numpy as np
+
+from holdfast.compiled import compiled
+from holdfast.sensors.values import Array
+from holdfast.twin.contact import LOAD, SLIP, constants_of, new_contact, touch
+from holdfast.twin.hand import HandModel, object_xml
+from holdfast.twin.objects import Thing, distance_to
+from holdfast.twin.protocol import OPEN
+from holdfast.twin.randomized.palm import PalmMotion
+from holdfast.twin.skin import Skin
+from holdfast.twin.surface import Surface
+
+STEP_RATE = 1500.0
+"""Least rate of the physics [Hz]: stiff skins on light objects need more than soft fingertips."""
+N_AXES = 3
+"""Joints of a pad: along its closing line, and two across it."""
+
+
+@dataclass(frozen=True)
+class Drives:
+    """What moves the pads.
+
+    Attributes:
+        stiffness: of the closing drive [N/m].
+        side_stiffness: of a pad across its closing line [N/m].
+        damping_ratio: of both.
+        mass: of a pad [kg].
+        noise: of a drive's force, rms [N].
+        glitch_rate: jumps of a set-point per second [1/s].
+        glitch_size: standard deviation of a jump [m].
+    """
+
+    stiffness: float
+    side_stiffness: float
+    damping_ratio: float
+    mass: float
+    noise: float
+    glitch_rate: float
+    glitch_size: float
+
+    @property
+    def damping(self) -> float:
+        """Of the closing drive [N s/m]."""
+        return float(2 * self.damping_ratio * np.sqrt(self.stiffness * self.mass))
+
+
+@dataclass(frozen=True)
+class PadLayout:
+    """Where the pads are around an object.
+
+    Attributes:
+        surface: the skin of a pad, in the fingertip frame.
+        contact_point: (3,) the point of the skin that meets the object, in that frame [m].
+        frames: (n, 3, 3) from the fingertip frames to the palm's, with the pads' normals towards
+            the object.
+        points: (n, 3) where each pad meets the object, in the palm frame [m].
+        outward: (n, 3) from the object to each pad.
+    """
+
+    surface: Surface
+    contact_point: Array
+    frames: Array
+    points: Array
+    outward: Array
+
+    @property
+    def n_pads(self) -> int:
+        """Number of pads."""
+        return len(self.points)
+
+
+def flat_patch(positions: Array, pitch: float) -> Surface:
+    """Make the skin of a flat patch of taxels: a grid of nodes that goes half a pitch beyond.
+
+    Args:
+        positions: (n_taxels, 3) of the taxels, normal along z [m].
+        pitch: between neighbouring taxels [m].
+    """
+    low, high = positions.min(axis=0)[:2] - pitch / 2, positions.max(axis=0)[:2] + pitch / 2
+    counts = np.clip(np.rint((high - low) / 0.0028).astype(int), 5, 13)
+    axes = [
+        low[k] + (np.arange(counts[k]) + 0.5) * (high[k] - low[k]) / counts[k] for k in range(2)
+    ]
+    x, y = (grid.ravel() for grid in np.meshgrid(*axes, indexing="ij"))
+    nodes = np.column_stack([x, y, np.zeros(len(x))])
+    area = float(np.prod((high - low) / counts))
+    normals = np.tile([0.0, 0.0, 1.0], (len(nodes), 1))
+    return Surface(nodes, normals, np.full(len(nodes), area))
+
+
+def pad_layout(
+    surface: Surface, normal: Array, contact_point: Array, n_pads: int, thing: Thing, height: float
+) -> PadLayout:
+    """Place pads around an object whose middle axis is z: a thumb at +x, the others at -x.
+
+    Args:
+        surface: the skin of a pad.
+        normal: (3,) of the skin, in the fingertip frame.
+        contact_point: (3,) the point of the skin that meets the object, in that frame [m].
+        n_pads: two to four.
+        thing: the object.
+        height: of the grip over the centre of mass [m].
+
+    Raises:
+        ValueError: a pad does not reach the object there.
+    """
+    spread = {2: [0.0], 3: [0.013, -0.013], 4: [0.024, 0.0, -0.024]}[n_pads]
+    sides = np.array([1.0, *[-1.0] * len(spread)])
+    heights = height + np.array([0.0, *spread])
+    outward = sides[:, None] * [1.0, 0.0, 0.0]
+    reach = np.array([_reach(thing, *pair) for pair in zip(outward, heights, strict=True)])
+    points = outward * reach[:, None] + heights[:, None] * [0.0, 0.0, 1.0]
+    frames = np.array([_frame(normal, -out) for out in outward])
+    return PadLayout(surface, contact_point, frames, points, outward)
+
+
+def _frame(normal: Array, inward: Array) -> Array:
+    """Rotation that turns the skin's normal inward, and the finger's long axis up or level."""
+    across = np.array([0.0, 1.0, 0.0])
+    third = np.cross(inward, across)
+    if normal[2] > 0.5:  # a flat patch: normal along z
+        return np.column_stack([across, np.cross(inward, across), inward])
+    return np.column_stack([inward, np.cross(across, inward), across])  # curved: normal along x
+
+
+def _reach(thing: Thing, outward: Array, height: float) -> float:
+    """Distance from the object's axis to its surface along a direction, at a height [m]."""
+    distances = np.linspace(0.0, 0.09, 901)
+    points = distances[:, None] * outward + [0.0, 0.0, height]
+    inside = np.flatnonzero(distance_to(thing, points) < 0)
+    if not len(inside):
+        raise ValueError(
+            f"the pad at {1e3 * height:.0f} mm does not reach the object {thing.name!r}"
+        )
+    return float(distances[inside[-1]])
+
+
+def gripper_model(layout: PadLayout, thing: Thing, drives: Drives, timestep: float) -> HandModel:
+    """Build the pads and the object for MuJoCo, in the palm frame."""
+    bodies = "".join(_pad_xml(layout, i, drives) for i in range(layout.n_pads))
+    model = mujoco.MjModel.from_xml_string(f"""<mujoco model="gripper">
+  <compiler angle="radian"/>
+  <option timestep="{timestep!r}" integrator="implicitfast" gravity="0 0 0"/>
+  <default><geom contype="0" conaffinity="0"/></default>
+  <worldbody>{bodies}{object_xml(thing)}</worldbody>
+</mujoco>""")
+    tips = np.array([model.body(f"pad{i}").id for i in range(layout.n_pads)])
+    mounts = np.zeros((layout.n_pads, 3))
+    return HandModel(model, mujoco.MjData(model), tips, model.body("object").id, mounts)
+
+
+def _pad_xml(layout: PadLayout, i: int, drives: Drives) -> str:
+    frame = layout.frames[i]
+    place = layout.points[i] + OPEN * layout.outward[i] - frame @ layout.contact_point
+    quaternion = np.empty(4)
+    mujoco.mju_mat2Quat(quaternion, np.ascontiguousarray(frame).ravel())
+    axes = [frame.T @ -layout.outward[i]]
+    axes.append(np.roll(axes[0], 1) if abs(axes[0]).max() > 0.99 else np.eye(3)[0])
+    axes.append(np.cross(axes[0], axes[1]))
+    damping = 2 * drives.damping_ratio * np.sqrt(drives.side_stiffness * drives.mass)
+    sides = "".join(
+        f'<joint type="slide" axis="{_text(axis)}" stiffness="{drives.side_stiffness:.9g}" '
+        f'damping="{damping:.9g}"/>'
+        for axis in axes[1:]
+    )
+    return (
+        f'<body name="pad{i}" pos="{_text(place)}" quat="{_text(quaternion)}">'
+        f'<joint type="slide" axis="{_text(axes[0])}"/>{sides}'
+        f'<geom type="box" size=".012 .012 .004" mass="{drives.mass:.9g}"/></body>'
+    )
+
+
+def _text(values: Array) -> str:
+    return " ".join(f"{value:.12g}" for value in values)
+
+
+class GripperWorld:
+    """One object between the pads, stepped sample by sample.
+
+    Args:
+        layout: of the pads.
+        thing: the object.
+        drives: of the pads.
+        skin: of the pads.
+        generator: of noise and glitches.
+        rate: samples per second [Hz].
+
+    Attributes:
+        contact: state of the contact.
+        bodies: (n_pads + 1, 18) pads and object, in the palm frame.
+        outside: (6,) force and torque of the operator on the object.
+        set_point_error: largest jump of a set-point during the last sample [m].
+        friction_scale: factor on the friction of the object.
+    """
+
+    def __init__(
+        self,
+        layout: PadLayout,
+        thing: Thing,
+        drives: Drives,
+        skin: Skin,
+        generator: np.random.Generator,
+        rate: float,
+    ) -> None:
+        self.layout, self.thing, self.drives = layout, thing, drives
+        self.n_substeps = max(1, int(np.ceil(STEP_RATE / rate)))
+        self.timestep = 1 / (rate * self.n_substeps)
+        self.hand = gripper_model(layout, thing, drives, self.timestep)
+        self.contact = new_contact(layout.surface, layout.n_pads)
+        self.constants = constants_of(layout.surface, thing, skin)
+        self.bodies = np.zeros((layout.n_pads + 1, 18))
+        self.outside = np.zeros(6)
+        self.set_point_error = 0.0
+        self.friction_scale = 1.0
+        self._friction = self.constants.solid.copy()
+        self._generator = generator
+        self._wrench = np.zeros(6)
+        self._jump = np.zeros(layout.n_pads)
+        self._jump_until = -1.0
+        self.time = 0.0
+        mujoco.mj_forward(self.hand.model, self.hand.data)
+        self.hand.bodies(self.bodies)
+
+    @property
+    def loads(self) -> Array:
+        """(n_pads,) pressing force of each pad [N]."""
+        return self.contact.tips[:, LOAD]
+
+    @property
+    def slip(self) -> float:
+        """Largest slip speed of a pad that presses [m/s]."""
+        return float(np.where(self.loads > 0, self.contact.tips[:, SLIP], 0.0).max())
+
+    def advance(
+        self, travels: Array, operator: "OperatorForce", palm: PalmMotion, row: float
+    ) -> None:
+        """Step the physics by one sample.
+
+        Args:
+            travels: (n_pads,) set-points of the closing drives [m].
+            operator: fills the force of the operator on the object.
+            palm: motion of the palm.
+            row: time since the lock [s]; negative before.
+        """
+        model, data = self.hand.model, self.hand.data
+        self._scale_friction()
+        self._draw_glitch()
+        noise = self.drives.noise * self._generator.standard_normal(self.layout.n_pads)
+        self.set_point_error = float(np.abs(self._jump).max())
+        for k in range(self.n_substeps):
+            at = palm.at(row + k * self.timestep)
+            model.opt.gravity[:] = palm.gravity[at]
+            mujoco.mj_step1(model, data)
+            self.hand.bodies(self.bodies)
+            touch(self.contact, self.constants, self.bodies, self.timestep)
+            operator.fill(self.bodies[-1], self.outside, k * self.timestep)
+            _on_object(
+                self.contact.wrench, self.outside, self.bodies[-1], self.thing.inertia,
+                self.thing.mass, palm.spin[at], palm.turn[at], self._wrench,
+            )  # fmt: skip
+            self.hand.apply(self.contact.tips, self._wrench, self.bodies)
+            _drive(
+                data.qpos, data.qvel, travels, self._jump, noise, self.drives.stiffness,
+                self.drives.damping, data.qfrc_applied,
+            )  # fmt: skip
+            mujoco.mj_step2(model, data)
+        self.time += self.n_substeps * self.timestep
+
+    def _scale_friction(self) -> None:
+        from holdfast.twin.shapes import MU_KINETIC, MU_STATIC
+
+        for place in (MU_STATIC, MU_KINETIC):
+            self.constants.solid[place] = self.friction_scale * self._friction[place]
+
+    def _draw_glitch(self) -> None:
+        if self.time >= self._jump_until:
+            self._jump[:] = 0.0
+        period = self.n_substeps * self.timestep
+        if self._generator.random() < self.drives.glitch_rate * period:
+            pad = int(self._generator.integers(self.layout.n_pads))
+            self._jump[pad] = self._generator.normal(0.0, self.drives.glitch_size)
+            self._jump_until = self.time + self._generator.uniform(0.006, 0.020)
+
+
+class OperatorForce:
+    """Force and torque of the operator on the object; none, in this base."""
+
+    def fill(self, body: Array, out: Array, ahead: float) -> None:
+        """Fill (6,) force and torque about the centre of mass, in the palm frame.
+
+        Args:
+            body: (18,) the object.
+            out: (6,) is filled.
+            ahead: time since the sample began [s].
+        """
+        out[:] = 0.0
+
+
+@compiled
+def _on_object(
+    fingers: Array,
+    outside: Array,
+    body: Array,
+    inertia: Array,
+    mass: float,
+    spin: Array,
+    turn: Array,
+    out: Array,
+) -> None:
+    """Sum fingers, operator and the inertia of a turning frame: -m(2 w x v), -I dw/dt."""
+    for k in range(6):
+        out[k] = fingers[k] + outside[k]
+    vx, vy, vz = body[12], body[13], body[14]
+    out[0] -= 2 * mass * (spin[1] * vz - spin[2] * vy)
+    out[1] -= 2 * mass * (spin[2] * vx - spin[0] * vz)
+    out[2] -= 2 * mass * (spin[0] * vy - spin[1] * vx)
+    for r in range(3):  # I = R diag R^T
+        for c in range(3):
+            about = 0.0
+            for k in range(3):
+                about += body[3 + 3 * r + k] * inertia[k] * body[3 + 3 * c + k]
+            out[3 + r] -= about * turn[c]
+
+
+@compiled
+def _drive(
+    place: Array,
+    speed: Array,
+    travels: Array,
+    jump: Array,
+    noise: Array,
+    stiffness: float,
+    damping: float,
+    out: Array,
+) -> None:
+    for i in range(len(travels)):
+        j = N_AXES * i
+        out[j] = stiffness * (travels[i] + jump[i] - place[j]) - damping * speed[j] + noise[i]

@@ -1,0 +1,339 @@
+"""From a seed and a number to a recording of a randomized hand, with exact truth."""
+
+import zlib
+from dataclasses import dataclass, replace
+
+import msgspec
+import numpy as np
+
+from holdfast.contact import Phase
+from holdfast.recordings import Recording, Tactile, Truth
+from holdfast.sensors.values import Array
+from holdfast.twin.contact import SHARE, SLIP
+from holdfast.twin.hand import FINGERS
+from holdfast.twin.labels import LabelRule, labels_from_truth
+from holdfast.twin.operator import draw_tremor, hold_wrench
+from holdfast.twin.profile import profile
+from holdfast.twin.protocol import OPEN, THUMB_SHARE, Command, Plan, Protocol
+from holdfast.twin.randomized.drawing import (
+    SENSOR_KINDS,
+    SensorDraw,
+    draw_drives,
+    draw_layout,
+    draw_object,
+    draw_sensor,
+    draw_skin,
+    log_uniform,
+    random_rotation,
+    ranges,
+    uniform,
+)
+from holdfast.twin.randomized.gripper import GripperWorld, OperatorForce
+from holdfast.twin.randomized.palm import palm_motion
+from holdfast.twin.randomized.scenario import Scenario, draw_events
+from holdfast.twin.uskin import Uskin, with_server_effects
+
+MAX_TRIES = 12
+"""Draws of an object and a place of the pads until the pads reach it."""
+MAX_SECONDS = 45.0
+"""Longest recording [s]."""
+ATTEMPTS = 6
+"""A hold that fails at once is drawn again, this often at the most."""
+SHORTEST_HOLD = 2.5
+"""A hold that ends sooner after the lock than this has failed at once [s]."""
+WATCHED_AFTER_LOSS = 1.5
+"""A recording goes on for so long after the object was lost [s]."""
+
+
+@dataclass(frozen=True)
+class RandomHold:
+    """Which recording of a randomized hand.
+
+    Attributes:
+        number: from 0 on; every number is another hand, sensor, object and hold.
+        seed: of all.
+        kind: of the sensor; None draws it.
+        attempt: from 0 on; a hold that fails at once is drawn again.
+    """
+
+    number: int
+    seed: int = 0
+    kind: str | None = None
+    attempt: int = 0
+
+    @property
+    def name(self) -> str:
+        """Name of its recording."""
+        return f"hand{self.number:04d}"
+
+    def generator(self, part: str) -> np.random.Generator:
+        """Make the random numbers of one part; parts do not disturb each other."""
+        key = zlib.crc32(f"{self.number}/{self.attempt}/{part}".encode())
+        return np.random.default_rng([self.seed, key])
+
+
+def simulate_random(hold: RandomHold) -> Recording:
+    """Simulate one hold of a randomized hand.
+
+    Returns:
+        Readings of two to four pads, with truth and labels. The metadata say what was drawn.
+    """
+    for attempt in range(ATTEMPTS):
+        run = _run(replace(hold, attempt=attempt))
+        run.play()
+        if run.held_for >= SHORTEST_HOLD:
+            break
+    return run.recording()
+
+
+def _run(hold: RandomHold) -> "_Run":
+    """Draw a hold.
+
+    Raises:
+        ValueError: no object that was drawn fits the hand.
+    """
+    generator = hold.generator("hand")
+    span = ranges()
+    kind = hold.kind or str(generator.choice(SENSOR_KINDS))
+    drawn = draw_sensor(hold.generator("sensor"), kind)
+    n_pads = int(generator.choice(span["hand"]["pads"]))
+    grip = log_uniform(generator, span["hand"]["grip"])
+    for _ in range(MAX_TRIES):
+        thing = draw_object(generator, grip, n_pads - 1)
+        try:
+            layout = draw_layout(generator, kind, thing, n_pads)
+            break
+        except ValueError:
+            continue
+    else:
+        raise ValueError(f"no object of {MAX_TRIES} fits the hand {hold.number}")
+    drives, skin = draw_drives(generator), draw_skin(generator)
+    world = GripperWorld(layout, thing, drives, skin, hold.generator("world"), drawn.sensor.rate)
+    return _Run(hold, world, _plan(generator, grip, n_pads), drawn)
+
+
+def _plan(generator: np.random.Generator, grip: float, n_pads: int) -> Plan:
+    span = ranges()
+    events = span["events"]
+    chosen = msgspec.structs.replace(
+        profile("reference"),
+        name="randomized",
+        hold=uniform(generator, events["hold"]),
+        grip=grip,
+    )
+    grips = grip * np.array([THUMB_SHARE * (n_pads - 1), *[1.0] * (n_pads - 1)])
+    return Plan(
+        profile=chosen,
+        grips=grips,
+        speed=uniform(generator, span["hand"]["closing_speed"]),
+        before=uniform(generator, events["idle"]),
+        after=uniform(generator, events["idle"]),
+        pushes=(),
+    )
+
+
+class _Run:
+    """One hold as it is simulated, sample by sample."""
+
+    def __init__(self, hold: RandomHold, world: GripperWorld, plan: Plan, drawn: SensorDraw):
+        generator = hold.generator("scenario")
+        span = ranges()
+        self.hold, self.world, self.plan, self.drawn = hold, world, plan, drawn
+        self.period = 1 / drawn.sensor.rate
+        self.protocol = Protocol(plan, self.period)
+        tremors = np.stack([draw_tremor(generator), draw_tremor(generator)])
+        self.events = draw_events(generator, span["events"], span["arm"], plan.profile.hold)
+        self.scenario = Scenario(self.events, tremors, plan.profile.tremor)
+        segments = [event.segment for event in self.events if event.segment is not None]
+        vibration = log_uniform(generator, span["arm"]["vibration"])
+        orientation = random_rotation(generator)
+        self.palm = palm_motion(
+            generator, segments, orientation, vibration, plan.profile.hold + 1.0
+        )
+        self.holder = _Holder(world, self.scenario, tremors[0], plan.profile.tremor)
+        uskin = hold.generator("skin")
+        nodes = world.layout.surface.nodes
+        self.skins = [
+            Uskin(drawn.parameters, drawn.sensor, nodes, uskin) for _ in range(world.layout.n_pads)
+        ]
+        self._phase: list[str] = []
+        self._rows: dict[str, list[Array]] = {
+            key: [] for key in ("outside_force", "object_pose", "set_point_error", "gravity")
+        }
+        self._tips: list[Array] = []
+        self._forces: list[list[Array]] = [[] for _ in self.skins]
+
+    def play(self) -> None:
+        """Simulate until the object is released, or lost and watched for a while."""
+        touch_depths: Array | None = None
+        k = 0
+        while True:
+            time = k * self.period
+            body = self.world.bodies[-1]
+            command = self.protocol.command(time, self.world.loads, self.world.slip, body)
+            since = -1.0
+            if self.protocol.locked_at is not None:
+                since = time - self.protocol.locked_at
+                if touch_depths is None:
+                    touch_depths = self._touch_depths(command)
+                    self.scenario.spare = self._spare()
+                holding = self.protocol.lost_at is None and command.phase is not Phase.RELEASED
+                if holding and since < self.plan.profile.hold:
+                    self.scenario.step(since, self.world.slip, body[15:18], body, self.period)
+                    self.scenario.set_down(self.palm.gravity[self.palm.at(since)])
+            self._advance(command, since, touch_depths)
+            self._log(command)
+            k += 1
+            lost_at = self.protocol.lost_at
+            lost = lost_at is not None and time > lost_at + WATCHED_AFTER_LOSS
+            if self.protocol.over(time) or lost or time > MAX_SECONDS:
+                return
+
+    def _advance(self, command: Command, since: float, touch_depths: Array | None) -> None:
+        travels = OPEN - command.depths
+        if touch_depths is not None and command.phase is Phase.LOCKED:
+            pressed = travels - (OPEN - touch_depths)
+            travels = OPEN - touch_depths + self.scenario.grip_scale * pressed
+        self.world.friction_scale = self.scenario.friction_scale
+        self.holder.command(command, self.protocol.anchor, since, self.world.time)
+        self.world.advance(travels, self.holder, self.palm, since)
+
+    def _touch_depths(self, command: Command) -> Array:
+        """Depths at which each drive, alone, would just hold its load: where the grip begins."""
+        return command.depths + self.world.loads / self.world.drives.stiffness
+
+    def _spare(self) -> float:
+        thing = self.world.thing
+        limit = float(thing.mu_static * self.world.loads.sum())
+        return max(limit - 9.81 * thing.mass, 0.0)
+
+    def _log(self, command: Command) -> None:
+        world = self.world
+        self._phase.append(command.phase)
+        acting = self.scenario.acting or command.hold > 0
+        self._rows["outside_force"].append(world.outside[:3].copy() * acting)
+        if self.scenario.acting and np.linalg.norm(world.outside[3:]) > 0.002:
+            self._rows["outside_force"][-1] += 0.06 * np.array([0.0, 0.0, 1.0])
+        data = world.hand.data
+        pose = np.concatenate([world.bodies[-1, :3], data.qpos[-4:]])
+        self._rows["object_pose"].append(pose)
+        self._rows["set_point_error"].append(np.array(world.set_point_error))
+        self._rows["gravity"].append(world.hand.model.opt.gravity.copy())
+        self._tips.append(world.contact.tips.copy())
+        for pile, skin, forces in zip(
+            self._forces, self.skins, world.contact.node_forces, strict=True
+        ):
+            pile.append(skin.taxel_forces(forces[None])[0])
+
+    @property
+    def held_for(self) -> float:
+        """How long the object was held [s]."""
+        locked_at, lost_at = self.protocol.locked_at, self.protocol.lost_at
+        if locked_at is None:
+            return 0.0
+        return (len(self._phase) * self.period if lost_at is None else lost_at) - locked_at
+
+    def recording(self) -> Recording:
+        """Make the recording of what was simulated."""
+        times = np.arange(len(self._phase)) * self.period
+        fingers = FINGERS[: self.world.layout.n_pads]
+        truth = self._truth(times, fingers)
+        generator = self.hold.generator("readout")
+        modules: dict[str, Tactile] = {}
+        server = generator.random() < ranges()["sensor"]["server"]
+        for finger, skin, pile in zip(fingers, self.skins, self._forces, strict=True):
+            readings, stamps = _readings(skin, np.array(pile), times, generator), times
+            if server:
+                stamps, readings = with_server_effects(
+                    times, readings, generator, jitter=0.1 * self.period
+                )
+            labels = labels_from_truth(truth, finger, LabelRule(margin=0.0))
+            modules[finger] = Tactile(skin.sensor, stamps, readings, skin.sensor.unit, labels)
+        whole = Recording(self.hold.name, modules, self._metadata(), truth)
+        return self._cut(whole, generator)
+
+    def _cut(self, whole: Recording, generator: np.random.Generator) -> Recording:
+        """Cut the beginning off half of the recordings, so that they begin in contact."""
+        loaded = generator.random() < ranges()["sensor"]["loaded_start"]
+        locked_at = self.protocol.locked_at
+        if not loaded or locked_at is None:
+            return whole
+        start = locked_at + float(generator.uniform(0.3, 2.0))
+        modules = {
+            name: module.slice(int(np.searchsorted(module.times, start)), module.n_samples)
+            for name, module in whole.modules.items()
+        }
+        return Recording(whole.name, modules, {**whole.metadata, "starts_loaded": True})
+
+    def _truth(self, times: Array, fingers: tuple[str, ...]) -> Truth:
+        tips = np.array(self._tips)
+        of_fingers = {
+            finger: {
+                "contact_force": -tips[:, place, :3],
+                "slip_speed": tips[:, place, SLIP],
+                "slipping_share": tips[:, place, SHARE],
+            }
+            for place, finger in enumerate(fingers)
+        }
+        hand = {name: np.array(rows) for name, rows in self._rows.items()}
+        return Truth(times, {"phase": np.array(self._phase, dtype=str), **hand}, of_fingers)
+
+    def _metadata(self) -> dict[str, object]:
+        thing = self.world.thing
+        return {
+            "object": thing.shape,
+            "object_mass": thing.mass,
+            "friction": thing.mu_static,
+            "sensor_kind": self.drawn.sensor.name,
+            "n_pads": self.world.layout.n_pads,
+            "grip": self.plan.profile.grip,
+            "events": [event.kind for event in self.events],
+            "case": "failed" if self.protocol.failed else "random",
+            "profile": "randomized",
+            "seed": self.hold.seed,
+            "hand": f"random-{self.hold.number}",
+            "source": "twin",
+            "locked_at": self.protocol.locked_at,
+            "lost_at": self.protocol.lost_at,
+        }
+
+
+class _Holder(OperatorForce):
+    """The operator: holds the object until the lock and after the hold, else acts by events."""
+
+    def __init__(self, world: GripperWorld, scenario: Scenario, tremor: Array, rms: float) -> None:
+        self._weight_of = world.thing.mass
+        self._world = world
+        self._scenario = scenario
+        self._tremor, self._rms = tremor, rms
+        self._hold, self._time, self._since = 1.0, 0.0, -1.0
+        self._anchor = np.zeros(12)
+
+    def command(self, command: Command, anchor: Array, since: float, time: float) -> None:
+        """Take what to do during the next sample."""
+        self._hold, self._since, self._time = command.hold, since, time
+        self._anchor = anchor
+
+    def fill(self, body: Array, out: Array, ahead: float) -> None:
+        """Fill the force and torque on the object: see `OperatorForce`."""
+        if self._since >= 0:
+            self._scenario.fill(body, out, ahead)
+        else:
+            out[:] = 0.0
+        if self._hold > 0:
+            held = hold_wrench(
+                body, self._anchor, self._hold, 0.0, self._tremor, self._rms, self._time + ahead
+            )
+            out += held
+            gravity = self._world.hand.model.opt.gravity
+            out[:3] -= self._hold * self._weight_of * gravity
+
+
+def _readings(skin: Uskin, forces: Array, times: Array, generator: np.random.Generator) -> Array:
+    """Compute what the sensor sends: counts, or newtons with the model's calibration."""
+    counts = skin.counts(forces, times, generator)
+    if skin.sensor.unit == "count":
+        return counts
+    parameters = skin.parameters
+    newtons = (counts.astype(np.float64) - parameters.baseline) / parameters.counts_per_newton
+    return np.asarray(newtons.astype(np.float32))
