@@ -22,6 +22,8 @@ from holdfast.twin.surface import Surface
 
 STEP_RATE = 1500.0
 """Least rate of the physics [Hz]: stiff skins on light objects need more than soft fingertips."""
+MAX_TURN_CHANGE = 0.3
+"""Largest change of the object's angular velocity by the operator in a step [rad/s]."""
 N_AXES = 3
 """Joints of a pad: along its closing line, and two across it."""
 
@@ -213,7 +215,7 @@ class GripperWorld:
         rate: float,
     ) -> None:
         self.layout, self.thing, self.drives = layout, thing, drives
-        self.n_substeps = max(1, int(np.ceil(STEP_RATE / rate)))
+        self.n_substeps = max(1, int(np.ceil(_step_rate(layout, thing, drives, skin) / rate)))
         self.timestep = 1 / (rate * self.n_substeps)
         self.hand = gripper_model(layout, thing, drives, self.timestep)
         self.contact = new_contact(layout.surface, layout.n_pads)
@@ -241,6 +243,13 @@ class GripperWorld:
         """Largest slip speed of a pad that presses [m/s]."""
         return float(np.where(self.loads > 0, self.contact.tips[:, SLIP], 0.0).max())
 
+    @property
+    def unstable(self) -> bool:
+        """Whether the physics diverged."""
+        kinds = mujoco.mjtWarning
+        diverged = (kinds.mjWARN_BADQACC, kinds.mjWARN_BADQPOS, kinds.mjWARN_BADQVEL)
+        return any(self.hand.data.warning[kind].number > 0 for kind in diverged)
+
     def advance(
         self, travels: Array, operator: "OperatorForce", palm: PalmMotion, row: float
     ) -> None:
@@ -264,6 +273,7 @@ class GripperWorld:
             self.hand.bodies(self.bodies)
             touch(self.contact, self.constants, self.bodies, self.timestep)
             operator.fill(self.bodies[-1], self.outside, k * self.timestep)
+            self._limit_torque()
             _on_object(
                 self.contact.wrench, self.outside, self.bodies[-1], self.thing.inertia,
                 self.thing.mass, palm.spin[at], palm.turn[at], self._wrench,
@@ -275,6 +285,17 @@ class GripperWorld:
             )  # fmt: skip
             mujoco.mj_step2(model, data)
         self.time += self.n_substeps * self.timestep
+
+    def _limit_torque(self) -> None:
+        """Keep the operator's torque below what would turn the object too fast for a step.
+
+        The damping of a hand is stiff beside the inertia of a small object.
+        """
+        spin = float(np.linalg.norm(self.bodies[-1, 15:18]))
+        largest = float(self.thing.inertia.min()) * (MAX_TURN_CHANGE + 0.5 * spin) / self.timestep
+        torque = float(np.linalg.norm(self.outside[3:]))
+        if torque > largest:
+            self.outside[3:] *= largest / torque
 
     def _scale_friction(self) -> None:
         from holdfast.twin.shapes import MU_KINETIC, MU_STATIC
@@ -290,6 +311,17 @@ class GripperWorld:
             pad = int(self._generator.integers(self.layout.n_pads))
             self._jump[pad] = self._generator.normal(0.0, self.drives.glitch_size)
             self._jump_until = self.time + self._generator.uniform(0.006, 0.020)
+
+
+def _step_rate(layout: PadLayout, thing: Thing, drives: Drives, skin: Skin) -> float:
+    """Return the rate that the stiffest contact on the lightest body needs [Hz].
+
+    All pads press on the object with their skin, or with 2 cm^2 of it where it is larger.
+    """
+    area = min(float(layout.surface.areas.sum()), 2e-4)
+    stiffness = layout.n_pads * skin.stiffness * area
+    fastest = np.sqrt(stiffness / min(thing.mass, drives.mass))  # [rad/s]
+    return float(max(STEP_RATE, 1.2 * fastest))
 
 
 class OperatorForce:

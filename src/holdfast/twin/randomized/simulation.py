@@ -81,7 +81,7 @@ def simulate_random(hold: RandomHold) -> Recording:
     for attempt in range(ATTEMPTS):
         run = _run(replace(hold, attempt=attempt))
         run.play()
-        if run.held_for >= SHORTEST_HOLD:
+        if run.held_for >= SHORTEST_HOLD and not run.world.unstable:
             break
     return run.recording()
 
