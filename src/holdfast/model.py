@@ -22,6 +22,10 @@ from holdfast.sensors.types import ROTATION_TOLERANCE
 SCHEMA = "holdfast.model/1"
 ANY_FINGER = "*"
 """Name in place of a finger, for a model of any finger."""
+EXACT_RATE = 0.05
+"""Tolerance of a measured rate beside a nominal one, as a share of it."""
+RELATIVE_RATES = (30.0, 500.0)
+"""Rates for which relative features are made [Hz]."""
 RATE_TOLERANCE = 0.2
 """A source whose rate differs less from the model's, as a share of it, is not resampled."""
 
@@ -227,13 +231,25 @@ class Model(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=Tru
         }
 
     def plan(self, sensors: Mapping[str, Sensor], source_rate: float) -> StreamPlan:
-        """Return the plan of the feature stream of some fingers, for a source of a rate [Hz]."""
+        """Return the plan of the feature stream of some fingers, for a source of a rate [Hz].
+
+        Raises:
+            ModelError: the features are relative, and the rate is outside `RELATIVE_RATES`.
+        """
+        relative = any(spec.seconds for name in sensors for spec in self.finger(name).features)
+        low, high = RELATIVE_RATES
+        rate = self.rate or source_rate
+        if relative and not low * (1 - EXACT_RATE) <= rate <= high * (1 + EXACT_RATE):
+            raise ModelError(
+                f"{rate:.4g} Hz given, the model expects {low:g} to {high:g} Hz; resample the "
+                "recording, or set the sensor to another rate"
+            )
         return StreamPlan(
             sensors=sensors,
             features={name: self.finger(name).features for name in sensors},
             window=self.window,
             tare=Tare.parse(self.tare),
-            rate=self.rate or source_rate,
+            rate=rate,
         )
 
     def rate_fits(self, rate: float) -> bool:
@@ -313,6 +329,13 @@ def _twin() -> Model:
     return msgspec.structs.replace(model, name="builtin:twin")
 
 
+def _any() -> Model:
+    """Return the model of any hand, trained on randomized hands of the twin."""
+    data = (resources.files("holdfast") / "models" / "any.json").read_bytes()
+    model = msgspec.json.decode(data, type=Model, dec_hook=_decode)
+    return msgspec.structs.replace(model, name="builtin:any")
+
+
 def _noise_floor() -> Model:
     """Return a model without training: stable while sigma is under three times the noise.
 
@@ -331,7 +354,7 @@ def _noise_floor() -> Model:
     return Model(name="builtin:noise-floor", fingers={ANY_FINGER: finger})
 
 
-BUILT_IN = {"builtin:twin": _twin, "builtin:noise-floor": _noise_floor}
+BUILT_IN = {"builtin:any": _any, "builtin:twin": _twin, "builtin:noise-floor": _noise_floor}
 
 
 def _check_sensors(data: bytes) -> None:

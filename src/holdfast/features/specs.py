@@ -95,7 +95,8 @@ class FeatureSpec(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
             )
         if (self.kind in RELATIVE_KINDS) != (self.seconds > 0):
             raise ValueError(
-                f"{self.kind} with a lag of {self.seconds} s given; only relative kinds have one"
+                f"a lag above 0 s expected for relative kinds alone; {self.kind} with "
+                f"{self.seconds:g} s given"
             )
         if self.kind in WINDOWED:
             check_window(self.window)

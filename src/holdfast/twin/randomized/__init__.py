@@ -1,0 +1,1 @@
+"""Randomized hands: sensors, grippers, objects and arm motions drawn from wide ranges."""

@@ -1,6 +1,5 @@
 """A hand, a sensor, an object and a hold, drawn from ranges: what one recording is made from."""
 
-import math
 import tomllib
 from dataclasses import dataclass, replace
 from functools import cache
@@ -10,13 +9,13 @@ from typing import Any
 import numpy as np
 
 from holdfast.sensors import Sensor, sensor
-from holdfast.sensors.values import Array
+from holdfast.sensors.types import Array
 from holdfast.twin.objects import SHAPES, Thing, make_thing
 from holdfast.twin.randomized.gripper import Drives, PadLayout, flat_patch, pad_layout
-from holdfast.twin.randomized.palm import Span
+from holdfast.twin.randomized.palm import log_uniform, uniform
 from holdfast.twin.skin import Skin
 from holdfast.twin.surface import curved_fingertip
-from holdfast.twin.uskin_parameters import UskinParameters
+from holdfast.twin.uskin_parameters import Three, UskinParameters
 
 PAD = (0.0261, 0.0, 0.016)
 """The middle of a curved fingertip's pad, in the fingertip frame [m]."""
@@ -49,16 +48,6 @@ def ranges() -> dict[str, dict[str, Any]]:
     return tomllib.loads(text)
 
 
-def uniform(generator: np.random.Generator, span: Span) -> float:
-    """Draw between the ends of a range."""
-    return float(generator.uniform(*span))
-
-
-def log_uniform(generator: np.random.Generator, span: Span) -> float:
-    """Draw between the ends of a range, evenly on a logarithmic scale."""
-    return float(math.exp(generator.uniform(math.log(span[0]), math.log(span[1]))))
-
-
 def draw_sensor(generator: np.random.Generator, kind: str) -> SensorDraw:
     """Draw a sensor of a kind: rate, unit, gains, cross-talk, noise, lag and drift."""
     span = ranges()["sensor"]
@@ -74,16 +63,21 @@ def draw_sensor(generator: np.random.Generator, kind: str) -> SensorDraw:
         spread=_SPREAD.get(kind, 2.8e-3),
         gain_spread=uniform(generator, span["gain_spread"]),
         cross_talk=uniform(generator, span["cross_talk"]),
-        counts_per_newton=tuple(scale * value for value in base.counts_per_newton),
+        counts_per_newton=_scaled(base.counts_per_newton, scale),
         limits=(2.5, 2.5, 12.0) if kind in ("anyskin", "papillarray") else base.limits,
         lag_shares=lags,
         lag_times=(uniform(generator, span["lag_time"]), 2.0),
-        thermal_counts=tuple(drift * scale * value for value in base.thermal_counts),
+        thermal_counts=_scaled(base.thermal_counts, drift * scale),
         noise_counts=log_uniform(generator, span["noise"]) * base.noise_counts,
     )
     limits = None if newtons else known.limits
     made = replace(known, rate=rate, unit="N" if newtons else "count", limits=limits)
     return SensorDraw(made, parameters)
+
+
+def _scaled(values: Three, factor: float) -> Three:
+    x, y, z = values
+    return factor * x, factor * y, factor * z
 
 
 def _sensor(kind: str) -> Sensor:

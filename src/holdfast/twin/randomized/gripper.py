@@ -11,12 +11,13 @@ import mujoco
 import numpy as np
 
 from holdfast.compiled import compiled
-from holdfast.sensors.values import Array
+from holdfast.sensors.types import Array
 from holdfast.twin.contact import LOAD, SLIP, constants_of, new_contact, touch
 from holdfast.twin.hand import HandModel, object_xml
 from holdfast.twin.objects import Thing, distance_to
 from holdfast.twin.protocol import OPEN
 from holdfast.twin.randomized.palm import PalmMotion
+from holdfast.twin.shapes import MU_KINETIC, MU_STATIC
 from holdfast.twin.skin import Skin
 from holdfast.twin.surface import Surface
 
@@ -129,7 +130,6 @@ def pad_layout(
 def _frame(normal: Array, inward: Array) -> Array:
     """Rotation that turns the skin's normal inward, and the finger's long axis up or level."""
     across = np.array([0.0, 1.0, 0.0])
-    third = np.cross(inward, across)
     if normal[2] > 0.5:  # a flat patch: normal along z
         return np.column_stack([across, np.cross(inward, across), inward])
     return np.column_stack([inward, np.cross(across, inward), across])  # curved: normal along x
@@ -298,8 +298,6 @@ class GripperWorld:
             self.outside[3:] *= largest / torque
 
     def _scale_friction(self) -> None:
-        from holdfast.twin.shapes import MU_KINETIC, MU_STATIC
-
         for place in (MU_STATIC, MU_KINETIC):
             self.constants.solid[place] = self.friction_scale * self._friction[place]
 

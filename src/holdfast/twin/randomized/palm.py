@@ -11,7 +11,7 @@ from typing import NamedTuple
 import numpy as np
 from scipy.spatial.transform import Rotation
 
-from holdfast.sensors.values import Array
+from holdfast.sensors.types import Array
 
 GRAVITY = 9.81
 """[m/s^2]"""
@@ -63,6 +63,16 @@ class Segment(NamedTuple):
     rate: float
 
 
+def uniform(generator: np.random.Generator, span: Span) -> float:
+    """Draw between the ends of a range."""
+    return float(generator.uniform(*span))
+
+
+def log_uniform(generator: np.random.Generator, span: Span) -> float:
+    """Draw between the ends of a range, evenly on a logarithmic scale."""
+    return float(math.exp(generator.uniform(math.log(span[0]), math.log(span[1]))))
+
+
 def draw_segment(
     generator: np.random.Generator, ranges: Mapping[str, Span], kind: str, start: float
 ) -> Segment:
@@ -76,13 +86,13 @@ def draw_segment(
     """
     direction = generator.standard_normal(3)
     direction /= np.linalg.norm(direction)
-    rate = float(generator.uniform(*ranges.get(f"{kind}_rate", (0.0, 0.0))))
+    rate = uniform(generator, ranges.get(f"{kind}_rate", (0.0, 0.0)))
     return Segment(
         kind,
         start,
-        float(generator.uniform(*ranges[f"{kind}_duration"])),
+        uniform(generator, ranges[f"{kind}_duration"]),
         direction,
-        float(generator.uniform(*ranges[f"{kind}_size"])),
+        uniform(generator, ranges[f"{kind}_size"]),
         rate,
     )
 

@@ -11,7 +11,7 @@ from typing import NamedTuple
 import numpy as np
 from scipy.spatial.transform import Rotation
 
-from holdfast.sensors.values import Array
+from holdfast.sensors.types import Array
 from holdfast.twin.operator import (
     HOLD_STIFFNESS,
     MOVE,
@@ -22,7 +22,7 @@ from holdfast.twin.operator import (
 )
 from holdfast.twin.randomized.gripper import OperatorForce
 from holdfast.twin.randomized.palm import KINDS as PALM_KINDS
-from holdfast.twin.randomized.palm import Segment, Span, draw_segment
+from holdfast.twin.randomized.palm import Segment, Span, draw_segment, log_uniform, uniform
 
 OPERATOR_KINDS = ("move", "push", "pull", "twist", "drag", "spin", "weight")
 """A person acts on the object: moves it to and fro, pushes it with a finger, pulls or twists it
@@ -38,6 +38,8 @@ RELEASE_TIME = 0.06
 """A force or torque that has made the object slide goes away in this time [s]."""
 RECOVERY_TIME = 0.08
 """A grip that was loosened, or a friction that fell, comes back in this time [s]."""
+WEIGHT_SETTLE_TIME = 0.5
+"""Time after a weight was added in which the operator still counts as acting [s]."""
 HAND_TIME = 0.15
 """Time in which a hand that drags or spins the object closes on it, and opens again [s]."""
 MAX_PULL, MAX_TWIST = 15.0, 0.4
@@ -97,13 +99,6 @@ def draw_events(
 def _draw_event(
     generator: np.random.Generator, ranges: dict[str, Span], arm: dict[str, Span], start: float
 ) -> Event:
-    def uniform(name: str) -> float:
-        return float(generator.uniform(*ranges[name]))
-
-    def log_uniform(name: str) -> float:
-        low, high = ranges[name]
-        return float(math.exp(generator.uniform(math.log(low), math.log(high))))
-
     kind = str(generator.choice(KINDS))
     if kind in PALM_KINDS:
         segment = draw_segment(generator, arm, kind, start)
@@ -111,35 +106,73 @@ def _draw_event(
     direction = generator.standard_normal(3)
     direction[0] *= 0.5  # mostly across the closing line
     direction /= np.linalg.norm(direction)
-    offset = generator.standard_normal(3)
-    offset *= uniform("pull_arm") / np.linalg.norm(offset)
-    distance = uniform("slip_distance")
+    if kind in GRIP_KINDS:
+        return _draw_grip_change(generator, ranges, kind, start)
     if kind in ("move", "push"):
         push = _draw_push(generator, kind, start, direction)
         return Event(kind, start, push.duration, push=push, direction=direction)
-    if kind == "pull":
-        rate = log_uniform("pull_rate")
-        longest = min(MAX_PULL / rate, LONGEST_EVENT)
-        return Event(kind, start, longest, 0.0, rate, distance, direction, offset)
+    if kind in ("drag", "spin"):
+        return _draw_drag(generator, ranges, kind, start, direction)
+    if kind == "weight":
+        duration = uniform(generator, ranges["weight_time"]) + WEIGHT_SETTLE_TIME
+        return Event(kind, start, duration, uniform(generator, ranges["weight_share"]))
+    return _draw_pull(generator, ranges, kind, start, direction)
+
+
+def _draw_grip_change(
+    generator: np.random.Generator, ranges: dict[str, Span], kind: str, start: float
+) -> Event:
+    distance = uniform(generator, ranges["slip_distance"])
+    if kind == "regrip":
+        duration = uniform(generator, ranges["regrip_time"])
+        return Event(kind, start, duration, uniform(generator, ranges["regrip_share"]))
+    if kind == "loosen":
+        rate = log_uniform(generator, ranges["loosen_rate"])
+        return Event(kind, start, LONGEST_EVENT, rate=rate, until=distance)
+    factor, fall = (
+        uniform(generator, ranges["slippery"]),
+        uniform(generator, ranges["slippery_time"]),
+    )
+    return Event(kind, start, LONGEST_EVENT / 2, factor, fall, distance)
+
+
+def _draw_drag(
+    generator: np.random.Generator,
+    ranges: dict[str, Span],
+    kind: str,
+    start: float,
+    direction: Array,
+) -> Event:
+    """Draw a hand that drags the object across the pads, or spins it about their line."""
+    speed = log_uniform(generator, ranges[f"{kind}_speed"])
+    way = uniform(generator, ranges[f"{kind}_way"])
+    direction[0] *= 0.3 if kind == "drag" else 4.0
+    direction /= np.linalg.norm(direction)
+    duration = min(way / speed, LONGEST_EVENT) + 2 * HAND_TIME
+    stiffness = uniform(generator, ranges["hand_stiffness"])
+    return Event(kind, start, duration, stiffness, speed, direction=direction)
+
+
+def _draw_pull(
+    generator: np.random.Generator,
+    ranges: dict[str, Span],
+    kind: str,
+    start: float,
+    direction: Array,
+) -> Event:
+    """Draw a force, or a torque about the line of the pads, that grows until the object slides."""
     if kind == "twist":
-        rate = log_uniform("twist_rate")
+        rate = log_uniform(generator, ranges["twist_rate"])
         axis = np.array([1.0, 0.0, 0.0]) + 0.15 * generator.standard_normal(3)
         axis *= generator.choice([-1.0, 1.0]) / np.linalg.norm(axis)
-        longest = min(MAX_TWIST / rate, LONGEST_EVENT)
-        return Event(kind, start, longest, 0.0, rate, uniform("slip_angle"), axis)
-    if kind in ("drag", "spin"):
-        speed, way = log_uniform(f"{kind}_speed"), uniform(f"{kind}_way")
-        direction[0] *= 0.3 if kind == "drag" else 4.0  # across the pads, or about their line
-        direction /= np.linalg.norm(direction)
-        duration = min(way / speed, LONGEST_EVENT) + 2 * HAND_TIME
-        return Event(kind, start, duration, uniform("hand_stiffness"), speed, direction=direction)
-    if kind == "weight":
-        return Event(kind, start, uniform("weight_time") + 0.5, uniform("weight_share"), 0.3)
-    if kind == "regrip":
-        return Event(kind, start, uniform("regrip_time"), uniform("regrip_share"))
-    if kind == "loosen":
-        return Event(kind, start, LONGEST_EVENT, 0.0, log_uniform("loosen_rate"), distance)
-    return Event(kind, start, 1.5, uniform("slippery"), uniform("slippery_time"), distance)
+        angle = uniform(generator, ranges["slip_angle"])
+        return Event(kind, start, min(MAX_TWIST / rate, LONGEST_EVENT), 0.0, rate, angle, axis)
+    rate = log_uniform(generator, ranges["pull_rate"])
+    arm = generator.standard_normal(3)
+    arm *= uniform(generator, ranges["pull_arm"]) / np.linalg.norm(arm)
+    distance = uniform(generator, ranges["slip_distance"])
+    longest = min(MAX_PULL / rate, LONGEST_EVENT)
+    return Event(kind, start, longest, 0.0, rate, distance, direction, arm)
 
 
 def _draw_push(generator: np.random.Generator, kind: str, start: float, direction: Array) -> Push:
@@ -272,7 +305,7 @@ class Scenario(OperatorForce):
         elif event.kind in ("drag", "spin"):
             out += self._dragged(event, body, elapsed)
         elif event.kind == "weight":
-            share = min(elapsed / (event.duration - 0.5), 1.0)
+            share = min(elapsed / (event.duration - WEIGHT_SETTLE_TIME), 1.0)
             self._weight = event.size * self.spare * share * self._down
         else:
             force = event.rate * (min(self._now + ahead, self._ended_at) - event.start)

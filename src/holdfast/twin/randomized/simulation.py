@@ -2,13 +2,15 @@
 
 import zlib
 from dataclasses import dataclass, replace
+from typing import Any
 
 import msgspec
 import numpy as np
+import numpy.typing as npt
 
 from holdfast.contact import Phase
 from holdfast.recordings import Recording, Tactile, Truth
-from holdfast.sensors.values import Array
+from holdfast.sensors.types import Array
 from holdfast.twin.contact import SHARE, SLIP
 from holdfast.twin.hand import FINGERS
 from holdfast.twin.labels import LabelRule, labels_from_truth
@@ -23,13 +25,11 @@ from holdfast.twin.randomized.drawing import (
     draw_object,
     draw_sensor,
     draw_skin,
-    log_uniform,
     random_rotation,
     ranges,
-    uniform,
 )
 from holdfast.twin.randomized.gripper import GripperWorld, OperatorForce
-from holdfast.twin.randomized.palm import palm_motion
+from holdfast.twin.randomized.palm import log_uniform, palm_motion, uniform
 from holdfast.twin.randomized.scenario import Scenario, draw_events
 from holdfast.twin.uskin import Uskin, with_server_effects
 
@@ -135,7 +135,9 @@ def _plan(generator: np.random.Generator, grip: float, n_pads: int) -> Plan:
 class _Run:
     """One hold as it is simulated, sample by sample."""
 
-    def __init__(self, hold: RandomHold, world: GripperWorld, plan: Plan, drawn: SensorDraw):
+    def __init__(
+        self, hold: RandomHold, world: GripperWorld, plan: Plan, drawn: SensorDraw
+    ) -> None:
         generator = hold.generator("scenario")
         span = ranges()
         self.hold, self.world, self.plan, self.drawn = hold, world, plan, drawn
@@ -235,14 +237,15 @@ class _Run:
 
     def recording(self) -> Recording:
         """Make the recording of what was simulated."""
-        times = np.arange(len(self._phase)) * self.period
+        times: Array = np.arange(len(self._phase), dtype=np.float64) * self.period
         fingers = FINGERS[: self.world.layout.n_pads]
         truth = self._truth(times, fingers)
         generator = self.hold.generator("readout")
         modules: dict[str, Tactile] = {}
         server = generator.random() < ranges()["sensor"]["server"]
         for finger, skin, pile in zip(fingers, self.skins, self._forces, strict=True):
-            readings, stamps = _readings(skin, np.array(pile), times, generator), times
+            stamps: Array = times
+            readings = _readings(skin, np.array(pile), times, generator)
             if server:
                 stamps, readings = with_server_effects(
                     times, readings, generator, jitter=0.1 * self.period
@@ -329,7 +332,9 @@ class _Holder(OperatorForce):
             out[:3] -= self._hold * self._weight_of * gravity
 
 
-def _readings(skin: Uskin, forces: Array, times: Array, generator: np.random.Generator) -> Array:
+def _readings(
+    skin: Uskin, forces: Array, times: Array, generator: np.random.Generator
+) -> npt.NDArray[Any]:
     """Compute what the sensor sends: counts, or newtons with the model's calibration."""
     counts = skin.counts(forces, times, generator)
     if skin.sensor.unit == "count":
