@@ -175,8 +175,8 @@ def parse_features(
         >>> [str(feature) for feature in parse_features("F_a,sigma")]
         ['F_a', 'sigma[14]']
     """
-    if names in NAMED_FEATURES:
-        return NAMED_FEATURES[str(names)]
+    if isinstance(names, str) and names in NAMED_FEATURES:
+        return NAMED_FEATURES[names]
     given = names.split(",") if isinstance(names, str) else list(names)
     wanted: list[str] = []
     for name in (name.strip() for name in given):
