@@ -172,8 +172,8 @@ def test_refuses_an_unknown_name():
     with pytest.raises(ModelError) as raised:
         Model.load("builtin:magic")
     assert (
-        str(raised.value)
-        == "unknown model 'builtin:magic'; built in are builtin:twin, builtin:noise-floor"
+        str(raised.value) == "unknown model 'builtin:magic'; built in are builtin:any, "
+        "builtin:twin, builtin:noise-floor"
     )
 
 

@@ -24,8 +24,8 @@ def test_names(names, expected):
 
 
 KNOWN = (
-    "there are F_a, F_x, F_y, F_z, m, sigma, F_tip for F_x, F_y and F_z, and holdfast alone for "
-    "the project's own features"
+    "there are F_a, F_x, F_y, F_z, m, sigma, F_tip for F_x, F_y and F_z, and holdfast or any "
+    "alone for the project's own features"
 )
 
 

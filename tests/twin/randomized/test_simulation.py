@@ -1,0 +1,83 @@
+import numpy as np
+import pytest
+
+from holdfast.contact import ContactState
+from holdfast.features import fingertip_force
+from holdfast.io import load_recording, save_recording
+from holdfast.twin.randomized.drawing import SENSOR_KINDS, draw_object, draw_sensor
+from holdfast.twin.randomized.scenario import KINDS, draw_events
+from holdfast.twin.randomized.simulation import RandomHold, simulate_random
+
+
+@pytest.fixture(scope="module")
+def hands():
+    return [simulate_random(RandomHold(number, seed=3)) for number in range(4)]
+
+
+def test_the_same_number_and_seed_give_the_same_bytes(hands):
+    assert simulate_random(RandomHold(1, seed=3)).digest == hands[1].digest
+    assert len({hand.digest for hand in hands}) == len(hands)
+
+
+def test_every_hand_has_two_to_four_fingers_and_labels(hands):
+    for hand in hands:
+        assert 2 <= len(hand.modules) <= 4
+        assert len(hand.modules) == hand.metadata["n_pads"]
+        for module in hand.modules.values():
+            assert np.isfinite(module.readings).all()
+            assert (module.label_states > 0).all()
+            assert 25.0 < 1 / module.period < 520.0
+
+
+def test_a_stable_object_does_not_slide(hands):
+    for hand in (hand for hand in hands if hand.truth is not None):
+        for name, arrays in hand.truth.fingers.items():
+            times = hand.modules[name].times
+            stable = hand.modules[name].label_states == ContactState.STABLE.code
+            slip = np.interp(times, hand.truth.times, arrays["slip_speed"])
+            assert stable.sum() == 0 or np.quantile(slip[stable], 0.99) < 0.0015
+
+
+def test_readings_show_the_contact_force():
+    """Of a sensor without gains, cross-talk or noise to speak of, the sum of the taxels."""
+    hand = simulate_random(RandomHold(2, seed=3, kind="papillarray"))
+    if hand.truth is None:
+        pytest.skip("this hold begins in contact, and has no truth")
+    name = "thumb"
+    module = hand.modules[name]
+    force = np.linalg.norm(fingertip_force(module.readings, module.sensor, tare=0.3), axis=1)
+    wanted = np.linalg.norm(hand.truth.fingers[name]["contact_force"], axis=1)
+    held = wanted > 0.5 * wanted.max()
+    assert np.corrcoef(force[held | (wanted < 0.01)], wanted[held | (wanted < 0.01)])[0, 1] > 0.9
+
+
+@pytest.mark.parametrize("kind", SENSOR_KINDS)
+def test_every_kind_of_sensor_can_be_drawn(kind):
+    drawn = draw_sensor(np.random.default_rng(0), kind)
+    assert drawn.sensor.n_taxels >= 5
+    assert 30.0 <= drawn.sensor.rate <= 500.0
+    assert drawn.sensor.limits is None or drawn.sensor.unit == "count"
+
+
+@pytest.mark.parametrize("seed", range(20))
+def test_friction_holds_every_object(seed):
+    thing = draw_object(np.random.default_rng(seed), grip=2.0, n_opposite=1)
+    assert thing.mass * 9.81 <= 2 * thing.mu_static * 2.0 or thing.mass < 0.0304
+
+
+def test_events_fill_the_hold_and_do_not_overlap():
+    from holdfast.twin.randomized.drawing import ranges
+
+    found = set()
+    for seed in range(40):
+        events = draw_events(np.random.default_rng(seed), ranges()["events"], ranges()["arm"], 18.0)
+        ends = [event.start + event.duration for event in events]
+        assert all(event.start > end for event, end in zip(events[1:], ends, strict=False))
+        assert ends[-1] < 18.0
+        found |= {event.kind for event in events}
+    assert found == set(KINDS)
+
+
+def test_is_saved_and_loaded(hands, tmp_path):
+    save_recording(hands[0], tmp_path / "hand.parquet")
+    assert load_recording(tmp_path / "hand.parquet").digest == hands[0].digest
