@@ -5,7 +5,7 @@ skin and object, which are applied as external forces.
 """
 
 import csv
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from importlib import resources
 
 import mujoco
@@ -73,7 +73,7 @@ def hand_xml(side: str = "right", item: GraspObject | None = None) -> str:
         raise ValueError(f"side 'right' or 'left' expected, {side!r} given")
     rows = [_mirrored(row) if side == "left" else row for row in _table()]
     turn = np.pi / 2 if side == "right" else -np.pi / 2
-    body = "" if item is None else _object_xml(item)
+    body = "" if item is None else object_xml(item)
     return f"""<mujoco model="allegro {side}">
   <compiler angle="radian" eulerseq="XYZ"/>
   <option timestep="{TIMESTEP!r}" integrator="implicitfast" gravity="0 0 {-GRAVITY}"/>
@@ -110,12 +110,14 @@ class HandModel:
         data: MuJoCo's state, which changes with time.
         tips: (4,) bodies of the last links, in the order of `FINGERS`.
         object_body: body of the object.
+        mounts: (4, 3) origin of each fingertip frame in its last link [m].
     """
 
     model: mujoco.MjModel
     data: mujoco.MjData
     tips: np.ndarray
     object_body: int
+    mounts: Array = field(default_factory=lambda: MOUNTS)
 
     @classmethod
     def build(cls, item: GraspObject, side: str = "right") -> "HandModel":
@@ -133,7 +135,7 @@ class HandModel:
         data = self.data
         _bodies(
             data.xpos, data.xmat, data.xipos, data.ximat, data.cvel, data.subtree_com,
-            self.tips, self.object_body, self.model.body_rootid, MOUNTS, out,
+            self.tips, self.object_body, self.model.body_rootid, self.mounts, out,
         )  # fmt: skip
 
     def apply(self, tips: Array, object_wrench: Array, bodies: Array) -> None:
@@ -276,7 +278,8 @@ def _box_xml(sides: tuple[float, ...], middle: tuple[float, ...], mass: float) -
     return f'<geom type="box" size="{half}" pos="{place}" mass="{mass}"/>'
 
 
-def _object_xml(item: GraspObject) -> str:
+def object_xml(item: GraspObject) -> str:
+    """Return the MJCF of a free object."""
     inertia = " ".join(f"{value:.9g}" for value in item.inertia)
     return f"""<body name="object"><freejoint/>
       <inertial pos="0 0 0" mass="{item.mass}" diaginertia="{inertia}"/>

@@ -157,13 +157,18 @@ def load_objects(path: str | Path | None = None) -> dict[str, GraspObject]:
     objects = {}
     for name, row in table.items():
         try:
-            objects[name] = _object(name, row)
+            objects[name] = make_object(name, row)
         except ValueError as cause:
             raise ValueError(f"{path}: {name}: {cause}") from cause
     return objects
 
 
-def _object(name: str, row: object) -> GraspObject:
+def make_object(name: str, row: object) -> GraspObject:
+    """Return the object that the fields of a line of the table describe.
+
+    Raises:
+        ValueError: a field is unknown or missing, or a number is out of range.
+    """
     shape, numbers = _read(row)
     size, friction, texture = (numbers[key] for key in ("size", "friction", "texture"))
     _check(shape, size, friction, texture)

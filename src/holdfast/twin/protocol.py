@@ -96,9 +96,10 @@ class Protocol:
         self.lost_at: float | None = None
         self.anchor = np.zeros(12)
         self._period = period
-        self._depths = np.full(4, OPEN_GAP)
-        self._over_grip_for = np.zeros(4)
-        self._stopped = np.zeros(4, dtype=np.bool_)
+        n_fingers = len(plan.grips)
+        self._depths = np.full(n_fingers, OPEN_GAP)
+        self._over_grip_for = np.zeros(n_fingers)
+        self._stopped = np.zeros(n_fingers, dtype=np.bool_)
         self._all_stopped_at = np.inf
         self._released_at = np.inf
         self._untouched_for = 0.0

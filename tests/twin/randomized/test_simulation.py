@@ -61,8 +61,8 @@ def test_every_kind_of_sensor_can_be_drawn(kind):
 
 @pytest.mark.parametrize("seed", range(20))
 def test_friction_holds_every_object(seed):
-    thing = draw_object(np.random.default_rng(seed), grip=2.0, n_opposite=1)
-    assert thing.mass * 9.81 <= 2 * thing.mu_static * 2.0 or thing.mass < 0.0304
+    item = draw_object(np.random.default_rng(seed), grip=2.0, n_opposite=1)
+    assert item.mass * 9.81 <= 2 * item.mu_static * 2.0 or item.mass < 0.0304
 
 
 def test_events_fill_the_hold_and_do_not_overlap():

@@ -10,7 +10,7 @@ import numpy as np
 
 from holdfast.sensors import Sensor, sensor
 from holdfast.sensors.types import Array
-from holdfast.twin.objects import SHAPES, Thing, make_thing
+from holdfast.twin.objects import SHAPES, GraspObject, make_object
 from holdfast.twin.randomized.gripper import Drives, PadLayout, flat_patch, pad_layout
 from holdfast.twin.randomized.palm import log_uniform, uniform
 from holdfast.twin.skin import Skin
@@ -110,7 +110,7 @@ def draw_skin(generator: np.random.Generator) -> Skin:
     return Skin(stiffness=stiffness)
 
 
-def draw_object(generator: np.random.Generator, grip: float, n_opposite: int) -> Thing:
+def draw_object(generator: np.random.Generator, grip: float, n_opposite: int) -> GraspObject:
     """Draw an object that the grip can hold: its friction holds three times its weight or more.
 
     Args:
@@ -143,10 +143,12 @@ def draw_object(generator: np.random.Generator, grip: float, n_opposite: int) ->
         "finger_height": 0.0,
         "yaw": 0.0,
     }
-    return make_thing(shape, row)
+    return make_object(shape, row)
 
 
-def draw_layout(generator: np.random.Generator, kind: str, thing: Thing, n_pads: int) -> PadLayout:
+def draw_layout(
+    generator: np.random.Generator, kind: str, item: GraspObject, n_pads: int
+) -> PadLayout:
     """Place the pads round the object, at a height over its centre of mass.
 
     Raises:
@@ -158,10 +160,10 @@ def draw_layout(generator: np.random.Generator, kind: str, thing: Thing, n_pads:
         known = _sensor(kind)
         surface = flat_patch(known.positions, _PITCH.get(kind, 6e-3))
         normal, point = np.array([0.0, 0.0, 1.0]), np.zeros(3)
-    room = max(thing.half_height - (0.012 if n_pads == 2 else 0.034), 0.0)
-    middle = float(thing.foot[2]) + thing.half_height
+    room = max(item.half_height - (0.012 if n_pads == 2 else 0.034), 0.0)
+    middle = float(item.foot[2]) + item.half_height
     height = middle + room * uniform(generator, ranges()["object"]["off_centre"])
-    return pad_layout(surface, normal, point, n_pads, thing, height)
+    return pad_layout(surface, normal, point, n_pads, item, height)
 
 
 def random_rotation(generator: np.random.Generator) -> Array:

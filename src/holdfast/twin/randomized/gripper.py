@@ -14,8 +14,8 @@ from holdfast.compiled import compiled
 from holdfast.sensors.types import Array
 from holdfast.twin.contact import LOAD, SLIP, constants_of, new_contact, touch
 from holdfast.twin.hand import HandModel, object_xml
-from holdfast.twin.objects import Thing, distance_to
-from holdfast.twin.protocol import OPEN
+from holdfast.twin.objects import GraspObject, distance_to
+from holdfast.twin.protocol import OPEN_GAP
 from holdfast.twin.randomized.palm import PalmMotion
 from holdfast.twin.shapes import MU_KINETIC, MU_STATIC
 from holdfast.twin.skin import Skin
@@ -102,7 +102,12 @@ def flat_patch(positions: Array, pitch: float) -> Surface:
 
 
 def pad_layout(
-    surface: Surface, normal: Array, contact_point: Array, n_pads: int, thing: Thing, height: float
+    surface: Surface,
+    normal: Array,
+    contact_point: Array,
+    n_pads: int,
+    item: GraspObject,
+    height: float,
 ) -> PadLayout:
     """Place pads around an object whose middle axis is z: a thumb at +x, the others at -x.
 
@@ -111,7 +116,7 @@ def pad_layout(
         normal: (3,) of the skin, in the fingertip frame.
         contact_point: (3,) the point of the skin that meets the object, in that frame [m].
         n_pads: two to four.
-        thing: the object.
+        item: the object.
         height: of the grip over the centre of mass [m].
 
     Raises:
@@ -121,7 +126,7 @@ def pad_layout(
     sides = np.array([1.0, *[-1.0] * len(spread)])
     heights = height + np.array([0.0, *spread])
     outward = sides[:, None] * [1.0, 0.0, 0.0]
-    reach = np.array([_reach(thing, *pair) for pair in zip(outward, heights, strict=True)])
+    reach = np.array([_reach(item, *pair) for pair in zip(outward, heights, strict=True)])
     points = outward * reach[:, None] + heights[:, None] * [0.0, 0.0, 1.0]
     frames = np.array([_frame(normal, -out) for out in outward])
     return PadLayout(surface, contact_point, frames, points, outward)
@@ -135,26 +140,28 @@ def _frame(normal: Array, inward: Array) -> Array:
     return np.column_stack([inward, np.cross(across, inward), across])  # curved: normal along x
 
 
-def _reach(thing: Thing, outward: Array, height: float) -> float:
+def _reach(item: GraspObject, outward: Array, height: float) -> float:
     """Distance from the object's axis to its surface along a direction, at a height [m]."""
     distances = np.linspace(0.0, 0.09, 901)
     points = distances[:, None] * outward + [0.0, 0.0, height]
-    inside = np.flatnonzero(distance_to(thing, points) < 0)
+    inside = np.flatnonzero(distance_to(item, points) < 0)
     if not len(inside):
         raise ValueError(
-            f"the pad at {1e3 * height:.0f} mm does not reach the object {thing.name!r}"
+            f"the pad at {1e3 * height:.0f} mm does not reach the object {item.name!r}"
         )
     return float(distances[inside[-1]])
 
 
-def gripper_model(layout: PadLayout, thing: Thing, drives: Drives, timestep: float) -> HandModel:
+def gripper_model(
+    layout: PadLayout, item: GraspObject, drives: Drives, timestep: float
+) -> HandModel:
     """Build the pads and the object for MuJoCo, in the palm frame."""
     bodies = "".join(_pad_xml(layout, i, drives) for i in range(layout.n_pads))
     model = mujoco.MjModel.from_xml_string(f"""<mujoco model="gripper">
   <compiler angle="radian"/>
   <option timestep="{timestep!r}" integrator="implicitfast" gravity="0 0 0"/>
   <default><geom contype="0" conaffinity="0"/></default>
-  <worldbody>{bodies}{object_xml(thing)}</worldbody>
+  <worldbody>{bodies}{object_xml(item)}</worldbody>
 </mujoco>""")
     tips = np.array([model.body(f"pad{i}").id for i in range(layout.n_pads)])
     mounts = np.zeros((layout.n_pads, 3))
@@ -163,7 +170,7 @@ def gripper_model(layout: PadLayout, thing: Thing, drives: Drives, timestep: flo
 
 def _pad_xml(layout: PadLayout, i: int, drives: Drives) -> str:
     frame = layout.frames[i]
-    place = layout.points[i] + OPEN * layout.outward[i] - frame @ layout.contact_point
+    place = layout.points[i] + OPEN_GAP * layout.outward[i] - frame @ layout.contact_point
     quaternion = np.empty(4)
     mujoco.mju_mat2Quat(quaternion, np.ascontiguousarray(frame).ravel())
     axes = [frame.T @ -layout.outward[i]]
@@ -191,7 +198,7 @@ class GripperWorld:
 
     Args:
         layout: of the pads.
-        thing: the object.
+        item: the object.
         drives: of the pads.
         skin: of the pads.
         generator: of noise and glitches.
@@ -208,18 +215,18 @@ class GripperWorld:
     def __init__(
         self,
         layout: PadLayout,
-        thing: Thing,
+        item: GraspObject,
         drives: Drives,
         skin: Skin,
         generator: np.random.Generator,
         rate: float,
     ) -> None:
-        self.layout, self.thing, self.drives = layout, thing, drives
-        self.n_substeps = max(1, int(np.ceil(_step_rate(layout, thing, drives, skin) / rate)))
+        self.layout, self.item, self.drives = layout, item, drives
+        self.n_substeps = max(1, int(np.ceil(_step_rate(layout, item, drives, skin) / rate)))
         self.timestep = 1 / (rate * self.n_substeps)
-        self.hand = gripper_model(layout, thing, drives, self.timestep)
+        self.hand = gripper_model(layout, item, drives, self.timestep)
         self.contact = new_contact(layout.surface, layout.n_pads)
-        self.constants = constants_of(layout.surface, thing, skin)
+        self.constants = constants_of(layout.surface, item, skin)
         self.bodies = np.zeros((layout.n_pads + 1, 18))
         self.outside = np.zeros(6)
         self.set_point_error = 0.0
@@ -275,8 +282,8 @@ class GripperWorld:
             operator.fill(self.bodies[-1], self.outside, k * self.timestep)
             self._limit_torque()
             _on_object(
-                self.contact.wrench, self.outside, self.bodies[-1], self.thing.inertia,
-                self.thing.mass, palm.spin[at], palm.turn[at], self._wrench,
+                self.contact.wrench, self.outside, self.bodies[-1], self.item.inertia,
+                self.item.mass, palm.spin[at], palm.turn[at], self._wrench,
             )  # fmt: skip
             self.hand.apply(self.contact.tips, self._wrench, self.bodies)
             _drive(
@@ -292,7 +299,7 @@ class GripperWorld:
         The damping of a hand is stiff beside the inertia of a small object.
         """
         spin = float(np.linalg.norm(self.bodies[-1, 15:18]))
-        largest = float(self.thing.inertia.min()) * (MAX_TURN_CHANGE + 0.5 * spin) / self.timestep
+        largest = float(self.item.inertia.min()) * (MAX_TURN_CHANGE + 0.5 * spin) / self.timestep
         torque = float(np.linalg.norm(self.outside[3:]))
         if torque > largest:
             self.outside[3:] *= largest / torque
@@ -311,14 +318,14 @@ class GripperWorld:
             self._jump_until = self.time + self._generator.uniform(0.006, 0.020)
 
 
-def _step_rate(layout: PadLayout, thing: Thing, drives: Drives, skin: Skin) -> float:
+def _step_rate(layout: PadLayout, item: GraspObject, drives: Drives, skin: Skin) -> float:
     """Return the rate that the stiffest contact on the lightest body needs [Hz].
 
     All pads press on the object with their skin, or with 2 cm^2 of it where it is larger.
     """
     area = min(float(layout.surface.areas.sum()), 2e-4)
     stiffness = layout.n_pads * skin.stiffness * area
-    fastest = np.sqrt(stiffness / min(thing.mass, drives.mass))  # [rad/s]
+    fastest = np.sqrt(stiffness / min(item.mass, drives.mass))  # [rad/s]
     return float(max(STEP_RATE, 1.2 * fastest))
 
 

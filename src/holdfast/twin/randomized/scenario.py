@@ -15,7 +15,7 @@ from holdfast.sensors.types import Array
 from holdfast.twin.operator import (
     HOLD_STIFFNESS,
     MOVE,
-    Push,
+    Disturbance,
     hold_wrench,
     move_wrench,
     push_wrench,
@@ -71,7 +71,7 @@ class Event(NamedTuple):
     until: float = math.inf
     direction: Array = np.zeros(3)
     arm: Array = np.zeros(3)
-    push: Push | None = None
+    push: Disturbance | None = None
     segment: Segment | None = None
 
 
@@ -175,7 +175,9 @@ def _draw_pull(
     return Event(kind, start, longest, 0.0, rate, distance, direction, arm)
 
 
-def _draw_push(generator: np.random.Generator, kind: str, start: float, direction: Array) -> Push:
+def _draw_push(
+    generator: np.random.Generator, kind: str, start: float, direction: Array
+) -> Disturbance:
     """Draw a disturbance as of the profile `reference`, half of them smaller or larger."""
     scale = float(math.exp(0.4 * generator.standard_normal()))
     arm = generator.normal(0.0, 0.006, size=3)
@@ -188,7 +190,7 @@ def _draw_push(generator: np.random.Generator, kind: str, start: float, directio
         depth, stiffness = generator.uniform(0.003, 0.010), generator.uniform(400.0, 1000.0)
         rate, duration = generator.uniform(3.0, 6.0), float(generator.uniform(0.4, 1.2))
     numbers = np.array([*direction, *arm, scale * depth, stiffness, rate])
-    return Push(start, duration, "random", style, numbers)
+    return Disturbance(start, duration, "random", style, numbers)
 
 
 class Scenario(OperatorForce):
@@ -338,17 +340,17 @@ class Scenario(OperatorForce):
         self._down = gravity / max(float(np.linalg.norm(gravity)), 1e-9)
         self._weight = float(np.linalg.norm(self._weight)) * self._down
 
-    def _pushed(self, push: Push, body: Array, elapsed: float) -> Array:
+    def _pushed(self, push: Disturbance, body: Array, elapsed: float) -> Array:
         if push.style == MOVE:
             return np.array(
                 move_wrench(
-                    body, self._origin, push.numbers, push.duration, self._tremors[1],
+                    body, self._origin, push.parameters, push.duration, self._tremors[1],
                     self._tremor, elapsed,
                 )
             )  # fmt: skip
         return np.array(
             push_wrench(
-                body, self._origin, push.numbers, push.style, push.duration, self._tremors[1],
+                body, self._origin, push.parameters, push.style, push.duration, self._tremors[1],
                 self._tremor, elapsed,
             )
         )  # fmt: skip

@@ -11,12 +11,12 @@ import numpy.typing as npt
 from holdfast.contact import Phase
 from holdfast.recordings import Recording, Tactile, Truth
 from holdfast.sensors.types import Array
-from holdfast.twin.contact import SHARE, SLIP
+from holdfast.twin.contact import SLIP, SLIPPING_SHARE
 from holdfast.twin.hand import FINGERS
 from holdfast.twin.labels import LabelRule, labels_from_truth
 from holdfast.twin.operator import draw_tremor, hold_wrench
 from holdfast.twin.profile import profile
-from holdfast.twin.protocol import OPEN, THUMB_SHARE, Command, Plan, Protocol
+from holdfast.twin.protocol import OPEN_GAP, THUMB_SHARE, Command, Plan, Protocol
 from holdfast.twin.randomized.drawing import (
     SENSOR_KINDS,
     SensorDraw,
@@ -99,16 +99,16 @@ def _run(hold: RandomHold) -> "_Run":
     n_pads = int(generator.choice(span["hand"]["pads"]))
     grip = log_uniform(generator, span["hand"]["grip"])
     for _ in range(MAX_TRIES):
-        thing = draw_object(generator, grip, n_pads - 1)
+        item = draw_object(generator, grip, n_pads - 1)
         try:
-            layout = draw_layout(generator, kind, thing, n_pads)
+            layout = draw_layout(generator, kind, item, n_pads)
             break
         except ValueError:
             continue
     else:
         raise ValueError(f"no object of {MAX_TRIES} fits the hand {hold.number}")
     drives, skin = draw_drives(generator), draw_skin(generator)
-    world = GripperWorld(layout, thing, drives, skin, hold.generator("world"), drawn.sensor.rate)
+    world = GripperWorld(layout, item, drives, skin, hold.generator("world"), drawn.sensor.rate)
     return _Run(hold, world, _plan(generator, grip, n_pads), drawn)
 
 
@@ -128,7 +128,7 @@ def _plan(generator: np.random.Generator, grip: float, n_pads: int) -> Plan:
         speed=uniform(generator, span["hand"]["closing_speed"]),
         before=uniform(generator, events["idle"]),
         after=uniform(generator, events["idle"]),
-        pushes=(),
+        disturbances=(),
     )
 
 
@@ -188,14 +188,14 @@ class _Run:
             k += 1
             lost_at = self.protocol.lost_at
             lost = lost_at is not None and time > lost_at + WATCHED_AFTER_LOSS
-            if self.protocol.over(time) or lost or time > MAX_SECONDS:
+            if self.protocol.is_over(time) or lost or time > MAX_SECONDS:
                 return
 
     def _advance(self, command: Command, since: float, touch_depths: Array | None) -> None:
-        travels = OPEN - command.depths
+        travels = OPEN_GAP - command.depths
         if touch_depths is not None and command.phase is Phase.LOCKED:
-            pressed = travels - (OPEN - touch_depths)
-            travels = OPEN - touch_depths + self.scenario.grip_scale * pressed
+            pressed = travels - (OPEN_GAP - touch_depths)
+            travels = OPEN_GAP - touch_depths + self.scenario.grip_scale * pressed
         self.world.friction_scale = self.scenario.friction_scale
         self.holder.command(command, self.protocol.anchor, since, self.world.time)
         self.world.advance(travels, self.holder, self.palm, since)
@@ -205,9 +205,9 @@ class _Run:
         return command.depths + self.world.loads / self.world.drives.stiffness
 
     def _spare(self) -> float:
-        thing = self.world.thing
-        limit = float(thing.mu_static * self.world.loads.sum())
-        return max(limit - 9.81 * thing.mass, 0.0)
+        item = self.world.item
+        limit = float(item.mu_static * self.world.loads.sum())
+        return max(limit - 9.81 * item.mass, 0.0)
 
     def _log(self, command: Command) -> None:
         world = self.world
@@ -274,7 +274,7 @@ class _Run:
             finger: {
                 "contact_force": -tips[:, place, :3],
                 "slip_speed": tips[:, place, SLIP],
-                "slipping_share": tips[:, place, SHARE],
+                "slipping_share": tips[:, place, SLIPPING_SHARE],
             }
             for place, finger in enumerate(fingers)
         }
@@ -282,11 +282,11 @@ class _Run:
         return Truth(times, {"phase": np.array(self._phase, dtype=str), **hand}, of_fingers)
 
     def _metadata(self) -> dict[str, object]:
-        thing = self.world.thing
+        item = self.world.item
         return {
-            "object": thing.shape,
-            "object_mass": thing.mass,
-            "friction": thing.mu_static,
+            "object": item.shape,
+            "object_mass": item.mass,
+            "friction": item.mu_static,
             "sensor_kind": self.drawn.sensor.name,
             "n_pads": self.world.layout.n_pads,
             "grip": self.plan.profile.grip,
@@ -305,7 +305,7 @@ class _Holder(OperatorForce):
     """The operator: holds the object until the lock and after the hold, else acts by events."""
 
     def __init__(self, world: GripperWorld, scenario: Scenario, tremor: Array, rms: float) -> None:
-        self._weight_of = world.thing.mass
+        self._weight_of = world.item.mass
         self._world = world
         self._scenario = scenario
         self._tremor, self._rms = tremor, rms
