@@ -245,3 +245,32 @@ def test_a_table_that_lacks_the_object(tmp_path, capsys):
     words = ["simulate", str(tmp_path / "out"), "--table", str(table), "--objects", "can"]
     assert main(words) == 2
     assert capsys.readouterr().err == "holdfast: no object 'can'; there are mug\n"
+
+
+class TestRandomizedHands:
+    def test_are_simulated_and_kept(self, capsys, out):
+        words = (out, "--randomize", "--repeats", 2, "--seed", 4, "--jobs", 1, "--json")
+        code, printed, _ = run(capsys, *words)
+        assert code == 0
+        assert json.loads(printed) == {
+            "out": str(out),
+            "recordings": ["hand0000", "hand0001"],
+            "failed": [],
+            "profile": "randomized",
+        }
+        assert {r.metadata["profile"] for r in load_dataset(out)} == {"randomized"}
+        code, printed, err = run(capsys, *words)
+        assert json.loads(printed)["recordings"] == []
+        assert "2 of 2 recordings exist already" in err
+
+    def test_of_another_seed_are_refused(self, capsys, out):
+        run(capsys, out, "--randomize", "--repeats", 1, "--jobs", 1)
+        told = refusal(capsys, out, "--randomize", "--repeats", 1, "--seed", 9)
+        assert told == (
+            f"{out / 'hand0000.parquet'} has profile randomized, seed 0; profile randomized, seed "
+            "9 given: choose another folder, or overwrite it with --force"
+        )
+
+    def test_their_number_is_checked(self, capsys, out):
+        told = refusal(capsys, out, "--randomize", "--repeats", 0)
+        assert told == ("repeats of at least 1 and a seed of at least 0 expected; 0 and 0 given")

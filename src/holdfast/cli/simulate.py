@@ -13,6 +13,7 @@ from holdfast.cli.terminal.progress import ProgressBar
 from holdfast.twin.profile import ATTEMPTS
 
 if TYPE_CHECKING:
+    from holdfast.twin.randomized.simulation import RandomHold
     from holdfast.twin.simulation import Grasp
 
 
@@ -27,7 +28,10 @@ def simulate(
         Path | None, typer.Option(help="Your own objects: a .toml file like that of the twin.")
     ] = None,
     cases: Annotated[str, typer.Option(help="1: hold; 2: hold and disturb; or 1,2.")] = "1,2",
-    repeats: Annotated[int, typer.Option(help="Number of grasps of each object and case.")] = 5,
+    repeats: Annotated[
+        int,
+        typer.Option(help="Number of grasps of each object and case, or of --randomize hands."),
+    ] = 5,
     profile: Annotated[
         str,
         typer.Option(
@@ -35,6 +39,12 @@ def simulate(
         ),
     ] = "reference",
     seed: Annotated[int, typer.Option(help="Seed; the same seed gives the same bytes.")] = 0,
+    randomize: Annotated[
+        bool,
+        typer.Option(
+            "--randomize", help="Draw another hand, sensor, object and arm motion each time."
+        ),
+    ] = False,
     server: Annotated[
         bool,
         typer.Option(
@@ -61,12 +71,24 @@ def simulate(
     kept, so the same command continues a run that was stopped. If the object is dropped, the
     recording is named "...-failed1" and the grasp is repeated with weaker disturbances.
 
+    With --randomize, every recording has another hand: two to four fingers or a parallel
+    gripper, six kinds of sensors in counts or newtons at 30 to 500 Hz, another object, and an arm
+    that carries, swings, brakes and turns. Only --repeats, --seed, --jobs and --force apply then.
+
     Example:
       holdfast simulate twin/
+      holdfast simulate hands/ --randomize --repeats 100
       holdfast simulate few/ --objects can,ball --cases 2 --repeats 1 --profile vigorous
     """
     from holdfast.files import refuse_overwrite
 
+    if randomize:
+        names = simulate_hands(out, repeats, seed, jobs=jobs, force=force)
+        if as_json:
+            print_json({"out": out, "recordings": names, "failed": [], "profile": "randomized"})
+        else:
+            print_line(f"{len(names)} recordings of randomized hands in {out}")
+        return
     if video is not None:
         from holdfast.twin.render import check_film
 
@@ -82,6 +104,44 @@ def simulate(
         print_json({"out": out, "recordings": names, "failed": failed, "profile": profile})
         return
     print_line(f"{len(names)} recordings in {out}, {len(failed)} of them of failed grasps")
+
+
+def simulate_hands(out: Path, n_hands: int, seed: int, *, jobs: int, force: bool) -> list[str]:
+    """Simulate randomized hands whose recordings do not exist; return the names of new ones.
+
+    Raises:
+        ValueError: a number is out of range.
+        OutputError: an existing recording has another seed or profile.
+    """
+    from holdfast.parallel import map_ordered
+    from holdfast.twin.randomized.simulation import RandomHold
+
+    _check_numbers(n_hands, seed)
+    out.mkdir(parents=True, exist_ok=True)
+    holds = [RandomHold(number, seed) for number in range(n_hands)]
+    wanted: dict[str, object] = {"profile": "randomized", "seed": seed}
+    tasks = [
+        (hold, out, force)
+        for hold in holds
+        if force or not _is_recorded(out / f"{hold.name}.parquet", wanted)
+    ]
+    if len(tasks) < n_hands:
+        print_message(f"{n_hands - len(tasks)} of {n_hands} recordings exist already")
+    names = []
+    with ProgressBar("simulating", len(tasks)) as bar:
+        for name in map_ordered(simulate_hand, tasks, 1 if len(tasks) == 1 else jobs):
+            names.append(name)
+            bar.advance()
+    return names
+
+
+def simulate_hand(hold: "RandomHold", out: Path, force: bool) -> str:
+    """Simulate a randomized hand; return the name of the recording."""
+    from holdfast.io import save_recording
+    from holdfast.twin.randomized.simulation import simulate_random
+
+    save_recording(simulate_random(hold), out / f"{hold.name}.parquet", force=force)
+    return hold.name
 
 
 def simulate_grasps(grasps: "Sequence[Grasp]", out: Path, *, jobs: int, force: bool) -> list[str]:
@@ -149,10 +209,7 @@ def plan_grasps(
     check_profile(profile)
     if not {case.strip() for case in cases.split(",")} <= {str(case) for case in CASES}:
         raise ValueError(f"--cases 1, 2 or 1,2 expected, {cases!r} given")
-    if repeats < 1 or seed < 0:
-        raise ValueError(
-            f"repeats of at least 1 and a seed of at least 0 expected; {repeats} and {seed} given"
-        )
+    _check_numbers(repeats, seed)
     chosen = sorted({int(case) for case in cases.split(",")})
     source = None if table is None else str(table)
     grasps = [
@@ -162,6 +219,13 @@ def plan_grasps(
     for grasp in grasps:
         grasp.item  # noqa: B018 (raises for an unknown object before the simulation starts)
     return grasps
+
+
+def _check_numbers(repeats: int, seed: int) -> None:
+    if repeats < 1 or seed < 0:
+        raise ValueError(
+            f"repeats of at least 1 and a seed of at least 0 expected; {repeats} and {seed} given"
+        )
 
 
 def _is_finished(grasp: "Grasp", out: Path) -> bool:
@@ -176,10 +240,16 @@ def _has_failed(grasp: "Grasp", out: Path) -> bool:
 
 
 def _exists(grasp: "Grasp", path: Path) -> bool:
-    """Return whether a recording exists, and check that it has the settings of the grasp.
+    """Return whether the recording of a grasp exists; see `_is_recorded`."""
+    expected = {"profile": grasp.profile, "seed": grasp.seed, "server": grasp.server}
+    return _is_recorded(path, expected)
+
+
+def _is_recorded(path: Path, expected: "dict[str, object]") -> bool:
+    """Return whether a recording exists, and check that it has the expected settings.
 
     Raises:
-        OutputError: the recording has another profile or seed.
+        OutputError: the recording has other settings.
     """
     from holdfast.errors import OutputError
     from holdfast.io import load_recording
@@ -187,8 +257,7 @@ def _exists(grasp: "Grasp", path: Path) -> bool:
     if not path.exists():
         return False
     metadata = load_recording(path, labels=False).metadata
-    found = {name: metadata.get(name) for name in ("profile", "seed", "server")}
-    expected = {"profile": grasp.profile, "seed": grasp.seed, "server": grasp.server}
+    found = {name: metadata.get(name) for name in expected}
     if found != expected:
         raise OutputError(
             f"{path} has {_list(found)}; {_list(expected)} given: choose another folder, "
