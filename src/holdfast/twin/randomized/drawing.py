@@ -130,7 +130,7 @@ def draw_object(generator: np.random.Generator, grip: float, n_opposite: int) ->
         "sphere": [wide],
         "box": [wide, other, tall, 0.003],
         "cylinder": [wide, tall, 0.003],
-        "capsule": [wide, max(tall, wide)],
+        "capsule": [wide, max(tall, 1.1 * wide)],
         "hexagon": [wide, tall, 0.003],
         "frustum": [wide, other, tall, 0.003],
     }
