@@ -133,6 +133,8 @@ def tables(plan: StudyPlan, results: Mapping[str, Any]) -> list[ResultTable]:
         f"(1) {GRIP.reason} Measured: linear regression of the logarithm of the energy of the "
         f"Haar details of F_a (N_w = {DEFAULT_WINDOW}) on those of the true contact force and of "
         "the true slip speed, both means over the window, if the mean speed is above 1 mm/s. "
+        "(A first version demanded sliding in the whole window; only 2 of 16 recordings had such "
+        "windows, so the measure was changed, but not the expectation.) "
         f"(2) {SETTLES.reason} Measured: by finger, the ratio of the geometric means of sigma in "
         "the first second after the lock and from then on until the first disturbance or the "
         "release, without glitches. Supported: the value is at least as large as expected, and "
