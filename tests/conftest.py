@@ -4,10 +4,19 @@ import math
 import os
 import re
 import shutil
+import signal
 from pathlib import Path
 
 import hypothesis
 import pytest
+
+for _signal, _handler in (
+    (signal.SIGINT, signal.default_int_handler),
+    (signal.SIGHUP, signal.SIG_DFL),
+):
+    if signal.getsignal(_signal) is signal.SIG_IGN:  # as in a background job of a shell
+        signal.signal(_signal, _handler)
+
 
 # The checks of a submission try the same examples every time; at home they differ.
 hypothesis.settings.register_profile("checks", derandomize=True)
