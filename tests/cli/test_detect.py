@@ -263,7 +263,7 @@ def test_refusals(capsys, model, grasp, save, tmp_path):
         f"cannot read the model {missing}: No such file or directory"
     )
     assert refusal(capsys, "builtin:best", grasp) == (
-        "unknown model 'builtin:best'; built in are builtin:twin, builtin:noise-floor"
+        "unknown model 'builtin:best'; built in are builtin:any, builtin:twin, builtin:noise-floor"
     )
     assert refusal(capsys, model, "twin:?object=anvil").startswith(
         "twin:?object=anvil: no object 'anvil'; there are "

@@ -131,7 +131,7 @@ def test_refusals(capsys, folder, tmp_path):
         f"cannot read the model {tmp_path / 'none.json'}: No such file or directory"
     )
     assert refusal(capsys, "builtin:magic", new) == (
-        "unknown model 'builtin:magic'; built in are builtin:twin, builtin:noise-floor"
+        "unknown model 'builtin:magic'; built in are builtin:any, builtin:twin, builtin:noise-floor"
     )
     assert refusal(capsys, model, tmp_path / "none") == (
         f"there is no folder {tmp_path / 'none'}; a folder of recordings expected"

@@ -132,7 +132,7 @@ def test_a_model_is_not_overwritten(capsys, data, model):
         (
             ["--features", "F_a,magic"],
             "unknown feature 'magic'; there are F_a, F_x, F_y, F_z, m, sigma, F_tip for F_x, F_y "
-            "and F_z, and holdfast alone for the project's own features",
+            "and F_z, and holdfast or any alone for the project's own features",
         ),
         (
             ["--tare", "soon"],
@@ -157,7 +157,8 @@ def test_a_model_is_not_overwritten(capsys, data, model):
         ),
         (
             ["--init", "builtin:hand"],
-            "unknown model 'builtin:hand'; built in are builtin:twin, builtin:noise-floor",
+            "unknown model 'builtin:hand'; built in are builtin:any, builtin:twin, "
+            "builtin:noise-floor",
         ),
     ],
 )
