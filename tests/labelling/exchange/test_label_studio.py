@@ -6,7 +6,6 @@ import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
-from tests.labelling.tiny import TINY
 
 from holdfast.contact import Cause, ContactState
 from holdfast.errors import RecordingError
@@ -19,6 +18,7 @@ from holdfast.labelling.exchange.label_studio import (
 )
 from holdfast.labelling.exchange.label_studio_export import task_of
 from holdfast.recordings import Label, Recording, Tactile
+from labelling.tiny import TINY
 
 TIMES = np.arange(400) / 100.0
 FINGERS = ("thumb", "index")

@@ -5,7 +5,6 @@ from xml.etree import ElementTree
 
 import numpy as np
 import pytest
-from tests.labelling.tiny import TINY, tiny_recording
 
 from holdfast.contact import Cause, ContactState
 from holdfast.errors import OutputError, RecordingError
@@ -18,6 +17,7 @@ from holdfast.labelling.exchange.label_studio_export import (
     task_of,
 )
 from holdfast.recordings import Label, Recording, Tactile
+from labelling.tiny import TINY, tiny_recording
 
 
 def table(text):

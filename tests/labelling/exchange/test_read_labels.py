@@ -2,7 +2,6 @@ import json
 from dataclasses import replace
 
 import pytest
-from tests.labelling.tiny import tiny_recording
 
 from holdfast.contact import ContactState
 from holdfast.errors import RecordingError
@@ -10,6 +9,7 @@ from holdfast.io import labels_to_csv, save_labels, save_recording
 from holdfast.labelling.exchange.label_studio_export import save_label_studio
 from holdfast.labelling.exchange.read_labels import read_labels
 from holdfast.recordings import Label
+from labelling.tiny import tiny_recording
 
 
 @pytest.fixture(scope="module")

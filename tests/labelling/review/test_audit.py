@@ -4,7 +4,6 @@ from dataclasses import replace
 import msgspec
 import numpy as np
 import pytest
-from tests.labelling.tiny import TINY, tiny_recording
 
 from holdfast.contact import ContactState
 from holdfast.errors import TrainingError
@@ -19,6 +18,7 @@ from holdfast.labelling.review.audit import (
 )
 from holdfast.recordings import Label, Recording, Tactile
 from holdfast.training import Setting
+from labelling.tiny import TINY, tiny_recording
 
 NONE, UNSTABLE, STABLE = (
     ContactState.NO_CONTACT,

@@ -2,7 +2,6 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from tests.labelling.tiny import STATES, TINY, tiny_recording
 
 from holdfast.contact import ContactState
 from holdfast.errors import TrainingError
@@ -11,6 +10,7 @@ from holdfast.labelling.review.out_of_fold import out_of_fold
 from holdfast.recordings import Label, Recording, Tactile
 from holdfast.resampling import resample
 from holdfast.training import Setting
+from labelling.tiny import STATES, TINY, tiny_recording
 
 NONE, UNSTABLE, STABLE = (
     ContactState.NO_CONTACT,
