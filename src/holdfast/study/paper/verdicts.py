@@ -43,7 +43,7 @@ DIGITS = {"delay median [s]": 3, "delay 95 % [s]": 3, "disturbances": 0, "failed
 Keys = dict[str, Key]
 
 
-class Disturbance(msgspec.Struct, frozen=True):
+class DisturbanceOutcome(msgspec.Struct, frozen=True):
     """One disturbance of a held object, and its detection by the hand.
 
     Attributes:
@@ -86,7 +86,7 @@ class GraspVerdict(msgspec.Struct, frozen=True):
     unstable: tuple[int, int]
     first_stable: list[float]
     lasting_stable: list[float]
-    disturbances: list[Disturbance]
+    disturbances: list[DisturbanceOutcome]
 
 
 def tasks(plan: StudyPlan) -> list[Task]:
@@ -240,7 +240,9 @@ def stable_after_lock(
     return first, lasting
 
 
-def find_disturbances(hand: FingerDecisions | None, truth: Truth | None) -> list[Disturbance]:
+def find_disturbances(
+    hand: FingerDecisions | None, truth: Truth | None
+) -> list[DisturbanceOutcome]:
     """Return the disturbances of a held object, each with its detection by an alarm.
 
     An alarm is a change of the hand from STABLE to another known state. Disturbances with a
@@ -261,7 +263,7 @@ def find_disturbances(hand: FingerDecisions | None, truth: Truth | None) -> list
         before = int(np.searchsorted(hand.times, onset - TIME_TOLERANCE)) - 1
         alarms = hand.times[alarm & inside]
         found.append(
-            Disturbance(
+            DisturbanceOutcome(
                 start=onset,
                 end=last,
                 slides=bool((phase[start:end] == Phase.SLIPPING).any()),
