@@ -28,6 +28,7 @@ from holdfast.classifiers import Parameters
 from holdfast.features import parse_features
 from holdfast.io import load_dataset
 from holdfast.metrics import Decisions, bootstrap_interval, ratio_of_sums, summarise
+from holdfast.metrics.truth_labels import LabelRule, labels_from_truth
 from holdfast.model import Model
 from holdfast.recordings import Recording, label_states
 from holdfast.training import Setting, compute_decisions
@@ -37,7 +38,6 @@ from holdfast.training.setting import SEARCH_SAMPLES
 from holdfast.training.splits import inner_folds, split_data
 from holdfast.training.training_samples import FingerSamples, gather_samples
 from holdfast.training.tuning import INNER_FOLDS, search
-from holdfast.twin.labels import LabelRule, labels_from_truth
 
 START = "builtin:twin"
 HEADER = (

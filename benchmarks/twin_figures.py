@@ -26,9 +26,9 @@ import numpy as np
 from holdfast.contact import HELD_PHASES, Cause, ContactState, Phase
 from holdfast.io import load_dataset
 from holdfast.metrics import Metrics
+from holdfast.metrics.truth_labels import LabelRule, labels_from_truth
 from holdfast.recordings import Label, Recording, Truth, labels_from_samples
 from holdfast.training import Setting, train
-from holdfast.twin.labels import LabelRule, labels_from_truth
 from holdfast.twin.objects import OTHER_OBJECTS, load_objects, object_named
 from holdfast.twin.simulation import Grasp, simulate
 

@@ -66,6 +66,7 @@ def test_unlabelled_and_undecided_samples_are_left_out():
     states = [STABLE, UNKNOWN, UNKNOWN, STABLE]
     metrics = sample_metrics(labels, states, [0.9, np.nan, np.nan, 0.9])
     assert (metrics.n, metrics.n_undecided) == (1, 2)
+    assert metrics.without_estimate == pytest.approx(200 / 3)
     assert metrics.confusion == [[0, 0], [0, 1]]
 
 

@@ -1,4 +1,5 @@
 import weakref
+from dataclasses import replace
 
 import msgspec
 import numpy as np
@@ -66,14 +67,41 @@ def test_events_of_recordings_add_up():
     assert metrics.events.fingers["thumb"].n_events == 6
 
 
+def test_events_are_found_in_the_exact_labels_where_they_are_known():
+    drawn = decisions(0)
+    exact = {n: replace(f, exact_labels=np.roll(f.labels, 10)) for n, f in drawn.fingers.items()}
+    known = Decisions.of("known", exact, 2)
+    metrics = summarise([known, drawn])
+    one, two = (recording.events for recording in metrics.recordings)
+    assert (one.hand.onsets, two.hand.onsets, metrics.events.hand.onsets) == (
+        "truth", "labels", "mixed",
+    )  # fmt: skip
+    assert one.fingers["thumb"].onsets == "truth"
+    finger = exact["thumb"]
+    wanted = event_metrics(finger.times, finger.exact_labels, finger.states)
+    assert one.fingers["thumb"].missed == wanted.missed != two.fingers["thumb"].missed
+    assert metrics.recordings[0].fingers == metrics.recordings[1].fingers
+
+
+def test_a_hand_has_exact_labels_only_if_all_fingers_have_them():
+    drawn = decisions(0)
+    thumb = drawn.fingers["thumb"]
+    some = {**drawn.fingers, "thumb": replace(thumb, exact_labels=thumb.labels)}
+    assert Decisions.of("some", some, 2).hand.exact_labels is None
+    every = {n: replace(f, exact_labels=f.labels) for n, f in drawn.fingers.items()}
+    hand = Decisions.of("every", every, 2).hand
+    assert hand.exact_labels.tolist() == hand.labels.tolist()
+
+
 def test_json_has_the_fields_of_the_contract():
     document = msgspec.json.decode(msgspec.json.encode(summarise([decisions(1), decisions(2)])))
     assert {"fingers", "pooled", "recordings", "events"} <= set(document)
     sample = {"n", "accuracy", "fdr", "fpr", "fnr", "auc", "auc_contact", "confusion"}
+    sample |= {"without_estimate"}
     assert sample <= set(document["pooled"])
     assert sample <= set(document["recordings"][0]["fingers"]["thumb"])
     event = {"n_events", "stable_minutes", "missed", "delay_median", "delay_p95"}
-    assert event | {"false_alarms_per_minute"} <= set(document["events"]["hand"])
+    assert event | {"false_alarms_per_minute", "onsets"} <= set(document["events"]["hand"])
     assert set(document["events"]["hand"]["missed"]) == {"0.05", "0.1", "0.2"}
     assert set(document["events"]["fingers"]) == {"thumb", "index"}
 

@@ -1,13 +1,15 @@
 import weakref
+from dataclasses import replace
 
 import numpy as np
 import pytest
 
-from holdfast.contact import STABLE, UNKNOWN
+from holdfast.contact import STABLE, UNKNOWN, UNSTABLE, Phase
 from holdfast.detector import detect
 from holdfast.errors import ModelError
 from holdfast.metrics import hand_decisions
 from holdfast.model import Model
+from holdfast.recordings import Truth
 from holdfast.training import Setting, compute_decisions, evaluate, train
 from holdfast.training.evaluation import combine_decisions
 
@@ -32,6 +34,27 @@ def test_decisions_are_those_of_the_detector_with_the_labels(model, grasps):
     np.testing.assert_array_equal(decisions.hand.times, detection.times)
     expected = hand_decisions(decisions.fingers, 2)
     np.testing.assert_array_equal(decisions.hand.labels, expected.labels)
+
+
+def test_exact_labels_come_from_the_truth(model, grasps):
+    times = grasps[0].modules["thumb"].times
+    n = len(times)
+    pushed = (times > 1.0) & (times < 1.5)
+    thumb = {"contact_force": np.ones((n, 3)), "slip_speed": np.zeros(n)}
+    hand = {
+        "phase": np.where(pushed, Phase.DISTURBED, Phase.LOCKED).astype(str),
+        "outside_force": np.zeros((n, 3)),
+    }
+    recording = replace(grasps[0], truth=Truth(times, hand, {"thumb": thumb}))
+    found = compute_decisions(model, recording)
+    exact = found.fingers["thumb"].exact_labels
+    np.testing.assert_array_equal(exact == UNSTABLE, pushed)
+    np.testing.assert_array_equal(exact == STABLE, ~pushed)
+    labels = grasps[0].modules["thumb"].label_states
+    np.testing.assert_array_equal(found.fingers["thumb"].labels, labels)
+    assert found.fingers["index"].exact_labels is None
+    assert found.hand.exact_labels is None
+    assert compute_decisions(model, grasps[0]).fingers["thumb"].exact_labels is None
 
 
 def test_labels_of_a_recording_at_another_rate(model):

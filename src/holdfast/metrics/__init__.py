@@ -8,6 +8,7 @@ from holdfast.metrics.events import (
     InstabilityEvent,
     event_metrics,
     match_alarms,
+    match_decisions,
     pool_events,
 )
 from holdfast.metrics.intervals import Interval, bootstrap_interval, ratio_of_sums
@@ -40,6 +41,7 @@ __all__ = [
     "event_metrics",
     "hand_decisions",
     "match_alarms",
+    "match_decisions",
     "pool_events",
     "ratio_of_sums",
     "sample_metrics",

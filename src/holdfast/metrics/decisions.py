@@ -1,6 +1,6 @@
 """Decisions about a recording, with its labels: the input of all metrics."""
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from types import MappingProxyType
 from typing import Any, Self
@@ -26,6 +26,8 @@ class FingerDecisions:
         states: (n,) codes of the decided states.
         stable_probability: (n,) probability that the contact is stable; NaN if the state is
             UNKNOWN. All NaN for a hand, whose state follows from those of its fingers.
+        exact_labels: (n,) codes of the states by the truth; None if it is not known. Events are
+            found in them, because a person draws labels with a margin around a disturbance.
 
     Raises:
         ValueError: the lengths of the arrays differ, or the times do not increase.
@@ -35,6 +37,7 @@ class FingerDecisions:
     labels: Codes
     states: Codes
     stable_probability: Array
+    exact_labels: Codes | None = None
 
     def __post_init__(self) -> None:
         arrays: dict[str, npt.NDArray[Any]] = {
@@ -43,6 +46,8 @@ class FingerDecisions:
             "states": np.asarray(self.states, dtype=np.int8),
             "stable_probability": np.asarray(self.stable_probability, dtype=np.float64),
         }
+        if self.exact_labels is not None:
+            arrays["exact_labels"] = np.asarray(self.exact_labels, dtype=np.int8)
         check_lengths(**arrays)
         check_times(arrays["times"])
         for name, array in arrays.items():
@@ -78,8 +83,8 @@ def hand_decisions(fingers: Mapping[str, FingerDecisions], n_model_fingers: int)
     """Return the labels and states of a hand, at every time of any finger.
 
     A finger keeps its latest code until its next sample, and is UNKNOWN before its first. The
-    code of the hand follows from those of the fingers as in `holdfast.contact.hand_state`, both
-    for the labels and for the decided states.
+    code of the hand follows from those of the fingers as in `holdfast.contact.hand_state`, for
+    the labels, for the decided states, and for the exact labels if all fingers have them.
 
     Args:
         fingers: of one recording, each at its own times.
@@ -98,13 +103,19 @@ def hand_decisions(fingers: Mapping[str, FingerDecisions], n_model_fingers: int)
     """
     each = list(fingers.values())
     times = np.unique(np.concatenate([np.empty(0), *(finger.times for finger in each)]))
-    labels = [_latest_codes(finger.times, finger.labels, times) for finger in each]
-    states = [_latest_codes(finger.times, finger.states, times) for finger in each]
+
+    def of_hand(codes: Sequence[Codes]) -> Codes:
+        pairs = zip(each, codes, strict=True)
+        latest = [_latest_codes(finger.times, own, times) for finger, own in pairs]
+        return _hand_states(latest, len(times), n_model_fingers)
+
+    exact = [finger.exact_labels for finger in each if finger.exact_labels is not None]
     return FingerDecisions(
         times,
-        _hand_states(labels, len(times), n_model_fingers),
-        _hand_states(states, len(times), n_model_fingers),
+        of_hand([finger.labels for finger in each]),
+        of_hand([finger.states for finger in each]),
         np.full(len(times), np.nan),
+        of_hand(exact) if each and len(exact) == len(each) else None,
     )
 
 

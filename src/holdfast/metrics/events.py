@@ -6,15 +6,15 @@ last for the median interval between samples.
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass
-from typing import NamedTuple
+from dataclasses import dataclass, replace
+from typing import Literal, NamedTuple
 
 import msgspec
 import numpy as np
 import numpy.typing as npt
 
 from holdfast.contact import NO_CONTACT, STABLE, UNSTABLE, ContactState
-from holdfast.metrics.decisions import Codes, check_lengths, check_times
+from holdfast.metrics.decisions import Codes, FingerDecisions, check_lengths, check_times
 from holdfast.metrics.masks import runs
 from holdfast.metrics.statistics import finite_or_none, percent, quantile
 from holdfast.sensors.types import Array
@@ -39,6 +39,9 @@ POST_DURATIONS = (0.05, 0.1, 0.2)
 
 TIME_TOLERANCE = 1e-6
 """Times that differ by less are equal [s]; covers rounding errors of float64."""
+
+Onsets = Literal["truth", "labels", "mixed"]
+"""Where the onsets of events come from: the truth, the labels, or one in each recording."""
 
 
 class InstabilityEvent(NamedTuple):
@@ -80,11 +83,13 @@ class AlarmMatch:
         events: in order of time, each with its alarm.
         false_alarms: in order of time.
         stable_seconds: duration of stable labels [s].
+        onsets: where the labels come from in which the events were found.
     """
 
     events: tuple[InstabilityEvent, ...]
     false_alarms: tuple[FalseAlarm, ...]
     stable_seconds: float
+    onsets: Onsets = "labels"
 
     def n_missed(self, post: float) -> int:
         """Return the number of events without an alarm until onset + post [s]."""
@@ -104,6 +109,7 @@ class EventMetrics(msgspec.Struct, frozen=True):
         delay_p95: 95th percentile of the same.
         false_alarms_per_minute: per minute of stable label; None without stable labels.
         false_alarms: number of false alarms by labelled state; UNKNOWN without a label.
+        onsets: `truth` where the recordings have it, else `labels`; `mixed` if some have it.
     """
 
     n_events: int
@@ -113,6 +119,7 @@ class EventMetrics(msgspec.Struct, frozen=True):
     delay_p95: float | None
     false_alarms_per_minute: float | None
     false_alarms: dict[str, int]
+    onsets: Onsets = "labels"
 
 
 def event_metrics(
@@ -186,6 +193,13 @@ def match_alarms(times: npt.ArrayLike, labels: npt.ArrayLike, states: npt.ArrayL
     )
 
 
+def match_decisions(finger: FingerDecisions) -> AlarmMatch:
+    """Return the events and alarms of a finger, or hand; events by the truth where it is known."""
+    if finger.exact_labels is None:
+        return match_alarms(finger.times, finger.labels, finger.states)
+    return replace(match_alarms(finger.times, finger.exact_labels, finger.states), onsets="truth")
+
+
 def alarm_places(states: Codes) -> npt.NDArray[np.intp]:
     """Return the samples at which alarms come: not stable, right after a stable sample.
 
@@ -223,12 +237,18 @@ def pool_events(matches: Sequence[AlarmMatch]) -> EventMetrics:
         delay_p95=finite_or_none(quantile(delays, 0.95)),
         false_alarms_per_minute=len(false_labels) / minutes if minutes else None,
         false_alarms={str(state): false_labels.count(state) for state in ContactState},
+        onsets=_common_onsets(matches),
     )
 
 
 def event_delays(matches: Sequence[AlarmMatch]) -> Array:
     """Return the delays of all events in ascending order [s]; infinite for a missed event."""
     return np.sort(np.array([event.delay for match in matches for event in match.events]))
+
+
+def _common_onsets(matches: Sequence[AlarmMatch]) -> Onsets:
+    found = {match.onsets for match in matches} or {"labels"}
+    return found.pop() if len(found) == 1 else "mixed"
 
 
 _STATES = tuple(ContactState)

@@ -32,6 +32,7 @@ class SampleMetrics(msgspec.Struct, frozen=True):
         confusion: [[TN, FP], [FN, TP]].
         brier: mean of (stable_probability - class)^2; None if a score is no probability.
         n_undecided: number of samples with a label whose decided state is UNKNOWN.
+        without_estimate: the same as a share of all samples with a label [%].
     """
 
     n: int
@@ -44,6 +45,7 @@ class SampleMetrics(msgspec.Struct, frozen=True):
     confusion: list[list[int]]
     brier: float | None
     n_undecided: int
+    without_estimate: float | None = None
 
 
 @dataclass(frozen=True, eq=False)
@@ -156,6 +158,7 @@ def metrics_of_samples(samples: ScoredSamples) -> SampleMetrics:
         confusion=[[tn, fp], [fn, tp]],
         brier=finite_or_none(samples.squared_error / n) if n else None,
         n_undecided=samples.n_undecided,
+        without_estimate=percent(samples.n_undecided, n + samples.n_undecided),
     )
 
 

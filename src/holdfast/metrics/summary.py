@@ -7,13 +7,13 @@ from functools import partial
 import msgspec
 import numpy as np
 
-from holdfast.metrics.decisions import Decisions, FingerDecisions
+from holdfast.metrics.decisions import Decisions
 from holdfast.metrics.events import (
     POST_DURATIONS,
     AlarmMatch,
     EventMetrics,
     event_delays,
-    match_alarms,
+    match_decisions,
     pool_events,
 )
 from holdfast.metrics.intervals import (
@@ -138,6 +138,7 @@ def summarise(
         ValueError: the probability of a decided sample is NaN.
 
     Example:
+        >>> from holdfast.metrics import FingerDecisions
         >>> thumb = FingerDecisions([0.0, 0.01], [3, 2], [3, 2], [0.9, 0.2])
         >>> metrics = summarise([Decisions.of("one", {"thumb": thumb}, n_model_fingers=1)])
         >>> metrics.pooled.accuracy, metrics.events.hand.n_events, metrics.intervals
@@ -166,15 +167,13 @@ def _evaluate(decisions: Decisions) -> _RecordingResults:
         for name, finger in decisions.fingers.items()
     }
     matches = {
-        name: _match(finger) for name, finger in decisions.fingers.items() if finger.labels.any()
+        name: match_decisions(finger)
+        for name, finger in decisions.fingers.items()
+        if finger.labels.any()
     }
     hand = decisions.hand
-    hand_matches = [] if hand is None or not hand.labels.any() else [_match(hand)]
+    hand_matches = [] if hand is None or not hand.labels.any() else [match_decisions(hand)]
     return _RecordingResults(decisions.name, samples, matches, hand_matches)
-
-
-def _match(finger: FingerDecisions) -> AlarmMatch:
-    return match_alarms(finger.times, finger.labels, finger.states)
 
 
 def _recording_metrics(results: _RecordingResults) -> RecordingMetrics:

@@ -14,7 +14,7 @@ from holdfast.metrics import (
     RecordingMetrics,
     SampleMetrics,
     calibration_sums,
-    match_alarms,
+    match_decisions,
 )
 from holdfast.metrics.decisions import FingerDecisions
 from holdfast.metrics.events import EARLY_TOLERANCE, POST_DURATIONS, event_delays
@@ -175,7 +175,7 @@ def _draw_delays(
 def _draw_delay_curve(
     axes: Axes, decisions: Sequence[FingerDecisions], *, color: str, linewidth: float, alpha: float
 ) -> None:
-    matches = [match_alarms(each.times, each.labels, each.states) for each in decisions]
+    matches = [match_decisions(each) for each in decisions]
     delays = event_delays(matches)
     if not len(delays):
         return

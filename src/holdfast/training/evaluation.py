@@ -8,6 +8,7 @@ import numpy as np
 from holdfast.detector import detect
 from holdfast.metrics import Decisions, FingerDecisions, Metrics, summarise
 from holdfast.metrics.decisions import hand_decisions
+from holdfast.metrics.truth_labels import LabelRule, labels_by_truth
 from holdfast.model import Model
 from holdfast.recordings import Recording, label_states
 from holdfast.training.splits import Integers
@@ -16,16 +17,20 @@ from holdfast.training.splits import Integers
 def compute_decisions(model: Model, recording: Recording) -> Decisions:
     """Return the decisions of a model about a recording, with the labels.
 
+    If the recording has a truth, the decisions have exact labels too, without a margin.
+
     Raises:
         ModelError: the recording has other fingers or sensors.
     """
     detection = detect(model, recording)
+    exact = labels_by_truth(recording, LabelRule(margin=0.0))
     fingers = {
         name: FingerDecisions(
             times=trace.times,
             labels=label_states(recording.modules[name].labels, trace.times),
             states=trace.state,
             stable_probability=trace.stable_probability,
+            exact_labels=label_states(exact[name], trace.times) if name in exact else None,
         )
         for name, trace in detection.fingers.items()
     }

@@ -10,6 +10,7 @@ import msgspec
 import numpy as np
 
 from holdfast.contact import Phase
+from holdfast.metrics.truth_labels import LabelRule, labels_from_truth, phases_from_touch
 from holdfast.recordings import Recording, Tactile, Truth
 from holdfast.sensors import sensor
 from holdfast.sensors.types import Array
@@ -17,7 +18,6 @@ from holdfast.twin.contact import SLIP, SLIPPING_SHARE
 from holdfast.twin.control import STEPS_PER_CONTROL, draw_controller
 from holdfast.twin.grasp import ClosingPath, closing_path
 from holdfast.twin.hand import FINGERS, N_JOINTS, RATE, TIMESTEP, HandModel
-from holdfast.twin.labels import LabelRule, labels_from_truth, phases_from_touch
 from holdfast.twin.objects import GraspObject, object_named
 from holdfast.twin.operator import draw_disturbances, draw_tremor
 from holdfast.twin.profile import Profile, profile

@@ -2,8 +2,9 @@ import numpy as np
 import pytest
 
 from holdfast.contact import UNSTABLE
+from holdfast.metrics.truth_labels import LabelRule, relabel
 from holdfast.recordings import label_states
-from holdfast.study.evaluation.variation import Variation, relabel
+from holdfast.study.evaluation.variation import Variation
 from holdfast.synthetic import synthetic_recording
 from study.example_recordings import recording_with_truth
 
@@ -50,4 +51,4 @@ def test_a_margin_extends_disturbances_if_the_truth_is_known():
         shaken = (states == UNSTABLE) & (module.times > 4) & (module.times < 8)
         n[margin] = int(shaken.sum())
     assert n == pytest.approx({0.0: 180, 0.1: 210, 0.2: 240}, abs=1)
-    assert relabel(RECORDING, 0.1) is RECORDING
+    assert relabel(RECORDING, LabelRule()) is RECORDING

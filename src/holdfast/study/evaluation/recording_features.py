@@ -12,9 +12,10 @@ from holdfast.features import Tare
 from holdfast.metrics import FingerDecisions, hand_decisions
 from holdfast.metrics.decisions import Codes
 from holdfast.metrics.masks import Mask
+from holdfast.metrics.truth_labels import LabelRule, relabel
 from holdfast.recordings import Recording, Truth, label_states
 from holdfast.sensors.types import Array
-from holdfast.study.evaluation.variation import Variation, relabel
+from holdfast.study.evaluation.variation import Variation
 from holdfast.study.methods import HAND, HandSignal, Method, hand_signal
 from holdfast.study.plan import Corpus
 from holdfast.training.training_samples import rest_moments
@@ -119,7 +120,7 @@ def _recording_features(
     modules = {name: recording.modules[name] for name in fingers}
     without_contact = modules if hand.tare.without_contact else {}
     held = recording.metadata.get("object")
-    exact = relabel(recording, 0.0)
+    exact = relabel(recording, LabelRule(margin=0.0))
     compared = {name: _after(warm_up, hand, name)[::stride] for name in fingers}
     labels = _label_codes(recording, fingers, stride)
     return RecordingFeatures(

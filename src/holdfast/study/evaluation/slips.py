@@ -8,9 +8,9 @@ import numpy as np
 from holdfast.contact import CONTACT_FORCE, HELD_PHASES, SLIP_SPEED
 from holdfast.metrics.events import MIN_GAP_DURATION, MIN_STABLE_DURATION, TIME_TOLERANCE
 from holdfast.metrics.masks import Mask, join_runs, runs
+from holdfast.metrics.truth_labels import LabelRule, glitches
 from holdfast.recordings import Truth
 from holdfast.sensors.types import Array
-from holdfast.twin.labels import LabelRule, glitches
 
 MIN_SLIP_DURATION = 0.02
 """A slip lasts at least this time [s], or slides at least `MIN_SLIP_DISTANCE`."""

@@ -6,8 +6,8 @@ from dataclasses import replace
 import msgspec
 import numpy as np
 
+from holdfast.metrics.truth_labels import LabelRule, relabel
 from holdfast.recordings import Recording, Tactile
-from holdfast.twin.labels import LabelRule, labels_from_truth
 
 
 class Variation(msgspec.Struct, frozen=True):
@@ -28,7 +28,7 @@ class Variation(msgspec.Struct, frozen=True):
     def apply(self, recording: Recording) -> Recording:
         """Return the varied recording. The same recording always gets the same noise."""
         if self.margin is not None:
-            recording = relabel(recording, self.margin)
+            recording = relabel(recording, LabelRule(margin=self.margin))
         if self == Variation(margin=self.margin):
             return recording
         seed = zlib.crc32(recording.name.encode())
@@ -49,25 +49,3 @@ class Variation(msgspec.Struct, frozen=True):
             readings=readings[:: self.every],
             sensor=replace(module.sensor, rate=module.sensor.rate / self.every),
         )
-
-
-def relabel(recording: Recording, margin: float) -> Recording:
-    """Return the recording with labels made from its truth.
-
-    A recording without a truth is returned unchanged. So are fingers without a truth.
-
-    Args:
-        recording: to label.
-        margin: time by which labels extend disturbances at both ends [s].
-    """
-    truth = recording.truth
-    if truth is None or not {"phase", "outside_force"} <= set(truth.hand):
-        return recording
-    rule = LabelRule(margin=margin)
-    modules = {
-        name: replace(module, labels=labels_from_truth(truth, name, rule))
-        if {"contact_force", "slip_speed"} <= set(truth.fingers.get(name, ()))
-        else module
-        for name, module in recording.modules.items()
-    }
-    return replace(recording, modules=modules)

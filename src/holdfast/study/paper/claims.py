@@ -17,6 +17,7 @@ from holdfast.features import DEFAULT_WINDOW, Tare, haar_features
 from holdfast.metrics import Interval, bootstrap_interval
 from holdfast.metrics.intervals import Statistic
 from holdfast.metrics.masks import Mask
+from holdfast.metrics.truth_labels import LabelRule, glitches
 from holdfast.recordings import Truth
 from holdfast.sensors.types import Array
 from holdfast.study.methods import FingerSignal, hand_signal
@@ -26,7 +27,6 @@ from holdfast.study.plan import Corpus, StudyPlan
 from holdfast.study.report.html_report import ReportFigure
 from holdfast.study.report.result_tables import Key, ResultTable, Row
 from holdfast.study.tasks import Task
-from holdfast.twin.labels import LabelRule, glitches
 
 ROLES = ("main", "fresh", "others", "gentle", "vigorous")
 """Corpora whose recordings are used, if they exist; nothing is fitted to a classifier."""

@@ -12,8 +12,8 @@ from holdfast.contact import HELD_PHASES, SLIP_SPEED, UNSTABLE, Cause, ContactSt
 from holdfast.features import Tare
 from holdfast.labelling.rules import signal
 from holdfast.metrics.masks import Mask
+from holdfast.metrics.truth_labels import LabelRule, fingers_with_truth, relabel
 from holdfast.recordings import Recording, Tactile, Truth, label_states, labels_from_samples
-from holdfast.twin.labels import LabelRule, labels_from_truth
 
 LabelSource = Literal["recording", "exact", "drawn", "sliding"]
 """Where labels come from.
@@ -23,19 +23,10 @@ LabelSource = Literal["recording", "exact", "drawn", "sliding"]
 unstable; disturbances without sliding and glitches are stable.
 """
 
-HAND_TRUTH = {"phase", "outside_force"}
-FINGER_TRUTH = {"contact_force", "slip_speed"}
-"""Names in the truth that labels need."""
-
 
 def has_truth(recording: Recording) -> bool:
     """Return whether exact labels can be made for all fingers of a recording."""
-    truth = recording.truth
-    return (
-        truth is not None
-        and set(truth.hand) >= HAND_TRUTH
-        and all(set(truth.fingers.get(name, ())) >= FINGER_TRUTH for name in recording.modules)
-    )
+    return len(fingers_with_truth(recording)) == len(recording.modules)
 
 
 def relabelled(recording: Recording, source: LabelSource, tare: str) -> Recording:
@@ -53,14 +44,11 @@ def relabelled(recording: Recording, source: LabelSource, tare: str) -> Recordin
     truth = recording.truth
     if source == "recording" or truth is None or not has_truth(recording):
         return recording
-    rule = LabelRule(margin=0.0)
-    modules = {
-        name: replace(module, labels=labels_from_truth(truth, name, rule))
-        for name, module in recording.modules.items()
-    }
-    if source == "sliding":
-        modules = {name: _only_sliding(module, truth, name) for name, module in modules.items()}
-    return replace(recording, modules=modules)
+    exact = relabel(recording, LabelRule(margin=0.0))
+    if source == "exact":
+        return exact
+    modules = {name: _only_sliding(module, truth, name) for name, module in exact.modules.items()}
+    return replace(exact, modules=modules)
 
 
 def _only_sliding(module: Tactile, truth: Truth, finger: str) -> Tactile:

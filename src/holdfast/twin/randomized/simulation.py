@@ -9,11 +9,11 @@ import numpy as np
 import numpy.typing as npt
 
 from holdfast.contact import Phase
+from holdfast.metrics.truth_labels import LabelRule, labels_from_truth
 from holdfast.recordings import Recording, Tactile, Truth
 from holdfast.sensors.types import Array
 from holdfast.twin.contact import SLIP, SLIPPING_SHARE
 from holdfast.twin.hand import FINGERS
-from holdfast.twin.labels import LabelRule, labels_from_truth
 from holdfast.twin.operator import draw_tremor, hold_wrench
 from holdfast.twin.profile import profile
 from holdfast.twin.protocol import OPEN_GAP, THUMB_SHARE, Command, Plan, Protocol

@@ -6,8 +6,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from holdfast.contact import Cause, ContactState, Phase
+from holdfast.metrics.truth_labels import LabelRule, labels_from_truth, phases_from_touch
 from holdfast.recordings import Truth, label_states
-from holdfast.twin.labels import LabelRule, labels_from_truth, phases_from_touch
 
 RATE = 150
 RULE = LabelRule()

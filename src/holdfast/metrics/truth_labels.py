@@ -4,7 +4,7 @@ A finger that shakes the object leaves it three to eight times a second, so "an 
 acts" changes often within one shake. A person labels the shake as a whole, and so does this.
 """
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 import numpy.typing as npt
@@ -22,8 +22,13 @@ from holdfast.contact import (
     Phase,
 )
 from holdfast.metrics.masks import Mask, join_runs, runs, runs_with, widen_runs
-from holdfast.recordings import Label, Truth, labels_from_samples
+from holdfast.recordings import Label, Recording, Truth, labels_from_samples
 from holdfast.sensors.types import Array
+
+HAND_TRUTH = {"phase", "outside_force"}
+"""Arrays of the truth of the hand without which there are no labels."""
+FINGER_TRUTH = {"contact_force", "slip_speed"}
+"""Arrays of the truth of a finger without which it has no labels."""
 
 
 @dataclass(frozen=True)
@@ -103,6 +108,42 @@ def labels_from_truth(
     ]
     period = float(np.median(np.diff(times)))
     return labels_from_samples(times, states, period=period, evidence="truth", author="twin")
+
+
+def relabel(recording: Recording, rule: LabelRule) -> Recording:
+    """Return the recording with labels made from its truth.
+
+    Fingers without a truth keep their labels.
+
+    Args:
+        recording: to label.
+        rule: thresholds and margins.
+    """
+    found = labels_by_truth(recording, rule)
+    modules = {
+        name: replace(module, labels=found.get(name, module.labels))
+        for name, module in recording.modules.items()
+    }
+    return replace(recording, modules=modules) if found else recording
+
+
+def labels_by_truth(recording: Recording, rule: LabelRule) -> dict[str, tuple[Label, ...]]:
+    """Return the labels of each finger whose truth is known; none without a truth.
+
+    Args:
+        recording: with the truth.
+        rule: thresholds and margins.
+    """
+    truth, known = recording.truth, fingers_with_truth(recording)
+    return {} if truth is None else {name: labels_from_truth(truth, name, rule) for name in known}
+
+
+def fingers_with_truth(recording: Recording) -> list[str]:
+    """Return the fingers whose labels can be made from the truth."""
+    truth = recording.truth
+    if truth is None or not truth.hand.keys() >= HAND_TRUTH:
+        return []
+    return [n for n in recording.modules if truth.fingers.get(n, {}).keys() >= FINGER_TRUTH]
 
 
 def glitches(truth: Truth, rule: LabelRule) -> Mask:
