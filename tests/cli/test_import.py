@@ -179,7 +179,7 @@ class TestOutputs:
 
 def test_refusals(capsys, table, tmp_path):
     out = tmp_path / "out"
-    formats = "uskin-pick-move, xela-log, gtac, arq-crisp, rosbag, csv"
+    formats = "uskin-pick-move, xela-log, gtac, anyskin-slip, arq-crisp, rosbag, csv"
     missing, empty, text = tmp_path / "none", tmp_path / "empty", tmp_path / "notes.txt"
     empty.mkdir()
     text.write_text("hello")

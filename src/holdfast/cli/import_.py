@@ -63,10 +63,10 @@ def import_(
 ) -> None:
     """Import recordings from other formats.
 
-    Formats: uskin-pick-move, xela-log, gtac, arq-crisp, rosbag, csv (see docs/formats.md), and
-    recordings of holdfast itself. From an .mcap file that was cut off, everything up to the cut
-    is recovered. Write OUT/NAME.parquet for each recording. If one of them fails, none is
-    written.
+    Formats: uskin-pick-move, xela-log, gtac, anyskin-slip, arq-crisp, rosbag, csv (see
+    docs/formats.md), and recordings of holdfast itself. From an .mcap file that was cut off,
+    everything up to the cut is recovered. Write OUT/NAME.parquet for each recording. If one of
+    them fails, none is written.
 
     Example:
       holdfast import data/uskin_pick_move real/

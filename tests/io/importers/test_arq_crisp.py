@@ -42,6 +42,38 @@ def test_every_experiment_is_a_recording(tmp_path):
     assert module.readings[1, 2].tolist() == [13, 15, 17]
 
 
+def test_the_documented_layout_of_2021(tmp_path):
+    """A file for each object; GGCNN2/OBJECT/PoseN/ExpM holds float64 data and int64 labels."""
+    codes = np.array([0, 3, 4, 5, 2, 0], dtype="<i8")
+    arrays = {
+        "tactile_data_raw": 32000.0 + np.arange(18 * 3 * 6).reshape(18, 3, 6),
+        "tactile_timestamps": 1.6e12 + np.array([0.0, 5.546, 11.092, 16.638, 22.184, 27.73]),
+        "tactile_slips_label": codes,
+        "tactile_changes_label": (codes > 0).astype("<i8"),
+    }
+    for thing in ("brush", "screwDriver", "SpoolSolder"):
+        with h5py.File(tmp_path / f"slipDataset_{thing}_tactile.h5", "w") as file:
+            for pose in (1, 2):
+                for experiment in (1, 10, 2):
+                    group = file.create_group(f"GGCNN2/{thing}/Pose{pose}/Exp{experiment}")
+                    for name, values in arrays.items():
+                        group.create_dataset(name, data=values)
+    recordings = list(import_recordings(tmp_path))
+    assert [recording.name for recording in recordings[-6:]] == [
+        f"GGCNN2_screwDriver_Pose{pose}_Exp{k}" for pose in (1, 2) for k in (1, 2, 10)
+    ]
+    assert {recording.metadata["object"] for recording in recordings} == {
+        "brush", "screwDriver", "SpoolSolder",
+    }  # fmt: skip
+    module = recordings[0].modules["finger1"]
+    assert module.readings.dtype == np.uint16
+    assert module.readings[1].tolist() == arrays["tactile_data_raw"][:, :, 1].tolist()
+    assert module.rate == pytest.approx(180.31, abs=0.01)
+    assert module.label_states.tolist() == [
+        NO_CONTACT, UNSTABLE, STABLE, UNSTABLE, UNSTABLE, NO_CONTACT,
+    ]  # fmt: skip
+
+
 @pytest.mark.parametrize(("n_taxels", "name"), [(18, "uskin-3x6"), (24, "uskin-4x6")])
 def test_both_sensors(tmp_path, n_taxels, name):
     write(tmp_path / "a.h5", [4, 5], n_taxels)
@@ -94,8 +126,9 @@ def test_bad_input_gives_one_line(tmp_path, n_taxels, changes, text):
 def test_files_that_are_not_a_data_set(tmp_path):
     path = tmp_path / "a.h5"
     path.write_text("version https://git-lfs.github.com/spec/v1\n")
-    with pytest.raises(RecordingError, match=r"is not an HDF5 file .for a Git LFS pointer"):
-        list(import_recordings(path, "arq-crisp"))
+    for place, form in ((path, "arq-crisp"), (path, None), (tmp_path, None)):
+        with pytest.raises(RecordingError, match=r"is not an HDF5 file .for a Git LFS pointer"):
+            list(import_recordings(place, form))
     path.unlink()
     write(path, [0, 1], tactile_data_raw=None)
     with pytest.raises(RecordingError, match="no group with tactile_data_raw in it"):

@@ -14,6 +14,7 @@ FORMATS = {
     "uskin-pick-move": "folders of uSkin 4x4 recordings with measured slip (imanlab)",
     "xela-log": "CSV of a whole hand: a time column and 368 x 3 columns in flat taxel order",
     "gtac": "CSV of the GTac gripper: 15 magnetic nodes",
+    "anyskin-slip": "CSV of the AnySkin slip data set of Pollen Robotics: 5 magnetometers",
     "arq-crisp": "HDF5 of the ARQ-CRISP slip data sets of 2021 and 2023 (extra: hdf5)",
     "rosbag": "bags of ROS 1 and ROS 2 with topics of XELA or Contactile (extra: bags)",
     "csv": "the generic CSV of docs/formats.md",

@@ -43,8 +43,11 @@ _HELD_BEFORE = (_RELEASE, _HELD_IN_MOTION, _SLIP_AT_REST, _SLIP_IN_MOTION)
 
 
 def can_read(path: Path) -> bool:
-    """Return whether `path` is an HDF5 file, or a folder with one."""
-    return any(_is_hdf5(file) for file in _files(path))
+    """Return whether `path` is an HDF5 file, or a folder with one.
+
+    A pointer of Git LFS under the name of such a file counts: `read` says how to get the data.
+    """
+    return any(file.suffix in SUFFIXES or _is_hdf5(file) for file in _files(path))
 
 
 def read(path: Path) -> Iterator[Recording]:
