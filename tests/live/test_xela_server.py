@@ -333,3 +333,56 @@ def test_the_event_loop_is_closed():
         loop = server._loop
         assert isinstance(loop, asyncio.AbstractEventLoop)
     assert loop.is_closed()
+
+
+class Grasp(Made):
+    """Source that can begin again: its samples repeat, its times continue."""
+
+    n_restarts = n_read = 0
+
+    def restart(self):
+        self.n_restarts += 1
+        self.k = 0
+
+    def read(self, timeout):
+        arrival = super().read(timeout)
+        self.n_read += 1
+        return arrival._replace(time=time_of(self.n_read))
+
+
+def first_sample(arrivals):
+    return arrivals[0].samples["thumb"]
+
+
+@pytest.mark.parametrize("sensors", [TIPS, WHOLE], ids=["tips", "hand"])
+def test_each_client_receives_the_recording_from_its_beginning(sensors):
+    made = Grasp(sensors)
+    beginning = samples_of(sensors, 0)["thumb"]
+    with played(made, restart=True) as server:
+        with open_source(server.uri) as one:
+            assert np.array_equal(first_sample(taken(one, 100)), beginning)
+            with open_source(server.uri) as other:
+                assert np.array_equal(first_sample(taken(other, 50)), beginning)
+            both = taken(one, 300)
+            assert any(np.array_equal(a.samples["thumb"], beginning) for a in both)
+            assert (np.diff([a.time for a in both]) > 0).all()
+        assert server.n_clients == 0 or eventually(lambda: server.n_clients == 0)
+        n_read = made.n_read
+        assert not server.wait(0.5)
+        assert made.n_read <= n_read + 100  # it is not read without clients
+        n_read = made.n_read
+        assert not server.wait(0.3)
+        assert made.n_read == n_read
+        with open_source(server.uri) as late:
+            arrivals = taken(late, 10)
+        assert np.array_equal(first_sample(arrivals), beginning)
+        assert made.n_restarts == 3
+        assert server.failure is None
+
+
+def test_a_source_without_a_beginning_continues_for_each_client():
+    with played(Made(), restart=True) as server:
+        for _ in range(2):
+            with open_source(server.uri) as source:
+                taken(source, 20)
+        assert server.failure is None

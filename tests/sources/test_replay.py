@@ -327,3 +327,17 @@ def test_the_wall_clock_is_what_counts(path):
         arrivals = list(source)
     assert time.monotonic() - began >= 0.49
     assert all(one.received <= two.received for one, two in itertools.pairwise(arrivals))
+
+
+@pytest.mark.parametrize("loop", [False, True])
+def test_it_starts_again_from_the_beginning(path, clock, loop):
+    with Replay(path, loop=loop) as source:
+        source.restart()  # at its beginning, it has no effect
+        before = [source.read(60.0) for _ in range(20)]
+        source.restart()
+        after = [source.read(60.0) for _ in range(20)]
+    assert after[0].time == pytest.approx(before[-1].time + module.PAUSE)
+    for one, again in zip(before, after, strict=True):
+        assert again.time - one.time == pytest.approx(after[0].time - before[0].time)
+        for name, sample in one.samples.items():
+            np.testing.assert_array_equal(again.samples[name], sample)

@@ -118,6 +118,14 @@ def test_the_next_repeats_follow(quick):
     np.testing.assert_allclose(times[1:, 0] - times[:-1, -1], 1.0)
 
 
+def test_it_starts_the_current_grasp_again(quick):
+    with open_source("twin:?repeat=4", speed=0, loop=True) as source:
+        list(itertools.islice(source, 13))  # three samples of the second grasp
+        source.restart()
+        arrivals = list(itertools.islice(source, 20))
+    assert [int(a.samples["thumb"][0, 0]) for a in arrivals] == [50] * 10 + [60] * 10
+
+
 def test_the_next_grasp_is_simulated_by_another_process(monkeypatch):
     monkeypatch.setattr(module, "simulate", lambda _: short(ball()))
     with open_source(BALL, speed=0, loop=True) as source:

@@ -53,8 +53,9 @@ def play(
     --separate, are sent as sensors 1, 2, ... Readings in newtons are sent as calibrated values,
     with counts computed from a data sheet. Stop it with Ctrl-C.
 
-    SOURCE is the path of a recording, or twin:?object=can&seed=1. It is repeated, unless --once
-    is given.
+    SOURCE is the path of a recording, or twin:?object=can&seed=1. It begins when the first client
+    connects, and again for all clients when another one connects, so that each client can take
+    its tare while nothing is touched. It is repeated, unless --once is given.
 
     Example:
       holdfast play twin:?object=can
@@ -71,8 +72,9 @@ def play(
     with open_source(source, speed=speed, loop=not once) as opened:
         whole = is_part_of_hand(opened.sensors) if whole_hand is None else whole_hand
         server = XelaServer(
-            opened, version=version, host=host, port=port, whole_hand=whole, wait=once
-        )
+            opened, version=version, host=host, port=port, whole_hand=whole,
+            wait=once, restart=not once,
+        )  # fmt: skip
         with suppress(KeyboardInterrupt), handle_stop_signals(), server:
             _print_address(server, source, version, as_json=as_json)
             _print_status(server)
@@ -108,4 +110,6 @@ def _print_status(server: "XelaServer") -> None:
 
 
 def _clients(number: int) -> str:
+    if not number:
+        return "waiting for a client"
     return "1 client" if number == 1 else f"{number} clients"

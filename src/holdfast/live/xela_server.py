@@ -2,6 +2,7 @@
 
 import asyncio
 import logging
+import math
 import time
 from collections.abc import Iterator
 from contextlib import suppress
@@ -38,8 +39,9 @@ class XelaServer:
     """XELA server that sends the samples of a source; it runs in its own threads.
 
     The time stamps are the times of the source, shifted by a constant so that the first one is
-    the current time. Packets are sent as soon as the source provides the samples. A client
-    that does not read delays no other client.
+    the current time; again so when a client connects to a server without clients. Packets are
+    sent as soon as the source provides the samples. A client that does not read delays no other
+    client.
 
     Args:
         source: an open source; the caller closes it.
@@ -48,6 +50,8 @@ class XelaServer:
         port: 0 for any free port.
         whole_hand: send fingertips as part of a whole hand.
         wait: start to read the source when the first client connects.
+        restart: begin the source again for each client that connects, and do not read it while
+            there is no client. A client then receives a recording from its beginning.
 
     Attributes:
         encoder: encoder of the packets.
@@ -71,22 +75,27 @@ class XelaServer:
         port: int = PORT,
         whole_hand: bool = False,
         wait: bool = False,
+        restart: bool = False,
     ) -> None:
         self.encoder = XelaEncoder(source.sensors, version=version, whole_hand=whole_hand)
-        self._batcher = SampleBatcher(source.sensors, own_stamps=self.encoder.has_own_stamps)
         self._source = source
+        self._batcher = self._new_batcher()
         self._address = host, port
         self.n_packets = 0
         self.failure: Exception | None = None
         self._start_failure: Exception | None = None
         self._clients: set[ServerConnection] = set()
+        self._joining: set[ServerConnection] = set()
         self._listening = Event()
         self._stopping = Event()
         self._ended = Event()
         self._client_seen = Event()
         if not wait:
             self._client_seen.set()
-        self._time_offset: float | None = None
+        self._restarts = restart
+        self._joined = Event()
+        self._time_offset = -math.inf
+        self._has_offset = False
         self._server_thread = Thread(target=self._serve, name="holdfast-play", daemon=True)
         self._source_thread = Thread(
             target=self._read_source, name="holdfast-play-source", daemon=True
@@ -95,7 +104,7 @@ class XelaServer:
     @property
     def n_clients(self) -> int:
         """Number of connected clients."""
-        return len(self._clients)
+        return len(self._clients) + len(self._joining)
 
     @property
     def ended(self) -> bool:
@@ -135,10 +144,10 @@ class XelaServer:
     def _read_source(self) -> None:
         """Read the source, and pass its packets to the event loop that sends them."""
         try:
-            while not self._stopping.is_set() and not self._client_seen.wait(READ_TIMEOUT):
-                pass
+            if self._restarts:
+                self._encode_one()
             while not self._stopping.is_set() and not self._source.ended:
-                arrival = self._source.read(READ_TIMEOUT)
+                arrival = self._source.read(READ_TIMEOUT) if self._may_read() else None
                 if arrival is not None and arrival.samples:
                     self._queue_packets(self._batcher.add(arrival.samples, arrival.time))
             self._queue_packets(self._batcher.flush())
@@ -149,14 +158,50 @@ class XelaServer:
                 self._wait_for_clients()
             self._ended.set()
 
+    def _encode_one(self) -> None:
+        """Encode the first samples, so that readings of another kind fail before a client comes."""
+        arrival = self._source.read(READ_TIMEOUT)
+        if arrival is not None and arrival.samples:
+            for batch in self._batcher.add(arrival.samples, arrival.time):
+                self._packet(batch)
+
+    def _may_read(self) -> bool:
+        """Return whether to read the source now, after a wait for clients if necessary."""
+        if not self._restarts:
+            return self._client_seen.wait(READ_TIMEOUT)
+        if self._joined.is_set():
+            self._joined.clear()
+            self._restart_source()
+        elif not self.n_clients:
+            self._joined.wait(READ_TIMEOUT)
+            return False
+        return True
+
+    def _restart_source(self) -> None:
+        """Begin the source again. Clients that joined receive nothing from before."""
+        self._queue_packets(self._batcher.flush())
+        self._batcher = self._new_batcher()
+        self._has_offset = self._has_offset and bool(self._clients)
+        self._source.restart()
+        self._loop.call_soon_threadsafe(self._admit)
+
+    def _new_batcher(self) -> SampleBatcher:
+        return SampleBatcher(self._source.sensors, own_stamps=self.encoder.has_own_stamps)
+
+    def _admit(self) -> None:
+        """Send packets to the clients that joined, too."""
+        self._clients |= self._joining
+        self._joining.clear()
+
     def _queue_packets(self, batches: Iterator[SampleBatch]) -> None:
         for batch in batches:
             self._loop.call_soon_threadsafe(self._send, self._packet(batch))
 
     def _packet(self, batch: SampleBatch) -> str:
         now = time.time()
-        if self._time_offset is None:
-            self._time_offset = now - batch.time
+        if not self._has_offset:  # time stamps never go back
+            self._time_offset = max(self._time_offset, now - batch.time)
+            self._has_offset = True
         times = {name: one + self._time_offset for name, one in batch.times.items()}
         packet = self.encoder.packet(batch.samples, batch.time + self._time_offset, now, times)
         return packet.decode()
@@ -198,13 +243,17 @@ class XelaServer:
         """Send "Welcome" to a client, then all packets until it disconnects."""
         with suppress(ConnectionClosed):
             await client.send(self.encoder.welcome().decode())
-            self._clients.add(client)
+            self._joining.add(client)
+            if not self._restarts:
+                self._admit()
             self._client_seen.set()
+            self._joined.set()
             try:
                 async for _ in client:  # a XELA server takes no commands
                     pass
             finally:
                 self._clients.discard(client)
+                self._joining.discard(client)
 
     def _send(self, packet: str) -> None:
         for client in [one for one in self._clients if _unsent_bytes(one) > MAX_BACKLOG]:

@@ -108,6 +108,9 @@ class Source(ABC):
         """Whether no arrival follows; a device never ends."""
         return False
 
+    def restart(self) -> None:  # noqa: B027 (most sources have no beginning)
+        """Begin again, where the source has a beginning; a device continues."""
+
     @abstractmethod
     def close(self) -> None:
         """Release the device. It has no effect on a source that is closed."""

@@ -168,6 +168,11 @@ class Player(Source):
             time.sleep(wait)
         return None if due > now + timeout else self._arrival(item)
 
+    def restart(self) -> None:
+        """Play the current recording from its beginning again; time continues after a pause."""
+        if not math.isnan(self._last):  # else it is still at its beginning
+            self._begin(self._same_chunks())
+
     def close(self) -> None:
         """Release the recording."""
         self._reset()
@@ -211,15 +216,24 @@ class Player(Source):
         if not (self._continues and self._is_ready(self._number + 1, timeout)):
             return None
         self._number += 1
-        self._content = timed_samples(self._late_chunks(self._number))
+        return self._begin(self._late_chunks(self._number))
+
+    def _begin(self, chunks: Iterable[Recording]) -> TimedSamples | None:
+        """Continue with a recording from its beginning, after a pause. Return its first item."""
+        self._content = timed_samples(chunks)
+        self._next = None
         self._shift = 0.0
         first = self._peek()
-        if first is not None and self._continues:
+        if first is not None and first.samples:  # else it cannot be read
             self._shift = self._last + PAUSE - first.time
             # A recording that was not ready in time still plays at its own speed.
             now = time.monotonic()
             self._start = max(now, self._due(first.time, now)), self._last + PAUSE
         return first
+
+    def _same_chunks(self) -> Iterator[Recording]:
+        """Yield the chunks of the current recording once more."""
+        yield from self._chunks(self._number)
 
     def _late_chunks(self, number: int) -> Iterator[Recording]:
         """Yield the chunks of a recording; errors occur at the first one, in `_peek`."""

@@ -6,7 +6,6 @@ import sys
 from collections.abc import Iterable, Iterator
 from contextlib import suppress
 from dataclasses import asdict, replace
-from itertools import chain
 from pathlib import Path
 from tempfile import TemporaryDirectory
 
@@ -40,6 +39,7 @@ class Twin(Player):
     def __init__(self, address: Address, *, speed: float = 1.0, loop: bool = False) -> None:
         self._simulator: _Simulator | None = None
         self._grasp = grasp_of(address)
+        self._current: list[Recording] = []
         super().__init__(address.text, speed=speed, loop=loop)
 
     def close(self) -> None:
@@ -52,14 +52,18 @@ class Twin(Player):
     def _chunks(self, number: int) -> Iterable[Recording]:
         simulator = self._simulator
         chunks = iter([simulated(self._grasp)]) if simulator is None else simulator.chunks()
-        first = next(chunks)
+        self._current = list(chunks)
+        first = self._current[0]
         n_failed = first.metadata["attempt"]
         failed = f", after {n_failed} failed attempt{'s' * (n_failed > 1)}" if n_failed else ""
         self._notices.append(f"the twin grasps: {first.name}{failed}")
         if self._loops:
             self._simulator = simulator = simulator or _Simulator()
             simulator.start(replace(self._grasp, repeat=self._grasp.repeat + number + 1))
-        return chain([first], chunks)
+        return self._current
+
+    def _same_chunks(self) -> Iterator[Recording]:
+        yield from self._current
 
     def _metadata(self, first: Recording) -> dict[str, object]:
         return {**first.metadata, "source": self.name}
