@@ -96,13 +96,46 @@ def test_the_token_is_needed(capsys, grasp, when_served):
     def work(url):
         with pytest.raises(urllib.error.HTTPError, match="401"):
             ask(f"{url.partition('?')[0]}api/v1/info")
-        return ask(f"{url.partition('?')[0]}api/v1/info", Authorization="Bearer s&cret")
+        return ask(f"{url.partition('?')[0]}api/v1/info", Authorization="Bearer s&cret-long")
 
     found = when_served(work)
-    code, out, _ = run(capsys, MODEL, grasp, "--port", 0, "--json", "--token", "s&cret")
+    code, out, _ = run(capsys, MODEL, grasp, "--port", 0, "--json", "--token", "s&cret-long")
     assert code == 0
-    assert json.loads(out)["url"].endswith("?token=s%26cret")
+    assert json.loads(out)["url"].endswith("?token=s%26cret-long")
     assert found[0]["type"] == "hello"
+
+
+def test_the_token_of_a_file_or_of_the_environment(
+    capsys, grasp, when_served, tmp_path, monkeypatch
+):
+    file = tmp_path / "token.txt"
+    file.write_text("  from-a-file\nsecond line\n")
+    monkeypatch.setenv("HOLDFAST_TOKEN", "from-the-environment")
+    for words, token in (
+        (("--token-file", file), "from-a-file"),
+        ((), "from-the-environment"),
+        (("--token", "from-the-option"), "from-the-option"),
+    ):
+        when_served(lambda url: None)
+        code, out, _ = run(capsys, MODEL, grasp, "--port", 0, "--json", *words)
+        assert code == 0
+        assert json.loads(out)["url"].endswith(f"?token={token}")
+
+
+def test_tokens_that_are_refused(capsys, grasp, tmp_path):
+    none, binary = tmp_path / "none", tmp_path / "binary"
+    binary.write_bytes(b"\xff\xfe\n")
+    for words, text in (
+        (("--token", "7 bytes"), "--token: at least 8 characters expected, 7 given"),
+        (("--token-file", none), f"--token-file {none}: a file expected, there is none"),
+        (("--token-file", tmp_path), f"--token-file {tmp_path}: a file expected, there is none"),
+        (("--token-file", binary), f"--token-file {binary}: text expected, other bytes given"),
+        (
+            ("--token-file", none, "--token", "x" * 9),
+            "--token and --token-file given; only one of them expected",
+        ),
+    ):
+        assert refusal(capsys, MODEL, grasp, *words) == text
 
 
 def test_once_ends_with_the_recording(capsys, grasp):
@@ -113,7 +146,8 @@ def test_once_ends_with_the_recording(capsys, grasp):
 
 def test_refusals(capsys, grasp, tmp_path):
     assert refusal(capsys, MODEL, grasp, "--host", "0.0.0.0") == (
-        "--host 0.0.0.0 opens the service to the network: give --token SECRET as well"
+        "--host 0.0.0.0 opens the service to the network: give --token SECRET as well "
+        "(or --token-file FILE, or HOLDFAST_TOKEN in the environment)"
     )
     assert refusal(capsys, MODEL, tmp_path / "none.parquet") == (
         f"{tmp_path / 'none.parquet'} does not exist; a recording's file expected"

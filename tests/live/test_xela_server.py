@@ -15,6 +15,7 @@ from holdfast.live.xela_server import XelaServer
 from holdfast.sensors import hand, sensor
 from holdfast.sources import Arrival, Source, base, open_source
 from holdfast.sources.base import notice_arrival
+from holdfast.web.connections import ConnectionLimit
 
 TIPS = dict.fromkeys(("thumb", "index", "middle", "ring"), sensor("uskin-curved"))
 WHOLE = {name: one.sensor for name, one in hand("allegro-uskin").modules.items()}
@@ -227,20 +228,114 @@ def test_an_arrival_without_samples_is_not_sent():
     assert 0 < server.n_packets < 20
 
 
+HANDSHAKE = (
+    b"GET / HTTP/1.1\r\nHost: 127.0.0.1\r\nUpgrade: websocket\r\nConnection: Upgrade\r\n"
+    b"Sec-WebSocket-Key: AAAAAAAAAAAAAAAAAAAAAA==\r\nSec-WebSocket-Version: 13\r\n"
+)
+
+
+def port_of(server):
+    return int(server.uri.split("?")[0].rsplit(":", maxsplit=1)[1])
+
+
+def raw_client(stack, server, data=HANDSHAKE + b"\r\n"):
+    """A client that sent these bytes, and reads nothing."""
+    lazy = stack.enter_context(socket.socket())
+    lazy.setsockopt(socket.SOL_SOCKET, socket.SO_RCVBUF, 4096)
+    lazy.settimeout(PATIENCE)
+    lazy.connect(("127.0.0.1", port_of(server)))
+    lazy.sendall(data)
+    return lazy
+
+
+def is_closed(client):
+    try:
+        return client.recv(1) == b""
+    except ConnectionResetError:
+        return True
+
+
 def test_a_client_that_does_not_read_is_disconnected_and_delays_no_other(monkeypatch):
     monkeypatch.setattr(module, "MAX_BACKLOG", 100_000)
-    with played(Made(WHOLE)) as server, socket.socket() as lazy:
-        lazy.setsockopt(socket.SOL_SOCKET, socket.SO_RCVBUF, 4096)
-        lazy.connect(("127.0.0.1", int(server.uri.rsplit(":", maxsplit=1)[1])))
-        lazy.sendall(
-            b"GET / HTTP/1.1\r\nHost: x\r\nUpgrade: websocket\r\nConnection: Upgrade\r\n"
-            b"Sec-WebSocket-Key: AAAAAAAAAAAAAAAAAAAAAA==\r\nSec-WebSocket-Version: 13\r\n\r\n"
-        )
+    with ExitStack() as stack:
+        server = stack.enter_context(played(Made(WHOLE)))
+        raw_client(stack, server)
         assert eventually(lambda: server.n_clients == 1)
         with open_source(server.uri) as source:
             assert eventually(lambda: server.n_clients == 2)
             while server.n_clients == 2:
                 assert all(a.n_lost == 0 for a in taken(source, 10))
+
+
+def test_clients_that_do_not_read_share_a_bound(monkeypatch):
+    monkeypatch.setattr(module, "MAX_TOTAL_BACKLOG", 500_000)
+    with ExitStack() as stack:
+        server = stack.enter_context(played(Made(WHOLE)))
+        for _ in range(10):
+            raw_client(stack, server)
+        assert eventually(lambda: server.n_clients == 10)
+        with open_source(server.uri) as source:
+            while server.n_clients > 1:
+                assert all(a.n_lost == 0 for a in taken(source, 10))
+
+
+@pytest.mark.parametrize(
+    ("backlogs", "slow"),
+    [
+        ({"a": 10, "b": 0}, []),
+        ({"a": 10, "b": 101}, ["b"]),
+        ({"a": 90, "b": 80, "c": 100}, ["c"]),
+        ({"a": 100, "b": 100, "c": 100, "d": 1}, ["a", "b"]),
+    ],
+)
+def test_the_slowest_clients_are_disconnected_first(monkeypatch, backlogs, slow):
+    monkeypatch.setattr(module, "MAX_BACKLOG", 100)
+    monkeypatch.setattr(module, "MAX_TOTAL_BACKLOG", 180)
+    assert module._too_slow(backlogs) == slow
+
+
+@pytest.mark.parametrize(
+    ("head", "status", "text"),
+    [
+        (HANDSHAKE.replace(b"127.0.0.1", b"evil.example"), 403, b"host 'evil.example' refused"),
+        (HANDSHAKE + b"Origin: http://evil.example\r\n", 403, b"origin 'http://evil.example' refu"),
+        (HANDSHAKE + b"Origin: null\r\n", 403, b"origin 'null' refused"),
+        (HANDSHAKE + b"Origin: http://127.0.0.1\r\n", 101, b""),
+        (HANDSHAKE + b"Host: 127.0.0.1\r\n", 400, b"one host and one origin expected"),
+        (HANDSHAKE.replace(b"Host: 127.0.0.1\r\n", b""), 400, b"one host and one origin"),
+    ],
+)
+def test_pages_of_other_origins_are_refused(head, status, text):
+    with ExitStack() as stack:
+        server = stack.enter_context(played(Made()))
+        client = raw_client(stack, server, head + b"\r\n")
+        found = client.recv(1 << 16)
+        while text not in found and (more := client.recv(1 << 16)):
+            found += more
+        assert found.split()[1] == str(status).encode()
+        assert text in found
+
+
+def test_too_many_clients_are_refused(monkeypatch):
+    monkeypatch.setattr(module, "MAX_CLIENTS", 2)
+    with ExitStack() as stack:
+        server = stack.enter_context(played(Made()))
+        for _ in range(2):
+            raw_client(stack, server)
+        assert eventually(lambda: server.n_clients == 2)
+        assert raw_client(stack, server).recv(12) == b"HTTP/1.1 503"
+
+
+def test_connections_without_a_request_do_not_block_clients(monkeypatch):
+    limit = ConnectionLimit(max_total=8, max_per_address=8)
+    monkeypatch.setattr(module.ConnectionLimit, "of_process", lambda: limit)
+    with ExitStack() as stack:
+        server = stack.enter_context(played(Made()))
+        held = [raw_client(stack, server, b"GET /") for _ in range(40)]
+        with open_source(server.uri) as source:
+            taken(source, 5)
+            assert len(limit) <= 8
+            assert all(is_closed(one) for one in held[:30])
 
 
 def test_a_client_goes_on_after_a_restart(monkeypatch):
@@ -249,7 +344,7 @@ def test_a_client_goes_on_after_a_restart(monkeypatch):
     with ExitStack() as stack:
         with played(Made()) as server:
             source = stack.enter_context(open_source(server.uri))
-            port = int(server.uri.split("?")[0].rsplit(":", maxsplit=1)[1])
+            port = port_of(server)
             before = taken(source, 50)
         with played(Made(first=1000), port=port):
             after = taken(source, 300)

@@ -1,13 +1,18 @@
+import asyncio
 import os
 import signal
 import socket
 import threading
 import urllib.request
+from contextlib import asynccontextmanager
 
 import pytest
-from aiohttp import web
+from aiohttp import ClientSession, web
 
 from holdfast.errors import OutputError
+from holdfast.web import connections, server
+from holdfast.web.connections import ConnectionLimit
+from holdfast.web.guard import SECURITY_HEADERS, Guard
 from holdfast.web.server import run_server
 
 
@@ -60,3 +65,147 @@ def test_a_port_in_use():
 def test_an_invalid_port(port):
     with pytest.raises(OutputError, match=r"^cannot listen at 127\.0\.0\.1:"):
         run_server(app(), "127.0.0.1", port, print)
+
+
+@asynccontextmanager
+async def opened(application, monkeypatch, **limits):
+    """The address of a server with other limits, and a function that opens a raw connection."""
+    if limits:
+        monkeypatch.setattr(server.ConnectionLimit, "of_process", lambda: ConnectionLimit(**limits))
+    async with server.listening(application, "127.0.0.1", 0) as url:
+        port = int(url.rstrip("/").rpartition(":")[2])
+
+        async def connect(data=b""):
+            reader, writer = await asyncio.open_connection("127.0.0.1", port)
+            writer.write(data)
+            held.append(writer)
+            return reader, writer
+
+        held = []
+        try:
+            yield url, connect
+        finally:
+            for writer in held:
+                writer.close()
+
+
+async def rest(reader):
+    """What a server sends until it closes the connection."""
+    try:
+        return await reader.read()
+    except ConnectionResetError:
+        return b""
+
+
+def run(work):
+    return asyncio.run(asyncio.wait_for(work, 30))
+
+
+@pytest.mark.parametrize(
+    "data", [b"", b"GET / HTTP/1.1\r\nHost: x\r\n", b"GET / HTTP/1.1\r\nHost: x\r\n\r\n"]
+)
+def test_connections_without_a_complete_request_are_closed(monkeypatch, data):
+    monkeypatch.setattr(server, "HEADER_TIMEOUT", 0.05)
+
+    async def work():
+        async with opened(app(), monkeypatch) as (_, connect):
+            reader, _ = await connect(data)
+            return await rest(reader)
+
+    assert (b"hello" in run(work())) == data.endswith(b"\r\n\r\n")
+
+
+def test_held_connections_do_not_block_a_new_client(monkeypatch):
+    async def work():
+        async with opened(app(), monkeypatch, max_total=8, max_per_address=6) as (url, connect):
+            held = [await connect(b"GET / HTTP/1.1\r\n") for _ in range(60)]
+            async with ClientSession() as client, client.get(url) as answer:
+                text = await answer.text()
+            closed = [await rest(reader) for reader, _ in held[:54]]
+            return text, closed
+
+    text, closed = run(work())
+    assert text == "hello"
+    assert closed == [b""] * 54
+
+
+def test_open_sockets_stay_and_further_ones_are_refused(monkeypatch):
+    async def echo(request):
+        socket = web.WebSocketResponse()
+        await socket.prepare(request)
+        async for message in socket:
+            await socket.send_str(message.data)
+        return socket
+
+    application = app()
+    application.router.add_get("/ws", echo)
+
+    async def work():
+        async with (
+            opened(application, monkeypatch, max_total=3, max_per_address=3) as (url, connect),
+            ClientSession() as client,
+            client.ws_connect(f"{url}ws") as one,
+            client.ws_connect(f"{url}ws") as two,
+        ):
+            for _ in range(20):
+                await connect(b"GET")
+            for socket in (one, two):
+                await socket.send_str("still here")
+                assert await socket.receive_str() == "still here"
+            async with client.ws_connect(f"{url}ws"):
+                reader, _ = await connect(b"GET")
+                return await rest(reader)
+
+    assert run(work()) == b""
+
+
+@pytest.mark.parametrize(
+    ("request_", "status"),
+    [
+        (b"GET /none HTTP/1.1\r\nHost: 127.0.0.1\r\n\r\n", b"404"),
+        (b"GET /broken HTTP/1.1\r\nHost: 127.0.0.1\r\n\r\n", b"500"),
+        (b"GET / HTTP/1.1\r\nHost: evil\r\n\r\n", b"403"),
+        (b"GET / HTTP/9\r\n\r\n", b"400"),
+        (b"GET / HTTP/1.1\r\nA: " + b"x" * 20_000 + b"\r\n\r\n", b"400"),
+    ],
+)
+def test_errors_have_the_security_headers(monkeypatch, request_, status):
+    async def broken(_):
+        raise RuntimeError("inside")
+
+    application = app()
+    application.router.add_get("/broken", broken)
+    application.middlewares.append(Guard("127.0.0.1").middleware)
+
+    async def work():
+        async with opened(application, monkeypatch) as (_, connect):
+            reader, _ = await connect(request_)
+            return await reader.readuntil(b"\r\n\r\n")
+
+    head = run(work())
+    assert head.split()[1] == status
+    for name, value in SECURITY_HEADERS.items():
+        assert f"{name}: {value}".encode() in head
+    assert b"inside" not in head
+
+
+def test_failures_are_one_line_of_log(monkeypatch, caplog):
+    monkeypatch.setattr(server.LOGGER, "filters", [connections.BriefLog()])
+
+    async def broken(_):
+        raise RuntimeError("inside\nof it")
+
+    application = app()
+    application.router.add_get("/broken", broken)
+
+    async def work():
+        async with opened(application, monkeypatch) as (url, _), ClientSession() as client:
+            for _ in range(20):
+                async with client.get(f"{url}broken") as answer:
+                    assert answer.status == 500
+
+    run(work())
+    (record,) = caplog.records
+    assert record.getMessage().startswith("Error handling request")
+    assert "\n" not in record.getMessage()
+    assert record.exc_info is None

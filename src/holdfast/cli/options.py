@@ -1,6 +1,7 @@
 """Options that several verbs share, with the checks and conversions of their values."""
 
 import math
+import os
 from collections.abc import Mapping
 from enum import StrEnum
 from pathlib import Path
@@ -17,6 +18,10 @@ if TYPE_CHECKING:
     from holdfast.model import Model
     from holdfast.sources import Source
 
+TOKEN_VARIABLE = "HOLDFAST_TOKEN"
+"""Environment variable with the token of the pages."""
+MAX_TOKEN_LENGTH = 1024
+"""Longest token that is read from a file [characters]."""
 PLOT_SUFFIXES = (".pdf", ".png", ".svg")
 
 
@@ -83,7 +88,18 @@ PortOption = Annotated[
 ]
 TokenOption = Annotated[
     str | None,
-    typer.Option("--token", help="Secret that clients must send; required for other hosts."),
+    typer.Option(
+        "--token",
+        help="Secret that clients must send; required for other hosts. Other users of this "
+        "machine can read it in the list of processes: prefer --token-file.",
+    ),
+]
+TokenFileOption = Annotated[
+    Path | None,
+    typer.Option(
+        "--token-file",
+        help="File with the secret in its first line; or set HOLDFAST_TOKEN instead.",
+    ),
 ]
 PlotOption = Annotated[
     Path | None, typer.Option("--plot", help="Write a figure to this .svg, .png or .pdf file.")
@@ -91,6 +107,27 @@ PlotOption = Annotated[
 ForcePlotOption = Annotated[
     bool, typer.Option("--force", help="Overwrite the figure if it exists.")
 ]
+
+
+def find_token(token: str | None, file: Path | None) -> str | None:
+    """Return the token of `--token`, `--token-file` or the environment; None without one.
+
+    Raises:
+        ValueError: both options are given, or the file cannot be read as text.
+    """
+    if token is not None and file is not None:
+        raise ValueError("--token and --token-file given; only one of them expected")
+    if file is None:
+        return os.environ.get(TOKEN_VARIABLE) if token is None else token
+    try:
+        if not file.is_file():
+            raise ValueError(f"--token-file {file}: a file expected, there is none")
+        with file.open(encoding="utf-8") as opened:
+            return opened.readline(MAX_TOKEN_LENGTH + 1).strip()
+    except OSError as cause:
+        raise ValueError(f"--token-file {file}: cannot be read: {cause.strerror}") from cause
+    except UnicodeDecodeError as cause:
+        raise ValueError(f"--token-file {file}: text expected, other bytes given") from cause
 
 
 def load_model(name: str, debounce: float | None, hysteresis: float | None) -> "Model":

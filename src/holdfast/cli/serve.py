@@ -22,9 +22,11 @@ from holdfast.cli.options import (
     RatePolicy,
     SourceArgument,
     SpeedOption,
+    TokenFileOption,
     TokenOption,
     check_speed,
     create_stream_detector,
+    find_token,
     load_model,
 )
 from holdfast.cli.terminal.console import print_json, print_message
@@ -46,6 +48,7 @@ def serve(
     host: HostOption = DEFAULT_HOST,
     port: PortOption = DEFAULT_PORT,
     token: TokenOption = None,
+    token_file: TokenFileOption = None,
     record_to: Annotated[
         Path, typer.Option(help="Folder for recordings that are started on the page.")
     ] = Path("recordings"),
@@ -76,12 +79,13 @@ def serve(
     Example:
       holdfast serve builtin:twin twin:?object=can
       holdfast serve model.json xela://auto --ros2
-      holdfast serve model.json grasp.parquet --host 0.0.0.0 --token SECRET
+      holdfast serve model.json grasp.parquet --host 0.0.0.0 --token-file secret.txt
     """
     from holdfast.live.stream_detector import compile_kernels
     from holdfast.sources import open_source
     from holdfast.web.guard import Guard
 
+    token = find_token(token, token_file)
     guard = Guard(host, token)
     check_speed(source, speed)
     loaded = load_model(model, debounce, hysteresis)

@@ -6,11 +6,13 @@ import math
 import time
 from collections.abc import Iterator
 from contextlib import suppress
+from http import HTTPStatus
 from threading import Event, Thread
 from typing import Self
 
 from websockets.asyncio.server import ServerConnection, broadcast, serve
 from websockets.exceptions import ConnectionClosed
+from websockets.http11 import Request, Response
 
 from holdfast.errors import listen_error
 from holdfast.sources import Source
@@ -20,12 +22,23 @@ from holdfast.sources.xela.encoder import (
     SampleBatcher,
     XelaEncoder,
 )
+from holdfast.web.connections import (
+    BACKLOG,
+    HEADER_TIMEOUT,
+    ConnectionLimit,
+    log_exceptions_briefly,
+)
+from holdfast.web.origin import is_local, refusal
 
 HOST, PORT = "127.0.0.1", 5000
 READ_TIMEOUT = 0.2
 """Maximum time to wait for the source before the stop flag is checked [s]."""
 MAX_BACKLOG = 32 * 2**20
 """Maximum unsent data of a client [bytes]; a client with more is disconnected."""
+MAX_TOTAL_BACKLOG = 64 * 2**20
+"""Maximum unsent data of all clients [bytes]; the slowest ones are disconnected first."""
+MAX_CLIENTS = 64
+"""Maximum number of clients."""
 CLOSE_TIMEOUT = 1.0
 """Time for the closing handshake of a client [s]."""
 DRAIN_TIMEOUT = 10.0
@@ -41,7 +54,7 @@ class XelaServer:
     The time stamps are the times of the source, shifted by a constant so that the first one is
     the current time; again so when a client connects to a server without clients. Packets are
     sent as soon as the source provides the samples. A client that does not read delays no other
-    client.
+    client, and is disconnected. Requests of web pages from another origin are refused.
 
     Args:
         source: an open source; the caller closes it.
@@ -223,12 +236,14 @@ class XelaServer:
     async def _run(self) -> None:
         self._loop = asyncio.get_running_loop()
         self._stop = asyncio.Event()
+        log_exceptions_briefly(self._loop)
         host, port = self._address
         try:
             server = await serve(
                 self._serve_client, host, port,
-                compression=None, close_timeout=CLOSE_TIMEOUT, max_size=2**16,
-                logger=_SILENT_LOGGER,
+                process_request=self._refusal, compression=None, max_size=2**16,
+                open_timeout=HEADER_TIMEOUT, close_timeout=CLOSE_TIMEOUT, backlog=BACKLOG,
+                logger=_SILENT_LOGGER, create_connection=self._connection_class(),
             )  # fmt: skip
         except (OSError, OverflowError) as cause:
             self._start_failure = listen_error(host, port, cause)
@@ -239,10 +254,40 @@ class XelaServer:
             self._listening.set()
             await self._stop.wait()
 
+    def _connection_class(self) -> type[ServerConnection]:
+        """Return the class of connections that count for the limit of this server."""
+        limit = self._limit = ConnectionLimit.of_process()
+
+        class Connection(ServerConnection):
+            def connection_made(self, transport: asyncio.BaseTransport) -> None:
+                super().connection_made(transport)
+                limit.add(transport)
+
+            def connection_lost(self, error: Exception | None) -> None:
+                limit.remove(self.transport)
+                super().connection_lost(error)
+
+        return Connection
+
+    def _refusal(self, client: ServerConnection, request: Request) -> Response | None:
+        """Return the response to a client that is refused; None if it is accepted."""
+        hosts, origins = (request.headers.get_all(name) for name in ("Host", "Origin"))
+        if len(hosts) != 1 or len(origins) > 1:
+            return client.respond(HTTPStatus.BAD_REQUEST, "one host and one origin expected\n")
+        origin = origins[0] if origins else None
+        why = refusal(hosts[0], origin, only_local=is_local(self._address[0]))
+        if why is not None:
+            return client.respond(HTTPStatus.FORBIDDEN, f"{why}\n")
+        if len(self._clients) >= MAX_CLIENTS:
+            text = f"{MAX_CLIENTS} clients are connected; disconnect one of them\n"
+            return client.respond(HTTPStatus.SERVICE_UNAVAILABLE, text)
+        return None
+
     async def _serve_client(self, client: ServerConnection) -> None:
         """Send "Welcome" to a client, then all packets until it disconnects."""
         with suppress(ConnectionClosed):
             await client.send(self.encoder.welcome().decode())
+            self._limit.mark_stream(client.transport)
             self._joining.add(client)
             if not self._restarts:
                 self._admit()
@@ -256,7 +301,7 @@ class XelaServer:
                 self._joining.discard(client)
 
     def _send(self, packet: str) -> None:
-        for client in [one for one in self._clients if _unsent_bytes(one) > MAX_BACKLOG]:
+        for client in _too_slow({one: _unsent_bytes(one) for one in self._clients}):
             client.transport.abort()
         broadcast(self._clients, packet)
         self.n_packets += 1
@@ -266,3 +311,14 @@ def _unsent_bytes(client: ServerConnection) -> int:
     """Return the number of bytes that wait to be sent to a client."""
     n_bytes: int = client.transport.get_write_buffer_size()
     return n_bytes
+
+
+def _too_slow(backlogs: dict[ServerConnection, int]) -> list[ServerConnection]:
+    """Return the clients to disconnect, given the unsent data of each client [bytes]."""
+    total, slow = sum(backlogs.values()), []
+    for client in sorted(backlogs, key=backlogs.__getitem__, reverse=True):
+        if backlogs[client] <= MAX_BACKLOG and total <= MAX_TOTAL_BACKLOG:
+            break
+        total -= backlogs[client]
+        slow.append(client)
+    return slow

@@ -2,9 +2,10 @@
 
 import hmac
 from collections.abc import Awaitable, Callable
-from ipaddress import ip_address
 
 from aiohttp import web
+
+from holdfast.web.origin import is_local, refusal
 
 SECURITY_HEADERS = {
     "Content-Security-Policy": "default-src 'self'; connect-src 'self'; img-src 'self' data:; "
@@ -19,6 +20,9 @@ embed it."""
 TOKEN_PATHS = ("/api/", "/media/")
 """Paths that need the token; the page itself contains no secret."""
 
+MIN_TOKEN_LENGTH = 8
+"""Minimum length of a token [characters]; a shorter one could be guessed."""
+
 Handler = Callable[[web.Request], Awaitable[web.StreamResponse]]
 
 
@@ -32,34 +36,37 @@ class Guard:
 
     Raises:
         ValueError: the host can be reached from the network but there is no token, or the
-            token is empty.
+            token is too short.
     """
 
     def __init__(self, host: str, token: str | None = None) -> None:
-        if token is not None and not token.strip():
-            raise ValueError("--token: some text expected, none given")
+        if token is not None:
+            _check_token(token)
         self._local = is_local(host)
         if not self._local and token is None:
             raise ValueError(
-                f"--host {host} opens the service to the network: give --token SECRET as well"
+                f"--host {host} opens the service to the network: give --token SECRET as well "
+                "(or --token-file FILE, or HOLDFAST_TOKEN in the environment)"
             )
         self._token = token
 
     @web.middleware
     async def middleware(self, request: web.Request, handler: Handler) -> web.StreamResponse:
-        """Check a request, and add the security headers to its response."""
-        self._check(request)
-        response = await handler(request)
+        """Check a request, and add the security headers to its response or error."""
+        try:
+            self._check(request)
+            response = await handler(request)
+        except web.HTTPException as error:
+            error.headers.update(SECURITY_HEADERS)
+            raise
         if not response.prepared:
             response.headers.update(SECURITY_HEADERS)
         return response
 
     def _check(self, request: web.Request) -> None:
-        if self._local and not is_local(_without_port(request.host)):
-            raise web.HTTPForbidden(text=f"host {request.host!r} refused: this machine expected")
-        origin = request.headers.get("Origin")
-        if origin is not None and origin.partition("://")[2] != request.host:
-            raise web.HTTPForbidden(text=f"origin {origin!r} refused: {request.host} expected")
+        why = refusal(request.host, request.headers.get("Origin"), only_local=self._local)
+        if why is not None:
+            raise web.HTTPForbidden(text=why)
         if request.path.startswith(TOKEN_PATHS) and not self._has_token(request):
             raise web.HTTPUnauthorized(
                 text="token expected: Authorization: Bearer TOKEN, or ?token=TOKEN",
@@ -71,19 +78,18 @@ class Guard:
             return True
         bearer = request.headers.get("Authorization", "").removeprefix("Bearer ")
         given = bearer or request.query.get("token", "")
-        return hmac.compare_digest(given.encode(), self._token.encode())
+        return hmac.compare_digest(_bytes(given), _bytes(self._token))
 
 
-def is_local(host: str) -> bool:
-    """Return whether a host name can only be reached from this machine."""
-    try:
-        return ip_address(host.strip("[]")).is_loopback
-    except ValueError:
-        return host == "localhost"
+def _check_token(token: str) -> None:
+    if not token.strip():
+        raise ValueError("--token: some text expected, none given")
+    if len(token) < MIN_TOKEN_LENGTH:
+        raise ValueError(
+            f"--token: at least {MIN_TOKEN_LENGTH} characters expected, {len(token)} given"
+        )
 
 
-def _without_port(host: str) -> str:
-    """Return a host without its port."""
-    if host.startswith("["):
-        return host.partition("]")[0] + "]"
-    return host.partition(":")[0]
+def _bytes(token: str) -> bytes:
+    """Return the bytes of a token; a header may contain bytes that are not UTF-8."""
+    return token.encode("utf-8", "surrogatepass")

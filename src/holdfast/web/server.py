@@ -2,17 +2,29 @@
 
 import asyncio
 import signal
-from collections.abc import Callable
-from contextlib import suppress
+from collections.abc import AsyncIterator, Callable
+from contextlib import asynccontextmanager, suppress
+from typing import Any
 
 from aiohttp import web
+from aiohttp.typedefs import Middleware
 
 from holdfast.errors import listen_error
+from holdfast.web.connections import (
+    BACKLOG,
+    HEADER_TIMEOUT,
+    LOGGER,
+    ConnectionLimit,
+    log_exceptions_briefly,
+)
+from holdfast.web.guard import SECURITY_HEADERS, Handler
 
 POLL_INTERVAL = 0.2
 """Time between two calls of `is_over` [s]."""
 SHUTDOWN_TIMEOUT = 1.0
 """Time that clients have to disconnect [s]."""
+LINGERING_TIME = 1.0
+"""Time for which the rest of a refused request is read and dropped [s]."""
 
 
 def run_server(
@@ -45,18 +57,89 @@ async def _serve(
     announce: Callable[[str], None],
     is_over: Callable[[], bool],
 ) -> None:
-    runner = web.AppRunner(app, access_log=None, shutdown_timeout=SHUTDOWN_TIMEOUT)
-    await runner.setup()
-    try:
-        await _listen(runner, host, port)
-        announce(_address(runner, host))
+    log_exceptions_briefly(asyncio.get_running_loop())
+    async with listening(app, host, port) as url:
+        announce(url)
         stopped = asyncio.Event()
         _stop_by_signal(stopped)
         while not stopped.is_set() and not is_over():
             with suppress(TimeoutError):
                 await asyncio.wait_for(stopped.wait(), POLL_INTERVAL)
+
+
+@asynccontextmanager
+async def listening(app: web.Application, host: str, port: int) -> AsyncIterator[str]:
+    """Serve a web application in the running event loop, with limited connections.
+
+    Yields:
+        The address of the page.
+
+    Raises:
+        OutputError: the address is in use or cannot be bound.
+    """
+    limit = ConnectionLimit.of_process()
+    app.middlewares.insert(0, _mark_requests(limit))
+    runner = web.AppRunner(app, shutdown_timeout=SHUTDOWN_TIMEOUT)
+    await runner.setup()
+    try:
+        server = await _listen(runner, limit, host, port)
+        try:
+            yield _address(server, host)
+        finally:
+            server.close()
     finally:
         await runner.cleanup()
+
+
+class _Connection(web.RequestHandler):
+    """Connection of a client, which counts for a limit.
+
+    aiohttp closes a connection whose header does not arrive within the keep-alive timeout.
+    """
+
+    __slots__ = ("_limit", "_own_transport")
+
+    def __init__(self, server: web.Server, limit: ConnectionLimit) -> None:
+        super().__init__(
+            server,
+            loop=asyncio.get_running_loop(),
+            keepalive_timeout=HEADER_TIMEOUT,
+            lingering_time=LINGERING_TIME,
+            auto_decompress=False,
+            logger=LOGGER,
+            access_log=None,  # type: ignore[arg-type]  # aiohttp accepts it
+        )
+        self._limit = limit
+        self._own_transport: asyncio.BaseTransport | None = None
+
+    def connection_made(self, transport: asyncio.BaseTransport) -> None:
+        super().connection_made(transport)
+        self._own_transport = transport
+        self._limit.add(transport)
+
+    def connection_lost(self, error: BaseException | None) -> None:
+        self._limit.remove(self._own_transport)
+        super().connection_lost(error)
+
+    def set_parser(self, *parts: Any, **named: Any) -> None:  # noqa: ANN401 (of aiohttp)
+        """Keep the connection: it is a WebSocket from here on."""
+        super().set_parser(*parts, **named)
+        self._limit.mark_stream(self._own_transport)
+
+    def handle_error(self, *parts: Any, **named: Any) -> web.StreamResponse:  # noqa: ANN401
+        """Return the response to a request that is not valid, or that failed."""
+        response = super().handle_error(*parts, **named)
+        response.headers.update(SECURITY_HEADERS)
+        return response
+
+
+def _mark_requests(limit: ConnectionLimit) -> Middleware:
+    @web.middleware
+    async def mark(request: web.Request, handler: Handler) -> web.StreamResponse:
+        with limit.request(request.transport):
+            return await handler(request)
+
+    return mark
 
 
 def _stop_by_signal(stopped: asyncio.Event) -> None:
@@ -69,14 +152,21 @@ def _stop_by_signal(stopped: asyncio.Event) -> None:
                 loop.add_signal_handler(number, stopped.set)
 
 
-async def _listen(runner: web.AppRunner, host: str, port: int) -> None:
+async def _listen(
+    runner: web.AppRunner, limit: ConnectionLimit, host: str, port: int
+) -> asyncio.Server:
+    application = runner.server
+    if application is None:
+        raise RuntimeError("the application is not set up")
     try:
-        await web.TCPSite(runner, host, port).start()
+        return await asyncio.get_running_loop().create_server(
+            lambda: _Connection(application, limit), host, port, backlog=BACKLOG
+        )
     except (OSError, OverflowError) as cause:
         raise listen_error(host, port, cause) from cause
 
 
-def _address(runner: web.AppRunner, host: str) -> str:
-    port = runner.addresses[0][1]
+def _address(server: asyncio.Server, host: str) -> str:
+    port = server.sockets[0].getsockname()[1]
     shown = "127.0.0.1" if host in ("0.0.0.0", "::") else host
     return f"http://[{shown}]:{port}/" if ":" in shown else f"http://{shown}:{port}/"

@@ -479,16 +479,23 @@ def test_no_files_but_the_pages(tmp_path, path):
 
 def test_other_origins_and_those_without_the_token_are_refused(tmp_path):
     async def work():
-        async with served([made(tmp_path)], token="secret") as client:
+        async with served([made(tmp_path)], token="long-secret") as client:
             found = []
             for headers in (
                 {},
-                {"Authorization": "Bearer secret"},
-                {"Authorization": "Bearer secret", "Origin": "http://evil.example"},
-                {"Authorization": "Bearer secret", "Host": "evil.example"},
+                {"Authorization": "Bearer long-secret"},
+                {"Authorization": "Bearer long-secret", "Origin": "http://evil.example"},
+                {"Authorization": "Bearer long-secret", "Host": "evil.example"},
             ):
                 async with client.get("/api/v1/recordings", headers=headers) as answer:
                     found.append(answer.status)
             return found
 
     assert run(work()) == [401, 200, 403, 403]
+
+
+def test_a_document_that_is_nested_too_deeply(tmp_path):
+    body = b'{"parameters": {"delay": ' + b"[" * 100_000
+    ((status, reply),) = ask([made(tmp_path)], (*PROPOSE[:2], body))
+    assert status == 400
+    assert reply["error"].endswith("/propose: the document is nested too deeply")

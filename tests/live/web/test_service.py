@@ -293,7 +293,7 @@ def test_without_a_folder_there_are_no_recordings():
     assert run(work()) == (409, "no folder for recordings: start with --record-to FOLDER")
 
 
-@pytest.mark.parametrize("body", [b"{", b"[]", b'{"name": 3}', b'{"nam": "a"}'])
+@pytest.mark.parametrize("body", [b"{", b"[" * 50_000, b"[]", b'{"name": 3}', b'{"nam": "a"}'])
 def test_invalid_request_bodies_are_refused(tmp_path, body):
     async def work():
         async with (
@@ -337,23 +337,40 @@ def test_other_origins_and_host_names_are_refused(headers, status):
 def test_the_token_is_needed_and_accepted_in_both_forms():
     async def work():
         found = []
-        async with served(patient(10), token="secret") as (client, _):
+        async with served(patient(10), token="long-secret") as (client, _):
             for words in (
                 {},
                 {"headers": {"Authorization": "Bearer wrong"}},
-                {"headers": {"Authorization": "Bearer secret"}},
-                {"params": {"token": "secret"}},
+                {"headers": {"Authorization": "Bearer long-secret"}},
+                {"params": {"token": "long-secret"}},
                 {"params": {"token": "sécret"}},
             ):
                 async with client.get("/api/v1/info", **words) as answer:
                     found.append(answer.status)
-            async with client.ws_connect("/api/v1/live?token=secret") as socket:
+            async with client.ws_connect("/api/v1/live?token=long-secret") as socket:
                 assert (await socket.receive_json())["type"] == "hello"
             async with client.get("/") as answer:
                 assert answer.status == 200  # the page itself holds no secret
         return found
 
     assert run(work()) == [401, 401, 200, 200, 401]
+
+
+def test_too_many_websockets_are_refused(monkeypatch):
+    monkeypatch.setattr("holdfast.live.web.service.MAX_CLIENTS", 2)
+
+    async def work():
+        async with served(patient(10)) as (client, _):
+            async with client.ws_connect("/api/v1/live"), client.ws_connect("/api/v1/estimates"):
+                async with client.get("/api/v1/live") as answer:
+                    full = answer.status, (await answer.json())["error"]
+                async with client.get("/api/v1/info") as answer:
+                    assert answer.status == 200
+            async with client.ws_connect("/api/v1/live") as socket:
+                assert (await socket.receive_json())["type"] == "hello"
+            return full
+
+    assert run(work()) == (503, "2 WebSockets are open; close one of them")
 
 
 def test_the_page_loads_nothing_from_other_servers():
@@ -398,6 +415,6 @@ def test_listening_to_the_network_needs_a_token():
         Guard("0.0.0.0")
     with pytest.raises(ValueError, match=r"^--token: some text expected, none given$"):
         Guard("127.0.0.1", " ")
-    Guard("0.0.0.0", "secret")
+    Guard("0.0.0.0", "long-secret")
     Guard("::1")
     Guard("localhost")

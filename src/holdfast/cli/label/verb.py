@@ -12,7 +12,9 @@ from holdfast.cli.options import (
     JsonOption,
     PortOption,
     TareOption,
+    TokenFileOption,
     TokenOption,
+    find_token,
 )
 from holdfast.cli.serve import DEFAULT_HOST
 
@@ -76,6 +78,7 @@ def label(
     host: HostOption = DEFAULT_HOST,
     port: PortOption = DEFAULT_PORT,
     token: TokenOption = None,
+    token_file: TokenFileOption = None,
     no_browser: Annotated[
         bool, typer.Option("--no-browser", help="Do not open the page in a browser.")
     ] = False,
@@ -107,7 +110,7 @@ def label(
     from holdfast.cli.label.inputs import PageOptions, RuleOptions
 
     options = RuleOptions(tare, poses, tuple(tracks or ()), tuple(parameters or ()))
-    page_options = PageOptions(host, port, token, not no_browser, as_json)
+    page_options = PageOptions(host, port, find_token(token, token_file), not no_browser, as_json)
     mode = _mode(auto, compare, audit, export, import_from)
     if page and mode != "audit":
         raise ValueError("--page shows the result of --audit: give --audit as well")

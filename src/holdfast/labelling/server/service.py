@@ -4,7 +4,6 @@ import asyncio
 from collections.abc import Callable
 from importlib import resources
 from pathlib import Path
-from typing import TypeVar
 
 import msgspec
 from aiohttp import web
@@ -26,17 +25,18 @@ from holdfast.labelling.server.schema import (
 from holdfast.labelling.server.signals import DEFAULT_POINTS
 from holdfast.labelling.server.store import ConflictError, ReadOnlyError, parse_labels
 from holdfast.labelling.server.workspace import Workspace
+from holdfast.web.body import BodyReader, json_error
 from holdfast.web.guard import Guard, Handler
 
 MAX_REQUEST_BYTES = 64 << 20
 """Largest request of a page, which sends all labels of a recording [bytes]."""
+MAX_PENDING_BYTES = 2 * MAX_REQUEST_BYTES
+"""Largest sum of all requests that have not arrived completely [bytes]."""
 
 PAGE = Path(str(resources.files("holdfast.labelling") / "page"))
 """Files of the labelling page."""
 SHARED = Path(str(resources.files("holdfast.web") / "static"))
 """Files that all pages share."""
-
-T = TypeVar("T")
 
 _encode = msgspec.json.Encoder().encode
 
@@ -51,9 +51,8 @@ class LabellingService:
 
     def __init__(self, workspace: Workspace, guard: Guard) -> None:
         self._workspace = workspace
-        self.app = web.Application(
-            middlewares=[guard.middleware, _errors_as_json], client_max_size=MAX_REQUEST_BYTES
-        )
+        self._bodies = BodyReader(MAX_REQUEST_BYTES, MAX_PENDING_BYTES, web.HTTPUnprocessableEntity)
+        self.app = web.Application(middlewares=[guard.middleware, _errors_as_json])
         self.app.add_routes(self._routes())
 
     def _routes(self) -> list[web.AbstractRouteDef]:
@@ -90,7 +89,7 @@ class LabellingService:
 
     async def _save(self, request: web.Request) -> web.Response:
         index = self._index(request)
-        body = await _body(request, SaveRequest)
+        body = await self._bodies.read(request, SaveRequest)
 
         def save() -> SaveReply:
             stored = self._workspace.save(
@@ -103,7 +102,7 @@ class LabellingService:
 
     async def _propose(self, request: web.Request) -> web.Response:
         index = self._index(request)
-        body = await _body(request, ProposeRequest)
+        body = await self._bodies.read(request, ProposeRequest)
 
         def propose() -> ProposeReply:
             rule, found = self._workspace.propose(index, body.rule, body.parameters)
@@ -116,14 +115,14 @@ class LabellingService:
         index, video = self._index(request), int(request.match_info["index"])
         file = await asyncio.to_thread(self._workspace.video, index, video)
         if file is None:
-            raise _error(web.HTTPNotFound, "there is no such video beside the recording")
+            raise json_error(web.HTTPNotFound, "there is no such video beside the recording")
         return web.FileResponse(file)
 
     def _index(self, request: web.Request) -> int:
         index = int(request.match_info["id"])
         n = len(self._workspace.paths)
         if index >= n:
-            raise _error(web.HTTPNotFound, f"recording 0 to {n - 1} expected, {index} given")
+            raise json_error(web.HTTPNotFound, f"recording 0 to {n - 1} expected, {index} given")
         return index
 
 
@@ -147,13 +146,6 @@ async def _reply(work: Callable[[], object]) -> web.Response:
     return await asyncio.to_thread(lambda: _json(work()))
 
 
-async def _body(request: web.Request, kind: type[T]) -> T:
-    try:
-        return msgspec.json.decode(await request.read() or b"{}", type=kind)
-    except (msgspec.DecodeError, UnicodeError) as cause:
-        raise ValueError(f"{request.path}: {cause}") from cause
-
-
 def _query_number(request: web.Request, name: str) -> float | None:
     """Return a number of the query; None if it is missing."""
     text = request.query.get(name)
@@ -167,10 +159,6 @@ def _query_number(request: web.Request, name: str) -> float | None:
 
 def _line(error: BaseException) -> str:
     return " ".join(str(error).split()) or type(error).__name__
-
-
-def _error(kind: Callable[..., web.HTTPException], text: str) -> web.HTTPException:
-    return kind(text=_encode({"error": text}).decode(), content_type="application/json")
 
 
 def _json(value: object, status: int = 200) -> web.Response:

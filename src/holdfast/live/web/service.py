@@ -6,7 +6,6 @@ from collections.abc import AsyncIterator, Callable
 from contextlib import suppress
 from importlib import resources
 from pathlib import Path
-from typing import TypeVar
 
 import msgspec
 from aiohttp import WSMsgType, web
@@ -23,6 +22,7 @@ from holdfast.live.status import (
 from holdfast.live.stream_detector import StreamUpdate
 from holdfast.live.web import schema
 from holdfast.model import Model
+from holdfast.web.body import BodyReader, json_error
 from holdfast.web.guard import Guard
 
 LIVE_DOCUMENT_RATE = 20.0
@@ -30,15 +30,17 @@ LIVE_DOCUMENT_RATE = 20.0
 MAX_QUEUED_DOCUMENTS = {"live": 32, "estimates": 1024}
 """Maximum number of documents that wait for a slow client: more than a second. The oldest is
 dropped first."""
-HEARTBEAT_INTERVAL = 10.0
+HEARTBEAT_INTERVAL = 6.0
 """Time between two pings; a client that does not answer within half of it is disconnected [s]."""
+MAX_CLIENTS = 64
+"""Maximum number of WebSockets at a time."""
+MAX_REQUEST_BYTES = 1 << 16
+"""Largest body of a request: a name or the text of a marker [bytes]."""
 
 PAGE_FOLDER = Path(str(resources.files("holdfast.live.web") / "page"))
 """Files of the page."""
 SHARED_FOLDER = Path(str(resources.files("holdfast.web") / "static"))
 """Files that all pages share."""
-
-T = TypeVar("T")
 
 _encode = msgspec.json.Encoder().encode
 
@@ -101,6 +103,7 @@ class LiveService:
         self._started = time.time()
         self._clients: dict[str, set[WebSocketClient]] = {"live": set(), "estimates": set()}
         self._newest_document = b"{}"
+        self._bodies = BodyReader(MAX_REQUEST_BYTES, MAX_CLIENTS * MAX_REQUEST_BYTES)
         self.app = web.Application(middlewares=[guard.middleware])
         self.app.add_routes(self._routes())
         self.app.cleanup_ctx.append(self._publish)
@@ -177,6 +180,9 @@ class LiveService:
         return await self._serve_socket(request, "estimates")
 
     async def _serve_socket(self, request: web.Request, kind: str) -> web.WebSocketResponse:
+        if sum(map(len, self._clients.values())) >= MAX_CLIENTS:
+            text = f"{MAX_CLIENTS} WebSockets are open; close one of them"
+            raise json_error(web.HTTPServiceUnavailable, text)
         socket = web.WebSocketResponse(
             heartbeat=HEARTBEAT_INTERVAL, compress=False, max_msg_size=1024
         )
@@ -204,14 +210,14 @@ class LiveService:
         return await _answer(self._session.restart_tare)
 
     async def _post_recording(self, request: web.Request) -> web.Response:
-        name = (await _read_body(request, _RecordingRequest)).name
+        name = (await self._bodies.read(request, _RecordingRequest)).name
         return await _answer(lambda: {"path": str(self._recorder.start(name))})
 
     async def _delete_recording(self, _: web.Request) -> web.Response:
         return await _answer(lambda: recording_info(self._recorder.stop()))
 
     async def _post_marker(self, request: web.Request) -> web.Response:
-        text = (await _read_body(request, _MarkerRequest)).text
+        text = (await self._bodies.read(request, _MarkerRequest)).text
         return await _answer(lambda: self._recorder.add_marker(text))
 
 
@@ -229,15 +235,6 @@ async def _answer(work: Callable[[], object]) -> web.Response:
         return _json(await asyncio.to_thread(work) or {})
     except HoldfastError as refusal:
         return _json({"error": str(refusal)}, status=409)
-
-
-async def _read_body(request: web.Request, kind: type[T]) -> T:
-    data = await request.read() or b"{}"
-    try:
-        return msgspec.json.decode(data, type=kind)
-    except msgspec.DecodeError as cause:
-        text = _encode({"error": f"{request.path}: {cause}"}).decode()
-        raise web.HTTPBadRequest(text=text, content_type="application/json") from cause
 
 
 def _json(value: object, status: int = 200) -> web.Response:
