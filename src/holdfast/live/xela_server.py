@@ -278,7 +278,7 @@ class XelaServer:
         why = refusal(hosts[0], origin, only_local=is_local(self._address[0]))
         if why is not None:
             return client.respond(HTTPStatus.FORBIDDEN, f"{why}\n")
-        if len(self._clients) >= MAX_CLIENTS:
+        if len(self._clients | self._joining) >= MAX_CLIENTS:
             text = f"{MAX_CLIENTS} clients are connected; disconnect one of them\n"
             return client.respond(HTTPStatus.SERVICE_UNAVAILABLE, text)
         return None
