@@ -20,6 +20,8 @@ if TYPE_CHECKING:
     from holdfast.contact import Fault as Fault
     from holdfast.contact import HandEstimate as HandEstimate
     from holdfast.contact import Reason as Reason
+    from holdfast.control import GripCommand as GripCommand
+    from holdfast.control import GripController as GripController
     from holdfast.detector import Detector as Detector
     from holdfast.detector import detect as detect
     from holdfast.errors import HoldfastError as HoldfastError
@@ -78,6 +80,8 @@ _HOMES = {
     "Fault": "contact",
     "HandEstimate": "contact",
     "Reason": "contact",
+    "GripCommand": "control",
+    "GripController": "control",
     "StreamDetector": "live.stream_detector",
     "Arrival": "sources",
     "Source": "sources",

@@ -1,0 +1,96 @@
+"""Commands of a grip controller: values without behaviour."""
+
+from collections.abc import Mapping
+from enum import StrEnum
+from typing import NamedTuple
+
+import msgspec
+
+
+class LoopState(StrEnum):
+    """State of the loop.
+
+    IDLE: no grip yet, or stopped. HOLD: the force does not change. REACT: the force rises.
+    RELAX: the force falls. FAULT: the hand holds its last command or opens, see `Limits`.
+    """
+
+    IDLE = "IDLE"
+    HOLD = "HOLD"
+    REACT = "REACT"
+    RELAX = "RELAX"
+    FAULT = "FAULT"
+
+
+class GripReason(StrEnum):
+    """Reason of a change of force, or of a fault."""
+
+    NONE = ""
+    UNSTABLE = "unstable"
+    SLIP = "slip"
+    LOAD = "load"
+    MARGIN = "margin"
+    BALANCE = "balance"
+    RELAX = "relax"
+    STALE = "stale"
+    NOT_FINITE = "not_finite"
+    CLOCK = "clock"
+    FINGER_FAULT = "finger_fault"
+    LOST = "lost"
+    OVERLOAD = "overload"
+    WATCHDOG = "watchdog"
+
+
+class FingerCommand(msgspec.Struct, frozen=True, gc=False):
+    """Command of one finger.
+
+    Attributes:
+        scale: force of the finger as a multiple of its force when the grip began. A hand turns
+            it into the largest torque of each joint, efforts or set-points.
+        reason: why the force rises or falls; empty where it stays.
+    """
+
+    scale: float
+    reason: GripReason = GripReason.NONE
+
+
+class GripCommand(msgspec.Struct, frozen=True, gc=False):
+    """Command of a hand at one instant.
+
+    Attributes:
+        time: time of the update, on the clock of the source [s].
+        state: state of the loop.
+        fingers: command of each finger.
+        release: True if the hand shall open; the scales have no meaning then.
+        reason: why the state is FAULT; empty otherwise.
+    """
+
+    time: float
+    state: LoopState
+    fingers: Mapping[str, FingerCommand]
+    release: bool = False
+    reason: GripReason = GripReason.NONE
+
+
+class GripEvent(NamedTuple):
+    """Change of the loop, for the log: a new state, or the beginning of a rise of force.
+
+    Attributes:
+        time: time of the update [s].
+        state: state of the loop.
+        finger: finger whose force begins to rise; empty for a change of the state alone.
+        scale: force scale of that finger, before it rises; NaN for a change of the state alone.
+        reason: why.
+    """
+
+    time: float
+    state: LoopState
+    finger: str
+    scale: float
+    reason: GripReason
+
+    def __str__(self) -> str:
+        """Return the text of the marker in a recording."""
+        why = f" ({self.reason})" if self.reason else ""
+        if not self.finger:
+            return f"grip {self.state}{why}"
+        return f"grip {self.state}: {self.finger} rises from {self.scale:.3f}{why}"

@@ -1,0 +1,42 @@
+"""Law on the relative change of the tangential force.
+
+Wong and Zhu, Frontiers in Robotics and AI (2026), 10.3389/frobt.2026.1735467, detect slip where
+|T_k - T_(k-1)| / max(T_(k-1), eps) exceeds a threshold, T being the tangential resultant of a
+finger. Only the abstract was available: threshold, eps and the size of a reaction are own choices.
+"""
+
+from collections.abc import Sequence
+
+from holdfast.control.command import GripReason
+from holdfast.control.laws.base import Law, Touch, Wish
+
+THRESHOLD = 0.1
+"""Relative change of the tangential force in one sample that counts as a slip."""
+FLOOR = 0.1
+"""eps, as a share of the normal force of the start."""
+GAIN = 1.1
+"""Factor of the force of a finger that slips."""
+
+
+class WongZhu(Law):
+    """Law that raises the force of a finger whose tangential force jumps."""
+
+    def start(self, touches: Sequence[Touch], thumb: int) -> None:
+        """Remember the tangential forces."""
+        self._last = [touch.tangential for touch in touches]
+
+    def wishes(self, touches: Sequence[Touch], time: float, dt: float) -> list[Wish]:
+        """Raise each finger that slips."""
+        out = []
+        for k, touch in enumerate(touches):
+            if touch.known and self._slips(touch, self._last[k]):
+                out.append((touch.scale * GAIN, GripReason.SLIP))
+            else:
+                out.append((touch.scale, GripReason.NONE))
+            if touch.known:
+                self._last[k] = touch.tangential
+        return out
+
+    @staticmethod
+    def _slips(touch: Touch, last: float) -> bool:
+        return abs(touch.tangential - last) > THRESHOLD * max(last, FLOOR * touch.start_normal)
