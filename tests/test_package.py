@@ -12,7 +12,7 @@ PUBLIC = [
     *("FEATURE_NAMES", "fingertip_force", "haar_features"),
     *("Hand", "Sensor", "sensor", "Label", "Recording", "Tactile", "Truth"),
     *("load_dataset", "load_recording", "save_recording"),
-    *("Model", "Detector", "StreamDetector", "detect"),
+    *("Model", "Detector", "StreamDetector", "detect", "GripController", "GripCommand"),
     *("ContactEstimate", "ContactEvent", "ContactState", "HandEstimate"),
     *("Cause", "Fault", "Reason"),
     *("StabilityClassifier", "train", "evaluate", "event_metrics", "sample_metrics"),

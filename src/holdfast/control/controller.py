@@ -73,7 +73,7 @@ class GripController:
         _check_unit(self.law, sensors, newtons_per_unit)
         given = 1.0 if newtons_per_unit is None else newtons_per_unit
         self._factors: Three = given if isinstance(given, tuple) else (given, given, given)
-        self._normals = {name: tuple(float(x) for x in one.normal) for name, one in sensors.items()}
+        self._normals = {name: _three(one.normal) for name, one in sensors.items()}
         rates = [one.rate for one in sensors.values()]
         self._max_age = 1 / min(rates, default=DEFAULT_RATE) + limits.stale_after
         self._thumb = thumb
