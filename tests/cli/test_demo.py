@@ -8,23 +8,19 @@ import pytest
 from holdfast.cli import demo as verb
 from holdfast.cli import main
 from holdfast.cli import simulate as simulate_verb
-from holdfast.cli.demo import replay
-from holdfast.io import load_dataset, save_recording
-from holdfast.model import Debounce, Model
-from holdfast.synthetic import synthetic_recording
-from holdfast.training import Setting, train
+from holdfast.io import load_dataset
+from holdfast.model import Model
 from holdfast.twin import simulation
 from holdfast.twin.profile import profile
 
-FINGERS = ("thumb", "index")
 SHORT = msgspec.structs.replace(profile("reference"), idle=(0.7, 0.8), hold=6.0)
 
 
 @pytest.fixture(autouse=True)
 def small(monkeypatch):
-    """Simulate one flask per case, in this process."""
+    """Simulate one mug per case, in this process."""
     whole = simulate_verb.simulate_grasps
-    monkeypatch.setattr(verb, "OBJECTS", "flask")
+    monkeypatch.setattr(verb, "OBJECTS", "mug")
     monkeypatch.setattr(verb, "N_REPEATS", 1)
     monkeypatch.setattr(simulation, "profile", lambda name: SHORT)
     monkeypatch.setattr(
@@ -45,23 +41,28 @@ def test_simulates_trains_and_replays(capsys, tmp_path):
     assert code == 0
     result = json.loads(out)
     recordings = load_dataset(result["recordings"])
-    assert list(recordings.names) == ["flask-case1-1", "flask-case2-1"]
+    assert list(recordings.names) == ["mug-case1-1", "mug-case2-1"]
     assert tuple(Model.load(result["model"]).fingers) == ("thumb", "index", "middle", "ring")
     assert result["updates"] == recordings[1].modules["thumb"].n_samples
+    assert Model.load(result["model"]).name == "demo"
     assert 50 < result["accuracy"] <= 100
+    assert result["shipped"]["model"] == verb.DEMO_MODEL
+    assert result["shipped"]["metrics"]["events"]["hand"]["onsets"] == "truth"
     assert result["seconds"] > 0
-    for step in ("1/4", "2/4", "3/4", "4/4  replaying flask-case2-1"):
+    for step in ("1/4", "2/4", "3/4", "4/4  replaying mug-case2-1"):
         assert step in err
-    assert "hand" in err
-    assert "STABLE" in err
+    assert "STABLE      the hand holds the object" in err
+    assert "     mug-case1-1\n" in err
 
 
 def test_prints_next_steps_and_refuses_to_overwrite(capsys, tmp_path):
     folder = tmp_path / "demo"
     code, out, _ = run(capsys, folder, "--speed", 0)
     assert code == 0
-    for line in (f"{folder}/recordings", "model.json", "what to try next", "holdfast detect"):
+    for line in (f"{folder}/recordings", "model.json", "Next:", "holdfast evaluate builtin:"):
         assert line in out
+    for figure in ("disturbances of a held object", "false alarms per minute", "median delay"):
+        assert figure in out
     code, out, err = run(capsys, folder, "--speed", 0)
     assert (code, out, err.count("\n")) == (2, "", 1)
     assert "model.json exists already" in err
@@ -91,11 +92,11 @@ def test_the_replay_page_stops_at_the_end_of_the_recording(capsys, tmp_path, mon
         return False
 
     monkeypatch.setattr("holdfast.cli.serve.open_browser", lambda url: _in_a_thread(look, url))
-    code, out, err = run(capsys, tmp_path / "demo", "--speed", 8)
+    code, out, err = run(capsys, tmp_path / "demo", "--speed", 8, "--browser")
     assert code == 0
     assert "(open it in a browser)" in err
     assert "it stops at the end of the recording" in err
-    assert "what to try next" in out
+    assert "Next:" in out
     assert [set(page["fingers"]) for page in pages] == [{"thumb", "index", "middle", "ring"}]
 
 
@@ -104,47 +105,23 @@ def _in_a_thread(work, url):
     return False
 
 
-@pytest.fixture(scope="module")
-def recording():
-    return synthetic_recording("grasp", 0, FINGERS)
+def test_without_a_graphical_browser_the_replay_is_in_the_terminal(monkeypatch):
+    monkeypatch.setattr("sys.stdin.isatty", lambda: True, raising=False)
+    for display, expected in (("", False), (":0", True)):
+        monkeypatch.setattr("sys.platform", "linux")
+        monkeypatch.delenv("WAYLAND_DISPLAY", raising=False)
+        monkeypatch.setenv("DISPLAY", display)
+        assert verb._on_page(None, 1.0, as_json=False) is expected
+        assert verb._on_page(True, 1.0, as_json=False)
+        assert not verb._on_page(False, 1.0, as_json=False)
+    assert not verb._on_page(True, 0.0, as_json=False)
+    assert not verb._on_page(True, 1.0, as_json=True)
 
 
-@pytest.fixture(scope="module")
-def model(recording):
-    others = [synthetic_recording(f"grasp-{k}", k, FINGERS) for k in (1, 2)]
-    return train(others, Setting(trials=0)).model
+def test_the_objects_are_not_those_of_the_training():
+    from holdfast.twin.objects import OTHER_OBJECTS, load_objects
 
-
-@pytest.fixture
-def path(recording, tmp_path):
-    save_recording(recording, tmp_path / "grasp.parquet")
-    return tmp_path / "grasp.parquet"
-
-
-def test_every_sample_is_an_update_and_changes_of_the_hand_are_printed(
-    capsys, model, recording, path
-):
-    assert replay(model, path, 0) == recording.modules["thumb"].n_samples
-    out, err = capsys.readouterr()
-    assert out == ""
-    lines = err.splitlines()
-    assert lines
-    assert all("hand" in line and " -> " in line for line in lines)
-    times = [float(line.split()[0]) for line in lines]
-    assert times == sorted(times)
-    assert 0 <= times[0] <= times[-1] <= recording.modules["thumb"].times[-1]
-    assert len({line.split(" -> ")[1] for line in lines}) > 1
-
-
-def test_on_a_terminal_a_table_is_shown(capsys, model, recording, path, monkeypatch):
-    monkeypatch.setattr(verb.sys.stderr, "isatty", lambda: True, raising=False)
-    assert replay(model, path, 40.0) == recording.modules["thumb"].n_samples
-    err = capsys.readouterr().err
-    assert "thumb" in err
-    assert "sigma" in err
-
-
-def test_replayed_states_are_debounced(model):
-    before = model.debounce
-    assert verb.with_debouncing(model).debounce == Debounce(verb.MIN_DURATION, verb.HYSTERESIS)
-    assert model.debounce == before
+    model = Model.load(verb.DEMO_MODEL)
+    names = "mug", "carton"
+    assert set(names) <= set(load_objects(OTHER_OBJECTS))
+    assert not any(name in seen for name in names for seen in model.training.recordings)

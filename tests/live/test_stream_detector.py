@@ -346,6 +346,18 @@ def test_events_are_the_changes_of_the_estimates():
     assert events[0].previous is ContactState.UNKNOWN
 
 
+def test_changes_that_lasted_are_fewer_than_changes():
+    every = list(StreamDetector(build.model(), build.Script.of(build.grasp())).changes(0.0))
+    lasted = list(StreamDetector(build.model(), build.Script.of(build.grasp())).changes(0.3))
+    assert {event.finger for event in every} == {*build.FINGERS, "hand"}
+    assert 0 < len(lasted) < len(every)
+    assert {(e.finger, e.state, e.time) for e in lasted} <= {
+        (e.finger, e.state, e.time) for e in every
+    }
+    with pytest.raises(ValueError, match="at least 0 s expected"):
+        next(StreamDetector(build.model(), build.Script.of(build.grasp())).changes(-1.0))
+
+
 def test_the_old_name_works_and_warns():
     recording = build.grasp()
     sensors = build.Script.of(recording).sensors

@@ -19,7 +19,7 @@ from holdfast.cli.terminal.console import print_error
 from holdfast.errors import HoldfastError
 
 VERBS = {
-    "demo": "Simulate grasps, train a model on them, and replay one of them.",
+    "demo": "Simulate grasps, detect and train on them, and replay one of them.",
     "simulate": "Simulate recordings of grasps with the physical twin.",
     "record": "Record a source; a crash loses at most the last half second.",
     "import": "Import recordings from other formats.",

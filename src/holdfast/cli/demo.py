@@ -3,7 +3,7 @@
 import math
 import sys
 import time
-from collections.abc import Iterator
+from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
@@ -13,19 +13,15 @@ from holdfast.cli.options import JsonOption
 from holdfast.cli.terminal.console import print_json, print_line, print_message
 
 if TYPE_CHECKING:
-    from rich.table import Table
-
-    from holdfast.contact import ContactEstimate, HandEstimate
+    from holdfast.metrics import Metrics
     from holdfast.model import Model
+    from holdfast.recordings import Recording
+    from holdfast.training import Trained
 
-OBJECTS, N_REPEATS = "can,box", 2
-"""Objects of the demo, and grasps of each object and case."""
-REFRESH_INTERVAL = 0.1
-"""Time between two updates of the table on the terminal [s]."""
-MIN_DURATION, HYSTERESIS = 0.1, 0.1
-"""Debouncing of the states that a person watches: duration [s] and distance in probability."""
-BAR_WIDTH = 20
-COLOURS = {"UNKNOWN": "dim", "NO_CONTACT": "white", "UNSTABLE": "bold red", "STABLE": "green"}
+DEMO_MODEL = "builtin:twin"
+"""The model of the demo: the best one that ships for the sensor of the simulated hand."""
+OBJECTS, CASES, N_REPEATS = "mug,carton", "1,2", 1
+"""Objects of the demo, none of which `DEMO_MODEL` was trained on; cases and grasps of each."""
 
 
 def demo(
@@ -37,17 +33,22 @@ def demo(
     ] = 1.0,
     seed: Annotated[int, typer.Option(help="Seed of the recordings.")] = 0,
     browser: Annotated[
-        bool,
-        typer.Option("--browser/--no-browser", help="Replay on a web page, or in the terminal."),
-    ] = True,
+        bool | None,
+        typer.Option(
+            "--browser/--no-browser",
+            help="Replay on a web page, or in the terminal.",
+            show_default="page if a browser can be opened",
+        ),
+    ] = None,
     force: Annotated[bool, typer.Option("--force", help="Overwrite an earlier demo.")] = False,
     as_json: JsonOption = False,
 ) -> None:
-    """Simulate grasps, train a model on them, and replay one of them.
+    """Simulate grasps, detect and train on them, and replay one of them.
 
-    Simulate grasps of a can and a box with the physical twin. Train a model on them, and print
-    its cross-validated accuracy. Replay one recording sample by sample, as a hand would send it,
-    on a web page or in the terminal.
+    Simulate grasps of a mug and a carton with the physical twin. Evaluate the model that ships
+    with holdfast on them; it has not seen these objects. Train a model with the features of the
+    paper on them. Replay one recording sample by sample, as a hand would send it, on a web page
+    or in the terminal.
 
     Example:
       holdfast demo
@@ -55,8 +56,8 @@ def demo(
       holdfast demo results/ --speed 0 --json
     """
     from holdfast.files import refuse_overwrite
-    from holdfast.io import load_dataset
-    from holdfast.training import Setting, train
+    from holdfast.model import Model
+    from holdfast.training import evaluate
 
     if not (math.isfinite(speed) and speed >= 0):
         raise ValueError(f"--speed: at least 0 expected, {speed:g} given")
@@ -64,53 +65,80 @@ def demo(
     folder, model = out / "recordings", out / "model.json"
     folder.mkdir(parents=True, exist_ok=True)
     refuse_overwrite(model, force=force)
-    names = _simulate(folder, seed, force)
-    print_message("2/4  training and cross-validation (the first run also compiles the kernels)")
-    recordings = load_dataset(folder)
-    trained = train(recordings, Setting(trials=0, seed=seed))
-    trained.model.save(model, force=force)
-    accuracy = trained.cross_validation.pooled.accuracy
-    print_message(f"3/4  accuracy on recordings left out of training: {accuracy:.1f} % of samples")
-    name = [name for name in names if name in recordings.names][-1]  # a grasp may have failed
-    at_speed = f" at speed {speed:g}" if speed else ""
-    print_message(f"4/4  replaying {name} sample by sample{at_speed}")
-    path, steady_model = folder / f"{name}.parquet", with_debouncing(trained.model)
-    n_updates = 0
-    if browser and speed and not as_json:
-        _replay_on_page(steady_model, path, out, speed)
-    else:
-        n_updates = replay(steady_model, path, speed)
+    recordings = _simulate(folder, seed, force)
+    print_message(f"2/4  evaluating {DEMO_MODEL}, which was not trained on these objects")
+    ours = Model.load(DEMO_MODEL)
+    metrics = evaluate(ours, recordings)
+    trained = _train(recordings, model, seed, force)
+    shown = recordings[-1]
+    n_updates = _replay(ours, shown, out, speed, page=_on_page(browser, speed, as_json=as_json))
     if as_json:
         print_json(
             {
                 "recordings": folder,
                 "model": model,
-                "accuracy": accuracy,
+                "accuracy": trained.cross_validation.pooled.accuracy,
+                "shipped": {"model": DEMO_MODEL, "metrics": metrics},
                 "updates": n_updates,
                 "seconds": time.monotonic() - start,
             }
         )
         return
-    _print_next_steps(out, folder, model, name, time.monotonic() - start)
+    _print_results(metrics, trained, len(recordings))
+    _print_next_steps(out, folder / f"{shown.name}.parquet", time.monotonic() - start)
 
 
-def _simulate(folder: Path, seed: int, force: bool) -> list[str]:
-    """Simulate grasps with and without disturbances; return their names."""
+def _simulate(folder: Path, seed: int, force: bool) -> "Sequence[Recording]":
+    """Simulate grasps with and without disturbances; return those that did not fail."""
     from holdfast.cli.simulate import plan_grasps, simulate_grasps
+    from holdfast.io import load_dataset
+    from holdfast.twin.objects import OTHER_OBJECTS
 
-    grasps = plan_grasps(OBJECTS, "1,2", N_REPEATS, "reference", seed)
-    print_message(f"1/4  simulating {len(grasps)} grasps: an Allegro hand with uSkin fingertips")
-    simulate_grasps(grasps, folder, jobs=-1, force=force)
-    return [grasp.name for grasp in grasps]
+    grasps = plan_grasps(OBJECTS, CASES, N_REPEATS, "reference", seed, table=OTHER_OBJECTS)
+    names = OBJECTS.replace(",", " and ")
+    print_message(f"1/4  simulating {len(grasps)} grasps: {names}, Allegro hand, uSkin fingertips")
+    simulate_grasps(grasps, folder, jobs=-1, force=force, report=_report_grasp)
+    return load_dataset(folder)
 
 
-def with_debouncing(model: "Model") -> "Model":
-    """Return the model with debouncing, so that a person can follow its states."""
-    from msgspec.structs import replace
+def _report_grasp(names: Sequence[str]) -> None:
+    print_message(f"     {', '.join(names)}")
 
-    from holdfast.model import Debounce
 
-    return replace(model, debounce=Debounce(MIN_DURATION, HYSTERESIS))
+def _train(recordings: "Sequence[Recording]", path: Path, seed: int, force: bool) -> "Trained":
+    """Train a model with the features of the paper, and save it with a name."""
+    from dataclasses import replace
+
+    import msgspec
+
+    from holdfast.training import Setting, train
+
+    print_message("3/4  training a model with the features of the paper, one grasp left out")
+    trained = train(recordings, Setting(trials=0, seed=seed))
+    named = replace(trained, model=msgspec.structs.replace(trained.model, name="demo"))
+    named.model.save(path, force=force)
+    return named
+
+
+def _on_page(browser: bool | None, speed: float, *, as_json: bool) -> bool:
+    """Return whether the replay is shown on a page."""
+    from holdfast.cli.serve import has_browser
+
+    wanted = has_browser() and sys.stdin.isatty() if browser is None else browser
+    return bool(wanted and speed and not as_json)
+
+
+def _replay(model: "Model", recording: "Recording", out: Path, speed: float, *, page: bool) -> int:
+    """Replay a recording on a page or in the terminal; return the number of estimates."""
+    at_speed = f" at speed {speed:g}" if speed else ""
+    print_message(f"4/4  replaying {recording.name} sample by sample{at_speed}")
+    path = out / "recordings" / f"{recording.name}.parquet"
+    if page:
+        _replay_on_page(model, path, out, speed)
+        return 0
+    from holdfast.cli.demo_replay import TrueEvents, replay
+
+    return replay(model, path, speed, TrueEvents.of(model, recording))
 
 
 def _replay_on_page(model: "Model", path: Path, out: Path, speed: float) -> None:
@@ -131,91 +159,31 @@ def _replay_on_page(model: "Model", path: Path, out: Path, speed: float) -> None
         run_page(model, source, announce, port=0, folder=out / "recorded", stay=stay)
 
 
-def replay(model: "Model", path: Path, speed: float) -> int:
-    """Play a recording sample by sample through a detector, and print the states.
-
-    On a terminal a table follows all states; elsewhere each change of the hand is one line.
-
-    Args:
-        model: the model to use.
-        path: path of the recording.
-        speed: 1 is real time, 0 as fast as possible.
-
-    Returns:
-        Number of estimates.
-    """
-    from holdfast.live.stream_detector import StreamDetector
-    from holdfast.sources import open_source
-
-    with open_source(str(path), speed=speed) as source:
-        estimates = iter(StreamDetector(model, source))
-        if speed and sys.stderr.isatty():
-            return _show_table(estimates)
-        return _print_changes(estimates)
+def _print_results(metrics: "Metrics", trained: "Trained", n: int) -> None:
+    hand = metrics.events.hand
+    missed, delay = hand.missed["0.1"], hand.delay_median
+    detected = "-" if missed is None else f"{100 - missed:.0f} %"
+    print_line(f"\n{DEMO_MODEL} on {n} grasps of objects that it was not trained on:")
+    print_line(f"  {hand.n_events} disturbances of a held object, {detected} detected within 0.1 s")
+    print_line(f"  median delay {'-' if delay is None else f'{1000 * delay:.0f} ms'}")
+    print_line(f"  {_text(hand.false_alarms_per_minute)} false alarms per minute of quiet hold")
+    print_line(f"  {_text(metrics.pooled.accuracy)} % of all samples are classified as labelled")
+    own = trained.cross_validation.pooled.accuracy
+    print_line("a model of the paper's features, trained here, each grasp left out once:")
+    print_line(f"  {_text(own)} % of all samples are classified as labelled")
 
 
-def _print_changes(estimates: "Iterator[HandEstimate]") -> int:
-    previous: str = "UNKNOWN"
-    n_updates = 0
-    for estimate in estimates:
-        n_updates += 1
-        if estimate.state != previous:
-            print_message(f"  {estimate.time:7.3f} s  hand {previous} -> {estimate.state}")
-            previous = estimate.state
-    return n_updates
+def _text(value: float | None) -> str:
+    return "-" if value is None else f"{value:.1f}"
 
 
-def _show_table(estimates: "Iterator[HandEstimate]") -> int:
-    from rich.console import Console
-    from rich.live import Live
-
-    updated_at, n_updates = 0.0, 0
-    with Live(console=Console(stderr=True), auto_refresh=False) as screen:
-        for estimate in estimates:
-            n_updates += 1
-            if time.monotonic() - updated_at > REFRESH_INTERVAL:
-                updated_at = time.monotonic()
-                screen.update(_table(estimate), refresh=True)
-    return n_updates
-
-
-def _table(estimate: "HandEstimate") -> "Table":
-    from rich.table import Table
-
-    table = Table(title=f"{estimate.time:.2f} s   hand {_coloured(estimate.state)}")
-    for heading in ("finger", "state", "stable", "", "sigma", "force [counts]"):
-        table.add_column(heading, min_width=8)
-    for name, finger in estimate.fingers.items():
-        table.add_row(name, *_cells(finger))
-    return table
-
-
-def _cells(finger: "ContactEstimate") -> tuple[str, ...]:
-    probability = finger.stable_probability
-    known = finger.state != "UNKNOWN"
-    bar = "#" * round(BAR_WIDTH * probability) if known else ""
-    force = ", ".join(f"{value:7.0f}" for value in finger.force)
-    return (
-        _coloured(finger.state) + (f" ({finger.reason})" if finger.reason else ""),
-        f"{probability:.2f}" if known else "",
-        f"{bar:<{BAR_WIDTH}}",
-        f"{finger.instability:8.2f}",
-        force,
-    )
-
-
-def _coloured(state: str) -> str:
-    return f"[{COLOURS[state]}]{state:10}[/]"
-
-
-def _print_next_steps(out: Path, folder: Path, model: Path, name: str, seconds: float) -> None:
-    print_line(f"finished in {seconds:.0f} s; results in {out}:")
-    print_line(f"  {folder}: simulated recordings, {model}: the model")
-    print_line("what to try next:")
-    print_line(f"  holdfast info {folder}/{name}.parquet --plot grasp.png")
-    print_line(f"  holdfast evaluate {model} {folder}")
-    print_line(f"  holdfast detect {model} {folder}/{name}.parquet | head")
-    print_line(f"  holdfast serve {model} twin:?object=ball    (live page of the twin)")
-    print_line("  holdfast serve builtin:twin xela://auto    (live page of your own hand)")
-    print_line("  holdfast simulate twin/    (the whole protocol: six objects, 60 grasps)")
-    print_line("  holdfast import YOUR-DATA recordings/    (formats: holdfast import --help)")
+def _print_next_steps(out: Path, shown: Path, seconds: float) -> None:
+    print_line(f"\nfinished in {seconds:.0f} s; recordings and model.json are in {out}/. Next:")
+    for command, purpose in (
+        (f"info {shown} --plot grasp.png", "a picture of this grasp"),
+        (f"evaluate {DEMO_MODEL} {out}/recordings", "all figures"),
+        (f"serve {DEMO_MODEL} twin:?object=can", "a live page of the twin"),
+        ("serve builtin:any xela://auto", "a live page of your own hand"),
+        ("import --help", "your own recordings"),
+    ):
+        print_line(f"  # {purpose}\n  holdfast {command}")

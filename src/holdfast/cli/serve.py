@@ -193,10 +193,15 @@ def page_url(url: str, token: str | None) -> str:
     return url if token is None else f"{url}?token={quote(token, safe='')}"
 
 
+def has_browser() -> bool:
+    """Return whether this machine may have a graphical browser."""
+    desktop = sys.platform in ("win32", "darwin")
+    return bool(desktop or os.environ.get("DISPLAY") or os.environ.get("WAYLAND_DISPLAY"))
+
+
 def open_browser(url: str) -> bool:
     """Open a page in a graphical browser; return False if there is none."""
-    desktop = sys.platform in ("win32", "darwin")
-    if not (desktop or os.environ.get("DISPLAY") or os.environ.get("WAYLAND_DISPLAY")):
+    if not has_browser():
         return False
     try:
         return webbrowser.open(url)

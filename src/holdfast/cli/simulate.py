@@ -1,6 +1,6 @@
 """`holdfast simulate`: recordings of the physical twin, with exact truth."""
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from itertools import product
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
@@ -144,8 +144,17 @@ def simulate_hand(hold: "RandomHold", out: Path, force: bool) -> str:
     return hold.name
 
 
-def simulate_grasps(grasps: "Sequence[Grasp]", out: Path, *, jobs: int, force: bool) -> list[str]:
+def simulate_grasps(
+    grasps: "Sequence[Grasp]",
+    out: Path,
+    *,
+    jobs: int,
+    force: bool,
+    report: Callable[[list[str]], None] = lambda _: None,
+) -> list[str]:
     """Simulate the grasps whose recordings do not exist; return the names of new recordings.
+
+    `report` is called with the names of the recordings of each finished grasp.
 
     Raises:
         OutputError: an existing recording has another seed or profile.
@@ -159,6 +168,7 @@ def simulate_grasps(grasps: "Sequence[Grasp]", out: Path, *, jobs: int, force: b
     with ProgressBar("simulating", len(tasks)) as bar:
         for names in map_ordered(simulate_grasp, tasks, 1 if len(tasks) == 1 else jobs):
             written += names
+            report(names)
             bar.advance()
     return written
 

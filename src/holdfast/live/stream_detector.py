@@ -25,6 +25,7 @@ from holdfast.contact import (
 from holdfast.detector import HAND, Detector
 from holdfast.errors import ModelError, StreamError
 from holdfast.features import Tare
+from holdfast.live.lasting_changes import DEFAULT_DURATION, LastingChanges
 from holdfast.model import Model
 from holdfast.recordings import GAP_PERIODS
 from holdfast.resampling import Resampler
@@ -273,7 +274,8 @@ class StreamDetector:
     any used finger is silent: every finger is then UNKNOWN, also while the source reports
     faults or notices.
 
-    Iterate over it to get every `HandEstimate`, or call `read` in a loop of your own.
+    Iterate over it to get every `HandEstimate`, use `changes` to get the changes of state that
+    lasted, or call `read` in a loop of your own.
 
     Args:
         model: with a tare that can be taken live.
@@ -336,6 +338,22 @@ class StreamDetector:
         for one in self.finish().estimates:
             yield one.estimate
 
+    def changes(self, min_duration: float = DEFAULT_DURATION) -> Iterator[ContactEvent]:
+        """Yield the changes of each finger and of the hand that lasted, until the source ends.
+
+        A change is yielded when the new state has lasted, with the time at which it began. For
+        control, use the estimates: they come without this delay.
+
+        Args:
+            min_duration: minimum time that a new state must last [s].
+
+        Raises:
+            ValueError: the duration is negative or not finite.
+        """
+        lasting = LastingChanges((*self.fingers, HAND), min_duration)
+        for estimate in self:
+            yield from lasting.update(_states(estimate), estimate.time)
+
     @property
     def rate(self) -> float:
         """Measured rate of the source [Hz]; NaN during the first half second."""
@@ -394,8 +412,12 @@ class StreamDetector:
         return StreamUpdate(arrival, estimates, events)
 
     def _events(self, estimate: HandEstimate) -> list[ContactEvent]:
-        states = [finger.state for finger in estimate.fingers.values()]
-        return self._changes.update([*states, estimate.state], estimate.time)
+        return self._changes.update(_states(estimate), estimate.time)
+
+
+def _states(estimate: HandEstimate) -> list[ContactState]:
+    """Return the states of the fingers, then that of the hand."""
+    return [*(finger.state for finger in estimate.fingers.values()), estimate.state]
 
 
 def _lost_fingers(before: HandEstimate, now: HandEstimate) -> set[str]:
