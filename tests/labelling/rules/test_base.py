@@ -4,7 +4,13 @@ import pytest
 from hypothesis import given
 
 from holdfast.contact import NO_CONTACT, STABLE, UNSTABLE, Cause
-from holdfast.labelling.rules.base import LabelWriter, StateTimeline, label_confidence
+from holdfast.labelling.rules.base import (
+    MAX_RATIO,
+    LabelWriter,
+    StateTimeline,
+    evidence_ratio,
+    label_confidence,
+)
 
 TIMES = np.arange(10.0)
 WRITER = LabelWriter(
@@ -69,3 +75,10 @@ def test_confidence_grows_with_evidence_and_duration(ratio, other, duration, lon
         <= label_confidence(high, long)
         <= 1
     )
+
+
+@given(quantity=st.floats(0, 1e300), threshold=st.floats(0, 1e300))
+def test_an_evidence_ratio_is_finite_and_positive_whatever_the_threshold(quantity, threshold):
+    (ratio,) = evidence_ratio([quantity], threshold)
+    assert 1 / MAX_RATIO <= ratio <= MAX_RATIO
+    assert (ratio > 1) == (quantity > threshold) or abs(ratio - 1) < 1e-12

@@ -7,6 +7,7 @@ from hypothesis import given, settings
 
 from holdfast.contact import Cause
 from holdfast.errors import RecordingError
+from holdfast.io import import_recordings
 from holdfast.labelling.rules import signal
 from holdfast.recordings import Recording, label_states
 
@@ -15,6 +16,7 @@ from .build import (
     DURATION,
     FREE,
     GRIP,
+    NOISE,
     PUSH,
     PUSHED,
     RELEASE,
@@ -190,3 +192,35 @@ def test_no_sample_for_the_tare():
     recording = grasp(fingers=("thumb",))
     with pytest.raises(RecordingError, match=r"no finite sample to take the tare from \(20:21\)"):
         signal.propose(recording, tare=(20, 21))
+
+
+def with_dead_band(recording, limit):
+    """The same recording from a device that sends whole numbers, and 0 below a limit."""
+    modules = {}
+    for name, each in recording.modules.items():
+        readings = np.rint(each.readings - 1000)
+        readings[np.abs(readings) < limit] = 0
+        modules[name] = replace(each, readings=readings.astype(np.int32))
+    return Recording(recording.name, modules)
+
+
+def test_a_tare_stretch_without_any_noise():
+    recording = with_dead_band(grasp(), 5 * NOISE)
+    assert not recording.modules["thumb"].readings[:100].any()
+    for labels in signal.propose(recording).values():
+        check(labels, EDGE)
+        assert all(0 < label.confidence < 1 for label in labels)
+
+
+def test_readings_that_never_change_are_no_contact_without_evidence():
+    readings = np.full((300, 16, 3), 1000)
+    still = replace(module(clock()[:300], np.zeros((300, 3))), readings=readings)
+    (label,) = signal.propose(Recording("still", {"thumb": still}))["thumb"]
+    assert (label.state, label.confidence) == ("NO_CONTACT", 0.5)
+
+
+def test_real_recordings_with_a_constant_tare_stretch(data_folder):
+    for recording in import_recordings(data_folder / "gtac"):
+        labels = signal.propose(recording)["finger1"]
+        assert labels[0].state == "NO_CONTACT"
+        assert all(0 < label.confidence < 1 for label in labels)

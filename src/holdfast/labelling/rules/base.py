@@ -19,6 +19,9 @@ CONFIDENCE_TIME = 0.2
 EVIDENCE_QUANTILE = 0.25
 """Quantile of the evidence within a label that its confidence rests on."""
 
+MAX_RATIO = 200.0
+"""Largest evidence ratio, of a confidence of 0.998. A ratio over a threshold of 0 is this one."""
+
 _CAUSES = (None, *Cause)
 _STATES = tuple(ContactState)
 
@@ -99,6 +102,27 @@ class LabelWriter:
         confidence = self.trust * label_confidence(ratio, end - start)
         text = self.evidence(state, cause, ratio) + (f"; {self.note}" if self.note else "")
         return Label(start, end, state, cause, text, round(confidence, 3), self.author)
+
+
+def evidence_ratio(quantity: npt.ArrayLike, threshold: npt.ArrayLike) -> Array:
+    """Return a quantity over its threshold, from 1 / MAX_RATIO to MAX_RATIO.
+
+    Both may be 0, where readings do not change. The ratio of two zeros is 1: no evidence.
+
+    Args:
+        quantity: (n,), at least 0.
+        threshold: of the quantity, at least 0, in the same unit; (n,) or one for all.
+
+    Example:
+        >>> evidence_ratio([1.0, 3.0, 0.0], 2.0).tolist(), evidence_ratio([0.0, 3.0], 0.0).tolist()
+        ([0.5, 1.5, 0.005], [1.0, 200.0])
+    """
+    given, least = np.broadcast_arrays(
+        np.asarray(quantity, dtype=np.float64), np.asarray(threshold, dtype=np.float64)
+    )
+    ratio = np.where(given > 0, MAX_RATIO, 1.0)
+    np.divide(given, least, out=ratio, where=least > given / MAX_RATIO)
+    return np.clip(ratio, 1 / MAX_RATIO, MAX_RATIO)
 
 
 def label_confidence(ratio: float, duration: float) -> float:

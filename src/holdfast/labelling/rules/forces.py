@@ -65,6 +65,15 @@ class FingerForce:
         return drop_short_runs(fill_short_gaps(touching & ~self._creep(), n), n)
 
     @cached_property
+    def evidence_threshold(self) -> float | None:
+        """Threshold that the evidence of contact is measured by; None without a threshold.
+
+        Readings that do not change in the tare have a threshold of 0, with which nothing can be
+        compared. The force that is visible on a plot replaces it.
+        """
+        return None if self.threshold is None else self.threshold or VISIBLE_SHARE * self._grip
+
+    @cached_property
     def _grip(self) -> float:
         """The largest F_a of the recording that lasts; a short knock does not."""
         lasting = minimum_filter1d(np.where(self.known, self.amplitude, 0.0), self._n(MERGE_GAP))

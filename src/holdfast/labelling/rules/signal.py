@@ -20,7 +20,12 @@ from holdfast.contact import (
 )
 from holdfast.features import Tare
 from holdfast.features.tare import TareArgument
-from holdfast.labelling.rules.base import LabelWriter, StateTimeline, check_positive
+from holdfast.labelling.rules.base import (
+    LabelWriter,
+    StateTimeline,
+    check_positive,
+    evidence_ratio,
+)
 from holdfast.labelling.rules.forces import (
     VISIBLE_SHARE,
     FingerForce,
@@ -115,7 +120,7 @@ def _change_ratio(finger: FingerForce, rule: SignalRule) -> Array:
         least = REST_FACTOR * float(np.quantile(change[touching], 0.2))
     else:
         least = max(rule.share * grip_force(finger, touching), NOISE_FACTOR * finger.noise)
-    return np.where(touching, change / max(least, np.finfo(float).tiny), 0.0)
+    return np.where(touching, evidence_ratio(change, least), 0.0)
 
 
 def _changing(hand: HandForce, change: Mapping[str, Array], rule: SignalRule) -> dict[str, Mask]:
@@ -138,8 +143,8 @@ def _no_contact(hand: HandForce, finger: FingerForce) -> StateTimeline:
     """Return a timeline with the intervals without contact."""
     timeline = StateTimeline.unknown(hand.times)
     ratio: Array | float = UNMEASURED_RATIO
-    if finger.threshold is not None:
-        ratio = finger.threshold / np.maximum(finger.amplitude, np.finfo(float).tiny)
+    if finger.evidence_threshold is not None:
+        ratio = evidence_ratio(finger.evidence_threshold, finger.amplitude)
     timeline.set_state(~finger.contact & finger.known, NO_CONTACT, None, ratio)
     return timeline
 
@@ -179,7 +184,7 @@ class _GraspLabeller:
         touching = finger.contact & self._inside
         if not touching.any():
             return
-        timeline.set_state(touching, STABLE, None, 1 / np.maximum(ratio, np.finfo(float).tiny))
+        timeline.set_state(touching, STABLE, None, evidence_ratio(1.0, ratio))
         timeline.set_state(touching & self._changing[name], UNSTABLE, Cause.DISTURBANCE, ratio)
         before = np.arange(len(touching)) < self._locked
         timeline.set_state(touching & before, UNSTABLE, Cause.CLOSING, _contact_ratio(finger))
@@ -212,9 +217,9 @@ class _GraspLabeller:
 
 
 def _contact_ratio(finger: FingerForce) -> Array | float:
-    if finger.threshold is None:
+    if finger.evidence_threshold is None:
         return UNMEASURED_RATIO
-    return finger.amplitude / finger.threshold
+    return evidence_ratio(finger.amplitude, finger.evidence_threshold)
 
 
 def _label_loss(hand: HandForce, timelines: Mapping[str, StateTimeline]) -> None:

@@ -29,6 +29,7 @@ from holdfast.labelling.rules.base import (
     LabelWriter,
     StateTimeline,
     check_positive,
+    evidence_ratio,
 )
 from holdfast.labelling.rules.forces import (
     FingerForce,
@@ -71,7 +72,6 @@ GRASP_REST_TIME = 0.3
 SPIN_LEVER = 0.01
 """Distance from the centre of the contact at which spin counts as sliding: the edge of the contact
 patch of a fingertip [m]."""
-TINY_RATIO = 1e-9
 
 
 @dataclass(frozen=True)
@@ -196,7 +196,7 @@ class _FingerLabeller:
         ratio = self._motion_ratio(motion, point)
         moving = self._moving(ratio)
         held = self._contact & motion.known
-        timeline.set_state(held, STABLE, None, 1 / np.maximum(ratio, TINY_RATIO))
+        timeline.set_state(held, STABLE, None, evidence_ratio(1.0, ratio))
         timeline.set_state(held & moving, UNSTABLE, Cause.SLIP, ratio)
         self._label_no_contact(timeline)
         for start, end in runs(self._contact):
@@ -275,9 +275,9 @@ class _FingerLabeller:
         free = ~self._contact & finger.known
         if self._drop is not None:
             timeline.set_state(free, NO_CONTACT, Cause.LOST, LOSS_RATIO)
-        elif finger.threshold is not None:
-            amplitude = np.maximum(finger.amplitude, np.finfo(float).tiny)
-            timeline.set_state(free, NO_CONTACT, None, finger.threshold / amplitude)
+        elif finger.evidence_threshold is not None:
+            ratio = evidence_ratio(finger.evidence_threshold, finger.amplitude)
+            timeline.set_state(free, NO_CONTACT, None, ratio)
 
 
 def _label_writer(poses: Poses, clock: ClockOffset, rule: TrackingRule) -> LabelWriter:
