@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from holdfast.cli import main
-from holdfast.io import save_recording
+from holdfast.io import save_labels, save_recording
 from holdfast.recordings import Recording, Tactile, Truth
 from holdfast.sensors import sensor
 from holdfast.synthetic import synthetic_recording
@@ -64,6 +64,7 @@ def test_json_of_a_recording(capsys, path, grasp):
             "fingers": {"thumb": ["slip_speed"]},
         },
         "digest": grasp.digest,
+        "findings": [],
     }
     labels = {"stable": 0.0, "unstable": 0.0, "no_contact": 0.0}
     for label in grasp.modules["thumb"].labels:
@@ -112,6 +113,24 @@ def test_the_table(capsys, path):
     assert re.search(r"^thumb +uskin-curved +30 +count .* none$", out, re.MULTILINE)
     assert re.search(r"^ +5\.300 +shaken$", out, re.MULTILINE)
     assert max(map(len, out.splitlines())) < 150
+
+
+def test_findings_are_listed(capsys, grasp, path):
+    save_labels(grasp, path, author="rule:signal")
+    save_recording(replace(grasp, metadata={"starts_loaded": True}), path, force=True)
+    assert [one["kind"] for one in info_json(capsys, path)["findings"]] == [
+        "starts_loaded", "hidden_labels",
+    ]  # fmt: skip
+    assert main(["info", str(path)]) == 0
+    lines = capsys.readouterr().out.splitlines()
+    findings = lines[lines.index("findings:") + 1 :]
+    assert (
+        findings[0]
+        == "- begins in contact (metadata: starts_loaded): choose --tare first in train and"
+    )
+    assert max(map(len, findings)) <= 80
+    assert main(["info", str(path.parent)]) == 0
+    assert capsys.readouterr().out.rstrip().endswith(" starts_loaded, hidden_labels")
 
 
 def test_a_cut_file_is_shown(capsys, grasp, tmp_path):

@@ -11,7 +11,7 @@ import pytest
 
 from holdfast import files
 from holdfast.cli import main
-from holdfast.io import load_dataset, load_recording, save_recording
+from holdfast.io import labels_path, load_dataset, load_recording, save_labels, save_recording
 from holdfast.model import Model
 from holdfast.recordings import Recording
 from holdfast.synthetic import synthetic_recording
@@ -355,3 +355,14 @@ def with_flat_skin(recording):
         for name, module in recording.modules.items()
     }
     return replace(recording, modules=modules)
+
+
+def test_labels_of_a_rule_that_hide_others_are_reported(capsys, data, model):
+    path = data / "grasp-0.parquet"
+    save_labels(load_recording(path), path, author="rule:signal")
+    try:
+        code, _, err = run(capsys, data, "-o", model, "--trials", 0)
+    finally:
+        labels_path(path).unlink()
+    assert code == 0
+    assert err.startswith("labels of a rule outrank the labels that came with 1 of 3 recordings")

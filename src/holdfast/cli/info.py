@@ -3,6 +3,8 @@
 from collections.abc import Iterable, Mapping
 from dataclasses import replace
 from pathlib import Path
+from shutil import get_terminal_size
+from textwrap import fill
 from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
@@ -35,10 +37,14 @@ def info(
 ) -> None:
     """Show the content of a recording, or of a folder of recordings.
 
-    Print modules, sensors, number of samples, rates, gaps, repeated samples, seconds of each
-    label, number of samples with faults, and metadata. The figure shows forces, sigma, labels,
-    markers and slip (if the recording has truth) of each finger over time. The tare is used for
-    the figure and the faults; choose a time without contact.
+    Print modules, sensors, number of samples, rates, gaps (steps in time of over three periods),
+    repeats (samples equal to the one before), seconds of each label, number of samples with
+    faults, metadata, and findings that matter for labels and training: constant readings, a start
+    in contact, hidden labels (docs/command-line.md defines every word).
+
+    The figure shows forces, sigma, labels, markers and slip (if the recording has truth) of each
+    finger over time. The tare is used for the figure and the faults; choose a time without
+    contact.
 
     Example:
       holdfast info real/
@@ -62,7 +68,7 @@ def _print_file(path: Path, plot: Path | None, tare: "Tare", force: bool, as_jso
     if plot is not None:
         check_plot(plot, force)
     recording = load_recording(path)
-    document = _document(recording, tare)
+    document = _document(recording, tare, path)
     if plot is not None:
         from holdfast.plots.recording import plot_recording
 
@@ -81,7 +87,7 @@ def _print_folder(folder: Path, tare: "Tare", as_json: bool) -> None:
     documents: list[dict[str, Any]] = []
     for path in progress(paths, "reading"):
         try:
-            documents.append(_document(load_recording(path), tare))
+            documents.append(_document(load_recording(path), tare, path))
         except RecordingError as cause:
             documents.append({"name": path.stem, "error": str(cause)})
     if as_json:
@@ -95,8 +101,11 @@ def _print_folder(folder: Path, tare: "Tare", as_json: bool) -> None:
         raise RecordingError(failures[-1])
 
 
-def _document(recording: "Recording", tare: "Tare") -> dict[str, Any]:
-    truth = recording.truth
+def _document(recording: "Recording", tare: "Tare", path: Path) -> dict[str, Any]:
+    from holdfast.labelling.review.findings import findings_of, hidden_labels
+
+    truth, hidden = recording.truth, hidden_labels(path)
+    findings = findings_of(recording) + ([] if hidden is None else [hidden])
     return {
         "name": recording.name,
         "modules": {
@@ -116,6 +125,7 @@ def _document(recording: "Recording", tare: "Tare") -> dict[str, Any]:
             "fingers": {finger: list(arrays) for finger, arrays in truth.fingers.items()},
         },
         "digest": recording.digest,
+        "findings": [one._asdict() for one in findings],
     }
 
 
@@ -180,11 +190,22 @@ def _print_one(document: Mapping[str, Any]) -> None:
     header = ("module", "sensor", "taxels", "unit", "samples", "rate [Hz]", "gaps", "repeats")
     labels = tuple(f"{state} [s]" for state in _label_states())
     print_table((*header, *labels, "faults"), _module_rows(document["modules"]))
+    _print_findings(document["findings"])
     if document["markers"]:
         print_line()
         print_table(
             ("marker [s]", "text"), [(f"{m['time']:.3f}", m["text"]) for m in document["markers"]]
         )
+
+
+def _print_findings(findings: list[Mapping[str, str]]) -> None:
+    """Print one paragraph for each finding, as wide as the terminal."""
+    if findings:
+        print_line("\nfindings:")
+    width = get_terminal_size().columns
+    for one in findings:
+        text = f"{one['module']}: {one['text']}" if one["module"] else one["text"]
+        print_line(fill(text, width, initial_indent="- ", subsequent_indent="  "))
 
 
 def _channels(truth: Mapping[str, Any]) -> list[str]:
@@ -225,6 +246,7 @@ def _summary(document: Mapping[str, Any]) -> tuple[object, ...]:
     modules = list(document["modules"].values())
     rates = sorted(m["rate"] for m in modules if m["n_samples"])
     faults = sorted({fault for m in modules for fault in m["faults"]})
+    found = dict.fromkeys(one["kind"] for one in document["findings"])
     return (
         document["name"],
         len(modules),
@@ -233,7 +255,7 @@ def _summary(document: Mapping[str, Any]) -> tuple[object, ...]:
         f"{document['duration']:.2f}",
         sum(m["gaps"] for m in modules),
         *(f"{sum(m['labels'][s] for m in modules) / len(modules):.2f}" for s in _label_states()),
-        ", ".join(([] if document["complete"] else ["cut off"]) + faults) or "ok",
+        ", ".join(([] if document["complete"] else ["cut off"]) + [*faults, *found]) or "ok",
     )
 
 

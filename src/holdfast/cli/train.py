@@ -101,6 +101,7 @@ def train(
     from holdfast.cli.evaluate import print_metrics
     from holdfast.files import refuse_overwrite
     from holdfast.io import load_dataset
+    from holdfast.labelling.review.findings import report_hidden_labels
     from holdfast.training import train as fit
 
     setting = _setting(
@@ -117,6 +118,7 @@ def train(
     )
     refuse_overwrite(model, force=force)
     recordings = load_dataset(data)
+    report_hidden_labels(recordings.paths, print_message)
     journal = _search_journal(model, resume=resume, force=force)
     try:
         trained = fit(

@@ -1,8 +1,9 @@
 import json
+from dataclasses import replace
 
 import pytest
 
-from holdfast.io import labels_path, load_labels, load_recording, save_labels
+from holdfast.io import labels_path, load_labels, load_recording, save_labels, save_recording
 from holdfast.synthetic import synthetic_recording
 
 from .helpers import FINGERS, refusal, run, run_json, save_manual_labels
@@ -37,9 +38,50 @@ def test_the_table_of_a_rule(capsys, folder):
     ]  # fmt: skip
     assert (one.split()[0], two.split()[0]) == ("one", "two")
     assert err == (
-        "2 of 2 recordings also contain labels; the label files replace them as long as "
-        "they exist\n"
+        "2 of 2 recordings came with labels; the label files outrank them in train and evaluate: "
+        "delete NAME.labels.json to use them again\n"
     )
+
+
+def test_hidden_labels_are_reported_before_anything_is_written(capsys, folder):
+    code, _, err = run(capsys, "--auto", "signal", folder, "--dry-run")
+    assert (code, err) == (
+        0,
+        "2 of 2 recordings came with labels; the label files would outrank them in train and "
+        "evaluate\n",
+    )
+
+
+class TestRecordingsThatBeginInContact:
+    @pytest.fixture
+    def held(self, folder):
+        path = folder / "two.mcap"
+        recording = replace(load_recording(path), metadata={"starts_loaded": True})
+        save_recording(recording, path, force=True)
+        return folder
+
+    def messages(self, capsys, folder, *words):
+        code, _, err = run(capsys, "--auto", "signal", folder, "--dry-run", *words)
+        assert code == 0
+        return err.splitlines()
+
+    def test_the_first_sample_is_their_tare(self, capsys, held):
+        text = "1 of 2 recordings begin in contact (two: metadata: starts_loaded): "
+        more = "; if the others do too, give --tare first"
+        assert self.messages(capsys, held)[0] == f"{text}the first sample is their tare{more}"
+        (one, two) = run_json(capsys, "--auto", "signal", held, "--dry-run")["recordings"]
+        assert (one["starts_loaded"], two["starts_loaded"]) == ("", "metadata: starts_loaded")
+        (first,) = run_json(
+            capsys, "--auto", "signal", held / "two.mcap", "--dry-run", "--tare", "first"
+        )["recordings"]
+        assert first["labels"] == two["labels"]
+
+    def test_a_tare_that_contains_the_grip_is_reported(self, capsys, held):
+        text = "1 of 2 recordings begin in contact (two: metadata: starts_loaded): "
+        assert self.messages(capsys, held, "--tare", "0.5")[0] == (
+            f"{text}a tare of 0.5 s contains their grip, --tare first fits them"
+        )
+        assert len(self.messages(capsys, held, "--tare", "first")) == 1
 
 
 def test_a_dry_run_writes_nothing(capsys, folder):

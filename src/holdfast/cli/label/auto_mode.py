@@ -67,6 +67,7 @@ def label_by_rule(
         return labels
 
     documents = label_all(files, label)
+    report_loaded_starts(documents, options.tare)
     if as_json:
         print_json({"rule": rule, "written": not dry_run, "recordings": documents})
     else:
@@ -192,6 +193,28 @@ def _print_doubtful(doubtful: Sequence[tuple[str, dict[str, Any]]]) -> None:
         print_line(f"and {len(doubtful) - MAX_DOUBTFUL_SHOWN} more: --json prints all")
 
 
+def report_loaded_starts(documents: Sequence[dict[str, Any]], tare: str | None) -> None:
+    """Report recordings that begin in contact, and whether the tare fits them.
+
+    Args:
+        documents: from `label_all`.
+        tare: of the option `--tare`, if it is given.
+    """
+    from holdfast.features import Tare
+
+    loaded = [each for each in documents if each.get("starts_loaded")]
+    if not loaded or (tare is not None and not Tare.parse(tare).without_contact):
+        return
+    first = loaded[0]
+    text = f"{len(loaded)} of {len(documents)} recordings begin in contact "
+    text += f"({first['name']}: {first['starts_loaded']})"
+    if tare is not None:
+        print_message(f"{text}: a tare of {tare} s contains their grip, --tare first fits them")
+        return
+    more = "; if the others do too, give --tare first" if len(loaded) < len(documents) else ""
+    print_message(f"{text}: the first sample is their tare{more}")
+
+
 def report_failures(documents: Sequence[dict[str, Any]], *, written: bool) -> None:
     """Report labels that are hidden by the label files, and recordings that failed.
 
@@ -205,11 +228,8 @@ def report_failures(documents: Sequence[dict[str, Any]], *, written: bool) -> No
     from holdfast.errors import RecordingError
 
     n_hidden = sum(bool(each.get("n_inside")) for each in documents)
-    if written and n_hidden:
-        print_message(
-            f"{n_hidden} of {len(documents)} recordings also contain labels; the label files "
-            "replace them as long as they exist"
-        )
+    if n_hidden:
+        print_message(_hidden_text(n_hidden, len(documents), written=written))
     errors = [each["error"] for each in documents if "error" in each]
     for error in errors[:-1]:
         print_error(error)
@@ -217,8 +237,16 @@ def report_failures(documents: Sequence[dict[str, Any]], *, written: bool) -> No
         raise RecordingError(errors[-1])
 
 
+def _hidden_text(n_hidden: int, n: int, *, written: bool) -> str:
+    text = f"{n_hidden} of {n} recordings came with labels; the label files "
+    if not written:
+        return f"{text}would outrank them in train and evaluate"
+    return f"{text}outrank them in train and evaluate: delete NAME.labels.json to use them again"
+
+
 def _document(path: Path, recording: "Recording", labels: "Labels") -> dict[str, Any]:
     from holdfast.io.label_files import labels_path
+    from holdfast.labelling.rules.start import evidence_of_contact
 
     return {
         "name": recording.name,
@@ -227,6 +255,7 @@ def _document(path: Path, recording: "Recording", labels: "Labels") -> dict[str,
         "seconds": _label_seconds(labels),
         "labels": _labels_json(labels),
         "doubtful": _doubtful_labels(labels),
+        "starts_loaded": evidence_of_contact(recording),
         "n_inside": sum(len(module.labels) for module in recording.modules.values()),
     }
 

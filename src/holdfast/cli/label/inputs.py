@@ -18,13 +18,13 @@ class RuleOptions:
     """Options of a rule.
 
     Attributes:
-        tare: tare of the recordings.
+        tare: tare of the recordings; by default the one that fits the start of each.
         poses: path of a CSV file of poses, or of a bag, for the rule `tracking`.
         tracks: topics or frames of a bag, as BODY=NAME.
         parameters: other parameters, as NAME=VALUE.
     """
 
-    tare: str = "0.5"
+    tare: str | None = None
     poses: Path | None = None
     tracks: tuple[str, ...] = ()
     parameters: tuple[str, ...] = ()

@@ -43,7 +43,6 @@ def show_label_page(
         ValueError: other hosts may connect, but there is no token.
         OutputError: the address is not available.
     """
-    from holdfast.features import Tare
     from holdfast.labelling.server.service import LabellingService
     from holdfast.labelling.server.workspace import Workspace
     from holdfast.web.guard import Guard
@@ -55,7 +54,7 @@ def show_label_page(
         files,
         author=login_name() if author is None else author,
         clock=current_time,
-        tare=Tare.parse(options.tare),
+        tare=options.tare,
         poses=options.tracking,
         suspects=suspects,
     )

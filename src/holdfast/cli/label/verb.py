@@ -11,7 +11,6 @@ from holdfast.cli.options import (
     JobsOption,
     JsonOption,
     PortOption,
-    TareOption,
     TokenFileOption,
     TokenOption,
     find_token,
@@ -60,7 +59,13 @@ def label(
         list[str] | None,
         typer.Option("--set", metavar="NAME=VALUE", help="Parameter of the rule; may be repeated."),
     ] = None,
-    tare: TareOption = "0.5",
+    tare: Annotated[
+        str | None,
+        typer.Option(
+            help="Tare: seconds from the start, first, none, or START:END [s].",
+            show_default="0.5, or first if a recording begins in contact",
+        ),
+    ] = None,
     author: Annotated[
         str | None,
         typer.Option(help="Author of the labels.", show_default="login name, or rule:RULE"),
@@ -91,8 +96,10 @@ def label(
     change is saved at once. Labels are stored in NAME.labels.json beside the recording. The
     recording itself is never changed.
 
-    --auto writes the labels that a rule proposes, and prints those with low confidence. Labels
-    of a person are overwritten only with --force. --compare prints Cohen's kappa and onset
+    --auto writes the labels that a rule proposes, and prints those with low confidence. They
+    outrank labels that came with the recording; --dry-run only shows them. Labels of a person are
+    overwritten only with --force. The tare of a recording that begins in contact is its first
+    sample. --compare prints Cohen's kappa and onset
     differences of two sets of labels: files, folders, or a rule. --audit prints labels that a
     cross-validated classifier contradicts. See docs/labels.md.
 

@@ -139,7 +139,7 @@ def _robot(table: Table) -> Mapping[str, npt.NDArray[Any]]:
 
 
 def _metadata(path: Path) -> dict[str, Any]:
-    metadata: dict[str, Any] = {"object": "box", "source": SOURCE}
+    metadata: dict[str, Any] = {"object": "box", "source": SOURCE, "starts_loaded": True}
     if path.is_file():
         rows = list(csv.DictReader(path.read_text("utf-8-sig").splitlines()))
         if rows:

@@ -78,7 +78,7 @@ class ProtocolMarker(NamedTuple):
 
 def propose(
     recording: Recording,
-    tare: TareArgument | Tare = 0.5,
+    tare: TareArgument | Tare | None = None,
     delay: float = 0.0,
     opening: float = 1.0,
 ) -> dict[str, tuple[Label, ...]]:
@@ -86,7 +86,8 @@ def propose(
 
     Args:
         recording: with markers, as `holdfast record` writes them.
-        tare: how the baseline is found; the force decides on contact.
+        tare: how the baseline is found, by default as `fitting_tare` chooses; the force decides
+            on contact.
         delay: of the person who set the markers [s].
         opening: time that the hand takes to open [s].
 

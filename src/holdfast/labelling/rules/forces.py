@@ -12,6 +12,7 @@ from holdfast.errors import RecordingError
 from holdfast.features import Tare
 from holdfast.features.force import tared_force
 from holdfast.features.tare import TareArgument, baseline_of, offline_tare
+from holdfast.labelling.rules.start import fitting_tare
 from holdfast.metrics.masks import Mask, covered, drop_short_runs, fill_short_gaps, n_samples_of
 from holdfast.recordings import GAP_PERIODS, Recording, Tactile
 from holdfast.sensors.types import Array
@@ -117,18 +118,18 @@ class HandForce:
         return np.asarray(np.sum(touching, axis=0))
 
 
-def hand_force(recording: Recording, tare: TareArgument | Tare = 0.5) -> HandForce:
+def hand_force(recording: Recording, tare: TareArgument | Tare | None = None) -> HandForce:
     """Return the forces of a recording's fingers, with the tare subtracted from all samples.
 
     Args:
         recording: with any sensors. Modules without a finite sample in the tare are left out.
-        tare: how the baseline is found.
+        tare: how the baseline is found; by default as `fitting_tare` chooses.
 
     Raises:
         RecordingError: no module has a finite sample for the tare.
         ValueError: the tare is unknown.
     """
-    how = Tare.parse(tare)
+    how = fitting_tare(recording, tare)
     period = 1 / recording.rate
     times = np.arange(recording.start, recording.end + period / 2, period)
     fingers = {

@@ -77,7 +77,7 @@ class SignalRule:
 
 
 def propose(
-    recording: Recording, tare: TareArgument | Tare = 0.5, rule: SignalRule | None = None
+    recording: Recording, tare: TareArgument | Tare | None = None, rule: SignalRule | None = None
 ) -> dict[str, tuple[Label, ...]]:
     """Return labels by finger from the force alone.
 
@@ -86,8 +86,9 @@ def propose(
 
     Args:
         recording: the recording. Its labels and its truth are ignored.
-        tare: how the baseline is found. With "first" or "none", for recordings that begin in
-            contact, the object is held from the start until the force drops for good.
+        tare: how the baseline is found; by default as `fitting_tare` chooses. With "first" or
+            "none", for recordings that begin in contact, the object is held from the start until
+            the force drops for good.
         rule: thresholds.
 
     Raises:

@@ -47,6 +47,7 @@ from holdfast.labelling.rules.motion import (
     relative_track,
 )
 from holdfast.labelling.rules.poses import Poses, PoseTrack, poses_of, tip_tracks_of
+from holdfast.labelling.rules.start import fitting_tare
 from holdfast.metrics.masks import (
     Mask,
     drop_short_runs,
@@ -112,7 +113,7 @@ class TrackingRule:
 
 def propose(
     recording: Recording,
-    tare: TareArgument | Tare = 0.5,
+    tare: TareArgument | Tare | None = None,
     tracking: str | Path | Poses | None = None,
     offset: float | None = None,
     rule: TrackingRule | None = None,
@@ -126,6 +127,7 @@ def propose(
     Args:
         recording: with poses in its truth, unless `tracking` is given. Its labels are ignored.
         tare: how the baseline is found; "first" or "none" for recordings that begin in contact.
+            By default as `fitting_tare` chooses.
         tracking: path of a CSV file of poses (`poses_from_csv`), or poses.
         offset: added to the times of the poses [s]. By default 0 for poses of the recording, else
             the offset with the highest correlation of motion and force.
@@ -137,7 +139,8 @@ def propose(
     """
     rule = rule or TrackingRule()
     poses = poses_of(recording, tracking)
-    hand = hand_force(recording, tare)
+    how = fitting_tare(recording, tare)
+    hand = hand_force(recording, how)
     tips = tip_tracks_of(poses, list(hand.fingers))
     tracks = {name: relative_track(poses.object_track, tip) for name, tip in tips.items()}
     clock = ClockOffset(offset, 1.0) if offset is not None else _clock_offset(poses, tracks, hand)
@@ -147,7 +150,7 @@ def propose(
     labels = {}
     for name, track in tracks.items():
         finger, module = hand.fingers[name], recording.modules[name]
-        point = None if tips[name] is None else centre_of_pressure(module, tare, hand)
+        point = None if tips[name] is None else centre_of_pressure(module, how, hand)
         motion = motion_of(track, hand.times, point, clock.seconds)
         timeline = _FingerLabeller(finger, hand.times, rule, drop).timeline(motion, point)
         labels[name] = writer.labels(timeline, finger.span)

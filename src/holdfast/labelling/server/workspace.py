@@ -17,6 +17,7 @@ from holdfast.io import load_recording, mcap, parquet
 from holdfast.io.header import Header
 from holdfast.labelling.rules import propose
 from holdfast.labelling.rules.poses import Poses, poses_of
+from holdfast.labelling.rules.start import fitting_tare
 from holdfast.labelling.server.signals import Signals, change_points
 from holdfast.labelling.server.store import (
     Labels,
@@ -71,7 +72,7 @@ class OpenRecording:
 
     path: Path
     recording: Recording
-    tare: TareArgument | Tare
+    tare: Tare
 
     @cached_property
     def signals(self) -> Signals:
@@ -95,7 +96,7 @@ class Workspace:
         paths: of the recordings.
         author: default author of labels.
         clock: returns the current time as ISO 8601 text.
-        tare: how baselines are found.
+        tare: how baselines are found; by default as `fitting_tare` chooses for each recording.
         poses: path of a CSV file of poses, or poses, for the rule `tracking`.
         suspects: results of an audit of these recordings.
     """
@@ -106,14 +107,14 @@ class Workspace:
         *,
         author: str,
         clock: Callable[[], str],
-        tare: TareArgument | Tare = 0.5,
+        tare: TareArgument | Tare | None = None,
         poses: str | Path | Poses | None = None,
         suspects: "Sequence[Suspect]" = (),
     ) -> None:
         self.paths = tuple(paths)
         self.author = author
         self._clock = clock
-        self._tare = Tare.parse(tare)
+        self._tare = None if tare is None else Tare.parse(tare)
         self._poses = poses
         self._suspects = tuple(suspects)
         self._proposals: dict[int, Proposals] = {}
@@ -149,7 +150,8 @@ class Workspace:
                 while len(self._open) >= MAX_RECORDINGS_IN_MEMORY:
                     self._open.popitem(last=False)
                 recording = load_recording(path, labels=False)
-                self._open[key] = OpenRecording(path, recording, self._tare)
+                tare = fitting_tare(recording, self._tare)
+                self._open[key] = OpenRecording(path, recording, tare)
             self._open.move_to_end(key)
             return self._open[key]
 
@@ -230,7 +232,7 @@ class Workspace:
         opened = self.open(index)
         with self._compute_lock:
             chosen = rule or default_rule(opened.recording, self._poses)
-            given: dict[str, Any] = {"tare": self._tare, **parameters}
+            given: dict[str, Any] = {"tare": opened.tare, **parameters}
             if chosen == "tracking":
                 given["tracking"] = self._poses
             self._proposals[index] = propose(chosen, opened.recording, **given)

@@ -1,0 +1,153 @@
+"""Findings about a recording that matter before it is labelled or trained on."""
+
+from collections.abc import Callable, Iterator, Sequence
+from pathlib import Path
+from typing import Literal, NamedTuple
+
+import numpy as np
+
+from holdfast.errors import HoldfastError
+from holdfast.io.label_files import labels_path, load_labels
+from holdfast.labelling.rules.forces import hand_force
+from holdfast.labelling.rules.start import evidence_of_contact
+from holdfast.labelling.server.workspace import summary_of
+from holdfast.metrics.masks import runs
+from holdfast.model import RELATIVE_RATES
+from holdfast.recordings import Recording, Tactile
+
+CONSTANT_SECONDS = 0.5
+"""Shortest stretch without any change of the readings that is reported [s]."""
+AXES = "xyz"
+
+Kind = Literal[
+    "constant", "dead", "axes", "one_taxel", "rate", "starts_loaded", "no_contact", "hidden_labels"
+]
+
+
+class Finding(NamedTuple):
+    """A property of a recording that a person should see.
+
+    Attributes:
+        module: name of the module; empty for the whole recording.
+        kind: what was found.
+        text: what was found, and what follows from it, in one line.
+    """
+
+    module: str
+    kind: Kind
+    text: str
+
+
+def findings_of(recording: Recording) -> list[Finding]:
+    """Return the findings about the readings of a recording, module by module.
+
+    Example:
+        >>> from holdfast.synthetic import synthetic_recording
+        >>> findings_of(synthetic_recording("made", seed=0))
+        []
+    """
+    found = [
+        Finding(name, kind, text)
+        for name, module in recording.modules.items()
+        if module.n_samples > 1
+        for kind, text in _of_module(module)
+    ]
+    if reason := evidence_of_contact(recording):
+        text = f"begins in contact ({reason}): choose --tare first in train and info"
+        return [*found, Finding("", "starts_loaded", text)]
+    if _without_contact(recording):
+        found.append(Finding("", "no_contact", "no finger is in contact in the whole recording"))
+    return found
+
+
+def hidden_labels(path: Path) -> Finding | None:
+    """Return a finding if labels of a rule hide labels inside a recording; else None.
+
+    Args:
+        path: of the recording.
+
+    Raises:
+        RecordingError: the recording or its label file cannot be read.
+    """
+    beside = labels_path(path)
+    if not beside.exists():
+        return None
+    file = load_labels(beside)
+    authors = [file.author, *(each.author for own in file.modules.values() for each in own)]
+    rule = next((author for author in authors if author.startswith("rule:")), None)
+    if rule is None or not (n_inside := summary_of(path).n_inside):
+        return None
+    text = f"{beside.name} has labels of {rule}, which outrank the {n_inside} labels that came "
+    return Finding("", "hidden_labels", text + "with the recording; delete it to use those")
+
+
+def report_hidden_labels(paths: Sequence[Path], report: Callable[[str], None]) -> None:
+    """Report in one line how many recordings have labels of a rule that hide labels inside.
+
+    Recordings that cannot be read are left out.
+
+    Args:
+        paths: of the recordings.
+        report: receives the line; it is not called if there are no such recordings.
+    """
+    hidden = [path.stem for path in paths if _hides(path)]
+    if hidden:
+        report(
+            f"labels of a rule outrank the labels that came with {len(hidden)} of {len(paths)} "
+            f"recordings ({hidden[0]}{', ...' if len(hidden) > 1 else ''}); delete their "
+            ".labels.json files to use those"
+        )
+
+
+def _hides(path: Path) -> bool:
+    try:
+        return hidden_labels(path) is not None
+    except HoldfastError:
+        return False
+
+
+def _of_module(module: Tactile) -> Iterator[tuple[Kind, str]]:
+    low, high = RELATIVE_RATES
+    if not low <= module.rate <= high:
+        yield "rate", f"{module.rate:.4g} Hz; builtin:any needs {low:g} to {high:g} Hz"
+    if module.sensor.n_taxels == 1:
+        yield "one_taxel", "one taxel: taxels cannot be compared, only its force is judged"
+    still = _still_axes(module)
+    if len(still) == len(AXES):
+        yield "dead", "the readings never change: the sensor is dead or disconnected"
+        return
+    if still:
+        yield "axes", f"readings along {' and '.join(still)} never change; 3 axes are expected"
+    if text := _constant(module):
+        yield "constant", text
+
+
+def _still_axes(module: Tactile) -> list[str]:
+    """Return the axes that no taxel changes."""
+    readings = module.readings
+    finite = np.isfinite(readings)
+    changed = (readings[1:] != readings[:-1]) & finite[1:] & finite[:-1]
+    return [axis for k, axis in enumerate(AXES) if not changed[:, :, k].any()]
+
+
+def _constant(module: Tactile) -> str:
+    """Return a text about stretches in which no reading changes; empty without any."""
+    times = module.times
+    same = (module.readings[1:] == module.readings[:-1]).all(axis=(1, 2))
+    stretches = [(times[first], times[last]) for first, last in runs(same)]
+    long = [(start, end) for start, end in stretches if end - start >= CONSTANT_SECONDS]
+    if not long:
+        return ""
+    total = sum(end - start for start, end in long)
+    text = f"no reading changes for {total:.2f} s in all, in stretches of {CONSTANT_SECONDS} s "
+    text += f"or more, the first from {long[0][0]:.2f} to {long[0][1]:.2f} s"
+    if long[0][0] > times[0]:
+        return text
+    return f"{text}: the tare shows no noise; give train a --contact-threshold"
+
+
+def _without_contact(recording: Recording) -> bool:
+    try:
+        return not hand_force(recording).n_touching.any()
+    except HoldfastError:  # no sample for the tare
+        return False
