@@ -1,10 +1,20 @@
 import errno
+import os
 from pathlib import Path
 
 import pytest
+from hypothesis import given
+from hypothesis import strategies as st
 
 from holdfast.errors import OutputError
-from holdfast.files import refuse_overwrite, whole_file, write_whole
+from holdfast.files import (
+    check_regular,
+    file_stem,
+    read_input,
+    refuse_overwrite,
+    whole_file,
+    write_whole,
+)
 
 
 def test_writes_the_whole(tmp_path):
@@ -78,10 +88,10 @@ def test_a_full_disk_keeps_the_old_file(tmp_path, monkeypatch):
 
 
 def test_no_temporary_file_can_be_made(tmp_path, monkeypatch):
-    def read_only(*args):
+    def read_only(self, mode=0o666, exist_ok=True):
         raise OSError(errno.EROFS, "Read-only file system")
 
-    monkeypatch.setattr("tempfile.mkstemp", read_only)
+    monkeypatch.setattr(Path, "touch", read_only)
     with pytest.raises(OutputError, match=r"cannot write .*a: Read-only file system$"):
         write_whole(tmp_path / "a", b"")
 
@@ -110,3 +120,62 @@ def test_a_folder_is_not_replaced(tmp_path):
 def test_refuse_overwrite_lets_a_new_name_pass(tmp_path):
     refuse_overwrite(tmp_path / "new")
     assert not (tmp_path / "new").exists()
+
+
+ODD_NAMES = ["", ".", "..", "../../up", "/abs", "a/b", "a\\b", ".hidden", "x\x00y", "a\n"]
+ODD_NAMES += ["-rf", "con", "NUL.x", "a" * 400, "é" * 200, "end.", "end ", "a\ud800", "a\u202eb"]
+ODD_NAMES += ["\x1b[31m"]
+
+
+@pytest.mark.parametrize("name", ["grasp", "can-case1-1", "Möhre 3 (rot)", "a.b", "x..y", "50 %"])
+def test_a_valid_name_is_kept(name):
+    assert file_stem(name) == name
+
+
+@given(st.text() | st.sampled_from(ODD_NAMES))
+def test_a_stem_is_one_part_of_a_path_that_every_system_accepts(name):
+    stem = file_stem(name)
+    assert Path(stem).name == stem
+    assert stem == stem.strip(" .")
+    assert stem.isprintable()
+    assert not set(stem) & set('<>:"/\\|?*')
+    assert 0 < len(stem.encode()) < 200
+    assert file_stem(stem) == stem
+
+
+def test_different_names_have_different_stems():
+    assert len({file_stem(name) for name in ODD_NAMES}) == len(ODD_NAMES)
+
+
+def test_a_stem_is_a_file_in_its_folder(tmp_path):
+    for name in ODD_NAMES:
+        write_whole(tmp_path / f"{file_stem(name)}.json", b"{}")
+    assert len(list(tmp_path.iterdir())) == len(ODD_NAMES)
+
+
+def test_the_mask_of_the_process_is_not_touched(tmp_path, monkeypatch):
+    def touched(mask):
+        raise AssertionError("another thread would create files of any mode meanwhile")
+
+    monkeypatch.setattr(os, "umask", touched)
+    write_whole(tmp_path / "a", b"")
+
+
+@pytest.mark.parametrize("read", [check_regular, lambda path: read_input(path, 10)])
+def test_an_input_that_may_never_end_is_refused_at_once(tmp_path, read):
+    os.mkfifo(tmp_path / "pipe")
+    expected = "it is a pipe or a device; a regular file expected"
+    for path in (tmp_path / "pipe", Path("/dev/zero"), Path("/dev/null")):
+        with pytest.raises(OSError, match=expected):
+            read(path)
+    with pytest.raises(OSError, match="it is a folder; a file expected"):
+        read(tmp_path)
+    with pytest.raises(FileNotFoundError):
+        read(tmp_path / "none")
+
+
+def test_a_large_input_is_refused(tmp_path):
+    (tmp_path / "a").write_bytes(b"12345678901")
+    with pytest.raises(OSError, match="it has more than 10 bytes"):
+        read_input(tmp_path / "a", 10)
+    assert read_input(tmp_path / "a", 11) == b"12345678901"

@@ -1,12 +1,48 @@
-"""Output files that are written whole or not at all."""
+"""Files: outputs that are written whole or not at all, their names, and inputs that end."""
 
+import errno
 import os
-import tempfile
+import re
+import stat
 from collections.abc import Iterator
 from contextlib import contextmanager
+from hashlib import blake2b
 from pathlib import Path
 
 from holdfast.errors import OutputError
+
+MAX_STEM_SIZE = 190
+"""Maximum length of the stem of a file's name, in bytes of UTF-8; systems allow 255 in all."""
+
+_FORBIDDEN = frozenset('<>:"/\\|?*')
+"""Characters that the name of a file must not have on some system."""
+_RESERVED = re.compile(r"(con|prn|aux|nul|com\d|lpt\d)(\..*)?", re.IGNORECASE | re.ASCII)
+"""Names that are devices on Windows."""
+_MAX_ATTEMPTS = 100
+"""Number of random names that are tried for a temporary file."""
+
+
+def file_stem(name: str) -> str:
+    """Return a stem for the file of anything with a name, such as a recording or an object.
+
+    A name that is valid for a file on every system is returned unchanged. Otherwise invalid
+    characters are replaced, and a hash of the name is added, so that different names give
+    different files. The file is always inside its folder.
+
+    Example:
+        >>> file_stem("can-case1-1"), file_stem("../../can")
+        ('can-case1-1', '_.._can-7f7bd239')
+    """
+    kept = "".join("_" if c in _FORBIDDEN or not c.isprintable() else c for c in name)
+    kept = kept.strip(" .").lstrip("-")
+    if len(encoded := kept.encode()) > MAX_STEM_SIZE:
+        kept = encoded[: MAX_STEM_SIZE - 9].decode(errors="ignore")
+    if _RESERVED.fullmatch(kept):
+        kept = f"_{kept}"
+    if kept and kept == name:
+        return name
+    digest = blake2b(name.encode(errors="surrogatepass"), digest_size=4).hexdigest()
+    return f"{kept or 'unnamed'}-{digest}"
 
 
 @contextmanager
@@ -26,15 +62,9 @@ def whole_file(path: str | Path, *, force: bool = False) -> Iterator[Path]:
     """
     target = Path(path)
     refuse_overwrite(target, force=force)
-    try:
-        handle, name = tempfile.mkstemp(target.suffix, f".{target.stem}.", target.parent)
-    except OSError as cause:
-        raise OutputError(f"cannot write {target}: {cause.strerror}") from cause
-    os.close(handle)
-    part = Path(name)
+    part = _new_file_beside(target)
     try:
         yield part
-        part.chmod(0o666 & ~_umask())
         part.replace(target)
     except OSError as cause:
         if cause.filename not in (None, str(part), str(target)):
@@ -67,7 +97,50 @@ def refuse_overwrite(path: str | Path, *, force: bool = False) -> None:
         raise OutputError(f"cannot write {target}: the folder {target.parent} does not exist")
 
 
-def _umask() -> int:
-    mask = os.umask(0)
-    os.umask(mask)
-    return mask
+def check_regular(path: str | Path) -> None:
+    """Check that an input is a regular file: reading a pipe or a device may never end.
+
+    Raises:
+        OSError: it is something else, or does not exist.
+    """
+    mode = Path(path).stat().st_mode
+    if stat.S_ISDIR(mode):
+        raise IsADirectoryError(errno.EISDIR, "it is a folder; a file expected", str(path))
+    if not stat.S_ISREG(mode):
+        raise OSError(errno.EINVAL, "it is a pipe or a device; a regular file expected", str(path))
+
+
+def read_input(path: str | Path, max_size: int) -> bytes:
+    """Return the content of a small input file.
+
+    Args:
+        path: of the file.
+        max_size: number of bytes above which the file is refused.
+
+    Raises:
+        OSError: it cannot be read, is no regular file, or is too large.
+    """
+    check_regular(path)
+    with Path(path).open("rb") as file:
+        data = file.read(max_size + 1)
+    if len(data) > max_size:
+        raise OSError(errno.EFBIG, f"it has more than {max_size} bytes", str(path))
+    return data
+
+
+def _new_file_beside(target: Path) -> Path:
+    """Create a hidden file with the mode of any new file in the folder of `target`.
+
+    Raises:
+        OutputError: the folder does not accept it.
+    """
+    for _ in range(_MAX_ATTEMPTS):
+        part = target.with_name(f".{target.stem}.{os.urandom(6).hex()}{target.suffix}")
+        try:
+            part.touch(exist_ok=False)
+        except FileExistsError:
+            continue
+        except OSError as cause:
+            raise OutputError(f"cannot write {target}: {cause.strerror}") from cause
+        return part
+    raise OutputError(f"cannot write {target}: no name for a temporary file is free")

@@ -239,6 +239,18 @@ def test_an_own_object(tmp_path):
     assert (grasp.name, grasp.item.mass) == ("mug-case1-1", 0.2)
 
 
+def test_an_object_whose_name_is_a_path_stays_in_the_folder(capsys, tmp_path):
+    table = tmp_path / "mine.toml"
+    table.write_text(MUG.replace("mug", '"../../mug"', 1))
+    out = tmp_path / "a" / "b"
+    words = (out, "--table", table, "--cases", 1, "--repeats", 1, "--jobs", 1)
+    assert run(capsys, *words)[0] == 0
+    assert sorted(path.name for path in tmp_path.iterdir()) == ["a", "mine.toml"]
+    assert [path.name for path in out.parent.iterdir()] == ["b"]
+    assert load_dataset(out)[0].name == "../../mug-case1-1"
+    assert run(capsys, *words)[2] == "1 of 1 recordings exist already\n"
+
+
 def test_a_table_that_lacks_the_object(tmp_path, capsys):
     table = tmp_path / "mine.toml"
     table.write_text(MUG)

@@ -171,10 +171,73 @@ def test_a_chunk_lost_from_the_middle_is_damage(make_recording, tmp_path):
     raw = path.read_bytes()
     lost = raw.index(chunks[5].data)
     opcode = raw.rindex(b"\x06" + (len(chunks[5].data) + 44).to_bytes(8, "little"), 0, lost)
-    damaged = raw[:opcode] + b"\x7f" + raw[opcode + 1 : len(raw) * 2 // 3]
-    path.write_bytes(damaged)
+    end = opcode + 9 + len(chunks[5].data) + 44
+    path.write_bytes(raw[:opcode] + raw[end : len(raw) * 2 // 3])
     with pytest.raises(RecordingError, match=r"is damaged: message \d+ is missing"):
         load_recording(path)
+
+
+def chunk_places(raw):
+    """Return the place of each chunk after the first, which holds the header."""
+    places, place = [], 8
+    while raw[place] != 15:
+        places += [place] if raw[place] == 6 else []
+        place += 9 + int.from_bytes(raw[place + 1 : place + 9], "little")
+    return places[1:]
+
+
+@pytest.mark.parametrize("inside", [1, 41], ids=["length of the record", "length of its data"])
+def test_a_damaged_length_in_a_cut_file_is_no_cut(make_recording, tmp_path, inside):
+    path = tmp_path / "a.mcap"
+    save_recording(make_recording(), path)
+    raw = path.read_bytes()
+    place = chunk_places(raw)[3]
+    for bit in range(64):
+        damaged = bytearray(raw[: len(raw) * 2 // 3])
+        damaged[place + inside + bit // 8] ^= 1 << bit % 8
+        path.write_bytes(damaged)
+        with pytest.raises(RecordingError, match=r"is damaged: the (record|chunk) at byte"):
+            load_recording(path)
+
+
+def test_a_damaged_kind_of_record_in_a_cut_file_is_no_cut(make_recording, tmp_path):
+    path = tmp_path / "a.mcap"
+    save_recording(make_recording(), path)
+    raw = path.read_bytes()
+    *_, place = [p for p in chunk_places(raw) if p < len(raw) * 2 // 3]
+    for bit in range(8):
+        damaged = bytearray(raw[: len(raw) * 2 // 3])
+        damaged[place] ^= 1 << bit
+        path.write_bytes(damaged)
+        with pytest.raises(RecordingError, match="contradicts its length"):
+            load_recording(path)
+
+
+@pytest.mark.parametrize("name", [b"lz4", b"zzz\xff", b""])
+def test_another_compression_in_a_cut_file_is_refused(make_recording, tmp_path, name):
+    path = tmp_path / "a.mcap"
+    save_recording(make_recording(), path)
+    raw = path.read_bytes()
+    place = chunk_places(raw)[3] + 9 + 32
+    damaged = bytearray(raw[: len(raw) * 2 // 3])
+    damaged[place : place + 4] = name.ljust(4, b"x")
+    path.write_bytes(damaged)
+    with pytest.raises(RecordingError, match="fails its checksum"):
+        load_recording(path)
+
+
+def test_zeros_in_place_of_the_last_chunks_are_a_cut(make_recording, tmp_path):
+    """After a failure of the power a file has its new size, but zeros in place of the data."""
+    recording = make_recording()
+    path = tmp_path / "a.mcap"
+    save_recording(recording, path)
+    raw = path.read_bytes()
+    place = chunk_places(raw)[3]
+    for end in (place, place + 5, place + 60, place + 1000):
+        path.write_bytes(raw[:end] + bytes(20_000))
+        part = load_recording(path)
+        assert_prefix(part, recording)
+        assert part.modules["thumb"].n_samples > 50
 
 
 def test_files_of_others_are_refused(tmp_path):

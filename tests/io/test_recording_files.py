@@ -1,15 +1,19 @@
+import os
 import subprocess
 import sys
 from dataclasses import replace
 from itertools import pairwise
 
+import msgspec
 import numpy as np
 import pytest
 
 from holdfast.contact import ContactState
 from holdfast.errors import OutputError, RecordingError
 from holdfast.io import load_recording, read_chunks, save_labels, save_recording
+from holdfast.io.header import encode_header
 from holdfast.io.mcap_writer import RecordingWriter
+from holdfast.labelling.server.workspace import summary_of
 from holdfast.recordings import Label
 
 
@@ -130,3 +134,105 @@ def test_chunks_do_not_overlap_in_time(make_recording, tmp_path, suffix, n_sampl
     save_recording(make_recording(), tmp_path / f"a{suffix}")
     chunks = list(read_chunks(tmp_path / f"a{suffix}", n_samples))
     assert all(one.end < two.start for one, two in pairwise(chunks))
+
+
+def read_all(path):
+    """Read a file by every way; each returns or raises a `RecordingError` with its name."""
+    refusals = []
+    for read in (load_recording, lambda file: list(read_chunks(file)), summary_of):
+        try:
+            read(path)
+        except RecordingError as refusal:
+            assert str(path) in str(refusal)
+            assert "\n" not in str(refusal)
+            refusals.append(str(refusal))
+    return refusals
+
+
+DEEP = "[" * 100_000 + "]" * 100_000
+LIES = {
+    "number": lambda head: head["truth"]["hand"]["matrix"].update(number="object"),
+    "number of a module": lambda head: head["modules"]["thumb"].update(number="datetime64[s]"),
+    "shape": lambda head: head["truth"]["hand"]["matrix"].update(shape=[-1, 2]),
+    "large shape": lambda head: head["truth"]["hand"]["matrix"].update(shape=[1 << 19, 1 << 19]),
+    "n_samples": lambda head: head["modules"]["thumb"].update(n_samples=-5),
+    "n_rows": lambda head: head["truth"].update(n_rows=1 << 62),
+    "positions": lambda head: head["modules"]["thumb"]["sensor"].update(positions=[[]]),
+    "rate": lambda head: head["modules"]["thumb"]["sensor"].update(rate=10**400),
+    "limits": lambda head: head["modules"]["thumb"]["sensor"].update(limits={"a": 1}),
+    "deep": lambda head: head["metadata"].update(object="DEEP"),
+    "deep sensor": lambda head: head["modules"]["thumb"]["sensor"].update(name="DEEP"),
+    "label": lambda head: head["modules"]["thumb"]["labels"][0].update(start=5.0),
+    "markers": lambda head: head.update(markers=[["a", 1.0]]),
+}
+
+
+@pytest.mark.parametrize("suffix", ["parquet", "mcap"])
+@pytest.mark.parametrize("lie", LIES)
+def test_a_header_that_lies_is_refused(make_recording, tmp_path, monkeypatch, suffix, lie):
+    def encode(header):
+        head = msgspec.json.decode(encode_header(header))
+        LIES[lie](head)
+        return msgspec.json.encode(head).replace(b'"DEEP"', DEEP.encode())
+
+    module = "parquet" if suffix == "parquet" else "mcap_writer"
+    monkeypatch.setattr(f"holdfast.io.{module}.encode_header", encode)
+    path = tmp_path / f"a.{suffix}"
+    save_recording(make_recording(150), path)
+    assert len(read_all(path)) >= 2  # a summary needs only a part of the header
+
+
+@pytest.mark.parametrize("suffix", ["parquet", "mcap"])
+def test_a_library_may_raise_any_error(make_recording, tmp_path, monkeypatch, suffix):
+    def fail(*_):
+        raise AttributeError("'NoneType' object\nhas no attribute")
+
+    path = tmp_path / f"a.{suffix}"
+    save_recording(make_recording(150), path)
+    monkeypatch.setattr(f"holdfast.io.{suffix}.decode_header", fail)
+    text = f"{path} is damaged: 'NoneType' object has no attribute"
+    assert read_all(path) == [text] * 3
+
+
+@pytest.mark.parametrize("suffix", ["parquet", "mcap"])
+def test_a_pipe_or_a_device_is_refused_at_once(tmp_path, suffix):
+    pipe, device = tmp_path / f"pipe.{suffix}", tmp_path / f"device.{suffix}"
+    os.mkfifo(pipe)
+    device.symlink_to("/dev/zero")
+    for path in (pipe, device):
+        with pytest.raises(RecordingError, match="is a pipe or a device; a recording's file"):
+            load_recording(path)
+
+
+@pytest.mark.parametrize("suffix", ["parquet", "mcap"])
+def test_the_size_in_memory_is_limited(make_recording, tmp_path, monkeypatch, suffix):
+    path = tmp_path / f"a.{suffix}"
+    save_recording(make_recording(), path)
+    monkeypatch.setenv("HOLDFAST_MAX_BYTES", "100000")
+    with pytest.raises(RecordingError) as refused:
+        load_recording(path)
+    expected = r"MB in memory, 0.1 MB are allowed for a file of \S+ MB; set HOLDFAST_MAX_BYTES to"
+    refused.match(expected)
+    monkeypatch.setenv("HOLDFAST_MAX_BYTES", "1000000")
+    assert load_recording(path).complete
+
+
+@pytest.mark.parametrize("suffix", ["parquet", "mcap"])
+def test_texts_count_as_long_as_the_longest(make_recording, tmp_path, monkeypatch, suffix):
+    texts = np.array(["free"] * 299 + ["x" * 4000])
+    recording = make_recording()
+    path = tmp_path / f"a.{suffix}"
+    save_recording(replace(recording, truth=replace(recording.truth, hand={"a": texts})), path)
+    monkeypatch.setenv("HOLDFAST_MAX_BYTES", "4700000")
+    with pytest.raises(RecordingError, match=r"MB in memory, 4.7 MB are allowed"):
+        load_recording(path)
+    monkeypatch.setenv("HOLDFAST_MAX_BYTES", "6000000")
+    assert load_recording(path).truth.hand["a"][-1] == "x" * 4000
+
+
+@pytest.mark.parametrize("given", ["-1", "0", "1e9", "1 GB", "9" * 30])
+def test_a_limit_that_is_no_number_is_refused(make_recording, tmp_path, monkeypatch, given):
+    save_recording(make_recording(150), tmp_path / "a.parquet")
+    monkeypatch.setenv("HOLDFAST_MAX_BYTES", given)
+    with pytest.raises(RecordingError, match="HOLDFAST_MAX_BYTES: a whole number of bytes expect"):
+        load_recording(tmp_path / "a.parquet")

@@ -142,12 +142,10 @@ def _write(
     recording: "Recording", folder: Path, out: Path, suffix: RecordingFormat, force: bool
 ) -> _Imported:
     from holdfast.errors import RecordingError
-    from holdfast.files import refuse_overwrite
+    from holdfast.files import file_stem, refuse_overwrite
     from holdfast.io import save_recording
 
-    file_name = f"{recording.name}.{suffix}"
-    if Path(file_name).name != file_name or "\\" in file_name or file_name.startswith("."):
-        raise RecordingError(f"{recording.name!r} cannot be the name of a file")
+    file_name = f"{file_stem(recording.name)}.{suffix}"
     refuse_overwrite(out / file_name, force=force)
     if (folder / file_name).exists():
         raise RecordingError(

@@ -154,12 +154,13 @@ def _output_path(source: str, out: Path, object_name: str, *, force: bool) -> Pa
 
 def _recording_name(source: str, object_name: str) -> str:
     """Return the name of the source recording, or the object or device with the time."""
+    from holdfast.files import file_stem
     from holdfast.sources.uri import is_uri
 
     if not is_uri(source):
-        return Path(source).stem
+        return file_stem(Path(source).stem)
     name = re.sub(r"[^\w.-]+", "_", object_name or source.partition(":")[0]).strip("._")
-    return f"{name or 'grasp'}-{time.strftime('%Y%m%d-%H%M%S')}"
+    return f"{file_stem(name or 'grasp')}-{time.strftime('%Y%m%d-%H%M%S')}"
 
 
 def _create_recorder(

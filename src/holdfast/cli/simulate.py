@@ -123,7 +123,7 @@ def simulate_hands(out: Path, n_hands: int, seed: int, *, jobs: int, force: bool
     tasks = [
         (hold, out, force)
         for hold in holds
-        if force or not _is_recorded(out / f"{hold.name}.parquet", wanted)
+        if force or not _is_recorded(_path_of(hold.name, out), wanted)
     ]
     if len(tasks) < n_hands:
         print_message(f"{n_hands - len(tasks)} of {n_hands} recordings exist already")
@@ -140,7 +140,7 @@ def simulate_hand(hold: "RandomHold", out: Path, force: bool) -> str:
     from holdfast.io import save_recording
     from holdfast.twin.randomized.simulation import simulate_random
 
-    save_recording(simulate_random(hold), out / f"{hold.name}.parquet", force=force)
+    save_recording(simulate_random(hold), _path_of(hold.name, out), force=force)
     return hold.name
 
 
@@ -186,8 +186,7 @@ def simulate_grasp(grasp: "Grasp", out: Path, force: bool) -> list[str]:
         if not force and _has_failed(this, out):
             continue
         recording = run(this)
-        path = out / f"{recording.name}.parquet"
-        save_recording(recording, path, force=force)
+        save_recording(recording, _path_of(recording.name, out), force=force)
         names.append(recording.name)
         if recording.metadata["case"] != "failed":
             break
@@ -238,15 +237,22 @@ def _check_numbers(repeats: int, seed: int) -> None:
         )
 
 
+def _path_of(name: str, out: Path) -> Path:
+    """Return the path of the recording of that name."""
+    from holdfast.files import file_stem
+
+    return out / f"{file_stem(name)}.parquet"
+
+
 def _is_finished(grasp: "Grasp", out: Path) -> bool:
     """Return whether the recording of the grasp, or of its last failed attempt, exists."""
     last_failed = f"{grasp.name}-failed{ATTEMPTS}"
-    return any(_exists(grasp, out / f"{name}.parquet") for name in (grasp.name, last_failed))
+    return any(_exists(grasp, _path_of(name, out)) for name in (grasp.name, last_failed))
 
 
 def _has_failed(grasp: "Grasp", out: Path) -> bool:
     """Return whether the recording of this failed attempt exists."""
-    return _exists(grasp, out / f"{grasp.failed_name}.parquet")
+    return _exists(grasp, _path_of(grasp.failed_name, out))
 
 
 def _exists(grasp: "Grasp", path: Path) -> bool:
@@ -288,7 +294,7 @@ def _remove_others(grasp: "Grasp", out: Path, names: "Sequence[str]") -> None:
     failed = [f"{grasp.name}-failed{attempt + 1}" for attempt in range(ATTEMPTS)]
     for name in (grasp.name, *failed):
         if name not in names:
-            (out / f"{name}.parquet").unlink(missing_ok=True)
+            _path_of(name, out).unlink(missing_ok=True)
 
 
 def _write_video(grasp: "Grasp", video: Path, force: bool) -> None:

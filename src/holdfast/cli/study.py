@@ -302,10 +302,11 @@ def real_corpus(out: Path) -> "tuple[Corpus | None, list[str]]":
 
 
 def _import(source: Path, out: Path) -> None:
+    from holdfast.files import file_stem
     from holdfast.io import import_recordings, save_recording
 
     out.mkdir(parents=True, exist_ok=True)
     for recording in import_recordings(source):
-        path = out / f"{recording.name}.parquet"
+        path = out / f"{file_stem(recording.name)}.parquet"
         if not path.exists():
             save_recording(recording, path)

@@ -1,8 +1,9 @@
 """Header of a recording's file: all of the recording but its arrays, as JSON."""
 
 from collections.abc import Mapping
+from math import prod
 from pathlib import Path
-from typing import Any, Literal
+from typing import Annotated, Any, Literal, get_args
 
 import msgspec
 import numpy as np
@@ -14,11 +15,19 @@ from holdfast.recordings import Label, Recording, Truth
 from holdfast.sensors import Sensor
 from holdfast.sensors.types import Unit
 
-NUMBER_TYPES = (
-    *("int8", "int16", "int32", "int64", "uint8", "uint16", "uint32", "uint64"),
-    *("float32", "float64", "bool", "str"),
-)
+NumberType = Literal[
+    "int8", "int16", "int32", "int64", "uint8", "uint16", "uint32", "uint64",
+    "float32", "float64", "bool", "str",
+]  # fmt: skip
+NUMBER_TYPES: tuple[str, ...] = get_args(NumberType)
 """Number types that a file can store."""
+
+MAX_VALUES = 1 << 20
+"""Maximum number of values of an array at one time."""
+Count = Annotated[int, msgspec.Meta(ge=0, lt=1 << 48)]
+Shape = Annotated[
+    list[Annotated[int, msgspec.Meta(ge=0, le=MAX_VALUES)]], msgspec.Meta(max_length=8)
+]
 
 
 class LabelData(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
@@ -38,22 +47,26 @@ class ModuleData(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
 
     sensor: dict[str, Any]
     unit: Unit
-    number: str | None = None
-    n_samples: int | None = None
+    number: NumberType | None = None
+    n_samples: Count | None = None
     labels: list[LabelData] = []
 
 
 class ArrayData(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     """Number type of a truth array, and shape of one of its values."""
 
-    number: str
-    shape: list[int]
+    number: NumberType
+    shape: Shape
+
+    def __post_init__(self) -> None:
+        if prod(self.shape) > MAX_VALUES:
+            raise ValueError(f"at most {MAX_VALUES} values expected, shape {self.shape} given")
 
 
 class TruthData(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     """Truth arrays in a file, and the number of their rows."""
 
-    n_rows: int
+    n_rows: Count
     hand: dict[str, ArrayData]
     fingers: dict[str, dict[str, ArrayData]]
 
@@ -140,7 +153,9 @@ def decode_header(data: bytes | str, path: Path) -> Header:
     try:
         header = msgspec.json.decode(data, type=Header)
         header_sensors(header)
-    except (msgspec.DecodeError, ValueError, TypeError, IndexError) as cause:
+    except (
+        msgspec.DecodeError, ValueError, TypeError, LookupError, ArithmeticError, RecursionError
+    ) as cause:  # fmt: skip
         raise RecordingError(f"{path}: the header of the recording is refused: {cause}") from cause
     return header
 
@@ -185,7 +200,7 @@ def label_of(data: LabelData) -> Label:
     )
 
 
-def number_type(array: npt.NDArray[Any], name: str) -> str:
+def number_type(array: npt.NDArray[Any], name: str) -> NumberType:
     """Return the name of an array's number type.
 
     Args:
@@ -198,7 +213,7 @@ def number_type(array: npt.NDArray[Any], name: str) -> str:
     number = "str" if array.dtype.kind == "U" else array.dtype.name
     if number not in NUMBER_TYPES:
         raise RecordingError(f"{name} are {number}; a file stores {', '.join(NUMBER_TYPES)}")
-    return number
+    return number  # type: ignore[return-value]
 
 
 def _truth_data(truth: Truth) -> TruthData:

@@ -102,7 +102,7 @@ def load_labels(path: str | Path) -> LabelFile:
         return msgspec.json.decode(Path(path).read_bytes(), type=LabelFile)
     except OSError as cause:
         raise RecordingError(f"cannot read {path}: {cause.strerror}") from cause
-    except (msgspec.DecodeError, UnicodeError) as cause:
+    except (msgspec.DecodeError, UnicodeError, RecursionError) as cause:
         raise RecordingError(f"{path} is not a label file: {cause}") from cause
 
 

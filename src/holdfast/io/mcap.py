@@ -1,26 +1,19 @@
 """MCAP files of recordings: save, load, and recover what is left of a cut file."""
 
-import struct
-import zlib
 from collections.abc import Iterator
-from io import BytesIO
 from pathlib import Path
-from typing import BinaryIO, NamedTuple
+from typing import NamedTuple
 
 import msgspec
 import numpy as np
-from mcap.data_stream import ReadDataStream
-from mcap.exceptions import McapError
-from mcap.opcode import Opcode
-from mcap.records import Channel, Chunk, Message, Schema
-from mcap.stream_reader import breakup_chunk
+from mcap.records import Channel, Message, Schema
 from mcap.writer import MCAP0_MAGIC as MAGIC
-from zstandard import ZstdError
 
 from holdfast.errors import RecordingError
 from holdfast.files import whole_file
 from holdfast.io.header import Header, decode_header, header_of
 from holdfast.io.mcap_messages import decode_samples, decode_text, number_of_type
+from holdfast.io.mcap_records import check_checksums, has_end, read_chunks
 from holdfast.io.mcap_writer import (
     HEADER_TOPIC,
     LIBRARY,
@@ -28,6 +21,7 @@ from holdfast.io.mcap_writer import (
     MESSAGE_SECONDS,
     MessageLog,
 )
+from holdfast.io.safe_reading import check_size, size_limit
 from holdfast.io.timed_arrays import (
     TRUTH,
     ArraySpec,
@@ -39,15 +33,6 @@ from holdfast.io.timed_arrays import (
     time_spans,
 )
 from holdfast.recordings import Recording
-
-MAX_UNPACKED_CHUNK_SIZE = 1 << 30
-"""Maximum size of a chunk after unpacking, in bytes; a larger one is refused."""
-BLOCK_SIZE = 1 << 20
-"""Number of bytes that are read at a time."""
-
-_RECORD = struct.Struct("<BQ")
-_FOOTER = struct.Struct("<BQQQI")
-_DATA_END = struct.Struct("<BQI")
 
 
 class _McapMessage(NamedTuple):
@@ -89,8 +74,10 @@ def load(path: Path) -> Recording:
         spec.topic: [(np.empty(0), spec.empty())] if spec.number else [] for spec in specs
     }
     markers: list[tuple[float, str]] = []
+    size = _JoinedSize(path)
     for topic, samples in _samples(path, header, messages, markers):
         parts[topic].append(samples)
+        size.add(topic, samples)
     arrays = {
         topic: (
             np.concatenate([times for times, _ in samples]),
@@ -150,9 +137,9 @@ def _is_complete(path: Path) -> bool:
     """
     if is_foreign(path):
         raise RecordingError(f"{path} is an MCAP file but no recording of holdfast")
-    complete = _has_end(path)
+    complete = has_end(path)
     if complete:
-        _check_checksums(path)
+        check_checksums(path)
     return complete
 
 
@@ -181,6 +168,32 @@ def _samples(
             yield message.topic, _decoded(path, message, specs.get(message.topic))
 
 
+class _JoinedSize:
+    """Size in memory of arrays that are read in parts; texts are as long as the longest."""
+
+    def __init__(self, path: Path) -> None:
+        self._path = path
+        self._limit = size_limit(path)
+        self._total = 0
+        self._texts: dict[str, tuple[int, int]] = {}
+
+    def add(self, topic: str, samples: TimedArray) -> None:
+        """Add a part of an array.
+
+        Raises:
+            RecordingError: the arrays are too large.
+        """
+        times, values = samples
+        self._total += times.nbytes + values.nbytes
+        if values.dtype.kind == "U":
+            n, width = self._texts.get(topic, (0, 0))
+            widest = max(width, values.itemsize)
+            self._texts[topic] = n + values.size, widest
+            self._total += (n + values.size) * widest - n * width - values.nbytes
+        if self._total > self._limit:
+            check_size(self._path, self._total)
+
+
 def _decoded(path: Path, message: _McapMessage, spec: ArraySpec | None) -> TimedArray:
     number = number_of_type(message.schema)
     try:
@@ -204,7 +217,7 @@ def _messages(path: Path, complete: bool) -> Iterator[_McapMessage]:
     schemas: dict[int, Schema] = {}
     channels: dict[int, Channel] = {}
     expected = 0
-    for chunk in _chunks(path, complete):
+    for chunk in read_chunks(path, complete):
         for record in chunk:
             if isinstance(record, Schema):
                 schemas[record.id] = record
@@ -218,95 +231,3 @@ def _messages(path: Path, complete: bool) -> Iterator[_McapMessage]:
                     raise RecordingError(f"{path} is damaged: message {expected} is missing")
                 expected += 1
                 yield _McapMessage(channel.topic, schemas[channel.schema_id].name, record.data)
-
-
-def _chunks(path: Path, complete: bool) -> Iterator[list[object]]:
-    """Yield the records of each chunk; for a cut file, of each chunk before the cut."""
-    size = path.stat().st_size
-    with path.open("rb") as file:
-        if file.read(len(MAGIC)) != MAGIC:
-            raise RecordingError(f"{path} is no MCAP file, or its first bytes are damaged")
-        while len(head := file.read(_RECORD.size)) == _RECORD.size:
-            opcode, length = _RECORD.unpack(head)
-            if opcode == Opcode.DATA_END:
-                return
-            end = file.tell() + length
-            if end > size:
-                return
-            if opcode != Opcode.CHUNK:
-                file.seek(end)
-                continue
-            try:
-                records = _unpacked(file.read(length))
-            except (McapError, ValueError, MemoryError, struct.error, ZstdError) as cause:
-                if not complete and end == size:
-                    return
-                raise RecordingError(
-                    f"{path} is damaged: the chunk at byte {end - length} fails its checksum"
-                ) from cause
-            yield records
-
-
-def _unpacked(data: bytes) -> list[object]:
-    chunk = Chunk.read(ReadDataStream(BytesIO(data)))
-    if chunk.uncompressed_size > MAX_UNPACKED_CHUNK_SIZE:
-        raise ValueError(f"{chunk.uncompressed_size} bytes claimed")
-    if chunk.uncompressed_crc == 0 and chunk.uncompressed_size:
-        raise ValueError("no checksum")
-    return list(breakup_chunk(chunk, validate_crc=True))
-
-
-def _has_end(path: Path) -> bool:
-    """Return whether the file has a footer; a file without one was cut."""
-    if path.stat().st_size == 0:
-        raise RecordingError(f"{path} is empty (0 bytes); an MCAP recording expected")
-    with path.open("rb") as file:
-        opcode, length, *_ = _FOOTER.unpack(_tail(file))
-        file.seek(-min(len(MAGIC), path.stat().st_size), 2)
-        ends = file.read() == MAGIC
-    return (ends and path.stat().st_size > len(MAGIC)) or _is_footer(opcode, length)
-
-
-def _is_footer(opcode: int, length: int) -> bool:
-    return opcode == Opcode.FOOTER and length == _FOOTER.size - _RECORD.size
-
-
-def _tail(file: BinaryIO) -> bytes:
-    """Return the bytes at the place of the footer, before the magic at the end."""
-    size = file.seek(0, 2)
-    file.seek(max(0, size - _FOOTER.size - len(MAGIC)))
-    return file.read(_FOOTER.size).ljust(_FOOTER.size, b"\x00")
-
-
-def _check_checksums(path: Path) -> None:
-    """Check every byte of a complete file: data section, its end, summary, footer, magic.
-
-    Raises:
-        RecordingError: a checksum does not match.
-    """
-    with path.open("rb") as file:
-        opcode, length, start, _, summary_crc = _FOOTER.unpack(_tail(file))
-        size = file.seek(0, 2)
-        place = size - len(MAGIC) - _FOOTER.size
-        valid = _is_footer(opcode, length) and _DATA_END.size + len(MAGIC) <= start <= place
-        if valid:
-            file.seek(0)
-            data_crc = _crc(file, start - _DATA_END.size)
-            ending = _DATA_END.unpack(file.read(_DATA_END.size))
-            valid = (
-                ending == (Opcode.DATA_END, 4, data_crc)
-                and _crc(file, place + _FOOTER.size - 4 - start) == summary_crc
-                and file.read()[4:] == MAGIC
-            )
-    if not valid:
-        raise RecordingError(
-            f"{path} is damaged, or was not written by holdfast: its checksums do not match"
-        )
-
-
-def _crc(file: BinaryIO, n_bytes: int) -> int:
-    crc = 0
-    while n_bytes and (block := file.read(min(BLOCK_SIZE, n_bytes))):
-        crc = zlib.crc32(block, crc)
-        n_bytes -= len(block)
-    return crc

@@ -19,6 +19,9 @@ from holdfast.sensors.types import Array
 TEXT_TYPE = "holdfast_msgs/msg/Text"
 TEXT_SCHEMA = "# A text and when it was set [s].\nfloat64 time\nstring text\n"
 
+MAX_TEXTS_SIZE = 1 << 28
+"""Maximum size of the texts of one message in memory [bytes]."""
+
 _TEXT = parse_definition(TEXT_TYPE, TEXT_SCHEMA)
 _ENCODE_TEXT, _DECODE_TEXT = MessageEncoder(_TEXT), MessageDecoder(_TEXT, ros2=True)
 _PACKAGE, _SUFFIX = "holdfast_msgs/msg/", "Samples"
@@ -80,10 +83,19 @@ def decode_samples(data: bytes, number: str) -> tuple[Array, npt.NDArray[Any]]:
     """
     message = _samples_decoder(number)(data)
     times, shape = message["times"], tuple(message["shape"].tolist())
-    values = np.array(message["values"], dtype=str) if number == "str" else message["values"]
+    values = message["values"]
+    if number == "str":
+        _check_texts(values)
+        values = np.array(values, dtype=str)
     if len(values) != len(times) * prod(shape):
         raise ValueError(f"{len(values)} values given for {len(times)} samples of shape {shape}")
     return times, values.reshape(len(times), *shape)
+
+
+def _check_texts(texts: list[str]) -> None:
+    """Check the size of the array of texts, whose elements are as long as the longest."""
+    if (size := 4 * len(texts) * max(map(len, texts), default=0)) > MAX_TEXTS_SIZE:
+        raise ValueError(f"texts take {size} bytes in memory, at most {MAX_TEXTS_SIZE} expected")
 
 
 def encode_text(time: float, text: str) -> bytes:

@@ -22,6 +22,7 @@ import pyarrow.parquet as pq
 from holdfast.errors import RecordingError
 from holdfast.files import whole_file
 from holdfast.io.header import Header, decode_header, encode_header, header_of
+from holdfast.io.safe_reading import check_size, one_line
 from holdfast.io.timed_arrays import (
     TRUTH_TIME,
     ArraySpec,
@@ -87,6 +88,7 @@ def load(path: Path) -> Recording:
     """
     header, file = _open(path)
     n_rows = file.metadata.num_rows
+    check_size(path, sum(_size(spec) for spec in array_specs(header)))
     buffers = {spec.topic: _ArrayBuffer(spec, n_rows, path) for spec in array_specs(header)}
     for arrays in _groups(header, file, path):
         for topic, (times, values) in arrays.items():
@@ -137,7 +139,7 @@ def _open(path: Path) -> tuple[Header, pq.ParquetFile]:
     try:
         file = pq.ParquetFile(path, page_checksum_verification=True)
     except (pa.ArrowException, OSError) as cause:
-        raise RecordingError(f"{path} is damaged: {_one_line(cause)}") from cause
+        raise RecordingError(f"{path} is damaged: {one_line(cause)}") from cause
     metadata = file.metadata.metadata or {}
     return decode_header(metadata.get(HEADER_KEY.encode(), b""), path), file
 
@@ -271,13 +273,31 @@ def _groups(header: Header, file: pq.ParquetFile, path: Path) -> Iterator[TimedA
     if file.schema_arrow.names != _schema(specs).names:
         raise RecordingError(f"{path}: its columns are not those that its header names")
     for group in range(file.num_row_groups):
+        _check_group(file.metadata.row_group(group), path)
         try:
             table = file.read_row_group(group)
             yield _arrays(specs, table)
         except (pa.ArrowException, OSError, ValueError) as cause:
             raise RecordingError(
-                f"{path} is damaged in row group {group}: {_one_line(cause)}"
+                f"{path} is damaged in row group {group}: {one_line(cause)}"
             ) from cause
+
+
+def _check_group(group: pq.RowGroupMetaData, path: Path) -> None:
+    """Check that a row group is not larger than recordings have."""
+    if group.num_rows > GROUP_ROWS:
+        raise RecordingError(
+            f"{path} is damaged: a row group of at most {GROUP_ROWS} rows expected, "
+            f"{group.num_rows} given"
+        )
+    check_size(path, group.num_rows * group.num_columns * 8)
+    check_size(path, group.total_byte_size)
+
+
+def _size(spec: ArraySpec) -> int:
+    """Return the size of an array and its times in memory [bytes]."""
+    n_bytes: int = 8 + spec.n_components * np.dtype(_memory_type(spec)).itemsize
+    return (spec.n or 0) * n_bytes
 
 
 def _arrays(specs: list[ArraySpec], table: pa.Table) -> TimedArrays:
@@ -345,8 +365,9 @@ class _ArrayBuffer:
     def result(self) -> TimedArray:
         if self._end != self._n:
             raise RecordingError(f"{self._path}: {self._end} samples, its header names {self._n}")
-        return self._times, self._values.astype(str) if self._is_text else self._values
+        return self._times, self._texts() if self._is_text else self._values
 
-
-def _one_line(cause: BaseException) -> str:
-    return " ".join(str(cause).split())[:200]
+    def _texts(self) -> npt.NDArray[Any]:
+        longest = max(map(len, self._values.flat), default=0)
+        check_size(self._path, 4 * longest * self._values.size)
+        return self._values.astype(str)

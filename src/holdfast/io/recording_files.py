@@ -11,6 +11,7 @@ import numpy as np
 from holdfast.errors import OutputError, RecordingError
 from holdfast.io.header import Header
 from holdfast.io.label_files import labels_for, labels_path
+from holdfast.io.safe_reading import recording_errors
 from holdfast.io.timed_arrays import (
     TACTILE,
     TimedArray,
@@ -45,10 +46,9 @@ def load_recording(path: str | Path, labels: bool = True) -> Recording:
             file belongs to another recording.
     """
     file = Path(path)
-    try:
-        recording: Recording = _format_of(file).load(file)
-    except OSError as cause:
-        raise RecordingError(f"cannot read {file}: {cause.strerror or cause}") from cause
+    file_format = _format_of(file)
+    with recording_errors(file):
+        recording: Recording = file_format.load(file)
     file_labels = labels_for(file, recording.digest) if labels else None
     if file_labels is None:
         return recording
@@ -106,12 +106,16 @@ def is_recording(path: Path) -> bool:
     """Return whether a file is a recording, which may be cut or damaged."""
     if path.suffix not in SUFFIXES or not path.is_file():
         return False
-    return not _format_module(path.suffix).is_foreign(path)
+    try:
+        return not _format_module(path.suffix).is_foreign(path)
+    except OSError:  # it cannot be read; `load_recording` says why
+        return True
 
 
 def _format_of(path: Path) -> ModuleType:
     if not path.is_file():
         problem = "is a folder" if path.is_dir() else "does not exist"
+        problem = "is a pipe or a device" if path.exists() and not path.is_dir() else problem
         raise RecordingError(f"{path} {problem}; a recording's file expected")
     if path.suffix not in SUFFIXES:
         raise RecordingError(f"cannot read {path}: {_expected_suffixes(path)}")
@@ -148,6 +152,13 @@ def _with_native_readings(recording: Recording) -> Recording:
 
 
 def _chunks(
+    file_format: ModuleType, path: Path, n_samples: int, *, labels: bool
+) -> Iterator[Recording]:
+    with recording_errors(path):
+        yield from _chunks_of(file_format, path, n_samples, labels=labels)
+
+
+def _chunks_of(
     file_format: ModuleType, path: Path, n_samples: int, *, labels: bool
 ) -> Iterator[Recording]:
     header, groups, complete = file_format.read_groups(path)

@@ -9,6 +9,7 @@ from dataclasses import asdict, replace
 from pathlib import Path
 from tempfile import TemporaryDirectory
 
+from holdfast.files import file_stem
 from holdfast.io import read_chunks, save_recording
 from holdfast.recordings import Recording
 from holdfast.sources.replay import Player
@@ -84,7 +85,7 @@ class _Simulator:
         """Begin to simulate a grasp. Delete the one before the last, which was played."""
         self._previous_path.unlink(missing_ok=True)
         self._previous_path = self._path
-        self._path = self._path.with_name(f"{grasp.name}.parquet")
+        self._path = self._path.with_name(f"{file_stem(grasp.name)}.parquet")
         self._grasp, self._process = grasp, None
         with suppress(OSError):  # without a process, `chunks` simulates
             self._process = self._run(json.dumps(asdict(grasp)))

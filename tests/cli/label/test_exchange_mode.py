@@ -1,4 +1,6 @@
-from holdfast.io import labels_path, load_labels, load_recording
+from dataclasses import replace
+
+from holdfast.io import labels_path, load_labels, load_recording, save_recording
 
 from .helpers import refusal, run_json, save_manual_labels
 
@@ -36,3 +38,14 @@ def test_labels_go_to_csv_and_back(capsys, folder):
     save_manual_labels(folder / "two.mcap")
     line = refusal(capsys, "--import", out, folder, "--author", "bob")
     assert "one.labels.json (and 1 more): labels of " in line
+
+
+def test_a_recording_whose_name_is_a_path_is_exported_into_the_folder(capsys, folder):
+    path = folder / "one.parquet"
+    for name in ("../../up", str(folder.parent / "abs")):
+        save_recording(replace(load_recording(path), name=name), path, force=True)
+        before = sorted(folder.parent.iterdir())
+        run_json(capsys, "--export", "csv", folder / "out", path)
+        run_json(capsys, "--import", folder / "out", path, "--dry-run")
+        assert sorted(folder.parent.iterdir()) == before
+    assert len(list((folder / "out").iterdir())) == 2

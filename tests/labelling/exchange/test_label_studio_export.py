@@ -190,8 +190,9 @@ def test_recordings_that_cannot_be_exported(tmp_path, grasps):
     with pytest.raises(RecordingError) as error:
         save_label_studio([], tmp_path / "b")
     assert str(error.value) == "no recordings given; at least one expected"
-    outside = Recording("../can", grasps[0].modules)
-    with pytest.raises(RecordingError) as error:
-        save_label_studio([outside], tmp_path / "c")
-    assert str(error.value) == "a name that is valid for a file expected, recording '../can' given"
+
+
+def test_a_name_with_a_path_stays_in_the_folder(tmp_path, grasps):
+    save_label_studio([Recording("../can", grasps[0].modules)], tmp_path / "out")
+    assert len(list((tmp_path / "out").glob("*.signals.csv"))) == 1
     assert not (tmp_path / "can.signals.csv").exists()

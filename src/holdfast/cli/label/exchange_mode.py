@@ -59,13 +59,13 @@ def export_labels(
 
 
 def _export_csv(recordings: "Sequence[Recording]", out: Path, force: bool) -> list[Path]:
-    from holdfast.files import refuse_overwrite, write_whole
+    from holdfast.files import file_stem, refuse_overwrite, write_whole
     from holdfast.io import labels_to_csv
 
     out.mkdir(parents=True, exist_ok=True)
     written = []
     for recording in progress(recordings, "exporting"):
-        target = out / f"{recording.name}.labels.csv"
+        target = out / f"{file_stem(recording.name)}.labels.csv"
         refuse_overwrite(target, force=force)
         labels = {name: module.labels for name, module in recording.modules.items()}
         write_whole(target, labels_to_csv(labels).encode(), force=force)

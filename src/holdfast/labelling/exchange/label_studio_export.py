@@ -21,7 +21,7 @@ import numpy as np
 from holdfast.contact import LABEL_STATES, Cause, ContactState
 from holdfast.errors import OutputError, RecordingError
 from holdfast.features import DEFAULT_WINDOW
-from holdfast.files import refuse_overwrite, write_whole
+from holdfast.files import file_stem, refuse_overwrite, write_whole
 from holdfast.labelling.exchange.label_studio import label_name, state_of
 from holdfast.labelling.server.signals import SERIES, signal_values
 from holdfast.recordings import Label, Recording, Tactile
@@ -62,8 +62,7 @@ def save_label_studio(
 
     Raises:
         OutputError: a file exists already or cannot be written.
-        RecordingError: there is no recording, two have the same name, or a name is not valid as
-            the name of a file.
+        RecordingError: there is no recording, or two have the same name.
     """
     target = Path(folder)
     _create(target)
@@ -75,7 +74,7 @@ def save_label_studio(
     extra: set[str] = set()
     for recording in recordings:
         _check_name(recording.name, tasks)
-        signals = recording.name + SIGNALS
+        signals = file_stem(recording.name) + SIGNALS
         write_whole(target / signals, signals_csv(recording, window).encode(), force=force)
         link = f"{base.rstrip('/')}/{quote(signals)}"
         tasks[recording.name] = task_of(recording, link, predictions=predictions)
@@ -161,8 +160,6 @@ def _create(folder: Path) -> None:
 def _check_name(name: str, known: Collection[str]) -> None:
     if name in known:
         raise RecordingError(f"two recordings have the name {name!r}; different names expected")
-    if Path(name).name != name or "\\" in name:
-        raise RecordingError(f"a name that is valid for a file expected, recording {name!r} given")
 
 
 def _result(finger: str, number: int, label: Label) -> dict[str, Any]:

@@ -3,6 +3,7 @@
 from pathlib import Path
 
 from holdfast.errors import RecordingError
+from holdfast.files import file_stem
 from holdfast.io.header import label_of
 from holdfast.io.label_files import SUFFIX, labels_from_csv, load_labels
 from holdfast.io.recording_files import SUFFIXES, load_recording
@@ -90,12 +91,12 @@ def _is_label_studio(file: Path) -> bool:
 def _find_in_folder(folder: Path, recording: Recording) -> Path:
     endings = (SUFFIX, *SUFFIXES, ".labels.csv", ".csv", ".json")
     for ending in endings:
-        if (file := folder / f"{recording.name}{ending}").is_file():
+        if (file := folder / f"{file_stem(recording.name)}{ending}").is_file():
             return file
     others = [file for file in sorted(folder.glob("*.json")) if not file.name.endswith(SUFFIX)]
     if len(others) == 1:
         return others[0]
     raise RecordingError(
         f"no labels of {recording.name!r} in {folder}; "
-        f"{recording.name} with one of {', '.join(endings)} expected"
+        f"{file_stem(recording.name)} with one of {', '.join(endings)} expected"
     )

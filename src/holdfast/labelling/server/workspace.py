@@ -15,6 +15,7 @@ from holdfast.features import Tare
 from holdfast.features.tare import TareArgument
 from holdfast.io import load_recording, mcap, parquet
 from holdfast.io.header import Header
+from holdfast.io.safe_reading import recording_errors
 from holdfast.labelling.rules import propose
 from holdfast.labelling.rules.poses import Poses, poses_of
 from holdfast.labelling.rules.start import fitting_tare
@@ -284,10 +285,8 @@ def summary_of(path: Path) -> RecordingSummary:
     Raises:
         RecordingError: the recording cannot be read.
     """
-    try:
+    with recording_errors(path):
         header, complete = _header(path)
-    except OSError as cause:
-        raise RecordingError(f"cannot read {path}: {cause.strerror or cause}") from cause
     if header is None or not (complete and header.digest):
         return _summary_of_samples(load_recording(path, labels=False))
     return RecordingSummary(

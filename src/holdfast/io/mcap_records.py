@@ -1,0 +1,206 @@
+"""Records of the MCAP files of recordings: their chunks, their checksums, and where they are cut.
+
+Every length in a complete file is under a checksum. In a file that was cut, a damaged length
+could be taken for the cut; so each length is compared with the lengths inside of its record.
+"""
+
+import struct
+import zlib
+from collections.abc import Iterator
+from io import BytesIO
+from pathlib import Path
+from typing import BinaryIO
+
+import zstandard
+from mcap.data_stream import ReadDataStream
+from mcap.exceptions import McapError
+from mcap.opcode import Opcode
+from mcap.records import Chunk
+from mcap.stream_reader import breakup_chunk
+from mcap.writer import MCAP0_MAGIC as MAGIC
+
+from holdfast.errors import RecordingError
+from holdfast.io.safe_reading import one_line
+
+MAX_CHUNK_SIZE = 1 << 28
+"""Maximum size of a chunk before and after unpacking, in bytes; a larger one is refused."""
+BLOCK_SIZE = 1 << 20
+"""Number of bytes that are read at a time."""
+
+_RECORD = struct.Struct("<BQ")
+_FOOTER = struct.Struct("<BQQQI")
+_DATA_END = struct.Struct("<BQI")
+_CHUNK = struct.Struct("<QQQII")
+"""Beginning of a chunk: its times, size and checksum, and the length of a name."""
+_HEAD_SIZE = 64
+"""Number of bytes of a record that are needed to compare its lengths."""
+
+
+def read_chunks(path: Path, complete: bool) -> Iterator[list[object]]:
+    """Yield the records of each chunk; for a cut file, of each chunk before the cut.
+
+    Args:
+        path: path of the file.
+        complete: whether the file has its end, so that `check_checksums` has checked it.
+
+    Raises:
+        RecordingError: the file is damaged.
+    """
+    size = path.stat().st_size
+    with path.open("rb") as file:
+        if file.read(len(MAGIC)) != MAGIC:
+            raise RecordingError(f"{path} is no MCAP file, or its first bytes are damaged")
+        while len(record := file.read(_RECORD.size)) == _RECORD.size:
+            opcode, length = _RECORD.unpack(record)
+            start, end = file.tell(), file.tell() + length
+            head = file.read(min(length, _HEAD_SIZE))
+            if not complete and not _is_plausible(opcode, length, head):
+                if _is_blank(file, start + _HEAD_SIZE):
+                    return
+                raise RecordingError(
+                    f"{path} is damaged: the record at byte {start - _RECORD.size} contradicts "
+                    "its length"
+                )
+            if opcode == Opcode.DATA_END or end > size:
+                return
+            if opcode == Opcode.CHUNK:
+                try:
+                    records = _unpacked(head + file.read(length - len(head)))
+                except (McapError, ValueError, MemoryError, OverflowError, struct.error) as cause:
+                    if not complete and _is_blank(file, end):
+                        return
+                    raise RecordingError(
+                        f"{path} is damaged: the chunk at byte {start} fails its checksum "
+                        f"({one_line(cause)})"
+                    ) from cause
+                yield records
+            file.seek(end)
+
+
+def has_end(path: Path) -> bool:
+    """Return whether the file has a footer; a file without one was cut.
+
+    Raises:
+        RecordingError: the file is empty.
+    """
+    size = path.stat().st_size
+    if size == 0:
+        raise RecordingError(f"{path} is empty (0 bytes); an MCAP recording expected")
+    with path.open("rb") as file:
+        opcode, length, *_ = _FOOTER.unpack(_tail(file))
+        file.seek(-min(len(MAGIC), size), 2)
+        ends = file.read() == MAGIC
+    return (ends and size > len(MAGIC)) or _is_footer(opcode, length)
+
+
+def check_checksums(path: Path) -> None:
+    """Check every byte of a complete file: data section, its end, summary, footer, magic.
+
+    Raises:
+        RecordingError: a checksum does not match.
+    """
+    with path.open("rb") as file:
+        opcode, length, start, _, summary_crc = _FOOTER.unpack(_tail(file))
+        size = file.seek(0, 2)
+        place = size - len(MAGIC) - _FOOTER.size
+        valid = _is_footer(opcode, length) and _DATA_END.size + len(MAGIC) <= start <= place
+        if valid:
+            file.seek(0)
+            data_crc = _crc(file, start - _DATA_END.size)
+            ending = _DATA_END.unpack(file.read(_DATA_END.size))
+            valid = (
+                ending == (Opcode.DATA_END, 4, data_crc)
+                and _crc(file, place + _FOOTER.size - 4 - start) == summary_crc
+                and file.read()[4:] == MAGIC
+            )
+    if not valid:
+        raise RecordingError(
+            f"{path} is damaged, or was not written by holdfast: its checksums do not match"
+        )
+
+
+def _is_plausible(opcode: int, length: int, head: bytes) -> bool:
+    """Return whether a record is one of a recording, and its length that of its content.
+
+    Args:
+        opcode: kind of the record.
+        length: of the record, in bytes.
+        head: its first bytes; a record that is cut has less of them.
+    """
+    match opcode:
+        case Opcode.HEADER | Opcode.METADATA:  # two texts, or a text and a map
+            first = _number(head, 0, 4)
+            second = None if first is None else _number(head, 4 + first, 4)
+            inside = None if first is None or second is None else 8 + first + second
+        case Opcode.MESSAGE_INDEX:
+            n_bytes = _number(head, 2, 4)
+            inside = None if n_bytes is None else 6 + n_bytes
+        case Opcode.CHUNK:
+            inside = _chunk_length(head)
+        case Opcode.DATA_END:
+            inside = 4
+        case _:
+            return False
+    return length < MAX_CHUNK_SIZE and inside in (None, length)
+
+
+def _chunk_length(head: bytes) -> int | None:
+    """Return the length of a chunk by the lengths inside of it; None if they are cut off."""
+    name_size = _number(head, _CHUNK.size - 4, 4)
+    n_bytes = None if name_size is None else _number(head, _CHUNK.size + name_size, 8)
+    return None if name_size is None or n_bytes is None else _CHUNK.size + name_size + 8 + n_bytes
+
+
+def _number(data: bytes, place: int, size: int) -> int | None:
+    """Return the number of `size` bytes at a place; None if the data end before."""
+    part = data[place : place + size]
+    return int.from_bytes(part, "little") if len(part) == size else None
+
+
+def _is_blank(file: BinaryIO, place: int) -> bool:
+    """Return whether there are only zeros from a place on, as after a failure of the power."""
+    file.seek(place)
+    while block := file.read(BLOCK_SIZE):
+        if any(block):
+            return False
+    return True
+
+
+def _unpacked(data: bytes) -> list[object]:
+    chunk = Chunk.read(ReadDataStream(BytesIO(data)))
+    if chunk.compression not in ("", "zstd"):
+        raise ValueError(f"compression {chunk.compression[:20]!r} given, zstd expected")
+    if chunk.uncompressed_size > MAX_CHUNK_SIZE:
+        raise ValueError(f"{chunk.uncompressed_size} bytes claimed")
+    if chunk.uncompressed_crc == 0 and chunk.uncompressed_size:
+        raise ValueError("no checksum")
+    try:
+        if chunk.compression and not 0 <= _content_size(chunk.data) <= chunk.uncompressed_size:
+            raise ValueError("its packed size contradicts its size")
+        return list(breakup_chunk(chunk, validate_crc=True))
+    except zstandard.ZstdError as cause:
+        raise ValueError(str(cause)) from cause
+
+
+def _content_size(data: bytes) -> int:
+    """Return the size that zstd would allocate for packed data; -1 if the data do not have it."""
+    return zstandard.frame_content_size(data)
+
+
+def _is_footer(opcode: int, length: int) -> bool:
+    return opcode == Opcode.FOOTER and length == _FOOTER.size - _RECORD.size
+
+
+def _tail(file: BinaryIO) -> bytes:
+    """Return the bytes at the place of the footer, before the magic at the end."""
+    size = file.seek(0, 2)
+    file.seek(max(0, size - _FOOTER.size - len(MAGIC)))
+    return file.read(_FOOTER.size).ljust(_FOOTER.size, b"\x00")
+
+
+def _crc(file: BinaryIO, n_bytes: int) -> int:
+    crc = 0
+    while n_bytes and (block := file.read(min(BLOCK_SIZE, n_bytes))):
+        crc = zlib.crc32(block, crc)
+        n_bytes -= len(block)
+    return crc
