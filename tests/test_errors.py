@@ -1,4 +1,7 @@
+import json
 import pickle
+from importlib import metadata
+from types import SimpleNamespace
 
 import pytest
 
@@ -32,11 +35,34 @@ def test_the_docstring_names_every_class():
     assert all(family.__name__ in errors.__doc__ for family in FAMILIES)
 
 
-def test_a_missing_extra_names_the_command_to_install_it():
+CLONE = {"url": "file:///home/me/my clone", "dir_info": {"editable": True}}
+WHEEL = {"url": "file:///tmp/holdfast-0.1.0-py3-none-any.whl", "archive_info": {}}
+
+
+@pytest.mark.parametrize(
+    ("installer", "origin", "command"),
+    [
+        ("uv", CLONE, "uv sync --inexact --extra hdf5"),
+        ("pip", CLONE, 'pip install -e "/home/me/my clone[hdf5]"'),
+        ("pip", WHEEL, f'pip install "holdfast[hdf5] @ {WHEEL["url"]}"'),
+        ("pip", None, 'pip install "holdfast[hdf5]"'),
+        ("uv", None, 'uv pip install "holdfast[hdf5]"'),
+    ],
+)
+def test_a_missing_extra_names_the_command_that_adds_it(monkeypatch, installer, origin, command):
+    files = {"INSTALLER": f"{installer}\n", "direct_url.json": origin and json.dumps(origin)}
+    found = SimpleNamespace(read_text=files.get)
+    monkeypatch.setattr("importlib.metadata.distribution", lambda name: found)
     failure = errors.MissingExtra("h5py", "hdf5")
-    assert str(failure) == (
-        'this needs the package h5py, which is not installed: pip install "holdfast[hdf5]"'
-    )
+    assert str(failure) == f"this needs the package h5py, which is not installed: {command}"
+
+
+def test_without_an_installation_the_package_is_named(monkeypatch):
+    def missing(name):
+        raise metadata.PackageNotFoundError(name)
+
+    monkeypatch.setattr("importlib.metadata.distribution", missing)
+    assert errors.install_command("hdf5") == 'pip install "holdfast[hdf5]"'
 
 
 def test_a_missing_extra_can_be_pickled():

@@ -56,10 +56,29 @@ class MissingExtra(HoldfastError):  # noqa: N818 (it names what to install, not 
 
     def __str__(self) -> str:
         package, extra = self.args
-        return (
-            f"this needs the package {package}, which is not installed: "
-            f'pip install "holdfast[{extra}]"'
-        )
+        return f"this needs the package {package}, which is not installed: {install_command(extra)}"
+
+
+def install_command(extra: str) -> str:
+    """Return the command that adds an extra to this installation.
+
+    From a clone it installs the clone, and from a wheel the wheel, not a package of that name.
+    """
+    import json
+    from importlib.metadata import PackageNotFoundError, distribution
+
+    try:
+        found = distribution("holdfast")
+    except PackageNotFoundError:
+        return f'pip install "holdfast[{extra}]"'
+    with_uv = (found.read_text("INSTALLER") or "").strip() == "uv"
+    origin = json.loads(found.read_text("direct_url.json") or "{}")
+    if origin.get("dir_info", {}).get("editable"):
+        folder = origin["url"].removeprefix("file://")
+        pip = f'pip install -e "{folder}[{extra}]"'
+        return f"uv sync --inexact --extra {extra}" if with_uv else pip
+    package = f"holdfast[{extra}] @ {origin['url']}" if origin else f"holdfast[{extra}]"
+    return f'{"uv " * with_uv}pip install "{package}"'
 
 
 def listen_error(host: str, port: int, cause: Exception) -> OutputError:

@@ -15,7 +15,7 @@ from holdfast.classifiers.tcn import (
     validation_rows,
     weight_shapes,
 )
-from holdfast.errors import MissingExtra, TrainingError
+from holdfast.errors import MissingExtra, TrainingError, install_command
 
 RECIPE = TemporalConvolution()
 SHORT = {**RECIPE.reference, "n_epochs": 2}
@@ -276,7 +276,7 @@ def test_without_torch_the_error_names_the_extra(monkeypatch):
     with pytest.raises(MissingExtra) as raised:
         RECIPE.fit(waves(50), SHORT, 0)
     assert str(raised.value) == (
-        'this needs the package torch, which is not installed: pip install "holdfast[deep]"'
+        f"this needs the package torch, which is not installed: {install_command('deep')}"
     )
     network = Network(drawn(3), np.zeros(3), np.ones(3), n_steps=10, class_ratio=1.0)
     with pytest.raises(MissingExtra):

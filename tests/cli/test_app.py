@@ -1,6 +1,7 @@
 import os
 import subprocess
 import sys
+from importlib import metadata
 
 import pytest
 
@@ -58,6 +59,31 @@ def test_help_lists_the_first_line_of_every_verb(verb):
     assert app.load_verb(verb).__doc__.splitlines()[0] == app.VERBS[verb]
 
 
+def test_without_words_the_help_is_shown(capsys):
+    assert main([]) == 0
+    out = capsys.readouterr().out
+    assert out.index("holdfast demo") < out.index("Commands:")
+    assert "docs/" in out.rstrip().splitlines()[-1]
+    assert all(len(line) <= 80 for line in out.splitlines())
+
+
+def test_version(capsys):
+    assert main(["--version"]) == 0
+    assert capsys.readouterr().out == f"holdfast {metadata.version('holdfast')}\n"
+
+
+def complete(*words):
+    typed = {"COMP_WORDS": " ".join(words), "COMP_CWORD": str(len(words) - 1)}
+    done = run(env={**os.environ, **typed, "_HOLDFAST_COMPLETE": "complete_bash"})
+    assert (done.returncode, done.stderr) == (0, "")
+    return done.stdout.split()
+
+
+def test_a_shell_completes_verbs_and_options():
+    assert complete("holdfast", "de") == ["demo", "detect"]
+    assert complete("holdfast", "detect", "--hy") == ["--hysteresis"]
+
+
 def test_help_names_every_verb_and_loads_nothing_heavy():
     code = (
         "import sys; from holdfast.cli import main; main(['--help']); "
@@ -73,7 +99,6 @@ def test_help_names_every_verb_and_loads_nothing_heavy():
 @pytest.mark.parametrize(
     ("words", "message"),
     [
-        ([], "holdfast: Missing command (see holdfast --help)"),
         (["fly"], "holdfast: No such command 'fly'"),
         (["--fast"], "holdfast: No such option: --fast"),
         (["doctor", "--fast"], "holdfast: No such option: --fast"),

@@ -8,6 +8,7 @@ import pytest
 from holdfast.cli import doctor as verb
 from holdfast.cli import main
 from holdfast.cli.doctor import EXTRA_PURPOSES
+from holdfast.errors import install_command
 from holdfast.sources.xela import places
 
 
@@ -32,7 +33,7 @@ def test_the_kernels_work(capsys):
 def test_every_extra_has_a_purpose_and_a_way_to_get_it(capsys):
     extras = report(capsys)["extras"]
     assert set(extras) == set(EXTRA_PURPOSES)
-    assert extras["hdf5"]["install"] == 'pip install "holdfast[hdf5]"'
+    assert extras["hdf5"]["install"] == install_command("hdf5")
 
 
 def test_missing_packages_are_reported(capsys, monkeypatch):
@@ -43,7 +44,7 @@ def test_missing_packages_are_reported(capsys, monkeypatch):
     assert main(["doctor"]) == 0
     out = capsys.readouterr().out
     assert "MISSING" in out
-    assert 'pip install "holdfast[hdf5]"' in out
+    assert install_command("hdf5") in out
 
 
 def test_broken_kernels_are_reported_with_exit_code_0(capsys, monkeypatch):
@@ -70,6 +71,21 @@ def test_no_data(capsys, monkeypatch):
     assert "not set" in capsys.readouterr().out
 
 
+def test_the_configuration_of_the_hand(capsys, monkeypatch, tmp_path):
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.delenv("HOLDFAST_CONFIG", raising=False)
+    assert report(capsys)["config"] == {"path": None, "content": {}, "error": None}
+    (tmp_path / "holdfast.toml").write_text('model = "builtin:twin"\n')
+    config = report(capsys)["config"]
+    assert config == {
+        "path": "holdfast.toml", "content": {"model": "builtin:twin"}, "error": None,
+    }  # fmt: skip
+    (tmp_path / "holdfast.toml").write_text("modle = 1\n")
+    assert report(capsys)["config"]["error"].startswith("holdfast.toml: unknown key modle; there")
+    assert main(["doctor"]) == 0
+    assert "WRONG: holdfast.toml: unknown key modle" in capsys.readouterr().out
+
+
 def test_what_can_be_reached(capsys, monkeypatch):
     monkeypatch.setattr("holdfast.sources.xela.places.own_address", lambda: None)
     found = report(capsys)["sources"]
@@ -88,8 +104,8 @@ def test_a_listening_server_is_reported(monkeypatch):
 def test_missing_extras_are_reported(monkeypatch):
     monkeypatch.setattr(verb, "find_spec", lambda name: None)
     found = verb.check_sources()
-    assert found["ros2"] == 'not installed: pip install "holdfast[ros2]"'
-    assert found["serial"] == 'not installed: pip install "holdfast[serial]"'
+    assert found["ros2"] == f"not installed: {install_command('ros2')}"
+    assert found["serial"] == f"not installed: {install_command('serial')}"
 
 
 def test_a_bad_master_is_reported(capsys, monkeypatch):

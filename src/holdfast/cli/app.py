@@ -11,15 +11,17 @@ import sys
 import traceback
 from collections.abc import Callable, Sequence
 from importlib import import_module
+from pathlib import Path
+from typing import Annotated
 
 import typer
 from typer.main import get_command
 
-from holdfast.cli.terminal.console import print_error
+from holdfast.cli.terminal.console import print_error, print_line
 from holdfast.errors import HoldfastError
 
 VERBS = {
-    "demo": "Simulate grasps, detect and train on them, and replay one of them.",
+    "demo": "Simulate grasps, detect and train on them, and replay one.",
     "simulate": "Simulate recordings of grasps with the physical twin.",
     "record": "Record a source; a crash loses at most the last half second.",
     "import": "Import recordings from other formats.",
@@ -36,6 +38,21 @@ VERBS = {
     "doctor": "Check the installation and the reachable sources.",
 }
 """All verbs in the order of the help, with the first line of their docstrings."""
+
+CONFIGURED_VERBS = ("detect", "serve", "record", "hold")
+"""Verbs that read the configuration file of `cli/config.py`."""
+
+HELP = """Detect whether the contact of each fingertip of a robot hand is stable, slipping or
+disturbed, from its tactile sensors, at every sample.
+
+Start with: holdfast demo. It needs no hand and takes a minute."""
+EPILOG = (
+    "Each verb has its own help with an example: holdfast VERB --help. With a hand: holdfast "
+    "doctor finds it, and holdfast serve builtin:any xela://auto shows it. The tutorials and all "
+    "pages: docs/ of the repository."
+)
+COMPLETE_VARIABLE = "_HOLDFAST_COMPLETE"
+"""Is set by the completion script of a shell."""
 
 EXIT_BAD_INPUT = 2
 EXIT_INTERRUPTED = 130
@@ -55,7 +72,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     Returns:
         0 after success, 2 after bad input, 130 after an interrupt, 1 after an internal error.
     """
-    words = list(sys.argv[1:] if arguments is None else arguments)
+    words = list(sys.argv[1:] if arguments is None else arguments) or ["--help"]
     try:
         code = _run(words)
         sys.stdout.flush()
@@ -67,6 +84,8 @@ def main(arguments: Sequence[str] | None = None) -> int:
 
 
 def _run(words: list[str]) -> int:
+    if COMPLETE_VARIABLE in os.environ:
+        return _complete()
     command = get_command(_app(words))
     try:
         with command.make_context("holdfast", words) as context:
@@ -79,10 +98,9 @@ def _run(words: list[str]) -> int:
 def _app(words: list[str]) -> typer.Typer:
     """Create the app with all verbs; import only those among `words`."""
     app = typer.Typer(
-        help="Detect whether the contacts of a robot hand are stable, from its tactile sensors.",
-        epilog="Start with: holdfast sensors",
+        help=HELP,
+        epilog=EPILOG,
         rich_markup_mode=None,
-        add_completion=False,
         context_settings={"help_option_names": ["-h", "--help"]},
     )
     app.callback()(_root)
@@ -91,8 +109,24 @@ def _app(words: list[str]) -> typer.Typer:
             verb = load_verb(name)
             app.command(name, help=_help(verb))(verb)
         else:
-            app.command(name, help=summary)(_root)
+            app.command(name, help=summary)(_placeholder)
     return app
+
+
+def _complete() -> int:
+    """Print the completions for a shell; its script set the words in the environment."""
+    typed = [os.environ.get(name, "") for name in ("COMP_WORDS", "_TYPER_COMPLETE_ARGS")]
+    command = get_command(_app(" ".join(typed).split()))
+    command.main([], prog_name="holdfast", complete_var=COMPLETE_VARIABLE)
+    return 0
+
+
+def _version(value: bool) -> None:
+    if value:
+        from importlib.metadata import version
+
+        print_line(f"holdfast {version('holdfast')}")
+        raise typer.Exit
 
 
 def load_verb(name: str) -> Callable[..., None]:
@@ -102,8 +136,32 @@ def load_verb(name: str) -> Callable[..., None]:
     return verb
 
 
-def _root() -> None:
-    """Do nothing; a placeholder for verbs that are not imported."""
+def _root(
+    context: typer.Context,
+    config: Annotated[
+        Path | None,
+        typer.Option(
+            help="Configuration file of your hand.",
+            show_default="HOLDFAST_CONFIG, or holdfast.toml in this folder",
+        ),
+    ] = None,
+    version: Annotated[
+        bool,
+        typer.Option("--version", help="Print the version.", callback=_version, is_eager=True),
+    ] = False,
+) -> None:
+    """Read the configuration file, for the verbs that use it."""
+    if context.invoked_subcommand in CONFIGURED_VERBS or config is not None:
+        from holdfast.cli.config import find_config, load_config
+
+        path = find_config(config)
+        if path is not None:
+            context.obj = load_config(path)
+            context.default_map = context.obj.defaults()
+
+
+def _placeholder() -> None:
+    """Do nothing; in place of a verb that is not imported."""
 
 
 def _help(verb: Callable[..., None]) -> str:

@@ -43,7 +43,7 @@ def demo(
     force: Annotated[bool, typer.Option("--force", help="Overwrite an earlier demo.")] = False,
     as_json: JsonOption = False,
 ) -> None:
-    """Simulate grasps, detect and train on them, and replay one of them.
+    """Simulate grasps, detect and train on them, and replay one.
 
     Simulate grasps of a mug and a carton with the physical twin. Evaluate the model that ships
     with holdfast on them; it has not seen these objects. Train a model with the features of the

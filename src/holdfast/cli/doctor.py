@@ -9,10 +9,16 @@ from contextlib import suppress
 from importlib import metadata
 from importlib.util import find_spec
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
+
+import typer
 
 from holdfast.cli.options import JsonOption
 from holdfast.cli.terminal.console import print_json, print_line, print_table
+from holdfast.errors import install_command
+
+if TYPE_CHECKING:
+    from holdfast.cli.config import Config
 
 EXTRA_PURPOSES = {
     "bags": "import of ROS 1 and ROS 2 bags",
@@ -30,24 +36,25 @@ CONNECT_TIMEOUT = 0.3
 _REQUIREMENT = re.compile(r"(?P<package>[\w.-]+)(?:.*extra\s*==\s*['\"](?P<extra>[\w-]+)['\"])?")
 
 
-def doctor(as_json: JsonOption = False) -> None:
+def doctor(context: typer.Context, as_json: JsonOption = False) -> None:
     """Check the installation and the reachable sources.
 
     Report Python, the packages, the extras and how to install them, the compiled kernels, the
-    live sources that can be reached, and the folder in HOLDFAST_DATA. The exit code is always 0.
+    live sources that can be reached, the configuration file of the hand, and the folder in
+    HOLDFAST_DATA. The exit code is always 0.
 
     Example:
       holdfast doctor
       holdfast doctor --json
     """
-    report = _report()
+    report = _report(context)
     if as_json:
         print_json(report)
     else:
         _print(report)
 
 
-def _report() -> dict[str, Any]:
+def _report(context: typer.Context) -> dict[str, Any]:
     packages = _packages()
     return {
         "holdfast": metadata.version("holdfast"),
@@ -60,6 +67,7 @@ def _report() -> dict[str, Any]:
         "extras": {extra: _extra(extra, found) for extra, found in sorted(packages.items())},
         "kernels": _kernels(),
         "data": _data(),
+        "config": _config(context.obj),
         "sources": check_sources(),
     }
 
@@ -87,7 +95,7 @@ def _extra(extra: str, packages: dict[str, str | None]) -> dict[str, Any]:
         "purpose": EXTRA_PURPOSES.get(extra, ""),
         "installed": None not in packages.values(),
         "packages": packages,
-        "install": f'pip install "holdfast[{extra}]"',
+        "install": install_command(extra),
     }
 
 
@@ -116,6 +124,34 @@ def _data() -> dict[str, Any]:
     return {"path": given, "found": given is not None and Path(given).is_dir()}
 
 
+def _config(given: "Config | None") -> dict[str, Any]:
+    """Return the path, content and error of the configuration file."""
+    import msgspec
+
+    from holdfast.cli.config import find_config, load_config
+
+    path, error = None, None
+    try:
+        path = find_config()
+        given = given or (None if path is None else load_config(path))
+    except ValueError as cause:
+        error = str(cause)
+    content = {} if given is None else msgspec.to_builtins(given)
+    return {
+        "path": None if path is None else str(path),
+        "content": {key: value for key, value in content.items() if value},
+        "error": error,
+    }
+
+
+def _config_text(config: dict[str, Any]) -> str:
+    if config["error"]:
+        return f"WRONG: {config['error']}"
+    if not config["content"]:
+        return "none: holdfast.toml in this folder, or HOLDFAST_CONFIG"
+    return ", ".join(f"{key} {value}" for key, value in config["content"].items())
+
+
 def _print(report: dict[str, Any]) -> None:
     kernels, data = report["kernels"], report["data"]
     loaded = f"work ({kernels['seconds']:.1f} s to load)"
@@ -124,6 +160,7 @@ def _print(report: dict[str, Any]) -> None:
         ("kernels", loaded if kernels["ok"] else kernels["error"]),
         ("kernel cache", kernels["cache"]),
         ("HOLDFAST_DATA", _data_text(data)),
+        ("your hand", _config_text(report["config"])),
     ]
     print_table(("holdfast", report["holdfast"]), rows)
     print_line()
@@ -180,13 +217,13 @@ def _ros1() -> str:
 
 def _ros2() -> str:
     if find_spec("cyclonedds") is None:
-        return 'not installed: pip install "holdfast[ros2]"'
+        return f"not installed: {install_command('ros2')}"
     return f"cyclonedds, domain {os.environ.get('ROS_DOMAIN_ID', '0')}"
 
 
 def _serial() -> str:
     if find_spec("serial") is None:
-        return 'not installed: pip install "holdfast[serial]"'
+        return f"not installed: {install_command('serial')}"
     from serial.tools.list_ports import comports
 
     return ", ".join(port.device for port in comports()) or "no serial port"

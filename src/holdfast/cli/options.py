@@ -35,8 +35,31 @@ class RatePolicy(StrEnum):
 ModelArgument = Annotated[
     str, typer.Argument(help="A model file, builtin:twin or builtin:noise-floor.")
 ]
+
+
+def complete_source(context: typer.Context, source: str) -> str:
+    """Return a source with the parameters of the configuration file that it does not have.
+
+    Raises:
+        ValueError: the source is `hand`, and there is no configuration file.
+    """
+    if context.obj is not None:
+        completed: str = context.obj.complete(source)
+        return completed
+    if source == "hand" and not Path(source).exists():
+        raise ValueError(
+            "hand is the source of a configuration file; there is no holdfast.toml in this "
+            "folder (or name one with holdfast --config FILE)"
+        )
+    return source
+
+
 SourceArgument = Annotated[
-    str, typer.Argument(help="Path of a recording, or URI of a source (see above).")
+    str,
+    typer.Argument(
+        help="Path of a recording, URI of a source (see above), or hand (of holdfast.toml).",
+        callback=complete_source,
+    ),
 ]
 JsonOption = Annotated[bool, typer.Option("--json", help="Print JSON on stdout.")]
 SeedOption = Annotated[int, typer.Option("--seed", help="Seed of all random numbers.")]

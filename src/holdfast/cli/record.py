@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from holdfast.cli.options import JsonOption, SpeedOption, check_speed
+from holdfast.cli.options import JsonOption, SpeedOption, check_speed, complete_source
 from holdfast.cli.terminal.console import print_json, print_line, print_message
 from holdfast.cli.terminal.stopping import StopRequest, handle_stop_signals
 
@@ -27,7 +27,12 @@ _SUFFIX = ".mcap"
 
 def record(
     source: Annotated[
-        str, typer.Argument(help="URI such as xela://HOST:PORT or twin:, or path of a recording.")
+        str,
+        typer.Argument(
+            help="URI such as xela://HOST:PORT or twin:, path of a recording, or hand (of "
+            "holdfast.toml).",
+            callback=complete_source,
+        ),
     ],
     out: Annotated[
         Path, typer.Argument(help="NAME.mcap, or a folder, which is created if missing.")

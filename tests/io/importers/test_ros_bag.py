@@ -5,7 +5,7 @@ import numpy as np
 import pytest
 
 from holdfast.cli import main
-from holdfast.errors import MissingExtra, RecordingError
+from holdfast.errors import MissingExtra, RecordingError, install_command
 from holdfast.io import import_recordings, load_recording, save_recording
 from holdfast.io.recording_files import is_recording
 from holdfast.ros.sensor_messages import DeviceSample
@@ -372,5 +372,5 @@ class TestRefusals:
             given.text(EPOCH)
         for name in [name for name in sys.modules if name.split(".")[0] == "rosbags"]:
             monkeypatch.setitem(sys.modules, name, None)
-        with pytest.raises(MissingExtra, match=re.escape('pip install "holdfast[bags]"')):
+        with pytest.raises(MissingExtra, match=re.escape(install_command("bags"))):
             import_recordings(given.path)

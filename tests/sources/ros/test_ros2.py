@@ -13,7 +13,7 @@ import pytest
 pytest.importorskip("cyclonedds", reason="cyclonedds is not installed")
 pytest.importorskip("rosbags", reason="rosbags is not installed")
 
-from holdfast.errors import MissingExtra, SourceError
+from holdfast.errors import MissingExtra, SourceError, install_command
 from holdfast.ros import dds
 from holdfast.ros.definitions import parse_definition
 from holdfast.ros.sensor_messages import known_definition
@@ -190,4 +190,4 @@ def test_without_cyclonedds(monkeypatch):
         monkeypatch.setitem(sys.modules, name, None)
     with pytest.raises(MissingExtra) as caught:
         open_source("ros2:///a")
-    assert 'pip install "holdfast[ros2]"' in str(caught.value)
+    assert install_command("ros2") in str(caught.value)

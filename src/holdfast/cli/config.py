@@ -1,0 +1,132 @@
+"""The configuration file `holdfast.toml`: one's own hand, so that URIs need no retyping."""
+
+import os
+import tomllib
+from pathlib import Path
+from typing import Any
+from urllib.parse import urlencode
+
+import msgspec
+
+from holdfast.cli.app import CONFIGURED_VERBS
+
+CONFIG_NAME, CONFIG_VARIABLE = "holdfast.toml", "HOLDFAST_CONFIG"
+HAND = "hand"
+"""Name of the configured source on the command line."""
+
+
+class Config(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
+    """Content of a configuration file; every key may be missing.
+
+    Attributes:
+        model: default of MODEL.
+        source: URI of the hand; by default the XELA server at `host`.
+        host: host and port of the XELA server; by default `auto`.
+        fingers: name of each module by its number.
+        sensor: name of a built-in sensor, or a JSON file; for devices that do not name theirs.
+        values: `counts` or `calibrated`.
+        ignore: taxels to ignore by finger, counted from 0.
+    """
+
+    model: str | None = None
+    source: str | None = None
+    host: str | None = None
+    fingers: dict[str, str] = {}
+    sensor: str | None = None
+    values: str | None = None
+    ignore: dict[str, list[int]] = {}
+
+    def complete(self, source: str) -> str:
+        """Return the URI of a source with the parameters that it does not have.
+
+        Args:
+            source: path or URI from the command line, or `hand`.
+        """
+        from holdfast.sources.uri import DEVICE_MODULES, is_uri, parse
+
+        if source == HAND and not Path(HAND).exists():
+            source = self.source or f"xela://{self.host or 'auto'}"
+        if not is_uri(source):
+            return source
+        scheme, address = parse(source)
+        if scheme not in DEVICE_MODULES:
+            return source
+        more = {key: v for key, v in self._parameters(scheme).items() if v is not None}
+        missing = {key: value for key, value in more.items() if key not in address.parameters}
+        if not missing:
+            return source
+        return f"{source}{'&' if '?' in source else '?'}{urlencode(missing, safe=':,/')}"
+
+    def defaults(self) -> dict[str, dict[str, str]]:
+        """Return the default value of each argument and option, by verb."""
+        found: dict[str, str] = {"source": HAND}
+        if self.model is not None:
+            found["model"] = self.model
+        if self.ignore:
+            found["ignore"] = ",".join(f"{f}:{k}" for f, own in self.ignore.items() for k in own)
+        return dict.fromkeys(CONFIGURED_VERBS, found)
+
+    def _parameters(self, scheme: str) -> dict[str, str | None]:
+        fingers = ",".join(f"{number}:{name}" for number, name in self.fingers.items()) or None
+        shared = {"fingers": fingers, "sensor": self.sensor}
+        return shared if scheme == "serial" else {**shared, "values": self.values}
+
+
+def find_config(given: Path | None = None) -> Path | None:
+    """Return the configuration file: the given one, HOLDFAST_CONFIG, or holdfast.toml here.
+
+    Raises:
+        ValueError: the given file does not exist.
+    """
+    variable = os.environ.get(CONFIG_VARIABLE)
+    for path, where in ((given, "--config"), (variable and Path(variable), CONFIG_VARIABLE)):
+        if path:
+            if not path.is_file():
+                raise ValueError(f"{where}: there is no file {path}")
+            return path
+    here = Path(CONFIG_NAME)
+    return here if here.is_file() else None
+
+
+def load_config(path: Path) -> Config:
+    """Read a configuration file. Paths in it are relative to its folder.
+
+    Raises:
+        ValueError: it is not TOML, or has an unknown key or a value of another type.
+    """
+    try:
+        content: dict[str, Any] = tomllib.loads(path.read_text("utf-8"))
+    except (tomllib.TOMLDecodeError, UnicodeDecodeError) as cause:
+        raise ValueError(f"{path} is not TOML: {cause}") from cause
+    known = Config.__struct_fields__
+    if unknown := sorted(set(content) - set(known)):
+        raise ValueError(
+            f"{path}: unknown key {', '.join(unknown)}; there are {', '.join(sorted(known))}"
+        )
+    try:
+        config = msgspec.convert(content, Config)
+    except msgspec.ValidationError as cause:
+        raise ValueError(f"{path}: {cause}") from cause
+    _check(config, path)
+    files = {
+        key: _beside(path, value)
+        for key in ("model", "sensor")
+        if (value := getattr(config, key)) is not None
+    }
+    return msgspec.structs.replace(config, **files)
+
+
+def _check(config: Config, path: Path) -> None:
+    if config.source is not None and config.host is not None:
+        raise ValueError(f"{path}: source or host expected, both given")
+    if wrong := [number for number in config.fingers if not number.isdecimal()]:
+        raise ValueError(
+            f'{path}: fingers: 1 = "thumb" expected, the number of a module, {wrong[0]!r} given'
+        )
+    if any(taxel < 0 for taxels in config.ignore.values() for taxel in taxels):
+        raise ValueError(f"{path}: ignore: taxels from 0 expected")
+
+
+def _beside(path: Path, value: str) -> str:
+    """Return the path of a .json file that is named relative to the configuration file."""
+    return str(path.parent / value) if value.endswith(".json") else value
