@@ -62,7 +62,7 @@ def test_cdr_of_either_byte_order():
 
 
 def test_a_length_that_lies_takes_no_memory():
-    decode = MessageDecoder(parse_definition("p/A", "B[] b\n====\nMSG: p/B\n"), ros2=False)
+    decode = MessageDecoder(parse_definition("p/A", "B[] b\n====\nMSG: p/B\nint8 x"), ros2=False)
     with pytest.raises(ValueError, match="b: 4294967295 given, 0 bytes left"):
         decode(b"\xff" * 4)
     decode = MessageDecoder(parse_definition("p/A", "float64[] b"), ros2=False)
@@ -99,3 +99,13 @@ def test_values_that_do_not_fit():
         encode({"pair": [1, 256]})
     with pytest.raises(KeyError):
         encode({})
+
+
+@pytest.mark.parametrize("ros2", [True, False])
+def test_a_claimed_number_of_messages_must_fit_in_the_bytes(ros2):
+    """Each element of a sequence has a minimum size; nothing is created for more of them."""
+    text = "B[] x\n===\nMSG: p/B\nfloat64 y\nstring z"
+    decode = MessageDecoder(parse_definition("p/A", text), ros2=ros2)
+    data = (b"\x00\x01\x00\x00" if ros2 else b"") + (100).to_bytes(4, "little") + bytes(1100)
+    with pytest.raises(ValueError, match="x: 100 given, 1100 bytes left"):
+        decode(data)

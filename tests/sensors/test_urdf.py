@@ -1,3 +1,5 @@
+import os
+
 import numpy as np
 import pytest
 
@@ -107,3 +109,42 @@ def test_document_types_are_refused(finger, declared):
     text = r"declares a document type, which a URDF file never needs$"
     with pytest.raises(ValueError, match=text):
         Sensor.from_urdf(path, "tip")
+
+
+def test_a_long_chain_is_walked_once(tmp_path):
+    """Each link's pose is computed once: the joints of a chain are not walked for each taxel."""
+    n = 3000
+    joints = "".join(
+        f'<joint name="taxel{k}"><origin xyz="0 0 0.001" rpy="0 0 0.1"/><parent link="l{k}"/>'
+        f'<child link="l{k + 1}"/></joint>'
+        for k in range(n)
+    )
+    path = tmp_path / "chain.urdf"
+    path.write_text(f"<robot>{joints}</robot>")
+    one = Sensor.from_urdf(path, "l0")
+    np.testing.assert_allclose(one.positions[:, 2], 0.001 * (1 + np.arange(n)))
+    angle = 0.1 * n
+    np.testing.assert_allclose(one.rotations[-1, 0, :2], [np.cos(angle), -np.sin(angle)], atol=1e-9)
+
+
+def test_links_in_a_circle_end(tmp_path):
+    path = tmp_path / "circle.urdf"
+    path.write_text(
+        "<robot>"
+        + "".join(
+            f'<joint name="{name}"><parent link="{parent}"/><child link="{child}"/></joint>'
+            for name, parent, child in [("taxel", "a", "b"), ("j", "b", "a"), ("taxel2", "c", "c")]
+        )
+        + "</robot>"
+    )
+    assert Sensor.from_urdf(path, "a").n_taxels == 1
+    assert Sensor.from_urdf(path, "c").n_taxels == 1
+
+
+def test_a_pipe_and_other_encodings_are_refused(tmp_path):
+    os.mkfifo(tmp_path / "pipe")
+    with pytest.raises(OSError, match="a regular file expected"):
+        Sensor.from_urdf(tmp_path / "pipe", "a")
+    (tmp_path / "a.urdf").write_text(FINGER, "utf-16")
+    with pytest.raises(ValueError, match=r"a\.urdf is not a URDF file: 'utf-8' codec"):
+        Sensor.from_urdf(tmp_path / "a.urdf", "tip")

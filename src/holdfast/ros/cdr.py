@@ -11,7 +11,7 @@ from typing import Any, Literal
 import numpy as np
 import numpy.typing as npt
 
-from holdfast.ros.definitions import NUMBER_CODES, Definition, Field
+from holdfast.ros.definitions import FIELD_SIZES, NUMBER_CODES, Definition, Field
 
 HEAD = b"\x00\x01\x00\x00"
 """First bytes of a CDR message: little endian, no options. Alignment counts from their end."""
@@ -47,6 +47,7 @@ class MessageDecoder:
         self._definition = definition
         self._open: Callable[[bytes], _Ros1Bytes] = _CdrBytes if ros2 else _Ros1Bytes
         self._points = _point_types(definition)
+        self._sizes = {**FIELD_SIZES, **definition.sizes}
 
     def __call__(self, data: bytes) -> dict[str, Any]:
         """Decode a message.
@@ -74,7 +75,7 @@ class MessageDecoder:
             return source.array(field.kind, n)
         if (number := self._points.get(field.kind)) is not None:
             return source.array(number, 3 * n).reshape(n, 3)
-        if n > source.n_left:  # every value takes at least a byte
+        if n * self._sizes[field.kind] > source.n_left:
             raise ValueError(f"{field.name}: {n} given, {source.n_left} bytes left")
         return [self._value(source, field.kind) for _ in range(n)]
 

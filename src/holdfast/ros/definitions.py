@@ -26,8 +26,20 @@ NUMBER_CODES = {
 }
 """Number types of ROS and their codes in NumPy."""
 
+LENGTH_SIZE = 4
+"""Size of the length before a text or a sequence [bytes]."""
+FIELD_SIZES = {
+    "string": LENGTH_SIZE,
+    **{kind: 1 if code == "?" else int(code[1:]) for kind, code in NUMBER_CODES.items()},
+}
+"""Minimum size of a value of each type that is no message [bytes]."""
+
 MAX_DEPTH = 8
 """Maximum depth of messages inside messages."""
+MAX_TEXT_SIZE = 1 << 16
+"""Maximum number of characters of a definition."""
+MAX_FIELDS = 4096
+"""Maximum number of fields of a message, with the fields of messages inside it."""
 
 SEPARATOR = "\n" + "=" * 80 + "\nMSG: "
 """Text between the types of a definition; the name of the next type follows."""
@@ -40,6 +52,15 @@ ROS2_HEADER = (
     + "builtin_interfaces/Time\nint32 sec\nuint32 nanosec\n"
 )
 """Definition of the header of a message, to append to a definition."""
+
+
+class _Extent(NamedTuple):
+    """Depth of a type, number of fields in it, and minimum size of its messages [bytes]."""
+
+    depth: int
+    n_fields: int
+    size: int
+
 
 _STAMPS = {"time": ("uint32 secs", "uint32 nsecs"), "duration": ("int32 secs", "int32 nsecs")}
 _SEPARATOR = re.compile(r"^=+\s*\nMSG:\s*(\S+)\s*$", re.MULTILINE)
@@ -69,10 +90,12 @@ class Definition(NamedTuple):
     Attributes:
         name: `package/Type`.
         types: fields of each type by its name.
+        sizes: minimum number of bytes of a message of each type, without padding.
     """
 
     name: str
     types: Mapping[str, tuple[Field, ...]]
+    sizes: Mapping[str, int]
 
     @property
     def fields(self) -> tuple[Field, ...]:
@@ -98,21 +121,24 @@ def parse_definition(name: str, text: str) -> Definition:
         text: text of the definition.
 
     Raises:
-        ValueError: a line is not a field, or a type is not defined or is nested too deep.
+        ValueError: a line is not a field; a type is not defined, holds itself or is nested too
+            deep; an array has elements without fields; or the definition is too large.
 
     Example:
         >>> parse_definition("pkg/Named", "string name\nfloat64[] values # [N]").fields[1]
         Field(name='values', kind='float64', size=0)
     """
+    if len(text) > MAX_TEXT_SIZE:
+        raise ValueError(f"{name}: at most {MAX_TEXT_SIZE} characters expected, {len(text)} given")
     first, *others = _SEPARATOR.split(text.replace("\r\n", "\n"))
     blocks = {short_name(name): first}
     pairs = zip(others[::2], others[1::2], strict=True)
     blocks.update((short_name(other), body) for other, body in pairs)
     blocks.update((stamp, "\n".join(lines)) for stamp, lines in _STAMPS.items())
     types = {block: tuple(_fields(block, body, blocks)) for block, body in blocks.items()}
-    definition = Definition(short_name(name), types)
-    _check_depth(definition, definition.name, 0)
-    return definition
+    extents: dict[str, _Extent] = {}
+    _measure(short_name(name), types, extents)
+    return Definition(short_name(name), types, {kind: one.size for kind, one in extents.items()})
 
 
 def field_paths(definition: Definition) -> set[str]:
@@ -162,9 +188,34 @@ def _kind(kind: str, block: str, blocks: Mapping[str, str]) -> str:
     raise ValueError(f"{block}: a field is of {kind}, which is not defined")
 
 
-def _check_depth(definition: Definition, name: str, depth: int) -> None:
-    if depth > MAX_DEPTH:
-        raise ValueError(f"{definition.name} holds itself, or is nested too deep")
-    for field in definition.types[name]:
-        if field.kind in definition.types:
-            _check_depth(definition, field.kind, depth + 1)
+def _measure(
+    name: str,
+    types: Mapping[str, tuple[Field, ...]],
+    extents: dict[str, _Extent],
+    inside: tuple[str, ...] = (),
+) -> _Extent:
+    """Return the extent of a type, and add it to `extents`; each type is measured once.
+
+    Raises:
+        ValueError: a type holds itself, is nested too deep or has too many fields, or an array
+            has elements without fields, of which a short message could hold any number.
+    """
+    if name in inside or len(inside) > MAX_DEPTH:
+        raise ValueError(f"{(*inside, name)[0]} holds itself, or is nested too deep")
+    if name not in extents:
+        depth, n_fields, size = 0, 0, 0
+        for field in types[name]:
+            one = _Extent(0, 1, FIELD_SIZES.get(field.kind, 0))
+            if field.kind in types:
+                one = _measure(field.kind, types, extents, (*inside, name))
+            if field.size is not None and one.size == 0:
+                raise ValueError(f"{name}: {field.name} is an array of {field.kind} without fields")
+            depth, n_fields = max(depth, one.depth + 1), n_fields + one.n_fields
+            size += LENGTH_SIZE if field.size == 0 else one.size * (field.size or 1)
+        if depth > MAX_DEPTH + 1 or n_fields > MAX_FIELDS:
+            raise ValueError(
+                f"{name}: at most {MAX_FIELDS} fields, nested {MAX_DEPTH} deep, expected; "
+                f"{n_fields} fields, nested {depth - 1} deep, given"
+            )
+        extents[name] = _Extent(depth, n_fields, size)
+    return extents[name]

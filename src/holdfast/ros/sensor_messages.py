@@ -71,6 +71,8 @@ class DeviceSample(NamedTuple):
     forces: Array
 
 
+MAX_MESSAGE_SIZE = 1 << 20
+"""Maximum size of a message of a device; one of a whole hand with all fields has 20 kB [bytes]."""
 PAPILLARRAY = "papillarray"
 """Name of Contactile's sensor, which sends no model name."""
 
@@ -111,8 +113,12 @@ class SampleDecoder:
         """Return the sample of each device in a message.
 
         Raises:
-            ValueError: the bytes are not a message of this type.
+            ValueError: the bytes are not a message of this type, or too many.
         """
+        if len(data) > MAX_MESSAGE_SIZE:
+            raise ValueError(
+                f"a message of at most {MAX_MESSAGE_SIZE} bytes expected, {len(data)} given"
+            )
         return self._convert(self._decode(data))
 
 

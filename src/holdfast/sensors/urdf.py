@@ -1,13 +1,21 @@
 """Taxel poses from a URDF file."""
 
 import xml.etree.ElementTree as ET
+from collections.abc import Mapping
 from pathlib import Path
 
 import numpy as np
 import numpy.typing as npt
 from scipy.spatial.transform import Rotation
 
+from holdfast.files import read_input
+
+MAX_FILE_SIZE = 1 << 26
+"""Maximum size of a URDF file [bytes]."""
+
 Array = npt.NDArray[np.float64]
+Pose = tuple[Array, Array]
+"""Position [m] and rotation matrix."""
 
 
 def taxel_poses(path: Path, base: str, match: str) -> tuple[Array, Array]:
@@ -29,7 +37,8 @@ def taxel_poses(path: Path, base: str, match: str) -> tuple[Array, Array]:
     links = set(parents) | {joint.parent for joint in joints}
     if base not in links:
         raise ValueError(f"{path} has no link {base!r}; it has {', '.join(sorted(links)[:10])}")
-    poses = [pose for j in joints if match in j.name if (pose := _pose(j, base, parents))]
+    frames = _frames(base, parents)
+    poses = [_pose(j, frames[j.parent]) for j in joints if match in j.name and j.parent in frames]
     if not poses:
         raise ValueError(f"{path} has no joint below {base!r} whose name contains {match!r}")
     return np.array([p for p, _ in poses]), np.array([r for _, r in poses])
@@ -48,7 +57,10 @@ class _Joint:
 
 
 def _joints(path: Path) -> list[_Joint]:
-    text = path.read_text("utf-8")
+    try:
+        text = read_input(path, MAX_FILE_SIZE).decode()
+    except UnicodeError as cause:
+        raise ValueError(f"{path} is not a URDF file: {cause}") from cause
     if "<!DOCTYPE" in text or "<!ENTITY" in text:
         raise ValueError(f"{path} declares a document type, which a URDF file never needs")
     try:
@@ -74,15 +86,28 @@ def _link(joint: ET.Element, end: str) -> str:
     return "" if element is None else element.get("link", "")
 
 
-def _pose(joint: _Joint, base: str, parents: dict[str, _Joint]) -> tuple[Array, Array] | None:
-    """Return the pose of a joint in the frame of `base`; None if it is not below `base`."""
-    position, rotation = joint.position, joint.rotation
-    visited = set()
-    while joint.parent != base:
-        if joint.parent not in parents or joint.parent in visited:
-            return None
-        visited.add(joint.parent)
-        joint = parents[joint.parent]
-        position = joint.position + joint.rotation @ position
-        rotation = joint.rotation @ rotation
-    return position, rotation
+def _frames(base: str, parents: Mapping[str, _Joint]) -> dict[str, Pose]:
+    """Return the pose of `base` and of each link below it in the frame of `base`.
+
+    Args:
+        base: name of the link.
+        parents: joint above each link.
+    """
+    below: dict[str, list[str]] = {}
+    for link, joint in parents.items():
+        below.setdefault(joint.parent, []).append(link)
+    frames: dict[str, Pose] = {base: (np.zeros(3), np.eye(3))}
+    left = [base]
+    while left:
+        link = left.pop()
+        for child in below.get(link, ()):
+            if child not in frames:  # links in a circle are visited once
+                frames[child] = _pose(parents[child], frames[link])
+                left.append(child)
+    return frames
+
+
+def _pose(joint: _Joint, parent: Pose) -> Pose:
+    """Return the pose of the link below a joint, in the frame that the parent's pose is in."""
+    position, rotation = parent
+    return position + rotation @ joint.position, rotation @ joint.rotation

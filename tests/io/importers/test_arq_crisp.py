@@ -1,4 +1,5 @@
 import sys
+from contextlib import suppress
 
 import h5py
 import numpy as np
@@ -7,6 +8,9 @@ import pytest
 from holdfast.contact import NO_CONTACT, STABLE, UNKNOWN, UNSTABLE, Cause
 from holdfast.errors import MissingExtra, RecordingError
 from holdfast.io import import_recordings
+
+SHAPE = (18, 3, 4)
+GROUP = "GGCNN2/Solder/Pose1/Exp1"
 
 
 def write(path, codes, n_taxels=18, name="GGCNN2/Solder/Pose1/Exp1", **changes):
@@ -142,3 +146,70 @@ def test_without_h5py_the_extra_is_named(tmp_path, monkeypatch):
     monkeypatch.setitem(sys.modules, "h5py", None)
     with pytest.raises(MissingExtra, match=r'pip install "holdfast\[hdf5\]"'):
         import_recordings(tmp_path, "arq-crisp")
+
+
+def external_storage(group, name, other):
+    group.create_dataset(name, SHAPE, "f8", external=[(str(other), 0, h5py.h5f.UNLIMITED)])
+
+
+def external_link(group, name, other):
+    with h5py.File(other, "w") as file:
+        file["x"] = np.zeros(SHAPE)
+    group[name] = h5py.ExternalLink(str(other), "x")
+
+
+def virtual(group, name, other):
+    with h5py.File(other, "w") as file:
+        file["x"] = np.zeros(SHAPE)
+    layout = h5py.VirtualLayout(SHAPE, "f8")
+    layout[:] = h5py.VirtualSource(str(other), "x", SHAPE)
+    group.create_virtual_dataset(name, layout)
+
+
+def soft_link(group, name, other):
+    group.file["x"] = np.zeros(SHAPE)
+    group[name] = h5py.SoftLink("/x")
+
+
+@pytest.mark.parametrize("store", [external_storage, external_link, virtual, soft_link])
+@pytest.mark.parametrize("name", ["tactile_data_raw", "tactile_timestamps", "tactile_slips_label"])
+def test_only_arrays_in_the_file_itself_are_read(tmp_path, store, name):
+    other = tmp_path / "secret"
+    other.write_bytes(b"secret" * 1000)
+    write(tmp_path / "a.h5", [4, 5, 4, 4], **{name: None})
+    with h5py.File(tmp_path / "a.h5", "a") as file:
+        store(file[GROUP], name, other)
+    with pytest.raises(RecordingError, match=f"/{GROUP}/{name} is no array stored in this file"):
+        list(import_recordings(tmp_path / "a.h5", "arq-crisp"))
+
+
+def test_a_group_in_another_file_is_not_found(tmp_path):
+    write(tmp_path / "other.h5", [4, 5])
+    with h5py.File(tmp_path / "a.h5", "w") as file:
+        file["link"] = h5py.ExternalLink(str(tmp_path / "other.h5"), f"/{GROUP}")
+    with pytest.raises(RecordingError, match="no group with tactile_data_raw"):
+        list(import_recordings(tmp_path / "a.h5", "arq-crisp"))
+
+
+def test_texts_and_huge_arrays_are_refused(tmp_path):
+    write(tmp_path / "a.h5", [4, 5, 4, 4], tactile_timestamps=["a", "b", "c", "d"])
+    with pytest.raises(RecordingError, match="numbers expected in tactile_timestamps, object giv"):
+        list(import_recordings(tmp_path / "a.h5", "arq-crisp"))
+    write(tmp_path / "b.h5", [4, 5, 4, 4], tactile_data_raw=None)
+    with h5py.File(tmp_path / "b.h5", "a") as file:
+        shape = (18, 3, 10**8)
+        file[GROUP].create_dataset("tactile_data_raw", shape, "f8", chunks=(18, 3, 100))
+    with pytest.raises(RecordingError, match=r"takes 43200 MB in memory, 1073\.74 MB are allowed"):
+        list(import_recordings(tmp_path / "b.h5", "arq-crisp"))
+
+
+def test_a_flipped_bit_raises_no_other_error(tmp_path):
+    write(tmp_path / "a.h5", [4, 5, 4, 4])
+    raw = (tmp_path / "a.h5").read_bytes()
+    chance = np.random.default_rng(0)
+    for place in chance.integers(8, len(raw), 400):
+        damaged = bytearray(raw)
+        damaged[place] ^= 1 << chance.integers(8)
+        (tmp_path / "b.h5").write_bytes(damaged)
+        with suppress(RecordingError):
+            list(import_recordings(tmp_path / "b.h5", "arq-crisp"))

@@ -1,3 +1,6 @@
+import os
+import re
+
 import pytest
 
 from holdfast.errors import RecordingError
@@ -36,3 +39,20 @@ def test_an_empty_file(tmp_path, name):
     (tmp_path / "a.csv").write_text("")
     with pytest.raises(RecordingError, match=r"a\.csv is (empty|not an HDF5 file)"):
         list(import_recordings(tmp_path / "a.csv", name))
+
+
+def test_a_pipe_is_refused_at_once(tmp_path):
+    os.mkfifo(tmp_path / "a.csv")
+    with pytest.raises(RecordingError, match="it is a pipe or a device; a regular file expected"):
+        import_recordings(tmp_path / "a.csv")
+
+
+def test_an_importer_may_raise_any_error(tmp_path, monkeypatch):
+    def broken(path, sensors):
+        raise KeyError("x\ny")
+        yield
+
+    monkeypatch.setattr("holdfast.io.importers.generic_csv.read", broken)
+    (tmp_path / "a.csv").write_text("a")
+    with pytest.raises(RecordingError, match=re.escape(f"{tmp_path / 'a.csv'} is damaged: 'x")):
+        list(import_recordings(tmp_path / "a.csv", "csv"))

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from holdfast.errors import RecordingError
-from holdfast.io.importers.table import natural_order, read_table, with_integer_type
+from holdfast.io.importers.table import Table, natural_order, read_table, with_integer_type
 
 
 def test_numbers_text_comments_and_holes(tmp_path):
@@ -42,4 +42,39 @@ def test_files_that_are_not_text(tmp_path, raw):
     path = tmp_path / "a.csv"
     path.write_bytes(raw)
     with pytest.raises(RecordingError, match=r"a\.csv(, row 2, column 'b': .* given,| is not CSV)"):
+        read_table(path)
+
+
+class CountedName(str):
+    """Name of a column that counts how often it is compared with another one."""
+
+    n_compared = 0
+    __slots__ = ()
+
+    def __eq__(self, other):
+        CountedName.n_compared += 1
+        return str.__eq__(self, other)
+
+    __hash__ = str.__hash__
+
+
+def test_the_columns_of_a_wide_table_are_found_in_linear_time():
+    names = tuple(CountedName(f"t{k}_x") for k in range(2000))
+    table = Table(Path("a.csv"), names, np.arange(2000.0)[None], 2, ())
+    assert table.columns([str(name) for name in names]).tolist() == [list(range(2000))]
+    assert CountedName.n_compared < 20_000
+
+
+def test_the_first_of_two_columns_with_one_name_is_used():
+    table = Table(Path("a.csv"), ("a", "a"), np.array([[1.0, 2.0]]), 2, ())
+    assert table.columns(["a"]).tolist() == [[1.0]]
+
+
+def test_a_cell_without_end(tmp_path):
+    path = tmp_path / "a.csv"
+    path.write_text("time,x\n0,1\n1," + "9" * 140_000 + "a\n")
+    with pytest.raises(RecordingError, match="is not a table of numbers: field larger than field"):
+        read_table(path)
+    path.write_text("time," + "x" * 140_000 + "\n0,1\n")
+    with pytest.raises(RecordingError, match="is not CSV text: field larger than field limit"):
         read_table(path)

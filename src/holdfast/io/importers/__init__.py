@@ -7,6 +7,8 @@ from pathlib import Path
 from types import ModuleType
 
 from holdfast.errors import RecordingError
+from holdfast.files import check_regular
+from holdfast.io.safe_reading import recording_errors
 from holdfast.recordings import Recording
 from holdfast.sensors import Sensor
 
@@ -51,12 +53,21 @@ def import_recordings(
         raise ValueError(f"unknown format {format!r}; there are {', '.join(FORMATS)}")
     if not place.exists():
         raise RecordingError(f"{place} does not exist; a file or folder to import expected")
-    name = format or _detected_format(place)
-    source = _importer(name)
-    recordings: Iterator[Recording] = (
-        source.read(place, sensors) if name == "csv" else source.read(place)
-    )
-    return recordings if labels else (_without_labels(recording) for recording in recordings)
+    with recording_errors(place):
+        if not place.is_dir():
+            check_regular(place)
+        name = format or _detected_format(place)
+        source = _importer(name)
+        recordings: Iterator[Recording] = (
+            source.read(place, sensors) if name == "csv" else source.read(place)
+        )
+    return _guarded(place, recordings, labels=labels)
+
+
+def _guarded(path: Path, recordings: Iterator[Recording], *, labels: bool) -> Iterator[Recording]:
+    with recording_errors(path):
+        for recording in recordings:
+            yield recording if labels else _without_labels(recording)
 
 
 def _importer(name: str) -> ModuleType:

@@ -16,6 +16,7 @@ import numpy as np
 from holdfast.contact import Cause, ContactState
 from holdfast.errors import MissingExtra, RecordingError
 from holdfast.io.importers.table import natural_order, with_integer_type
+from holdfast.io.safe_reading import check_size, one_line
 from holdfast.recordings import Label, Recording, Tactile, labels_from_samples
 from holdfast.sensors import Sensor, sensor
 from holdfast.sensors.types import Array
@@ -96,10 +97,13 @@ def _recordings(path: Path, h5py: ModuleType) -> Iterator[Recording]:
             if not names:
                 raise RecordingError(f"{path}: no group with {DATA} in it")
             for name in sorted(names, key=lambda name: natural_order(Path(name.replace("/", "_")))):
-                yield _recording(f"{path}: {name}", name.split("/"), file[name])
-    except (OSError, KeyError, ValueError) as cause:
+                arrays = _Arrays(path, file[name], h5py)
+                yield _recording(f"{path}: {name}", name.split("/"), arrays)
+    except RecordingError:
+        raise
+    except Exception as cause:  # h5py raises errors of any type for a damaged file
         raise RecordingError(
-            f"{path} is damaged or not a data set of ARQ-CRISP: {cause}"
+            f"{path} is damaged or not a data set of ARQ-CRISP: {one_line(cause)}"
         ) from cause
 
 
@@ -107,11 +111,50 @@ def _keys(item: object) -> Sequence[str]:
     return tuple(item) if isinstance(item, Mapping) else ()
 
 
-def _recording(place: str, parts: list[str], group: Mapping[str, Any]) -> Recording:
+class _Arrays:
+    """Arrays of numbers in a group of an HDF5 file, by name.
+
+    Only arrays inside of the file itself are read. HDF5 can also store the names of other files
+    (external links, external storage, virtual arrays), and would read any file of the user.
+    """
+
+    def __init__(self, path: Path, group: Any, h5py: ModuleType) -> None:  # noqa: ANN401 (h5py)
+        self._path = path
+        self._group = group
+        self._h5py = h5py
+
+    def __contains__(self, name: str) -> bool:
+        return name in self.names()
+
+    def names(self) -> list[str]:
+        """Return the names in the group."""
+        return list(self._group)
+
+    def __getitem__(self, name: str) -> Array:
+        """Return an array as float64.
+
+        Raises:
+            RecordingError: it is not stored in the file, is not of numbers, or is too large.
+        """
+        h5py = self._h5py
+        link = self._group.get(name, getlink=True)
+        item = self._group[name] if isinstance(link, h5py.HardLink) else None
+        if not isinstance(item, h5py.Dataset) or item.is_virtual or item.external:
+            raise RecordingError(
+                f"{self._path}: {self._group.name}/{name} is no array stored in this file; "
+                "links to other places and files are refused"
+            )
+        if item.dtype.kind not in "biuf":
+            raise RecordingError(f"{self._path}: numbers expected in {name}, {item.dtype} given")
+        check_size(self._path, 8 * item.size)
+        return np.asarray(item[()], dtype=np.float64)
+
+
+def _recording(place: str, parts: list[str], group: _Arrays) -> Recording:
     if TIMES not in group:
-        raise RecordingError(f"{place} has no {TIMES}; it has {', '.join(group)}")
-    raw = np.asarray(group[DATA], dtype=np.float64)
-    times = np.asarray(group[TIMES], dtype=np.float64).ravel() * MILLISECOND
+        raise RecordingError(f"{place} has no {TIMES}; it has {', '.join(group.names())}")
+    raw = group[DATA]
+    times = group[TIMES].ravel() * MILLISECOND
     if raw.ndim != 3 or raw.shape[1:] != (3, len(times)):
         raise RecordingError(
             f"{place}: {DATA} of shape (n_taxels, 3, {len(times)}) expected, {raw.shape} given"
@@ -120,7 +163,7 @@ def _recording(place: str, parts: list[str], group: Mapping[str, Any]) -> Record
     try:
         module = Tactile(_sensor(readings.shape[1]), times, readings)
         if LABELS in group:
-            labels = _labels(np.asarray(group[LABELS]).ravel(), module)
+            labels = _labels(group[LABELS].ravel(), module)
             module = replace(module, labels=labels)
         return Recording("_".join(parts), {"finger1": module}, _metadata(parts))
     except RecordingError as cause:
@@ -149,7 +192,7 @@ def _labels(codes: Array, module: Tactile) -> tuple[Label, ...]:
     if len(codes) != module.n_samples:
         raise RecordingError(f"{len(codes)} labels given for {module.n_samples} samples")
     if not np.isin(codes, range(_OTHER + 1)).all():
-        raise RecordingError(f"labels 0 to {_OTHER} expected, {codes.max()} given")
+        raise RecordingError(f"labels 0 to {_OTHER} expected, {codes.max():g} given")
     return labels_from_samples(
         module.times,
         _states([int(code) for code in codes]),

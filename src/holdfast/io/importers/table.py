@@ -39,13 +39,14 @@ class Table(NamedTuple):
         Raises:
             RecordingError: a column is missing.
         """
-        if missing := [name for name in names if name not in self.names]:
+        places = {name: place for place, name in reversed(list(enumerate(self.names)))}
+        if missing := [name for name in names if name not in places]:
             raise RecordingError(
                 f"{self.path}: column {missing[0]!r} is missing"
                 f"{f' and {len(missing) - 1} more' if len(missing) > 1 else ''}; "
                 f"it has {_shortened(self.names)}"
             )
-        return self.values[:, [self.names.index(name) for name in names]]
+        return self.values[:, [places[name] for name in names]]
 
 
 def header_line(path: Path) -> tuple[str, ...]:
@@ -153,17 +154,21 @@ def _cause_of(
         lines = list(file)[first_line - 1 :]
     if not any(line.strip() for line in lines):
         return _without_samples(path)
-    for number, row in enumerate(csv.reader(lines), start=first_line):
-        if row and len(row) != len(names):
-            return RecordingError(
-                f"{path}, row {number}: {len(row)} cells given, {len(names)} expected as in the "
-                "header"
-            )
-        for name, cell in zip(names, row, strict=False):
-            if name not in text and not _is_number(cell):
+    try:
+        for number, row in enumerate(csv.reader(lines), start=first_line):
+            if row and len(row) != len(names):
                 return RecordingError(
-                    f"{path}, row {number}, column {name!r}: {cell[:40]!r} given, a number expected"
+                    f"{path}, row {number}: {len(row)} cells given, {len(names)} expected as in "
+                    "the header"
                 )
+            for name, cell in zip(names, row, strict=False):
+                if name not in text and not _is_number(cell):
+                    return RecordingError(
+                        f"{path}, row {number}, column {name!r}: {cell[:40]!r} given, a number "
+                        "expected"
+                    )
+    except csv.Error as problem:  # a cell of more than 131,072 characters, for instance
+        cause = str(problem)
     return RecordingError(f"{path} is not a table of numbers: {' '.join(cause.split())[:200]}")
 
 
