@@ -13,6 +13,7 @@ FAMILIES = (
     errors.TrainingError,
     errors.StreamError,
     errors.SourceError,
+    errors.HandError,
     errors.EngineError,
     errors.OutputError,
     errors.MissingExtra,

@@ -6,6 +6,7 @@
     ├── TrainingError    the data cannot train or test a classifier (one class, one group)
     ├── StreamError      a detector cannot process the samples
     ├── SourceError      a source cannot be reached, sends nothing, or is not the expected one
+    ├── HandError        a hand cannot be commanded: it does not answer, or has another controller
     ├── EngineError      the processes or the cluster that make parallel calls fail
     ├── OutputError      an output exists already or cannot be written
     └── MissingExtra     an optional package is not installed
@@ -38,6 +39,10 @@ class StreamError(HoldfastError):
 
 class SourceError(HoldfastError):
     """A source cannot be reached, or sends nothing or other data: repair it, then try again."""
+
+
+class HandError(HoldfastError):
+    """A hand cannot be commanded: see that it is left in a safe state, then repair it."""
 
 
 class EngineError(HoldfastError):

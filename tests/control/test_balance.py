@@ -1,6 +1,6 @@
 import numpy as np
 import pytest
-from hypothesis import given
+from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy.optimize import linprog
 
@@ -14,6 +14,7 @@ grasps = st.integers(2, 5).flatmap(
 )
 
 
+@settings(max_examples=40, deadline=None)
 @given(grasps)
 def test_the_forces_are_balanced_and_none_is_lowered(grasp):
     wanted, forces = grasp
@@ -25,6 +26,7 @@ def test_the_forces_are_balanced_and_none_is_lowered(grasp):
     assert max(scales) <= max(wanted) + 1e-9
 
 
+@settings(max_examples=40, deadline=None)
 @given(grasps)
 def test_no_balanced_scales_need_less_force(grasp):
     """The same by linear programming: least total force, subject to balance."""

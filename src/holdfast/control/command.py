@@ -37,6 +37,7 @@ class GripReason(StrEnum):
     FINGER_FAULT = "finger_fault"
     LOST = "lost"
     OVERLOAD = "overload"
+    LIMIT = "limit"
     WATCHDOG = "watchdog"
 
 

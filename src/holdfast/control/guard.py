@@ -1,0 +1,91 @@
+"""Last check of every command before it leaves. It trusts no controller. No I/O, no clock."""
+
+import math
+from collections.abc import Mapping
+
+from holdfast.control.command import FingerCommand, GripCommand, GripReason, LoopState
+from holdfast.control.limits import Limits
+
+SLACK = 1e-9
+"""Rounding that a limit may be exceeded by."""
+
+
+class CommandGuard:
+    """Check of commands against the limits, and limit of their rate.
+
+    A command beyond the limits is replaced by the safe command: the last good scales, or
+    release. From then on every command is, until `reset`.
+
+    Args:
+        limits: the same as those of the controller.
+
+    Attributes:
+        violation: what the first refused command violated; empty if none was.
+
+    Example:
+        >>> guard = CommandGuard(Limits(max_scale=2.0))
+        >>> bad = GripCommand(0.0, LoopState.HOLD, {"thumb": FingerCommand(7.0)})
+        >>> guard.admit(bad).fingers["thumb"].scale, guard.violation
+        (1.0, 'thumb: a scale of 7 given, 1 to 2 expected')
+    """
+
+    def __init__(self, limits: Limits) -> None:
+        self.limits = limits
+        self.reset()
+
+    def reset(self) -> None:
+        """Forget all commands."""
+        self.violation = ""
+        self._scales: dict[str, float] = {}
+        self._checked_at = -math.inf
+        self._sent_at = -math.inf
+        self._state = LoopState.IDLE
+
+    def admit(self, command: GripCommand) -> GripCommand | None:
+        """Return the command to send.
+
+        Returns:
+            The command; the safe command in its place; or None if the last one was sent less
+            than a period of `Limits.max_rate` ago. A new FAULT is never held back.
+        """
+        self.violation = self.violation or self._violation(command)
+        if self.violation:
+            command = self._safe(command)
+        self._scales = {name: one.scale for name, one in command.fingers.items()}
+        if math.isfinite(command.time):
+            self._checked_at = max(self._checked_at, command.time)
+        early = command.time - self._sent_at < (1.0 - SLACK) / self.limits.max_rate
+        new_fault = command.state is LoopState.FAULT and self._state is not LoopState.FAULT
+        if early and not new_fault:
+            return None
+        self._sent_at, self._state = command.time, command.state
+        return command
+
+    def _violation(self, command: GripCommand) -> str:
+        limits = self.limits
+        elapsed = command.time - self._checked_at
+        elapsed = max(elapsed, 0.0) if math.isfinite(elapsed) else 0.0
+        for name, one in command.fingers.items():
+            if not limits.min_scale - SLACK <= one.scale <= limits.max_scale + SLACK:
+                return (
+                    f"{name}: a scale of {one.scale:g} given, {limits.min_scale:g} to "
+                    f"{limits.max_scale:g} expected"
+                )
+            rise = one.scale - self._scales.get(name, 1.0)
+            if rise > limits.rise * elapsed + SLACK:
+                return (
+                    f"{name}: a rise of {rise:g} in {elapsed:g} s given, {limits.rise:g}/s at most"
+                )
+        return ""
+
+    def _safe(self, command: GripCommand) -> GripCommand:
+        names: Mapping[str, object] = self._scales or command.fingers
+        fingers = {name: FingerCommand(self._scales.get(name, 1.0)) for name in names}
+        release = self.limits.on_fault == "open"
+        return GripCommand(command.time, LoopState.FAULT, fingers, release, GripReason.LIMIT)
+
+
+def safe_command(last: GripCommand, reason: GripReason, *, release: bool) -> GripCommand:
+    """Return a command that keeps the scales of the last one, or opens the hand."""
+    fingers = {name: FingerCommand(one.scale) for name, one in last.fingers.items()}
+    return GripCommand(last.time, LoopState.FAULT, fingers, release, reason)

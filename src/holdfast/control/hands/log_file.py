@@ -1,0 +1,54 @@
+"""A hand that is a file: every command is a line of JSON. For dry runs and tests."""
+
+from pathlib import Path
+from typing import BinaryIO
+
+import msgspec
+
+from holdfast.control.command import GripCommand
+from holdfast.control.hands.base import Hand
+from holdfast.errors import HandError
+
+
+class LogFile(Hand):
+    """Hand that appends each command to a file.
+
+    Args:
+        name: URI of the hand.
+        path: of the file; it is created if it does not exist.
+    """
+
+    def __init__(self, name: str, path: str | Path) -> None:
+        self.name = name
+        self._path = Path(path)
+        self._file: BinaryIO | None = None
+
+    def open(self) -> None:
+        """Open the file.
+
+        Raises:
+            HandError: it cannot be written.
+        """
+        try:
+            self._file = self._path.open("ab", buffering=0)
+        except OSError as cause:
+            raise HandError(f"cannot write {self._path}: {cause.strerror}") from cause
+
+    def send(self, command: GripCommand) -> None:
+        """Append a line.
+
+        Raises:
+            HandError: the file is not open, or the disk is full.
+        """
+        try:
+            if self._file is None:
+                raise HandError(f"{self.name} is not open")
+            self._file.write(msgspec.json.encode(command) + b"\n")
+        except OSError as cause:
+            raise HandError(f"cannot write {self._path}: {cause.strerror}") from cause
+
+    def close(self) -> None:
+        """Close the file."""
+        if self._file is not None:
+            self._file.close()
+            self._file = None

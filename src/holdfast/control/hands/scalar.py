@@ -1,0 +1,64 @@
+"""Grippers with one force: a Python function gets the largest scale of all fingers."""
+
+from collections.abc import Callable
+from importlib import import_module
+
+from holdfast.control.command import GripCommand
+from holdfast.control.hands.base import Hand
+from holdfast.errors import HandError
+
+
+class ScalarGripper(Hand):
+    """Gripper that takes one number: the force scale, or 0 to open.
+
+    Args:
+        function: is called with the scale at each command.
+        name: URI of the hand.
+
+    Example:
+        >>> from holdfast.control import FingerCommand, LoopState
+        >>> fingers = {"finger1": FingerCommand(1.2), "finger2": FingerCommand(1.5)}
+        >>> with ScalarGripper(print) as gripper:
+        ...     gripper.send(GripCommand(0.0, LoopState.REACT, fingers))
+        ...     gripper.send(GripCommand(0.1, LoopState.FAULT, fingers, release=True))
+        1.5
+        0.0
+    """
+
+    def __init__(self, function: Callable[[float], object], name: str = "call:") -> None:
+        self.name = name
+        self._function = function
+
+    @classmethod
+    def from_path(cls, path: str, name: str) -> "ScalarGripper":
+        """Return the gripper of a function, given as MODULE:FUNCTION.
+
+        Raises:
+            ValueError: there is no such module or function.
+        """
+        module, _, function = path.partition(":")
+        try:
+            found = getattr(import_module(module), function)
+        except (ImportError, AttributeError, ValueError) as cause:
+            raise ValueError(f"{name}: call:MODULE:FUNCTION expected ({cause})") from cause
+        if not callable(found):
+            raise ValueError(f"{name}: {path} is no function")
+        return cls(found, name)
+
+    def open(self) -> None:
+        """Do nothing."""
+
+    def send(self, command: GripCommand) -> None:
+        """Call the function.
+
+        Raises:
+            HandError: the function failed.
+        """
+        scale = max((one.scale for one in command.fingers.values()), default=1.0)
+        try:
+            self._function(0.0 if command.release else scale)
+        except Exception as cause:  # the function is the user's
+            raise HandError(f"{self.name}: {type(cause).__name__}: {cause}") from cause
+
+    def close(self) -> None:
+        """Do nothing."""

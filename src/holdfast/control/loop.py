@@ -1,0 +1,98 @@
+"""The loop: from estimates to a hand, with guard, watchdog and log."""
+
+from collections.abc import Callable
+from contextlib import nullcontext, suppress
+from types import TracebackType
+from typing import Self
+
+from holdfast.contact import HandEstimate
+from holdfast.control.command import GripCommand, GripReason
+from holdfast.control.controller import GripController
+from holdfast.control.guard import CommandGuard, safe_command
+from holdfast.control.hands import Hand
+from holdfast.control.watchdog import Watchdog
+from holdfast.errors import HandError
+
+Log = Callable[[str, float], None]
+"""Function that gets each event of the loop as a text and its time [s]."""
+
+
+class GripLoop:
+    """Loop that commands one hand, estimate by estimate.
+
+    Leaving it as a context manager sends a last command: the scales as they are after a normal
+    end, the safe command after an exception.
+
+    Args:
+        controller: makes the commands.
+        hand: an open hand; it gets commands only if `armed`.
+        armed: whether commands are sent; otherwise it is a dry run.
+        watchdog: started watchdog; None for a hand that needs none, as the twin.
+        log: gets all events of the loop.
+
+    Attributes:
+        last: the last command; None before the first.
+        n_sent: number of commands that were sent.
+    """
+
+    def __init__(
+        self,
+        controller: GripController,
+        hand: Hand,
+        *,
+        armed: bool = False,
+        watchdog: Watchdog | None = None,
+        log: Log | None = None,
+    ) -> None:
+        self.controller, self.hand, self.armed = controller, hand, armed
+        self.guard = CommandGuard(controller.limits)
+        self.last: GripCommand | None = None
+        self.n_sent = 0
+        self._watchdog = watchdog
+        self._log = log or (lambda text, time: None)
+
+    def step(self, estimate: HandEstimate, time: float) -> GripCommand:
+        """Update the controller, check its command and send it.
+
+        Args:
+            estimate: the newest estimate, or the last one again.
+            time: time now, on the clock of the source [s].
+
+        Raises:
+            HandError: the hand refuses the command, or the watchdog has taken over.
+        """
+        command = self.controller.update(estimate, time)
+        for event in self.controller.events():
+            self._log(str(event), event.time)
+        violated = self.guard.violation
+        admitted = self.guard.admit(command)
+        if self.guard.violation != violated:
+            self._log(f"grip FAULT (limit): {self.guard.violation}", time)
+        self.last = admitted or self.last or command
+        if self.armed:
+            self._send(self.last, is_new=admitted is not None)
+        return self.last
+
+    def _send(self, command: GripCommand, *, is_new: bool) -> None:
+        """Send a heartbeat, and the command if it is new."""
+        if self._watchdog is not None:
+            self._watchdog.beat(command)
+        if is_new:
+            self.hand.send(command)
+            self.n_sent += 1
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(
+        self,
+        kind: type[BaseException] | None,
+        error: BaseException | None,
+        trace: TracebackType | None,
+    ) -> None:
+        """Leave the hand in a safe state."""
+        if not self.armed or self.last is None:
+            return
+        release = kind is not None and self.controller.limits.on_fault == "open"
+        with suppress(HandError) if kind else nullcontext():
+            self.hand.send(safe_command(self.last, GripReason.NONE, release=release))

@@ -1,0 +1,97 @@
+"""What every hand must fulfil, and each hand by itself."""
+
+import builtins
+
+import msgspec
+import pytest
+
+from holdfast.control import FingerCommand, GripCommand, LoopState
+from holdfast.control.hands import Claim, open_hand
+from holdfast.control.hands.scalar import ScalarGripper
+from holdfast.errors import HandError
+
+COMMAND = GripCommand(
+    1.0, LoopState.REACT, {"thumb": FingerCommand(1.3), "index": FingerCommand(1.1)}
+)
+RELEASE = msgspec.structs.replace(COMMAND, release=True)
+
+
+@pytest.fixture(params=["log:{}/hand", "call:builtins:abs"])
+def hand(request, tmp_path):
+    return open_hand(request.param.format(tmp_path))
+
+
+class TestContract:
+    def test_it_takes_commands_while_it_is_open(self, hand):
+        with hand as opened:
+            opened.send(COMMAND)
+            opened.send(RELEASE)
+            opened.send(GripCommand(2.0, LoopState.IDLE, {}))
+
+    def test_it_can_be_closed_twice_and_opened_again(self, hand):
+        for _ in range(2):
+            hand.open()
+            hand.send(COMMAND)
+            hand.close()
+            hand.close()
+
+    def test_its_name_is_its_uri(self, hand):
+        assert open_hand(hand.name).name == hand.name
+
+
+class TestLogFile:
+    def test_each_command_is_a_line(self, tmp_path):
+        with open_hand(f"log:{tmp_path}/hand") as hand:
+            hand.send(COMMAND)
+            hand.send(RELEASE)
+        lines = (tmp_path / "hand").read_bytes().splitlines()
+        assert [msgspec.json.decode(one, type=GripCommand) for one in lines] == [COMMAND, RELEASE]
+
+    def test_a_closed_hand_takes_no_command(self, tmp_path):
+        with pytest.raises(HandError, match=r"log:.*/hand is not open"):
+            open_hand(f"log:{tmp_path}/hand").send(COMMAND)
+
+    def test_a_missing_folder_is_an_error(self, tmp_path):
+        with pytest.raises(HandError, match="cannot write"):
+            open_hand(f"log:{tmp_path}/no/hand").open()
+
+
+class TestScalarGripper:
+    def test_it_gets_the_largest_scale_and_0_to_open(self):
+        given = []
+        gripper = ScalarGripper(given.append)
+        gripper.send(COMMAND)
+        gripper.send(RELEASE)
+        assert given == [1.3, 0.0]
+
+    def test_a_function_that_fails_is_one_line(self):
+        with pytest.raises(HandError, match="call:: ZeroDivisionError: "):
+            ScalarGripper(lambda scale: scale / 0).send(COMMAND)
+
+    @pytest.mark.parametrize("path", ["nothing:here", "builtins:nothing", "builtins", ":abs"])
+    def test_a_function_that_does_not_exist_is_refused(self, path):
+        with pytest.raises(ValueError, match=r"call:MODULE:FUNCTION expected"):
+            open_hand(f"call:{path}")
+
+    def test_what_is_no_function_is_refused(self):
+        assert not callable(builtins.__name__)
+        with pytest.raises(ValueError, match="builtins:__name__ is no function"):
+            open_hand("call:builtins:__name__")
+
+
+@pytest.mark.parametrize("uri", ["magic:", "log:", "hand", ""])
+def test_an_unknown_hand_is_refused(uri):
+    with pytest.raises(ValueError, match="is no hand; there are twin:, log:PATH"):
+        open_hand(uri)
+
+
+def test_a_hand_has_one_controller_at_a_time(tmp_path):
+    name = f"log:{tmp_path}"
+    with (
+        Claim(name),
+        pytest.raises(HandError, match="has another controller already"),
+        Claim(name),
+    ):
+        pass
+    with Claim(name):
+        pass
