@@ -1,9 +1,11 @@
 import os
 import signal
 import socket
+import subprocess
 import sys
 import time
 from contextlib import contextmanager
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -48,6 +50,40 @@ def die_at(place, deadly):
     if place == deadly:
         os.kill(os.getpid(), signal.SIGKILL)
     return place
+
+
+ENDLESS = """
+import os, sys, time
+from holdfast.parallel import map_ordered
+
+def work(place):
+    print(os.getpid(), flush=True)
+    time.sleep(100)
+
+list(map_ordered(work, [(0,), (1,)], n_jobs=2))
+"""
+
+
+@pytest.mark.skipif(sys.platform == "win32", reason="Windows does not change the parent")
+@pytest.mark.parametrize("number", [signal.SIGKILL, signal.SIGTERM])
+def test_a_killed_process_leaves_no_workers(number):
+    words = (sys.executable, "-c", ENDLESS)
+    with subprocess.Popen(words, stdout=subprocess.PIPE, stderr=subprocess.DEVNULL) as parent:
+        workers = [int(parent.stdout.readline()) for _ in range(2)]
+        parent.send_signal(number)
+        deadline = time.monotonic() + 60
+        while any(map(is_running, workers)) and time.monotonic() < deadline:
+            time.sleep(0.05)
+        assert not any(map(is_running, workers))
+
+
+def is_running(process):
+    try:
+        os.kill(process, 0)
+    except ProcessLookupError:
+        return False
+    status = Path(f"/proc/{process}/status")
+    return not (status.exists() and "State:\tZ" in status.read_text())
 
 
 @contextmanager

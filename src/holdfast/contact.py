@@ -63,6 +63,7 @@ class Fault(StrEnum):
     PACKET_GAP = "packet_gap"
     LATE = "late"
     CLOCK_JUMP = "clock_jump"
+    RATE = "rate"
 
 
 SIGNAL_FAULTS = tuple(Fault)[:8]

@@ -4,11 +4,14 @@ When a process dies, the calls that were running are made again. Results do not 
 or in which order the calls are made.
 """
 
+import os
+import time
 import warnings
 from collections.abc import Callable, Hashable, Iterable, Iterator
 from contextlib import contextmanager, suppress
-from functools import partial
+from functools import cache, partial
 from queue import Empty, SimpleQueue
+from threading import Thread
 from typing import TYPE_CHECKING, Any, NamedTuple, Self, TypeVar
 
 from holdfast.errors import EngineError, MissingExtra
@@ -26,6 +29,9 @@ MAX_RETRIES = 2
 
 CONNECT_TIMEOUT = 10.0
 """Time within which a scheduler must answer [s]."""
+
+PARENT_CHECK_INTERVAL = 1.0
+"""Time between two checks of a process whether the process that started it still runs [s]."""
 
 NO_WORKER_TIMEOUT = 30.0
 """Time for which a cluster may have neither a worker nor a new result [s]."""
@@ -150,7 +156,8 @@ def _in_processes(
     while started or not ended:
         for name in list(started):
             yield name, _call_alone(function, name, started.pop(name))
-        tasks = (delayed(_call_named)(function, *call) for call in _record(rest, started))
+        call_named = delayed(_call_in_worker)
+        tasks = (call_named(os.getpid(), function, *call) for call in _record(rest, started))
         with suppress(TerminatedWorkerError):
             for name, result in Parallel(n_jobs, return_as="generator_unordered")(tasks):
                 del started[name]
@@ -165,8 +172,24 @@ def _record(calls: Iterator[Call[K]], started: dict[K, Arguments]) -> Iterator[C
         yield name, arguments
 
 
-def _call_named(function: Callable[..., T], name: K, arguments: Arguments) -> tuple[K, T]:
+def _call_in_worker(
+    parent: int, function: Callable[..., T], name: K, arguments: Arguments
+) -> tuple[K, T]:
+    _end_with(parent)
     return name, function(*arguments)
+
+
+@cache
+def _end_with(parent: int) -> None:
+    """End this process when its parent has died; no other process would end it."""
+
+    def wait() -> None:
+        while os.getppid() == parent:
+            time.sleep(PARENT_CHECK_INTERVAL)
+        os._exit(1)
+
+    if os.getpid() != parent:
+        Thread(target=wait, name="holdfast-parent", daemon=True).start()
 
 
 def _call_alone(function: Callable[..., T], name: object, arguments: Arguments) -> T:
@@ -176,7 +199,8 @@ def _call_alone(function: Callable[..., T], name: object, arguments: Arguments) 
 
     for _ in range(MAX_RETRIES):
         with suppress(TerminatedWorkerError):
-            result: T = Parallel(n_jobs=2)([delayed(function)(*arguments)])[0]
+            call = delayed(_call_in_worker)(os.getpid(), function, None, arguments)
+            result: T = Parallel(n_jobs=2)([call])[0][1]
             return result
     raise EngineError(
         f"{name}: its process died {1 + MAX_RETRIES} times, killed or out of memory; "

@@ -1,11 +1,12 @@
 import math
+import re
 
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
 from holdfast.contact import Fault
-from holdfast.sources.timeline import Timeline, TransportDelay
+from holdfast.sources.timeline import Timeline, TransportDelay, clock_notice
 
 PERIOD = 1 / 150
 
@@ -102,15 +103,48 @@ def test_clocks_that_drift_are_not_late():
     assert not any(s.faults for s in stamped)
 
 
+def share_of_faults(pairs):
+    """Share of the samples after the first second that have a fault."""
+    stamped = stamps(pairs)[150:]
+    return sum(bool(one.faults) for one in stamped) / len(stamped)
+
+
+@pytest.mark.parametrize("speed", [1.2, 1.5, 3.0, 20.0])
+def test_a_clock_that_is_too_fast_is_a_fault_within_a_second(speed):
+    assert share_of_faults([(1000.0 + speed * k * PERIOD, k * PERIOD) for k in range(900)]) == 1
+
+
+def test_a_clock_that_is_a_little_too_fast_is_none():
+    assert share_of_faults([(1000.0 + 1.05 * k * PERIOD, k * PERIOD) for k in range(900)]) == 0
+
+
+@pytest.mark.parametrize("step", [-PERIOD, -0.3 * PERIOD, -0.04, -1.0, 0.0])
+def test_a_clock_that_goes_backwards_or_stands_still_is_a_fault_within_a_second(step):
+    assert share_of_faults([(1000.0 + step * k, k * PERIOD) for k in range(900)]) == 1
+
+
+def test_a_clock_that_jumps_again_and_again_is_a_fault():
+    assert share_of_faults([(1000.0 + 60.0 * (k % 2), k * PERIOD) for k in range(900)]) == 1
+
+
+def test_an_unsteady_clock_recovers_within_two_seconds():
+    """A burst of two seconds of samples at the start; the first of them was the quickest."""
+    burst = [(1000.0 + k * PERIOD, 50.0) for k in range(300)]
+    after = [(1000.0 + k * PERIOD, 50.0 + (k - 300) * PERIOD) for k in range(300, 900)]
+    stamped = stamps([*burst, *after])
+    assert stamped[299].faults == (Fault.CLOCK_JUMP,)
+    assert not any(one.faults for one in stamped[600:])
+
+
 def test_a_clock_that_runs_away_is_late():
     stamped = stamps([(1000.0 + k, 50.0 + k * 1.01) for k in range(100)])
     assert [s.faults for s in stamped[:9]] == [()] * 9
     assert all(s.faults == (Fault.LATE,) for s in stamped[12:])
 
 
-@pytest.mark.parametrize("wrong", [math.nan, math.inf, -math.inf])
+@pytest.mark.parametrize("wrong", [math.nan, math.inf, -math.inf, 1e300, -1e300, 1e11])
 def test_a_stamp_that_is_not_finite_is_refused(wrong):
-    with pytest.raises(ValueError, match=f"a time in seconds expected, {wrong} given"):
+    with pytest.raises(ValueError, match=re.escape(f"a time in seconds expected, {wrong} given")):
         Timeline().stamp(wrong, 0.0)
 
 
@@ -129,3 +163,21 @@ def test_a_delay_after_a_reset():
     delay.reset()
     assert delay.update(2.0, 5.0) == 0.0
     assert delay.lead(3.0, 5.5) == pytest.approx(0.5, abs=1e-3)
+
+
+@pytest.mark.parametrize(
+    ("stamp", "text"),
+    [
+        (1.7e9, None),
+        (1.7e9 - 59, None),
+        (3000.0, None),
+        (-5.0, None),
+        (1.7e9 - 90, "are 2 min behind the clock of this machine: old data?"),
+        (1.7e9 - 7201, "are 2 h behind the clock of this machine: old data?"),
+        (1.5e9, "are 2315 d behind the clock of this machine: old data?"),
+        (1.8e9, "are 1157 d ahead of the clock of this machine: is its clock set?"),
+    ],
+)
+def test_stamps_of_another_time(stamp, text):
+    expected = None if text is None else f"the stamps of the device {text}"
+    assert clock_notice(stamp, 1.7e9) == expected

@@ -26,11 +26,13 @@ from holdfast.detector import HAND, Detector
 from holdfast.errors import ModelError, StreamError
 from holdfast.features import Tare
 from holdfast.live.lasting_changes import DEFAULT_DURATION, LastingChanges
+from holdfast.live.rate import RateMonitor, measure_rate
 from holdfast.model import Model
 from holdfast.recordings import GAP_PERIODS
 from holdfast.resampling import Resampler
 from holdfast.sensors import Sensor, sensor
 from holdfast.sources import Arrival, Source
+from holdfast.sources.base import DeviceSource
 
 RATE_MEASUREMENT_TIME = 0.5
 """Length of the first part of a stream, from which its rate is measured [s]."""
@@ -89,9 +91,12 @@ class ArrivalDetector:
         sensors: of the source, by module.
         strict: refuse a rate that is not the model's instead of resampling.
         ignore: taxels by finger, from 0, that contribute nothing and cause no fault.
+        watch_rate: report the fault RATE while the rate of a finger differs by more than 20 %
+            from that at the start. A recording has the same estimates without it.
 
     Attributes:
         fingers: sensor of each finger that the model uses.
+        notices: messages for the user since they were last taken from the list.
         rate: measured rate of the source [Hz]; NaN while it is not known.
         resampled: True if the source is resampled to the model's rate.
 
@@ -106,6 +111,7 @@ class ArrivalDetector:
         *,
         strict: bool = False,
         ignore: Mapping[str, tuple[int, ...]] | None = None,
+        watch_rate: bool = False,
     ) -> None:
         if Tare.parse(model.tare).kind == "interval":
             raise ModelError(
@@ -116,6 +122,9 @@ class ArrivalDetector:
         self.fingers = dict(model.fingers_of(sensors))
         self.rate = math.nan
         self.resampled = False
+        self.notices: list[str] = []
+        self._watch_rate = watch_rate
+        self._monitor: RateMonitor | None = None
         self._strict = strict
         self._ignore = ignore
         self._buffer: deque[Arrival] = deque(maxlen=MAX_BUFFERED_ARRIVALS)
@@ -148,7 +157,7 @@ class ArrivalDetector:
         buffered = [one for one in self._buffer if one.samples]
         if not arrival.samples or arrival.time - buffered[0].time < RATE_MEASUREMENT_TIME:
             return []
-        rate = _measure_rate(buffered, self.fingers)
+        rate = measure_rate(buffered, self.fingers)
         if rate is None:  # no samples of the model's fingers yet
             self._buffer.clear()
             self._buffer.append(arrival)
@@ -161,7 +170,7 @@ class ArrivalDetector:
         if self._detector is not None or not buffered:
             return []
         nominal = next(iter(self.fingers.values())).rate
-        return self._start(_measure_rate(buffered, self.fingers) or self.model.rate or nominal)
+        return self._start(measure_rate(buffered, self.fingers) or self.model.rate or nominal)
 
     def mark_silent(self) -> list[StreamEstimate]:
         """Set every finger to UNKNOWN, with the reason `gap`, until its next sample.
@@ -220,6 +229,7 @@ class ArrivalDetector:
                 )
             self.resampled = True
             self._resamplers = {name: Resampler(rate, model.rate) for name in self.fingers}
+        self._monitor = RateMonitor(rate, self.fingers) if self._watch_rate else None
         self._detector = detector = Detector(model, self.fingers, rate, ignore=self._ignore)
         buffered = list(self._buffer)
         self._buffer.clear()
@@ -231,6 +241,8 @@ class ArrivalDetector:
             self._silent_fingers.discard(name)
         self._faults.update(arrival.faults)
         found = {name: arrival.samples[name] for name in self.fingers if name in arrival.samples}
+        if self._monitor is not None:
+            self._watch(self._monitor, found, arrival.time)
         for instant, samples in self._at_model_rate(arrival.time, found):
             before, self._last = self._last, detector.update(samples, instant)
             lost = _lost_fingers(before, self._last) - samples.keys() if before else ()
@@ -239,6 +251,14 @@ class ArrivalDetector:
             faulty = tuple(name for name in self.fingers if name in arrival.faults)
             if faulty:
                 yield StreamEstimate(self._with_stream_faults(self._last), faulty)
+
+    def _watch(self, monitor: RateMonitor, samples: Samples, instant: float) -> None:
+        """Update the rates of the fingers, and report a change as a fault and a notice."""
+        notice = monitor.update(samples, instant)
+        if notice is not None:
+            self.notices.append(notice)
+        for name in monitor.changed & samples.keys():
+            self._faults[name] = (*self._faults.get(name, ()), Fault.RATE)
 
     def _with_stream_faults(self, estimate: HandEstimate) -> HandEstimate:
         """Return the estimate with the faults of the source, and with silent fingers."""
@@ -324,7 +344,10 @@ class StreamDetector:
     ) -> None:
         self.source = source
         self.silent = False
-        self._detector = ArrivalDetector(model, source.sensors, strict=strict, ignore=ignore)
+        self._detector = ArrivalDetector(
+            model, source.sensors, strict=strict, ignore=ignore,
+            watch_rate=isinstance(source, DeviceSource),
+        )  # fmt: skip
         self.fingers = self._detector.fingers
         self._changes = StateChanges((*self.fingers, HAND))
         self._slowdown = 1 / min(source.speed or 1.0, 1.0)
@@ -382,6 +405,9 @@ class StreamDetector:
         elif not (self.silent or self.source.ended) and self._timed_out(arrival, timeout):
             self.silent = True
             estimates += self._detector.mark_silent()
+        if arrival is not None and self._detector.notices:
+            arrival = arrival._replace(notices=(*arrival.notices, *self._detector.notices))
+            self._detector.notices.clear()
         return self._update(arrival, estimates)
 
     def finish(self) -> StreamUpdate:
@@ -428,13 +454,3 @@ def _lost_fingers(before: HandEstimate, now: HandEstimate) -> set[str]:
         for name, finger in now.fingers.items()
         if finger.state is unknown and before.fingers[name].state is not unknown
     }
-
-
-def _measure_rate(arrivals: list[Arrival], fingers: Mapping[str, Sensor]) -> float | None:
-    """Return the median rate of the fingers, from steps without gaps [Hz]; None without steps."""
-    rates = []
-    for name in fingers:
-        steps = np.diff([one.time for one in arrivals if name in one.samples])
-        if len(steps):
-            rates.append(1 / steps[steps <= GAP_PERIODS * np.median(steps)].mean())
-    return float(np.median(rates)) if rates else None

@@ -13,6 +13,7 @@ import numpy.typing as npt
 
 from holdfast.contact import Fault
 from holdfast.sensors import Sensor
+from holdfast.sources.timeline import clock_notice
 
 MARKER_PREFIX = "marker: "
 """Begin of a notice that repeats a marker of a recording."""
@@ -212,6 +213,15 @@ class DeviceSource(Source):
             self._silent = False
             self._last_sample_at = received
         self._pending.extend(arrivals)
+
+    def _note_clock(self) -> None:
+        """Add a notice to the first samples if the device's clock differs much from the host's."""
+        for k, arrival in enumerate(self._pending):
+            if arrival.samples:
+                text = clock_notice(arrival.time, time.time())
+                if text is not None:
+                    self._pending[k] = arrival._replace(notices=(*arrival.notices, text))
+                return
 
     def _notify(self, received: float, *notices: str) -> None:
         self._pending.append(notice_arrival(received, *notices))

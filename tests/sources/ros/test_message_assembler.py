@@ -110,6 +110,21 @@ class TestTimes:
         )
         assert [int(a.samples["finger1"][0, 0]) for a in arrivals] == list(range(5))
 
+    @pytest.mark.parametrize("wrong", [1e300, -1e300, 1e12, np.nan])
+    def test_a_stamp_that_is_thousands_of_years_away_is_refused(self, wrong):
+        packets = [[uskin(k)] for k in range(10)]
+        packets[4] = [uskin(4, time=wrong)]
+        arrivals = taken(identified(*packets[0]), packets)
+        assert [a.n_refused for a in arrivals] == [0] * 4 + [1] + [0] * 5
+        assert arrivals[4].notices == ("a message has no time, others had",)
+        times = [a.time - EPOCH for a in arrivals if a.samples]
+        np.testing.assert_allclose(times, [0.01 * k for k in range(10) if k != 4], atol=1e-6)
+
+    def test_a_first_stamp_that_is_thousands_of_years_away_is_not_used(self):
+        packets = [[uskin(k, time=1e300)] for k in range(5)]
+        arrivals = taken(identified(*packets[0]), packets)
+        np.testing.assert_allclose([a.time for a in arrivals], 50.0 + 0.01 * np.arange(5))
+
     def test_stamps_of_the_header_or_of_the_host(self):
         for stamp, start in ((7.0, 7.0), (None, 50.0)):
             packets = [

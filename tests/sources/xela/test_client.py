@@ -179,8 +179,9 @@ class TestReading:
             arrivals = until(source, lambda a: a.time == START + 2 * PERIOD)
         assert sum(a.n_refused for a in arrivals) == 3
         notices = [notice for a in arrivals for notice in a.notices]
-        assert len(notices) == 1
-        assert notices[0].startswith("invalid packet: ")
+        assert len(notices) == 2
+        assert notices[0].endswith("behind the clock of this machine: old data?")
+        assert notices[1].startswith("invalid packet: ")
 
     def test_another_number_of_taxels(self):
         with server([patch(1)]) as (port, said), open_source(f"xela://127.0.0.1:{port}") as source:
@@ -204,12 +205,27 @@ class TestReading:
         with server([patch(1)]) as (port, said), open_source(f"xela://127.0.0.1:{port}") as source:
             deadline = time.monotonic() + PATIENCE
             notices = []
-            while not notices and time.monotonic() < deadline:
+            while len(notices) < 2 and time.monotonic() < deadline:
                 said.put(patch(1))
                 arrival = source.read(0.01)
                 if arrival is not None:
                     notices += arrival.notices
-        assert notices == ["no new sample for 0.05 s"]
+        assert notices[1:] == ["no new sample for 0.05 s"]
+
+    @pytest.mark.parametrize(
+        ("ahead", "notices"),
+        [
+            (-3600 * 24, ("the stamps of the device are 24 h behind the clock of this machine: old "
+                          "data?",)),
+            (600, ("the stamps of the device are 10 min ahead of the clock of this machine: is its "
+                   "clock set?",)),
+            (-30, ()),
+        ],
+    )  # fmt: skip
+    def test_stamps_of_another_time_give_a_notice(self, ahead, notices):
+        first = patch(1, time=time.time() + ahead)
+        with server([first]) as (port, _), open_source(f"xela://127.0.0.1:{port}") as source:
+            assert source.read(1.0).notices == notices
 
 
 def test_a_source_that_is_closed_gives_nothing():
@@ -292,3 +308,24 @@ class TestReconnecting:
 
 def refuse(place):
     raise ConnectionRefusedError
+
+
+@pytest.mark.parametrize("location", ["ws://127.0.0.1:{other}/", "ws://localhost:{port}/", "/b"])
+def test_redirects_are_not_followed(location):
+    """A server that redirects its clients to another one."""
+    with server([patch(1)]) as (other, _), socket.create_server(("127.0.0.1", 0)) as listener:
+        port = listener.getsockname()[1]
+        where = location.format(other=other, port=port)
+
+        def redirect():
+            connection, _ = listener.accept()
+            with connection:
+                connection.recv(1 << 16)
+                head = f"HTTP/1.1 302 Found\r\nLocation: {where}\r\nContent-Length: 0\r\n\r\n"
+                connection.sendall(head.encode())
+
+        thread = threading.Thread(target=redirect)
+        thread.start()
+        with pytest.raises(SourceError, match=f"the server at 127.0.0.1:{port} is no XELA server"):
+            open_source(f"xela://127.0.0.1:{port}").open()
+        thread.join()

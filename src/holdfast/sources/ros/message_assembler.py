@@ -9,12 +9,13 @@ from holdfast.sensors import Sensor, sensor
 from holdfast.sensors.types import Unit
 from holdfast.sources.assembler import Assembler, Device
 from holdfast.sources.base import Arrival
+from holdfast.sources.timeline import is_plausible
 from holdfast.sources.xela.decoder import no_calibration
 from holdfast.sources.xela.devices import xela_devices
 
 _STAMPS: tuple[Callable[[DeviceSample], float | None], ...] = (
-    lambda sample: sample.time,
-    lambda sample: sample.stamp,
+    lambda sample: _plausible(sample.time),
+    lambda sample: _plausible(sample.stamp),
 )
 """Stamps of a sample, the best one first: the device's own, and that in the header."""
 
@@ -156,3 +157,8 @@ def has_taxels(sample: DeviceSample) -> bool:
 
 def _number(sample: DeviceSample) -> int:
     return 1 if sample.number is None else sample.number
+
+
+def _plausible(time: float | None) -> float | None:
+    """Return a time, or None instead of one that is thousands of years away."""
+    return time if time is not None and is_plausible(time) else None

@@ -138,6 +138,7 @@ class TopicSource(DeviceSource):
             self._notify(now, *notices)
         for message in messages:
             self._assemble(message)
+        self._note_clock()
 
     def _first_messages(self, deadline: float) -> tuple[list[ReceivedMessage], list[DeviceSample]]:
         """Return the first messages, until a device repeats, and the first sample of each."""

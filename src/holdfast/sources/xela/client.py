@@ -1,11 +1,17 @@
 """Connection to XELA's server. This module owns the socket and the clock."""
 
 import logging
+import socket
 import time
 from collections.abc import Mapping
 from contextlib import suppress
 
-from websockets.exceptions import ConnectionClosed, ConnectionClosedOK, WebSocketException
+from websockets.exceptions import (
+    ConnectionClosed,
+    ConnectionClosedOK,
+    InvalidHandshake,
+    WebSocketException,
+)
 from websockets.sync.client import ClientConnection, connect
 
 from holdfast.errors import SourceError
@@ -19,6 +25,8 @@ OPEN_TIMEOUT = 5.0
 """Longest wait for the first packet with samples [s]."""
 CONNECT_TIMEOUT = 1.0
 """Longest time of one attempt to connect [s]; a read may take longer than its timeout by this."""
+MIN_HANDSHAKE_TIME = 0.1
+"""Minimum time for the handshake, even if the connection took longer [s]."""
 SILENCE_TIMEOUT = 1.5
 """A connected server without a new sample for this time is silent [s]; it may pause for 1 s."""
 PING_INTERVAL, PING_TIMEOUT = 10.0, 5.0
@@ -82,6 +90,7 @@ class XelaSource(DeviceSource):
         first, *others = self._decoder.decode(text, received)
         first = first._replace(notices=(*notices, *first.notices))
         self._queue([first, *others], received)
+        self._note_clock()
 
     def _new_decoder(self) -> XelaDecoder:
         names, calibrated, sensor = self._options
@@ -169,15 +178,23 @@ class XelaSource(DeviceSource):
 
 
 def _connect(place: Place) -> ClientConnection:
-    return connect(
-        f"ws://{place}",
-        compression=None,
-        proxy=None,
-        open_timeout=CONNECT_TIMEOUT,
-        ping_interval=PING_INTERVAL,
-        ping_timeout=PING_TIMEOUT,
-        close_timeout=CONNECT_TIMEOUT,
-        max_size=MAX_PACKET_SIZE,
-        max_queue=MAX_QUEUED_PACKETS,
-        logger=_LOGGER,
-    ).__enter__()
+    """Connect to a server. A redirect to another server is refused."""
+    deadline = time.monotonic() + CONNECT_TIMEOUT
+    address = socket.create_connection((place.host, place.port), CONNECT_TIMEOUT)
+    address.settimeout(None)
+    try:
+        return connect(
+            f"ws://{place}",
+            sock=address,  # websockets follows redirects only with sockets of its own
+            compression=None,
+            proxy=None,
+            open_timeout=max(deadline - time.monotonic(), MIN_HANDSHAKE_TIME),
+            ping_interval=PING_INTERVAL,
+            ping_timeout=PING_TIMEOUT,
+            close_timeout=CONNECT_TIMEOUT,
+            max_size=MAX_PACKET_SIZE,
+            max_queue=MAX_QUEUED_PACKETS,
+            logger=_LOGGER,
+        ).__enter__()
+    except ValueError as cause:
+        raise InvalidHandshake(str(cause)) from cause

@@ -10,9 +10,8 @@ import numpy as np
 import numpy.typing as npt
 
 from holdfast.sources.assembler import SEQUENCE_PERIOD
+from holdfast.sources.timeline import is_plausible
 
-MIN_TIME, MAX_TIME = -1e11, 1e11
-"""Valid stamps: 3,000 years before and after 1970 [s]. Doubles still resolve 0.1 ms there."""
 ROUTINE_TYPE = "routine"
 """Type of packets with samples; packets have a type since version 1.8."""
 MAX_NAME_LENGTH = 64
@@ -162,7 +161,7 @@ def _value(fields: Mapping[str, msgspec.Raw], name: str) -> Any:  # noqa: ANN401
 def _stamp(time: object) -> float:
     if isinstance(time, bool) or not isinstance(time, int | float):
         raise InvalidPacket("its time is no number")
-    if not MIN_TIME < time < MAX_TIME:
+    if not is_plausible(time):
         raise InvalidPacket("its time is thousands of years away")
     return float(time)
 

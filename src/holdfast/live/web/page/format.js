@@ -28,6 +28,7 @@ const FAULTS = {
   packet_gap: "packets missing",
   late: "late",
   clock_jump: "clock jumped",
+  rate: "rate changed",
 };
 
 /** Return the key of a state in class names, shapes and colours: "no-contact". */

@@ -1,0 +1,89 @@
+import numpy as np
+import pytest
+
+from holdfast.contact import ContactState, Fault
+from holdfast.live.rate import RateMonitor
+from holdfast.live.stream_detector import ArrivalDetector
+
+from . import build
+
+RATE = 150.0
+FINGERS = ("thumb", "index")
+
+
+def times_at(*parts):
+    """Times of samples, given (rate, seconds) of each part."""
+    steps = [np.full(round(rate * seconds), 1 / rate) for rate, seconds in parts]
+    return np.cumsum(np.concatenate(steps))
+
+
+def first_change(times, rate=RATE):
+    """When a monitor reports another rate, and its notices."""
+    monitor = RateMonitor(rate, FINGERS)
+    notices, changed = [], []
+    for time in times.tolist():
+        notice = monitor.update(dict.fromkeys(FINGERS), time)
+        notices += [notice] if notice else []
+        if monitor.changed:
+            changed.append(time)
+    return changed[0] if changed else None, notices
+
+
+@pytest.mark.parametrize("rate", [30.0, 100.0, 150.0, 1000.0])
+@pytest.mark.parametrize("factor", [1 / 3, 0.5, 0.7, 1.5, 3.0])
+def test_another_rate_is_reported_within_a_second(rate, factor):
+    found, notices = first_change(times_at((rate, 2.0), (factor * rate, 3.0)), rate)
+    assert 2.0 < found < 3.05
+    assert len(notices) == 1
+    assert notices[0].endswith(
+        f"samples per second, {rate:.3g} at the start: open the source again"
+    )
+
+
+@pytest.mark.parametrize("factor", [0.85, 1.0, 1.15])
+def test_nearly_the_same_rate_is_not_reported(factor):
+    assert first_change(times_at((RATE, 2.0), (factor * RATE, 5.0))) == (None, [])
+
+
+def test_jitter_pauses_and_single_losses_are_not_reported():
+    generator = np.random.default_rng(0)
+    times = times_at((RATE, 20.0))
+    times = np.sort(times + generator.uniform(-0.4, 0.4, len(times)) / RATE)
+    times = times[generator.random(len(times)) > 0.05]  # every 20th packet is lost
+    times[times > 5] += 3.0  # a pause
+    assert first_change(times) == (None, [])
+
+
+def test_the_rate_may_return():
+    monitor = RateMonitor(RATE, FINGERS)
+    for time in times_at((RATE, 1.0), (50.0, 1.0)).tolist():
+        monitor.update({"thumb": None}, time)
+    assert monitor.changed == {"thumb"}
+    for time in (2.0 + times_at((RATE, 1.0))).tolist():
+        monitor.update({"thumb": None}, time)
+    assert monitor.changed == set()
+
+
+def test_no_finger_is_stable_once_the_rate_fell():
+    recording = build.grasp()
+    sensors = build.Script.of(recording).sensors
+    detector = ArrivalDetector(build.model(), sensors, watch_rate=True)
+    arrivals = build.arrivals_of(recording)
+    for arrival in arrivals[:700]:
+        detector.update(arrival)
+    assert detector.notices == []
+    begin, after = arrivals[700].time, []
+    for k, arrival in enumerate(arrivals[700:850]):
+        slow = arrival._replace(time=begin + k / 50)
+        after += [one.estimate for one in detector.update(slow) if k > 50]
+    assert len(detector.notices) == 1
+    assert {one.state for one in after} == {ContactState.UNKNOWN}
+    assert all(Fault.RATE in finger.faults for one in after for finger in one.fingers.values())
+
+
+def test_a_recording_is_not_watched():
+    detector = ArrivalDetector(build.model(), build.Script.of(build.grasp()).sensors)
+    for k, arrival in enumerate(build.arrivals_of(build.grasp())[:400]):
+        (*_, last) = detector.update(arrival._replace(time=k / (150 if k < 200 else 50))) or [None]
+    assert Fault.RATE not in last.estimate.fingers["thumb"].faults
+    assert detector.notices == []
