@@ -22,8 +22,7 @@ def first_change(times, rate=RATE):
     monitor = RateMonitor(rate, FINGERS)
     notices, changed = [], []
     for time in times.tolist():
-        notice = monitor.update(dict.fromkeys(FINGERS), time)
-        notices += [notice] if notice else []
+        notices += monitor.update(dict.fromkeys(FINGERS), time)
         if monitor.changed:
             changed.append(time)
     return changed[0] if changed else None, notices

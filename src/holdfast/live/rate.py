@@ -47,27 +47,26 @@ class RateMonitor:
         self._windows = {name: _Window() for name in fingers}
         self.changed: set[str] = set()
 
-    def update(self, samples: Mapping[str, object], time: float) -> str | None:
-        """Update the rates of the fingers with a sample at a time [s]; return a notice or None."""
-        notice = None
+    def update(self, samples: Mapping[str, object], time: float) -> list[str]:
+        """Update the rates of the fingers with a sample at a time [s]; return new notices."""
+        notices: list[str] = []
         for name in samples:
             rate = self._windows[name].update(time, self._interval, self._longest_step)
             if rate is not None:
-                notice = self._compare(name, rate) or notice
-        return notice
+                notices += self._compare(name, rate)
+        return notices
 
-    def _compare(self, name: str, rate: float) -> str | None:
+    def _compare(self, name: str, rate: float) -> list[str]:
         if abs(rate / self._rate - 1) <= RATE_TOLERANCE:
             self.changed.discard(name)
-            return None
-        first = not self.changed
+            return []
+        before = bool(self.changed)
         self.changed.add(name)
-        if not first:
-            return None
-        return (
+        text = (
             f"{name} sends {rate:.3g} samples per second, {self._rate:.3g} at the start: "
             "open the source again"
         )
+        return [] if before else [text]
 
 
 class _Window:

@@ -91,8 +91,7 @@ class ArrivalDetector:
         sensors: of the source, by module.
         strict: refuse a rate that is not the model's instead of resampling.
         ignore: taxels by finger, from 0, that contribute nothing and cause no fault.
-        watch_rate: report the fault RATE while the rate of a finger differs by more than 20 %
-            from that at the start. A recording has the same estimates without it.
+        watch_rate: report the fault RATE while a finger has another rate than at the start.
 
     Attributes:
         fingers: sensor of each finger that the model uses.
@@ -253,10 +252,8 @@ class ArrivalDetector:
                 yield StreamEstimate(self._with_stream_faults(self._last), faulty)
 
     def _watch(self, monitor: RateMonitor, samples: Samples, instant: float) -> None:
-        """Update the rates of the fingers, and report a change as a fault and a notice."""
-        notice = monitor.update(samples, instant)
-        if notice is not None:
-            self.notices.append(notice)
+        """Report a change of the rate of fingers as a fault and a notice."""
+        self.notices += monitor.update(samples, instant)
         for name in monitor.changed & samples.keys():
             self._faults[name] = (*self._faults.get(name, ()), Fault.RATE)
 
