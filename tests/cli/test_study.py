@@ -1,4 +1,5 @@
 import json
+from dataclasses import replace
 
 import msgspec
 import pytest
@@ -60,13 +61,40 @@ def test_own_recordings(capsys, data, tmp_path):
     assert {path.name for path in out.iterdir()} == {
         "report.html", "study.json", "tables", "figures", "work",
     }  # fmt: skip
-    assert json.loads((out / "study.json").read_text())["left_out"][0].startswith(
-        "real recordings, because none were found. Download them from github.com/"
-    )
+    summary = json.loads((out / "study.json").read_text())
+    assert summary["left_out"] == []
+    assert summary["data"]["real"] == summary["data"]["main"]
     assert "already holds a study" in refusal(capsys, data, "--out", out, "--quick")
     code, printed, _ = run(capsys, data, "--out", out, "--quick", "--force", "--json")
     assert code == 0
     assert json.loads(printed) == json.loads((out / "study.json").read_text())
+
+
+def test_recordings_of_the_twin_are_not_the_real_ones(data, tmp_path):
+    """Without HOLDFAST_DATA there are none; own recordings of a hand are real."""
+    settings = {"seed": 0, "tare": "0.5", "jobs": 1, "quick": True}
+    plan, left_out = verb._plan(data, tmp_path / "out", **settings)
+    assert (plan.real, left_out) == (plan.main, [])
+    recordings = [synthetic_recording(f"grasp-{k}", k) for k in range(2)]
+    twin = [replace(each, metadata={"source": "twin"}) for each in recordings]
+    plan, left_out = verb._plan(written(tmp_path / "twin", twin), tmp_path / "out", **settings)
+    assert plan.real is None
+    assert left_out[0].startswith(
+        "real recordings, because none were found. Download them from github.com/"
+    )
+
+
+def test_the_table_of_real_recordings_fits_a_terminal(capsys):
+    from holdfast.study.comparison.real_counts import AUC, CALLED_STABLE, MISSED
+
+    assert {AUC, CALLED_STABLE} == set(verb.PRINTED_COLUMNS["real"])
+    keys = {"method": "FFT band energy (Fernandez 2014)", "trained on": "the others"}
+    rows = [Row({**keys, "figure": figure}, 0.5) for figure in (AUC, CALLED_STABLE, MISSED)]
+    table = ResultTable("real", "Real", "", rows, ("method", "trained on"), digits_of={AUC: 2})
+    verb._print_result_table(table)
+    printed = capsys.readouterr().out.splitlines()
+    assert [line.split()[-2:] for line in printed[2:3]] == [["0.50", "0.5"]]
+    assert max(map(len, printed)) <= 80
 
 
 def test_the_twin_simulates_the_recordings_first(capsys, monkeypatch, tmp_path):

@@ -20,6 +20,7 @@ if TYPE_CHECKING:
 
 PRINTED_COLUMNS: dict[str, tuple[str, ...]] = {
     "confusion": (),
+    "real": ("AUC", "stable called STABLE [%]"),
     "methods": ("accuracy [%]", "FDR [%]", "FNR [%]", "AUC"),
     "events": ("missed at 50 ms [%]", "missed at 200 ms [%]", "false alarms per minute"),
 }
@@ -102,12 +103,15 @@ def study(
 
     Write OUT/report.html, every table as CSV, JSON, LaTeX and Markdown, every figure as SVG and
     PNG, and study.json. Finished tasks are kept in OUT/work and simulated recordings in OUT/data,
-    so the same command continues a study that was stopped. Real recordings are read from
-    HOLDFAST_DATA, or from ../shared/data, if they exist.
+    so the same command continues a study that was stopped. Of real recordings, imported or your
+    own, the study compares builtin:any, as it ships and adapted, with every method trained on the
+    other recordings. With recordings of the twin, the real ones are read from HOLDFAST_DATA, or
+    from ../shared/data, if they exist.
 
     Example:
       holdfast study --twin --quick --out quick/
       holdfast study --twin --out study/
+      holdfast study real/ --tare first --quick --out real-study/
       holdfast study recordings/ --out mine/ --engine dask:tcp://10.0.0.1:8786
     """
     from holdfast.study.run import run_study
@@ -181,7 +185,10 @@ def _check_arguments(
 def _plan(
     data: Path | None, out: Path, seed: int, tare: str, jobs: int, *, quick: bool
 ) -> "tuple[StudyPlan, list[str]]":
-    """Return the plan and what is left out; simulate the recordings if there is no `data`."""
+    """Return the plan and what is left out; simulate the recordings if there is no `data`.
+
+    Own recordings that the twin did not simulate are the real recordings of the study.
+    """
     from holdfast.study.plan import StudyPlan, scan_corpus
 
     if data is None:
@@ -189,6 +196,8 @@ def _plan(
         corpora = twin_corpora(folder, seed, quick=quick, jobs=jobs, tare=tare)
     else:
         corpora = {"main": scan_corpus("main", data, tare)}
+        if not corpora["main"].is_simulated:
+            return StudyPlan(corpora, corpora["main"], quick, seed), []
     real, left_out = real_corpus(out / "data" / "real")
     return StudyPlan(corpora, real, quick, seed), left_out
 

@@ -26,7 +26,7 @@ ROLES = {
     "glitch-0": "other objects, without glitches of the hand's controller",
     "glitch-1": "other objects, with 1 glitch a minute",
     "glitch-7": "other objects, with 7 glitches a minute",
-    "real": "recordings of a real gripper",
+    "real": "recordings of a real hand or gripper",
 }
 """What the recordings of each role are."""
 

@@ -58,6 +58,11 @@ class Corpus(msgspec.Struct, frozen=True):
             )
         return Dataset([paths[name] for name in self.recordings])
 
+    @property
+    def is_simulated(self) -> bool:
+        """Whether the twin made the recordings."""
+        return self.load()[0].metadata.get("source") == "twin"
+
 
 class StudyPlan(msgspec.Struct, frozen=True):
     """Everything that determines the tasks of a study.

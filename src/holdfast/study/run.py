@@ -102,7 +102,7 @@ def run_study(
     }
     seconds = {"data": made_in, "study": time.perf_counter() - start}
     summary = _summary(plan, seconds, len(tasks), [*left_out, *whole_hand_note(plan)])
-    sections = report_sections(outputs, environment.run_notes(summary), twin=_is_twin(plan))
+    sections = report_sections(outputs, environment.run_notes(summary), twin=plan.main.is_simulated)
     write_study(out, TITLE, environment.report_facts(summary), sections, summary, force=force)
     return [table for section in sections for table in section.tables]
 
@@ -113,10 +113,6 @@ def whole_hand_note(plan: StudyPlan) -> list[str]:
         return []
     titles = ", ".join(method.title for method in METHODS.values() if method.whole_hand)
     return [f"{titles}, because only the {plan.main.fingers[0]} has labels of both classes."]
-
-
-def _is_twin(plan: StudyPlan) -> bool:
-    return plan.main.load()[0].metadata.get("source") == "twin"
 
 
 def _summary(
