@@ -142,4 +142,4 @@ def _hand_probability(fingers: Sequence[FingerDecisions]) -> Array:
     in_contact = (states == STABLE) | (states == UNSTABLE)
     held = enough_contacts(in_contact.sum(axis=0), len(fingers))
     counted = np.where(held, in_contact, states != UNKNOWN)
-    return np.where(counted, probability, 1.0).min(axis=0)
+    return np.asarray(np.where(counted, probability, 1.0).min(axis=0))
