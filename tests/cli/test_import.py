@@ -188,7 +188,8 @@ def test_refusals(capsys, table, tmp_path):
     )
     for path in (empty, text):
         assert refusal(capsys, path, out) == (
-            f"{path} is of no supported format; supported are {formats} (choose one with --format)"
+            f"{path} is of no supported format; supported are {formats} (choose one with --format; "
+            "for a CSV file of any other logger give --sensor and --columns)"
         )
     assert refusal(capsys, text, out, "--format", "bag") == (
         f"unknown format 'bag'; there are {formats}"
@@ -208,3 +209,49 @@ def test_real_uskin(capsys, data_folder, tmp_path):
         capsys, data_folder / "uskin_pick_move", tmp_path, "--format", "uskin-pick-move"
     )
     assert (document["n_recordings"], document["n_modules"], document["n_samples"]) == (5, 10, 3272)
+
+
+class TestASensorOfOnesOwn:
+    @pytest.fixture
+    def press(self, tmp_path):
+        names = [f"F{axis}{k}" for k in range(9) for axis in "xyz"]
+        rows = [[str(10 * k), *(str(k + c) for c in range(27))] for k in range(30)]
+        path = tmp_path / "press.csv"
+        path.write_text("\n".join(map(",".join, [["timestamp", *names], *rows])) + "\n")
+        return path
+
+    @pytest.fixture
+    def grid(self, capsys, tmp_path):
+        assert main(["sensors", "--template", "3x3", "--pitch", "4.7"]) == 0
+        (tmp_path / "sensor.json").write_text(capsys.readouterr().out)
+        return tmp_path / "sensor.json"
+
+    def test_from_a_file_to_a_recording(self, capsys, press, grid, tmp_path):
+        assert main(["import", str(press), str(tmp_path / "out"), "--sensor", str(grid)]) == 0
+        err = capsys.readouterr().err
+        assert "the same as --columns 'time=timestamp:ms,taxels=F{axis}{taxel}'" in err
+        module = load_recording(tmp_path / "out" / "press.parquet").modules["finger1"]
+        assert (module.sensor.name, module.rate) == ("grid-3x3", pytest.approx(100.0))
+
+    def test_a_sensor_by_module_and_columns(self, press, grid, tmp_path):
+        words = ["--sensor", f"finger1={grid}", "--columns", "time=timestamp,taxels=F{axis}{taxel}"]
+        assert main(["import", str(press), str(tmp_path / "out"), *words]) == 0
+        assert (tmp_path / "out" / "press.parquet").exists()
+
+    def test_without_a_sensor(self, capsys, press, tmp_path):
+        assert main(["import", str(press), str(tmp_path / "out")]) == 2
+        err = capsys.readouterr().err
+        assert "the sensor of finger1 (9 taxels) is missing: --sensor NAME or --sensor FILE" in err
+        assert not (tmp_path / "out").exists()
+
+    @pytest.mark.parametrize(
+        ("words", "text"),
+        [
+            (("--sensor", "skin"), "unknown sensor 'skin'; built in are uskin-curved, uskin-4x4"),
+            (("--sensor", "gtac", "--sensor", "gtac"), "--sensor: two sensors given for all mod"),
+            (("--sensor", "none.json"), "none.json: No such file or directory"),
+            (("--columns", "F"), "--columns: time=COLUMN, taxels=COLUMN, signs=COLUMN"),
+        ],
+    )
+    def test_wrong_options(self, capsys, press, tmp_path, words, text):
+        assert refusal(capsys, press, tmp_path / "out", *words).startswith(text)

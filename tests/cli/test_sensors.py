@@ -133,3 +133,30 @@ def test_refusals(capsys, tmp_path):
 
 def test_ranges():
     assert _ranges([5, 3, 4, 9]) == "3-5, 9"
+
+
+class TestTemplate:
+    def test_it_is_read_back(self, capsys, tmp_path):
+        words = ["--template", "2X3", "--pitch", "4.7", "--rate", "60", "--unit", "N"]
+        assert main(["sensors", *words]) == 0
+        out = capsys.readouterr().out
+        assert max(map(len, out.splitlines())) < 80
+        (tmp_path / "s.json").write_text(out)
+        made = Sensor.from_json(tmp_path / "s.json")
+        assert (made.name, made.n_taxels, made.rate, made.unit) == ("grid-2x3", 6, 60.0, "N")
+        assert made.positions[0].tolist() == [-0.0047, 0.00235, 0.0]
+
+    @pytest.mark.parametrize(
+        ("words", "text"),
+        [
+            (("--template", "3"), "--template: ROWSxCOLUMNS such as 3x3 expected, '3' given"),
+            (("--template", "0x3"), "--template: ROWSxCOLUMNS such as 3x3 expected, '0x3' given"),
+            (("--template", "3x3", "--pitch", "0"), "--pitch: a distance above 0 mm expected, 0"),
+            (("--template", "3x3", "--rate", "-1"), "grid-3x3: a rate above 0 Hz expected, -1.0"),
+            (("--template", "3x3", "--unit", "kg"), "--unit: count or N expected, 'kg' given"),
+            (("gtac", "--template", "3x3"), "--template makes a new sensor; 'gtac' given as well"),
+        ],
+    )
+    def test_refusals(self, capsys, words, text):
+        assert main(["sensors", *words]) == 2
+        assert text in capsys.readouterr().err

@@ -1,7 +1,7 @@
 """`holdfast import`: recordings from other formats, and from files that were cut off."""
 
 import tempfile
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager, suppress
 from dataclasses import dataclass
 from enum import StrEnum
@@ -11,11 +11,13 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from holdfast.cli.options import JsonOption
+from holdfast.cli.sensors import find_sensor
 from holdfast.cli.terminal.console import print_json, print_line, print_message, print_table
 from holdfast.cli.terminal.progress import progress
 
 if TYPE_CHECKING:
     from holdfast.recordings import Recording
+    from holdfast.sensors import Sensor
 
 
 class RecordingFormat(StrEnum):
@@ -50,6 +52,23 @@ def import_(
         str | None,
         typer.Option("--format", help="Format of the input; detected from the content by default."),
     ] = None,
+    sensor: Annotated[
+        list[str] | None,
+        typer.Option(
+            "--sensor",
+            metavar="NAME|FILE.json",
+            help="Sensor of a CSV file: a name of `holdfast sensors` or a file; MODULE=NAME for "
+            "one module. May be repeated.",
+        ),
+    ] = None,
+    columns: Annotated[
+        str | None,
+        typer.Option(
+            help="Columns of a CSV file: time=COLUMN[:ms],taxels=PATTERN[,label=COLUMN], where "
+            "PATTERN is like F{axis}{taxel}.",
+            show_default="guessed from the header",
+        ),
+    ] = None,
     no_labels: Annotated[
         bool, typer.Option("--no-labels", help="Do not import the labels of the input.")
     ] = False,
@@ -68,14 +87,21 @@ def import_(
     everything up to the cut is recovered. Write OUT/NAME.parquet for each recording. If one of
     them fails, none is written.
 
+    A CSV file of any other logger needs its sensor. Its columns are guessed from the header; the
+    guess is shown first, as the text of --columns, which corrects it
+    (docs/tutorials/own-sensor.md).
+
     Example:
       holdfast import data/uskin_pick_move real/
       holdfast import log.csv real/ --format xela-log --no-labels
+      holdfast import press.csv real/ --sensor sensor.json
+      holdfast import press.csv real/ --sensor anyskin --columns 'time=t:ms,taxels=m{taxel}{axis}'
       holdfast import cut.mcap recovered/
     """
     if out.exists() and not out.is_dir():
         raise NotADirectoryError(20, "is a file; a folder expected", str(out))
-    recordings = _recordings(path, data_format, labels=not no_labels)
+    known = _sensors(sensor or ())
+    recordings = _recordings(path, data_format, known, columns, labels=not no_labels)
     with _staging_folder(out) as folder:
         imported = [
             _write(recording, folder, out, suffix, force)
@@ -86,12 +112,37 @@ def import_(
     _print(imported, out, as_json)
 
 
-def _recordings(path: Path, data_format: str | None, *, labels: bool) -> Iterator["Recording"]:
+def _recordings(
+    path: Path,
+    data_format: str | None,
+    sensors: "Mapping[str, Sensor]",
+    columns: str | None,
+    *,
+    labels: bool,
+) -> Iterator["Recording"]:
     from holdfast.io import import_recordings
 
-    if data_format is None and (files := _own_files(path)):
+    foreign = data_format is not None or sensors or columns is not None
+    if not foreign and (files := _own_files(path)):
         return (_load(file, labels=labels) for file in files)
-    return import_recordings(path, data_format, labels=labels)
+    return import_recordings(
+        path, data_format, labels=labels, sensors=sensors, columns=columns, report=print_message
+    )
+
+
+def _sensors(given: Sequence[str]) -> "dict[str, Sensor]":
+    """Return the sensors of `--sensor` by module; `"*"` is that of all others.
+
+    Raises:
+        ValueError: a module has two sensors, or a sensor is unknown or not valid.
+    """
+    sensors: dict[str, Sensor] = {}
+    for text in given:
+        module, equals, name = text.rpartition("=")
+        if (key := module if equals else "*") in sensors:
+            raise ValueError(f"--sensor: two sensors given for {module or 'all modules'}")
+        sensors[key] = find_sensor(name)
+    return sensors
 
 
 def _own_files(path: Path) -> list[Path]:

@@ -1,5 +1,6 @@
-"""`holdfast sensors`: the built-in sensors and hands."""
+"""`holdfast sensors`: the built-in sensors and hands, and files of sensors of one's own."""
 
+import math
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
@@ -20,6 +21,19 @@ def sensors(
     base: Annotated[
         str | None, typer.Option(help="Link of the .urdf file that is the fingertip frame.")
     ] = None,
+    template: Annotated[
+        str | None,
+        typer.Option(
+            metavar="ROWSxCOLUMNS", help="Print the JSON file of a flat grid, to be edited."
+        ),
+    ] = None,
+    pitch: Annotated[
+        float, typer.Option(help="With --template: distance between neighbouring taxels [mm].")
+    ] = 5.0,
+    rate: Annotated[float, typer.Option(help="With --template: nominal sample rate [Hz].")] = 100.0,
+    unit: Annotated[
+        str, typer.Option(help="With --template: unit of the readings, count or N.")
+    ] = "count",
     plot: PlotOption = None,
     force: ForcePlotOption = False,
     as_json: JsonOption = False,
@@ -29,11 +43,20 @@ def sensors(
     For a sensor: its taxels, unit, rate, limits and normal. For a hand: its modules and their
     indices in the flat packet. The figure shows the taxels.
 
+    --template prints the file of a sensor of your own: a flat grid, row by row from the top left,
+    with z along the outward normal (docs/sensors.md).
+
     Example:
       holdfast sensors
       holdfast sensors allegro-uskin --plot hand.svg
       holdfast sensors fingertip.urdf --base tip_link --json
+      holdfast sensors --template 3x3 --pitch 4.7 > sensor.json
     """
+    if template is not None:
+        if name is not None:
+            raise ValueError(f"--template makes a new sensor; {name!r} given as well")
+        _print_template(template, pitch, rate, unit)
+        return
     if name is None:
         _refuse_options(plot, base)
         _show_all(as_json)
@@ -42,6 +65,59 @@ def sensors(
     if plot is not None:
         _draw(found, plot, force)
     _show_one(found, as_json)
+
+
+def find_sensor(name: str) -> "Sensor":
+    """Return a built-in sensor by its name, or the sensor in a JSON file.
+
+    Raises:
+        ValueError: the name is unknown, or the file is not valid.
+        OSError: the file cannot be read.
+    """
+    from holdfast import sensors as known
+
+    if Path(name).suffix.lower() == ".json":
+        return known.Sensor.from_json(name)
+    if name in known.built_in_sensors():
+        return known.sensor(name)
+    raise ValueError(
+        f"unknown sensor {name!r}; built in are {', '.join(known.built_in_sensors())}; or give a "
+        ".json file (`holdfast sensors --template 3x3 > sensor.json` makes one)"
+    )
+
+
+def _print_template(grid: str, pitch: float, rate: float, unit: str) -> None:
+    """Print the JSON of a flat grid, one line for each taxel."""
+    import json
+
+    from holdfast.sensors import flat_sensor
+
+    rows, _, columns = grid.lower().partition("x")
+    if not (rows.isdecimal() and columns.isdecimal() and int(rows) * int(columns)):
+        raise ValueError(f"--template: ROWSxCOLUMNS such as 3x3 expected, {grid!r} given")
+    if not 0 < pitch < math.inf:
+        raise ValueError(f"--pitch: a distance above 0 mm expected, {pitch:g} given")
+    if unit not in ("count", "N"):
+        raise ValueError(f"--unit: count or N expected, {unit!r} given")
+    made = flat_sensor(
+        f"grid-{grid.lower()}",
+        int(rows),
+        int(columns),
+        1e-3 * pitch,
+        rate=rate,
+        unit="N" if unit == "N" else "count",
+    )
+    fields = [f"{json.dumps(key)}: {_lines(value)}" for key, value in made.to_dict().items()]
+    print_line("{\n  " + ",\n  ".join(fields) + "\n}")
+
+
+def _lines(value: object) -> str:
+    """Return JSON, with one line for each element of an array of arrays."""
+    import json
+
+    if isinstance(value, list) and isinstance(value[0], list):
+        return "[\n    " + ",\n    ".join(json.dumps(each) for each in value) + "\n  ]"
+    return json.dumps(value)
 
 
 def _refuse_options(plot: Path | None, base: str | None) -> None:

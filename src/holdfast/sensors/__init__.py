@@ -1,6 +1,12 @@
 """Sensors and hands: the pose of each taxel, built-in layouts, and XELA's model names."""
 
-from holdfast.sensors.built_in import built_in_hands, built_in_sensors, hand, sensor
+from holdfast.sensors.built_in import (
+    built_in_hands,
+    built_in_sensors,
+    flat_sensor,
+    hand,
+    sensor,
+)
 from holdfast.sensors.types import Hand, HandModule, Sensor
 
 __all__ = [
@@ -9,6 +15,7 @@ __all__ = [
     "Sensor",
     "built_in_hands",
     "built_in_sensors",
+    "flat_sensor",
     "hand",
     "sensor",
 ]

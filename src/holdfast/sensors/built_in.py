@@ -6,7 +6,7 @@ from importlib import resources
 
 import numpy as np
 
-from holdfast.sensors.types import Array, Hand, HandModule, Sensor
+from holdfast.sensors.types import Array, Hand, HandModule, Sensor, Unit
 
 UINT16 = (0.0, 65535.0)
 """Smallest and largest reading of XELA's sensors [count]."""
@@ -54,6 +54,36 @@ def built_in_sensors() -> tuple[str, ...]:
 def built_in_hands() -> tuple[str, ...]:
     """Return the names of the built-in hands."""
     return tuple(HANDS)
+
+
+def flat_sensor(
+    name: str,
+    n_rows: int,
+    n_columns: int,
+    pitch: float,
+    rate: float = 100.0,
+    unit: Unit = "count",
+) -> Sensor:
+    """Return a flat grid of taxels, row by row from the top left, with z as the normal.
+
+    Args:
+        name: name of the sensor.
+        n_rows: number of rows.
+        n_columns: number of taxels in a row.
+        pitch: distance between neighbouring taxels [m].
+        rate: nominal sample rate [Hz].
+        unit: unit of the readings.
+
+    Raises:
+        ValueError: a number or the unit is not valid.
+
+    Example:
+        >>> flat_sensor("mine", 3, 3, 0.0047).positions[0].tolist()
+        [-0.0047, 0.0047, 0.0]
+    """
+    positions = np.round(_grid(n_rows, n_columns, pitch, pitch), 9)
+    rotations = np.tile(np.eye(3), (len(positions), 1, 1))
+    return Sensor(name, positions, rotations, np.array([0.0, 0.0, 1.0]), rate, unit)
 
 
 @cache

@@ -46,7 +46,7 @@ def test_two_modules_with_labels_of_their_own(tmp_path):
 def test_the_sensor_can_be_given(tmp_path):
     write(tmp_path / "a.csv", [], ["time", *ONE], [[0, *[1] * 15]])
     with pytest.raises(
-        RecordingError, match=r"the sensor of finger1 is missing: a line '# sensor: finger"
+        RecordingError, match=r"the sensor of finger1 \(5 taxels\) is missing: --sensor NAME or"
     ):
         list(import_recordings(tmp_path / "a.csv"))
     given = {"finger1": sensor("anyskin")}
@@ -76,8 +76,12 @@ def test_the_sensor_can_be_given(tmp_path):
             [0, *[1] * 16],
             "unknown column 'temperature'; 'time', 'MODULE.t01.x'",
         ),
-        (["# sensor: anyskin"], ["t", *ONE], [0, *[1] * 15], "unknown column 't'; 'time', 'MOD"),
-        (["# sensor: anyskin"], ["time"], [0], "no taxel columns such as 'thumb.t01.x'"),
+        (
+            ["# sensor: anyskin"],
+            ["time"],
+            [0],
+            "no taxel columns such as x1, y1, z1, x2 among 'time'",
+        ),
         (
             ["# sensor: anyskin"],
             ["time", *ONE, "label"],
@@ -108,3 +112,91 @@ def test_bad_input_gives_one_line(tmp_path, comments, names, row, text):
         list(import_recordings(path, "csv"))
     assert str(caught.value).startswith(str(path))
     assert "\n" not in str(caught.value)
+
+
+OTHER = [f"F{axis}{k}" for k in range(5) for axis in "xyz"]
+ROWS = [[f"{10 * k}", *range(k, k + 15), "cold", "stable"] for k in range(4)]
+ANY = {"*": sensor("anyskin")}
+
+
+def write_other(path, rows=ROWS):
+    write(path, [], ["stamp", *OTHER, "note", "label"], rows)
+    return path
+
+
+def test_a_file_of_another_logger_is_guessed_and_reported(tmp_path):
+    texts = []
+    path = write_other(tmp_path / "a.csv")
+    (recording,) = import_recordings(path, sensors=ANY, report=texts.append)
+    module = recording.modules["finger1"]
+    np.testing.assert_allclose(module.times, [0.0, 0.01, 0.02, 0.03])
+    np.testing.assert_array_equal(module.readings[2, 4], [14, 15, 16])
+    assert module.label_states.tolist() == [STABLE] * 4
+    assert texts == [
+        "a.csv: the columns are a guess: 100 Hz, finger1 5 taxels; columns that are not used: "
+        "note\n  the same as --columns 'time=stamp:ms,taxels=F{axis}{taxel},label=label' (give "
+        "this option to correct it)"
+    ]
+    option = texts[0].split("'")[1]
+    (again,) = import_recordings(path, sensors=ANY, columns=option, report=pytest.fail)
+    assert again.digest == recording.digest
+
+
+def test_a_guess_is_reported_once_for_equal_files(tmp_path):
+    for name in ("a.csv", "b.csv"):
+        write_other(tmp_path / name)
+    texts = []
+    assert len(list(import_recordings(tmp_path, sensors=ANY, report=texts.append))) == 2
+    assert len(texts) == 1
+
+
+def test_columns_of_two_modules_with_sensors_of_their_own(tmp_path):
+    names = [f"{m}_{k}_{a}" for m in ("left", "right") for k in range(5) for a in "xyz"]
+    write(tmp_path / "a.csv", [], ["t", *names], [[k / 50, *range(30)] for k in range(3)])
+    given = {"left": sensor("anyskin"), "*": sensor("anyskin")}
+    (recording,) = import_recordings(tmp_path / "a.csv", sensors=given)
+    assert list(recording.modules) == ["left", "right"]
+    assert recording.modules["right"].readings[0, 0].tolist() == [15, 16, 17]
+
+
+def test_a_sensor_whose_z_falls_when_it_is_pressed(tmp_path):
+    path = write_other(tmp_path / "a.csv")
+    (recording,) = import_recordings(path, sensors=ANY, columns="signs=+--")
+    assert recording.modules["finger1"].readings[1, 1].tolist() == [4, -5, -6]
+    with pytest.raises(ValueError, match=r"signs=\+-- or the like expected, '-' given"):
+        import_recordings(path, columns="signs=-")
+
+
+def test_a_file_without_times(tmp_path):
+    write(tmp_path / "a.csv", [], OTHER, [list(range(k, k + 15)) for k in range(3)])
+    columns = "time=50Hz,taxels=Fx0..Fz4"
+    (recording,) = import_recordings(tmp_path / "a.csv", sensors=ANY, columns=columns)
+    assert recording.modules["finger1"].times.tolist() == [0.0, 0.02, 0.04]
+
+
+@pytest.mark.parametrize(
+    ("words", "text"),
+    [
+        (
+            {"sensors": {"*": sensor("gtac")}},
+            "finger1: 5 taxels in 15 columns given; 15 taxels x 3",
+        ),
+        ({}, "the sensor of finger1 (5 taxels) is missing"),
+        ({"columns": "time=when", "sensors": ANY}, "column 'when' is missing"),
+        (
+            {"columns": "label=note", "sensors": ANY},
+            "a.csv, row 2: label 'cold' given; no_contact,",
+        ),
+    ],
+)
+def test_what_other_files_lack(tmp_path, words, text):
+    path = write_other(tmp_path / "a.csv")
+    with pytest.raises(RecordingError, match=re.escape(text)):
+        list(import_recordings(path, **words))
+
+
+def test_sensors_and_columns_are_for_csv(tmp_path):
+    with pytest.raises(
+        ValueError, match=r"--sensor and --columns belong to the format csv; 'gtac'"
+    ):
+        import_recordings(tmp_path, "gtac", sensors=ANY)

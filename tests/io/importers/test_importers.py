@@ -19,7 +19,8 @@ def test_a_file_of_no_known_format(tmp_path):
             import_recordings(path)
         assert str(caught.value) == (
             f"{path} is of no supported format; supported are {', '.join(FORMATS)} "
-            "(choose one with --format)"
+            "(choose one with --format; for a CSV file of any other logger give --sensor and "
+            "--columns)"
         )
 
 

@@ -75,7 +75,8 @@ def test_a_start_in_contact(thumb):
     assert only == (
         "",
         "starts_loaded",
-        "begins in contact (metadata: starts_loaded): choose --tare first in train and info",
+        "begins in contact (metadata: starts_loaded): choose --tare first in train and info; "
+        "or z of the sensor points inwards (docs/sensors.md)",
     )
 
 

@@ -1,6 +1,6 @@
 """Import of recordings in other formats; each format has a module, which is loaded by name."""
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from dataclasses import replace
 from importlib import import_module
 from pathlib import Path
@@ -8,6 +8,7 @@ from types import ModuleType
 
 from holdfast.errors import RecordingError
 from holdfast.files import check_regular
+from holdfast.io.importers.csv_columns import Columns
 from holdfast.io.safe_reading import recording_errors
 from holdfast.recordings import Recording
 from holdfast.sensors import Sensor
@@ -19,7 +20,7 @@ FORMATS = {
     "anyskin-slip": "CSV of the AnySkin slip data set of Pollen Robotics: 5 magnetometers",
     "arq-crisp": "HDF5 of the ARQ-CRISP slip data sets of 2021 and 2023 (extra: hdf5)",
     "rosbag": "bags of ROS 1 and ROS 2 with topics of XELA or Contactile (extra: bags)",
-    "csv": "the generic CSV of docs/formats.md",
+    "csv": "the generic CSV of docs/formats.md, and CSV of any other logger",
 }
 """Formats that can be imported, with a description; they are detected in this order."""
 
@@ -30,6 +31,8 @@ def import_recordings(
     *,
     labels: bool = True,
     sensors: Mapping[str, Sensor] | None = None,
+    columns: Columns | str | None = None,
+    report: Callable[[str], None] = lambda _: None,
 ) -> Iterator[Recording]:
     """Import the recordings in a file or folder of another format, one at a time.
 
@@ -37,7 +40,10 @@ def import_recordings(
         path: path of the file or folder.
         format: one of `FORMATS`; by default it is detected from the content.
         labels: keep the labels in the data.
-        sensors: sensor by module, for `csv` files that do not name their sensors.
+        sensors: sensor by module, or of `"*"` for all modules, of a CSV file of any logger.
+        columns: columns of such a file, as `Columns` or as its text; what is not given is
+            guessed from the header. With `sensors` or `columns` the format is `csv`.
+        report: receives a text about columns that were guessed.
 
     Yields:
         Recordings; each is read when the iterator reaches it.
@@ -46,11 +52,17 @@ def import_recordings(
         RecordingError: `path` does not exist, no format fits, or the data contradict the
             format.
         MissingExtra: the format needs a package that is not installed.
-        ValueError: there is no format of this name.
+        ValueError: there is no format of this name, `columns` is not valid, or `sensors` or
+            `columns` are given for another format than `csv`.
     """
     place = Path(path)
+    given = Columns.parse(columns) if isinstance(columns, str) else columns
+    if format is None and (sensors or given):
+        format = "csv"  # noqa: A001 (as on the command line)
     if format is not None and format not in FORMATS:
         raise ValueError(f"unknown format {format!r}; there are {', '.join(FORMATS)}")
+    if format not in (None, "csv") and (sensors or given):
+        raise ValueError(f"--sensor and --columns belong to the format csv; {format!r} given")
     if not place.exists():
         raise RecordingError(f"{place} does not exist; a file or folder to import expected")
     with recording_errors(place):
@@ -59,7 +71,7 @@ def import_recordings(
         name = format or _detected_format(place)
         source = _importer(name)
         recordings: Iterator[Recording] = (
-            source.read(place, sensors) if name == "csv" else source.read(place)
+            source.read(place, sensors, given, report) if name == "csv" else source.read(place)
         )
     return _guarded(place, recordings, labels=labels)
 
@@ -79,9 +91,11 @@ def _detected_format(path: Path) -> str:
     for name in FORMATS:
         if _importer(name).can_read(path):
             return name
+    if _importer("csv").can_guess(path):
+        return "csv"
     raise RecordingError(
         f"{path} is of no supported format; supported are {', '.join(FORMATS)} "
-        "(choose one with --format)"
+        "(choose one with --format; for a CSV file of any other logger give --sensor and --columns)"
     )
 
 

@@ -1,23 +1,33 @@
-"""Import of the generic CSV of docs/formats.md, a format that is easy to write."""
+"""Import of CSV files: the generic CSV of docs/formats.md, and files of any other logger.
+
+In the generic CSV the names of the columns are fixed. The columns of any other file are given
+(`Columns`), or guessed from its header; what was guessed is reported.
+"""
 
 import re
-from collections.abc import Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from dataclasses import replace
 from pathlib import Path
 
+import numpy as np
+
 from holdfast.contact import Cause, ContactState
 from holdfast.errors import RecordingError
+from holdfast.io.importers.csv_columns import Columns, Layout, seconds_of
 from holdfast.io.importers.table import Table, csv_files, header_line, read_table, with_integer_type
 from holdfast.recordings import Label, Recording, Tactile, labels_from_samples
 from holdfast.sensors import Sensor, built_in_sensors, sensor
-from holdfast.sensors.types import Unit
+from holdfast.sensors.types import Array, Unit
 
 TIME = "time"
 DEFAULT_MODULE = "finger1"
 """Name of the module if the columns do not name one."""
+ANY_MODULE = "*"
+"""Key of the sensor of all modules that have none of their own."""
 
 Settings = Mapping[tuple[str, str | None], str]
 """Value by key (sensor or unit) and module; None for all modules."""
+Report = Callable[[str], None]
 
 _TAXEL = re.compile(r"(?:(?P<module>.+)\.)?t(?P<taxel>\d+)[._](?P<axis>[xyz])")
 _TEXT = re.compile(r"(?:(?P<module>.+)\.)?(?P<column>label|cause)")
@@ -29,49 +39,157 @@ def can_read(path: Path) -> bool:
     return any(_is_header(header_line(file)) for file in csv_files(path))
 
 
-def read(path: Path, sensors: Mapping[str, Sensor] | None = None) -> Iterator[Recording]:
+def can_guess(path: Path) -> bool:
+    """Return whether `path` is a CSV file, or a folder with one, whose columns can be guessed."""
+    return any(_is_guessable(header_line(file)) for file in csv_files(path))
+
+
+def read(
+    path: Path,
+    sensors: Mapping[str, Sensor] | None = None,
+    columns: Columns | None = None,
+    report: Report = lambda _: None,
+) -> Iterator[Recording]:
     """Read the recording in a CSV file, or those in the CSV files of a folder.
 
     Args:
         path: path of the file or folder.
-        sensors: sensor by module; they precede those that the file names.
+        sensors: sensor by module, or of `"*"` for all; they precede those that the file names.
+        columns: columns of the file; by default those of the generic CSV, or a guess.
+        report: receives a text about each different guess.
 
     Raises:
         RecordingError: there is no CSV file, or one has another form.
     """
-    files = [file for file in csv_files(path) if path.is_file() or _is_header(header_line(file))]
+    files = csv_files(path)
+    if path.is_dir():
+        files = [file for file in files if columns or _is_header(header_line(file))] or [
+            file for file in files if _is_guessable(header_line(file))
+        ]
     if not files:
         raise RecordingError(
             f"no CSV file in {path} with a column {TIME!r} and taxel columns; both are expected"
         )
-    return (_recording(file, sensors or {}) for file in files)
+    reported: set[str] = set()
+
+    def report_once(guess: str, text: str) -> None:
+        if guess not in reported:
+            reported.add(guess)
+            report(text)
+
+    return (_recording(file, sensors or {}, columns, report_once) for file in files)
 
 
 def _is_header(names: tuple[str, ...]) -> bool:
     return TIME in names and any(_TAXEL.fullmatch(name) for name in names)
 
 
-def _recording(path: Path, sensors: Mapping[str, Sensor]) -> Recording:
-    names = header_line(path)
-    table, cells = read_table(path, [name for name in names if _TEXT.fullmatch(name)])
-    layout = _layout(table)
-    settings = _settings(table)
+def _is_guessable(names: tuple[str, ...]) -> bool:
     try:
-        modules = {
-            name: _module(table, name, columns, settings, sensors)
-            for name, columns in layout.items()
-        }
-        labelled = {
-            name: replace(module, labels=_labels(table, cells, name, module))
-            for name, module in modules.items()
-        }
-        return Recording(path.stem, labelled, {"source": path.name})
+        Columns().completed(names, ())
+    except RecordingError:
+        return False
+    return True
+
+
+def _recording(
+    path: Path,
+    sensors: Mapping[str, Sensor],
+    columns: Columns | None,
+    report: Callable[[str, str], None],
+) -> Recording:
+    try:
+        if columns is None and _is_header(header_line(path)):
+            return _generic(path, sensors)
+        return _of_any_logger(path, sensors, columns or Columns(), report)
     except RecordingError as cause:
         text = str(cause)
         raise RecordingError(text if str(path) in text else f"{path}: {text}") from cause
 
 
-def _layout(table: Table) -> dict[str, dict[tuple[int, str], str]]:
+def _generic(path: Path, sensors: Mapping[str, Sensor]) -> Recording:
+    names = header_line(path)
+    table, cells = read_table(path, [name for name in names if _TEXT.fullmatch(name)])
+    layout, settings = _layout(table), _settings(table)
+    times = table.columns([TIME])[:, 0]
+    return _assembled(table, cells, times, layout, settings, sensors)
+
+
+def _of_any_logger(
+    path: Path,
+    sensors: Mapping[str, Sensor],
+    columns: Columns,
+    report: Callable[[str, str], None],
+) -> Recording:
+    """Return the recording in a file with any names of the columns; report a guess."""
+    names = header_line(path) or read_table(path)[0].names  # which reports what is wrong
+    n_taxels = {one.n_taxels for one in sensors.values()}
+    chosen = columns.completed(names, n_taxels)
+    layout = {module or DEFAULT_MODULE: own for module, own in chosen.layout(names).items()}
+    used = {name for own in layout.values() for name in own.values()}
+    text = {"label": chosen.label, "cause": chosen.cause}
+    table, found = read_table(path, [n for n in names if n not in used | {chosen.time}])
+    cells = {name: found[column] for name, column in text.items() if column in found}
+    times, unit = _times(table, chosen)
+    known = chosen if chosen.rate else replace(chosen, time_unit=unit)
+    if known != columns:
+        report(str(known), _guess_text(path, known, times, layout, names))
+    recording = _assembled(table, cells, times, layout, _settings(table), sensors)
+    return recording if chosen.signs is None else _with_signs(recording, chosen.factors)
+
+
+def _with_signs(recording: Recording, factors: Array) -> Recording:
+    """Return the recording with its readings times a factor for each axis."""
+    modules = {
+        name: replace(module, readings=with_integer_type(module.readings * factors))
+        for name, module in recording.modules.items()
+    }
+    return replace(recording, modules=modules)
+
+
+def _times(table: Table, columns: Columns) -> tuple[Array, str]:
+    if columns.rate is not None:
+        return np.arange(len(table.values)) / columns.rate, "s"
+    return seconds_of(table.columns([columns.time or TIME])[:, 0], columns.time_unit)
+
+
+def _guess_text(
+    path: Path, columns: Columns, times: Array, layout: Layout, names: tuple[str, ...]
+) -> str:
+    """Return what was guessed, and the option that says the same."""
+    steps = np.diff(times)
+    rate = 1 / float(np.median(steps)) if len(steps) and np.median(steps) > 0 else 0.0
+    modules = [f"{name} {len(own) // 3} taxels" for name, own in layout.items()]
+    used = {columns.time, columns.label, columns.cause}
+    used |= {name for own in layout.values() for name in own.values()}
+    unused = ", ".join(name for name in names if name not in used) or "none"
+    return (
+        f"{path.name}: the columns are a guess: {rate:.4g} Hz, {', '.join(modules)}; "
+        f"columns that are not used: {unused}\n"
+        f"  the same as --columns '{columns}' (give this option to correct it)"
+    )
+
+
+def _assembled(
+    table: Table,
+    cells: Mapping[str, list[str]],
+    times: Array,
+    layout: Layout,
+    settings: Settings,
+    sensors: Mapping[str, Sensor],
+) -> Recording:
+    modules = {
+        name: _module(table, times, name, columns, settings, sensors)
+        for name, columns in layout.items()
+    }
+    labelled = {
+        name: replace(module, labels=_labels(table, cells, name, module))
+        for name, module in modules.items()
+    }
+    return Recording(table.path.stem, labelled, {"source": table.path.name})
+
+
+def _layout(table: Table) -> Layout:
     """Return the column of each taxel and axis, by module."""
     layout: dict[str, dict[tuple[int, str], str]] = {}
     for name in table.names:
@@ -82,7 +200,8 @@ def _layout(table: Table) -> dict[str, dict[tuple[int, str], str]]:
         elif name != TIME and not _TEXT.fullmatch(name):
             raise RecordingError(
                 f"{table.path}: unknown column {name!r}; {TIME!r}, 'MODULE.t01.x' (or 't01_x'), "
-                "'label', 'cause', 'MODULE.label' and 'MODULE.cause' are known"
+                "'label', 'cause', 'MODULE.label' and 'MODULE.cause' are known; of other files "
+                "--columns names the columns"
             )
     if not layout:
         raise RecordingError(f"{table.path}: no taxel columns such as 'thumb.t01.x' or 't01_x'")
@@ -97,12 +216,13 @@ def _settings(table: Table) -> Settings:
 
 def _module(
     table: Table,
+    times: Array,
     name: str,
     columns: Mapping[tuple[int, str], str],
     settings: Settings,
     sensors: Mapping[str, Sensor],
 ) -> Tactile:
-    one = sensors.get(name) or _sensor(name, settings)
+    one = sensors.get(name) or sensors.get(ANY_MODULE) or _sensor(name, settings, columns)
     wanted = [(taxel + 1, axis) for taxel in range(one.n_taxels) for axis in "xyz"]
     if set(columns) != set(wanted):
         n_given = len({taxel for taxel, _ in columns})
@@ -111,18 +231,20 @@ def _module(
             f"x 3 axes from t01 on expected ({one.name})"
         )
     values = table.columns([columns[key] for key in wanted])
-    times = table.columns([TIME])[:, 0]
     return Tactile(
         one, times, with_integer_type(values).reshape(-1, one.n_taxels, 3), _unit(name, settings)
     )
 
 
-def _sensor(name: str, settings: Settings) -> Sensor:
+def _sensor(name: str, settings: Settings, columns: Mapping[tuple[int, str], str]) -> Sensor:
     given = settings.get(("sensor", name)) or settings.get(("sensor", None))
     if given is None:
+        n_taxels = len({taxel for taxel, _ in columns})
         raise RecordingError(
-            f"the sensor of {name} is missing: a line '# sensor: {name}=NAME' expected above the "
-            f"header; built in are {', '.join(built_in_sensors())}"
+            f"the sensor of {name} ({n_taxels} taxels) is missing: --sensor NAME or --sensor "
+            f"FILE.json expected, or a line '# sensor: {name}=NAME' above the header; built in are "
+            f"{', '.join(built_in_sensors())}; `holdfast sensors --template "
+            f"ROWSxCOLUMNS > FILE.json` makes a file of a flat grid"
         )
     try:
         return sensor(given)

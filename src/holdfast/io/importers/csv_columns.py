@@ -1,0 +1,277 @@
+"""Columns of a CSV file of any logger: which hold the time and the taxels, as given or guessed.
+
+They are written as in `--columns`: `time=stamp:ms,taxels=F{axis}{taxel},label=state`.
+"""
+
+import re
+from collections.abc import Collection, Iterator, Mapping, Sequence
+from dataclasses import dataclass, replace
+from itertools import takewhile
+
+import numpy as np
+
+from holdfast.errors import RecordingError
+from holdfast.sensors.types import Array
+
+Layout = Mapping[str, Mapping[tuple[int, str], str]]
+"""Column by taxel (from 1) and axis, by module; the module is empty without a name."""
+
+TIME_UNITS = {"s": 1.0, "ms": 1e-3, "us": 1e-6, "ns": 1e-9}
+"""Seconds in each unit of time."""
+PLAUSIBLE_RATES = (5.0, 5000.0)
+"""Rates that decide the unit of times without one [Hz]; it is unambiguous, because units are a
+factor of 1000 apart."""
+RUN = ".."
+"""Between the first and the last of consecutive columns."""
+
+_FIELDS = ("time", "taxels", "signs", "label", "cause")
+_TIME_NAMES = ("time", "t", "timestamp", "stamp", "seconds", "sec", "milliseconds", "millis")
+_RATE = re.compile(r"(?P<rate>\d+(?:\.\d+)?)\s*hz", re.IGNORECASE)
+_TOKEN = re.compile(r"\d+|[A-Za-z]+|[^A-Za-z\d]+")
+_WORD = re.compile(r"\{\w+\}|\d+|[A-Za-z]+|[^A-Za-z\d{]+")
+_PLACEHOLDERS = {
+    "{module}": r"(?P<module>.+?)",
+    "{taxel}": r"(?P<taxel>\d+)",
+    "{axis}": r"(?P<axis>[xyzXYZ])",
+}
+
+
+@dataclass(frozen=True)
+class Columns:
+    """Columns of a CSV file.
+
+    Attributes:
+        time: column of the times, or a rate such as `100Hz` if there is none.
+        time_unit: key of `TIME_UNITS`; None if it follows from the times.
+        taxels: names of the taxel columns with `{taxel}`, `{axis}` and `{module}` in place of
+            what differs; or FIRST..LAST, consecutive columns x, y, z of taxel after taxel.
+        signs: of the axes x, y and z, such as `+--` for a sensor whose z falls when it is pressed;
+            None for `+++`.
+        label: column of the states; None without.
+        cause: column of the causes; None without.
+    """
+
+    time: str | None = None
+    time_unit: str | None = None
+    taxels: str | None = None
+    signs: str | None = None
+    label: str | None = None
+    cause: str | None = None
+
+    @classmethod
+    def parse(cls, text: str) -> "Columns":
+        """Return the columns that a text describes; those that it leaves out are None.
+
+        Raises:
+            ValueError: a part is not FIELD=COLUMN, or its field or unit is unknown.
+
+        Example:
+            >>> Columns.parse("time=stamp:ms,taxels=F{axis}{taxel}").time_unit
+            'ms'
+        """
+        given: dict[str, str] = {}
+        for part in text.split(","):
+            field, _, column = (word.strip() for word in part.partition("="))
+            if field not in _FIELDS or not column or field in given:
+                raise ValueError(
+                    f"--columns: {', '.join(f'{name}=COLUMN' for name in _FIELDS)} expected, each "
+                    f"once, {part!r} given"
+                )
+            given[field] = column
+        if not re.fullmatch("[+-]{3}", given.get("signs", "+++")):
+            raise ValueError(f"--columns: signs=+-- or the like expected, {given['signs']!r} given")
+        time, colon, unit = given.get("time", "").rpartition(":")
+        if colon and unit in TIME_UNITS:
+            given |= {"time": time, "time_unit": unit}
+        return cls(**given)
+
+    def __str__(self) -> str:
+        unit = f":{self.time_unit}" if self.time_unit else ""
+        time = self.time and self.time + unit
+        values = (time, self.taxels, self.signs, self.label, self.cause)
+        found = zip(_FIELDS, values, strict=True)
+        return ",".join(f"{field}={value}" for field, value in found if value)
+
+    @property
+    def factors(self) -> Array:
+        """(3,) 1 or -1 for each axis."""
+        return np.array([1.0 if sign == "+" else -1.0 for sign in self.signs or "+++"])
+
+    @property
+    def rate(self) -> float | None:
+        """Rate of the samples [Hz] if there is no column of times; else None."""
+        match = _RATE.fullmatch(self.time or "")
+        return float(match["rate"]) if match else None
+
+    def completed(self, names: Sequence[str], n_taxels: Collection[int]) -> "Columns":
+        """Return the same columns, with a guess for the time and the taxels if not given.
+
+        Args:
+            names: names of the columns of the file.
+            n_taxels: numbers of taxels that the sensors of the file have, if known.
+
+        Raises:
+            RecordingError: nothing in the header looks like times or taxels.
+        """
+        time = self.time or _guessed_time(names)
+        others = [name for name in names if name != time]
+        taxels = self.taxels or _guessed_taxels(others, n_taxels) or _guessed_taxels(others, ())
+        label = self.label or ("label" if "label" in names else None)
+        cause = self.cause or ("cause" if "cause" in names else None)
+        if time is None:
+            raise RecordingError(
+                f"no column of times among {_shown(names)}: give --columns time=COLUMN, or "
+                "time=100Hz if there is none"
+            )
+        if taxels is None:
+            raise RecordingError(
+                f"no taxel columns such as x1, y1, z1, x2 among {_shown(names)}: give --columns "
+                "'taxels=F{axis}{taxel}' or, for consecutive columns, taxels=FIRST..LAST"
+            )
+        return replace(self, time=time, taxels=taxels, label=label, cause=cause)
+
+    def layout(self, names: Sequence[str]) -> Layout:
+        """Return the column of each taxel and axis, by module.
+
+        Raises:
+            RecordingError: no column has a name of this form, or the file lacks one.
+        """
+        pattern = self.taxels or ""
+        layout = _run_layout(pattern, names) if RUN in pattern else pattern_layout(pattern, names)
+        if not layout:
+            raise RecordingError(f"no column is named as {pattern!r}; it has {_shown(names)}")
+        return layout
+
+
+def seconds_of(values: Array, unit: str | None) -> tuple[Array, str]:
+    """Return times in seconds, and their unit; without one, that of a plausible rate.
+
+    Example:
+        >>> times, unit = seconds_of(np.array([0.0, 10.0, 20.0]), None)
+        >>> times.tolist(), unit
+        ([0.0, 0.01, 0.02], 'ms')
+    """
+    known = unit or _unit_of(values)
+    return values * TIME_UNITS[known], known
+
+
+def _unit_of(values: Array) -> str:
+    steps = np.diff(values)
+    steps = steps[np.isfinite(steps) & (steps > 0)]
+    step = float(np.median(steps)) if len(steps) else 0.0
+    low, high = PLAUSIBLE_RATES
+    fitting = (
+        unit for unit, size in TIME_UNITS.items() if low <= 1 / max(step * size, 1e-12) < high
+    )
+    return next(fitting, "s")
+
+
+def _guessed_time(names: Sequence[str]) -> str | None:
+    """Return the column of times: a usual name, with or without a unit, or one with "time"."""
+    bare = {re.sub(r"[\W_]*\b(s|ms|us|ns)\b\W*$", "", _spaced(name)): name for name in names}
+    usual = (bare[name] for name in _TIME_NAMES if name in bare)
+    part = (name for name in names if "time" in name.lower() or "stamp" in name.lower())
+    return next(usual, next(part, None))
+
+
+def _spaced(name: str) -> str:
+    return re.sub(r"[\W_]+", " ", name).strip().lower()
+
+
+def pattern_layout(pattern: str, names: Sequence[str]) -> Layout:
+    """Return the columns whose names fit a pattern, by module; taxels are counted from 1.
+
+    Example:
+        >>> pattern_layout("{module}_{axis}{taxel}", ("t", "a_x0", "a_y0", "a_z0"))
+        {'a': {(1, 'x'): 'a_x0', (1, 'y'): 'a_y0', (1, 'z'): 'a_z0'}}
+    """
+    if "{axis}" not in pattern:
+        raise RecordingError(f"taxels={pattern}: {{axis}}, or FIRST{RUN}LAST, expected in it")
+    expression = re.escape(pattern)
+    for placeholder, group in _PLACEHOLDERS.items():
+        expression = expression.replace(re.escape(placeholder), group, 1)
+    found: dict[str, dict[tuple[int, str], str]] = {}
+    for name in names:
+        if match := re.fullmatch(expression, name):
+            words = match.groupdict()
+            key = (int(words.get("taxel", "1")), words["axis"].lower())
+            found.setdefault(words.get("module", ""), {})[key] = name
+    return {module: _from_one(columns) for module, columns in found.items()}
+
+
+def _from_one(columns: Mapping[tuple[int, str], str]) -> dict[tuple[int, str], str]:
+    first = min(taxel for taxel, _ in columns)
+    return {(taxel - first + 1, axis): name for (taxel, axis), name in columns.items()}
+
+
+def _run_layout(text: str, names: Sequence[str]) -> Layout:
+    """Return consecutive columns, three for each taxel."""
+    ends = [word.strip() for word in text.split(RUN, 1)]
+    if missing := [name for name in ends if name not in names]:
+        raise RecordingError(f"taxels={text}: no column {missing[0]!r}; it has {_shown(names)}")
+    run = names[names.index(ends[0]) : names.index(ends[1]) + 1]
+    if not run or len(run) % 3:
+        raise RecordingError(f"taxels={text}: {len(run)} columns given; 3 for each taxel expected")
+    return {"": {(k // 3 + 1, "xyz"[k % 3]): name for k, name in enumerate(run)}}
+
+
+def _guessed_taxels(names: Sequence[str], n_taxels: Collection[int]) -> str | None:
+    """Return the pattern of the taxel columns: the one that most columns fit completely."""
+    candidates = dict.fromkeys(one for name in names for one in _patterns(name))
+    sizes: dict[str, int] = {}
+    for pattern in candidates:
+        columns = next(iter(pattern_layout(pattern, names).values()), {})
+        if _is_complete(columns) and (not n_taxels or len(columns) // 3 in n_taxels):
+            sizes[pattern] = len(columns)
+    if not sizes:
+        return None
+    most = max(sizes.values())
+    return _with_module([pattern for pattern, size in sizes.items() if size == most])
+
+
+def _patterns(name: str) -> Iterator[str]:
+    """Yield a name with each of its numbers and axis letters replaced by a placeholder."""
+    tokens = _TOKEN.findall(name)
+    numbers = [k for k, token in enumerate(tokens) if token.isdigit()]
+    for k, token in enumerate(tokens):
+        if token[-1].lower() not in "xyz":
+            continue
+        axis = {k: token[:-1] + "{axis}"}
+        for number in numbers:
+            both = axis | {number: "{taxel}"}
+            yield "".join(both.get(place, word) for place, word in enumerate(tokens))
+        yield "".join(axis.get(place, word) for place, word in enumerate(tokens))
+
+
+def _is_complete(columns: Collection[tuple[int, str]]) -> bool:
+    n = len(columns) // 3
+    return n > 0 and set(columns) == {(k + 1, axis) for k in range(n) for axis in "xyz"}
+
+
+def _with_module(patterns: Sequence[str]) -> str:
+    """Return one pattern for those of several modules: `{module}` replaces the word that differs.
+
+    Example:
+        >>> _with_module(["f1_{axis}{taxel}", "f2_{axis}{taxel}"])
+        '{module}_{axis}{taxel}'
+    """
+    words = [_WORD.findall(pattern) for pattern in patterns]
+    start = _common_start(words)
+    while start and start[-1].isalnum():  # "f1" and "f2" are whole names
+        start = start[:-1]
+    rest = [each[len(start) :] for each in words]
+    end = _common_start([each[::-1] for each in rest])[::-1]
+    names = ["".join(each[: len(each) - len(end)]) for each in rest]
+    if len(patterns) == 1 or any("{" in name or not name for name in names):
+        return patterns[0]
+    return "".join([*start, "{module}", *end])
+
+
+def _common_start(lists: Sequence[Sequence[str]]) -> list[str]:
+    columns = zip(*lists, strict=False)
+    return [words[0] for words in takewhile(lambda words: len(set(words)) == 1, columns)]
+
+
+def _shown(names: Sequence[str]) -> str:
+    shown = ", ".join(map(repr, names[:6]))
+    return f"{shown} and {len(names) - 6} more" if len(names) > 6 else shown
