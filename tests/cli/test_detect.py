@@ -16,6 +16,7 @@ from holdfast.detector import detect
 from holdfast.features import FeatureSpec
 from holdfast.io import load_recording, save_recording
 from holdfast.io.mcap_writer import RecordingWriter
+from holdfast.live.arrival_detector import ArrivalDetector
 from holdfast.live.stream_detector import StreamDetector
 from holdfast.live.xela_server import XelaServer
 from holdfast.model import Debounce, FingerModel, Model
@@ -355,3 +356,40 @@ def test_a_signal_stops_a_live_source(capsys, monkeypatch, save, number):
     ):
         found = summary(capsys, NOISE_FLOOR, server.uri)
     assert set(found["fingers"]) == {"thumb", "index"}
+
+
+def test_a_terminal_shows_the_changes_that_lasted(capsys, monkeypatch, save):
+    grasp = save(synthetic_recording("a", 1, ("thumb", "index")))
+    monkeypatch.setattr("sys.stdout.isatty", lambda: True, raising=False)
+    assert main(["detect", NOISE_FLOOR, str(grasp)]) == 0
+    header, *rows = capsys.readouterr().out.splitlines()
+    assert header.split() == ["time", "finger", "from", "to", "why"]
+    times = [float(row.split()[0]) for row in rows]
+    assert times == sorted(times)
+    assert {row.split()[2] for row in rows} == {"thumb", "index", "hand"}
+    assert 3 <= len(rows) < 100  # of 3450 estimates
+    assert all(len(row) <= 80 for row in rows)
+    assert any("-> UNSTABLE    P(stable) " in row for row in rows)
+    assert main(["detect", NOISE_FLOOR, str(grasp), "--json"]) == 0
+    assert json.loads(capsys.readouterr().out.splitlines()[0])["finger"] == "thumb"
+
+
+def test_faults_that_last_are_printed_once(capsys, monkeypatch, save):
+    grasp = save(synthetic_recording("a", 1, ("thumb", "index")))
+    update = ArrivalDetector.update
+
+    def late(detector, arrival):
+        return update(detector, arrival._replace(faults={"thumb": (Fault.LATE,)}))
+
+    monkeypatch.setattr(ArrivalDetector, "update", late)
+    monkeypatch.setattr("sys.stdout.isatty", lambda: True, raising=False)
+    with (
+        open_source(str(grasp), speed=1.5) as source,
+        XelaServer(source, port=0, wait=True) as server,
+    ):
+        assert main(["detect", NOISE_FLOOR, server.uri, "--seconds", "2.5"]) == 0
+    out, err = capsys.readouterr()
+    assert err.count("thumb: samples arrive late") == 1
+    first = next(row.split() for row in out.splitlines()[1:] if " index " in row)
+    assert 0 <= float(first[0]) < 3  # times count from the first sample
+    assert "thumb" not in out  # it is UNKNOWN all the time

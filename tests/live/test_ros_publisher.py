@@ -5,8 +5,9 @@ import pytest
 
 from holdfast.contact import ContactState, Fault, Reason
 from holdfast.live import ros_publisher
+from holdfast.live.arrival_detector import StreamEstimate
 from holdfast.live.ros_publisher import ERROR, OK, WARN, RosPublisher, diagnostics_of, topic_names
-from holdfast.live.stream_detector import StreamEstimate, StreamUpdate
+from holdfast.live.stream_detector import StreamUpdate
 
 from .estimates import UNITS, estimate, finger
 

@@ -94,7 +94,7 @@ def test_the_module_with_most_samples_gives_the_number_of_packets(start):
 
 
 def test_a_tare_that_timed_out_is_not_taken_later(monkeypatch):
-    monkeypatch.setattr("holdfast.live.session.TARE_TIMEOUT", 0.01)
+    monkeypatch.setattr("holdfast.live.session.REQUEST_TIMEOUT", 0.01)
     recording = build.grasp()
     session = session_of(build.Script.of(recording))
     taken = []
@@ -118,6 +118,29 @@ def test_the_tare_is_taken_in_the_session_and_refused_in_contact(start):
     wait_for(lambda: source.last.time >= arrivals[599].time)
     with pytest.raises(StreamError, match="in contact"):
         session.restart_tare()
+
+
+def test_the_threshold_is_changed_in_the_session(start):
+    recording = build.grasp()
+    source = build.Lasting.of(recording, build.arrivals_of(recording)[:200], patient=True)
+    session = start(source)
+    session.set_threshold(0.9)  # also before the rate is known
+    assert dict(session.stream.thresholds) == dict.fromkeys(build.FINGERS, 0.9)
+    wait_for(lambda: session.n_packets >= 200)
+    session.set_threshold(None)
+    own = build.model().finger("thumb").classifier.threshold
+    assert dict(session.stream.thresholds) == dict.fromkeys(build.FINGERS, own)
+    with pytest.raises(ValueError, match=r"^a threshold from 0 to 1 expected, 2 given$"):
+        session.set_threshold(2)
+    assert dict(session.stream.thresholds) == dict.fromkeys(build.FINGERS, own)
+
+
+def test_no_threshold_after_the_end(start):
+    session = start(build.Script.of(build.grasp()))
+    wait_for(lambda: session.ended)
+    message = r"^the source has ended: the threshold was not changed$"
+    with pytest.raises(SourceError, match=message):
+        session.set_threshold(0.5)
 
 
 def test_no_tare_while_no_samples_arrive(start):

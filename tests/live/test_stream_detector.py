@@ -8,8 +8,9 @@ import pytest
 from holdfast.contact import ContactState, Fault, Reason
 from holdfast.detector import Detector, detect
 from holdfast.errors import ModelError, StreamError
+from holdfast.live.arrival_detector import MAX_BUFFERED_ARRIVALS, ArrivalDetector
 from holdfast.live.judge import Judge
-from holdfast.live.stream_detector import MAX_BUFFERED_ARRIVALS, ArrivalDetector, StreamDetector
+from holdfast.live.stream_detector import StreamDetector
 from holdfast.recordings import Recording
 from holdfast.resampling import resample
 

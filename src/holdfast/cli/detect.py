@@ -23,7 +23,7 @@ from holdfast.cli.options import (
     parse_taxels,
     report_missing_fingers,
 )
-from holdfast.cli.terminal.console import print_json, print_message
+from holdfast.cli.terminal.console import print_json, print_line, print_message
 from holdfast.cli.terminal.progress import ProgressBar
 from holdfast.cli.terminal.stopping import StopRequest, handle_stop_signals
 
@@ -52,15 +52,17 @@ def detect(
     ] = None,
     ignore: IgnoreOption = "",
     as_json: Annotated[
-        bool, typer.Option("--json", help="With --summary: print JSON, not a table.")
+        bool,
+        typer.Option("--json", help="Print JSON on a terminal too; with --summary, no table."),
     ] = False,
 ) -> None:
     """Detect the contact state of every finger at every sample.
 
-    Print one line of JSON per finger and sample, in the order of time, with these fields:
-    time [s], finger, state, reason (why the state is UNKNOWN), stable_probability, instability
-    (sigma) and force (both in the unit of the readings), faults, and faulty_taxels. Values that
-    are not known are null. The memory does not grow with the length of the recording.
+    On a terminal, print one line for each change of state that lasted 0.1 s. In a pipe or file,
+    or with --json, print one line of JSON per finger and sample, in the order of time: time [s],
+    finger, state, reason (why the state is UNKNOWN), stable_probability, instability (sigma) and
+    force (both in the unit of the readings), faults, and faulty_taxels. Values that are not known
+    are null. The memory does not grow with the length of the recording.
 
     SOURCE is the path of a recording, or the URI of a live source, which is read until Ctrl-C:
     xela://HOST:PORT (or xela://auto), twin:?object=can, ros2:///xServTopic, ros1:///xServTopic
@@ -84,6 +86,13 @@ def detect(
     if summary:
         _print_summary(chunks, model, as_json=as_json)
         return
+    if sys.stdout.isatty() and not as_json:
+        _print_changes(chunks, live=live)
+    else:
+        _print_estimates(chunks, live=live)
+
+
+def _print_estimates(chunks: Iterator["EstimateChunk"], *, live: bool) -> None:
     from holdfast.cli.detect_output import json_lines
 
     for chunk in chunks:
@@ -91,6 +100,24 @@ def detect(
             sys.stdout.write(text)
         if live:
             sys.stdout.flush()
+
+
+def _print_changes(chunks: Iterator["EstimateChunk"], *, live: bool) -> None:
+    """Print the changes that lasted: of a live source at once, else below the progress bar."""
+    from holdfast.cli.detect_changes import HEADER, ChangeLines
+
+    changes = ChangeLines(from_first=live)
+    if live:
+        print_message("times since the first sample; --json prints every estimate; Ctrl-C stops")
+        print_line(HEADER)
+        for chunk in chunks:
+            for line in changes.add(chunk):
+                print_line(line)
+                sys.stdout.flush()
+        return
+    lines = [line for chunk in chunks for line in changes.add(chunk)]
+    for line in (HEADER, *lines):
+        print_line(line)
 
 
 def _check_seconds(seconds: float | None, source: str, *, live: bool) -> None:
@@ -177,10 +204,16 @@ def _detect_live(
 def _read_updates(
     stream: "StreamDetector", seconds: float | None, stop: StopRequest
 ) -> Iterator["StreamUpdate"]:
+    from holdfast.live.fault_notices import FaultWatch
+
     end = math.inf if seconds is None else time.monotonic() + seconds
+    faults = FaultWatch()
     while not (stream.source.ended or stop.requested) and time.monotonic() < end:
         update = stream.read()
         for notice in update.arrival.notices if update.arrival else ():
             print_message(notice)
+        for one in update.estimates:
+            for problem in faults.update(one.estimate):
+                print_message(problem.text)
         yield update
     yield stream.finish()

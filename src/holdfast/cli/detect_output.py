@@ -22,7 +22,7 @@ from holdfast.detector import HAND
 
 if TYPE_CHECKING:
     from holdfast.detector import Detection
-    from holdfast.live.stream_detector import StreamEstimate
+    from holdfast.live.arrival_detector import StreamEstimate
 
 LINES_PER_BLOCK = 8192
 MAX_EVENTS_SHOWN = 40

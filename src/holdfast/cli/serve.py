@@ -173,7 +173,7 @@ def run_page(
     from holdfast.web.server import run_server
 
     session = Session(stream or StreamDetector(model, source))
-    service = LiveService(session, model, guard or Guard(host), folder)
+    service = LiveService(session, model, guard or Guard(host), folder, print_message)
     for listener in listeners:
         session.add_listener(listener)
     session.start()

@@ -4,7 +4,7 @@ import warnings
 from collections.abc import Mapping
 from typing import Any
 
-from holdfast.live.stream_detector import ArrivalDetector, StreamEstimate
+from holdfast.live.arrival_detector import ArrivalDetector, StreamEstimate
 from holdfast.model import Model
 from holdfast.sensors import Sensor
 from holdfast.sources import Arrival

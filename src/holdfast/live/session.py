@@ -20,8 +20,8 @@ MAX_LATENCIES = 8192
 SWITCH_INTERVAL = 5e-4
 """Python's thread switch interval while a session runs [s]; a tenth of the default, so that
 other busy threads delay the detector less."""
-TARE_TIMEOUT = 2.0
-"""Maximum time that `Session.restart_tare` waits for the detector's thread [s]."""
+REQUEST_TIMEOUT = 2.0
+"""Maximum time that a request waits for the detector's thread [s]."""
 
 
 class Latency(NamedTuple):
@@ -63,7 +63,7 @@ class Session:
         self.failure: Exception | None = None
         self._n_samples = dict.fromkeys(self.source.sensors, 0)
         self._listeners: list[Listener] = []
-        self._tare_requests: deque[Future[None]] = deque()
+        self._requests: deque[tuple[Callable[[], None], Future[None]]] = deque()
         self._stopping = Event()
         self._thread = Thread(target=self._run, name="holdfast-detector", daemon=True)
         self._latencies = np.full(MAX_LATENCIES, np.nan)
@@ -99,13 +99,22 @@ class Session:
         """
         if self.ended:
             raise SourceError("the source has ended: no tare can be taken")
-        request: Future[None] = Future()
-        self._tare_requests.append(request)
-        try:
-            request.result(TARE_TIMEOUT)
-        except TimeoutError as cause:
-            request.cancel()
-            raise SourceError("the source does not answer: no tare can be taken") from cause
+        self._request(self._restart_tare, "no tare can be taken")
+
+    def set_threshold(self, threshold: float | None) -> None:
+        """Change the probability from which a contact is stable, for all fingers.
+
+        Args:
+            threshold: from 0 to 1; None for the thresholds of the model.
+
+        Raises:
+            SourceError: the source has ended or is silent.
+            ValueError: the threshold is not from 0 to 1.
+        """
+        consequence = "the threshold was not changed"
+        if self.ended:
+            raise SourceError(f"the source has ended: {consequence}")
+        self._request(lambda: self.stream.set_threshold(threshold), consequence)
 
     def latency(self) -> Latency:
         """Compute the percentiles of the newest latencies."""
@@ -124,8 +133,8 @@ class Session:
         self.ended = True
 
     def _step(self) -> None:
-        while self._tare_requests:
-            self._answer(self._tare_requests.popleft())
+        while self._requests:
+            _answer(*self._requests.popleft())
         update = self.stream.read()
         if update.arrival is not None:
             self._count(update.arrival, has_estimates=bool(update.estimates))
@@ -143,17 +152,32 @@ class Session:
         self.n_lost += arrival.n_lost
         self.n_refused += arrival.n_refused
 
-    def _answer(self, request: "Future[None]") -> None:
-        if not request.set_running_or_notify_cancel():
-            return  # the caller has timed out
+    def _restart_tare(self) -> None:
+        if self.stream.silent:
+            raise SourceError("no samples arrive: no tare can be taken")
+        self.stream.restart_tare()
+
+    def _request(self, work: Callable[[], None], consequence: str) -> None:
+        """Run `work` in the detector's thread, and wait for its end."""
+        request: Future[None] = Future()
+        self._requests.append((work, request))
         try:
-            if self.stream.silent:
-                raise SourceError("no samples arrive: no tare can be taken")
-            self.stream.restart_tare()
-            request.set_result(None)
-        except Exception as failure:
-            request.set_exception(failure)
+            request.result(REQUEST_TIMEOUT)
+        except TimeoutError as cause:
+            request.cancel()
+            raise SourceError(f"the source does not answer: {consequence}") from cause
 
     def _notify(self, update: StreamUpdate) -> None:
         for listener in self._listeners:
             listener(update)
+
+
+def _answer(work: Callable[[], None], request: "Future[None]") -> None:
+    """Run `work` for a request, and pass on its failure."""
+    if not request.set_running_or_notify_cancel():
+        return  # the caller has timed out
+    try:
+        work()
+        request.set_result(None)
+    except Exception as failure:
+        request.set_exception(failure)

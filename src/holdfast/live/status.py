@@ -2,13 +2,16 @@
 
 import time
 from collections import deque
+from collections.abc import Callable
 
 import numpy as np
 
 from holdfast.contact import ContactEstimate, ContactState, HandEstimate
+from holdfast.live.arrival_detector import StreamEstimate
+from holdfast.live.fault_notices import FAULT_TEXTS, FaultWatch
 from holdfast.live.recorder import Recorder
 from holdfast.live.session import Session
-from holdfast.live.stream_detector import StreamEstimate, StreamUpdate
+from holdfast.live.stream_detector import StreamUpdate
 from holdfast.live.web import schema
 from holdfast.model import Model
 from holdfast.sensors import Sensor
@@ -29,10 +32,13 @@ class StatusPublisher:
 
     Args:
         session: to publish.
+        report: called with the text of each notice about a fault or by the service.
     """
 
-    def __init__(self, session: Session) -> None:
+    def __init__(self, session: Session, report: Callable[[str], None] = lambda _: None) -> None:
         self._session = session
+        self._report = report
+        self._faults = FaultWatch()
         self._updates: deque[tuple[float, StreamUpdate]] = deque(maxlen=MAX_BUFFERED_UPDATES)
         self._own_notices: deque[schema.Notice] = deque(maxlen=MAX_BUFFERED_UPDATES)
         self._newest: HandEstimate | None = None
@@ -46,12 +52,14 @@ class StatusPublisher:
     def add_notice(self, text: str) -> None:
         """Add a notice of the service itself, in the service's thread."""
         self._own_notices.append(schema.Notice(time.time(), text))
+        self._report(text)
 
     def live_document(self, recorder: Recorder | None) -> schema.LiveDocument:
         """Return everything since the last call as one document."""
         updates = [self._updates.popleft() for _ in range(len(self._updates))]
-        own = [self._own_notices.popleft() for _ in range(len(self._own_notices))]
         estimates = [one for _, update in updates for one in update.estimates]
+        self._watch_faults(estimates)
+        own = [self._own_notices.popleft() for _ in range(len(self._own_notices))]
         if estimates:
             self._newest = estimates[-1].estimate
             self._update_taxels([update for _, update in updates])
@@ -70,7 +78,17 @@ class StatusPublisher:
             health=self._health(recorder),
             recording=None if recorder is None else recording_info(recorder),
             ended=self._session.ended,
+            problems=[
+                schema.ProblemDocument(problem.fault, problem.fingers, problem.text)
+                for problem in self._faults.current
+            ],
+            thresholds=dict(self._session.stream.thresholds),
         )
+
+    def _watch_faults(self, estimates: list[StreamEstimate]) -> None:
+        for one in estimates:
+            for problem in self._faults.update(one.estimate):
+                self.add_notice(problem.text)
 
     def _update_taxels(self, updates: list[StreamUpdate]) -> None:
         """Keep the newest readings of every finger, minus the tare."""
@@ -114,7 +132,22 @@ def hello_document(
         rate=None if np.isnan(stream.rate) else stream.rate,
         started=started,
         can_record=can_record,
+        faults={
+            fault: schema.FaultInfo(words=text.words, advice=text.advice)
+            for fault, text in FAULT_TEXTS.items()
+        },
+        debounce=schema.DebounceInfo(
+            min_duration=model.debounce.min_duration,
+            hysteresis=model.debounce.hysteresis,
+            hold=model.debounce.hold,
+        ),
+        operating_points=operating_points(model),
     )
+
+
+def operating_points(model: Model) -> list[schema.OperatingPoint]:
+    """Return what the model's own validation expects at each threshold that it has tried."""
+    return []
 
 
 def finger_document(

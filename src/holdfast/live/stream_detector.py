@@ -1,67 +1,25 @@
-"""Detect contact states from a live source.
+"""Detect contact states from a live source. `StreamDetector` reads it and owns the only clock."""
 
-`StreamDetector` reads an open source and owns the only clock. `ArrivalDetector` does the work:
-it has no clock, no thread and no I/O.
-"""
-
-import math
 import time
-from collections import deque
 from collections.abc import Iterator, Mapping
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 import numpy.typing as npt
 
-from holdfast.contact import (
-    ContactEvent,
-    ContactState,
-    Fault,
-    HandEstimate,
-    Reason,
-    StateChanges,
-    with_faults,
-)
+from holdfast.contact import ContactEvent, ContactState, HandEstimate, StateChanges
 from holdfast.detector import HAND, Detector
-from holdfast.errors import ModelError, StreamError
-from holdfast.features import Tare
+from holdfast.live.arrival_detector import ArrivalDetector, Samples, StreamEstimate
 from holdfast.live.lasting_changes import DEFAULT_DURATION, LastingChanges
-from holdfast.live.rate import RateMonitor, measure_rate
 from holdfast.model import Model
-from holdfast.recordings import GAP_PERIODS
-from holdfast.resampling import Resampler
-from holdfast.sensors import Sensor, sensor
+from holdfast.sensors import sensor
 from holdfast.sources import Arrival, Source
 from holdfast.sources.base import DeviceSource
-
-RATE_MEASUREMENT_TIME = 0.5
-"""Length of the first part of a stream, from which its rate is measured [s]."""
-MAX_BUFFERED_ARRIVALS = 4096
-"""Maximum number of arrivals in the buffer while the rate is measured.
-
-The clock of a device may stand still, so the time alone does not limit it."""
-MIN_SILENCE_TIMEOUT = 0.1
-"""Minimum time without samples after which a source counts as silent [s]."""
-
-Samples = Mapping[str, npt.NDArray[Any]]
 
 
 def compile_kernels() -> None:
     """Load the compiled kernels before a live source is opened."""
     Detector(Model.load("builtin:noise-floor"), {"index": sensor("uskin-4x4")})
-
-
-class StreamEstimate(NamedTuple):
-    """Estimate of the hand after an arrival.
-
-    Attributes:
-        estimate: of the hand and all its fingers.
-        updated_fingers: fingers whose estimate is new: they have a sample, or their fault
-            was reported, or their samples have been missing for too long.
-    """
-
-    estimate: HandEstimate
-    updated_fingers: tuple[str, ...]
 
 
 class StreamUpdate(NamedTuple):
@@ -76,211 +34,6 @@ class StreamUpdate(NamedTuple):
     arrival: Arrival | None
     estimates: list[StreamEstimate]
     events: list[ContactEvent]
-
-
-class ArrivalDetector:
-    """Detector that takes arrivals instead of samples.
-
-    It buffers the first half second until it has measured the rate of the source, then
-    processes the buffer. It resamples a source whose rate is not within 20 % of the model's.
-    A finger is UNKNOWN while the source reports a fault of it. Modules that the model does
-    not use are ignored. All other samples give the same estimates as in a recording.
-
-    Args:
-        model: with a tare that can be taken live.
-        sensors: of the source, by module.
-        strict: refuse a rate that is not the model's instead of resampling.
-        ignore: taxels by finger, from 0, that contribute nothing and cause no fault.
-        watch_rate: report the fault RATE while a finger has another rate than at the start.
-
-    Attributes:
-        fingers: sensor of each finger that the model uses.
-        notices: messages for the user since they were last taken from the list.
-        rate: measured rate of the source [Hz]; NaN while it is not known.
-        resampled: True if the source is resampled to the model's rate.
-
-    Raises:
-        ModelError: the source has none of the model's fingers, or another sensor.
-    """
-
-    def __init__(
-        self,
-        model: Model,
-        sensors: Mapping[str, Sensor],
-        *,
-        strict: bool = False,
-        ignore: Mapping[str, tuple[int, ...]] | None = None,
-        watch_rate: bool = False,
-    ) -> None:
-        if Tare.parse(model.tare).kind == "interval":
-            raise ModelError(
-                f"the model's tare is the interval {model.tare} s of a recording, which a live "
-                "source does not have; train with --tare 0.5, first or none"
-            )
-        self.model = model
-        self.fingers = dict(model.fingers_of(sensors))
-        self.rate = math.nan
-        self.resampled = False
-        self.notices: list[str] = []
-        self._watch_rate = watch_rate
-        self._monitor: RateMonitor | None = None
-        self._strict = strict
-        self._ignore = ignore
-        self._buffer: deque[Arrival] = deque(maxlen=MAX_BUFFERED_ARRIVALS)
-        self._detector: Detector | None = None
-        Detector(model, self.fingers, 100.0, ignore=ignore)  # raises for wrong arguments
-        self._resamplers: dict[str, Resampler] = {}
-        self._faults: dict[str, tuple[Fault, ...]] = {}
-        self._silent_fingers: set[str] = set()
-        self._last: HandEstimate | None = None
-
-    @property
-    def silence_timeout(self) -> float:
-        """Time without samples after which the source counts as silent [s]."""
-        if math.isnan(self.rate):
-            return MIN_SILENCE_TIMEOUT
-        return max(GAP_PERIODS / self.rate, MIN_SILENCE_TIMEOUT)
-
-    def update(self, arrival: Arrival) -> list[StreamEstimate]:
-        """Process an arrival.
-
-        Returns:
-            The new estimates, oldest first; none while the rate is not known.
-
-        Raises:
-            ModelError: the rate is not the model's, and `strict`.
-        """
-        if self._detector is not None:
-            return list(self._detect(self._detector, arrival))
-        self._append_to_buffer(arrival)
-        buffered = [one for one in self._buffer if one.samples]
-        if not arrival.samples or arrival.time - buffered[0].time < RATE_MEASUREMENT_TIME:
-            return []
-        rate = measure_rate(buffered, self.fingers)
-        if rate is None:  # no samples of the model's fingers yet
-            self._buffer.clear()
-            self._buffer.append(arrival)
-            return []
-        return self._start(rate)
-
-    def finish(self) -> list[StreamEstimate]:
-        """Return the estimates of a source that ended before its rate was known."""
-        buffered = [one for one in self._buffer if one.samples]
-        if self._detector is not None or not buffered:
-            return []
-        nominal = next(iter(self.fingers.values())).rate
-        return self._start(measure_rate(buffered, self.fingers) or self.model.rate or nominal)
-
-    def mark_silent(self) -> list[StreamEstimate]:
-        """Set every finger to UNKNOWN, with the reason `gap`, until its next sample.
-
-        Returns:
-            The estimate; none if there was no estimate before.
-        """
-        if self._last is None:
-            return []
-        self._silent_fingers = set(self.fingers)
-        return [StreamEstimate(self._with_stream_faults(self._last), tuple(self.fingers))]
-
-    def restart_tare(self) -> None:
-        """Discard the tare, and take a new one from the next samples.
-
-        Raises:
-            StreamError: a finger is in contact.
-        """
-        if self._detector is None or self._last is None:
-            return
-        touching = [
-            name
-            for name, finger in self._last.fingers.items()
-            if finger.state in (ContactState.STABLE, ContactState.UNSTABLE)
-        ]
-        if touching:
-            raise StreamError(
-                f"{', '.join(touching)} in contact: open the hand, then take the tare"
-            )
-        self._detector.reset()
-
-    def subtract_tare(self, samples: Samples) -> dict[str, npt.NDArray[np.float64]]:
-        """Return (n_taxels, 3) minus the tare, for the fingers whose tare is complete."""
-        baselines = {} if self._detector is None else self._detector.baselines()
-        return {
-            name: samples[name] - baseline
-            for name, baseline in baselines.items()
-            if name in samples
-        }
-
-    def _append_to_buffer(self, arrival: Arrival) -> None:
-        """Append an arrival; join consecutive arrivals without samples to one."""
-        if self._buffer and not (arrival.samples or self._buffer[-1].samples):
-            before = self._buffer.pop()
-            arrival = arrival._replace(faults={**before.faults, **arrival.faults})
-        self._buffer.append(arrival)
-
-    def _start(self, rate: float) -> list[StreamEstimate]:
-        """Create the detector for a rate, and process the buffer."""
-        model, self.rate = self.model, rate
-        if model.rate is not None and not model.rate_fits(rate):
-            if self._strict:
-                raise ModelError(
-                    f"{rate:.4g} Hz given, the model expects {model.rate:g} Hz within 20 % "
-                    "(--rate resample accepts it)"
-                )
-            self.resampled = True
-            self._resamplers = {name: Resampler(rate, model.rate) for name in self.fingers}
-        self._monitor = RateMonitor(rate, self.fingers) if self._watch_rate else None
-        self._detector = detector = Detector(model, self.fingers, rate, ignore=self._ignore)
-        buffered = list(self._buffer)
-        self._buffer.clear()
-        return [one for arrival in buffered for one in self._detect(detector, arrival)]
-
-    def _detect(self, detector: Detector, arrival: Arrival) -> Iterator[StreamEstimate]:
-        for name in arrival.samples:
-            self._faults.pop(name, None)
-            self._silent_fingers.discard(name)
-        self._faults.update(arrival.faults)
-        found = {name: arrival.samples[name] for name in self.fingers if name in arrival.samples}
-        if self._monitor is not None:
-            self._watch(self._monitor, found, arrival.time)
-        for instant, samples in self._at_model_rate(arrival.time, found):
-            before, self._last = self._last, detector.update(samples, instant)
-            lost = _lost_fingers(before, self._last) - samples.keys() if before else ()
-            yield StreamEstimate(self._with_stream_faults(self._last), (*samples, *lost))
-        if not found and self._last is not None:
-            faulty = tuple(name for name in self.fingers if name in arrival.faults)
-            if faulty:
-                yield StreamEstimate(self._with_stream_faults(self._last), faulty)
-
-    def _watch(self, monitor: RateMonitor, samples: Samples, instant: float) -> None:
-        """Report a change of the rate of fingers as a fault and a notice."""
-        self.notices += monitor.update(samples, instant)
-        for name in monitor.changed & samples.keys():
-            self._faults[name] = (*self._faults.get(name, ()), Fault.RATE)
-
-    def _with_stream_faults(self, estimate: HandEstimate) -> HandEstimate:
-        """Return the estimate with the faults of the source, and with silent fingers."""
-        n_fingers = 0 if self._detector is None else self._detector.n_fingers
-        if self._faults:
-            estimate = with_faults(estimate, self._faults, n_fingers)
-        if self._silent_fingers:
-            gap = dict.fromkeys(self._silent_fingers, (Fault.PACKET_GAP,))
-            estimate = with_faults(estimate, gap, n_fingers, Reason.GAP)
-        return estimate
-
-    def _at_model_rate(self, instant: float, samples: Samples) -> Iterator[tuple[float, Samples]]:
-        """Yield the samples unchanged, or resampled to the model's rate."""
-        if not self.resampled:
-            if samples:
-                yield instant, samples
-            return
-        resampled: dict[float, dict[str, npt.NDArray[Any]]] = {}
-        for name, sample in samples.items():
-            for when, value in self._resamplers[name].push(instant, sample):
-                resampled.setdefault(when, {})[name] = value
-        last = -math.inf if self._last is None else self._last.time
-        for when in sorted(resampled):
-            last = max(when, math.nextafter(last, math.inf))
-            yield last, resampled[when]
 
 
 class StreamDetector:
@@ -384,6 +137,22 @@ class StreamDetector:
         """True if the source is resampled to the model's rate."""
         return self._detector.resampled
 
+    @property
+    def thresholds(self) -> Mapping[str, float]:
+        """Probability from which each finger is stable."""
+        return self._detector.thresholds
+
+    def set_threshold(self, threshold: float | None) -> None:
+        """Change the probability from which a contact is stable, for all fingers.
+
+        Args:
+            threshold: from 0 to 1; None for the thresholds of the model.
+
+        Raises:
+            ValueError: the threshold is not from 0 to 1.
+        """
+        self._detector.set_threshold(threshold)
+
     def read(self) -> StreamUpdate:
         """Read the source once, and process what arrived.
 
@@ -441,13 +210,3 @@ class StreamDetector:
 def _states(estimate: HandEstimate) -> list[ContactState]:
     """Return the states of the fingers, then that of the hand."""
     return [*(finger.state for finger in estimate.fingers.values()), estimate.state]
-
-
-def _lost_fingers(before: HandEstimate, now: HandEstimate) -> set[str]:
-    """Return the fingers whose state has become UNKNOWN."""
-    unknown = ContactState.UNKNOWN
-    return {
-        name
-        for name, finger in now.fingers.items()
-        if finger.state is unknown and before.fingers[name].state is not unknown
-    }

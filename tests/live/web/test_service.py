@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 from aiohttp import ClientSession, WSServerHandshakeError, web
 
+from holdfast.contact import Fault
 from holdfast.detector import detect
 from holdfast.io import load_recording
 from holdfast.live.session import Session
@@ -21,10 +22,11 @@ PATIENCE = 30.0
 
 
 @asynccontextmanager
-async def served(source, token=None, host="127.0.0.1", folder=None, start=True):
+async def served(source, token=None, host="127.0.0.1", folder=None, start=True, reports=None):
     """Yield a client of the service of a source, and the session."""
     session = Session(StreamDetector(build.model(), source))
-    service = LiveService(session, build.model(), Guard(host, token), folder)
+    report = [].append if reports is None else reports.append
+    service = LiveService(session, build.model(), Guard(host, token), folder, report)
     runner = web.AppRunner(service.app, shutdown_timeout=0.5)
     await runner.setup()
     await web.TCPSite(runner, "127.0.0.1", 0).start()
@@ -291,6 +293,80 @@ def test_without_a_folder_there_are_no_recordings():
             return answer.status, (await answer.json())["error"]
 
     assert run(work()) == (409, "no folder for recordings: start with --record-to FOLDER")
+
+
+def test_the_threshold_is_changed_and_noticed():
+    async def work():
+        recording = build.grasp()
+        source = build.Lasting.of(recording, build.arrivals_of(recording)[:100], patient=True)
+        async with (
+            served(source, reports=reports) as (client, _),
+            client.ws_connect("/api/v1/live") as socket,
+        ):
+            hello = await socket.receive_json()
+            async with client.post("/api/v1/threshold", json={"value": 0.75}) as answer:
+                assert (answer.status, await answer.json()) == (200, {})
+            changed = await next_with_notice(socket)
+            async with client.delete("/api/v1/threshold") as answer:
+                assert answer.status == 200
+            return hello, changed, await next_with_notice(socket)
+
+    async def next_with_notice(socket):
+        while not (document := await socket.receive_json())["notices"]:
+            pass
+        return document
+
+    reports = []
+    hello, changed, restored = run(work())
+    own = hello["fingers"]["thumb"]["probability_threshold"]
+    assert changed["thresholds"] == dict.fromkeys(build.FINGERS, 0.75)
+    assert restored["thresholds"] == dict.fromkeys(build.FINGERS, own)
+    texts = [document["notices"][0]["text"] for document in (changed, restored)]
+    assert texts == reports == ["threshold set to 0.75", "threshold of the model restored"]
+
+
+@pytest.mark.parametrize("body", [b"{}", b'{"value": 1.5}', b'{"value": null}', b'{"value": "a"}'])
+def test_an_invalid_threshold_is_refused(body):
+    async def work():
+        async with (
+            served(patient(10)) as (client, session),
+            client.post("/api/v1/threshold", data=body) as answer,
+        ):
+            return answer.status, await answer.json(), dict(session.stream.thresholds)
+
+    status, answer, thresholds = run(work())
+    assert status == 400
+    assert answer["error"].startswith("/api/v1/threshold: ")
+    assert set(thresholds.values()) == {build.model().finger("thumb").classifier.threshold}
+
+
+def test_a_fault_that_lasts_is_a_problem_and_a_notice():
+    async def work():
+        recording = build.grasp()
+        steps = build.arrivals_of(recording)[:400]
+        for k in range(150, 400):
+            steps[k] = steps[k]._replace(faults={"thumb": (Fault.LATE,)})
+        source = build.Script.of(recording, steps, patient=True)
+        async with (
+            served(source, start=False) as (client, session),
+            client.ws_connect("/api/v1/live") as socket,
+        ):
+            hello = await socket.receive_json()
+            session.start()
+            document = {"problems": []}
+            notices = []
+            while not document["problems"]:
+                document = await socket.receive_json()
+                notices += document["notices"]
+            session.stop()
+            return hello, document, notices
+
+    hello, document, notices = run(work())
+    text = f"thumb: {hello['faults']['late']['advice']}"
+    assert document["problems"] == [{"fault": "late", "fingers": ["thumb"], "text": text}]
+    assert [notice["text"] for notice in notices] == [text]
+    assert set(hello["faults"]) == set(map(str, Fault))
+    assert hello["debounce"] == {"min_duration": 0.0, "hysteresis": 0.0, "hold": 0.1}
 
 
 @pytest.mark.parametrize("body", [b"{", b"[" * 50_000, b"[]", b'{"name": 3}', b'{"nam": "a"}'])

@@ -26,7 +26,7 @@ class FingerInfo(Struct, frozen=True, kw_only=True):
         normal: of the sensor in the fingertip frame.
         contact_threshold: F_a below which there is no contact [unit]; null if the model finds
             it from the noise.
-        probability_threshold: probability from which a contact is stable.
+        probability_threshold: probability from which a contact is stable, by the model.
     """
 
     sensor: str
@@ -37,6 +37,35 @@ class FingerInfo(Struct, frozen=True, kw_only=True):
     normal: Vector
     contact_threshold: float | None
     probability_threshold: float
+
+
+class FaultInfo(Struct, frozen=True, kw_only=True):
+    """Texts about a fault: its name in a few words, and what to do."""
+
+    words: str
+    advice: str
+
+
+class OperatingPoint(Struct, frozen=True, kw_only=True):
+    """What the validation of the model expects at a probability threshold.
+
+    Attributes:
+        threshold: probability from which a contact is stable.
+        false_alarms_per_minute: per minute of stable contact.
+        missed: share of events without an alarm within 0.2 s [%].
+    """
+
+    threshold: float
+    false_alarms_per_minute: Number
+    missed: Number
+
+
+class DebounceInfo(Struct, frozen=True, kw_only=True):
+    """Debouncing of state changes: see `holdfast.model.Debounce`."""
+
+    min_duration: float
+    hysteresis: float
+    hold: float
 
 
 class HelloDocument(Struct, frozen=True, kw_only=True, tag_field="type", tag="hello"):
@@ -50,6 +79,9 @@ class HelloDocument(Struct, frozen=True, kw_only=True, tag_field="type", tag="he
         rate: of the source [Hz]; null while it is not known.
         started: when the service started [s since 1970].
         can_record: whether the service can record.
+        faults: texts about every fault.
+        debounce: of the model.
+        operating_points: by increasing threshold; empty if the model has none.
     """
 
     model: str
@@ -59,6 +91,9 @@ class HelloDocument(Struct, frozen=True, kw_only=True, tag_field="type", tag="he
     rate: float | None
     started: float
     can_record: bool
+    faults: dict[Fault, FaultInfo] = {}
+    debounce: DebounceInfo | None = None
+    operating_points: list[OperatingPoint] = []
     schema: Literal["holdfast.live/1"] = "holdfast.live/1"
 
 
@@ -119,6 +154,14 @@ class Notice(Struct, frozen=True, gc=False):
     text: str
 
 
+class ProblemDocument(Struct, frozen=True, gc=False):
+    """Fault that lasts; the text says what to do."""
+
+    fault: Fault
+    fingers: tuple[str, ...]
+    text: str
+
+
 class LatencyInfo(Struct, frozen=True, gc=False):
     """Time from packet to estimate, over the newest estimates [s]."""
 
@@ -172,6 +215,8 @@ class LiveDocument(Struct, frozen=True, kw_only=True, tag_field="type", tag="liv
         health: statistics of the source.
         recording: progress of the recording; null if none is running.
         ended: whether the source has ended.
+        problems: faults that last.
+        thresholds: probability from which each finger is stable now.
     """
 
     time: Number
@@ -183,6 +228,8 @@ class LiveDocument(Struct, frozen=True, kw_only=True, tag_field="type", tag="liv
     health: Health
     recording: RecordingInfo | None
     ended: bool
+    problems: list[ProblemDocument] = []
+    thresholds: dict[str, float] = {}
 
 
 class EstimateDocument(

@@ -4,8 +4,10 @@ import asyncio
 import time
 from collections.abc import AsyncIterator, Callable
 from contextlib import suppress
+from http import HTTPStatus
 from importlib import resources
 from pathlib import Path
+from typing import Annotated
 
 import msgspec
 from aiohttp import WSMsgType, web
@@ -88,18 +90,24 @@ class LiveService:
         model: of the session.
         guard: check of every request.
         folder: for recordings; None if the service may not record.
+        report: called with the text of each notice about a fault or by the service.
 
     Attributes:
         app: the web application.
     """
 
     def __init__(
-        self, session: Session, model: Model, guard: Guard, folder: Path | None = None
+        self,
+        session: Session,
+        model: Model,
+        guard: Guard,
+        folder: Path | None = None,
+        report: Callable[[str], None] = lambda _: None,
     ) -> None:
         self._session = session
         self._model = model
         self._recorder = SessionRecorder(session, folder)
-        self._status = StatusPublisher(session)
+        self._status = StatusPublisher(session, report)
         self._started = time.time()
         self._clients: dict[str, set[WebSocketClient]] = {"live": set(), "estimates": set()}
         self._newest_document = b"{}"
@@ -119,6 +127,8 @@ class LiveService:
             web.get("/api/v1/state", self._get_state),
             web.get("/api/v1/schema", _get_schema),
             web.post("/api/v1/tare", self._post_tare),
+            web.post("/api/v1/threshold", self._post_threshold),
+            web.delete("/api/v1/threshold", self._delete_threshold),
             web.post("/api/v1/recording", self._post_recording),
             web.delete("/api/v1/recording", self._delete_recording),
             web.post("/api/v1/markers", self._post_marker),
@@ -209,6 +219,19 @@ class LiveService:
     async def _post_tare(self, _: web.Request) -> web.Response:
         return await _answer(self._session.restart_tare)
 
+    async def _post_threshold(self, request: web.Request) -> web.Response:
+        value = (await self._bodies.read(request, _ThresholdRequest)).value
+        return await self._set_threshold(value, f"threshold set to {value:.2f}")
+
+    async def _delete_threshold(self, _: web.Request) -> web.Response:
+        return await self._set_threshold(None, "threshold of the model restored")
+
+    async def _set_threshold(self, value: float | None, notice: str) -> web.Response:
+        answer = await _answer(lambda: self._session.set_threshold(value))
+        if answer.status == HTTPStatus.OK:
+            self._status.add_notice(notice)
+        return answer
+
     async def _post_recording(self, request: web.Request) -> web.Response:
         name = (await self._bodies.read(request, _RecordingRequest)).name
         return await _answer(lambda: {"path": str(self._recorder.start(name))})
@@ -219,6 +242,10 @@ class LiveService:
     async def _post_marker(self, request: web.Request) -> web.Response:
         text = (await self._bodies.read(request, _MarkerRequest)).text
         return await _answer(lambda: self._recorder.add_marker(text))
+
+
+class _ThresholdRequest(msgspec.Struct, forbid_unknown_fields=True):
+    value: Annotated[float, msgspec.Meta(ge=0, le=1)]
 
 
 class _RecordingRequest(msgspec.Struct, forbid_unknown_fields=True):

@@ -19,6 +19,7 @@ from aiohttp import WSCloseCode, web
 from holdfast.contact import ContactState, Fault, Reason
 from holdfast.detector import detect
 from holdfast.io import load_recording
+from holdfast.live.fault_notices import FAULT_TEXTS
 from holdfast.model import Model
 from holdfast.sensors import sensor
 from holdfast.web.guard import SECURITY_HEADERS
@@ -111,6 +112,7 @@ class Tape:
         self.length = float(times[-1] - times[0] + times[1] - times[0])
         self.states = dict.fromkeys((*tracks, "hand"), "UNKNOWN")
         self.n_packets = 0
+        self.points = []  # expected errors by threshold
         self.change = {}  # finger -> fields to write over its part of a message
 
     def hello(self):
@@ -132,6 +134,9 @@ class Tape:
             "source": "twin:?object=can&seed=1", "fingers": fingers,
             "modules": {name: track.layout.n_taxels for name, track in self.tracks.items()},
             "rate": 150.0, "started": time.time(), "can_record": True,
+            "faults": {fault: text._asdict() for fault, text in FAULT_TEXTS.items()},
+            "debounce": {"min_duration": 0.0, "hysteresis": 0.0, "hold": 0.1},
+            "operating_points": self.points,
         }  # fmt: skip
 
     def message(self, start, stop):
@@ -198,6 +203,7 @@ class Service:
         self.refusal = None  # error of every REST call
         self.calls = []
         self.recording = None
+        self.threshold = 0.5
         self.patch = {}  # fields that replace those of every message
         self.notices = []
         self.muted = False
@@ -243,6 +249,8 @@ class Service:
         app.router.add_get("/api/v1/live", self.live)
         app.router.add_get("/api/v1/info", self.info)
         app.router.add_post("/api/v1/tare", self.tare)
+        app.router.add_post("/api/v1/threshold", self.set_threshold)
+        app.router.add_delete("/api/v1/threshold", self.reset_threshold)
         app.router.add_post("/api/v1/recording", self.start_recording)
         app.router.add_delete("/api/v1/recording", self.stop_recording)
         app.router.add_post("/api/v1/markers", self.marker)
@@ -275,6 +283,14 @@ class Service:
         return web.json_response(self.tape.hello())
 
     async def tare(self, _):
+        return web.json_response({})
+
+    async def set_threshold(self, request):
+        self.threshold = (await request.json())["value"]
+        return web.json_response({})
+
+    async def reset_threshold(self, _):
+        self.threshold = 0.5
         return web.json_response({})
 
     async def start_recording(self, _):
@@ -313,6 +329,7 @@ class Service:
                 continue
             start, self.at = self.at, self.at + PERIOD * self.speed
             message = self.tape.message(start, self.at) | self.patch
+            message["thresholds"] = dict.fromkeys(self.tape.tracks, self.threshold)
             message["notices"], self.notices = self.notices, []
             if self.recording:
                 self.recording["seconds"] += PERIOD

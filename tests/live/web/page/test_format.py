@@ -2,6 +2,8 @@
 
 import pytest
 
+from holdfast.contact import ContactState, Reason
+
 CALL = "async ([name, value]) => (await import('/page/format.js'))[name](value)"
 
 
@@ -20,7 +22,8 @@ CALL = "async ([name, value]) => (await import('/page/format.js'))[name](value)"
         ("fileSize", 2.1e9, "2.1 GB"), ("stateKey", "NO_CONTACT", "no-contact"),
         ("stateKey", "<b>", "unknown"), ("stateWord", "NO_CONTACT", "NO CONTACT"),
         ("reasonWord", "warm_up", "warming up"), ("reasonWord", "", ""),
-        ("faultWord", "packet_gap", "packets missing"), ("faultWord", "a_new_one", "a new one"),
+        ("faultWord", "a_new_one", "a new one"), ("share", 0.5, "50\u202f%"),
+        ("share", 0.995, "99.5\u202f%"), ("share", None, "–"),
         ("unitWord", "count", "counts"), ("unitWord", "N", "N"),
     ],
 )  # fmt: skip
@@ -28,12 +31,40 @@ def test_words(module, name, value, text):
     assert module.evaluate(CALL, [name, value]) == text
 
 
-def test_every_state_reason_and_fault_has_its_words(module):
-    from holdfast.contact import ContactState, Fault, Reason
-
+def test_every_state_and_reason_has_its_words(module):
     words = module.evaluate("import('/page/format.js').then((m) => m.STATES)")
     assert words == [state.value for state in ContactState]
-    for name, members in (("reasonWord", Reason), ("faultWord", Fault)):
-        texts = [module.evaluate(CALL, [name, member.value]) for member in members]
-        assert len(set(texts)) == len(members)
-        assert not any("_" in text for text in texts)
+    texts = [module.evaluate(CALL, ["reasonWord", reason.value]) for reason in Reason]
+    assert len(set(texts)) == len(Reason)
+    assert not any("_" in text for text in texts)
+
+
+def test_faults_have_the_words_of_the_service(module):
+    call = "async ([fault, texts]) => (await import('/page/format.js')).faultWord(fault, texts)"
+    texts = {"late": {"words": "too late", "advice": "hurry"}}
+    assert module.evaluate(call, ["late", texts]) == "too late"
+    assert module.evaluate(call, ["clock_jump", texts]) == "clock jump"
+
+
+@pytest.mark.parametrize(
+    ("state", "probability", "debounce", "words"),
+    [
+        ("UNSTABLE", 0.98, {}, "held for 0.1 s after the last alarm"),
+        ("UNSTABLE", 0.98, {"hold": 0}, None),
+        ("UNSTABLE", 0.98, {"hold": 0, "min_duration": 0.05}, "stable when it lasts 0.05 s"),
+        ("UNSTABLE", 0.55, {"hysteresis": 0.1}, "stable from 60\u202f%"),
+        ("UNSTABLE", 0.49, {}, None),
+        ("UNSTABLE", None, {}, None),
+        ("STABLE", 0.45, {"hysteresis": 0.1}, "unstable below 40\u202f%"),
+        ("STABLE", 0.2, {"min_duration": 0.05}, "unstable when it lasts 0.05 s"),
+        ("STABLE", 0.98, {}, None),
+        ("NO_CONTACT", 0.98, {}, None),
+    ],
+)
+def test_a_state_that_differs_from_its_probability_is_explained(
+    module, state, probability, debounce, words
+):
+    call = "async (given) => (await import('/page/format.js')).debounceNote(...given)?.long ?? null"
+    finger = {"state": state, "stable_probability": probability}
+    debounce = {"min_duration": 0.0, "hysteresis": 0.0, "hold": 0.1} | debounce
+    assert module.evaluate(call, [finger, 0.5, debounce]) == words

@@ -189,6 +189,70 @@ def test_the_tare(visit, service):
     assert requests(service) == [("POST", "tare"), ("POST", "tare")]
 
 
+def test_a_fault_that_lasts_is_explained(visit, service):
+    page = visit(service.url)
+    wait_for_samples(page)
+    text = "thumb: the tare was taken in contact: open the hand"
+    problem = {"fault": "tare_loaded", "fingers": ["thumb"], "text": text}
+    service.patch = {"problems": [problem]}
+    service.tape.change = {"thumb": {"state": "UNKNOWN", "reason": "fault",
+                                     "faults": ["tare_loaded"]}}  # fmt: skip
+    shows(page, "#alert", f"^{text}$")
+    shows(page, '[aria-label="thumb"] .faults', "^loaded at tare$")
+    title = page.locator('[aria-label="thumb"] .faults').get_attribute("title")
+    assert "the tare was taken in contact" in title
+    service.patch = {"problems": []}
+    until(page, "document.getElementById('alert').hidden")
+
+
+def test_a_state_that_is_held_is_explained(visit, service):
+    change(service, state="UNSTABLE", stable_probability=0.98)
+    page = visit(service.url)
+    shows(page, '[aria-label="thumb"] .head', "held 0.1 s")
+    change(service, state="UNSTABLE", stable_probability=0.2)
+    until(page, "!document.querySelector('.card .reason').textContent")
+    page.set_viewport_size({"width": 390, "height": 844})
+    change(service, state="UNSTABLE", stable_probability=0.98)
+    shows(page, '[aria-label="thumb"] .head', "held for 0.1 s after the last alarm")
+
+
+def test_the_threshold_is_moved_and_restored(visit, service):
+    service.tape.points = [
+        {"threshold": 0.5, "false_alarms_per_minute": 4.0, "missed": 2.0},
+        {"threshold": 0.7, "false_alarms_per_minute": 1.25, "missed": 3.5},
+    ]
+    page = visit(service.url)
+    wait_for_samples(page)
+    shows(page, "#threshold-toggle", r"Threshold\s*50\s%")
+    assert page.locator("#threshold-panel").is_hidden()
+    page.keyboard.press("p")
+    shows(page, "#threshold-expected", r"Expected at 50\s%: 4.00 false alarms a minute, 2\s% of")
+    assert page.locator("#threshold-own").is_disabled()
+    page.locator("#threshold").fill("0.72")
+    shows(page, "#threshold-expected", r"Expected at 70\s%: 1.25 false alarms a minute, 3.5\s% of")
+    until(page, "holdfast.plots.thresholds.index === 0.72")
+    shows(page, "#threshold-now", r"72\s%")
+    mark = page.locator('[aria-label="index"] .threshold')
+    assert mark.evaluate("(e) => e.style.left") == "72%"
+    page.click("#threshold-own")
+    until(page, "holdfast.plots.thresholds.index === 0.5")
+    shows(page, "#threshold-now", r"50\s%")
+    assert [(method, path, body) for method, path, body in service.calls] == [
+        ("POST", "threshold", '{"value":0.72}'), ("DELETE", "threshold", ""),
+    ]  # fmt: skip
+    service.refusal = "the source has ended"
+    page.locator("#threshold").fill("0.9")
+    shows(page, ".toast.bad", "^the source has ended$")
+    shows(page, "#threshold-now", r"50\s%")
+
+
+def test_a_model_without_a_table_of_thresholds(visit, service):
+    page = visit(service.url)
+    wait_for_samples(page)
+    page.click("#threshold-toggle")
+    shows(page, "#threshold-expected", "has no table of thresholds")
+
+
 def test_a_recording_starts_and_stops(visit, service):
     page = visit(service.url)
     wait_for_samples(page)

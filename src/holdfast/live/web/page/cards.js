@@ -3,7 +3,7 @@
 import { make, shape, setText } from "../web/dom.js";
 import { fingerColour } from "../web/theme.js";
 import { Scale, TaxelMap } from "./taxel_map.js";
-import { faultWord, number, percent, reasonWord, stateKey, stateWord, unitWord } from "./format.js";
+import { debounceNote, faultWord, number, percent, reasonWord, stateKey, stateWord, unitWord } from "./format.js";
 
 // Range of the sigma bar by unit, from noise to a strong slip.
 const SIGMA_RANGES = { count: [1, 1000], N: [1e-3, 1] };
@@ -37,7 +37,7 @@ export class Cards {
     const entries = Object.entries(hello.fingers);
     this.cards = new Map(entries.map(([name, sensor], k) => {
       if (!this.scales.has(sensor.unit)) this.scales.set(sensor.unit, { disc: new Scale(sensor.unit), arrow: new Scale(sensor.unit) });
-      return [name, new Card(name, sensor, this.scales.get(sensor.unit), k, () => this.onChoose(name))];
+      return [name, new Card(name, sensor, this.scales.get(sensor.unit), k, hello, () => this.onChoose(name))];
     }));
     this.section.replaceChildren(...[...this.cards.values()].map((card) => card.element));
     for (const card of this.cards.values()) this.observer.observe(card.map.canvas.parentElement);
@@ -56,6 +56,7 @@ export class Cards {
     if (!this.frozen) this.decayScales(message.time);
     for (const [name, card] of this.cards) {
       const finger = message.fingers[name];
+      card.setThreshold(message.thresholds?.[name]);
       if (finger) card.update(finger, this.frozen);
     }
   }
@@ -87,17 +88,19 @@ export class Cards {
 }
 
 class Card {
-  constructor(name, sensor, scales, index, onChoose) {
+  constructor(name, sensor, scales, index, hello, onChoose) {
     this.sensor = sensor;
+    this.hello = hello;
     const swatch = make("i", "swatch");
     swatch.style.background = fingerColour(index);
     swatch.dataset.finger = index;
     this.shape = shape("unknown");
     this.word = make("strong", "word", "UNKNOWN");
     this.reason = make("span", "reason");
+    this.longReason = make("span", "reason long");
     const title = make("span", "name", swatch, make("span", "", name));
     title.title = name;
-    this.head = make("button", "head", this.shape, make("span", "head-text", make("span", "top-line", title, this.reason), this.word));
+    this.head = make("button", "head", this.shape, make("span", "head-text", make("span", "top-line", title, this.reason, this.longReason), this.word));
     this.head.type = "button";
     this.head.title = `Plots of ${name} (${index + 1})`;
     this.head.addEventListener("click", onChoose);
@@ -115,12 +118,9 @@ class Card {
 
   makeValues() {
     this.probability = meter("stable", "");
-    const threshold = this.sensor.probability_threshold;
-    if (Number.isFinite(threshold)) {
-      const mark = make("i", "threshold");
-      mark.style.left = `${100 * threshold}%`;
-      this.probability.bar.append(mark);
-    }
+    this.mark = make("i", "threshold");
+    this.probability.bar.append(this.mark);
+    this.setThreshold(this.sensor.probability_threshold);
     this.sigma = meter("σ", unitWord(this.sensor.unit));
     this.sigma.bar.classList.add("log");
     this.force = make("b", "", number(null));
@@ -132,8 +132,16 @@ class Card {
     return make("div", "values", this.probability.box, this.sigma.box, make("div", "force", total, ...this.axes.map(({ row }) => row)));
   }
 
+  /** Move the mark of the threshold from which the finger is stable. */
+  setThreshold(threshold) {
+    if (!Number.isFinite(threshold) || threshold === this.threshold) return;
+    this.threshold = threshold;
+    this.mark.style.left = `${100 * threshold}%`;
+  }
+
   update(finger, frozen) {
-    this.showState(finger.state, reasonWord(finger.reason));
+    const note = debounceNote(finger, this.threshold, this.hello.debounce);
+    this.showState(finger.state, note?.short ?? reasonWord(finger.reason), note?.long);
     setText(this.probability.value, percent(finger.stable_probability));
     setBar(this.probability, finger.stable_probability ?? 0);
     setText(this.sigma.value, number(finger.instability));
@@ -145,10 +153,11 @@ class Card {
     if (!frozen) this.map.update(finger.taxels, finger.faulty_taxels ?? []);
   }
 
-  showState(state, reason) {
+  showState(state, reason, longReason = reason) {
     const key = stateKey(state);
     setText(this.word, stateWord(state));
     setText(this.reason, reason);
+    setText(this.longReason, longReason);
     if (this.element.dataset.state === key) return;
     this.element.dataset.state = key;
     this.shape.firstChild.setAttribute("href", `#shape-${key}`);
@@ -158,7 +167,7 @@ class Card {
     const key = JSON.stringify([faults, taxels]);
     if (key === this.faultsKey) return;
     this.faultsKey = key;
-    const words = faults.map(faultWord);
+    const texts = this.hello.faults ?? {}, words = faults.map((fault) => faultWord(fault, texts));
     if (taxels.length) {
       const first = taxels.slice(0, 4).map((k) => k + 1).join(", ");
       words.push(`${taxels.length > 1 ? "taxels" : "taxel"} ${first}${taxels.length > 4 ? " …" : ""}`);
@@ -166,7 +175,7 @@ class Card {
     // There is room for three; the tooltip has all.
     const shown = words.length > 3 ? [...words.slice(0, 2), `${words.length - 2} more`] : words;
     this.faults.replaceChildren(...shown.map((word) => make("li", "", word)));
-    this.faults.title = words.join("; ");
+    this.faults.title = [words.join("; "), ...faults.map((fault) => texts[fault]?.advice ?? "")].filter(Boolean).join("\n");
     this.faults.hidden = !words.length;
   }
 }

@@ -15,29 +15,39 @@ const REASONS = {
   fault: "faulty",
 };
 
-const FAULTS = {
-  not_finite: "not a number",
-  stuck: "stuck",
-  saturated: "saturated",
-  tare_loaded: "loaded at tare",
-  dead: "dead",
-  noisy: "noisy",
-  out_of_range: "out of range",
-  tare_drift: "tare drifts",
-  taxel_count: "wrong number of taxels",
-  packet_gap: "packets missing",
-  late: "late",
-  clock_jump: "clock jumped",
-  rate: "rate changed",
-};
-
 /** Return the key of a state in class names, shapes and colours: "no-contact". */
 export const stateKey = (state) =>
   STATES.includes(state) ? state.toLowerCase().replace("_", "-") : "unknown";
 
 export const stateWord = (state) => withSpaces(state ?? "UNKNOWN");
 export const reasonWord = (reason) => (reason ? REASONS[reason] ?? withSpaces(reason) : "");
-export const faultWord = (fault) => FAULTS[fault] ?? withSpaces(fault);
+/** Return the name of a fault; `texts` are those of the service, by fault. */
+export const faultWord = (fault, texts) => texts?.[fault]?.words ?? withSpaces(fault);
+
+/** Format a fraction as percent, with a decimal if it has one: "50 %", "99.5 %". */
+export const share = (fraction) => (Number.isFinite(fraction) ? `${Number((100 * fraction).toFixed(1))}\u202f%` : NO_VALUE);
+
+/**
+ * Return why the state of a finger differs from what its probability says, in few words and in
+ * more; null if it does not differ.
+ */
+export function debounceNote({ state, stable_probability: probability }, threshold, debounce) {
+  if (!debounce || !Number.isFinite(probability)) return null;
+  const { hold, hysteresis, min_duration: duration } = debounce, above = probability >= threshold;
+  if (state === "UNSTABLE" && above) {
+    if (probability < threshold + hysteresis) return note(`from ${share(threshold + hysteresis)}`, `stable from ${share(threshold + hysteresis)}`);
+    if (hold > 0) return note(`held ${seconds(hold)}`, `held for ${seconds(hold)} after the last alarm`);
+    if (duration > 0) return note(`waits ${seconds(duration)}`, `stable when it lasts ${seconds(duration)}`);
+  }
+  if (state === "STABLE" && !above) {
+    if (probability >= threshold - hysteresis) return note(`below ${share(threshold - hysteresis)}`, `unstable below ${share(threshold - hysteresis)}`);
+    if (duration > 0) return note(`waits ${seconds(duration)}`, `unstable when it lasts ${seconds(duration)}`);
+  }
+  return null;
+}
+
+const note = (short, long) => ({ short, long });
+const seconds = (value) => `${Number(value.toPrecision(2))} s`;
 
 /** Format a duration in few characters: "0.8 s", "12 s", "3 min", "2 h". */
 export function duration(seconds) {

@@ -13,6 +13,7 @@ import { listenToKeys } from "./keys.js";
 import { EventLog, NoticeLog } from "./logs.js";
 import { Plots } from "./plots.js";
 import { SampleStore, capacityFor } from "./store.js";
+import { ThresholdPanel } from "./threshold.js";
 
 const WINDOWS = [5, 10, 30, 60]; // [s]
 const AGE_INTERVAL = 250; // [ms] between two updates of the ages in the event log
@@ -26,7 +27,8 @@ class Page {
     this.plots = new Plots(byId("stack"));
     this.cards = new Cards(byId("cards"), (name) => this.chooseFinger(this.plots.chosen === name ? null : name));
     this.controls = new Controls((text) => this.addMarker(text));
-    this.status = { link: "connecting", reason: "", ended: false, silent: false };
+    this.threshold = new ThresholdPanel();
+    this.status = { link: "connecting", reason: "", ended: false, silent: false, problem: "" };
     this.store = null;
     this.frozen = null; // a copy of the store while the plots are paused
     this.dirty = false;
@@ -38,6 +40,7 @@ class Page {
     listenToKeys({
       " ": () => this.togglePause(), t: () => this.controls.tare(), r: () => this.controls.record(),
       m: () => this.controls.mark(), f: () => this.controls.toggleFullScreen(), "?": () => byId("help").click(),
+      p: () => this.threshold.toggle(),
       digit: (n) => this.chooseFinger(n ? this.plots.names?.[n - 1] ?? this.plots.chosen : null),
     });
     onTheme(() => this.updateColours());
@@ -55,7 +58,7 @@ class Page {
     this.store = new SampleStore(names, capacityFor(hello.rate));
     this.maxGap = hello.rate ? Math.max(0.1, 4 / hello.rate) : 0.5;
     this.events.clear();
-    for (const part of [this.banner, this.cards, this.controls]) part.start(hello);
+    for (const part of [this.banner, this.cards, this.controls, this.threshold]) part.start(hello);
     this.plots.start(hello, this.store);
     this.fillFingers();
     this.showStream(hello);
@@ -65,6 +68,9 @@ class Page {
     if (!this.store) return;
     this.status.ended = Boolean(message.ended);
     this.status.silent = Boolean(message.health?.silent);
+    this.status.problem = (message.problems ?? []).map(({ text }) => text).join(" · ");
+    this.plots.thresholds = message.thresholds ?? {};
+    this.threshold.update(message.thresholds);
     this.now = message.time;
     this.store.append(message.series, Math.max(0, STATES.indexOf(message.hand)), this.maxGap);
     const { ended, silent } = this.status;
@@ -86,6 +92,7 @@ class Page {
     if (link === "lost" && this.status.link === "refused") return;
     Object.assign(this.status, { link, reason });
     this.controls.setConnected(link === "open");
+    this.threshold.setConnected(link === "open");
     this.showLink();
     if (link === "open") return;
     this.banner.showState("UNKNOWN", "NO CONNECTION");
@@ -94,12 +101,13 @@ class Page {
   }
 
   showLink() {
-    const { link, reason, ended, silent } = this.status, open = link === "open";
+    const { link, reason, ended, silent, problem } = this.status, open = link === "open";
     showAlert(
       link === "refused" && `Not connected: ${reason}`,
       link === "lost" && "Connection lost, trying again …",
       open && ended && "Source ended: these are its last values",
       open && silent && "No samples from the source",
+      open && problem,
     );
     const words = { connecting: "connecting", open: ended ? "source ended" : "connected", lost: "connection lost", refused: "not connected" };
     this.health.showConnection(open && (ended || silent) ? "quiet" : link, words[link]);

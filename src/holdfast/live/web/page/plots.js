@@ -28,6 +28,7 @@ export class Plots {
     this.window = 10;
     this.chosen = null; // a finger's name, or null for all
     this.markers = []; // times [s]
+    this.thresholds = {}; // of the live detector, by finger
     this.rows = [];
     this.observer = new ResizeObserver(() => this.resizePlots());
   }
@@ -38,6 +39,7 @@ export class Plots {
     this.names = Object.keys(hello.fingers);
     this.store = store;
     this.markers = [];
+    this.thresholds = {};
     if (!this.names.includes(this.chosen)) this.chosen = null;
     this.build();
   }
@@ -84,7 +86,7 @@ export class Plots {
 
   makeRow(kind, last) {
     const values = kind.lines.map(() => make("span", "value", number(null)));
-    const legend = make("div", kind.brief ? "legend brief" : "legend", ...kind.lines.map((entry, k) => {
+    const legend = make("div", `legend${kind.brief ? " brief" : ""}${this.chosen === null ? " of-all" : ""}`, ...kind.lines.map((entry, k) => {
       const swatch = make("i", "swatch");
       swatch.style.background = entry.colour;
       const item = make("span", "entry", swatch, make("span", "label", entry.label), values[k]);
@@ -144,7 +146,7 @@ export class Plots {
     drawMarkers(plot, this.markers.map((time) => time - now));
     if (row.kind.key !== "probability") return;
     const shown = this.chosen === null ? this.names : [this.chosen];
-    for (const value of new Set(shown.map((name) => this.fingers[name].probability_threshold))) {
+    for (const value of new Set(shown.map((name) => this.thresholds[name] ?? this.fingers[name].probability_threshold))) {
       if (Number.isFinite(value)) drawLevel(plot, value);
     }
   }

@@ -1,0 +1,78 @@
+"""Output of `holdfast detect` on a terminal: one line for each change of state that lasted."""
+
+from collections.abc import Iterator, Sequence
+from math import isnan, nan
+
+from holdfast.cli.detect_output import EstimateChunk
+from holdfast.contact import ContactEstimate, ContactEvent, ContactState, Reason
+from holdfast.detector import HAND
+from holdfast.live.fault_notices import FAULT_TEXTS
+from holdfast.live.lasting_changes import LastingChanges
+
+HEADER = f"{'time':>9}    {'finger':8}  {'from':10}    {'to':10}  why"
+REASON_WORDS = {
+    Reason.NONE: "",
+    Reason.TARE: "taking the tare",
+    Reason.WARM_UP: "too few samples yet",
+    Reason.GAP: "gap in the samples",
+    Reason.FAULT: "fault",
+}
+"""Words for the reason of UNKNOWN."""
+
+
+class ChangeLines:
+    """Find the changes of each finger and of the hand that lasted, as lines of text.
+
+    Args:
+        from_first: give times relative to the first sample: clocks of devices count from 1970.
+    """
+
+    def __init__(self, *, from_first: bool) -> None:
+        self._start = nan if from_first else 0.0
+        self._changes: dict[str, LastingChanges] = {}
+        self._why: dict[str, tuple[ContactState, str]] = {}
+
+    def add(self, chunk: EstimateChunk) -> list[str]:
+        """Return the lines for the next chunk of the same source, in the order of time."""
+        if isnan(self._start) and chunk.hand:
+            self._start = chunk.hand[0][0]
+        found: list[tuple[ContactEvent, str]] = []
+        for finger, estimates in chunk.fingers.items():
+            found += self._finger_changes(finger, estimates)
+        for time, state in chunk.hand:
+            found += [(event, "") for event in self._lasting(HAND, state, time)]
+        return [self._line(*one) for one in sorted(found, key=lambda one: one[0].time)]
+
+    def _finger_changes(
+        self, finger: str, estimates: Sequence[ContactEstimate]
+    ) -> Iterator[tuple[ContactEvent, str]]:
+        for one in estimates:
+            if self._why.get(finger, (None,))[0] is not one.state:
+                self._why[finger] = one.state, why(one)
+            for event in self._lasting(finger, one.state, one.time):
+                yield event, self._why[finger][1]
+
+    def _lasting(self, name: str, state: ContactState, time: float) -> list[ContactEvent]:
+        changes = self._changes.setdefault(name, LastingChanges([name]))
+        return changes.update([state], time)
+
+    def _line(self, event: ContactEvent, reason: str) -> str:
+        time = event.time - self._start
+        text = f"{time:9.3f} s  {event.finger:8}  {event.previous:10} -> {event.state:10}  {reason}"
+        return text.rstrip()
+
+
+def why(estimate: ContactEstimate) -> str:
+    """Return why a finger has its state, in a few words.
+
+    Example:
+        >>> why(ContactEstimate(1.0, ContactState.UNSTABLE, Reason.NONE, 0.08, 178.0, (1, 0, 0)))
+        'P(stable) 8 %, sigma 178'
+    """
+    if estimate.state is ContactState.UNKNOWN:
+        faults = ", ".join(FAULT_TEXTS[fault].words for fault in estimate.faults)
+        return faults or REASON_WORDS[estimate.reason]
+    if estimate.state is ContactState.NO_CONTACT:
+        return ""
+    percent = 100 * estimate.stable_probability
+    return f"P(stable) {percent:.0f} %, sigma {estimate.instability:.4g}"

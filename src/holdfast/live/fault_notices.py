@@ -1,0 +1,134 @@
+"""Faults that last, as notices for people: which fingers have them, and what to do."""
+
+from collections.abc import Mapping
+from typing import NamedTuple
+
+from holdfast.contact import Fault, HandEstimate
+
+MIN_FAULT_DURATION = 0.3
+"""Time that a fault must last before it is reported [s]."""
+REPEAT_INTERVAL = 10.0
+"""Time without a fault after which it is reported as a new one [s]."""
+
+
+class FaultText(NamedTuple):
+    """Texts about a fault.
+
+    Attributes:
+        words: name of the fault, in a few words.
+        advice: what happened, and what to do.
+    """
+
+    words: str
+    advice: str
+
+
+_NEW_TARE = "open the hand, then press Tare on the page, or start this command again"
+
+FAULT_TEXTS: Mapping[Fault, FaultText] = {
+    Fault.NOT_FINITE: FaultText(
+        "not a number", "readings are not numbers: check the calibration of the sensor"
+    ),
+    Fault.STUCK: FaultText(
+        "stuck", "readings do not change any more: check the cable, then restart the device"
+    ),
+    Fault.SATURATED: FaultText(
+        "saturated", "readings are at the end of the sensor's range: reduce the force"
+    ),
+    Fault.TARE_LOADED: FaultText("loaded at tare", f"the tare was taken in contact: {_NEW_TARE}"),
+    Fault.DEAD: FaultText(
+        "dead", "taxels have not changed since the start: leave them out by --ignore FINGER:TAXEL"
+    ),
+    Fault.NOISY: FaultText(
+        "noisy", "taxels are far noisier than others: leave them out by --ignore FINGER:TAXEL"
+    ),
+    Fault.OUT_OF_RANGE: FaultText(
+        "out of range", "readings are outside the range of the sensor: check its configuration"
+    ),
+    Fault.TARE_DRIFT: FaultText("tare drifts", f"the force crept away from zero: {_NEW_TARE}"),
+    Fault.TAXEL_COUNT: FaultText(
+        "wrong number of taxels",
+        "packets have another number of taxels than the sensor: check the device's configuration",
+    ),
+    Fault.PACKET_GAP: FaultText(
+        "packets missing", "no packets arrive: check the cable and the server of the sensor"
+    ),
+    Fault.LATE: FaultText(
+        "late", "samples arrive late: check the network, and the load of this computer"
+    ),
+    Fault.CLOCK_JUMP: FaultText(
+        "clock jumped", "the clock of the device jumped: synchronise it, or restart the device"
+    ),
+    Fault.RATE: FaultText(
+        "rate changed", "the device has changed its rate: start this command again"
+    ),
+}
+"""Texts of every fault, for pages and terminals."""
+
+
+class Problem(NamedTuple):
+    """Fault that some fingers have.
+
+    Attributes:
+        fault: the fault.
+        fingers: names of the fingers.
+    """
+
+    fault: Fault
+    fingers: tuple[str, ...]
+
+    @property
+    def text(self) -> str:
+        """The fingers, what happened, and what to do."""
+        return f"{', '.join(self.fingers)}: {FAULT_TEXTS[self.fault].advice}"
+
+
+class FaultWatch:
+    """Memory of the faults of a hand that reports those that last, once each.
+
+    Attributes:
+        current: problems that last at the newest estimate.
+
+    Example:
+        >>> from holdfast.contact import ContactEstimate, ContactState, Reason
+        >>> watch = FaultWatch()
+        >>> for time in (0.0, 0.2, 0.4, 0.6):
+        ...     thumb = ContactEstimate(
+        ...         time, ContactState.UNKNOWN, Reason.FAULT, 0.0, 0.0, (0, 0, 0), (Fault.LATE,)
+        ...     )
+        ...     hand = HandEstimate(time, ContactState.UNKNOWN, {"thumb": thumb})
+        ...     print(time, [problem.text for problem in watch.update(hand)])
+        0.0 []
+        0.2 []
+        0.4 ['thumb: samples arrive late: check the network, and the load of this computer']
+        0.6 []
+    """
+
+    def __init__(self) -> None:
+        self.current: list[Problem] = []
+        self._since: dict[tuple[Fault, str], float] = {}
+        self._reported: dict[tuple[Fault, str], float] = {}
+
+    def update(self, estimate: HandEstimate) -> list[Problem]:
+        """Return the problems that have begun to last."""
+        now = estimate.time
+        found = [(fault, name) for name, one in estimate.fingers.items() for fault in one.faults]
+        self._since = {key: min(now, self._since.get(key, now)) for key in found}
+        lasting = [key for key in found if now - self._since[key] >= MIN_FAULT_DURATION]
+        new = [key for key in lasting if not self._is_recent(key, now)]
+        self._reported.update(dict.fromkeys(lasting, now))
+        self.current = _problems(lasting)
+        return _problems(new)
+
+    def _is_recent(self, key: tuple[Fault, str], now: float) -> bool:
+        """Return whether a fault was reported and lasted until a short time ago."""
+        return key in self._reported and now - self._reported[key] < REPEAT_INTERVAL
+
+
+def _problems(found: list[tuple[Fault, str]]) -> list[Problem]:
+    """Return one problem for each fault, in the order of `Fault`."""
+    return [
+        Problem(fault, tuple(name for one, name in found if one is fault))
+        for fault in Fault
+        if any(one is fault for one, _ in found)
+    ]

@@ -1,0 +1,97 @@
+// Panel with the threshold of the probability: the expected errors, and the live detector's value.
+
+import { callService } from "../web/api.js";
+import { byId, setText } from "../web/dom.js";
+import { toast } from "./controls.js";
+import { number, share } from "./format.js";
+
+/** Return the point of the validation that is nearest to a threshold; null if there is none. */
+export function nearestPoint(points, threshold) {
+  const distance = (point) => Math.abs(point.threshold - threshold);
+  return points.reduce((best, point) => (best === null || distance(point) < distance(best) ? point : best), null);
+}
+
+/** Return what the validation of the model expects at a threshold, as a sentence. */
+export function expectation(points, threshold) {
+  const point = nearestPoint(points, threshold);
+  if (point === null) return "This model has no table of thresholds, so the errors to expect are not known.";
+  const missed = point.missed === null ? "" : `, ${number(point.missed).replace(/\.?0+$/, "")}\u202f% of events missed`;
+  return `Expected at ${share(point.threshold)}: ${number(point.false_alarms_per_minute)} false alarms a minute${missed} (validation of the model)`;
+}
+
+/** Return thresholds as text: one value, or the range of those of the fingers. */
+export function thresholdWord(values) {
+  const [low, high] = [Math.min(...values), Math.max(...values)];
+  return low === high ? share(low) : `${share(low)} to ${share(high)}`;
+}
+
+export class ThresholdPanel {
+  constructor() {
+    this.slider = byId("threshold");
+    this.own = []; // of the model, by finger
+    this.points = [];
+    this.values = [];
+    this.moving = false; // the user moves the slider, or the service has not answered yet
+    this.connected = false;
+    byId("threshold-toggle").addEventListener("click", () => this.toggle());
+    this.slider.addEventListener("input", () => { this.moving = true; this.showValue([Number(this.slider.value)]); });
+    this.slider.addEventListener("change", () => this.send("POST", { value: Number(this.slider.value) }));
+    // Remove the focus after a drag, so that keys are shortcuts again.
+    this.slider.addEventListener("pointerup", () => this.slider.blur());
+    byId("threshold-own").addEventListener("click", () => this.send("DELETE"));
+  }
+
+  start(hello) {
+    this.own = Object.values(hello.fingers).map((finger) => finger.probability_threshold);
+    this.points = hello.operating_points ?? [];
+    setText(byId("threshold-own"), `Model: ${thresholdWord(this.own)}`);
+    this.update();
+  }
+
+  setConnected(connected) {
+    this.connected = connected;
+    this.show();
+  }
+
+  /** Show the thresholds of the fingers of the live detector. */
+  update(thresholds) {
+    const values = Object.values(thresholds ?? {});
+    this.values = values.length ? values : this.own;
+    if (this.moving) return;
+    const middle = this.values.reduce((sum, value) => sum + value, 0) / this.values.length;
+    if (Number(this.slider.value) !== middle) this.slider.value = String(middle);
+    this.showValue(this.values);
+    this.show();
+  }
+
+  showValue(values) {
+    const word = thresholdWord(values);
+    setText(byId("threshold-value"), word);
+    setText(byId("threshold-now"), word);
+    const errors = values.length === 1 || new Set(values).size === 1
+      ? expectation(this.points, values[0]) : "The fingers have different thresholds.";
+    setText(byId("threshold-expected"), errors);
+  }
+
+  show() {
+    this.slider.disabled = !this.connected;
+    byId("threshold-own").disabled = !this.connected || this.values.every((value, k) => value === this.own[k]);
+  }
+
+  async send(method, body) {
+    this.moving = true;
+    try {
+      await callService(method, "threshold", body);
+    } catch (error) {
+      toast(error.message, "bad");
+    } finally {
+      this.moving = false;
+    }
+  }
+
+  toggle() {
+    const panel = byId("threshold-panel");
+    panel.hidden = !panel.hidden;
+    byId("threshold-toggle").setAttribute("aria-expanded", String(!panel.hidden));
+  }
+}
