@@ -85,12 +85,12 @@ def test_recordings_of_the_twin_are_not_the_real_ones(data, tmp_path):
 
 
 def test_the_table_of_real_recordings_fits_a_terminal(capsys):
-    from holdfast.study.comparison.real_counts import AUC, CALLED_STABLE, MISSED
+    from holdfast.study.comparison.real_counts import CALLED_STABLE, MEAN_AUC, MISSED
 
-    assert {AUC, CALLED_STABLE} == set(verb.PRINTED_COLUMNS["real"])
+    assert {MEAN_AUC, CALLED_STABLE} == set(verb.PRINTED_COLUMNS["real"])
     keys = {"method": "FFT band energy (Fernandez 2014)", "trained on": "the others"}
-    rows = [Row({**keys, "figure": figure}, 0.5) for figure in (AUC, CALLED_STABLE, MISSED)]
-    table = ResultTable("real", "Real", "", rows, ("method", "trained on"), digits_of={AUC: 2})
+    rows = [Row({**keys, "figure": figure}, 0.5) for figure in (MEAN_AUC, CALLED_STABLE, MISSED)]
+    table = ResultTable("real", "Real", "", rows, ("method", "trained on"), digits_of={MEAN_AUC: 2})
     verb._print_result_table(table)
     printed = capsys.readouterr().out.splitlines()
     assert [line.split()[-2:] for line in printed[2:3]] == [["0.50", "0.5"]]

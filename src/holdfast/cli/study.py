@@ -20,7 +20,7 @@ if TYPE_CHECKING:
 
 PRINTED_COLUMNS: dict[str, tuple[str, ...]] = {
     "confusion": (),
-    "real": ("AUC", "stable called STABLE [%]"),
+    "real": ("mean AUC", "stable called STABLE [%]"),
     "methods": ("accuracy [%]", "FDR [%]", "FNR [%]", "AUC"),
     "events": ("missed at 50 ms [%]", "missed at 200 ms [%]", "false alarms per minute"),
 }

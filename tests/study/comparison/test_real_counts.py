@@ -8,6 +8,7 @@ from holdfast.study.comparison.real_counts import (
     common_samples,
     count_pairs,
     count_recordings,
+    mean_auc_row,
     pair_rows,
     recording_rows,
 )
@@ -185,3 +186,15 @@ def test_the_auc_of_recordings_is_that_of_all_their_samples():
     scores = [Scores(np.array([0.9, 0.4]), np.array([0.5])), Scores(np.array([0.6]), np.empty(0))]
     row = auc_row({"figure": "AUC"}, [*scores, Scores(np.empty(0), np.empty(0))], 0)
     assert (row.ours, row.n, row.interval) == (pytest.approx(2 / 3), 2, None)
+
+
+def test_the_mean_auc_does_not_depend_on_the_scale_of_a_recording():
+    """The second recording has all scores below those of the first; the third has no slip."""
+    every = [labels(), labels(), labels(np.full(N, STABLE), np.zeros(N, dtype=bool))]
+    own = [estimates(0.5 + RIGHT / 2), estimates(RIGHT / 4), estimates(RIGHT)]
+    counts = count_recordings(every, {"one": own})["one"]
+    row = mean_auc_row({}, counts, 0)
+    assert (row.ours, row.n, row.interval) == (1.0, 2, None)
+    assert recording_rows({}, counts, 0)[0].ours < 1.0
+    assert mean_auc_row({}, counts[2:], 0).ours is None
+    assert mean_auc_row({}, [*counts, *counts], 0).interval == (1.0, 1.0)

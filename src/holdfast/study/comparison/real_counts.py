@@ -28,12 +28,12 @@ MIN_RECORDINGS = 3
 """Minimum number of recordings for an interval."""
 MISSED_AFTER = 0.2
 """A slip is missed without an alarm until this time after its onset [s]."""
-AUC, AUC_OF_HAND = "AUC", "AUC of the hand"
+AUC, AUC_OF_HAND, MEAN_AUC = "AUC", "AUC of the hand", "mean AUC"
 AUC_OF_SHIPPED, DIFFERENCE = f"AUC of {SHIPPED}", "difference"
 ACCURACY = "accuracy [%]"
 CALLED_STABLE = "stable called STABLE [%]"
 SLIPS, MISSED, FALSE_ALARMS = "slips", "missed slips [%]", "false alarms per minute"
-DIGITS = {AUC: 2, AUC_OF_HAND: 2, SLIPS: 0}
+DIGITS = {AUC: 2, AUC_OF_HAND: 2, MEAN_AUC: 2, SLIPS: 0}
 """Digits after the decimal point, where they are not 1."""
 
 
@@ -204,6 +204,22 @@ def recording_rows(keys: Keys, counts: Sequence[RecordingCounts], seed: int) -> 
         _sample_row({**keys, "figure": WITHOUT_ESTIMATE}, counts, "n_without", "n_labelled", seed),
         *_event_rows(keys, [each.events for each in counts], seed),
     ]
+
+
+def mean_auc_row(keys: Keys, counts: Sequence[RecordingCounts], seed: int) -> Row:
+    """Return the mean of the AUCs of the recordings that have both classes.
+
+    It does not depend on whether the probabilities of different fits have the same scale.
+
+    Args:
+        keys: of the row, but for its figure.
+        counts: of the recordings.
+        seed: of the bootstrap.
+    """
+    scores = (pool([unit.scores for unit in each.units]) for each in counts)
+    aucs = [each.auc for each in scores if each.auc is not None]
+    row = ratio_row({**keys, "figure": MEAN_AUC}, aucs, np.ones(len(aucs)), seed, scale=1.0)
+    return _with_interval_if_enough(row)
 
 
 def auc_row(keys: Keys, scores: Sequence[Scores], seed: int) -> Row:

@@ -18,6 +18,7 @@ from holdfast.study.comparison.real_counts import (
     auc_row,
     count_pairs,
     count_recordings,
+    mean_auc_row,
     pair_rows,
     recording_rows,
 )
@@ -66,18 +67,19 @@ MODELS: Mapping[Making, Line] = {
 """Lines of the model that ships."""
 
 MEANING = f"""One recording is left out at a time (with more than {MAX_FOLDS}, several); methods
-are trained on the others. {SHIPPED}, trained on the twin only, is shown as it ships, and adapted to
-one or all of the others. All lines are scored on the same samples: those at which every line has
-an estimate of every finger. A line without any estimate in a recording is left out there. "Without
-estimate" is the share of all labelled samples at which the line itself has none. AUC: stable
-against slip, samples of all fingers pooled (of the hand, for whole-hand methods); 0.5 is chance.
-It pools the probabilities of all folds and fingers, so it also depends on whether their scales
-agree. Missed slips: of the slips that begin after 0.5 s of stable, those without an alarm
-{1000 * MISSED_AFTER:g} ms after the onset. False alarms: under a stable label, per minute of it.
-Both are of the hand, at each line's own threshold. {SHIPPED} brings its features, tare, contact
-threshold and hold time; decisions of the methods are held for {HOLD_TIME:g} s. It is adapted by
-"holdfast train --init" without a search, and stays as it ships where the others lack a class.
-Intervals: from {MIN_RECORDINGS} recordings on.""".replace("\n", " ")
+are trained on the others. {SHIPPED}, trained on the twin only, is shown as it ships, and adapted
+to one or all of the others. All lines are scored on the same samples: those at which every line
+has an estimate of every finger. A line without any estimate in a recording is left out there.
+"Without estimate" is the share of all labelled samples at which the line itself has none. AUC:
+stable against slip, samples of all fingers pooled (of the hand, for whole-hand methods); 0.5 is
+chance. It pools the probabilities of all folds and fingers, so it also depends on whether their
+scales agree; the mean AUC, over the recordings with slip, does not depend on the folds. Missed
+slips: of the slips that begin after 0.5 s of stable, those without an alarm {MISSED_AFTER:g} s
+after the onset. False alarms: under a stable label, per minute of it. Both are of the hand, at
+each line's own threshold. {SHIPPED} brings its features, tare, contact threshold and hold time;
+decisions of the methods are held for {HOLD_TIME:g} s. It is adapted by "holdfast train --init"
+without a search, and stays as it ships where the others lack a class. Intervals: from
+{MIN_RECORDINGS} recordings on.""".replace("\n", " ")
 BY_RECORDING = "The figures of the table of pooled recordings, by recording."
 BY_FINGER = (
     "Stable against slip, by finger, on the same samples; recordings with both classes only."
@@ -154,8 +156,10 @@ def _lines(plan: StudyPlan, real: Corpus) -> dict[str, Line]:
 
 
 def _pooled(by_line: Mapping[Line, Sequence[RecordingCounts]], note: str, seed: int) -> ResultTable:
-    rows = [row for line, counts in by_line.items()
-            for row in recording_rows(_keys(line), counts, seed)]  # fmt: skip
+    rows: list[Row] = []
+    for line, counts in by_line.items():
+        rows.append(mean_auc_row(_keys(line), counts, seed))
+        rows += recording_rows(_keys(line), counts, seed)
     title = "Real recordings, pooled"
     return ResultTable("real", title, note, rows, ("method", "trained on"), digits_of=DIGITS)
 
