@@ -214,19 +214,26 @@ class TestFingers:
     def test_another_sensor(self):
         with pytest.raises(ModelError) as raised:
             model().predict_proba(recording(index=tactile(which=sensor(3, "big"))))
-        assert str(raised.value) == "index: 3 taxels (big) given, the model expects 2 (tiny)"
+        assert str(raised.value) == (
+            "index: 3 taxels (big) given, the model expects 2 (tiny); "
+            "builtin:any fits every 3-axis sensor"
+        )
 
     def test_readings_in_another_unit_or_turned_taxels(self):
         known = sensor()
         newtons = replace(known, unit="N")
         with pytest.raises(ModelError) as raised:
             model().fingers_of({"thumb": newtons})
-        assert str(raised.value) == "thumb: readings in N given, the model expects count"
+        assert str(raised.value) == (
+            "thumb: readings in N given, the model expects count; "
+            "builtin:any fits every 3-axis sensor"
+        )
         turned = replace(known, rotations=known.rotations[:, [1, 2, 0]])
         with pytest.raises(ModelError) as raised:
             model().fingers_of({"thumb": turned})
         assert str(raised.value) == (
-            "thumb: the taxels of tiny have other rotations than those of the training"
+            "thumb: the taxels of tiny have other rotations than those of the training; "
+            "builtin:any fits every 3-axis sensor"
         )
 
     def test_any_finger_of_its_sensor(self):
@@ -236,7 +243,8 @@ class TestFingers:
         with pytest.raises(ModelError) as raised:
             hand_model.fingers_of({"b": sensor(3, "big")})
         assert str(raised.value) == (
-            "the model is for fingers with the sensor 'tiny'; given are b (big)"
+            "the model is for fingers with the sensor 'tiny'; given are b (big); "
+            "builtin:any fits every 3-axis sensor"
         )
 
 
@@ -319,7 +327,8 @@ class TestTwin:
         with pytest.raises(ModelError) as raised:
             hand_model.predict_proba(recording(index=tactile()))
         assert str(raised.value) == (
-            "the model is for fingers with the sensor 'uskin-curved'; given are index (tiny)"
+            "the model is for fingers with the sensor 'uskin-curved'; given are index (tiny); "
+            "builtin:any fits every 3-axis sensor"
         )
 
     def test_a_copy_in_a_file_is_the_same(self, tmp_path):

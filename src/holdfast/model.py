@@ -282,7 +282,7 @@ class Model(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=Tru
             return dict(tips)
         fitting = {name: sensor for name, sensor in tips.items() if sensor.name == wanted}
         if not fitting:
-            raise ModelError(
+            raise _other_sensor(
                 f"the model is for fingers with the sensor {wanted!r}; given are "
                 + ", ".join(f"{name} ({sensor.name})" for name, sensor in modules.items())
             )
@@ -296,19 +296,24 @@ class Model(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=Tru
             return
         known = self.sensors[wanted]
         if (sensor.name, sensor.n_taxels) != (known.name, known.n_taxels):
-            raise ModelError(
+            raise _other_sensor(
                 f"{name}: {sensor.n_taxels} taxels ({sensor.name}) given, the model expects "
                 f"{known.n_taxels} ({known.name})"
             )
         if sensor.unit != known.unit:
-            raise ModelError(
+            raise _other_sensor(
                 f"{name}: readings in {sensor.unit} given, the model expects {known.unit}"
             )
         if not np.allclose(sensor.rotations, known.rotations, atol=ROTATION_TOLERANCE):
-            raise ModelError(
+            raise _other_sensor(
                 f"{name}: the taxels of {sensor.name} have other rotations than those of the "
                 "training"
             )
+
+
+def _other_sensor(text: str) -> ModelError:
+    """Return the error of a model for another sensor, with the built-in model that fits."""
+    return ModelError(f"{text}; builtin:any fits every 3-axis sensor")
 
 
 def built_in(name: str) -> Model:

@@ -249,7 +249,8 @@ def test_refusals(capsys, model, grasp, save, tmp_path):
     readings = np.zeros((100, 24, 3))
     wide = Recording("a", {"thumb": Tactile(sensor("uskin-4x6"), np.arange(100) / 100, readings)})
     assert refusal(capsys, model, save(wide)) == (
-        "thumb: 24 taxels (uskin-4x6) given, the model expects 30 (uskin-curved)"
+        "thumb: 24 taxels (uskin-4x6) given, the model expects 30 (uskin-curved); "
+        "builtin:any fits every 3-axis sensor"
     )
     other = save(synthetic_recording("b", 1, ("ring",)), "b.parquet")
     assert refusal(capsys, model, other) == "the model is for thumb, index; ring given"

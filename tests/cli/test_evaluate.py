@@ -196,5 +196,6 @@ def test_the_model_of_the_twin_refuses_another_sensor(capsys, folder, tmp_path):
     module = replace(one.modules["thumb"], sensor=skin)
     save_recording(replace(one, modules={"thumb": module}), tmp_path / "flat.parquet")
     assert refusal(capsys, "builtin:twin", tmp_path / "flat.parquet") == (
-        "the model is for fingers with the sensor 'uskin-curved'; given are thumb (flat)"
+        "the model is for fingers with the sensor 'uskin-curved'; given are thumb (flat); "
+        "builtin:any fits every 3-axis sensor"
     )

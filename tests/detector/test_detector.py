@@ -400,7 +400,10 @@ class TestConstruction:
     def test_another_sensor(self):
         with pytest.raises(ModelError) as raised:
             Detector(model(), {"thumb": sensor(3)})
-        assert str(raised.value) == "thumb: 3 taxels (tiny) given, the model expects 2 (tiny)"
+        assert str(raised.value) == (
+            "thumb: 3 taxels (tiny) given, the model expects 2 (tiny); "
+            "builtin:any fits every 3-axis sensor"
+        )
 
 
 class TestNoiseFloor:
