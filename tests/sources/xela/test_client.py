@@ -1,7 +1,7 @@
 import socket
 import threading
 import time
-from contextlib import ExitStack
+from contextlib import ExitStack, suppress
 
 import numpy as np
 import pytest
@@ -308,6 +308,30 @@ class TestReconnecting:
 
 def refuse(place):
     raise ConnectionRefusedError
+
+
+@pytest.mark.parametrize("n_headers", [0, 200_000])
+def test_a_server_that_answers_before_the_request(n_headers):
+    """The library's own check of its state fails then, by chance."""
+    with socket.create_server(("127.0.0.1", 0)) as listener:
+        port = listener.getsockname()[1]
+        ended = threading.Event()
+
+        def answer():
+            for _ in range(5):
+                connection, _ = listener.accept()
+                with connection:
+                    head = b"HTTP/1.1 101 OK\r\n" + b"A: b\r\n" * n_headers + b"\r\n"
+                    with suppress(OSError):
+                        connection.sendall(head)
+                    ended.wait(0.05)
+
+        thread = threading.Thread(target=answer)
+        thread.start()
+        for _ in range(5):
+            with pytest.raises(SourceError, match=f"the server at 127.0.0.1:{port} is no XELA"):
+                open_source(f"xela://127.0.0.1:{port}").open()
+        thread.join()
 
 
 @pytest.mark.parametrize("location", ["ws://127.0.0.1:{other}/", "ws://localhost:{port}/", "/b"])

@@ -196,5 +196,5 @@ def _connect(place: Place) -> ClientConnection:
             max_queue=MAX_QUEUED_PACKETS,
             logger=_LOGGER,
         ).__enter__()
-    except ValueError as cause:
-        raise InvalidHandshake(str(cause)) from cause
+    except (ValueError, AssertionError) as cause:  # it answered before it was asked
+        raise InvalidHandshake(str(cause) or "it answers no handshake") from cause

@@ -1,0 +1,1 @@
+"""Attacks on holdfast, with counts: `python benchmarks/attack.py PART`."""
