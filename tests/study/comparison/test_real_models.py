@@ -11,6 +11,7 @@ from holdfast.recordings import Label
 from holdfast.study.comparison import real_models
 from holdfast.study.comparison.real_estimates import method_estimates
 from holdfast.study.comparison.real_models import SHIPPED, model_estimates
+from holdfast.study.comparison.real_recordings import MODELS
 from holdfast.study.plan import scan_corpus
 from holdfast.synthetic import synthetic_recording
 from holdfast.training import Setting, compute_decisions, train
@@ -116,8 +117,9 @@ def test_recordings_that_the_model_refuses_have_no_estimate(tmp_path):
         }  # fmt: skip
         slow.append(replace(recording, modules=modules))
     corpus = scan_corpus("real", save_all(tmp_path / "real", slow), tare="first")
-    for each in model_estimates("untouched", corpus, 0):
-        assert (each.hand.states.array == UNKNOWN).all() and not each.known.array.any()
+    for making in MODELS:
+        for each in model_estimates(making, corpus, 0):
+            assert (each.hand.states.array == UNKNOWN).all() and not each.known.array.any()
 
 
 def test_the_folds_are_those_of_the_methods(corpus):

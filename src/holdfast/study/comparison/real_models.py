@@ -98,7 +98,7 @@ def _trained(recordings: Sequence[Recording], setting: Setting) -> Model | None:
     split: Split = "recording" if 2 <= len(recordings) <= MAX_FOLDS else "random"
     try:
         return train(recordings, replace(setting, split=split)).model
-    except TrainingError:
+    except (ModelError, TrainingError):
         return None
 
 
