@@ -275,6 +275,25 @@ class TestRandomizedHands:
         assert json.loads(printed)["recordings"] == []
         assert "2 of 2 recordings exist already" in err
 
+    def test_several_grasps_of_each(self, capsys, out):
+        words = (out, "--randomize", "--repeats", 1, "--grasps", 2, "--jobs", 1, "--json")
+        code, printed, _ = run(capsys, *words)
+        names = ["hand0000-grasp01", "hand0000-grasp02"]
+        assert (code, json.loads(printed)["recordings"]) == (0, names)
+
+    @pytest.mark.parametrize(
+        ("words", "message"),
+        [
+            (("--randomize", "--grasps", 0), "--grasps of at least 1 expected, 0 given"),
+            (
+                ("--grasps", 2),
+                "--grasps is for the hands of --randomize, 2 given; --repeats repeats grasps",
+            ),
+        ],
+    )
+    def test_their_grasps_are_checked(self, capsys, out, words, message):
+        assert refusal(capsys, out, *words) == message
+
     def test_of_another_seed_are_refused(self, capsys, out):
         run(capsys, out, "--randomize", "--repeats", 1, "--jobs", 1)
         told = refusal(capsys, out, "--randomize", "--repeats", 1, "--seed", 9)

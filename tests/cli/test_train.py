@@ -128,7 +128,7 @@ def test_a_model_is_not_overwritten(capsys, data, model):
     [
         (["--classifier", "magic"], "unknown classifier 'magic'; there are logreg, svm"),
         (["--window", "13"], "an even window of at least 2 samples expected, 13 given"),
-        (["--split", "half"], "unknown split 'half'; there are recording, object, random"),
+        (["--split", "half"], "unknown split 'half'; there are recording, object, time, random"),
         (
             ["--features", "F_a,magic"],
             "unknown feature 'magic'; there are F_a, F_x, F_y, F_z, m, sigma, F_tip for F_x, F_y "
@@ -178,7 +178,8 @@ def test_data_that_cannot_train_leave_everything_as_it_was(capsys, tmp_path, mod
     grasp = synthetic_recording("grasp", 0, ("thumb",))
     save_recording(grasp, folder / "grasp.parquet")
     assert refusal(capsys, folder, "-o", model, "--force") == (
-        "the split by recording needs at least two, 1 given (grasp)"
+        "the split by recording needs at least two, 1 given (grasp); the split by time needs "
+            "one recording"
     )
     bare = Recording("bare", {"thumb": synthetic_recording("x", 1).modules["thumb"]})
     save_recording(bare.with_labels({}), folder / "bare.parquet")

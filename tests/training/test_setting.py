@@ -9,7 +9,7 @@ def test_the_defaults_are_those_of_the_deployed_model():
     assert [str(feature) for feature in setting.features] == [
         "F_a", "F_x", "F_y", "F_z", "sigma[14]"
     ]  # fmt: skip
-    assert (setting.classifier, setting.window, str(setting.tare)) == ("logreg", 14, "0.5")
+    assert (setting.classifier, setting.window, str(setting.used_tare)) == ("logreg", 14, "0.5")
     assert (setting.split, setting.trials) == ("recording", 30)
     assert (setting.debounce, setting.rate) == (Debounce(), None)
 
@@ -19,7 +19,7 @@ def test_the_defaults_are_those_of_the_deployed_model():
     [
         ({"classifier": "magic"}, "unknown classifier 'magic'; there are logreg, svm"),
         ({"window": 13}, "an even window of at least 2 samples expected, 13 given"),
-        ({"split": "half"}, "unknown split 'half'; there are recording, object, random"),
+        ({"split": "half"}, "unknown split 'half'; there are recording, object, time, random"),
         (
             {"trials": -1},
             "trials of at least 0 and samples of at least 1 expected; -1 and 200000 given",

@@ -6,7 +6,17 @@ from hypothesis import strategies as st
 from holdfast.classifiers import Samples
 from holdfast.errors import TrainingError
 from holdfast.training.dataset_scan import ScannedRecording
-from holdfast.training.splits import RANDOM_FOLDS, inner_folds, split_data
+from holdfast.training.splits import (
+    RANDOM_FOLDS,
+    TIME_FOLDS,
+    TIME_GAP,
+    inner_folds,
+    split_data,
+)
+
+ALONE = (
+    "the split by {} needs at least two, 1 given ({}); the split by time needs one recording"
+)
 
 
 def entries(*objects):
@@ -56,14 +66,32 @@ def test_random_fifths_differ_by_recording_and_seed():
             "recording 'grasp-1' does not name its object ('object' in its metadata); the split "
             "by object needs the object of every recording",
         ),
-        (["can", "can"], "object", "the split by object needs at least two, 1 given (can)"),
-        (["can"], "recording", "the split by recording needs at least two, 1 given (grasp-0)"),
+        (["can", "can"], "object", ALONE.format("object", "can")),
+        (["can"], "recording", ALONE.format("recording", "grasp-0")),
     ],
 )
 def test_refusals(objects, split, message):
     with pytest.raises(TrainingError) as refusal:
         split_data(entries(*objects), split, 0)
     assert str(refusal.value) == message
+
+
+def test_a_unit_of_the_split_by_time_is_a_block_of_every_recording():
+    data_split = split_data(entries("can", "egg"), "time", 0)
+    units = data_split.units_of(1, 1000)
+    assert len(data_split.units) == TIME_FOLDS
+    inside = np.flatnonzero(units >= 0)
+    assert (units[inside] == inside // 200).all()
+    assert data_split.recordings_without({0}) == [0, 1]
+
+
+def test_between_two_blocks_of_time_there_is_a_gap():
+    units = split_data(entries("can"), "time", 0).units_of(0, 1000)
+    gap = round(100 * TIME_GAP)
+    for start in range(200, 1000, 200):
+        assert (units[start - gap : start + gap] == -1).all()
+        assert units[start - gap - 1] == start // 200 - 1
+        assert units[start + gap] == start // 200
 
 
 def samples(stable, groups):

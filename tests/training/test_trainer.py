@@ -324,7 +324,8 @@ def test_another_rate_is_evaluated_at_the_rate_of_the_model(grasps, split):
         (
             [tiny_recording(0)],
             "recording",
-            "the split by recording needs at least two, 1 given (grasp-0)",
+            "the split by recording needs at least two, 1 given (grasp-0); the split by time "
+            "needs one recording",
         ),
         (
             [tiny_recording(0), Recording("bare", {"thumb": tiny_module(1)})],

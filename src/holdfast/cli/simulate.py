@@ -45,6 +45,9 @@ def simulate(
             "--randomize", help="Draw another hand, sensor, object and arm motion each time."
         ),
     ] = False,
+    grasps: Annotated[
+        int, typer.Option(help="Number of grasps of each --randomize hand, of other objects.")
+    ] = 1,
     server: Annotated[
         bool,
         typer.Option(
@@ -73,32 +76,38 @@ def simulate(
 
     With --randomize, every recording has another hand: two to four fingers or a parallel
     gripper, six kinds of sensors in counts or newtons at 30 to 500 Hz, another object, and an arm
-    that carries, swings, brakes and turns. Only --repeats, --seed, --jobs and --force apply then.
+    that carries, swings, brakes and turns; with --grasps, several recordings of each. Only
+    --repeats, --grasps, --seed, --jobs and --force apply then.
 
     Example:
       holdfast simulate twin/
       holdfast simulate hands/ --randomize --repeats 100
+      holdfast simulate hands/ --randomize --repeats 12 --grasps 20
       holdfast simulate few/ --objects can,ball --cases 2 --repeats 1 --profile vigorous
     """
     from holdfast.files import refuse_overwrite
 
     if randomize:
-        names = simulate_hands(out, repeats, seed, jobs=jobs, force=force)
+        names = simulate_hands(out, repeats, seed, n_grasps=grasps, jobs=jobs, force=force)
         if as_json:
             print_json({"out": out, "recordings": names, "failed": [], "profile": "randomized"})
         else:
             print_line(f"{len(names)} recordings of randomized hands in {out}")
         return
+    if grasps != 1:
+        raise ValueError(
+            f"--grasps is for the hands of --randomize, {grasps} given; --repeats repeats grasps"
+        )
     if video is not None:
         from holdfast.twin.render import check_film
 
         check_film(video)
         refuse_overwrite(video, force=force)
-    grasps = plan_grasps(objects, cases, repeats, profile, seed, server=server, table=table)
+    planned = plan_grasps(objects, cases, repeats, profile, seed, server=server, table=table)
     out.mkdir(parents=True, exist_ok=True)
-    names = simulate_grasps(grasps, out, jobs=jobs, force=force)
+    names = simulate_grasps(planned, out, jobs=jobs, force=force)
     if video is not None:
-        _write_video(grasps[0], video, force)
+        _write_video(planned[0], video, force)
     failed = [name for name in names if "-failed" in name]
     if as_json:
         print_json({"out": out, "recordings": names, "failed": failed, "profile": profile})
@@ -106,7 +115,9 @@ def simulate(
     print_line(f"{len(names)} recordings in {out}, {len(failed)} of them of failed grasps")
 
 
-def simulate_hands(out: Path, n_hands: int, seed: int, *, jobs: int, force: bool) -> list[str]:
+def simulate_hands(
+    out: Path, n_hands: int, seed: int, *, n_grasps: int = 1, jobs: int, force: bool
+) -> list[str]:
     """Simulate randomized hands whose recordings do not exist; return the names of new ones.
 
     Raises:
@@ -117,16 +128,21 @@ def simulate_hands(out: Path, n_hands: int, seed: int, *, jobs: int, force: bool
     from holdfast.twin.randomized.simulation import RandomHold
 
     _check_numbers(n_hands, seed)
+    if n_grasps < 1:
+        raise ValueError(f"--grasps of at least 1 expected, {n_grasps} given")
     out.mkdir(parents=True, exist_ok=True)
-    holds = [RandomHold(number, seed) for number in range(n_hands)]
+    places = [None] if n_grasps == 1 else range(1, n_grasps + 1)
+    holds = [
+        RandomHold(number, seed, grasp=grasp) for number in range(n_hands) for grasp in places
+    ]
     wanted: dict[str, object] = {"profile": "randomized", "seed": seed}
     tasks = [
         (hold, out, force)
         for hold in holds
         if force or not _is_recorded(_path_of(hold.name, out), wanted)
     ]
-    if len(tasks) < n_hands:
-        print_message(f"{n_hands - len(tasks)} of {n_hands} recordings exist already")
+    if len(tasks) < len(holds):
+        print_message(f"{len(holds) - len(tasks)} of {len(holds)} recordings exist already")
     names = []
     with ProgressBar("simulating", len(tasks)) as bar:
         for name in map_ordered(simulate_hand, tasks, 1 if len(tasks) == 1 else jobs):

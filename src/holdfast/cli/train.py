@@ -13,6 +13,13 @@ if TYPE_CHECKING:
     from holdfast.model import Model
     from holdfast.training import Setting
 
+LEFT_OUT = {
+    "recording": "one recording at a time",
+    "object": "one object at a time",
+    "time": "one fifth of the time of every recording",
+    "random": "random samples",
+}
+
 
 def train(
     data: Annotated[Path, typer.Argument(help="A folder of labelled recordings.")],
@@ -30,7 +37,8 @@ def train(
     features: Annotated[
         str | None,
         typer.Option(
-            help="Names from F_a, F_x, F_y, F_z, m, sigma; or holdfast for the extended set.",
+            help="Names from F_a, F_x, F_y, F_z, m, sigma; holdfast for the extended set; or any "
+            "for relative features, which fit any sensor, unit and rate.",
             show_default="F_a,F_x,F_y,F_z,sigma",
         ),
     ] = None,
@@ -38,21 +46,35 @@ def train(
         str | None,
         typer.Option(
             help="Tare: seconds from the start, first, none, or START:END [s].",
-            show_default="0.5, or as --init",
+            show_default="0.5; first with --features any; or as --init",
         ),
     ] = None,
     split: Annotated[
         str,
-        typer.Option(help="Unit to leave out in cross-validation: recording, object or random."),
+        typer.Option(
+            help="Unit to leave out in cross-validation: recording, object, time or random."
+        ),
     ] = "recording",
     trials: Annotated[
         int,
         typer.Option(help="Trials of the parameter search; 0 uses the reference parameters."),
     ] = 30,
+    objective: Annotated[
+        str | None,
+        typer.Option(
+            help="Loss that the search minimises: error (share of wrong decisions) or log_loss.",
+            show_default="log_loss; error for svm",
+        ),
+    ] = None,
     seed: SeedOption = 0,
     shared: Annotated[
-        bool, typer.Option("--shared", help="Train one classifier for all fingers.")
-    ] = False,
+        bool | None,
+        typer.Option(
+            "--shared/--separate",
+            help="Train one classifier for all fingers, or one for each.",
+            show_default="--shared with --features any",
+        ),
+    ] = None,
     contact_threshold: Annotated[
         float | None,
         typer.Option(
@@ -110,6 +132,7 @@ def train(
         tare=tare,
         split=split,
         trials=trials,
+        objective=objective,
         seed=seed,
         shared=shared,
         contact_threshold=contact_threshold,
@@ -131,13 +154,18 @@ def train(
     trained.model.save(model, force=force)
     journal.unlink(missing_ok=True)
     if as_json:
-        print_json({"model": model, "split": split, "cross_validation": trained.cross_validation})
+        print_json(
+            {
+                "model": model,
+                "split": trained.split,
+                "cross_validation": trained.cross_validation,
+            }
+        )
         return
     print_metrics(trained.cross_validation)
-    left_out = "random samples" if split == "random" else f"one {split} at a time"
     print_line(
         f"\n{model}: trained on {len(recordings)} recordings; "
-        f"cross-validation leaves out {left_out}"
+        f"cross-validation leaves out {LEFT_OUT[trained.split]}"
     )
 
 

@@ -6,8 +6,14 @@ from dataclasses import dataclass
 import numpy as np
 
 from holdfast.errors import TrainingError
+from holdfast.model import EXACT_RATE, RELATIVE_RATES
 from holdfast.recordings import Recording
 from holdfast.sensors import Sensor
+
+RELATIVE_SAMPLE_RATE = 20.0
+"""Approximate number of samples per second that train a model of any rate [Hz].
+
+So a fast sensor counts no more than a slow one. Neighbouring samples are nearly copies."""
 
 
 @dataclass(frozen=True)
@@ -20,6 +26,7 @@ class ScannedRecording:
         object: object that was held; None if the metadata do not name it.
         rate: samples per second [Hz].
         n_labelled: number of labelled samples of each finger that has any.
+        step: every step-th of them is used.
     """
 
     name: str
@@ -27,6 +34,7 @@ class ScannedRecording:
     object: str | None
     rate: float
     n_labelled: dict[str, int]
+    step: int = 1
 
 
 @dataclass(frozen=True)
@@ -35,71 +43,93 @@ class DatasetScan:
 
     Attributes:
         recordings: in the order of the dataset.
-        sensors: sensor of each finger that has labels.
+        sensors: sensor of each finger that has labels; the first one, if they differ.
         requested_rate: rate of the model [Hz]; None for that of the recordings.
+        relative: whether the model is for any sensor and rate.
     """
 
     recordings: tuple[ScannedRecording, ...]
     sensors: dict[str, Sensor]
     requested_rate: float | None = None
+    relative: bool = False
 
     @property
-    def rate(self) -> float:
-        """The requested rate, else the median rate of the recordings [Hz]."""
+    def rate(self) -> float | None:
+        """The requested rate, else the median rate of the recordings [Hz]; None for any rate."""
+        if self.relative:
+            return None
         if self.requested_rate is not None:
             return self.requested_rate
         return float(np.median([recording.rate for recording in self.recordings]))
 
     @property
     def n_labelled(self) -> int:
-        """Number of labelled samples of the finger that has most."""
+        """Number of labelled samples that are used of the finger that has most."""
         return max(
-            sum(recording.n_labelled.get(finger, 0) for recording in self.recordings)
+            sum(-(-each.n_labelled.get(finger, 0) // each.step) for each in self.recordings)
             for finger in self.sensors
         )
 
 
-def scan_dataset(recordings: Iterable[Recording], rate: float | None = None) -> DatasetScan:
+def scan_dataset(
+    recordings: Iterable[Recording], rate: float | None = None, *, relative: bool = False
+) -> DatasetScan:
     """Read every recording once, one at a time, and check that all fit together.
 
     Args:
         recordings: labelled.
         rate: rate of the model [Hz]; None for the median rate of the recordings.
+        relative: the features are relative, so that sensors, units and rates may differ.
 
     Raises:
         TrainingError: there are no recordings or no labels, two recordings have the same
-            samples or name, or a finger has different sensors.
+            samples or name, a finger has different sensors, or relative features are not
+            made for the rate of a recording.
     """
     scanned: list[ScannedRecording] = []
     sensors: dict[str, Sensor] = {}
     for recording in recordings:
-        scanned.append(_scan(recording))
+        scanned.append(_scan(recording, relative))
         for finger in scanned[-1].n_labelled:
             found = recording.modules[finger].sensor
             known = sensors.setdefault(finger, found)
-            _check_same_sensor(f"{finger} of {recording.name!r}", found, known)
+            if not relative:
+                _check_same_sensor(f"{finger} of {recording.name!r}", found, known)
     if not scanned:
         raise TrainingError("no recordings given; at least one expected")
     if not sensors:
         raise TrainingError(f"none of the {len(scanned)} recordings has labels to train from")
     _check_no_duplicates(scanned)
-    return DatasetScan(tuple(scanned), sensors, rate)
+    return DatasetScan(tuple(scanned), sensors, rate, relative)
 
 
-def _scan(recording: Recording) -> ScannedRecording:
+def _scan(recording: Recording, relative: bool) -> ScannedRecording:
     counts = {
         name: int((module.label_states > 0).sum())
         for name, module in recording.modules.items()
         if module.labels
     }
+    counts = {name: count for name, count in counts.items() if count}
+    if relative and counts:
+        _check_rate(recording)
     held_object = recording.metadata.get("object")
     return ScannedRecording(
         name=recording.name,
         digest=recording.digest,
         object=None if held_object is None else str(held_object),
         rate=recording.rate,
-        n_labelled={name: count for name, count in counts.items() if count},
+        n_labelled=counts,
+        step=max(1, round(recording.rate / RELATIVE_SAMPLE_RATE)) if relative and counts else 1,
     )
+
+
+def _check_rate(recording: Recording) -> None:
+    low, high = RELATIVE_RATES
+    if not low * (1 - EXACT_RATE) <= recording.rate <= high * (1 + EXACT_RATE):
+        raise TrainingError(
+            f"recording {recording.name!r} has {recording.rate:.4g} Hz, relative features "
+            f"expect {low:g} to {high:g} Hz"
+        )
 
 
 def _check_same_sensor(what: str, sensor: Sensor, known: Sensor) -> None:

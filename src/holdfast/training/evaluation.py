@@ -5,6 +5,7 @@ from dataclasses import replace
 
 import numpy as np
 
+from holdfast.contact import UNKNOWN
 from holdfast.detector import detect
 from holdfast.metrics import Decisions, FingerDecisions, Metrics, summarise
 from holdfast.metrics.decisions import hand_decisions
@@ -61,7 +62,7 @@ def combine_decisions(
 
     Args:
         decisions: of each model, about the same recording.
-        units_of: returns the unit of each of n samples.
+        units_of: returns the unit of each of n samples; a sample of unit -1 loses its label.
         n_model_fingers: number of fingers of the models.
     """
     fingers = {}
@@ -71,6 +72,9 @@ def combine_decisions(
         states = np.stack([each.fingers[name].states for each in decisions])
         probabilities = np.stack([each.fingers[name].stable_probability for each in decisions])
         fingers[name] = replace(
-            first, states=states[unit, every], stable_probability=probabilities[unit, every]
+            first,
+            labels=np.where(unit < 0, UNKNOWN, first.labels),
+            states=states[unit, every],
+            stable_probability=probabilities[unit, every],
         )
     return Decisions.of(decisions[0].name, fingers, n_model_fingers)

@@ -90,19 +90,20 @@ def fit_model(
         fingers[finger] = FingerModel(
             features=setting.features,
             classifier=setting.recipe_of(finger).fit(samples, parameters[finger], setting.seed),
-            sensor=own.sensor.name,
+            sensor=None if own.sensor is None else own.sensor.name,
             contact_threshold=(
                 own.contact_threshold(recordings) if threshold is None else threshold
             ),
+            contact_load=setting.contact_load_of(finger),
         )
     if not fingers:
         return None
     return Model(
         fingers=fingers,
         rate=data.scan.rate,
-        sensors={own.sensor.name: own.sensor for own in data.fingers.values()},
+        sensors={own.sensor.name: own.sensor for own in data.fingers.values() if own.sensor},
         window=setting.window,
-        tare=str(setting.tare),
+        tare=str(setting.used_tare),
         debounce=setting.debounce,
     )
 
@@ -130,7 +131,7 @@ def fit_recordings(
     Raises:
         TrainingError: the recordings have no labels, or only one class.
     """
-    scan = scan_dataset(recordings, setting.rate)
+    scan = scan_dataset(recordings, setting.rate, relative=setting.relative)
     data_split = split_data(scan.recordings, "random", setting.seed)
     fingers = gather_samples(recordings, scan, setting, data_split)
     data = TrainingData(scan, data_split, fingers)

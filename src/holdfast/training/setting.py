@@ -11,14 +11,16 @@ from holdfast.features.haar import check_window
 from holdfast.model import ANY_FINGER, Debounce, Model
 from holdfast.training.tuning import OBJECTIVES, Objective
 
-Split = Literal["recording", "object", "random"]
-SPLITS: tuple[Split, ...] = ("recording", "object", "random")
+Split = Literal["recording", "object", "time", "random"]
+SPLITS: tuple[Split, ...] = ("recording", "object", "time", "random")
 
 MAX_SAMPLES = 200_000
 """Maximum number of samples per finger that training keeps in memory.
 
 Of larger data it uses every n-th sample. Neighbouring samples are nearly equal, so a linear rule
 loses little."""
+CONTACT_LOAD = 10.0
+"""Threshold of contact on the load for relative features, in multiples of its noise."""
 SEARCH_SAMPLES = 10_000
 """Maximum number of samples per finger in the search for hyper-parameters, at even steps."""
 
@@ -31,15 +33,18 @@ class Setting:
         classifier: `logreg` or `svm`.
         features: input of the classifier.
         window: N_w of the instability that is reported [samples].
-        tare: how the baseline is found.
-        split: unit that cross-validation leaves out: one `recording`, one `object`, or `random`
-            samples. The random split repeats the paper's protocol; its metrics are too good.
+        tare: how the baseline is found; None for `first` with relative features, which need no
+            tare without contact, else 0.5 s.
+        split: unit that cross-validation leaves out: one `recording`, one `object`, a block of
+            `time` of every recording, or `random` samples. The random split repeats the paper's
+            protocol. The metrics of the last two are too good.
         trials: of the search for hyper-parameters; 0 uses the reference parameters.
         objective: loss that the search minimises: `error` (the share of wrong decisions, as in
             the paper) or `log_loss`; None for that of the classifier: `error` for the SVM, which
             has no probability of its own, else `log_loss`.
         seed: of all random numbers.
-        shared: one classifier for all fingers instead of one for each.
+        shared: one classifier for all fingers instead of one for each; None for that of
+            relative features alone, which are the same on every finger and sensor.
         contact_threshold: F_a below it is no contact [unit of the readings]; None for the mean +
             5 standard deviations over the tare intervals, if they are without contact.
         max_samples: maximum number of samples per finger that are kept in memory.
@@ -56,12 +61,12 @@ class Setting:
         default_factory=lambda: parse_features(DEPLOYED_FEATURES)
     )
     window: int = DEFAULT_WINDOW
-    tare: Tare = field(default_factory=lambda: Tare.parse(0.5))
+    tare: Tare | None = None
     split: Split = "recording"
     trials: int = 30
     objective: Objective | None = None
     seed: int = 0
-    shared: bool = False
+    shared: bool | None = None
     contact_threshold: float | None = None
     max_samples: int = MAX_SAMPLES
     hold: float = 0.0
@@ -125,6 +130,35 @@ class Setting:
         if self.init is not None:
             return Adapted(self.init.finger(finger).classifier)
         return recipe(self.classifier)
+
+    @property
+    def relative(self) -> bool:
+        """Whether all features are relative: the model then fits any sensor, unit and rate."""
+        return all(spec.seconds for spec in self.features)
+
+    @property
+    def used_tare(self) -> Tare:
+        """The tare that is given, else that of the features."""
+        if self.tare is not None:
+            return self.tare
+        return Tare.parse("first" if self.relative else 0.5)
+
+    @property
+    def is_shared(self) -> bool:
+        """Whether one classifier is for all fingers."""
+        if self.shared is None:
+            return self.relative and (self.init is None or ANY_FINGER in self.init.fingers)
+        return self.shared
+
+    def contact_load_of(self, finger: str) -> float | None:
+        """Return the threshold of contact on the load; None without relative features.
+
+        Raises:
+            ModelError: the model to adapt lacks the finger.
+        """
+        if self.init is not None:
+            return self.init.finger(finger).contact_load
+        return CONTACT_LOAD if self.relative else None
 
     @property
     def search_objective(self) -> Objective:

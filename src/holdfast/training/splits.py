@@ -15,13 +15,20 @@ Integers = npt.NDArray[np.int64]
 
 RANDOM_FOLDS = 5
 """Number of folds of the random split: 80 % train, 20 % test, as in the paper."""
+TIME_FOLDS = 5
+"""Number of blocks of time into which the split by time cuts every recording."""
+TIME_GAP = 0.5
+"""Samples nearer than this to another block are left out of the split by time [s].
+
+It is the longest lag of the relative features."""
 
 
 @dataclass(frozen=True)
 class DataSplit:
     """Units of a dataset that are held out together.
 
-    A unit is a recording, an object, or a random fifth of all samples.
+    A unit is a recording, an object, a fifth of the time of every recording, or a random fifth of
+    all samples.
 
     Attributes:
         split: kind of the units.
@@ -29,12 +36,14 @@ class DataSplit:
         group_of: (n_recordings,) index of the recording, or object, in the folds of a search;
             for the splits `recording` and `object` also the index of its unit.
         seed: of the random split.
+        rates: (n_recordings,) samples per second of the recordings [Hz].
     """
 
     split: Split
     units: tuple[str, ...]
     group_of: Integers
     seed: int
+    rates: npt.NDArray[np.float64]
 
     def units_of(self, place: int, n_samples: int) -> Integers:
         """Return the unit of each sample of a recording, the same at every call.
@@ -42,7 +51,12 @@ class DataSplit:
         Args:
             place: index of the recording in the dataset.
             n_samples: number of its samples.
+
+        Returns:
+            (n_samples,); -1 for a sample between two blocks of time.
         """
+        if self.split == "time":
+            return _blocks(n_samples, len(self.units), round(TIME_GAP * self.rates[place]))
         if self.split == "random":
             return np.random.default_rng([self.seed, place]).integers(
                 len(self.units), size=n_samples
@@ -51,7 +65,7 @@ class DataSplit:
 
     def recordings_without(self, held: Collection[int]) -> list[int]:
         """Return the indices of the recordings of which not all samples are in held units."""
-        if self.split == "random":
+        if self.split in ("time", "random"):
             return list(range(len(self.group_of)))
         return [place for place, unit in enumerate(self.group_of) if unit not in held]
 
@@ -61,7 +75,7 @@ def split_data(recordings: Sequence[ScannedRecording], split: Split, seed: int) 
 
     Args:
         recordings: of the dataset, in order.
-        split: `recording`, `object` or `random`.
+        split: `recording`, `object`, `time` or `random`.
         seed: of the random split.
 
     Raises:
@@ -76,14 +90,30 @@ def split_data(recordings: Sequence[ScannedRecording], split: Split, seed: int) 
         )
     groups = list(dict.fromkeys(str(name) for name in names))
     group_of = np.array([groups.index(str(name)) for name in names])
-    if split == "random":
-        fifths = tuple(f"fifth {k + 1}" for k in range(RANDOM_FOLDS))
-        return DataSplit(split, fifths, group_of, seed)
+    rates = np.array([each.rate for each in recordings])
+    if split in ("time", "random"):
+        n_folds = TIME_FOLDS if split == "time" else RANDOM_FOLDS
+        parts = tuple(f"fifth {k + 1}" for k in range(n_folds))
+        return DataSplit(split, parts, group_of, seed, rates)
     if len(groups) < 2:
         raise TrainingError(
-            f"the split by {split} needs at least two, {len(groups)} given ({groups[0]})"
+            f"the split by {split} needs at least two, {len(groups)} given ({groups[0]}); the "
+            "split by time needs one recording"
         )
-    return DataSplit(split, tuple(groups), group_of, seed)
+    return DataSplit(split, tuple(groups), group_of, seed, rates)
+
+
+def _blocks(n_samples: int, n_blocks: int, gap: int) -> Integers:
+    """Return the block of each sample; -1 if it is nearer than the gap to another block.
+
+    Example:
+        >>> _blocks(10, 2, 1).tolist()
+        [0, 0, 0, 0, -1, -1, 1, 1, 1, 1]
+    """
+    block = np.arange(n_samples) * n_blocks // max(n_samples, 1)
+    for start in np.flatnonzero(np.diff(block)) + 1:
+        block[max(start - gap, 0) : start + gap] = -1
+    return block
 
 
 def inner_folds(samples: Samples, n_folds: int, seed: int) -> list[npt.NDArray[np.bool_]]:

@@ -1,7 +1,7 @@
 """Training: fit a model to all recordings, and cross-validate it with the detector itself."""
 
 from collections.abc import Callable, Collection, Iterable, Iterator, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Protocol, TypeVar
 
@@ -16,7 +16,7 @@ from holdfast.training.dataset_scan import scan_dataset
 from holdfast.training.evaluation import combine_decisions, compute_decisions
 from holdfast.training.model_fit import TrainingData, fit_full_model, fit_model
 from holdfast.training.provenance import adaptation_warnings, training_record
-from holdfast.training.setting import SEARCH_SAMPLES, Setting
+from holdfast.training.setting import SEARCH_SAMPLES, Setting, Split
 from holdfast.training.splits import inner_folds, split_data
 from holdfast.training.training_samples import gather_samples, thin
 from holdfast.training.tuning import INNER_FOLDS, search
@@ -54,10 +54,12 @@ class Trained:
     Attributes:
         model: fitted to all recordings.
         cross_validation: metrics of predictions out of fold.
+        split: unit that the cross-validation left out.
     """
 
     model: Model
     cross_validation: Metrics
+    split: Split = "recording"
 
 
 def train(
@@ -92,11 +94,13 @@ def train(
     trainer = _Trainer(recordings, setting, journal, warn, progress, n_jobs)
     trainer.check()
     final, *held_out = trainer.search([set(), *trainer.search_units()])
-    model = fit_full_model(trainer.data, setting, final)
+    model = fit_full_model(trainer.data, trainer.setting, final)
     metrics = trainer.cross_validate(held_out or [final])
     _warn_of_undecided(metrics, warn)
-    provenance = training_record(setting, trainer.scan, final, metrics.pooled)
-    return Trained(msgspec.structs.replace(model, training=provenance), metrics)
+    provenance = training_record(trainer.setting, trainer.scan, final, metrics.pooled)
+    return Trained(
+        msgspec.structs.replace(model, training=provenance), metrics, trainer.setting.split
+    )
 
 
 class _Trainer:
@@ -109,12 +113,26 @@ class _Trainer:
         progress: Progress,
         n_jobs: int,
     ) -> None:
-        self.recordings, self.setting, self.journal = recordings, setting, journal
+        self.recordings, self.journal = recordings, journal
         self.warn, self.progress, self.n_jobs = warn, progress, n_jobs
-        self.scan = scan_dataset(self._read("reading"), setting.rate)
+        self.scan = scan_dataset(
+            self._read("reading"), setting.rate, relative=setting.relative
+        )
+        self.setting = setting = self._with_split(setting)
         self.data_split = split_data(self.scan.recordings, setting.split, setting.seed)
         self.fingers = gather_samples(self._read("features"), self.scan, setting, self.data_split)
         self.data = TrainingData(self.scan, self.data_split, self.fingers)
+
+    def _with_split(self, setting: Setting) -> Setting:
+        """Return the setting; a model is adapted to one recording with the split by time."""
+        alone = len(self.scan.recordings) == 1 and setting.init is not None
+        if setting.split != "recording" or not alone:
+            return setting
+        self.warn(
+            "one recording given: the metrics are by blocks of time within it (--split time), "
+            "and too good; the next grasp is another"
+        )
+        return replace(setting, split="time")
 
     def check(self) -> None:
         """Check the samples, and warn of metrics that are missing or may be wrong.
@@ -194,7 +212,7 @@ class _Trainer:
         empty = Decisions(recording.name, {})
         if not self.scan.recordings[place].n_labelled:
             return empty
-        if self.data_split.split != "random":
+        if self.data_split.split not in ("time", "random"):
             model = models[self.data_split.group_of[place]]
             return empty if model is None else _decisions(model, recording)
         each = [_decisions(model, recording) for model in models if model is not None]

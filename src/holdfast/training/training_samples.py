@@ -8,7 +8,7 @@ import numpy as np
 import numpy.typing as npt
 
 from holdfast.classifiers import Samples
-from holdfast.contact import STABLE, UNKNOWN
+from holdfast.contact import NO_CONTACT, STABLE, UNKNOWN
 from holdfast.errors import TrainingError
 from holdfast.features import FeatureSpec, Tare
 from holdfast.features.force import rest_amplitude
@@ -30,20 +30,29 @@ class FingerSamples:
     """Training samples of one classifier.
 
     Attributes:
-        sensor: of the finger.
+        sensor: of the finger; None for any sensor.
         samples: labelled, with features; the groups are those of the split.
-        units: (n,) unit of each sample, with which it is held out.
+        units: (n,) unit of each sample, with which it is held out; -1 if it is held out with
+            every unit.
+        recordings: (n,) index of the recording of each sample.
+        times: (n,) time of each sample since the start of its recording [s].
         at_rest: (n_recordings, 3) number, sum and sum of squares of F_a in each tare interval.
     """
 
-    sensor: Sensor
+    sensor: Sensor | None
     samples: Samples
     units: Integers
+    recordings: Integers
+    times: npt.NDArray[np.float64]
     at_rest: npt.NDArray[np.float64]
 
     def without(self, held: Collection[int]) -> Samples:
         """Return the samples that are not in held units."""
-        return self.samples.take(~np.isin(self.units, list(held)))
+        return self.samples.take(self.kept(held))
+
+    def kept(self, held: Collection[int]) -> npt.NDArray[np.bool_]:
+        """Return (n,) whether a sample is not in held units."""
+        return ~np.isin(self.units, [-1, *held] if held else [])
 
     def can_evaluate(self, n_units: int) -> npt.NDArray[np.bool_]:
         """Return (n_units,) whether a unit has samples, and both classes are left without it."""
@@ -59,8 +68,8 @@ class FingerSamples:
 
     def _class_counts(self, n_units: int) -> Integers:
         """Return (2, n_units) number of samples of class 0 and class 1 in each unit."""
-        stable = self.samples.stable
-        parts = (self.units[stable == kind] for kind in (False, True))
+        stable, whole = self.samples.stable, self.units >= 0
+        parts = (self.units[whole & (stable == kind)] for kind in (False, True))
         return np.array([np.bincount(part, minlength=n_units) for part in parts])
 
     def contact_threshold(self, recordings: Sequence[int]) -> float | None:
@@ -87,34 +96,53 @@ def gather_samples(
         TrainingError: one classifier of all fingers is required, but their sensors differ.
     """
     step = thinning_step(scan.n_labelled, setting.max_samples)
-    parts: dict[str, list[Samples]] = {finger: [] for finger in scan.sensors}
-    units: dict[str, list[Integers]] = {finger: [] for finger in scan.sensors}
-    at_rest = {finger: np.zeros((len(scan.recordings), 3)) for finger in scan.sensors}
+    parts: dict[str, list[FingerSamples]] = {finger: [] for finger in scan.sensors}
     n_seen = dict.fromkeys(scan.sensors, 0)
     for place, given in enumerate(recordings):
-        if not scan.recordings[place].n_labelled:
+        scanned = scan.recordings[place]
+        if not scanned.n_labelled:
             continue
-        recording = resample_if_needed(given, scan.rate)
-        sensors = {f: s for f, s in scan.sensors.items() if _has_finger(recording, f, s)}
-        plan = stream_plan(sensors, setting.features, setting, scan.rate)
+        recording = given if scan.rate is None else resample_if_needed(given, scan.rate)
+        rate = scan.rate or recording.rate
+        plan = stream_plan(_sensors_of(recording, scan), setting.features, setting, rate)
         for finger, rows in extract(plan, recording).items():
             module = recording.modules[finger]
-            states = label_states(module.labels, module.times)
-            usable = usable_rows(rows.features, states)
+            states = _states_to_learn(module, scan.relative)
+            usable = usable_rows(rows.features, states)[:: scanned.step]
             kept = usable[-n_seen[finger] % step :: step]
             n_seen[finger] += len(usable)
+            at_rest = np.zeros((len(scan.recordings), 3))
+            if plan.tare.without_contact and not scan.relative:
+                at_rest[place] = rest_moments(module, plan.tare, rate)
             group = int(data_split.group_of[place])
-            parts[finger].append(labelled_samples(rows.features, states, kept, group))
-            units[finger].append(data_split.units_of(place, module.n_samples)[kept])
-            if plan.tare.without_contact:
-                at_rest[finger][place] = rest_moments(module, plan.tare, scan.rate)
-    fingers = {
-        finger: FingerSamples(
-            scan.sensors[finger], concatenate(own), np.concatenate(units[finger]), at_rest[finger]
-        )
-        for finger, own in parts.items()
+            parts[finger].append(
+                FingerSamples(
+                    None if scan.relative else module.sensor,
+                    labelled_samples(rows.features, states, kept, group),
+                    data_split.units_of(place, module.n_samples)[kept],
+                    np.full(len(kept), place),
+                    module.times[kept] - recording.start,
+                    at_rest,
+                )
+            )
+    fingers = {finger: _join(own) for finger, own in parts.items()}
+    return {ANY_FINGER: _pool(fingers)} if setting.is_shared else fingers
+
+
+def _sensors_of(recording: Recording, scan: DatasetScan) -> dict[str, Sensor]:
+    """Return the sensor of each finger that has samples, and the sensor of the scan."""
+    modules = {f: recording.modules[f] for f in scan.sensors if f in recording.modules}
+    return {
+        finger: module.sensor
+        for finger, module in modules.items()
+        if module.n_samples and (scan.relative or module.sensor == scan.sensors[finger])
     }
-    return {ANY_FINGER: _pool(fingers)} if setting.shared else fingers
+
+
+def _states_to_learn(module: Tactile, relative: bool) -> npt.NDArray[np.int8]:
+    """Return (n,) the labels, without those of no contact if the load separates them."""
+    states = label_states(module.labels, module.times)
+    return np.where(states == NO_CONTACT, UNKNOWN, states).astype(np.int8) if relative else states
 
 
 def usable_rows(features: npt.NDArray[np.floating[Any]], states: npt.NDArray[np.int8]) -> Integers:
@@ -169,14 +197,8 @@ def stream_plan(
     rate: float,
 ) -> StreamPlan:
     """Return the plan of the feature stream of some fingers, with a setting's window and tare."""
-    tare = Tare.parse(setting.tare)
+    tare = Tare.parse(setting.used_tare)
     return StreamPlan(sensors, dict.fromkeys(sensors, features), setting.window, tare, rate)
-
-
-def _has_finger(recording: Recording, finger: str, sensor: Sensor) -> bool:
-    """Return whether the recording has samples of a finger by that sensor."""
-    module = recording.modules.get(finger)
-    return module is not None and module.n_samples > 0 and module.sensor == sensor
 
 
 def contact_threshold(moments: npt.NDArray[np.float64]) -> float | None:
@@ -214,11 +236,18 @@ def _pool(fingers: Mapping[str, FingerSamples]) -> FingerSamples:
     if len({own.sensor for own in each}) > 1:
         raise TrainingError(
             "one classifier for all fingers needs one sensor; given are "
-            + ", ".join(f"{finger} ({own.sensor.name})" for finger, own in fingers.items())
+            + ", ".join(f"{f} ({own.sensor.name})" for f, own in fingers.items() if own.sensor)
         )
+    return _join(each)
+
+
+def _join(parts: Sequence[FingerSamples]) -> FingerSamples:
+    """Return the samples of all parts, in order."""
     return FingerSamples(
-        each[0].sensor,
-        concatenate([own.samples for own in each]),
-        np.concatenate([own.units for own in each]),
-        np.sum([own.at_rest for own in each], axis=0),
+        parts[0].sensor,
+        concatenate([own.samples for own in parts]),
+        np.concatenate([own.units for own in parts]),
+        np.concatenate([own.recordings for own in parts]),
+        np.concatenate([own.times for own in parts]),
+        np.sum([own.at_rest for own in parts], axis=0),
     )

@@ -150,7 +150,7 @@ class _FoldModels:
     ) -> "_FoldModels":
         if not recordings.fingers:
             return cls(frozenset(), constant, [None], [0] * len(recordings))
-        found = scan_dataset(recordings, setting.rate)
+        found = scan_dataset(recordings, setting.rate, relative=setting.relative)
         data_split = split_data(found.recordings, setting.split, setting.seed)
         data = TrainingData(
             found, data_split, gather_samples(recordings, found, setting, data_split)

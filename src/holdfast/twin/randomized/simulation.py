@@ -54,21 +54,32 @@ class RandomHold:
         seed: of all.
         kind: of the sensor; None draws it.
         attempt: from 0 on; a hold that fails at once is drawn again.
+        grasp: from 1 on, for several grasps of one hand: hand, grip, sensor and gains depend on
+            the number alone; object, place of the pads and events on the grasp too. None for
+            the only grasp of a hand.
     """
 
     number: int
     seed: int = 0
     kind: str | None = None
     attempt: int = 0
+    grasp: int | None = None
 
     @property
     def name(self) -> str:
         """Name of its recording."""
-        return f"hand{self.number:04d}"
+        name = f"hand{self.number:04d}"
+        return name if self.grasp is None else f"{name}-grasp{self.grasp:02d}"
+
+    @property
+    def hand(self) -> "RandomHold":
+        """The hold from which all is drawn that does not change with the grasp."""
+        return self if self.grasp is None else replace(self, attempt=0, grasp=None)
 
     def generator(self, part: str) -> np.random.Generator:
         """Make the random numbers of one part; parts do not disturb each other."""
-        key = zlib.crc32(f"{self.number}/{self.attempt}/{part}".encode())
+        grasp = "" if self.grasp is None else f"grasp{self.grasp}/"
+        key = zlib.crc32(f"{self.number}/{grasp}{self.attempt}/{part}".encode())
         return np.random.default_rng([self.seed, key])
 
 
@@ -92,12 +103,15 @@ def _run(hold: RandomHold) -> "_Run":
     Raises:
         ValueError: no object that was drawn fits the hand.
     """
-    generator = hold.generator("hand")
+    generator = hold.hand.generator("hand")
     span = ranges()
     kind = hold.kind or str(generator.choice(SENSOR_KINDS))
-    drawn = draw_sensor(hold.generator("sensor"), kind)
+    drawn = draw_sensor(hold.hand.generator("sensor"), kind)
     n_pads = int(generator.choice(span["hand"]["pads"]))
     grip = log_uniform(generator, span["hand"]["grip"])
+    if hold.grasp is not None:
+        drives, skin = draw_drives(generator), draw_skin(generator)
+        generator = hold.generator("grasp")
     for _ in range(MAX_TRIES):
         item = draw_object(generator, grip, n_pads - 1)
         try:
@@ -107,7 +121,8 @@ def _run(hold: RandomHold) -> "_Run":
             continue
     else:
         raise ValueError(f"no object of {MAX_TRIES} fits the hand {hold.number}")
-    drives, skin = draw_drives(generator), draw_skin(generator)
+    if hold.grasp is None:
+        drives, skin = draw_drives(generator), draw_skin(generator)
     world = GripperWorld(layout, item, drives, skin, hold.generator("world"), drawn.sensor.rate)
     return _Run(hold, world, _plan(generator, grip, n_pads), drawn)
 
@@ -153,7 +168,7 @@ class _Run:
             generator, segments, orientation, vibration, plan.profile.hold + 1.0
         )
         self.holder = _Holder(world, self.scenario, tremors[0], plan.profile.tremor)
-        uskin = hold.generator("skin")
+        uskin = hold.hand.generator("skin")
         nodes = world.layout.surface.nodes
         self.skins = [
             Uskin(drawn.parameters, drawn.sensor, nodes, uskin) for _ in range(world.layout.n_pads)
@@ -295,6 +310,7 @@ class _Run:
             "profile": "randomized",
             "seed": self.hold.seed,
             "hand": f"random-{self.hold.number}",
+            **({} if self.hold.grasp is None else {"grasp": self.hold.grasp}),
             "source": "twin",
             "locked_at": self.protocol.locked_at,
             "lost_at": self.protocol.lost_at,
