@@ -179,7 +179,7 @@ def test_data_that_cannot_train_leave_everything_as_it_was(capsys, tmp_path, mod
     save_recording(grasp, folder / "grasp.parquet")
     assert refusal(capsys, folder, "-o", model, "--force") == (
         "the split by recording needs at least two, 1 given (grasp); the split by time needs "
-            "one recording"
+        "one recording"
     )
     bare = Recording("bare", {"thumb": synthetic_recording("x", 1).modules["thumb"]})
     save_recording(bare.with_labels({}), folder / "bare.parquet")

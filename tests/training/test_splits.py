@@ -14,9 +14,7 @@ from holdfast.training.splits import (
     split_data,
 )
 
-ALONE = (
-    "the split by {} needs at least two, 1 given ({}); the split by time needs one recording"
-)
+ALONE = "the split by {} needs at least two, 1 given ({}); the split by time needs one recording"
 
 
 def entries(*objects):

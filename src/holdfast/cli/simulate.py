@@ -132,9 +132,7 @@ def simulate_hands(
         raise ValueError(f"--grasps of at least 1 expected, {n_grasps} given")
     out.mkdir(parents=True, exist_ok=True)
     places = [None] if n_grasps == 1 else range(1, n_grasps + 1)
-    holds = [
-        RandomHold(number, seed, grasp=grasp) for number in range(n_hands) for grasp in places
-    ]
+    holds = [RandomHold(number, seed, grasp=grasp) for number in range(n_hands) for grasp in places]
     wanted: dict[str, object] = {"profile": "randomized", "seed": seed}
     tasks = [
         (hold, out, force)

@@ -54,10 +54,13 @@ class DatasetScan:
     relative: bool = False
 
     @property
-    def rate(self) -> float | None:
-        """The requested rate, else the median rate of the recordings [Hz]; None for any rate."""
-        if self.relative:
-            return None
+    def model_rate(self) -> float | None:
+        """Rate to which recordings are resampled [Hz]; None if the model is for any rate."""
+        return None if self.relative else self.rate
+
+    @property
+    def rate(self) -> float:
+        """The requested rate, else the median rate of the recordings [Hz]."""
         if self.requested_rate is not None:
             return self.requested_rate
         return float(np.median([recording.rate for recording in self.recordings]))

@@ -100,7 +100,7 @@ def fit_model(
         return None
     return Model(
         fingers=fingers,
-        rate=data.scan.rate,
+        rate=data.scan.model_rate,
         sensors={own.sensor.name: own.sensor for own in data.fingers.values() if own.sensor},
         window=setting.window,
         tare=str(setting.used_tare),

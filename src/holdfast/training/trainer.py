@@ -115,9 +115,7 @@ class _Trainer:
     ) -> None:
         self.recordings, self.journal = recordings, journal
         self.warn, self.progress, self.n_jobs = warn, progress, n_jobs
-        self.scan = scan_dataset(
-            self._read("reading"), setting.rate, relative=setting.relative
-        )
+        self.scan = scan_dataset(self._read("reading"), setting.rate, relative=setting.relative)
         self.setting = setting = self._with_split(setting)
         self.data_split = split_data(self.scan.recordings, setting.split, setting.seed)
         self.fingers = gather_samples(self._read("features"), self.scan, setting, self.data_split)

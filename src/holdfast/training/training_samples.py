@@ -102,8 +102,8 @@ def gather_samples(
         scanned = scan.recordings[place]
         if not scanned.n_labelled:
             continue
-        recording = given if scan.rate is None else resample_if_needed(given, scan.rate)
-        rate = scan.rate or recording.rate
+        recording = given if scan.relative else resample_if_needed(given, scan.rate)
+        rate = scan.model_rate or recording.rate
         plan = stream_plan(_sensors_of(recording, scan), setting.features, setting, rate)
         for finger, rows in extract(plan, recording).items():
             module = recording.modules[finger]
