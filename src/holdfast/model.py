@@ -112,6 +112,30 @@ class Training(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     versions: dict[str, str] = {}
 
 
+class Tuning(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
+    """How the threshold of a model was chosen, and the metrics of the hand that it gave.
+
+    Attributes:
+        recordings: content digest of each recording, by name.
+        requested: maximum number of false alarms per minute of stable label.
+        threshold: that was chosen.
+        false_alarms_per_minute: on the recordings.
+        missed: by `post` [s], share of the events without an alarm until then [%].
+        delay_median: of the alarms [s]; None if it is infinite, or without events.
+        n_events: number of events in the recordings.
+        stable_minutes: duration of stable labels [min].
+    """
+
+    recordings: dict[str, str]
+    requested: float
+    threshold: float
+    false_alarms_per_minute: float
+    missed: dict[str, float | None]
+    delay_median: float | None
+    n_events: int
+    stable_minutes: float
+
+
 class Model(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
     """Model of a hand: a classifier for each finger, or one for all fingers (`"*"`).
 
@@ -123,6 +147,7 @@ class Model(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=Tru
         tare: how the baseline is found, as text: "0.5", "first", "none" or "START:END".
         debounce: debouncing of state changes.
         training: provenance; None for a model without training.
+        tuning: how the threshold was chosen; None if it follows from the training.
         schema: version of the file format.
         name: of the model.
 
@@ -142,6 +167,7 @@ class Model(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=Tru
     tare: str = "0.5"
     debounce: Debounce = Debounce()
     training: Training | None = None
+    tuning: Tuning | None = None
     schema: Literal["holdfast.model/1"] = "holdfast.model/1"
     name: str = ""
 

@@ -9,7 +9,7 @@ from scipy.optimize import approx_fprime
 from sklearn.linear_model import LogisticRegression
 
 from holdfast.classifiers import Adapted, LinearClassifier
-from holdfast.classifiers.adapted import _hessian, _log_odds, _loss
+from holdfast.classifiers.adapted import CALIBRATION, NONE, WEIGHTS, _hessian, _log_odds, _loss
 from holdfast.errors import TrainingError
 
 from .test_recipes import samples
@@ -26,8 +26,8 @@ UNLIKE = msgspec.structs.replace(PRIOR, slope=2.5, offset=-0.7, threshold=0.2)
 GIVEN = samples(600, share=0.3)
 
 
-def adapted(C, given=GIVEN, prior=PRIOR):
-    return Adapted(prior).fit(given, {"C": C}, 0)
+def adapted(C, given=GIVEN, prior=PRIOR, change=WEIGHTS):
+    return Adapted(prior).fit(given, {"change": change, "C": C}, 0)
 
 
 def decided(rule, given=GIVEN):
@@ -43,7 +43,7 @@ def test_gradient_and_hessian_are_those_of_finite_differences():
     rows = np.column_stack([np.ones(50), rng.normal(size=(50, 3))])
     stable = rng.random(50) < 0.3
     known, at = rng.normal(size=(2, 4))
-    given = (rows, stable, known, {"C": 0.7})
+    given = (rows, stable, known, 0.7)
     expected = approx_fprime(at, lambda v: _loss(v, *given)[0], 1e-7)
     assert _loss(at, *given)[1] == pytest.approx(expected, rel=1e-4, abs=1e-5)
     bent = [approx_fprime(at, lambda v, j=j: _loss(v, *given)[1][j], 1e-7) for j in range(4)]
@@ -53,37 +53,58 @@ def test_gradient_and_hessian_are_those_of_finite_differences():
 def test_the_loss_is_that_of_the_docstring():
     rows, stable = np.array([[1.0, 2.0], [1.0, -1.0], [1.0, 0.5]]), np.array([True, False, True])
     v, known = np.array([0.3, -0.2]), np.array([0.1, 0.4])
-    weights = (3 / 4, 3 / 2, 3 / 4)  # n / (2 n_class)
     expected = ((v - known) ** 2).sum() / 2
-    for row, sign, weight in zip(rows, (1, -1, 1), weights, strict=True):
-        expected += 0.7 * weight * np.log(1 + np.exp(-sign * (row @ v)))
-    assert _loss(v, rows, stable, known, {"C": 0.7})[0] == pytest.approx(expected)
+    for row, sign in zip(rows, (1, -1, 1), strict=True):
+        expected += 0.7 * np.log(1 + np.exp(-sign * (row @ v)))
+    assert _loss(v, rows, stable, known, 0.7)[0] == pytest.approx(expected)
 
 
 @pytest.mark.parametrize("prior", [PRIOR, UNLIKE])
-def test_with_few_samples_the_decisions_of_the_prior_stay(prior):
-    found = adapted(1e-12, prior=prior)
+@pytest.mark.parametrize("change", [CALIBRATION, WEIGHTS])
+def test_with_a_small_c_decisions_and_probabilities_of_the_prior_stay(prior, change):
+    found = adapted(1e-12, prior=prior, change=change)
     assert np.array_equal(decided(found), decided(prior))
+    known = prior.probability(GIVEN.features)
+    assert found.probability(GIVEN.features) == pytest.approx(known, abs=1e-6)
     assert 0.1 < decided(prior).mean() < 0.9
 
 
-def test_the_log_odds_of_a_prior_are_those_above_its_threshold():
+def test_without_a_change_the_prior_is_returned():
+    assert adapted(1.0, prior=UNLIKE, change=NONE) == UNLIKE
+    one_class = GIVEN._replace(stable=np.ones(600, dtype=bool))
+    assert adapted(1.0, one_class, UNLIKE, NONE) == UNLIKE
+
+
+def test_the_calibration_is_that_of_scikit_learn_on_the_log_odds():
+    p = UNLIKE.probability(GIVEN.features)
+    odds = np.log(p / (1 - p))[:, None]
+    peer = LogisticRegression(C=1e6, tol=1e-10, max_iter=1000).fit(odds, GIVEN.stable)
+    found = adapted(1e6, prior=UNLIKE, change=CALIBRATION)
+    expected = peer.predict_proba(odds)[:, 1]
+    assert found.probability(GIVEN.features) == pytest.approx(expected, abs=1e-4)
+    assert (found.coefficients, found.threshold) == (UNLIKE.coefficients, UNLIKE.threshold)
+
+
+def test_a_prior_that_is_upside_down_loses_its_slope():
+    """A calibration does not turn the order of the samples round."""
+    flipped = msgspec.structs.replace(PRIOR, coefficients=tuple(-c for c in rule_of(PRIOR)[1:]))
+    given = samples(600, share=0.3)
+    other = given._replace(stable=~decided(flipped, given))
+    found = adapted(1e3, other, flipped, CALIBRATION)
+    assert found.slope == pytest.approx(1e-6)
+
+
+def test_the_log_odds_of_a_prior_are_those_of_its_probability():
     scaled = (GIVEN.features - np.array(UNLIKE.mean)) / np.array(UNLIKE.scale)
     odds = np.column_stack([np.ones(len(scaled)), scaled]) @ _log_odds(UNLIKE)
     p = UNLIKE.probability(GIVEN.features)
-    assert odds == pytest.approx(np.log(p / (1 - p)) - np.log(0.2 / 0.8), abs=1e-6)
-
-
-@pytest.mark.parametrize("threshold", [0.0, 1.0])
-def test_a_constant_prior_can_be_adapted(threshold):
-    found = adapted(1e-12, prior=msgspec.structs.replace(PRIOR, threshold=threshold))
-    assert decided(found).all() == (threshold == 0.0)
+    assert odds == pytest.approx(np.log(p / (1 - p)), abs=1e-6)
 
 
 @pytest.mark.parametrize("prior", [PRIOR, UNLIKE])
 def test_with_a_large_c_it_equals_scikit_learn(prior):
     scaled = (GIVEN.features - np.array(prior.mean)) / np.array(prior.scale)
-    peer = LogisticRegression(C=1e6, class_weight="balanced", tol=1e-10, max_iter=1000)
+    peer = LogisticRegression(C=1e6, tol=1e-10, max_iter=1000)
     peer.fit(scaled, GIVEN.stable)
     found = adapted(1e6, prior=prior)
     expected = [peer.intercept_[0], *peer.coef_[0]]
@@ -98,17 +119,16 @@ def test_a_larger_c_moves_away_from_the_prior():
     assert (np.diff(far) > 0).all()
 
 
-def test_probabilities_are_of_the_base_rate_and_decisions_balanced():
-    """As for `logreg`: the correction for balanced classes moves the threshold along."""
+def test_probabilities_are_of_the_base_rate_and_the_threshold_stays():
     given = samples(6000, share=0.15)
-    found = adapted(1.0, given)
+    found = adapted(1.0, given, UNLIKE)
     assert found.probability(given.features).mean() == pytest.approx(0.15, abs=0.02)
-    balanced = found.decision(given.features) >= 0
-    assert np.array_equal(decided(found, given), balanced)
+    assert found.threshold == UNLIKE.threshold
 
 
 def test_it_is_deterministic():
-    assert Adapted(PRIOR).fit(GIVEN, {"C": 0.1}, 1) == Adapted(PRIOR).fit(GIVEN, {"C": 0.1}, 2)
+    parameters = {"change": WEIGHTS, "C": 0.1}
+    assert Adapted(PRIOR).fit(GIVEN, parameters, 1) == Adapted(PRIOR).fit(GIVEN, parameters, 2)
 
 
 def test_few_samples_help_a_prior_that_is_nearly_right():
@@ -150,11 +170,22 @@ def test_every_prior_has_a_name_of_its_own():
     assert len({Adapted(prior).name for prior in (PRIOR, UNLIKE, near)}) == 3
 
 
+def test_an_unknown_change_is_refused():
+    with pytest.raises(ValueError) as raised:
+        adapted(1.0, change="all")
+    assert str(raised.value) == "unknown change 'all'; there are none, calibration, weights"
+
+
 def test_the_search_covers_the_reference():
     class Trial:
+        def suggest_categorical(self, name, choices):
+            assert name == "change"
+            assert Adapted(PRIOR).reference["change"] in choices
+            return "weights"
+
         def suggest_float(self, name, low, high, *, log):
             assert (name, log) == ("C", True)
             assert low <= Adapted(PRIOR).reference["C"] <= high
             return low
 
-    assert Adapted(PRIOR).suggest(Trial()) == {"C": 1e-6}
+    assert Adapted(PRIOR).suggest(Trial()) == {"change": "weights", "C": 1e-6}

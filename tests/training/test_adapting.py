@@ -3,15 +3,12 @@
 from dataclasses import replace
 
 import msgspec
-import numpy as np
 import pytest
 
-from holdfast.classifiers import Samples
 from holdfast.errors import ModelError
 from holdfast.features import Tare, parse_features
 from holdfast.model import ANY_FINGER, Debounce
 from holdfast.training import Setting, evaluate, train
-from holdfast.training.trainer import _search
 
 from .build import TINY, tiny_recording
 
@@ -53,7 +50,9 @@ def test_the_features_window_and_tare_of_the_model_are_kept(known, few):
     assert (adapted.window, adapted.tare, adapted.debounce) == (8, "0.4", Debounce(0.02, 0.05, 0.1))
     scales = {part.classifier.scale for part in adapted.fingers.values()}
     assert scales == {known.fingers[ANY_FINGER].classifier.scale}
-    assert adapted.training.parameters == {f: {"C": 1e-3} for f in ("thumb", "index")}
+    assert adapted.training.parameters == {
+        finger: {"change": "calibration", "C": 1e-3} for finger in ("thumb", "index")
+    }
     assert (adapted.name, warnings) == ("", [])
 
 
@@ -101,21 +100,24 @@ def test_each_finger_is_adapted_from_its_own_classifier(known, few):
     assert adapted.fingers["thumb"].classifier.scale == part.classifier.scale
 
 
-def test_a_search_from_another_model_is_another_search(known, tmp_path):
-    """The trials of one search are not used by the other."""
-    rng = np.random.default_rng(0)
-    stable = rng.random(80) < 0.5
-    rows = rng.normal(size=(80, len(FEATURES))) + stable[:, None]
-    samples, journal = Samples(rows, stable, np.arange(80) % 4), tmp_path / "search"
-    lines = []
-    for shift in (0.0, 0.0, 1.0):
-        part = known.fingers[ANY_FINGER]
-        rule = msgspec.structs.replace(part.classifier, intercept=shift)
-        fingers = {ANY_FINGER: msgspec.structs.replace(part, classifier=rule)}
-        init = msgspec.structs.replace(known, fingers=fingers)
-        _search(samples, Setting.adapting(init, trials=2), "thumb", journal)
-        lines.append(len(journal.read_bytes().split()))
-    assert lines == [2, 2, 4]
+def test_one_recording_is_split_by_time(known, few):
+    warnings = []
+    setting = Setting.adapting(known, trials=0)
+    trained = [train(own, setting, warn=warnings.append) for own in (few[:1], few)]
+    assert [each.split for each in trained] == ["time", "recording"]
+    assert [each.model.training.split for each in trained] == ["time", "recording"]
+    assert warnings == [
+        "one recording given: the metrics are by blocks of time within it (--split time), and "
+        "too good; the next grasp is another"
+    ]
+
+
+def test_what_was_taken_is_reported_for_every_finger(known, few):
+    _, messages = train_with_warnings(few, Setting.adapting(known, trials=1))
+    assert len(messages) == 2
+    for message, finger in zip(messages, ("thumb", "index"), strict=True):
+        assert f"mine for {finger}" in message
+        assert "2 recordings" in message
 
 
 def test_windows_are_meant_for_the_rate_of_the_model(known):

@@ -90,6 +90,8 @@ def test_between_two_blocks_of_time_there_is_a_gap():
         assert (units[start - gap : start + gap] == -1).all()
         assert units[start - gap - 1] == start // 200 - 1
         assert units[start + gap] == start // 200
+    short = split_data(entries("can"), "time", 0).units_of(0, 100)
+    assert np.bincount(short[short >= 0]).tolist() == [15, 10, 10, 10, 15]
 
 
 def samples(stable, groups):

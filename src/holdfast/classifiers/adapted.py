@@ -5,26 +5,39 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 import numpy.typing as npt
+from msgspec.structs import replace
 
-from holdfast.classifiers.fitting import Parameters, Samples, check_classes, class_ratio
+from holdfast.classifiers.fitting import MIN_SLOPE, Parameters, Samples, check_classes
 from holdfast.classifiers.linear import LinearClassifier
 
 if TYPE_CHECKING:
     from optuna import Trial
 
 Array = npt.NDArray[np.float64]
+Flags = npt.NDArray[np.bool_]
+
+NONE, CALIBRATION, WEIGHTS = "none", "calibration", "weights"
+CHANGES = (NONE, CALIBRATION, WEIGHTS)
+"""What is changed of the prior: nothing; intercept and slope of its log odds; or all weights."""
 
 
 @dataclass(frozen=True)
 class Adapted:
-    """Logistic regression, regularised towards the weights of another classifier, not to zero.
+    """Logistic regression, regularised towards another classifier, not to zero.
 
-    v_0 are the intercept and the coefficients of the log odds of that classifier, the prior, over
-    features standardised as in its training. With balanced weights of the samples it minimises
+    z_i are the log odds of that classifier, the prior, at sample i. The change `calibration`
+    replaces them by a z_i + b, and minimises
 
-        |v - v_0|^2 / 2 + C sum_i weight_i log(1 + exp(-y_i z_i(v)))
+        ((a - 1)^2 + b^2) / 2 + C sum_i log(1 + exp(-y_i (a z_i + b)))
 
-    A C near 0 keeps the prior; a large C forgets it.
+    The change `weights` replaces the intercept and coefficients v_0 of the log odds, over
+    features standardised as in the training of the prior, and minimises
+
+        |v - v_0|^2 / 2 + C sum_i log(1 + exp(-y_i z_i(v)))
+
+    The change `none` keeps the prior. A C near 0 keeps it as well; a large C forgets it. The
+    threshold stays that of the prior: what a false alarm costs against a miss does not depend on
+    the hand.
 
     Attributes:
         prior: the classifier to adapt.
@@ -39,85 +52,95 @@ class Adapted:
 
     @property
     def reference(self) -> Parameters:
-        """Reference parameters: a thousand samples count as much as the prior."""
-        return {"C": 1e-3}
+        """Reference parameters: a cautious change of the calibration."""
+        return {"change": CALIBRATION, "C": 1e-3}
 
     def suggest(self, trial: "Trial") -> Parameters:
-        """Draw C over eight decades."""
-        return {"C": trial.suggest_float("C", 1e-6, 1e2, log=True)}
+        """Draw what is changed, and C over eight decades."""
+        return {
+            "change": trial.suggest_categorical("change", CHANGES),
+            "C": trial.suggest_float("C", 1e-6, 1e2, log=True),
+        }
 
     def fit(self, samples: Samples, parameters: Parameters, seed: int) -> LinearClassifier:
         """The classifier adapted to the samples; deterministic, the seed is not used.
 
         Raises:
             TrainingError: the samples have only one class.
-            ValueError: the number of features is not that of the prior.
+            ValueError: the number of features is not that of the prior, or the change is
+                unknown.
         """
-        from scipy.optimize import minimize
-
         del seed
-        check_classes(samples)
-        prior = self.prior
-        if samples.features.shape[1] != prior.n_features:
+        if parameters["change"] not in CHANGES:
             raise ValueError(
-                f"{samples.features.shape[1]} features given, {prior.n_features} expected to adapt"
+                f"unknown change {parameters['change']!r}; there are {', '.join(CHANGES)}"
             )
-        rows = (samples.features - np.array(prior.mean)) / np.array(prior.scale)
-        initial = _log_odds(prior)
-        odds = class_ratio(samples.stable)
-        found = minimize(
-            _loss,
-            initial,
-            args=(np.column_stack([np.ones(len(rows)), rows]), samples.stable, initial, parameters),
-            jac=True,
-            hess=_hessian,
-            method="trust-exact",
-            options={"gtol": 1e-8 * (1.0 + parameters["C"] * len(rows))},
-        )
-        return LinearClassifier(
-            mean=prior.mean,
-            scale=prior.scale,
-            coefficients=tuple(found.x[1:].tolist()),
-            intercept=float(found.x[0]),
-            offset=-float(np.log(odds)),
-            threshold=1.0 / (1.0 + odds),
-        )
+        if samples.features.shape[1] != self.prior.n_features:
+            raise ValueError(
+                f"{samples.features.shape[1]} features given, {self.prior.n_features} expected "
+                "to adapt"
+            )
+        if parameters["change"] == NONE:
+            return self.prior
+        check_classes(samples)
+        fit = _calibrated if parameters["change"] == CALIBRATION else _reweighted
+        return fit(self.prior, samples, parameters["C"])
+
+
+def _calibrated(prior: LinearClassifier, samples: Samples, c: float) -> LinearClassifier:
+    odds = prior.slope * prior.decision(samples.features) + prior.offset
+    rows = np.column_stack([np.ones(len(odds)), odds])
+    shift, stretch = _fit_towards(np.array([0.0, 1.0]), rows, samples.stable, c).tolist()
+    stretch = max(stretch, MIN_SLOPE)
+    return replace(prior, slope=stretch * prior.slope, offset=stretch * prior.offset + shift)
+
+
+def _reweighted(prior: LinearClassifier, samples: Samples, c: float) -> LinearClassifier:
+    rows = (samples.features - np.array(prior.mean)) / np.array(prior.scale)
+    rows = np.column_stack([np.ones(len(rows)), rows])
+    weights = _fit_towards(_log_odds(prior), rows, samples.stable, c).tolist()
+    return replace(
+        prior, intercept=weights[0], coefficients=tuple(weights[1:]), slope=1.0, offset=0.0
+    )
 
 
 def _log_odds(prior: LinearClassifier) -> Array:
-    """Return intercept and coefficients of the prior's log odds, minus those of its threshold."""
-    limit = np.clip(prior.threshold, 1e-12, 1 - 1e-12)
-    shift = prior.offset - np.log(limit / (1 - limit))
-    calibrated = prior.slope * np.array([prior.intercept, *prior.coefficients])
-    calibrated[0] += shift
-    return calibrated
-
-
-def _loss(
-    v: Array, rows: Array, stable: npt.NDArray[np.bool_], initial: Array, parameters: Parameters
-) -> tuple[float, Array]:
-    """Return the regularised loss and its gradient."""
-    weight = _weights(stable, parameters)
-    sign = np.where(stable, 1.0, -1.0)
-    margin = sign * (rows @ v)
-    difference = v - initial
-    loss = 0.5 * difference @ difference + weight @ np.logaddexp(0.0, -margin)
-    slope = -weight * sign * np.exp(-np.logaddexp(0.0, margin))
-    return float(loss), difference + rows.T @ slope
-
-
-def _hessian(
-    v: Array, rows: Array, stable: npt.NDArray[np.bool_], _: Array, parameters: Parameters
-) -> Array:
-    """Return the Hessian of the loss."""
-    probability = np.exp(-np.logaddexp(0.0, -(rows @ v)))
-    weight = _weights(stable, parameters) * probability * (1.0 - probability)
-    found: Array = np.eye(len(v)) + (rows * weight[:, None]).T @ rows
+    """Return intercept and coefficients of the prior's log odds."""
+    found: Array = prior.slope * np.array([prior.intercept, *prior.coefficients])
+    found[0] += prior.offset
     return found
 
 
-def _weights(stable: npt.NDArray[np.bool_], parameters: Parameters) -> Array:
-    """Return C times the weight of each sample; both classes have the same total weight."""
-    n, n_stable = len(stable), int(stable.sum())
-    fraction = np.where(stable, n / (2 * n_stable), n / (2 * (n - n_stable)))
-    return np.asarray(parameters["C"] * fraction)
+def _fit_towards(initial: Array, rows: Array, stable: Flags, c: float) -> Array:
+    """Return the weights with the least regularised loss."""
+    from scipy.optimize import minimize
+
+    found = minimize(
+        _loss,
+        initial,
+        args=(rows, stable, initial, c),
+        jac=True,
+        hess=_hessian,
+        method="trust-exact",
+        options={"gtol": 1e-8 * (1.0 + c * len(rows))},
+    )
+    return np.asarray(found.x)
+
+
+def _loss(v: Array, rows: Array, stable: Flags, initial: Array, c: float) -> tuple[float, Array]:
+    """Return the regularised loss and its gradient."""
+    sign = np.where(stable, 1.0, -1.0)
+    margin = sign * (rows @ v)
+    difference = v - initial
+    loss = 0.5 * difference @ difference + c * np.logaddexp(0.0, -margin).sum()
+    slope = -c * sign * np.exp(-np.logaddexp(0.0, margin))
+    return float(loss), difference + rows.T @ slope
+
+
+def _hessian(v: Array, rows: Array, stable: Flags, initial: Array, c: float) -> Array:
+    """Return the Hessian of the loss."""
+    del stable, initial
+    probability = np.exp(-np.logaddexp(0.0, -(rows @ v)))
+    weight = c * probability * (1.0 - probability)
+    found: Array = np.eye(len(v)) + (rows * weight[:, None]).T @ rows
+    return found

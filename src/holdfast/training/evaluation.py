@@ -74,6 +74,11 @@ def combine_decisions(
         fingers[name] = replace(
             first,
             labels=np.where(unit < 0, UNKNOWN, first.labels),
+            exact_labels=(
+                None
+                if first.exact_labels is None
+                else np.where(unit < 0, UNKNOWN, first.exact_labels)
+            ),
             states=states[unit, every],
             stable_probability=probabilities[unit, every],
         )

@@ -20,7 +20,7 @@ TIME_FOLDS = 5
 TIME_GAP = 0.5
 """Samples nearer than this to another block are left out of the split by time [s].
 
-It is the longest lag of the relative features."""
+It is the longest lag of the relative features; in short recordings it is a quarter of a block."""
 
 
 @dataclass(frozen=True)
@@ -56,7 +56,9 @@ class DataSplit:
             (n_samples,); -1 for a sample between two blocks of time.
         """
         if self.split == "time":
-            return _blocks(n_samples, len(self.units), round(TIME_GAP * self.rates[place]))
+            longest = n_samples // (4 * len(self.units))
+            gap = min(round(TIME_GAP * self.rates[place]), longest)
+            return _blocks(n_samples, len(self.units), gap)
         if self.split == "random":
             return np.random.default_rng([self.seed, place]).integers(
                 len(self.units), size=n_samples

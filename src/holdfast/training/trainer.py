@@ -12,6 +12,7 @@ from holdfast.metrics import Decisions, Metrics, summarise
 from holdfast.model import ANY_FINGER, Model
 from holdfast.parallel import map_ordered
 from holdfast.recordings import Recording
+from holdfast.training.adaptation import choose_adaptation
 from holdfast.training.dataset_scan import scan_dataset
 from holdfast.training.evaluation import combine_decisions, compute_decisions
 from holdfast.training.model_fit import TrainingData, fit_full_model, fit_model
@@ -156,12 +157,15 @@ class _Trainer:
     def search(self, held_units: Sequence[Collection[int]]) -> list[dict[str, Parameters]]:
         """Search the parameters of every finger, once for each collection of held-out units.
 
-        Without trials, return the reference parameters.
+        Without trials, return the reference parameters. A model to adapt has a few candidates
+        instead of a search.
         """
         setting = self.setting
         if not setting.trials:
             reference = {finger: setting.recipe_of(finger).reference for finger in self.fingers}
             return [reference for _ in held_units]
+        if setting.init is not None:
+            return [self._adapt(held, setting.init) for held in held_units]
         tasks = [
             (thin(own.without(held), SEARCH_SAMPLES), setting, finger, self.journal)
             for held in held_units
@@ -173,6 +177,16 @@ class _Trainer:
             self.warn(warning)
         parameters = iter(parameters for parameters, _ in found)
         return [{finger: next(parameters) for finger in self.fingers} for _ in held_units]
+
+    def _adapt(self, held: Collection[int], init: Model) -> dict[str, Parameters]:
+        """Choose how far every finger is adapted; report it if nothing is held out."""
+        found: dict[str, Parameters] = {}
+        for finger, own in self.fingers.items():
+            adaptation = choose_adaptation(own, init.finger(finger).classifier, held)
+            found[finger] = adaptation.parameters
+            if not held:
+                self.warn(adaptation.describe(init.name or "the model to adapt", finger))
+        return found
 
     def cross_validate(self, found: Sequence[Mapping[str, Parameters]]) -> Metrics:
         """Compute the metrics of predictions out of fold.

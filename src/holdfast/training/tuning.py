@@ -69,6 +69,14 @@ def search(
     return dict(study.best_params)
 
 
+def log_losses(
+    probability: npt.NDArray[np.float64], stable: npt.NDArray[np.bool_]
+) -> npt.NDArray[np.float64]:
+    """Return (n,) the log loss of the probability of stability of each sample."""
+    bounded = np.clip(probability, 1e-12, 1 - 1e-12)
+    return -np.log(np.where(stable, bounded, 1 - bounded))
+
+
 def _loss(
     samples: Samples,
     folds: Sequence[npt.NDArray[np.bool_]],
@@ -87,7 +95,6 @@ def _loss(
         if objective == "error":
             total += float(((probability >= classifier.threshold) != tested.stable).sum())
         else:
-            bounded = np.clip(probability, 1e-12, 1 - 1e-12)
-            total -= float(np.log(np.where(tested.stable, bounded, 1 - bounded)).sum())
+            total += float(log_losses(probability, tested.stable).sum())
         n += len(tested.stable)
     return total / n

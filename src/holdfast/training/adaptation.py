@@ -1,0 +1,177 @@
+"""How far a model is adapted to recordings: chosen by folds, in doubt not at all."""
+
+from collections.abc import Collection, Iterator, Sequence
+from typing import NamedTuple
+
+import numpy as np
+import numpy.typing as npt
+
+from holdfast.classifiers import LinearClassifier, Parameters, Samples
+from holdfast.classifiers.adapted import CALIBRATION, NONE, WEIGHTS, Adapted
+from holdfast.training.splits import TIME_FOLDS, TIME_GAP
+from holdfast.training.training_samples import FingerSamples, thinning_step
+from holdfast.training.tuning import log_losses
+
+Array = npt.NDArray[np.float64]
+Flags = npt.NDArray[np.bool_]
+
+MAX_ADAPTATION_SAMPLES = 10_000
+"""Maximum number of samples by which the adaptation is chosen, at even steps."""
+MAX_FOLDS = 5
+ENOUGH_RECORDINGS = 5
+"""With fewer recordings only cautious candidates are tried: large changes learn the few grasps."""
+CAUTIOUS: tuple[Parameters, ...] = (
+    {"change": NONE, "C": 0.0},
+    {"change": CALIBRATION, "C": 1e-3},
+    {"change": WEIGHTS, "C": 3e-4},
+    {"change": CALIBRATION, "C": 1e-2},
+)
+BOLD: tuple[Parameters, ...] = (
+    {"change": WEIGHTS, "C": 1e-3},
+    {"change": WEIGHTS, "C": 1e-2},
+    {"change": WEIGHTS, "C": 1e-1},
+)
+"""Candidates, the nearest to the model first. They were chosen on randomized hands of the twin."""
+
+
+class Adaptation(NamedTuple):
+    """What is taken over from the labels.
+
+    Attributes:
+        parameters: of `Adapted`.
+        n_recordings: from which it was chosen.
+        loss_before: mean log loss of the model on held-out samples.
+        loss_after: the same of the adapted model.
+    """
+
+    parameters: Parameters
+    n_recordings: int
+    loss_before: float
+    loss_after: float
+
+    def describe(self, model: str, finger: str) -> str:
+        """Return a line for the user.
+
+        Args:
+            model: name of the model that was adapted.
+            finger: name of the classifier; `"*"` for one of all fingers.
+        """
+        what = f"{model} for {finger}" if finger != "*" else model
+        n = f"{self.n_recordings} recording{'s' * (self.n_recordings > 1)}"
+        change = self.parameters["change"]
+        if change == NONE:
+            return f"kept {what}: the labels of {n} did not improve it"
+        part = "calibration" if change == CALIBRATION else "weights"
+        return (
+            f"adapted the {part} of {what} (C = {self.parameters['C']:g}): log loss on held-out "
+            f"parts of {n} {self.loss_after:.3f}, was {self.loss_before:.3f}"
+        )
+
+
+def choose_adaptation(
+    own: FingerSamples, prior: LinearClassifier, held: Collection[int] = ()
+) -> Adaptation:
+    """Choose how far a classifier is adapted to samples.
+
+    Every candidate is fitted without some recordings (of a single recording: without blocks of
+    time, with a gap) and compared with the others on them by the log loss. The nearest to the
+    prior is taken that is at most one standard error of the paired difference worse than the
+    best.
+
+    Args:
+        own: samples of one classifier.
+        prior: to adapt.
+        held: units that are left out.
+    """
+    kept = np.flatnonzero(own.kept(held))
+    step = thinning_step(len(kept), MAX_ADAPTATION_SAMPLES)
+    rows = kept[::step]
+    samples = Samples(*(array[rows] for array in own.samples))
+    recordings, blocks = own.recordings[rows], _time_blocks(own, rows)
+    n_recordings = len(np.unique(recordings))
+    many = n_recordings >= ENOUGH_RECORDINGS
+    candidates = CAUTIOUS + BOLD if many else CAUTIOUS
+    losses = np.full((len(candidates), len(rows)), np.nan)
+    for fold in _folds(recordings, blocks, own.times[rows]):
+        losses[:, fold.tested] = _held_out_losses(samples, fold, candidates, prior, step)
+    units = recordings if many else TIME_FOLDS * recordings + blocks
+    known = ~np.isnan(losses[0])
+    by_unit = [losses[:, known & (units == unit)].mean(axis=1) for unit in np.unique(units[known])]
+    table = np.array(by_unit).reshape(-1, len(candidates)).T
+    chosen = choose_nearest(table)
+    mean = table.mean(axis=1) if table.size else np.zeros(len(candidates))
+    return Adaptation(candidates[chosen], n_recordings, float(mean[0]), float(mean[chosen]))
+
+
+def choose_nearest(losses: Array) -> int:
+    """Return the first candidate that is within one standard error of the best.
+
+    Args:
+        losses: (n_candidates, n_units) loss on each unit, paired; the nearest to the prior first.
+
+    Returns:
+        Its row; 0 with fewer than two units.
+
+    Example:
+        >>> choose_nearest(np.array([[0.3, 0.5, 0.4], [0.2, 0.4, 0.3], [0.1, 0.5, 0.2]]))
+        1
+    """
+    if losses.shape[1] < 2:
+        return 0
+    worse = losses - losses[losses.mean(axis=1).argmin()]
+    error = worse.std(axis=1, ddof=1) / np.sqrt(losses.shape[1])
+    return int(np.flatnonzero(worse.mean(axis=1) <= error)[0])
+
+
+class _Fold(NamedTuple):
+    trained: Flags
+    tested: Flags
+
+
+def _folds(recordings: Array, blocks: Array, times: Array) -> Iterator[_Fold]:
+    """Yield folds that leave out recordings; of a single recording, blocks of time."""
+    names = np.unique(recordings)
+    if len(names) > 1:
+        for k in range(min(MAX_FOLDS, len(names))):
+            tested = np.isin(recordings, names[k::MAX_FOLDS])
+            yield _Fold(~tested, tested)
+        return
+    for block in np.unique(blocks):
+        tested = blocks == block
+        low, high = times[tested].min() - TIME_GAP, times[tested].max() + TIME_GAP
+        yield _Fold((times < low) | (times > high), tested)
+
+
+def _time_blocks(own: FingerSamples, rows: npt.NDArray[np.int64]) -> npt.NDArray[np.int64]:
+    """Return the fifth of the labelled time of its recording in which each sample is."""
+    blocks = np.zeros(len(rows), dtype=np.int64)
+    for place in np.unique(own.recordings[rows]):
+        chosen = own.recordings[rows] == place
+        times = own.times[rows][chosen]
+        share = (times - times.min()) / max(float(np.ptp(times)), 1e-9)
+        blocks[chosen] = np.minimum(TIME_FOLDS * share, TIME_FOLDS - 1).astype(np.int64)
+    return blocks
+
+
+def _held_out_losses(
+    samples: Samples, fold: _Fold, candidates: Sequence[Parameters], prior: LinearClassifier,
+    step: int,
+) -> Array:  # fmt: skip
+    """Return (n_candidates, n_tested) log losses; a candidate that cannot be fitted is the prior.
+
+    Args:
+        samples: of all folds.
+        fold: which of them to fit and to test.
+        candidates: to fit.
+        prior: to adapt.
+        step: every step-th sample is used, and stands for as many.
+    """
+    trained, tested = samples.take(fold.trained), samples.take(fold.tested)
+    recipe = Adapted(prior)
+    found = []
+    for candidate in candidates:
+        weighted = {**candidate, "C": step * candidate["C"]}
+        rule = prior if trained.one_class else recipe.fit(trained, weighted, 0)
+        probability = rule.probability(tested.features)
+        found.append(log_losses(probability, tested.stable))
+    return np.array(found)

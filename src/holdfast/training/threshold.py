@@ -1,0 +1,228 @@
+"""Choice of the threshold of a model for a wanted rate of false alarms."""
+
+import math
+from collections.abc import Callable, Iterable, Sequence
+from dataclasses import dataclass
+
+import msgspec
+import numpy as np
+
+from holdfast.errors import ModelError, TrainingError
+from holdfast.metrics import AlarmMatch, EventMetrics, FingerDecisions, pool_events
+from holdfast.model import Model, Tuning
+from holdfast.recordings import Recording
+from holdfast.training.evaluation import compute_decisions
+from holdfast.training.replay import Replay, alarms, stable_counts, with_threshold
+
+LOG_ODDS = np.arange(-40, 41) * 0.2
+"""Log odds of the thresholds that are tried first."""
+FINE_STEPS = np.arange(-9, 10) * 0.02
+"""Steps in log odds around the best of them."""
+USABLE_SHARE = 0.5
+"""A threshold is usable if the hand is STABLE in at least this share of the stable samples in
+which it is STABLE at the lowest threshold: a hand that is never STABLE gives no false alarm."""
+N_SHOWN = 3
+"""Thresholds that are shown on either side of the chosen one."""
+
+Steps = Callable[[Iterable[Recording]], Iterable[Recording]]
+
+
+class OperatingPoint(msgspec.Struct, frozen=True):
+    """Metrics of the hand at one threshold.
+
+    Attributes:
+        threshold: probability of stability from which on a contact is stable.
+        stable: share of the samples labelled STABLE that are decided STABLE [%].
+        events: false alarms, missed events and delays.
+    """
+
+    threshold: float
+    stable: float
+    events: EventMetrics
+
+    @property
+    def false_alarms(self) -> float:
+        """False alarms per minute of stable label."""
+        return self.events.false_alarms_per_minute or 0.0
+
+    @property
+    def missed(self) -> float:
+        """Mean of the missed events over all `post` [%]; 0 without events."""
+        return float(np.mean([share or 0.0 for share in self.events.missed.values()]))
+
+
+@dataclass(frozen=True)
+class Tuned:
+    """Result of tuning.
+
+    Attributes:
+        model: with the chosen threshold.
+        chosen: its metrics, by the detector itself.
+        before: metrics of the model that was given, by replay.
+        points: thresholds around it, by replay, lowest first; the chosen one is among them.
+    """
+
+    model: Model
+    chosen: OperatingPoint
+    before: OperatingPoint
+    points: tuple[OperatingPoint, ...]
+
+
+def tune(
+    model: Model,
+    recordings: Iterable[Recording],
+    false_alarms: float,
+    *,
+    progress: Steps = lambda recordings: recordings,
+) -> Tuned:
+    """Choose the threshold with the fewest missed events for a rate of false alarms of the hand.
+
+    The probabilities are computed once. The decision rule, with contact, hysteresis, hold and
+    minimum duration, is replayed for every threshold. The detector itself confirms the chosen
+    one.
+
+    Args:
+        model: to tune.
+        recordings: labelled; are read once for the probabilities and once to confirm.
+        false_alarms: maximum number per minute of stable label.
+        progress: iterates over the recordings.
+
+    Raises:
+        ValueError: the rate is negative or not finite.
+        TrainingError: the recordings have no labels, no stable labels, or no threshold gives
+            so few false alarms.
+        ModelError: the hand is never STABLE, whatever the threshold; or a recording has other
+            fingers or sensors.
+    """
+    if not (math.isfinite(false_alarms) and false_alarms >= 0):
+        raise ValueError(f"false alarms per minute of at least 0 expected, {false_alarms:g} given")
+    recordings = list(recordings) if not isinstance(recordings, Sequence) else recordings
+    digests: dict[str, str] = {}
+    replays = []
+    for recording in progress(recordings):
+        digests[recording.name] = recording.digest
+        replays.append(Replay.of(model, recording))
+    points = _usable([_point(replays, t) for t in _probabilities(LOG_ODDS)])
+    first = _best(points, false_alarms)
+    fine = [_point(replays, t) for t in _probabilities(_log_odds(first.threshold) + FINE_STEPS)]
+    every = _in_order([*points, *fine])
+    chosen = _confirm(model, recordings, _ranked(every, false_alarms), false_alarms)
+    tuned = with_threshold(model, chosen.threshold)
+    own = max(part.classifier.threshold for part in model.fingers.values())
+    return Tuned(
+        msgspec.structs.replace(tuned, tuning=_record(chosen, digests, false_alarms)),
+        chosen,
+        _point(replays, own),
+        _around(points, chosen),
+    )
+
+
+def _probabilities(log_odds: np.ndarray) -> list[float]:  # type: ignore[type-arg]
+    return [float(f"{p:.5g}") for p in 1 / (1 + np.exp(-log_odds))]
+
+
+def _log_odds(probability: float) -> float:
+    return math.log(probability / (1 - probability))
+
+
+def _point(replays: Sequence[Replay], threshold: float) -> OperatingPoint:
+    return _measure([replay.hand(threshold) for replay in replays], threshold)
+
+
+def _measure(hands: Sequence[FingerDecisions], threshold: float) -> OperatingPoint:
+    matches: list[AlarmMatch] = [alarms(hand) for hand in hands]
+    counts = [stable_counts(hand) for hand in hands]
+    labelled = sum(each["labelled"] for each in counts)
+    if not any(hand.labels.any() for hand in hands):
+        raise TrainingError(f"{len(hands)} recordings without labels; labels expected")
+    events = pool_events(matches)
+    if not events.stable_minutes or not labelled:
+        raise TrainingError(
+            "no time in which the hand is labelled stable; false alarms are counted per minute "
+            "of it"
+        )
+    decided = sum(each["decided"] for each in counts)
+    return OperatingPoint(threshold, 100 * decided / labelled, events)
+
+
+def _usable(points: list[OperatingPoint]) -> list[OperatingPoint]:
+    """Return the thresholds at which the hand is STABLE often enough."""
+    most = max(point.stable for point in points)
+    if most == 0:
+        raise ModelError(
+            "the model cannot be tuned: the hand is never STABLE at any threshold while it is "
+            "labelled stable (see holdfast detect --summary)"
+        )
+    return [point for point in points if point.stable >= USABLE_SHARE * most]
+
+
+def _ranked(points: Sequence[OperatingPoint], false_alarms: float) -> list[OperatingPoint]:
+    """Return the points with few enough false alarms, those that miss least first.
+
+    Without events, the most sensitive first.
+    """
+    found = [point for point in points if point.false_alarms <= false_alarms]
+    if points[0].events.n_events:
+        return sorted(found, key=lambda point: (point.missed, point.false_alarms))
+    return sorted(found, key=lambda point: -point.threshold)
+
+
+def _best(points: Sequence[OperatingPoint], false_alarms: float) -> OperatingPoint:
+    ranked = _ranked(points, false_alarms)
+    if ranked:
+        return ranked[0]
+    least = min(points, key=lambda point: (point.false_alarms, point.missed))
+    raise TrainingError(
+        f"no threshold gives at most {false_alarms:g} false alarms a minute on these "
+        f"recordings; the least is {least.false_alarms:.2g} at the threshold "
+        f"{least.threshold:.3g}, which {_cost(least)}"
+    )
+
+
+def _cost(point: OperatingPoint) -> str:
+    n = point.events.n_events
+    if not n:
+        return "has no event to miss"
+    return f"misses {point.events.missed['0.2']:.0f} % of {n} events within 0.2 s"
+
+
+def _confirm(
+    model: Model,
+    recordings: Sequence[Recording],
+    ranked: Sequence[OperatingPoint],
+    false_alarms: float,
+) -> OperatingPoint:
+    """Return the first point that the detector confirms; a long debouncing can differ a little."""
+    for point in ranked:
+        own = with_threshold(model, point.threshold)
+        hands = [compute_decisions(own, recording).hand for recording in recordings]
+        found = _measure([hand for hand in hands if hand is not None], point.threshold)
+        if found.false_alarms <= false_alarms:
+            return found
+    raise TrainingError(f"no threshold gives at most {false_alarms:g} false alarms a minute")
+
+
+def _in_order(points: Iterable[OperatingPoint]) -> list[OperatingPoint]:
+    return sorted({point.threshold: point for point in points}.values(), key=lambda p: p.threshold)
+
+
+def _around(points: Sequence[OperatingPoint], chosen: OperatingPoint) -> tuple[OperatingPoint, ...]:
+    """Return the chosen point and its neighbours among the first thresholds."""
+    others = [p for p in points if p.threshold != chosen.threshold]
+    below = [p for p in others if p.threshold < chosen.threshold][-N_SHOWN:]
+    above = [p for p in others if p.threshold > chosen.threshold][:N_SHOWN]
+    return (*below, chosen, *above)
+
+
+def _record(chosen: OperatingPoint, digests: dict[str, str], false_alarms: float) -> Tuning:
+    events = chosen.events
+    return Tuning(
+        recordings=digests,
+        requested=false_alarms,
+        threshold=chosen.threshold,
+        false_alarms_per_minute=chosen.false_alarms,
+        missed=events.missed,
+        delay_median=events.delay_median,
+        n_events=events.n_events,
+        stable_minutes=events.stable_minutes,
+    )
