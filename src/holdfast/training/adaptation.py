@@ -8,7 +8,7 @@ import numpy.typing as npt
 
 from holdfast.classifiers import LinearClassifier, Parameters, Samples
 from holdfast.classifiers.adapted import CALIBRATION, NONE, WEIGHTS, Adapted
-from holdfast.training.splits import TIME_FOLDS, TIME_GAP
+from holdfast.training.splits import TIME_FOLDS, TIME_GAP, Integers
 from holdfast.training.training_samples import FingerSamples, thinning_step
 from holdfast.training.tuning import log_losses
 
@@ -85,14 +85,15 @@ def choose_adaptation(
     """
     kept = np.flatnonzero(own.kept(held))
     step = thinning_step(len(kept), MAX_ADAPTATION_SAMPLES)
-    rows = kept[::step]
-    samples = Samples(*(array[rows] for array in own.samples))
-    recordings, blocks = own.recordings[rows], _time_blocks(own, rows)
+    rows = np.zeros(len(own.times), dtype=bool)
+    rows[kept[::step]] = True
+    samples, recordings, times = own.samples.take(rows), own.recordings[rows], own.times[rows]
+    blocks = _time_blocks(recordings, times)
     n_recordings = len(np.unique(recordings))
     many = n_recordings >= ENOUGH_RECORDINGS
     candidates = CAUTIOUS + BOLD if many else CAUTIOUS
-    losses = np.full((len(candidates), len(rows)), np.nan)
-    for fold in _folds(recordings, blocks, own.times[rows]):
+    losses = np.full((len(candidates), len(times)), np.nan)
+    for fold in _folds(recordings, blocks, times):
         losses[:, fold.tested] = _held_out_losses(samples, fold, candidates, prior, step)
     units = recordings if many else TIME_FOLDS * recordings + blocks
     known = ~np.isnan(losses[0])
@@ -128,7 +129,7 @@ class _Fold(NamedTuple):
     tested: Flags
 
 
-def _folds(recordings: Array, blocks: Array, times: Array) -> Iterator[_Fold]:
+def _folds(recordings: Integers, blocks: Integers, times: Array) -> Iterator[_Fold]:
     """Yield folds that leave out recordings; of a single recording, blocks of time."""
     names = np.unique(recordings)
     if len(names) > 1:
@@ -142,13 +143,13 @@ def _folds(recordings: Array, blocks: Array, times: Array) -> Iterator[_Fold]:
         yield _Fold((times < low) | (times > high), tested)
 
 
-def _time_blocks(own: FingerSamples, rows: npt.NDArray[np.int64]) -> npt.NDArray[np.int64]:
+def _time_blocks(recordings: Integers, times: Array) -> Integers:
     """Return the fifth of the labelled time of its recording in which each sample is."""
-    blocks = np.zeros(len(rows), dtype=np.int64)
-    for place in np.unique(own.recordings[rows]):
-        chosen = own.recordings[rows] == place
-        times = own.times[rows][chosen]
-        share = (times - times.min()) / max(float(np.ptp(times)), 1e-9)
+    blocks = np.zeros(len(times), dtype=np.int64)
+    for place in np.unique(recordings):
+        chosen = recordings == place
+        first, last = times[chosen].min(), times[chosen].max()
+        share = (times[chosen] - first) / max(float(last - first), 1e-9)
         blocks[chosen] = np.minimum(TIME_FOLDS * share, TIME_FOLDS - 1).astype(np.int64)
     return blocks
 

@@ -3,9 +3,11 @@
 import math
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
+from typing import Any
 
 import msgspec
 import numpy as np
+import numpy.typing as npt
 
 from holdfast.errors import ModelError, TrainingError
 from holdfast.metrics import AlarmMatch, EventMetrics, FingerDecisions, pool_events
@@ -117,7 +119,7 @@ def tune(
     )
 
 
-def _probabilities(log_odds: np.ndarray) -> list[float]:  # type: ignore[type-arg]
+def _probabilities(log_odds: npt.NDArray[np.floating[Any]]) -> list[float]:
     return [float(f"{p:.5g}") for p in 1 / (1 + np.exp(-log_odds))]
 
 
