@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 from msgspec import Struct
 from msgspec.json import Encoder
 
-from holdfast.cli.terminal.console import print_line, print_table
+from holdfast.cli.terminal.console import print_line, print_table, visible_json
 from holdfast.contact import (
     ContactEstimate,
     ContactEvent,
@@ -93,7 +93,7 @@ def json_lines(chunk: EstimateChunk) -> Iterator[str]:
     encoder = Encoder()
     for start in range(0, len(lines), LINES_PER_BLOCK):
         # A list, because msgspec 0.22 leaks the items of an iterator.
-        yield encoder.encode_lines(lines[start : start + LINES_PER_BLOCK]).decode()
+        yield visible_json(encoder.encode_lines(lines[start : start + LINES_PER_BLOCK]).decode())
 
 
 class DetectionSummary:

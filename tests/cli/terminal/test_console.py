@@ -2,8 +2,55 @@ import json
 
 import numpy as np
 import pytest
+from hypothesis import given
+from hypothesis import strategies as st
 
-from holdfast.cli.terminal.console import print_json, print_table
+from holdfast.cli.terminal.console import (
+    print_error,
+    print_json,
+    print_line,
+    print_message,
+    print_table,
+    visible,
+    visible_json,
+)
+
+HOSTILE = "can\x1b]0;title\x07\x1b[2J\x9b31m\r\x7f\u202eevil\ud800"
+SHOWN = r"can\x1b]0;title\x07\x1b[2J\x9b31m\r\x7f\u202eevil\ud800"
+
+
+def test_nothing_that_is_printed_controls_the_terminal(capsys):
+    print_line(HOSTILE)
+    print_message(HOSTILE)
+    print_error(f"two\nlines {HOSTILE}")
+    print_table(("name",), [(f"{HOSTILE}\nnext",)])
+    out, err = capsys.readouterr()
+    assert out == f"{SHOWN}\nname\n{SHOWN}\\nnext\n"
+    words = SHOWN.replace(r"\r", " ")
+    assert err == f"{SHOWN}\nholdfast: two lines {words}\n"
+
+
+def test_json_has_no_control_characters(capsys):
+    name = HOSTILE.removesuffix("\ud800") + "Möhre\U000e0001"
+    print_json({"name": name})
+    out = capsys.readouterr().out
+    assert out.removesuffix("\n").isprintable()
+    assert "Möhre" in out
+    assert json.loads(out) == {"name": name}
+
+
+@given(st.text())
+def test_visible_text_is_printable_and_json_keeps_its_value(text):
+    assert visible(text, allowed="").isprintable()
+    assert visible(visible(text)) == visible(text)
+    encoded = json.dumps(text, ensure_ascii=False)
+    assert visible_json(encoded).isprintable()
+    assert json.loads(visible_json(encoded)) == text
+
+
+def test_an_error_message_is_limited(capsys):
+    print_error("x" * 100_000)
+    assert len(capsys.readouterr().err) == len("holdfast: ...\n") + 2000
 
 
 def test_json_converts_numpy_values_and_paths(capsys, tmp_path):

@@ -1,22 +1,65 @@
-"""Print results on stdout, and messages on stderr."""
+"""Print results on stdout, and messages on stderr.
+
+Names come from files, servers and topics of others. Nothing that is printed here can control the
+terminal: characters that are not printable are shown as escapes.
+"""
 
 import sys
 from collections.abc import Iterable, Mapping, Sequence
 
+MAX_ERROR_LENGTH = 2000
+"""Number of characters of an error message that are printed."""
+
+
+def visible(text: str, allowed: str = "\n") -> str:
+    r"""Return a text with every character that is not printable as an escape.
+
+    Args:
+        text: any text.
+        allowed: characters that are kept although they are not printable.
+
+    Example:
+        >>> visible("Möhre"), visible("\x1b[2Jcan\u202e")
+        ('Möhre', '\\x1b[2Jcan\\u202e')
+    """
+    if text.isprintable():
+        return text
+    return "".join(
+        c if c.isprintable() or c in allowed else c.encode("unicode_escape").decode() for c in text
+    )
+
+
+def visible_json(text: str) -> str:
+    """Return JSON with every character that is not printable as an escape of JSON.
+
+    JSON itself escapes only the first 32 characters, and terminals have further control characters.
+    """
+    if text.isascii() and "\x7f" not in text:
+        return text
+    return "".join(c if c.isprintable() or c == "\n" else _json_escape(c) for c in text)
+
+
+def _json_escape(character: str) -> str:
+    units = character.encode("utf-16-be", "surrogatepass").hex()
+    return "".join(f"\\u{units[place : place + 4]}" for place in range(0, len(units), 4))
+
 
 def print_message(text: str) -> None:
     """Print a message for a person on stderr."""
-    sys.stderr.write(f"{text}\n")
+    sys.stderr.write(f"{visible(text)}\n")
 
 
 def print_error(text: str) -> None:
     """Print an error message on stderr, in one line."""
-    print_message(f"holdfast: {' '.join(text.split())}")
+    line = " ".join(text.split())
+    if len(line) > MAX_ERROR_LENGTH:
+        line = f"{line[:MAX_ERROR_LENGTH]}..."
+    print_message(f"holdfast: {line}")
 
 
 def print_line(text: str = "") -> None:
     """Print a line of a result on stdout."""
-    sys.stdout.write(f"{text}\n")
+    sys.stdout.write(f"{visible(text)}\n")
 
 
 def print_json(value: object) -> None:
@@ -30,7 +73,8 @@ def print_json(value: object) -> None:
     """
     from msgspec import json
 
-    sys.stdout.write(json.encode(value, enc_hook=_to_json_value).decode() + "\n")
+    text = json.encode(value, enc_hook=_to_json_value).decode()
+    sys.stdout.write(f"{visible_json(text)}\n")
 
 
 def print_table(header: Sequence[str], rows: Iterable[Sequence[object]]) -> None:
@@ -42,7 +86,7 @@ def print_table(header: Sequence[str], rows: Iterable[Sequence[object]]) -> None
         gtac         15
         anyskin       5
     """
-    lines = [[str(cell) for cell in row] for row in (header, *rows)]
+    lines = [[visible(str(cell), allowed="") for cell in row] for row in (header, *rows)]
     columns = [_align(column) for column in zip(*lines, strict=True)]
     for cells in zip(*columns, strict=True):
         print_line("  ".join(cells).rstrip())

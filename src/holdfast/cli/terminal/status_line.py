@@ -5,7 +5,7 @@ import time
 from types import TracebackType
 from typing import TYPE_CHECKING, Self
 
-from holdfast.cli.terminal.console import print_message
+from holdfast.cli.terminal.console import print_message, visible
 
 if TYPE_CHECKING:
     from rich.live import Live
@@ -55,7 +55,7 @@ class StatusLine:
         """Print messages above the line."""
         for text in texts:
             if self._live:
-                self._live.console.print(text, markup=False, highlight=False)
+                self._live.console.print(visible(text), markup=False, highlight=False)
             else:
                 print_message(text)
 
@@ -71,7 +71,9 @@ class StatusLine:
             return
         from rich.text import Text
 
-        line = Text("   ").join(Text(text, "bold red" if bad else "") for text, bad in parts)
+        line = Text("   ").join(
+            Text(visible(text, ""), "bold red" if bad else "") for text, bad in parts
+        )
         line.no_wrap, line.overflow = True, "ellipsis"
         self._live.update(line, refresh=True)
 
