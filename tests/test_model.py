@@ -1,5 +1,7 @@
 import json
+import os
 from dataclasses import replace
+from pathlib import Path
 
 import msgspec
 import numpy as np
@@ -89,6 +91,13 @@ def change(path, *keys):
 
 DEEP = b"[" * 100_000
 
+ANY = {
+    "features": [{"kind": "F_a"}],
+    "classifier": {
+        "type": "linear", "mean": [0], "scale": [1], "coefficients": [1], "intercept": 0
+    },
+}  # fmt: skip
+
 CHANGES = {
     "extra field": ((), {"colour": 1}, "Object contains unknown field `colour`"),
     "extra field of a finger": (("fingers", "thumb"), {"colour": 1},
@@ -116,6 +125,22 @@ CHANGES = {
     "a sensor's rotation": (("sensors", "tiny"), {"rotations": [np.zeros((3, 3)).tolist()] * 2},
                             "rotation"),
     "no sensor": (("sensors",), {"tiny": 5}, "are missing in a sensor"),
+    "huge window": (("fingers", "thumb", "features", 4), {"window": 10**9},
+                    "at most 65536 samples in a window expected, 1000000000 given"),
+    "window beyond 64 bits": ((), {"window": 2**63}, "at most 65536 samples in a window expected"),
+    "window beyond all": ((), {"window": 2**90}, ""),
+    "window with a fraction": ((), {"window": 1e308}, "Expected `int`"),
+    "huge rate": ((), {"rate": 1e308}, "at most 1000000 samples in a second expected, 1e+308 g"),
+    "rate without end": ((), {"rate": 10**400}, ""),
+    "a sensor's rate": (("sensors", "tiny"), {"rate": 1e308}, "tiny: at most 1e+06 Hz expected"),
+    "a sensor's rate without end": (("sensors", "tiny"), {"rate": 10**400}, ""),
+    "many fingers": ((), {"sensors": {}, "fingers": {f"f{k}": ANY for k in range(300)}},
+                     "at most 256 fingers expected, 300 given"),
+    "many features": (("fingers", "thumb"), {"features": [{"kind": "F_a"}] * 2000},
+                      "at most 1024 features of a finger expected, 2000 given"),
+    "many taxels": (("sensors", "tiny"), {"positions": [[0.0] * 3] * 5000,
+                                          "rotations": [np.eye(3).tolist()] * 5000},
+                    "at most 4096 taxels of tiny expected, 5000 given"),
     "a sensor's positions": (("sensors", "tiny"), {"positions": None}, "positions"),
 }  # fmt: skip
 
@@ -343,3 +368,28 @@ def test_the_plan_takes_the_models_rate():
     assert model().plan(sensors, 90.0).features["thumb"] == parse_features(
         "F_a,F_x,F_y,F_z,sigma", 6
     )
+
+
+def test_a_key_that_is_given_twice_is_refused(tmp_path):
+    path = saved(FULL, tmp_path / "m.json")
+    text = path.read_text()
+    path.write_text(text.replace('"rate":', '"rate": 100.0, "rate":', 1))
+    with pytest.raises(ModelError, match="the key 'rate' is given twice"):
+        Model.load(path)
+    path.write_text(text.replace('"threshold":', '"threshold": 0.5, "thr\\u0065shold":', 1))
+    with pytest.raises(ModelError, match="the key 'threshold' is given twice"):
+        Model.load(path)
+
+
+def test_a_large_file_and_a_pipe_are_refused_at_once(tmp_path):
+    os.mkfifo(tmp_path / "pipe")
+    for path in (tmp_path / "pipe", Path("/dev/zero")):
+        with pytest.raises(ModelError) as refused:
+            Model.load(path)
+        assert str(refused.value) == (
+            f"cannot read the model {path}: it is a pipe or a device; a regular file expected"
+        )
+    with (tmp_path / "large").open("wb") as file:
+        file.truncate(1 << 30)
+    with pytest.raises(ModelError, match="large: it has more than 16777216 bytes"):
+        Model.load(tmp_path / "large")

@@ -1,6 +1,7 @@
 """Files: outputs that are written whole or not at all, their names, and inputs that end."""
 
 import errno
+import json
 import os
 import re
 import stat
@@ -126,6 +127,24 @@ def read_input(path: str | Path, max_size: int) -> bytes:
     if len(data) > max_size:
         raise OSError(errno.EFBIG, f"it has more than {max_size} bytes", str(path))
     return data
+
+
+def check_keys(text: bytes) -> None:
+    """Check that no object in a JSON text has a key twice; readers differ in which one counts.
+
+    Raises:
+        ValueError: a key is given twice, or the text is not JSON.
+        RecursionError: the text is nested too deep.
+    """
+    json.loads(text, object_pairs_hook=_check_pairs)
+
+
+def _check_pairs(pairs: list[tuple[str, object]]) -> None:
+    seen: set[str] = set()
+    for key, _ in pairs:
+        if key in seen:
+            raise ValueError(f"the key {key!r} is given twice")
+        seen.add(key)
 
 
 def _new_file_beside(target: Path) -> Path:

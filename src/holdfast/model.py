@@ -14,14 +14,24 @@ from holdfast.classifiers import LinearClassifier
 from holdfast.errors import ModelError, OutputError
 from holdfast.features import DEFAULT_WINDOW, FeatureSpec, Tare
 from holdfast.features.stream import StreamPlan, extract
-from holdfast.files import write_whole
+from holdfast.files import check_keys, read_input, write_whole
 from holdfast.recordings import Recording
 from holdfast.sensors import Sensor
-from holdfast.sensors.types import ROTATION_TOLERANCE
+from holdfast.sensors.types import MAX_RATE, ROTATION_TOLERANCE
 
 SCHEMA = "holdfast.model/1"
 ANY_FINGER = "*"
 """Name in place of a finger, for a model of any finger."""
+MAX_FILE_SIZE = 1 << 24
+"""Maximum size of a model file; one of all 18 modules of a hand has 2 MB [bytes]."""
+MAX_WINDOW = 1 << 16
+"""Maximum length of a window [samples]."""
+MAX_FEATURES = 1024
+"""Maximum number of features of a finger."""
+MAX_FINGERS = 256
+"""Maximum number of fingers, and of sensors, in a model."""
+MAX_TAXELS = 4096
+"""Maximum number of taxels of a sensor in a model."""
 EXACT_RATE = 0.05
 """Tolerance of a measured rate beside a nominal one, as a share of it."""
 RELATIVE_RATES = (30.0, 500.0)
@@ -55,6 +65,10 @@ class FingerModel(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_on
     contact_load: float | None = None
 
     def __post_init__(self) -> None:
+        _check_limit("features of a finger", len(self.features), MAX_FEATURES)
+        _check_limit(
+            "samples in a window", max((x.window for x in self.features), default=0), MAX_WINDOW
+        )
         if self.contact_load is not None and not any(spec.seconds for spec in self.features):
             raise ModelError("contact_load given; it needs at least one relative feature")
         if len(self.features) != self.classifier.n_features:
@@ -178,6 +192,11 @@ class Model(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=Tru
             raise ModelError(f"a model for any finger ('*') has no others; {list(self.fingers)}")
         if self.rate is not None and not (math.isfinite(self.rate) and self.rate > 0):
             raise ModelError(f"a rate above 0 Hz expected, {self.rate} given")
+        _check_limit("samples in a second", self.rate or 0, MAX_RATE)
+        _check_limit("fingers", max(len(self.fingers), len(self.sensors)), MAX_FINGERS)
+        _check_limit("samples in a window", self.window, MAX_WINDOW)
+        for sensor in self.sensors.values():
+            _check_limit(f"taxels of {sensor.name}", sensor.n_taxels, MAX_TAXELS)
         for name, finger in self.fingers.items():
             if finger.sensor is not None and finger.sensor not in self.sensors:
                 raise ModelError(
@@ -198,13 +217,14 @@ class Model(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=Tru
         if str(path).startswith("builtin:"):
             return cls(**msgspec.structs.asdict(built_in(str(path))))
         try:
-            data = Path(path).read_bytes()
+            data = read_input(path, MAX_FILE_SIZE)
         except OSError as cause:
             raise ModelError(f"cannot read the model {path}: {cause.strerror}") from cause
         try:
+            check_keys(data)
             _check_sensors(data)
             return msgspec.json.decode(data, type=cls, dec_hook=_decode)
-        except (ModelError, TypeError, ValueError, RecursionError) as cause:  # msgspec's too
+        except (ModelError, TypeError, ValueError, ArithmeticError, RecursionError) as cause:
             raise ModelError(f"{path} is not a model of {SCHEMA}: {cause}") from cause
 
     def save(self, path: str | Path, *, force: bool = False) -> None:
@@ -340,6 +360,11 @@ class Model(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=Tru
 def _other_sensor(text: str) -> ModelError:
     """Return the error of a model for another sensor, with the built-in model that fits."""
     return ModelError(f"{text}; builtin:any fits every 3-axis sensor")
+
+
+def _check_limit(what: str, given: float, most: float) -> None:
+    if given > most:
+        raise ModelError(f"at most {most:.7g} {what} expected, {given} given")
 
 
 def built_in(name: str) -> Model:

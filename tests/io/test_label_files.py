@@ -1,3 +1,4 @@
+import os
 import re
 
 import msgspec
@@ -72,6 +73,7 @@ def test_labels_of_another_recording_are_refused(saved, make_recording):
 
 def changed(path, change):
     data = msgspec.json.decode(path.read_bytes())
+    data.pop("digest")
     change(data)
     path.write_bytes(msgspec.json.encode(data))
 
@@ -156,3 +158,44 @@ def test_missing_files(tmp_path):
     for read in (labels_from_csv, load_labels):
         with pytest.raises(RecordingError, match=r"cannot read .*: No such file"):
             read(tmp_path / "none")
+
+
+def test_any_flipped_bit_is_found(make_recording, tmp_path):
+    recording = make_recording(150)
+    path = save_labels(recording, tmp_path / "a.parquet", author="ada", notes="ü", time="2026")
+    raw = path.read_bytes()
+    modules = load_labels(path).modules
+    n_harmless = 0
+    for place in range(0, 8 * len(raw), 3):
+        damaged = bytearray(raw)
+        damaged[place // 8] ^= 1 << place % 8
+        path.write_bytes(damaged)
+        try:
+            assert load_labels(path).modules == modules
+            n_harmless += 1
+        except RecordingError:
+            continue
+    assert n_harmless < 50  # 2.0 and 2.00, or a space and another space
+
+
+def test_a_file_without_a_digest_is_read_and_an_edited_one_is_refused(make_recording, tmp_path):
+    recording = make_recording(150)
+    path = save_labels(recording, tmp_path / "a.parquet", author="ada")
+    text = path.read_text()
+    path.write_text(text.replace('"ada"', '"bob"'))
+    with pytest.raises(RecordingError) as refused:
+        load_labels(path)
+    assert str(refused.value) == (
+        f"{path} does not match its digest: it is damaged, or was edited by hand; if you edited "
+        'it, remove its line "digest"'
+    )
+    lines = [line for line in text.replace('"ada"', '"bob"').splitlines() if '"digest"' not in line]
+    path.write_text("\n".join(lines).replace('"notes": "",', '"notes": ""'))
+    assert load_labels(path).author == "bob"
+
+
+@pytest.mark.parametrize("read", [load_labels, labels_from_csv])
+def test_a_pipe_is_refused_at_once(tmp_path, read):
+    os.mkfifo(tmp_path / "pipe")
+    with pytest.raises(RecordingError, match="it is a pipe or a device; a regular file expected"):
+        read(tmp_path / "pipe")

@@ -1,5 +1,7 @@
 import errno
+import os
 import re
+import stat
 from itertools import pairwise
 
 import numpy as np
@@ -117,7 +119,7 @@ def test_a_full_disk(tmp_path, monkeypatch):
         raise OSError(errno.ENOSPC, "No space left on device")
 
     monkeypatch.setattr(
-        "holdfast.io.mcap_writer._UnbufferedStream.write", lambda self, data: full(data)
+        "holdfast.io.output_stream.UnbufferedStream.write", lambda self, data: full(data)
     )
     with pytest.raises(OutputError, match=r"cannot write .*a\.mcap: No space left on device"):
         writer.append("thumb", np.arange(100) * 0.1, readings(100))
@@ -160,6 +162,8 @@ def test_after_a_refusal_nothing_more_is_written(tmp_path, monkeypatch):
     disk = writer._log._stream._file
 
     class Full:
+        fileno = staticmethod(disk.fileno)
+
         def write(self, data):
             if len(data) > 10:
                 return disk.write(data[:10])
@@ -175,3 +179,46 @@ def test_after_a_refusal_nothing_more_is_written(tmp_path, monkeypatch):
     assert size < path.stat().st_size == writer.n_bytes
     recording = load_recording(path)
     assert (recording.complete, recording.modules["thumb"].n_samples) == (False, 100)
+
+
+SENSORS = {"thumb": sensor("anyskin")}
+
+
+def test_two_writers_of_one_file_are_refused(tmp_path):
+    path = tmp_path / "a.mcap"
+    with RecordingWriter(path, SENSORS) as first:
+        first.append("thumb", [0.0, 0.01], np.zeros((2, 5, 3)))
+        first.flush()
+        with pytest.raises(OutputError) as refused:
+            RecordingWriter(path, SENSORS, force=True)
+        assert str(refused.value) == (
+            f"{path} is being recorded by another program; choose another name"
+        )
+    assert load_recording(path).complete
+    with RecordingWriter(path, SENSORS, force=True) as second:
+        second.append("thumb", [5.0], np.zeros((1, 5, 3)))
+    assert load_recording(path).modules["thumb"].times.tolist() == [5.0]
+
+
+def test_a_pipe_is_no_output(tmp_path):
+    os.mkfifo(tmp_path / "a.mcap")
+    with pytest.raises(OutputError, match=r"cannot write .*a\.mcap: "):
+        RecordingWriter(tmp_path / "a.mcap", SENSORS, force=True)
+
+
+def test_with_fsync_the_writer_waits_for_the_disk(tmp_path, monkeypatch):
+    synced, sync = [], os.fsync
+    monkeypatch.setattr(os, "fsync", lambda handle: (synced.append(os.fstat(handle)), sync(handle)))
+    path = tmp_path / "a.mcap"
+    writer = RecordingWriter(path, SENSORS, fsync=True)
+    assert [stat.S_ISDIR(one.st_mode) for one in synced] == [False, True]
+    writer.append("thumb", [0.0, 0.01], np.zeros((2, 5, 3)))
+    writer.flush()
+    writer.sync()
+    assert synced[-1].st_size == path.stat().st_size
+    writer.close()
+    assert len(synced) == 4
+    assert synced[-1].st_size == path.stat().st_size
+    with RecordingWriter(tmp_path / "b.mcap", SENSORS) as plain:
+        plain.append("thumb", [0.0], np.zeros((1, 5, 3)))
+    assert len(synced) == 4

@@ -304,6 +304,43 @@ def test_a_removed_file_is_reported(path):
     assert recorder.status.n_dropped == 1
 
 
+def test_a_file_that_is_cut_meanwhile_is_reported(path):
+    recorder = Recorder(path, {"thumb": sensor("anyskin")})
+    recorder.put(Arrival(0.0, {"thumb": np.zeros((5, 3))}, received=0.0))
+    os.truncate(path, 100)
+    with pytest.raises(OutputError) as refused:
+        recorder.close()
+    assert str(refused.value) == (
+        f"cannot write {path}: another program changed it while it was recorded"
+    )
+    assert path.stat().st_size == 100
+
+
+def test_with_fsync_what_was_written_a_second_ago_is_on_the_disk(path, monkeypatch):
+    """By the record of each wait for the disk: when it ended, and how much was in the file."""
+    waits, sync = [], os.fsync
+
+    def record(handle):
+        size = os.fstat(handle).st_size
+        sync(handle)
+        waits.append((time.monotonic(), size))
+
+    monkeypatch.setattr(os, "fsync", record)
+    monkeypatch.setattr(module, "SYNC_INTERVAL", 0.1)
+    monkeypatch.setattr(module, "FLUSH_INTERVAL", 0.02)
+    with Recorder(path, {"thumb": sensor("anyskin")}, fsync=True) as recorder:
+        for k in range(40):
+            recorder.put(Arrival(k / 100, {"thumb": np.zeros((5, 3))}, received=k / 100))
+            time.sleep(0.01)
+        deadline = time.monotonic() + 60
+        while waits[-1][1] < recorder.status.n_bytes or recorder.status.n_samples < 40:
+            assert time.monotonic() < deadline
+            time.sleep(0.01)
+    assert waits[-1][1] == path.stat().st_size
+    assert len(waits) >= 5  # the file, its folder, while recording, and the end
+    assert module.FLUSH_INTERVAL + module.SYNC_INTERVAL < 1.0
+
+
 def test_an_error_in_the_thread_is_raised_by_close(path, monkeypatch):
     monkeypatch.setattr(RecordingWriter, "append", lambda *_: 1 / 0)
     recorder = Recorder(path, TWO)

@@ -193,3 +193,37 @@ class TestHand:
     def test_rotations_of_modules_are_checked(self):
         with pytest.raises(ValueError, match=r"^pair on tip: the rotation of taxel 1 is"):
             replace(one_module([0, 1]), rotations=np.ones((2, 3, 3)))
+
+
+def test_sensors_are_equal_but_for_the_last_digits():
+    """Another C library gives other last digits of a sine."""
+    curved = sensor("uskin-curved")
+    nearly = replace(
+        curved,
+        positions=curved.positions + 1e-15,
+        rotations=curved.rotations * (1 + 1e-15),
+        rate=curved.rate * (1 + 1e-15),
+    )
+    assert nearly.to_dict() != curved.to_dict()
+    assert nearly == curved
+    assert hash(nearly) == hash(curved)
+    assert len({curved, nearly}) == 1
+
+
+@pytest.mark.parametrize(
+    "change",
+    [
+        {"name": "other"},
+        {"unit": "N"},
+        {"limits": None},
+        {"limits": (0.0, 4095.0)},
+        {"rate": 151.0},
+        {"positions": np.zeros((30, 3))},
+        {"rotations": np.tile(np.eye(3), (30, 1, 1))},
+        {"normal": np.array([0.0, 0.0, 1.0])},
+    ],
+)
+def test_sensors_that_differ_are_not_equal(change):
+    curved = sensor("uskin-curved")
+    assert replace(curved, **change) != curved
+    assert curved != "uskin-curved"

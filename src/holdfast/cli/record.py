@@ -52,6 +52,12 @@ def record(
     fingers_only: Annotated[
         bool, typer.Option("--fingers-only", help="Leave out pads and palm.")
     ] = False,
+    fsync: Annotated[
+        bool,
+        typer.Option(
+            "--fsync", help="Wait for the disk: a power failure loses at most the last second."
+        ),
+    ] = False,
     force: Annotated[bool, typer.Option("--force", help="Overwrite the file.")] = False,
     as_json: JsonOption = False,
 ) -> None:
@@ -77,7 +83,9 @@ def record(
 
     with handle_stop_signals() as stop, open_source(source, speed=speed) as opened:
         stop.graceful = True
-        recorder = _create_recorder(opened, path, metadata, fingers_only=fingers_only, force=force)
+        recorder = _create_recorder(
+            opened, path, metadata, fingers_only=fingers_only, force=force, fsync=fsync
+        )
         _record(opened, recorder, stop, _read(opened, seconds, speed))
     _print_result(recorder.path, recorder.status, as_json)
 
@@ -169,7 +177,13 @@ def _recording_name(source: str, object_name: str) -> str:
 
 
 def _create_recorder(
-    source: "Source", path: Path, metadata: dict[str, Any], *, fingers_only: bool, force: bool
+    source: "Source",
+    path: Path,
+    metadata: dict[str, Any],
+    *,
+    fingers_only: bool,
+    force: bool,
+    fsync: bool,
 ) -> "Recorder":
     """Create the file and its recorder."""
     from holdfast.errors import OutputError, SourceError
@@ -188,7 +202,7 @@ def _create_recorder(
         raise OutputError(f"cannot write to {path.parent}: {cause.strerror}") from cause
     recorded_at = time.strftime("%Y-%m-%dT%H:%M:%SZ", time.gmtime())
     metadata = {**source.metadata, "recorded_at": recorded_at, **metadata}
-    return Recorder(path, sensors, metadata=metadata, force=force)
+    return Recorder(path, sensors, metadata=metadata, force=force, fsync=fsync)
 
 
 def _metadata(object_name: str, case: str, note: str, settings: list[str]) -> dict[str, Any]:

@@ -2,6 +2,7 @@
 
 import csv
 from collections.abc import Mapping, Sequence
+from hashlib import blake2b
 from io import StringIO
 from pathlib import Path
 from typing import Literal
@@ -10,11 +11,13 @@ import msgspec
 
 from holdfast.contact import Cause, ContactState
 from holdfast.errors import RecordingError
-from holdfast.files import write_whole
+from holdfast.files import read_input, write_whole
 from holdfast.io.header import LabelData, label_data, label_of
 from holdfast.recordings import Label, Recording
 
 SUFFIX = ".labels.json"
+MAX_FILE_SIZE = 1 << 28
+"""Maximum size of a file of labels [bytes]."""
 CSV_COLUMNS = ("finger", "start", "end", "state", "cause")
 
 
@@ -29,6 +32,7 @@ class LabelFile(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only
         author: person or program that made the labels.
         time: time of labelling, as ISO 8601 text; empty if unknown.
         notes: free text.
+        digest: hash of all other fields; empty in a file that a person wrote.
     """
 
     schema: Literal["holdfast.labels/1"] = "holdfast.labels/1"
@@ -38,6 +42,7 @@ class LabelFile(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only
     author: str = ""
     time: str = ""
     notes: str = ""
+    digest: str = ""
 
 
 def labels_path(path: str | Path) -> Path:
@@ -88,22 +93,40 @@ def save_labels(
         notes=notes,
     )
     target = labels_path(path)
-    write_whole(target, msgspec.json.format(msgspec.json.encode(file)) + b"\n", force=force)
+    write_whole(target, encode_labels(file), force=force)
     return target
+
+
+def encode_labels(file: LabelFile) -> bytes:
+    """Encode the content of a label file as JSON, with its digest."""
+    complete = msgspec.structs.replace(file, digest=_digest(file))
+    return msgspec.json.format(msgspec.json.encode(complete)) + b"\n"
 
 
 def load_labels(path: str | Path) -> LabelFile:
     """Load the label file at `path`.
 
     Raises:
-        RecordingError: it cannot be read or is not a label file.
+        RecordingError: it cannot be read, is not a label file, or does not match its digest.
     """
     try:
-        return msgspec.json.decode(Path(path).read_bytes(), type=LabelFile)
+        file = msgspec.json.decode(read_input(path, MAX_FILE_SIZE), type=LabelFile)
     except OSError as cause:
         raise RecordingError(f"cannot read {path}: {cause.strerror}") from cause
     except (msgspec.DecodeError, UnicodeError, RecursionError) as cause:
         raise RecordingError(f"{path} is not a label file: {cause}") from cause
+    if file.digest not in ("", _digest(file)):
+        raise RecordingError(
+            f"{path} does not match its digest: it is damaged, or was edited by hand; if you "
+            'edited it, remove its line "digest"'
+        )
+    return file
+
+
+def _digest(file: LabelFile) -> str:
+    """Return the hash of all fields but the digest, in a form without spaces."""
+    text = msgspec.json.encode(msgspec.structs.replace(file, digest=""))
+    return blake2b(text, digest_size=16).hexdigest()
 
 
 def labels_for(path: Path, digest: str) -> Mapping[str, tuple[Label, ...]] | None:
@@ -158,7 +181,8 @@ def labels_from_csv(path: str | Path, *, author: str = "") -> dict[str, tuple[La
         RecordingError: a column is missing, or a row is not a label.
     """
     try:
-        rows = list(csv.DictReader(StringIO(Path(path).read_text("utf-8-sig"))))
+        text = read_input(path, MAX_FILE_SIZE).decode("utf-8-sig")
+        rows = list(csv.DictReader(StringIO(text)))
     except OSError as cause:
         raise RecordingError(f"cannot read {path}: {cause.strerror}") from cause
     except (UnicodeError, csv.Error) as cause:

@@ -1,7 +1,7 @@
 """MCAP files of recordings, written while recording: data on disk survives a crash."""
 
+import os
 from collections.abc import Mapping, Sequence
-from io import FileIO
 from pathlib import Path
 from types import TracebackType
 from typing import IO, Any, Self, cast
@@ -22,6 +22,7 @@ from holdfast.io.mcap_messages import (
     samples_schema,
     samples_type,
 )
+from holdfast.io.output_stream import UnbufferedStream, open_alone, sync_folder
 from holdfast.io.timed_arrays import TACTILE, time_spans
 from holdfast.sensors import Sensor
 from holdfast.sensors.types import Array, Unit
@@ -56,9 +57,10 @@ class RecordingWriter:
         metadata: as in `Recording`.
         media: as in `Recording`.
         force: replace an existing file.
+        fsync: wait for the disk at the beginning, at the end and in `sync`.
 
     Raises:
-        OutputError: the file exists or cannot be written.
+        OutputError: the file exists or cannot be written, or another program is recording to it.
         RecordingError: the metadata are not plain JSON values.
 
     Example:
@@ -83,6 +85,7 @@ class RecordingWriter:
         metadata: Mapping[str, Any] | None = None,
         media: Sequence[tuple[str, float]] = (),
         force: bool = False,
+        fsync: bool = False,
     ) -> None:
         target = Path(path)
         units = units or {}
@@ -101,7 +104,7 @@ class RecordingWriter:
         self._numbers: dict[str, str] = {}
         self._last_times = dict.fromkeys(sensors, -np.inf)
         self._newest = -np.inf
-        self._log = MessageLog(target, header, force=force)
+        self._log = MessageLog(target, header, force=force, fsync=fsync)
 
     def append(self, module: str, times: npt.ArrayLike, readings: npt.ArrayLike) -> None:
         """Append the next samples of a module.
@@ -151,6 +154,14 @@ class RecordingWriter:
         """
         self._write_all()
         self._log.flush()
+
+    def sync(self) -> None:
+        """Return when all that was flushed is on the disk; a power failure does not lose it.
+
+        Raises:
+            OutputError: the disk reports an error.
+        """
+        self._log.sync()
 
     @property
     def n_bytes(self) -> int:
@@ -229,6 +240,7 @@ class MessageLog:
         path: path of the file.
         header: header of the recording; it is written to disk at once.
         force: replace an existing file.
+        fsync: as in `RecordingWriter`.
 
     Attributes:
         closed: whether the end of the file has been written.
@@ -237,18 +249,21 @@ class MessageLog:
         OutputError: the file exists or cannot be written.
     """
 
-    def __init__(self, path: Path, header: Header, *, force: bool = False) -> None:
+    def __init__(
+        self, path: Path, header: Header, *, force: bool = False, fsync: bool = False
+    ) -> None:
         header_text = encode_header(header).decode()
         refuse_overwrite(path, force=force)
         self._path = path
+        self._fsync = fsync
         self._channels: dict[str, int] = {}
         self._schemas: dict[str, int] = {}
         self._n_messages = 0
         self._chunk_span = (np.inf, -np.inf)
         self.closed = False
         with _disk_errors(path):
-            self._file = path.open("wb" if force else "xb", buffering=0)
-            self._stream = _UnbufferedStream(self._file)
+            self._file = open_alone(path, force=force)
+            self._stream = UnbufferedStream(self._file)
             self._writer = Writer(
                 cast("IO[bytes]", self._stream),
                 MAX_CHUNK_SIZE,
@@ -259,6 +274,10 @@ class MessageLog:
             self._writer.add_metadata("holdfast", _summary(header))
         self.write_text(HEADER_TOPIC, 0.0, header_text)
         self.flush()
+        if fsync:
+            self.sync()
+            with _disk_errors(path):
+                sync_folder(path.parent)
 
     def write_samples(self, topic: str, times: Array, values: npt.NDArray[Any]) -> None:
         """Write one message of samples: times (n,) [s] and values (n, ...)."""
@@ -280,6 +299,11 @@ class MessageLog:
             self._writer.flush()  # type: ignore[no-untyped-call]
         self._chunk_span = (np.inf, -np.inf)
 
+    def sync(self) -> None:
+        """Return when all that was flushed is on the disk, where no power failure loses it."""
+        with _disk_errors(self._path):
+            os.fsync(self._file.fileno())
+
     @property
     def n_bytes(self) -> int:
         """Length of the file in bytes."""
@@ -293,6 +317,8 @@ class MessageLog:
         with _disk_errors(self._path), self._file:
             self._writer.finish()  # type: ignore[no-untyped-call]
             self._writer.flush()  # type: ignore[no-untyped-call]
+            if self._fsync:
+                os.fsync(self._file.fileno())
 
     def _limit_chunk(self, start: float, end: float) -> None:
         """End the chunk if a message from `start` to `end` [s] would make it too long."""
@@ -320,45 +346,6 @@ class MessageLog:
         with _disk_errors(self._path):
             self._writer.add_message(channel, nanoseconds, data, nanoseconds, sequence)
         self._n_messages += 1
-
-
-class _UnbufferedStream:
-    """Output stream without a buffer; `mcap` would add one to a plain file.
-
-    After the first error of the disk every write fails. Without this, the end of the file could
-    follow a missing part, and the file would be damaged instead of cut.
-
-    Args:
-        file: file that was opened with `buffering=0`.
-
-    Attributes:
-        n_bytes: number of bytes written.
-    """
-
-    def __init__(self, file: FileIO) -> None:
-        self.n_bytes = 0
-        self._file = file
-        self._error: OSError | None = None
-
-    def write(self, data: bytes) -> int:
-        if self._error:
-            raise OSError(*self._error.args)
-        left = memoryview(data)
-        try:
-            while left:
-                n = self._file.write(left)
-                self.n_bytes += n
-                left = left[n:]
-        except OSError as error:
-            self._error = error
-            raise
-        return len(data)
-
-    def tell(self) -> int:
-        return self.n_bytes
-
-    def flush(self) -> None:
-        """Do nothing: there is no buffer."""
 
 
 class _disk_errors:  # noqa: N801 (used like a function)

@@ -23,6 +23,8 @@ if TYPE_CHECKING:
 
 FLUSH_INTERVAL = 0.2
 """Time between two writes to disk [s]."""
+SYNC_INTERVAL = 0.5
+"""Time between two waits for the disk with `fsync`; the first write after it waits [s]."""
 MAX_QUEUED_ARRIVALS = 4096
 """Maximum number of arrivals that wait for the disk: some 30 MB of a whole hand, or 27 s at
 150 Hz."""
@@ -92,6 +94,9 @@ class Recorder:
         name: of the recording; by default that of the file.
         metadata: as in `Recording`.
         force: replace an existing file.
+        fsync: wait for the disk at least every second, so that a power failure loses at most the
+            last second. Without it, the operating system may keep data in memory for half a
+            minute.
 
     Attributes:
         path: of the file.
@@ -121,9 +126,14 @@ class Recorder:
         name: str | None = None,
         metadata: Mapping[str, Any] | None = None,
         force: bool = False,
+        fsync: bool = False,
     ) -> None:
         self.path = Path(path)
-        self._writer = RecordingWriter(path, sensors, name=name, metadata=metadata, force=force)
+        self._writer = RecordingWriter(
+            path, sensors, name=name, metadata=metadata, force=force, fsync=fsync
+        )
+        self._fsync = fsync
+        self._synced_at = time.monotonic()
         self._file_id = _file_id(self.path)
         self._buffer = RecordingBuffer(sensors)
         self._queue: deque[Arrival | _QueuedMarker] = deque()
@@ -245,6 +255,9 @@ class Recorder:
         self._report_dropped()
         self._write_markers()
         self._writer.flush()
+        if self._fsync and time.monotonic() - self._synced_at >= SYNC_INTERVAL:
+            self._synced_at = time.monotonic()
+            self._writer.sync()
         self._check_file()
         self._measure_rate()
 

@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
+from holdfast.files import read_input
 from holdfast.sensors.types import Array, rebuilt
 from holdfast.twin.shapes import (
     AMPLITUDE,
@@ -34,6 +35,9 @@ BUILT_IN_OBJECTS = Path(__file__).with_name("objects.toml")
 """Table of the built-in objects, on which models are trained."""
 OTHER_OBJECTS = Path(__file__).with_name("other_objects.toml")
 """Table of other objects, for tests with objects that no model has seen."""
+
+MAX_FILE_SIZE = 1 << 20
+"""Maximum size of a table of objects [bytes]."""
 
 SHAPES = {
     "sphere": ("radius",),
@@ -149,7 +153,7 @@ def load_objects(path: str | Path | None = None) -> dict[str, GraspObject]:
     if path is None:
         return dict(_built_in())
     try:
-        table = tomllib.loads(Path(path).read_text("utf-8"))
+        table = tomllib.loads(read_input(path, MAX_FILE_SIZE).decode())
     except (tomllib.TOMLDecodeError, UnicodeDecodeError) as cause:
         raise ValueError(f"{path} is no TOML table of objects: {cause}") from cause
     if not table:

@@ -10,6 +10,7 @@ import numpy as np
 import numpy.typing as npt
 
 from holdfast.errors import RecordingError
+from holdfast.files import check_regular
 from holdfast.sensors.types import Array
 
 if TYPE_CHECKING:
@@ -123,6 +124,7 @@ def natural_order(path: Path) -> list[str | int]:
 def _head(path: Path) -> tuple[tuple[str, ...], tuple[str, ...], int]:
     """Return comments, names of the columns, and the line of the first row."""
     try:
+        check_regular(path)
         with path.open(encoding="utf-8-sig", newline="") as file:
             comments: list[str] = []
             for number, line in enumerate(file, start=1):

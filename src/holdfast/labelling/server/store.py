@@ -19,7 +19,13 @@ from holdfast.contact import LABEL_STATES, Cause, ContactState
 from holdfast.errors import HoldfastError, OutputError, RecordingError
 from holdfast.files import write_whole
 from holdfast.io.header import label_data
-from holdfast.io.label_files import LabelFile, labels_for, labels_path, load_labels
+from holdfast.io.label_files import (
+    LabelFile,
+    encode_labels,
+    labels_for,
+    labels_path,
+    load_labels,
+)
 from holdfast.labelling.review.spans import TIME_TOLERANCE
 from holdfast.recordings import Label, Recording, Tactile
 
@@ -147,7 +153,7 @@ def save_stored(
         time=time,
         notes=note,
     )
-    data = msgspec.json.format(msgspec.json.encode(file)) + b"\n"
+    data = encode_labels(file)
     target = labels_path(path)
     if is_read_only(path):
         raise ReadOnlyError(f"{target} cannot be written: it or its folder is read-only")
