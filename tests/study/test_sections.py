@@ -31,6 +31,15 @@ def test_tables_are_where_they_are_named_or_with_their_part():
     assert [picture.name for picture in found[-1].figures] == ["forces"]
 
 
+def test_the_summary_comes_first():
+    rows = [Row({"classifier": "LogReg", "on": "held out", "figure": "accuracy"}, 94.8, 95.3)]
+    confusion = ResultTable("confusion", "c", "", rows, ("classifier", "on"))
+    first, second, *_ = report_sections({"paper": PartOutput([confusion], [])}, ["a"], twin=False)
+    assert first.title == "Summary"
+    assert "LogReg 94.8 % correct (paper: 95.3 %)" in first.text
+    assert second.title == "What was run"
+
+
 def test_tables_of_the_twin_have_a_note():
     made = {
         "paper": PartOutput([table("confusion"), table("cost", None), discrepancies()], []),

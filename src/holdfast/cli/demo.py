@@ -182,7 +182,7 @@ def _print_next_steps(out: Path, shown: Path, seconds: float) -> None:
     for command, purpose in (
         (f"info {shown} --plot grasp.png", "a picture of this grasp"),
         (f"evaluate {DEMO_MODEL} {out}/recordings", "all figures"),
-        (f"serve {DEMO_MODEL} twin:?object=can", "a live page of the twin"),
+        (f"serve {DEMO_MODEL} 'twin:?object=can'", "a live page of the twin"),
         ("serve builtin:any xela://auto", "a live page of your own hand"),
         ("import --help", "your own recordings"),
     ):

@@ -7,6 +7,7 @@ import msgspec
 
 from holdfast.study.report.html_report import ReportFigure, Section
 from holdfast.study.report.result_tables import ResultTable
+from holdfast.study.report.summary import summary_text
 
 E = TypeVar("E", ResultTable, ReportFigure)
 
@@ -39,6 +40,12 @@ TWIN_NOTE = (
     "methods; they do not predict how well a method works on a real hand."
 )
 """Note of every table that is made from recordings of the twin."""
+
+READ_ON = (
+    "Every value has its interval and its number of recordings in its table; differences smaller "
+    "than the intervals may be chance."
+)
+"""End of the summary."""
 
 OUTLINES = (
     SectionOutline(
@@ -186,14 +193,16 @@ events."""
 def report_sections(
     outputs: Mapping[str, PartOutput], run_notes: Sequence[str], *, twin: bool
 ) -> list[Section]:
-    """Return the sections of the report: the run, the results, the limits of the twin.
+    """Return the sections of the report: summary, run, results, limits of the twin.
 
     Args:
         outputs: tables and figures, by part.
         run_notes: sentences on what was run and what was left out.
         twin: whether the recordings, except the real ones, are of the twin.
     """
-    sections = [Section("What was run", "\n".join(f"- {note}" for note in run_notes))]
+    summary = summary_text(table for output in outputs.values() for table in output.tables)
+    sections = [Section("Summary", f"{summary}\n\n{READ_ON}")] if summary else []
+    sections.append(Section("What was run", "\n".join(f"- {note}" for note in run_notes)))
     tables_by_part = {part: output.tables for part, output in outputs.items()}
     figures_by_part = {part: output.figures for part, output in outputs.items()}
     for outline in OUTLINES:

@@ -1,0 +1,167 @@
+"""Run the fenced blocks of a page as a reader does, in order, in one folder.
+
+A comment directly above a block says what is special about it:
+
+    <!-- not run: REASON -->   its `holdfast` commands are only checked for their options
+    <!-- until Ctrl-C -->      the command runs until it is interrupted
+    <!-- file: NAME -->        the block is the content of a file
+    <!-- live -->              the Python program runs until its source ends
+
+Blocks of `sh` and `python` run, others (`json`, `text`, ...) do not. A `holdfast` command without
+a pipe runs in this process, which saves the time to load the package.
+"""
+
+import os
+import re
+import shlex
+import signal
+import subprocess
+import sys
+from collections.abc import Iterator, Mapping
+from pathlib import Path
+from typing import NamedTuple
+
+from typer.main import get_command
+
+from holdfast.cli import app, main
+from holdfast.cli.config import Config
+
+ROOT = Path(__file__).parents[2]
+BIN = Path(sys.executable).parent
+PATIENCE = 120.0
+FENCE = re.compile(
+    r"^(?:<!-- (?P<note>[^\n]*?) -->\n)?```(?P<language>\w*)\n(?P<text>.*?)^```$", re.M | re.S
+)
+SHELL_SYMBOLS = re.compile(r"[|><&;$*`]")
+
+
+class Block(NamedTuple):
+    page: str
+    line: int
+    language: str
+    text: str
+    note: str
+
+    @property
+    def place(self) -> str:
+        return f"{self.page}:{self.line}"
+
+
+def blocks_of(path: Path) -> list[Block]:
+    text = path.read_text("utf-8")
+    return [
+        Block(path.name, text.count("\n", 0, found.start()) + 1, found["language"],
+              found["text"], found["note"] or "")
+        for found in FENCE.finditer(text)
+    ]  # fmt: skip
+
+
+def links_of(path: Path) -> list[tuple[str, str]]:
+    """The (file, anchor) of each link of a page to a file, or within the page."""
+    text = FENCE.sub("", path.read_text("utf-8"))
+    found = re.findall(r"\]\(([^)#\s:]*)(?:#([^)\s]*))?\)", text)
+    return [(target, anchor) for target, anchor in found if target or anchor]
+
+
+def anchors_of(path: Path) -> set[str]:
+    """The anchors of the headings of a page, as GitHub makes them."""
+    text = FENCE.sub("", path.read_text("utf-8"))
+    titles = re.findall(r"^#+ (.*)$", text, re.M)
+    return {re.sub(r"[^\w\- ]", "", title.lower()).replace(" ", "-") for title in titles}
+
+
+def run_page(path: Path, replace: Mapping[str, str] | None = None) -> int:
+    """Run the blocks of a page in the working folder; return how many ran.
+
+    Args:
+        path: of the page.
+        replace: texts that stand for something else here, such as the address of a hand.
+    """
+    names: dict[str, object] = {"__name__": "__main__"}
+    n_run = 0
+    for block in blocks_of(path):
+        text = block.text
+        for old, new in (replace or {}).items():
+            text = text.replace(old, new)
+        n_run += run_block(block._replace(text=text), names)
+    return n_run
+
+
+def run_block(block: Block, names: dict[str, object]) -> bool:
+    """Run a block; return whether it ran."""
+    kind, _, rest = block.note.partition(": ")
+    if kind == "not run":
+        check_options(block)
+        return False
+    if kind == "file":
+        Path(rest).write_text(block.text, "utf-8")
+    elif block.language == "sh":
+        for line in lines_of(block.text):
+            run_line(line, block, endless=kind == "until Ctrl-C")
+    elif block.language == "python" and ">>>" not in block.text:
+        exec(compile("\n" * block.line + block.text, block.page, "exec"), names)
+    else:
+        return False
+    return True
+
+
+def lines_of(text: str) -> Iterator[str]:
+    """The commands of a shell block, without comments."""
+    for line in text.replace("\\\n", " ").splitlines():
+        command = re.sub(r"(^|\s)#.*", "", line).strip()
+        if command:
+            yield command
+
+
+def run_line(line: str, block: Block, *, endless: bool) -> None:
+    words = shlex.split(line)
+    if endless:
+        interrupt(line, block)
+    elif words[0] == "holdfast" and not SHELL_SYMBOLS.search(line):
+        code = main(words[1:])
+        assert code == 0, f"{block.place}: {line!r} ended with {code}"
+    else:
+        done = subprocess.run(
+            ["bash", "-euo", "pipefail", "-c", line], env=environment(), check=False,
+            capture_output=True, text=True, timeout=PATIENCE,
+        )  # fmt: skip
+        assert done.returncode == 0, f"{block.place}: {line!r}: {done.stderr}"
+
+
+def interrupt(line: str, block: Block) -> None:
+    """Run a command until it has printed a line, then interrupt it as Ctrl-C does."""
+    process = subprocess.Popen(
+        ["bash", "-c", f"exec env {line}"], env=environment(), text=True,
+        stdout=subprocess.DEVNULL, stderr=subprocess.PIPE, start_new_session=True,
+    )  # fmt: skip
+    try:
+        first = process.stderr.readline()
+        os.killpg(process.pid, signal.SIGINT)
+        _, rest = process.communicate(timeout=PATIENCE)
+    finally:
+        if process.poll() is None:
+            os.killpg(process.pid, signal.SIGKILL)
+            process.communicate()
+    assert first, f"{block.place}: {line!r} printed nothing"
+    errors = [text for text in (first + rest).splitlines() if text.startswith("holdfast: ")]
+    assert set(errors) <= {"holdfast: interrupted"}, f"{block.place}: {line!r}: {errors}"
+    assert process.returncode in (0, 130), f"{block.place}: {line!r}: {first}{rest}"
+
+
+def environment() -> dict[str, str]:
+    return {**os.environ, "PATH": f"{BIN}{os.pathsep}{os.environ['PATH']}"}
+
+
+def check_options(block: Block) -> None:
+    """Check that the verbs and options of commands that do not run exist."""
+    if block.language != "sh":
+        return
+    for line in lines_of(block.text):
+        for part in re.split(r"[|&;]+", line):
+            words = [word for word in shlex.split(part) if word not in ("uv", "run")]
+            if words and Path(words[0]).name == "holdfast":
+                command = get_command(app._app(words[1:]))
+                with command.make_context("holdfast", words[1:]) as context:
+                    context.obj = Config()
+                    name, verb, rest = command.resolve_command(context, words[1:])
+                    verb.make_context(name, rest, parent=context)

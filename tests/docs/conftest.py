@@ -1,0 +1,66 @@
+import json
+import subprocess
+
+import numpy as np
+import pytest
+
+from holdfast.io import save_recording
+from holdfast.synthetic import synthetic_recording
+
+from .blocks import BIN
+
+FINGERS = ("thumb", "index", "middle", "ring")
+
+
+@pytest.fixture
+def folder(tmp_path, monkeypatch):
+    """An empty working folder, with the settings of no user."""
+    monkeypatch.chdir(tmp_path)
+    for name in ("HOLDFAST_CONFIG", "DISPLAY", "WAYLAND_DISPLAY"):
+        monkeypatch.delenv(name, raising=False)
+    return tmp_path
+
+
+@pytest.fixture
+def hand(tmp_path_factory):
+    """The address of a server that sends a grasp, as the one of a hand does."""
+    path = tmp_path_factory.mktemp("hand") / "grasp.parquet"
+    save_recording(synthetic_recording("grasp", 0, FINGERS), path)
+    command = [BIN / "holdfast", "play", path, "--port", "0", "--separate", "--json"]
+    server = subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.DEVNULL)
+    try:
+        yield json.loads(server.stdout.readline())["uri"]
+    finally:
+        server.kill()
+        server.communicate()
+
+
+@pytest.fixture
+def csv_recordings(folder):
+    """A function that writes grasps as CSV files, as a logger does, to a folder."""
+
+    def write(name, seeds=(0, 1, 2), fingers=("thumb", "index")):
+        (folder / name).mkdir()
+        for seed in seeds:
+            recording = synthetic_recording(f"grasp{seed}", seed, fingers)
+            write_csv(recording, folder / name / f"grasp{seed}.csv")
+
+    return write
+
+
+def write_csv(recording, path):
+    modules = recording.modules
+    first = next(iter(modules.values()))
+    names = [
+        f"{module}.t{taxel:02}.{axis}"
+        for module, one in modules.items()
+        for taxel in range(1, one.sensor.n_taxels + 1)
+        for axis in "xyz"
+    ]
+    columns = [first.times[:, None]]
+    columns += [one.readings.reshape(one.n_samples, -1) for one in modules.values()]
+    header = [f"# sensor: {module}={one.sensor.name}" for module, one in modules.items()]
+    np.savetxt(
+        path, np.hstack(columns), fmt=["%.6f"] + ["%d"] * len(names), delimiter=",",
+        header="\n".join([*header, ",".join(["time", *names])]), comments="",
+    )  # fmt: skip

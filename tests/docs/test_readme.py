@@ -1,0 +1,54 @@
+import re
+
+import pytest
+from msgspec.structs import replace
+
+from holdfast.cli import demo
+from holdfast.cli import simulate as simulate_verb
+from holdfast.io import save_recording
+from holdfast.synthetic import synthetic_recording
+from holdfast.twin import simulation
+from holdfast.twin.profile import profile
+
+from . import blocks
+
+README = blocks.ROOT / "README.md"
+SHORT = replace(profile("reference"), idle=(0.7, 0.8), hold=6.0)
+
+
+@pytest.fixture
+def short_demo(monkeypatch):
+    """The demo with short grasps, in this process."""
+    whole = simulate_verb.simulate_grasps
+    monkeypatch.setattr(demo, "OBJECTS", "mug")
+    monkeypatch.setattr(simulation, "profile", lambda name: SHORT)
+    monkeypatch.setattr(
+        simulate_verb,
+        "simulate_grasps",
+        lambda *given, **named: whole(*given, **{**named, "jobs": 1}),
+    )
+
+
+def test_every_block_works_as_printed(folder, csv_recordings, hand, short_demo):
+    csv_recordings("my-data")
+    save_recording(synthetic_recording("live", 0), folder / "live.parquet")
+    n_run = blocks.run_page(
+        README,
+        {
+            "uv run holdfast demo": "holdfast demo --no-browser --speed 0",
+            'open_source("xela://auto")': 'open_source("live.parquet", speed=0)',
+            "xela://auto": f"'{hand}' --port 0",
+            "holdfast play": "holdfast play --port 0",
+        },
+    )
+    assert n_run == 6
+    assert (folder / "model.json").exists()
+
+
+def test_the_links_exist():
+    for target, _ in blocks.links_of(README):
+        assert (blocks.ROOT / target).exists(), target
+
+
+def test_no_path_of_this_machine_is_named():
+    assert not re.search(r"/work/|/root/|/home/", README.read_text("utf-8"))

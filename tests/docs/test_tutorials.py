@@ -1,0 +1,108 @@
+import pytest
+from msgspec.structs import replace
+
+from holdfast.io import save_recording
+from holdfast.synthetic import synthetic_recording
+from holdfast.twin import simulation
+from holdfast.twin.profile import profile
+
+from . import blocks
+
+DOCS = blocks.ROOT / "docs"
+SHORT = replace(profile("reference"), idle=(0.7, 0.8), hold=6.0)
+
+
+@pytest.fixture
+def short_grasps(monkeypatch):
+    """Short grasps, simulated in this process."""
+    monkeypatch.setattr(simulation, "profile", lambda name: SHORT)
+    return {"holdfast simulate": "holdfast simulate --jobs 1"}
+
+
+def save_grasps(folder, fingers=("thumb", "index")):
+    folder.mkdir()
+    for seed in range(3):
+        recording = synthetic_recording(f"grasp{seed}", seed, fingers)
+        save_recording(recording, folder / f"grasp{seed}.parquet")
+
+
+def test_your_hand(folder, hand):
+    save_grasps(folder / "grasps")
+    save_recording(synthetic_recording("live", 0), folder / "live.parquet")
+    host = hand.removeprefix("xela://").partition("?")[0]
+    live = 'open_source("xela://auto?fingers=1:thumb,2:index")'
+    n_run = blocks.run_page(
+        DOCS / "tutorials" / "your-hand.md",
+        {
+            live: 'open_source("live.parquet", speed=0)',
+            'host = "auto"': f'host = "{host}"',
+            "holdfast serve": "holdfast serve --port 0",
+            "holdfast play": "holdfast play --port 0",
+            "holdfast label grasps": "holdfast label --port 0 grasps",
+        },
+    )
+    assert n_run == 10
+    assert (folder / "my-hand.json").exists()
+    assert (folder / "grasps" / "grasp0.labels.json").exists()
+
+
+def test_from_python(folder, short_grasps, capsys):
+    assert blocks.run_page(DOCS / "tutorials" / "from-python.md", short_grasps) == 9
+    out = capsys.readouterr().out
+    assert "STABLE" in out
+    assert "{'window': " in out
+
+
+def test_from_ros2(folder):
+    pytest.importorskip("cyclonedds")
+    replace = {"--ros2": "--ros2 --port 0"}
+    assert blocks.run_page(DOCS / "tutorials" / "from-ros2.md", replace) == 1
+
+
+def test_a_figure(folder, short_grasps):
+    assert blocks.run_page(DOCS / "tutorials" / "figure.md", short_grasps) == 4
+    for name in ("grasp.pdf", "errors.pdf", "probability.pdf"):
+        assert (folder / name).read_bytes().startswith(b"%PDF")
+
+
+def test_how_to(folder):
+    save_grasps(folder / "recordings")
+    assert blocks.run_page(DOCS / "how-to.md") == 4
+    assert (folder / "part.parquet").exists()
+
+
+def test_a_grid_search_on_real_recordings(folder, data_folder, capsys):
+    """The block of docs/training.md, on recordings of two objects that are imported here."""
+    from holdfast.io.importers import import_recordings
+
+    (folder / "recordings").mkdir()
+    for place, recording in enumerate(import_recordings(data_folder / "uskin_pick_move")):
+        named = {**recording.metadata, "object": f"grasp {place % 3}"}
+        changed = recording.__class__(recording.name, recording.modules, named)
+        save_recording(changed, folder / "recordings" / f"{recording.name}.parquet")
+    (block,) = [
+        each for each in blocks.blocks_of(DOCS / "training.md") if "GridSearchCV" in each.text
+    ]
+    faster = block.text.replace("[8, 14, 30]", "[8, 14]").replace("[0.01, 1.0]", "[1.0]")
+    names = {"__name__": "__main__"}
+    blocks.run_block(block._replace(text=faster), names)
+    assert 0.5 < names["search"].best_score_ <= 1
+    assert (folder / "model.json").exists()
+    assert capsys.readouterr().err == ""
+
+
+PAGES = [
+    *(DOCS / "tutorials").glob("*.md"),
+    DOCS / "how-to.md",
+    DOCS / "glossary.md",
+    blocks.ROOT / "examples" / "README.md",
+]
+
+
+@pytest.mark.parametrize("page", PAGES, ids=lambda page: page.name)
+def test_the_links_exist(page):
+    for target, anchor in blocks.links_of(page):
+        path = (page.parent / target).resolve() if target else page
+        assert path.exists(), target
+        if anchor and path.suffix == ".md":
+            assert anchor in blocks.anchors_of(path), f"{target}#{anchor}"
