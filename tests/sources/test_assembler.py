@@ -195,3 +195,11 @@ class TestNotices:
         assert all(math.isnan(arrival.time) for arrival in arrivals)
         (sample,) = packet(made, 0, 1)
         assert sum(arrival.n_refused for arrival in (*arrivals, sample)) == 25
+
+
+def test_a_fast_clock_gives_one_notice():
+    made, notices = assembler(1), []
+    for k in range(300):
+        arrivals = packet(made, k, 1, stamp=START + 1.5 * k * PERIOD)
+        notices += [text for one in arrivals for text in one.notices]
+    assert notices == ["the clock of the device runs 1.5 times as fast as that of this machine"]

@@ -109,9 +109,16 @@ def share_of_faults(pairs):
     return sum(bool(one.faults) for one in stamped) / len(stamped)
 
 
-@pytest.mark.parametrize("speed", [1.2, 1.5, 3.0, 20.0])
+@pytest.mark.parametrize("speed", [1.2, 1.5, 3.0])
 def test_a_clock_that_is_too_fast_is_a_fault_within_a_second(speed):
     assert share_of_faults([(1000.0 + speed * k * PERIOD, k * PERIOD) for k in range(900)]) == 1
+
+
+def test_a_recording_that_is_played_fast_is_no_fault():
+    timeline = Timeline()
+    for k in range(900):
+        assert timeline.stamp(1000.0 + 8 * k * PERIOD, k * PERIOD).faults == ()
+    assert timeline.clock.pace == pytest.approx(8.0, rel=0.01)
 
 
 def test_a_clock_that_is_a_little_too_fast_is_none():
@@ -127,13 +134,19 @@ def test_a_clock_that_jumps_again_and_again_is_a_fault():
     assert share_of_faults([(1000.0 + 60.0 * (k % 2), k * PERIOD) for k in range(900)]) == 1
 
 
-def test_an_unsteady_clock_recovers_within_two_seconds():
-    """A burst of two seconds of samples at the start; the first of them was the quickest."""
+def test_a_burst_at_the_start_makes_no_clock_fast():
+    """Two seconds of samples come at once; the last of them was the quickest."""
     burst = [(1000.0 + k * PERIOD, 50.0) for k in range(300)]
     after = [(1000.0 + k * PERIOD, 50.0 + (k - 300) * PERIOD) for k in range(300, 900)]
-    stamped = stamps([*burst, *after])
+    assert not any(one.faults for one in stamps([*burst, *after]))
+
+
+def test_an_unsteady_clock_recovers_within_a_second():
+    fast = [(1000.0 + 1.5 * k * PERIOD, 50.0 + k * PERIOD) for k in range(300)]
+    after = [(1000.0 + (k + 150) * PERIOD, 50.0 + k * PERIOD) for k in range(300, 900)]
+    stamped = stamps([*fast, *after])
     assert stamped[299].faults == (Fault.CLOCK_JUMP,)
-    assert not any(one.faults for one in stamped[600:])
+    assert not any(one.faults for one in stamped[450:])
 
 
 def test_a_clock_that_runs_away_is_late():

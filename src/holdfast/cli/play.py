@@ -27,7 +27,7 @@ def play(
     port: PortOption = 5000,
     speed: Annotated[
         float,
-        typer.Option(help="Speed: 1 is real time; below 1, clients report late samples."),
+        typer.Option(help="Speed: 1 is real time; at others, clients report faults of the clock."),
     ] = 1.0,
     once: Annotated[
         bool, typer.Option("--once", help="Wait for a client, play once, and stop.")

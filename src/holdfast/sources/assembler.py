@@ -84,6 +84,7 @@ class Assembler:
         self.devices: Mapping[int, Device] = {}
         self.n_lost = self.n_refused = 0
         self._timeline = Timeline()
+        self._is_fast = False
         self._packet = _PacketTime(math.nan, Stamp(math.nan), math.nan)
         self._delays: dict[int, TransportDelay] = {}
         self._newest: dict[int, Hashable] = {}
@@ -181,6 +182,7 @@ class Assembler:
         """
         stamp = self._timeline.stamp(time, received)
         self._packet = _PacketTime(time, stamp, received)
+        self._note_pace(received)
         if self._packet.jumped:
             for delay in self._delays.values():
                 delay.reset()
@@ -215,6 +217,14 @@ class Assembler:
             self.n_lost = self.n_refused = 0
         self._instants, self._faults, self._notices = {}, {}, []
         return arrivals
+
+    def _note_pace(self, received: float) -> None:
+        """Give a notice when the clock begins to run too fast."""
+        pace = self._timeline.clock.pace
+        if pace > 1.0 and not self._is_fast:
+            text = f"the clock of the device runs {pace:.2g} times as fast as that of this machine"
+            self.notify("clock", text, received)
+        self._is_fast = pace > 1.0
 
     def _time_of(self, number: int, stamp: float | None) -> Stamp:
         """Return the time of a device's sample, and the faults of its time."""

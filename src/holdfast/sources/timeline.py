@@ -15,10 +15,20 @@ MAX_CLOCK_DRIFT = 1e-4
 """Largest drift between two clocks [s/s]."""
 MAX_TIME = 1e11
 """Largest stamp: 3,000 years from 1970 [s]. Doubles still resolve 0.1 ms there."""
-UNSTEADY_SHARE = 0.2
-"""A clock is unsteady if it has got ahead by more than this share of `MIN_CLOCK_JUMP`."""
-CLOCK_RECOVERY = 0.1
-"""A clock that is this much too fast is steady, and an unsteady one recovers at this pace [s/s]."""
+PACE_INTERVAL = 0.25
+"""Time over which the pace of a clock is measured [s]."""
+N_FAST_INTERVALS = 3
+"""A clock is too fast if it is in as many intervals in a row as this."""
+FAST_SHARE = 0.05
+"""A clock is too fast if it gets ahead by more than this share of `MIN_CLOCK_JUMP` in each
+interval: by a tenth of the time."""
+MAX_FAULTY_PACE = 4.0
+"""A clock that runs faster than this is no faulty one: a recording is played fast [s/s]."""
+MAX_PACE_CHANGE = 0.1
+"""A clock that is too fast has a constant pace: from one interval to the next it changes by less
+than this share. A recording that is played fast by a busy machine does not."""
+MIN_REPEATED_JUMPS = 2
+"""A clock that jumps as often as this in two intervals is unsteady."""
 MIN_EPOCH_TIME = 1e8
 """A stamp above this counts from 1970, and not from the start of a device [s]."""
 MAX_CLOCK_DIFFERENCE = 60.0
@@ -76,35 +86,56 @@ class TransportDelay:
         return MAX_CLOCK_DRIFT * max(received - self._received, 0.0)
 
 
-class ClockSteadiness:
-    """Measure of how far a device's clock got ahead of the host's of late.
+class ClockPace:
+    """Pace of a device's clock, and how often it jumps, over the newest quarters of a second.
 
-    It adds up by how much each sample is quicker than the quickest before, and forgets a tenth of
-    a second in each second. A clock that runs 1.5 times too fast is unsteady after 0.25 s. Each
-    jump counts a tenth of a second, so a clock that jumps twice in a second is unsteady, too.
+    A clock gets ahead by as much as each sample is quicker than the quickest before. A burst of
+    samples after a stall makes no clock fast: it must be fast in three intervals in a row.
+
+    Attributes:
+        pace: of the clock, if it is too fast; 1 otherwise [s/s].
+        unsteady: whether samples must not be trusted: the clock is up to four times too fast, or
+            jumps again and again.
 
     Example:
-        >>> clock = ClockSteadiness()
-        >>> [clock.update(lead, passed=0.05) for lead in (0.03, 0.03, 0.03, 0.03, 0.03)]
-        [False, False, False, False, True]
+        >>> clock = ClockPace()
+        >>> for _ in range(20):
+        ...     clock.update(lead=0.05, passed=0.1)
+        >>> round(clock.pace, 2), clock.unsteady
+        (1.5, True)
     """
 
     def __init__(self) -> None:
-        self._ahead = 0.0
+        self.pace, self.unsteady = 1.0, False
+        self._lead = self._passed = 0.0
+        self._n_jumps = self._n_jumps_before = 0
+        self._paces = [1.0] * N_FAST_INTERVALS
 
-    def update(self, lead: float, passed: float, *, jumped: bool = False) -> bool:
-        """Return whether the clock is unsteady.
+    def update(self, lead: float, passed: float, *, jumped: bool = False) -> None:
+        """Update the pace with a sample.
 
         Args:
-            lead: by how much a sample is quicker than the quickest before [s].
+            lead: by how much the sample is quicker than the quickest before [s].
             passed: time since the last sample, on the host's clock [s].
             jumped: whether the clock jumped before this sample.
         """
-        limit = UNSTEADY_SHARE * MIN_CLOCK_JUMP
-        gained = limit if jumped else max(lead, 0.0)
-        kept = max(self._ahead - CLOCK_RECOVERY * max(passed, 0.0), 0.0)
-        self._ahead = min(kept + gained, 2 * limit)
-        return self._ahead > limit
+        self._lead += 0.0 if jumped else max(lead, 0.0)
+        self._passed += passed
+        self._n_jumps += jumped
+        if self._passed >= PACE_INTERVAL:
+            self._finish()
+
+    def _finish(self) -> None:
+        """End an interval."""
+        fast = self._lead > FAST_SHARE * MIN_CLOCK_JUMP * self._passed / PACE_INTERVAL
+        self._paces = [*self._paces[1:], 1 + self._lead / self._passed if fast else 1.0]
+        slowest, fastest = min(self._paces), max(self._paces)
+        self.pace = self._paces[-1] if slowest > 1.0 else 1.0
+        constant = fastest - slowest < MAX_PACE_CHANGE * slowest
+        jumpy = self._n_jumps + self._n_jumps_before >= MIN_REPEATED_JUMPS
+        self.unsteady = jumpy or (constant and 1.0 < self.pace <= MAX_FAULTY_PACE)
+        self._n_jumps_before = self._n_jumps
+        self._lead, self._passed, self._n_jumps = 0.0, 0.0, 0
 
 
 class Timeline:
@@ -118,6 +149,7 @@ class Timeline:
 
     Attributes:
         offset: sum of the device's clock jumps, added to its stamps [s].
+        clock: pace of the device's clock.
 
     Example:
         >>> timeline = Timeline()
@@ -129,7 +161,7 @@ class Timeline:
         self.offset = 0.0
         self._last = self._received = math.nan
         self._delay = TransportDelay()
-        self._steadiness = ClockSteadiness()
+        self.clock = ClockPace()
 
     def stamp(self, device_time: float, received: float) -> Stamp:
         """Return the time of a sample.
@@ -153,11 +185,12 @@ class Timeline:
         if time <= self._last:  # False before the first
             time = math.nextafter(self._last, math.inf)
         late = self._delay.is_late(time, received)
-        unsteady = not math.isnan(self._last) and self._steadiness.update(
-            lead, received - self._received, jumped=jumped
-        )
+        if not math.isnan(self._last):
+            self.clock.update(lead, received - self._received, jumped=jumped)
         self._last, self._received = time, received
-        return Stamp(time, (Fault.CLOCK_JUMP,) * (jumped or unsteady) + (Fault.LATE,) * late)
+        return Stamp(
+            time, (Fault.CLOCK_JUMP,) * (jumped or self.clock.unsteady) + (Fault.LATE,) * late
+        )
 
     def _jumped(self, time: float, lead: float) -> bool:
         if math.isnan(self._last):
