@@ -1,3 +1,4 @@
+import json
 import re
 
 import pytest
@@ -6,12 +7,14 @@ from msgspec.structs import replace
 from holdfast.cli import demo
 from holdfast.cli import simulate as simulate_verb
 from holdfast.io import save_recording
+from holdfast.study.report.summary import STRONGEST
 from holdfast.synthetic import synthetic_recording
 from holdfast.twin import simulation
 from holdfast.twin.profile import profile
 
 from . import blocks
 
+STUDY = json.loads((blocks.ROOT / "docs" / "study" / "study.json").read_text("utf-8"))
 README = blocks.ROOT / "README.md"
 SHORT = replace(profile("reference"), idle=(0.7, 0.8), hold=6.0)
 
@@ -43,6 +46,27 @@ def test_every_block_works_as_printed(folder, csv_recordings, hand, short_demo):
     )
     assert n_run == 6
     assert (folder / "model.json").exists()
+
+
+def figure(table, **keys):
+    (row,) = [row for row in STUDY["tables"][table] if keys.items() <= row.items()]
+    return f"{row['ours']:.1f}", f"{row['paper'] or 0:.1f}", row
+
+
+def test_the_figures_are_those_of_the_published_study():
+    accuracy = {"on": "held out", "figure": "accuracy"}
+    logreg, svm = (figure("confusion", classifier=name, **accuracy) for name in ("LogReg", "SVM"))
+    ours = figure("strongest", figure="holdfast [%]", **STRONGEST)
+    baseline = figure("strongest", figure="baseline [%]", **STRONGEST)
+    assert baseline[2]["baseline"] == "LogReg of log F_a and log sigma"
+    text = " ".join(README.read_text("utf-8").split())
+    for sentence in (
+        f"the paper's two classifiers are correct in {logreg[0]} and {svm[0]} % of the held-out "
+        f"samples (the paper reports {logreg[1]} and {svm[1]} %)",
+        f"has {baseline[0]} % errors, and our own method has {ours[0]} %",
+    ):
+        assert sentence in text, f"README.md should say: {sentence}"
+    assert ("figures of the quick study" in text) == STUDY["quick"]
 
 
 def test_the_links_exist():

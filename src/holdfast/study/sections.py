@@ -5,7 +5,7 @@ from typing import NamedTuple, TypeVar
 
 import msgspec
 
-from holdfast.study.report.html_report import ReportFigure, Section
+from holdfast.study.report.html_report import SUMMARY, ReportFigure, Section
 from holdfast.study.report.result_tables import ResultTable
 from holdfast.study.report.summary import summary_text
 
@@ -201,7 +201,7 @@ def report_sections(
         twin: whether the recordings, except the real ones, are of the twin.
     """
     summary = summary_text(table for output in outputs.values() for table in output.tables)
-    sections = [Section("Summary", f"{summary}\n\n{READ_ON}")] if summary else []
+    sections = [Section(SUMMARY, f"{summary}\n\n{READ_ON}")] if summary else []
     sections.append(Section("What was run", "\n".join(f"- {note}" for note in run_notes)))
     tables_by_part = {part: output.tables for part, output in outputs.items()}
     figures_by_part = {part: output.figures for part, output in outputs.items()}

@@ -114,6 +114,15 @@ def test_tables_and_figures_are_numbered_and_listed():
     assert '<span class="number">Figure 2.</span> Other' in text
 
 
+def test_the_summary_comes_before_the_contents():
+    with_summary = html_report("T", {}, [Section("Summary", "- one\n- two"), *sections()])
+    head, rest = with_summary.split("<nav")
+    assert "<h2>Summary</h2>" in head
+    assert "<li>two</li>" in head
+    assert "Summary" not in rest
+    assert rest == html_report("T", {}, sections()).split("<nav")[1]
+
+
 def test_the_report_is_reproducible():
     assert page() == page()
 

@@ -11,6 +11,9 @@ from holdfast.study.report.rendering import render
 from holdfast.study.report.result_tables import FILE_NAME, ResultTable
 from holdfast.study.report.table_layouts import TableText, table_text
 
+SUMMARY = "Summary"
+"""Title of the section that comes before the contents."""
+
 
 class ReportFigure(NamedTuple):
     """A figure of the report.
@@ -75,17 +78,19 @@ def html_report(title: str, facts: Mapping[str, object], sections: Sequence[Sect
         title: of the report.
         facts: how it was made: versions, seed, data, machine, time. A list becomes lines, a
             mapping becomes "name: value" lines.
-        sections: in order.
+        sections: in order; the one called `SUMMARY` comes before the contents.
 
     Raises:
         ValueError: two tables or two figures have the same name, or a name is no file name.
     """
     check_names(sections)
+    summary = [section for section in sections if section.title == SUMMARY]
     return render(
         "report.html",
         title=title,
         facts={name: _fact_lines(value) for name, value in facts.items()},
-        sections=_numbered(sections),
+        summary=_numbered(summary)[0] if summary else None,
+        sections=_numbered([section for section in sections if section.title != SUMMARY]),
     )
 
 

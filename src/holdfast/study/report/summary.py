@@ -39,7 +39,8 @@ def _accuracies(rows: list[Row]) -> Iterator[str]:
             for row in _select(rows, {"classifier": name, "on": on, "figure": "accuracy"})
         ]
         if found:
-            parts = [f"{name} {_value(row)} % correct{_paper(row)}" for name, row in found]
+            paper = _paper if on == "held out" else lambda _: ""  # it tested no other objects
+            parts = [f"{name} {_value(row)} % correct{paper(row)}" for name, row in found]
             yield f"{words}: {', '.join(parts)}{_recordings(found[0][1])}."
 
 
