@@ -2,6 +2,7 @@
 
     uv run python benchmarks/attack.py network               # more than a million packets
     uv run python benchmarks/attack.py network --scale 0.01 --json
+    uv run python benchmarks/attack.py files                 # more than 200,000 files, 200 kills
 
 The exit code is 1 if an attack gave a wrong value, an exception that is not documented, or took
 longer than it may. All traffic stays on this machine.
@@ -12,7 +13,7 @@ import importlib
 import json
 import sys
 
-PARTS = ("network",)
+PARTS = ("network", "files")
 
 
 def main() -> int:

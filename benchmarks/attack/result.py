@@ -45,7 +45,7 @@ class Result:
     def timed(self, work: Callable[[], bool], *documented: type[BaseException]) -> None:
         """Try one input: `work` returns whether it was accepted, or raises if it is refused."""
         self.n_tried += 1
-        begin = time.perf_counter()
+        begin = self.now()
         try:
             accepted = work()
         except documented:
@@ -55,12 +55,24 @@ class Result:
             self.note = self.note or f"{type(error).__name__}: {error}"[:120]
             return
         finally:
-            took = time.perf_counter() - begin
+            took = self.now() - begin
             self.worst = max(self.worst, took)
             self.n_slow += took > self.limit
         self.n_accepted += accepted
         self.n_refused += not accepted
 
+    def now(self) -> float:
+        """Return the time by which inputs are measured [s]."""
+        return time.perf_counter()
+
     def document(self) -> dict[str, object]:
         """Return the counts as JSON."""
         return asdict(self)
+
+
+class CpuResult(Result):
+    """Result whose times are those of the processor, which other programs do not lengthen."""
+
+    def now(self) -> float:
+        """Return the time that the processor has spent on this program [s]."""
+        return time.process_time()

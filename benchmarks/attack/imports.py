@@ -1,0 +1,111 @@
+"""Attacks on the import of other formats: damaged CSV, HDF5 and bags of ROS."""
+
+from collections.abc import Iterator
+from pathlib import Path
+from random import Random
+from tempfile import TemporaryDirectory
+
+import numpy as np
+
+from attack.mutations import cut, damaged
+from attack.result import CpuResult
+from holdfast.errors import RecordingError
+from holdfast.io import import_recordings
+from holdfast.ros.cdr import MessageEncoder
+from holdfast.ros.definitions import parse_definition
+from holdfast.ros.sensor_messages import SENS_STREAM
+
+KIND = "xela_server_ros2/msg/SensStream"
+
+
+def attack_imports(n_tried: int) -> Iterator[CpuResult]:
+    """Import damaged files of each format; those without their package are left out."""
+    for name, make in (
+        ("csv", _csv), ("gtac", _gtac), ("arq-crisp", _hdf5), ("rosbag", _db3), ("rosbag", _bag)
+    ):  # fmt: skip
+        with TemporaryDirectory() as folder:
+            try:
+                original = make(Path(folder))
+            except ImportError:
+                continue
+            yield _attack(name, original, n_tried)
+
+
+def _attack(name: str, original: Path, n_tried: int) -> CpuResult:
+    result = CpuResult(f"import {name}, {original.suffix}")
+    chance, data = Random(7), original.read_bytes()
+    if not list(import_recordings(original, name)):
+        raise ValueError(f"{name}: the undamaged file has no recording")
+    path = original.with_stem("damaged")
+    for k in range(n_tried):
+        path.write_bytes(damaged(data, chance) if k % 4 else cut(data, chance))
+        result.timed(lambda: bool(list(import_recordings(path, name))), RecordingError)
+    return result
+
+
+def _csv(folder: Path) -> Path:
+    names = [f"t{taxel:02d}_{axis}" for taxel in range(1, 6) for axis in "xyz"]
+    rows = [f"{k / 100},{','.join(str(k + j) for j in range(15))},stable" for k in range(20)]
+    path = folder / "a.csv"
+    path.write_text(f"# sensor: anyskin\ntime,{','.join(names)},label\n" + "\n".join(rows))
+    return path
+
+
+def _gtac(folder: Path) -> Path:
+    names = [f"mag_{axis}{node + 1}" for node in range(15) for axis in "xyz"]
+    rows = [",".join(str(k + j) for j in range(46)) for k in range(10)]
+    path = folder / "g.csv"
+    path.write_text(f"{','.join(names)},milliseconds\n" + "\n".join(rows))
+    return path
+
+
+def _hdf5(folder: Path) -> Path:
+    import h5py
+
+    path = folder / "a.h5"
+    with h5py.File(path, "w") as file:
+        group = file.create_group("planner/can/Pose1/Exp1")
+        group["tactile_data_raw"] = np.arange(18.0 * 3 * 8).reshape(18, 3, 8)
+        group["tactile_timestamps"] = 5.5 * np.arange(8)
+        group["tactile_slips_label"] = np.array([0, 3, 4, 5, 4, 2, 0, 0])
+    return path
+
+
+def _messages() -> list[bytes]:
+    definition = parse_definition(KIND, _definition())
+    encode = MessageEncoder(definition)
+    taxel = {"x": 30000, "y": 30000, "z": 30000}
+    return [
+        encode({"sensors": [{
+            "message": k, "time": 100.0 + k / 100, "model": "XR1944", "sensor_pos": 1,
+            "taxels": [taxel] * 16, "forces": [],
+        }]})
+        for k in range(8)
+    ]  # fmt: skip
+
+
+def _definition() -> str:
+    return SENS_STREAM.replace("xela_server_ros/", "xela_server_ros2/")
+
+
+def _db3(folder: Path) -> Path:
+    from rosbags.rosbag2 import StoragePlugin, Writer
+
+    with Writer(folder / "bag", version=9, storage_plugin=StoragePlugin.SQLITE3) as writer:
+        topic = writer.add_connection("/x", KIND, msgdef=_definition(), rihs01=f"RIHS01_{0:064x}")
+        for k, data in enumerate(_messages()):
+            writer.write(topic, 10**9 + k * 10**7, data)
+    return next((folder / "bag").glob("*.db3"))
+
+
+def _bag(folder: Path) -> Path:
+    from rosbags.rosbag1 import Writer
+
+    path = folder / "a.bag"
+    with Writer(path) as writer:
+        topic = writer.add_connection(
+            "/x", KIND, msgdef=_definition(), md5sum="0123456789abcdef0123456789abcdef"
+        )
+        for k, data in enumerate(_messages()):
+            writer.write(topic, 10**9 + k * 10**7, data[4:])
+    return path
