@@ -227,3 +227,14 @@ def test_sensors_that_differ_are_not_equal(change):
     curved = sensor("uskin-curved")
     assert replace(curved, **change) != curved
     assert curved != "uskin-curved"
+
+
+@pytest.mark.parametrize("size", [1e-308, 1e-150, 1.0, 1e150, 1e308])
+def test_a_normal_of_any_length_is_normalised(size):
+    one = replace(sensor("anyskin"), normal=np.array([0.0, size, 0.0]))
+    assert one.normal.tolist() == [0.0, 1.0, 0.0]
+
+
+def test_rotations_of_any_size_are_refused_without_a_warning():
+    with pytest.raises(ValueError, match="anyskin: components of rotations from -1 to 1 expected"):
+        replace(sensor("anyskin"), rotations=np.full((5, 3, 3), 1e308))

@@ -68,8 +68,8 @@ class Sensor:
         n_taxels = len(positions)
         rotations = _array(self.rotations, f"rotations of {self.name}", (n_taxels, 3, 3))
         normal = _array(self.normal, f"normal of {self.name}", (3,))
-        length = float(np.linalg.norm(normal))
-        if n_taxels == 0 or length == 0:
+        longest = float(np.abs(normal).max())
+        if n_taxels == 0 or longest == 0:
             raise ValueError(f"{self.name}: at least one taxel and a normal that is not zero")
         if not (np.isfinite(self.rate) and self.rate > 0):
             raise ValueError(f"{self.name}: a rate above 0 Hz expected, {self.rate} given")
@@ -82,7 +82,7 @@ class Sensor:
         object.__setattr__(self, "limits", _checked_limits(self.limits, self.name))
         object.__setattr__(self, "positions", _locked(positions))
         object.__setattr__(self, "rotations", _locked(_exact_rotations(rotations, self.name)))
-        object.__setattr__(self, "normal", _locked(normal / length))
+        object.__setattr__(self, "normal", _locked(_unit_vector(normal)))
 
     def __reduce__(self) -> tuple[Any, ...]:
         return rebuilt(self)
@@ -320,6 +320,8 @@ def _array(given: npt.ArrayLike, what: str, shape: tuple[int | None, ...]) -> Ar
 
 def _exact_rotations(rotations: Array, name: str) -> Array:
     """Return the nearest rotation matrices, by polar decomposition."""
+    if np.abs(rotations).max(initial=0.0) > 2:
+        raise ValueError(f"{name}: components of rotations from -1 to 1 expected")
     left, _, right = np.linalg.svd(rotations)
     exact: Array = left @ right
     error = np.abs(exact - rotations).max(axis=(1, 2))
@@ -336,6 +338,16 @@ def _exact_rotations(rotations: Array, name: str) -> Array:
             "(determinant -1); a rotation expected"
         )
     return rotations if error[worst] < EXACT_TOLERANCE else exact
+
+
+def _unit_vector(vector: Array) -> Array:
+    """Return the vector with length 1; one that has it already is unchanged."""
+    length = float(np.linalg.norm(vector)) if np.abs(vector).max() < 1e100 else np.inf
+    if not 1e-100 < length < np.inf:  # the squares would overflow
+        vector = vector / np.abs(vector).max()
+        length = float(np.linalg.norm(vector))
+    unit: Array = vector / length
+    return unit
 
 
 def _checked_limits(given: object, name: str) -> tuple[float, float] | None:
