@@ -39,7 +39,9 @@ def naive(readings, given, rate=RATE):
     floor = step * math.sqrt(3 * n_taxels)
     total = f.sum(axis=1)
     along = total @ normal
-    weights = np.abs(f @ normal)
+    least_loaded = [int(along[: k + 1].argmin()) for k in range(len(f))]
+    references = f[[0, *least_loaded[:-1]]]
+    weights = np.abs((f - references) @ normal)
     centre = np.array([w @ places / w.sum() if w.sum() else np.zeros(3) for w in weights])
     moment = np.array([normal @ np.cross(places, sample).sum(axis=0) for sample in f])
     norm = lambda vectors: np.sqrt((vectors**2).sum())  # noqa: E731
@@ -48,9 +50,10 @@ def naive(readings, given, rate=RATE):
     block, began = [], 0.0
     rows = np.full((len(f), len(RELATIVE_KINDS) * len(ANY_LAGS)), np.nan)
     for k in range(len(f)):
-        load = norm(total[k] - min(0.0, along[: k + 1].min()) * normal)
+        reference = least_loaded[k]
+        load, taxel_load = norm(total[k] - total[reference]), norm(f[k] - f[reference])
         keep = math.exp(-1 / rate / 5.0)
-        peak, peak_taxels = max(load, keep * peak), max(norm(f[k]), keep * peak_taxels)
+        peak, peak_taxels = max(load, keep * peak), max(taxel_load, keep * peak_taxels)
         now = least
         if k and (readings[k] != readings[k - 1]).any():
             block.append((norm(total[k] - total[k - 1]) ** 2, norm(f[k] - f[k - 1]) ** 2))

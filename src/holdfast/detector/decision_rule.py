@@ -15,8 +15,10 @@ from holdfast.features.arrays import (
     FAULT,
     FAULTS,
     MEAN,
+    MOVED_AT,
     NOISE,
     NOISE_NOW,
+    PEAK_LOAD,
     READY,
     REASON,
     SIGMA,
@@ -32,6 +34,7 @@ from holdfast.features.arrays import (
 )
 from holdfast.features.arrays import LOAD as MOTION_LOAD
 from holdfast.features.faults import TARE_DRIFT
+from holdfast.features.motion import RELEASED_SHARE
 from holdfast.features.stream import StreamPlan
 from holdfast.model import ANY_FINGER, Model
 
@@ -69,6 +72,10 @@ DRIFT_SECONDS = 1.0
 """A touch brings F_a over the threshold of contact in less time than this; a drift does not [s]."""
 CONTACT_RELEASE_RATIO = 0.7
 """Share of the threshold of contact on the load below which a contact ends."""
+TOUCH_SHARE = 1.5 * RELEASED_SHARE
+"""Share of the largest load so far that a touch exceeds."""
+REST_SECONDS = 0.2
+"""A force is at rest if it has not moved for this time [s]."""
 CALM_RATIO = 3.0
 """A finger is calm while sigma is at most this many times the sigma of noise alone."""
 
@@ -194,7 +201,8 @@ def step(
             codes[STATE] = codes[CANDIDATE] = UNKNOWN
             decided[PROBABILITY] = decided[LAST_UNSTABLE] = math.nan
         elif present[finger]:
-            if by_load and _is_unloaded(memory.motion[finger], rule.limits[finger], codes[STATE]):
+            limit = rule.limits[finger, CONTACT_LOAD]
+            if by_load and _is_unloaded(memory.motion[finger], limit, codes[STATE], time):
                 weights = rule.weights[finger, : rule.n_weights[finger]]
                 decided[PROBABILITY] = linear_probability(output.features[finger], weights)
                 state = NO_CONTACT
@@ -257,12 +265,23 @@ def _contact_threshold(noise: float, limits: Array) -> float:
 
 
 @compiled
-def _is_unloaded(motion: Array, limits: Array, reported: int) -> bool:
-    """Return whether the load is below its threshold, which is lower while in contact."""
-    threshold = limits[CONTACT_LOAD] * motion[NOISE_NOW]
+def _is_unloaded(motion: Array, limit: float, reported: int, time: float) -> bool:
+    """Return whether a finger is without contact: its load is small, and its force is at rest.
+
+    The threshold of the load is lower while in contact.
+
+    Args:
+        motion: of the finger, as in `Memory`.
+        limit: threshold of contact, as a multiple of the noise.
+        reported: the state that is reported.
+        time: of the sample [s].
+    """
+    threshold = max(limit * motion[NOISE_NOW], TOUCH_SHARE * motion[PEAK_LOAD])
     if reported in (STABLE, UNSTABLE):
-        threshold *= CONTACT_RELEASE_RATIO
-    return bool(motion[MOTION_LOAD] < threshold)
+        released = RELEASED_SHARE * motion[PEAK_LOAD]
+        threshold = max(CONTACT_RELEASE_RATIO * limit * motion[NOISE_NOW], released)
+    at_rest = time - motion[MOVED_AT] > REST_SECONDS
+    return bool(at_rest and motion[MOTION_LOAD] < threshold)
 
 
 @compiled

@@ -83,15 +83,17 @@ TRACK_PATH = 7  # length of the way of F_tip in this stretch
 TRACK_WIDTH = 8
 
 # Columns of Memory.motion.
-LEAST_NORMAL = 0  # least normal force since the start, at most 0
-LOAD = 1  # force beyond it
-TAXEL_LOAD = 2  # root of the sum of squares of the taxel forces
+LEAST_NORMAL = 0  # normal force of the reference: the least since the start, at most 0
+LOAD = 1  # force beyond the reference
+TAXEL_LOAD = 2  # root of the sum of squares of the taxel forces beyond the reference
 PEAK_LOAD, PEAK_TAXEL_LOAD = 3, 4  # the largest so far, slowly forgotten
 NOISE_NOW, TAXEL_NOISE_NOW = 5, 6  # of F_tip and of all taxels, standard deviation of the norm
 LEAST_NOISE, LEAST_TAXEL_NOISE = 7, 8  # of the blocks that are complete; infinite before
 BLOCK_SQUARES, BLOCK_TAXEL_SQUARES, BLOCK_STEPS = 9, 10, 11  # of the block that is not
 BLOCK_START = 12  # time [s]; NaN before the first sample
-MOTION_WIDTH = 13
+REFERENCE = 13  # the reference: F_tip at the least normal force, three components
+MOVED_AT = 16  # when the force last moved by much more than its noise [s]
+MOTION_WIDTH = 17
 
 # Columns of Output.status.
 REASON, FAULTS = 0, 1
@@ -129,6 +131,7 @@ class Memory(NamedTuple):
     levels: Array  # (n_fingers, LEVELS_WIDTH)
     own: Array  # (n_fingers, n_features) values of each finger, before the maximum of the hand
     taxel_forces: Array  # (longest lag + 1, n_taxels, 3) in the fingertip frame, a ring
+    reference: Array  # (n_taxels, 3) taxel forces at the least normal force since the start
     track: Array  # (n_fingers, TRACK_WIDTH, longest lag + 1), a ring
     motion: Array  # (n_fingers, MOTION_WIDTH)
     relative: Array  # (n_fingers, N_RELATIVE, n_lags) relative features of the last sample

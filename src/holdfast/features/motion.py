@@ -20,6 +20,7 @@ from holdfast.features.arrays import (
     LOAD_TO_NOISE,
     MIN_NOISE,
     MOMENT_CHANGE,
+    MOVED_AT,
     N_STRETCH,
     N_UNCHANGED,
     N_USED,
@@ -28,6 +29,7 @@ from holdfast.features.arrays import (
     PEAK_LOAD,
     PEAK_TAXEL_LOAD,
     PRESSURE_SHIFT,
+    REFERENCE,
     RESIDUAL,
     SHEAR_CHANGE,
     SHEAR_RESIDUAL,
@@ -48,6 +50,10 @@ NOISE_BLOCK_SECONDS, MIN_BLOCK_STEPS = 0.2, 5
 """A block over which noise is measured has at least this duration [s] and these steps."""
 NOISE_WEIGHT = 8.0
 """Share of the noise in the denominator: a load below it counts as nothing."""
+MOVE_SECONDS, MOVED_TO_NOISE = 0.133, 5.0
+"""A force moves if it changes within this time [s] by this many times its noise."""
+RELEASED_SHARE = 0.05
+"""Share of the largest load that a released skin may still show."""
 PRESSURE_FLOOR = 1e-3
 """Least shift of the centre of pressure, in radii of the patch."""
 TWO_AXES = math.sqrt(2.0 / 3.0)
@@ -70,8 +76,9 @@ def update_motion(layout: Layout, memory: Memory, readings: Array, f: int, time:
     n, length = memory.counts[f, N_STRETCH], len(memory.taxel_forces)
     now = (n - 1) % length
     _append_sample(layout, memory, readings, f, now, n > 1)
-    _update_load(layout, memory, f, now)
     _update_noise(layout, memory.motion, memory.counts, f, time)
+    _update_load(layout, memory, f, now)
+    _update_movement(layout, memory, f, now, time)
     if n < 2:
         for kind in range(memory.relative.shape[1]):
             for lag in range(len(layout.lags)):
@@ -88,7 +95,7 @@ def _append_sample(
 ) -> None:
     """Append taxel forces, centre of pressure, moment and path of a sample to the history."""
     first, last = layout.offsets[f], layout.offsets[f + 1]
-    forces, track = memory.taxel_forces, memory.track
+    forces, track, reference = memory.taxel_forces, memory.track, memory.reference
     nx, ny, nz = layout.normals[f, 0], layout.normals[f, 1], layout.normals[f, 2]
     length = len(forces)
     before = (now - 1) % length
@@ -107,9 +114,11 @@ def _append_sample(
             moved += (gx - sx) * (gx - sx) + (gy - sy) * (gy - sy) + (gz - sz) * (gz - sz)
         forces[now, i, 0], forces[now, i, 1], forces[now, i, 2] = gx, gy, gz
         px, py, pz = layout.places[i, 0], layout.places[i, 1], layout.places[i, 2]
-        pressed = abs(gx * nx + gy * ny + gz * nz)
-        fx, fy, fz, weight = fx + gx, fy + gy, fz + gz, weight + pressed
-        squares += gx * gx + gy * gy + gz * gz
+        fx, fy, fz = fx + gx, fy + gy, fz + gz
+        hx, hy, hz = gx - reference[i, 0], gy - reference[i, 1], gz - reference[i, 2]
+        pressed = abs(hx * nx + hy * ny + hz * nz)
+        weight += pressed
+        squares += hx * hx + hy * hy + hz * hz
         cx, cy, cz = cx + pressed * px, cy + pressed * py, cz + pressed * pz
         moment += nx * (py * gz - pz * gy) + ny * (pz * gx - px * gz) + nz * (px * gy - py * gx)
     weight = max(weight, 1e-300)
@@ -138,20 +147,45 @@ def _append_sample(
 
 @inlined
 def _update_load(layout: Layout, memory: Memory, f: int, now: int) -> None:
-    """Update the load: the force beyond the least normal force since the start.
+    """Update the reference, and the load beyond it.
 
-    A skin can only be pressed. A negative normal force says that the tare was taken under load.
+    A skin can only be pressed. So the least normal force since the start belongs to the least
+    load that is known, whatever the load was when the tare was taken.
     """
     track, motion = memory.track, memory.motion
     nx, ny, nz = layout.normals[f, 0], layout.normals[f, 1], layout.normals[f, 2]
     x, y, z = track[f, 0, now], track[f, 1, now], track[f, 2, now]
-    motion[f, LEAST_NORMAL] = min(motion[f, LEAST_NORMAL], x * nx + y * ny + z * nz)
-    least = motion[f, LEAST_NORMAL]
-    x, y, z = x - least * nx, y - least * ny, z - least * nz
+    normal = x * nx + y * ny + z * nz
+    if normal < motion[f, LEAST_NORMAL]:
+        motion[f, LEAST_NORMAL] = normal
+        motion[f, REFERENCE], motion[f, REFERENCE + 1], motion[f, REFERENCE + 2] = x, y, z
+        for i in range(layout.offsets[f], layout.offsets[f + 1]):
+            for axis in range(3):
+                memory.reference[i, axis] = memory.taxel_forces[now, i, axis]
+        motion[f, TAXEL_LOAD] = 0.0
+    x, y, z = (
+        x - motion[f, REFERENCE],
+        y - motion[f, REFERENCE + 1],
+        z - motion[f, REFERENCE + 2],
+    )
     keep = math.exp(-layout.period / LOAD_DECAY_SECONDS)
     motion[f, LOAD] = math.sqrt(x * x + y * y + z * z)
     motion[f, PEAK_LOAD] = max(motion[f, LOAD], keep * motion[f, PEAK_LOAD])
     motion[f, PEAK_TAXEL_LOAD] = max(motion[f, TAXEL_LOAD], keep * motion[f, PEAK_TAXEL_LOAD])
+
+
+@inlined
+def _update_movement(layout: Layout, memory: Memory, f: int, now: int, time: float) -> None:
+    """Note the time if the force moves: by much more than its noise, and more than an echo."""
+    track, motion, length = memory.track, memory.motion, memory.track.shape[2]
+    back = min(round(MOVE_SECONDS / layout.period), memory.counts[f, N_STRETCH] - 1, length - 1)
+    then = (now - back) % length
+    x = track[f, 0, now] - track[f, 0, then]
+    y = track[f, 1, now] - track[f, 1, then]
+    z = track[f, 2, now] - track[f, 2, then]
+    least = max(MOVED_TO_NOISE * motion[f, NOISE_NOW], RELEASED_SHARE * motion[f, PEAK_LOAD])
+    if x * x + y * y + z * z > least * least:
+        motion[f, MOVED_AT] = time
 
 
 @inlined

@@ -22,6 +22,7 @@ from holdfast.features.arrays import (
     LEVELS_WIDTH,
     LONGEST_WINDOW,
     MOTION_WIDTH,
+    MOVED_AT,
     N_RELATIVE,
     N_TARED,
     NOISE,
@@ -328,6 +329,7 @@ def _memory(layout: Layout) -> Memory:
     motion = np.zeros((n_fingers, MOTION_WIDTH))
     motion[:, [LEAST_NOISE, LEAST_TAXEL_NOISE]] = np.inf
     motion[:, BLOCK_START] = np.nan
+    motion[:, MOVED_AT] = -np.inf
     taxels = np.zeros((n_taxels, TAXELS_WIDTH))
     taxels[layout.ignored, CHANGED_AT] = np.inf  # never long ago
     return Memory(
@@ -339,6 +341,7 @@ def _memory(layout: Layout) -> Memory:
         levels=levels,
         own=np.full((n_fingers, layout.specs.shape[1]), np.nan),
         taxel_forces=np.zeros((length, n_taxels, 3)),
+        reference=np.zeros((n_taxels, 3)),
         track=np.zeros((n_fingers, TRACK_WIDTH, length)),
         motion=motion,
         relative=np.full((n_fingers, N_RELATIVE, len(layout.lags)), np.nan),
