@@ -19,9 +19,11 @@ from typing import NamedTuple
 import numpy as np
 from msgspec.structs import replace
 from scipy.ndimage import minimum_filter1d
+from scipy.optimize import minimize
+from scipy.special import expit
 from sklearn.metrics import roc_auc_score
 
-from holdfast.classifiers import Samples, recipe
+from holdfast.classifiers.linear import LinearClassifier
 from holdfast.contact import NO_CONTACT, STABLE, UNKNOWN, Cause
 from holdfast.features import Tare, parse_features
 from holdfast.features.stream import StreamPlan, extract
@@ -32,7 +34,8 @@ from holdfast.recordings import Recording
 FEATURES = parse_features("any")
 MAX_RATE = 20.0
 """Samples per second that are kept of each recording [Hz]; neighbours are nearly copies."""
-PARAMETERS = {"C": 0.01, "class_weight": None}
+C = 1e-3
+"""Weight of the samples against the penalty on the weights."""
 CONTACT_LOAD = 10.0
 """Threshold of contact, in multiples of the noise of the force: 6 standard deviations."""
 HOLD = 0.1
@@ -123,14 +126,30 @@ def held_probability(probability: np.ndarray, rate: float) -> np.ndarray:
     return minimum_filter1d(known, n + 1, origin=n // 2, mode="nearest")
 
 
-def fit(hands: list[HandSamples], chosen: np.ndarray):
-    groups = np.flatnonzero(chosen)
-    samples = Samples(
-        np.concatenate([hands[k].features for k in groups]),
-        np.concatenate([hands[k].stable for k in groups]),
-        np.repeat(groups, [len(hands[k].stable) for k in groups]),
-    )
-    return recipe("logreg").fit(samples, PARAMETERS, 0)
+def fit(hands: list[HandSamples], chosen: np.ndarray) -> LinearClassifier:
+    """Fit a logistic regression in which more change is never more stable.
+
+    The sign of every weight is fixed, except that of the ratio of load to noise. This costs
+    next to nothing on randomized hands, and keeps features that correlate on them from
+    cancelling where they do not.
+    """
+    used = [hands[k] for k in np.flatnonzero(chosen)]
+    features = np.concatenate([hand.features for hand in used])
+    sign = np.where(np.concatenate([hand.stable for hand in used]), 1.0, -1.0)
+    mean, scale = features.mean(axis=0), features.std(axis=0)
+    standardised = (features - mean) / scale
+
+    def loss(weights: np.ndarray) -> tuple[float, np.ndarray]:
+        margins = sign * (standardised @ weights[1:] + weights[0])
+        slopes = -sign * expit(-margins)
+        gradient = np.concatenate([[slopes.sum()], standardised.T @ slopes + weights[1:] / C])
+        penalty = float(weights[1:] @ weights[1:]) / (2 * C)
+        return float(np.logaddexp(0, -margins).sum()) + penalty, gradient
+
+    free, falling = (None, None), (None, 0.0)
+    bounds = [free, *(free if f.kind == "load_to_noise" else falling for f in FEATURES)]
+    found = minimize(loss, np.zeros(1 + len(FEATURES)), jac=True, bounds=bounds, method="L-BFGS-B")
+    return LinearClassifier(tuple(mean), tuple(scale), tuple(found.x[1:]), found.x[0])
 
 
 def report(
@@ -184,7 +203,7 @@ def save(
     training = Training(
         recordings=digests,
         split="a fifth of the hands",
-        parameters={"*": PARAMETERS},
+        parameters={"*": {"C": C, "class_weight": None}},
         figures=figures,
         versions={name: version(name) for name in ("holdfast", "numpy", "scikit-learn")},
     )

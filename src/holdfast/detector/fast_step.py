@@ -163,7 +163,7 @@ def fast_step(table: Integers, time: float) -> int:
     memory = Memory(
         floats2(table, 9), floats2(table, 10), floats2(table, 11), floats3(table, 12),
         integers2(table, 13), floats2(table, 14), floats2(table, 15), floats3(table, 30),
-        floats3(table, 31), floats2(table, 32), floats3(table, 33),
+        floats2(table, 31), floats3(table, 32), floats2(table, 33), floats3(table, 34),
     )  # fmt: skip
     output = Output(floats2(table, 16), floats2(table, 17), integers2(table, 18))
     rule = DecisionRule(

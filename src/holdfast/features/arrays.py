@@ -73,14 +73,13 @@ FIRST_RELATIVE = 8  # the kinds from it on look back by a lag in seconds
 
 # Rows of Memory.relative: kinds from FIRST_RELATIVE on.
 FORCE_CHANGE, SHEAR_CHANGE, RESIDUAL, SHEAR_RESIDUAL = range(4)
-PRESSURE_SHIFT, MOMENT_CHANGE, PATH, LOAD_TO_NOISE = range(4, 8)
-N_RELATIVE = 8
+PRESSURE_SHIFT, MOMENT_CHANGE, LOAD_TO_NOISE = range(4, 7)
+N_RELATIVE = 7
 
 # Rows of Memory.track: F_tip, then
 TRACK_PRESSURE = 3  # centre of pressure, in radii of the patch, in three axes
 TRACK_MOMENT = 6  # moment about the normal, divided by the radius
-TRACK_PATH = 7  # length of the way of F_tip in this stretch
-TRACK_WIDTH = 8
+TRACK_WIDTH = 7
 
 # Columns of Memory.motion.
 LEAST_NORMAL = 0  # normal force of the reference: the least since the start, at most 0

@@ -25,7 +25,6 @@ from holdfast.features.arrays import (
     N_UNCHANGED,
     N_USED,
     NOISE_NOW,
-    PATH,
     PEAK_LOAD,
     PEAK_TAXEL_LOAD,
     PRESSURE_SHIFT,
@@ -36,7 +35,6 @@ from holdfast.features.arrays import (
     TAXEL_LOAD,
     TAXEL_NOISE_NOW,
     TRACK_MOMENT,
-    TRACK_PATH,
     TRACK_PRESSURE,
     Array,
     Integers,
@@ -48,16 +46,21 @@ LOAD_DECAY_SECONDS = 5.0
 """Time constant with which the largest load so far is forgotten [s]."""
 NOISE_BLOCK_SECONDS, MIN_BLOCK_STEPS = 0.2, 5
 """A block over which noise is measured has at least this duration [s] and these steps."""
-NOISE_WEIGHT = 8.0
-"""Share of the noise in the denominator: a load below it counts as nothing."""
+NOISE_WEIGHT = 100.0
+"""Noise in the denominator: changes of a load below this many times its noise count less."""
 MOVE_SECONDS, MOVED_TO_NOISE = 0.133, 5.0
 """A force moves if it changes within this time [s] by this many times its noise."""
-RELEASED_SHARE = 0.05
+RELEASED_SHARE = 0.08
 """Share of the largest load that a released skin may still show."""
 PRESSURE_FLOOR = 1e-3
 """Least shift of the centre of pressure, in radii of the patch."""
-TWO_AXES = math.sqrt(2.0 / 3.0)
-"""Noise of two of three axes, as a share of that of all."""
+ONE_AXIS, TWO_AXES = 1.0 / 3.0, 2.0 / 3.0
+"""Squared noise of one and of two axes, as a share of that of all three."""
+NOISE_SQUARES = 4.0
+"""Squared noise that is subtracted from a squared change, which has that of two samples: 2, and
+as much again, because the noise is the least that was measured."""
+LEAST_CHANGE = 0.005
+"""A change by less than this share of the load counts as none."""
 
 
 @inlined
@@ -86,14 +89,14 @@ def update_motion(layout: Layout, memory: Memory, readings: Array, f: int, time:
         return
     for lag in range(len(layout.lags)):
         back = min(layout.lags[lag], n - 1)
-        _fill_lag(layout, memory, f, now, (n - 1 - back) % length, back, lag)
+        _fill_lag(layout, memory, f, now, (n - 1 - back) % length, lag)
 
 
 @inlined
 def _append_sample(
     layout: Layout, memory: Memory, readings: Array, f: int, now: int, has_previous: bool
 ) -> None:
-    """Append taxel forces, centre of pressure, moment and path of a sample to the history."""
+    """Append taxel forces, centre of pressure and moment of a sample to the history."""
     first, last = layout.offsets[f], layout.offsets[f + 1]
     forces, track, reference = memory.taxel_forces, memory.track, memory.reference
     nx, ny, nz = layout.normals[f, 0], layout.normals[f, 1], layout.normals[f, 2]
@@ -131,9 +134,6 @@ def _append_sample(
     track[f, TRACK_PRESSURE + 1, now] = cy / weight
     track[f, TRACK_PRESSURE + 2, now] = cz / weight
     track[f, TRACK_MOMENT, now] = moment
-    track[f, TRACK_PATH, now] = math.sqrt(step)
-    if has_previous:
-        track[f, TRACK_PATH, now] += track[f, TRACK_PATH, before]
     motion = memory.motion
     motion[f, TAXEL_LOAD] = math.sqrt(squares)
     if memory.counts[f, N_UNCHANGED] == 0 and has_previous:
@@ -212,9 +212,7 @@ def _update_noise(layout: Layout, motion: Array, counts: Integers, f: int, time:
 
 
 @inlined
-def _fill_lag(
-    layout: Layout, memory: Memory, f: int, now: int, then: int, n_steps: int, lag: int
-) -> None:
+def _fill_lag(layout: Layout, memory: Memory, f: int, now: int, then: int, lag: int) -> None:
     """Fill the relative features over one lag."""
     track, motion, out = memory.track, memory.motion, memory.relative
     nx, ny, nz = layout.normals[f, 0], layout.normals[f, 1], layout.normals[f, 2]
@@ -226,25 +224,21 @@ def _fill_lag(
     z = track[f, 2, now] - track[f, 2, then]
     across = x * nx + y * ny + z * nz
     square = x * x + y * y + z * z
-    out[f, FORCE_CHANGE, lag] = _relative(square, noise, load)
-    out[f, SHEAR_CHANGE, lag] = _relative(
-        max(square - across * across, 0.0), TWO_AXES * noise, load
-    )
+    out[f, FORCE_CHANGE, lag] = _relative(square, noise * noise, load)
+    shear = square - across * across
+    out[f, SHEAR_CHANGE, lag] = _relative(shear, TWO_AXES * noise * noise, load)
     n_used = layout.constants[f, N_USED]
     moved, pressed = _residual(layout, memory, f, now, then, x / n_used, y / n_used, z / n_used)
-    out[f, RESIDUAL, lag] = _relative(moved, taxel_noise, taxel_load)
-    out[f, SHEAR_RESIDUAL, lag] = _relative(
-        max(moved - pressed, 0.0), TWO_AXES * taxel_noise, taxel_load
-    )
+    echo = taxel_noise * taxel_noise
+    out[f, RESIDUAL, lag] = _relative(moved, echo, taxel_load)
+    out[f, SHEAR_RESIDUAL, lag] = _relative(moved - pressed, TWO_AXES * echo, taxel_load)
     shift = 0.0
     for axis in range(3):
         delta = track[f, TRACK_PRESSURE + axis, now] - track[f, TRACK_PRESSURE + axis, then]
         shift += delta * delta
     out[f, PRESSURE_SHIFT, lag] = math.log(math.sqrt(shift) + PRESSURE_FLOOR)
     turned = track[f, TRACK_MOMENT, now] - track[f, TRACK_MOMENT, then]
-    out[f, MOMENT_CHANGE, lag] = _relative(turned * turned, taxel_noise, load)
-    path = track[f, TRACK_PATH, now] - track[f, TRACK_PATH, then]
-    out[f, PATH, lag] = math.log((path + noise) / (n_steps * layout.period * load))
+    out[f, MOMENT_CHANGE, lag] = _relative(turned * turned, ONE_AXIS * echo, load)
     out[f, LOAD_TO_NOISE, lag] = math.log(load / noise)
 
 
@@ -268,6 +262,7 @@ def _residual(
 
 
 @compiled
-def _relative(square: float, floor: float, load: float) -> float:
-    """Return log(sqrt(v^2 + floor^2) / load)."""
-    return math.log(math.sqrt(square + floor * floor) / load)
+def _relative(square: float, noise_square: float, load: float) -> float:
+    """Return log(v / load) of a change v, given v^2 with noise; at least log(LEAST_CHANGE)."""
+    square = max(square - NOISE_SQUARES * noise_square, 0.0)
+    return 0.5 * math.log(square / (load * load) + LEAST_CHANGE * LEAST_CHANGE)

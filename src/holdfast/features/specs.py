@@ -16,7 +16,6 @@ RELATIVE_KINDS = (
     "shear_residual",
     "pressure_shift",
     "moment_change",
-    "path",
     "load_to_noise",
 )
 """Kinds that look back by a lag in seconds, relative to the load; see `features.motion`."""
@@ -44,8 +43,8 @@ class FeatureSpec(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
             relative kind, over a lag of `seconds`: `force_change` and `shear_change`, the change
             of F_tip and its part across the normal; `residual` and `shear_residual`, how far the
             taxels move against their mean; `pressure_shift`, how far the centre of pressure
-            moves; `moment_change`, the change of the moment about the normal; `path`, the way of
-            F_tip per second; `load_to_noise`, the load itself.
+            moves; `moment_change`, the change of the moment about the normal; `load_to_noise`, the
+            load itself.
         window: number of samples in the window, for the last four kinds; 0 for the others.
         seconds: lag of a relative kind [s]; while a stretch is shorter, the longest that there
             is, from two samples on.
@@ -74,7 +73,6 @@ class FeatureSpec(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
         "shear_residual",
         "pressure_shift",
         "moment_change",
-        "path",
         "load_to_noise",
     ]
     window: int = 0

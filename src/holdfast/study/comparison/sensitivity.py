@@ -31,11 +31,9 @@ from holdfast.study.report.result_tables import Key, ResultTable, Row
 from holdfast.study.tasks import Task
 from holdfast.twin.profile import profile, profiles
 
-VARIED_METHODS = ("logreg", "zhang", "trees", "holdfast")
+VARIED_METHODS = ("logreg", "zhang", "holdfast")
 QUICK_VARIED_METHODS = ("logreg", "holdfast")
 """Those of them that a quick study varies."""
-SLOW_VARIED_METHODS = ("trees",)
-"""Methods that are evaluated at every other value only."""
 NOISE_LEVELS = (0.0, 1.0, 2.0, 4.0, 8.0)
 """Standard deviations of the added noise [unit of the readings]."""
 SAMPLE_STEPS = (1, 2, 3, 5)
@@ -87,7 +85,7 @@ def tasks(plan: StudyPlan) -> list[Task]:
     named: dict[str, Task] = {}
     for sweep in sweeps(plan):
         for method in varied_methods(plan):
-            for variation in _variations(sweep, method).values():
+            for variation in sweep.variations.values():
                 task = _task(plan, method, variation)
                 named[task.name] = task
     for cut in CUTS:
@@ -172,14 +170,6 @@ def _margins(plan: StudyPlan) -> dict[float, Variation]:
     }
 
 
-def _variations(sweep: Sweep, method: str) -> dict[float, Variation]:
-    """Return the variations of a method: for a slow method, every other one and the default."""
-    every = list(sweep.variations.items())
-    step = 2 if method in SLOW_VARIED_METHODS and len(every) > 2 else 1
-    default = [(value, each) for value, each in every if each == Variation()]
-    return dict(sorted({**dict(every[::step]), **dict(default)}.items()))
-
-
 def _task(plan: StudyPlan, method: str, variation: Variation) -> Task:
     job = _job(plan, method, variation)
     return evaluation_task(_task_name(method, variation), job, quick=plan.quick)
@@ -207,7 +197,7 @@ def _job(plan: StudyPlan, method: str, variation: Variation) -> EvaluationJob:
 def _sweep_table(plan: StudyPlan, results: Results, sweep: Sweep) -> ResultTable:
     rows: list[Row] = []
     for method in varied_methods(plan):
-        for value, variation in _variations(sweep, method).items():
+        for value, variation in sorted(sweep.variations.items()):
             evaluation = results[_task_name(method, variation)]["recording"]
             keys: Keys = {"method": METHODS[method].title, sweep.key: value}
             rows += _rows(keys, evaluation, plan.seed)
