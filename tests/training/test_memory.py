@@ -46,6 +46,7 @@ def test_one_recording_is_in_memory_at_a_time(split):
 PROGRAM = """
 import resource, sys
 from pathlib import Path
+from holdfast.errors import RecordingError
 from holdfast.io import load_dataset
 from holdfast.training import Setting, train
 
@@ -58,7 +59,7 @@ resource.setrlimit(resource.RLIMIT_AS, (limit, limit))
 dataset = load_dataset(folder)
 try:
     held = list(dataset)
-except (MemoryError, OSError):
+except (MemoryError, RecordingError):
     held = None
 assert held is None, "the dataset fits into the room: this proves nothing"
 trained = train(dataset, Setting(trials=0))

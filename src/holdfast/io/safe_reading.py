@@ -32,6 +32,8 @@ def recording_errors(path: Path) -> Iterator[None]:
         raise
     except OSError as cause:
         raise RecordingError(f"cannot read {path}: {cause.strerror or cause}") from cause
+    except MemoryError as cause:
+        raise RecordingError(f"{path} does not fit into memory: {one_line(cause)}") from cause
     except Exception as cause:
         raise RecordingError(f"{path} is damaged: {one_line(cause)}") from cause
 

@@ -196,7 +196,8 @@ def test_one_state_only():
 def test_one_object_only(grasps):
     same = [replace(each, metadata={"object": "can"}) for each in grasps]
     assert refusal(TrainingError, same, replace(SETTING, split="object")) == (
-        "the split by object needs at least two, 1 given (can)"
+        "the split by object needs at least two, 1 given (can); the split by time needs one "
+        "recording"
     )
 
 
