@@ -44,7 +44,8 @@ class Plan(NamedTuple):
 
     Attributes:
         profile: profile from which they were drawn.
-        grips: (4,) load at which each finger stops: thumb, index, middle, ring [N].
+        grips: (4,) load at which each finger stops: thumb, index, middle, ring [N]; 0 for a
+            finger that stays open.
         speed: speed of closing [m/s].
         before: time with an open hand before the grasp [s].
         after: time after the release until the end [s].
@@ -110,6 +111,14 @@ class Protocol:
         """Whether the object was never locked, or lost."""
         return self.locked_at is None or self.lost_at is not None
 
+    def is_released(self, time: float) -> bool:
+        """Return whether the hand has begun to release the object."""
+        return time >= self._released_at
+
+    def release(self, time: float) -> None:
+        """Release the object from this time on [s], if it is not released before."""
+        self._released_at = min(self._released_at, time)
+
     def is_over(self, time: float) -> bool:
         """Return whether the grasp is complete."""
         return time > self._released_at + self.plan.after
@@ -142,7 +151,7 @@ class Protocol:
             self._all_stopped_at = min(self._all_stopped_at, time)
         if self._released_at < np.inf:  # closing has timed out
             return self._new_command(1.0, Phase.CLOSING)
-        gripped = (loads > CONTACT_LOAD).all()
+        gripped = ((loads > CONTACT_LOAD) | (self.plan.grips <= 0)).all()
         if gripped and time - self._all_stopped_at >= SETTLE_TIME:
             self.locked_at = time
             self._locked_place = body[:3].copy()

@@ -1,7 +1,7 @@
 """Simulate a grasp from a seed: a recording with exact truth, without a clock."""
 
 import zlib
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from functools import cache
 from pathlib import Path
@@ -9,22 +9,24 @@ from pathlib import Path
 import msgspec
 import numpy as np
 
-from holdfast.contact import Phase
-from holdfast.metrics.truth_labels import LabelRule, labels_from_truth, phases_from_touch
-from holdfast.recordings import Recording, Tactile, Truth
+from holdfast.metrics.truth_labels import LabelRule, labels_from_truth
+from holdfast.recordings import Recording, Tactile
 from holdfast.sensors import sensor
 from holdfast.sensors.types import Array
-from holdfast.twin.contact import SLIP, SLIPPING_SHARE
 from holdfast.twin.control import STEPS_PER_CONTROL, draw_controller
 from holdfast.twin.grasp import ClosingPath, closing_path
+from holdfast.twin.gripping import Pressing
 from holdfast.twin.hand import FINGERS, N_JOINTS, RATE, TIMESTEP, HandModel
+from holdfast.twin.loads import Load, load_state
 from holdfast.twin.objects import GraspObject, object_named
 from holdfast.twin.operator import draw_disturbances, draw_tremor
 from holdfast.twin.profile import Profile, profile
-from holdfast.twin.protocol import CONTACT_LOAD, THUMB_SHARE, Command, Plan, Protocol
+from holdfast.twin.protocol import THUMB_SHARE, Command, Plan, Protocol
 from holdfast.twin.surface import curved_fingertip
+from holdfast.twin.truth_log import TruthLog
 from holdfast.twin.uskin import Uskin, with_server_effects
 from holdfast.twin.uskin_parameters import UskinParameters
+from holdfast.twin.uskin_readout import Counts, Readout
 from holdfast.twin.world import World
 
 RETRY_DEPTH_FACTOR = 0.75
@@ -97,6 +99,126 @@ class Grasp:
 SampleCallback = Callable[[World, Command], None]
 
 
+class Simulation:
+    """Simulation of one grasp, sample by sample. It takes grip forces while it runs.
+
+    Args:
+        grasp: the grasp.
+        parameters: parameters of the skin; by default `UskinParameters()`.
+        plan: plan of the grasp; by default the one that is drawn for it.
+        loads: loads on the held object, in addition to the disturbances of the plan.
+
+    Attributes:
+        grasp: the grasp.
+        world: its physical state.
+        protocol: its course.
+        uskins: skin of each fingertip.
+        n_samples: number of samples so far.
+        command: command of the last sample.
+
+    Raises:
+        ValueError: object, profile or case is unknown, or the object cannot be grasped.
+    """
+
+    def __init__(
+        self,
+        grasp: Grasp,
+        parameters: UskinParameters | None = None,
+        *,
+        plan: Plan | None = None,
+        loads: Sequence[Load] = (),
+    ) -> None:
+        if grasp.case not in CASES:
+            raise ValueError(f"case 1 or 2 expected, {grasp.case} given")
+        chosen = profile(grasp.profile)
+        if grasp.glitch_rate is not None:
+            chosen = msgspec.structs.replace(chosen, glitch_rate=grasp.glitch_rate)
+        self.grasp, self._profile, self._loads = grasp, chosen, loads
+        self.plan = plan or _draw_plan(grasp, chosen)
+        self.world = _world(grasp, chosen.glitch_rate)
+        skin = parameters or UskinParameters()
+        if grasp.noise is not None:
+            skin = replace(skin, noise_counts=grasp.noise)
+        self.uskins = {finger: _skin(grasp.seed, finger, skin) for finger in FINGERS}
+        self.protocol = Protocol(self.plan, 1 / RATE)
+        self.command: Command | None = None
+        self.n_samples = 0
+        self._pressing: Pressing | None = None
+        self._truth_log = TruthLog()
+        self._taxel_forces: dict[str, list[Array]] = {finger: [] for finger in FINGERS}
+        self._readouts: dict[str, Readout] = {}
+
+    @property
+    def time(self) -> float:
+        """Time of the next sample [s]."""
+        return self.n_samples / RATE
+
+    @property
+    def held_for(self) -> float:
+        """Time since the object was locked [s]; negative before."""
+        locked_at = self.protocol.locked_at
+        return -1.0 if locked_at is None else self.time - locked_at
+
+    @property
+    def is_over(self) -> bool:
+        """Whether the grasp is complete."""
+        return self.protocol.is_over(self.time)
+
+    def step(self, scales: Array | None = None) -> None:
+        """Simulate one sample.
+
+        Args:
+            scales: (4,) force of each finger as a multiple of that at the lock; None, and before
+                the lock and during the release, leaves the set-points of the plan.
+        """
+        world, protocol = self.world, self.protocol
+        was_locked = protocol.locked_at is not None
+        command = protocol.command(self.time, world.loads, world.slip, world.bodies[-1])
+        if protocol.locked_at is not None and not was_locked:
+            joints = world.hand.data.qpos[:N_JOINTS]
+            self._pressing = Pressing(world.path, command.depths, joints)
+        if self._loads and was_locked:
+            world.set_load(load_state(self._loads, self.held_for))
+        moved, released = None, protocol.is_released(self.time)
+        if scales is not None and self._pressing is not None and not released:
+            moved = self._pressing.displacement(scales)
+        world.advance(command, self.plan, protocol.anchor, moved)
+        self._truth_log.add(world, command)
+        nodes = world.contact.node_forces
+        for (finger, uskin), forces in zip(self.uskins.items(), nodes, strict=True):
+            self._taxel_forces[finger].append(uskin.taxel_forces(forces[None])[0])
+        self.command = command
+        self.n_samples += 1
+
+    def read(self) -> dict[str, Counts]:
+        """Return the counts (n_taxels, 3) of the last sample; call it after every `step`."""
+        time = np.array([(self.n_samples - 1) / RATE])
+        counts = {}
+        for finger, uskin in self.uskins.items():
+            if finger not in self._readouts:
+                self._readouts[finger] = uskin.readout(self.grasp.generator(f"skin {finger}"))
+            forces = self._taxel_forces[finger][-1]
+            counts[finger] = self._readouts[finger].counts(forces[None], time)[0]
+        return counts
+
+    def recording(self) -> Recording:
+        """Return the recording so far, with truth and labels."""
+        grasp, times = self.grasp, np.arange(self.n_samples) / RATE
+        truth = self._truth_log.truth(times)
+        modules = {}
+        for finger, uskin in self.uskins.items():
+            forces = np.array(self._taxel_forces[finger])
+            counts = uskin.counts(forces, times, grasp.generator(f"skin {finger}"))
+            stamps = times
+            if grasp.server:
+                server = grasp.generator(f"server {finger}")
+                stamps, counts = with_server_effects(times, counts, server)
+            labels = labels_from_truth(truth, finger, label_rule(self._profile))
+            modules[finger] = Tactile(uskin.sensor, stamps, counts, labels=labels)
+        name = grasp.failed_name if self.protocol.failed else grasp.name
+        return Recording(name, modules, _metadata(grasp, self.protocol), truth)
+
+
 def simulate(
     grasp: Grasp,
     parameters: UskinParameters | None = None,
@@ -116,44 +238,12 @@ def simulate(
     Raises:
         ValueError: object, profile or case is unknown, or the object cannot be grasped.
     """
-    if grasp.case not in CASES:
-        raise ValueError(f"case 1 or 2 expected, {grasp.case} given")
-    chosen = profile(grasp.profile)
-    if grasp.glitch_rate is not None:
-        chosen = msgspec.structs.replace(chosen, glitch_rate=grasp.glitch_rate)
-    plan = _draw_plan(grasp, chosen)
-    world = _world(grasp, chosen.glitch_rate)
-    chosen_skin = parameters or UskinParameters()
-    if grasp.noise is not None:
-        chosen_skin = replace(chosen_skin, noise_counts=grasp.noise)
-    uskins = [_skin(grasp.seed, finger, chosen_skin) for finger in FINGERS]
-    protocol = Protocol(plan, 1 / RATE)
-    truth_log = _TruthLog()
-    taxel_forces: list[list[Array]] = [[] for _ in FINGERS]
-    k = 0
-    while not protocol.is_over(k / RATE):
-        command = protocol.command(k / RATE, world.loads, world.slip, world.bodies[-1])
-        world.advance(command, plan, protocol.anchor)
-        truth_log.add(world, command)
-        for collected, uskin, forces in zip(
-            taxel_forces, uskins, world.contact.node_forces, strict=True
-        ):
-            collected.append(uskin.taxel_forces(forces[None])[0])
-        if on_sample is not None:
-            on_sample(world, command)
-        k += 1
-    times = np.arange(k) / RATE
-    truth = truth_log.truth(times)
-    modules = {}
-    for finger, uskin, collected in zip(FINGERS, uskins, taxel_forces, strict=True):
-        noise = grasp.generator(f"skin {finger}")
-        counts, stamps = uskin.counts(np.array(collected), times, noise), times
-        if grasp.server:
-            stamps, counts = with_server_effects(times, counts, grasp.generator(f"server {finger}"))
-        labels = labels_from_truth(truth, finger, label_rule(chosen))
-        modules[finger] = Tactile(uskin.sensor, stamps, counts, labels=labels)
-    name = grasp.failed_name if protocol.failed else grasp.name
-    return Recording(name, modules, _metadata(grasp, protocol), truth)
+    simulation = Simulation(grasp, parameters)
+    while not simulation.is_over:
+        simulation.step()
+        if on_sample is not None and simulation.command is not None:
+            on_sample(simulation.world, simulation.command)
+    return simulation.recording()
 
 
 def label_rule(chosen: Profile) -> LabelRule:
@@ -210,54 +300,6 @@ def _object(name: str, table: str | Path | None) -> GraspObject:
 @cache
 def _path(name: str, table: str | Path | None) -> ClosingPath:
     return closing_path(_object(name, table))
-
-
-class _TruthLog:
-    """Collector of the truth, sample by sample."""
-
-    def __init__(self) -> None:
-        self._phase: list[Phase] = []
-        self._rows: dict[str, list[Array]] = {
-            name: [] for name in ("outside_force", "object_pose", "joints", "set_point_error")
-        }
-        self._tips: list[Array] = []
-        self._bodies: list[Array] = []
-
-    def add(self, world: World, command: Command) -> None:
-        data = world.hand.data
-        self._phase.append(command.phase)
-        self._rows["outside_force"].append(world.outside[:3].copy())
-        pose = np.concatenate([world.bodies[-1, :3], data.qpos[N_JOINTS + 3 :]])
-        self._rows["object_pose"].append(pose)
-        self._rows["joints"].append(data.qpos[:N_JOINTS].copy())
-        self._rows["set_point_error"].append(np.array(world.set_point_error))
-        self._tips.append(world.contact.tips.copy())
-        self._bodies.append(world.bodies[:-1].copy())
-
-    def truth(self, times: Array) -> Truth:
-        tips = np.array(self._tips)
-        bodies = np.array(self._bodies)
-        fingers = {
-            finger: {
-                "contact_force": -tips[:, place, :3],
-                "slip_speed": tips[:, place, SLIP],
-                "slipping_share": tips[:, place, SLIPPING_SHARE],
-                "tip_pose": _poses(bodies[:, place]),
-            }
-            for place, finger in enumerate(FINGERS)
-        }
-        hand = {name: np.array(rows) for name, rows in self._rows.items()}
-        push = np.linalg.norm(hand["outside_force"], axis=1)  # the only other contact then
-        phase = phases_from_touch(np.array(self._phase, dtype=str), push, CONTACT_LOAD)
-        return Truth(times, {"phase": phase, **hand}, fingers)
-
-
-def _poses(bodies: Array) -> Array:
-    """Return positions [m] and quaternions w, x, y, z, (n, 7)."""
-    from scipy.spatial.transform import Rotation
-
-    turns = Rotation.from_matrix(bodies[:, 3:12].reshape(-1, 3, 3)).as_quat()
-    return np.column_stack([bodies[:, :3], turns[:, 3], turns[:, :3]])
 
 
 def _metadata(grasp: Grasp, protocol: Protocol) -> dict[str, object]:

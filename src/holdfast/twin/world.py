@@ -9,9 +9,11 @@ from holdfast.twin.contact import LOAD, SLIP, constants_of, new_contact, touch
 from holdfast.twin.control import STEPS_PER_CONTROL, Controller, control
 from holdfast.twin.grasp import ClosingPath, object_pose
 from holdfast.twin.hand import FINGERS, GRAVITY, N_JOINTS, SUBSTEPS, TIMESTEP, HandModel
+from holdfast.twin.loads import LoadState
 from holdfast.twin.objects import GraspObject
 from holdfast.twin.operator import MOVE, hold_wrench, move_wrench, push_wrench
 from holdfast.twin.protocol import OPEN_GAP, Command, Plan
+from holdfast.twin.shapes import MU_KINETIC, MU_STATIC
 from holdfast.twin.surface import curved_fingertip
 
 MIN_HEIGHT = -0.3
@@ -51,6 +53,8 @@ class World:
         self.outside = np.zeros(6)
         self.set_point_error = 0.0
         self._wrench = np.zeros(6)
+        self._pull = np.zeros(3)
+        self._frictions = self.constants.solid[MU_STATIC : MU_KINETIC + 1].copy()
         self._parameters = np.zeros(9)
         self._origin = np.zeros(12)
         self._disturbance = -1
@@ -67,10 +71,31 @@ class World:
         """Largest slip speed of a fingertip in contact [m/s]."""
         return float(np.where(self.loads > 0, self.contact.tips[:, SLIP], 0.0).max())
 
-    def advance(self, command: Command, plan: Plan, anchor: Array) -> None:
-        """Advance by one sample, seven physics steps, with that command."""
+    def set_load(self, load: LoadState) -> None:
+        """Set force, friction and acceleration of the hand until they are set again.
+
+        The hand does not move in the world: its acceleration is a change of gravity.
+        """
+        self._pull[:] = load.force
+        self.hand.model.opt.gravity[:] = [0.0, 0.0, -GRAVITY] - load.acceleration
+        frictions = self.constants.solid[MU_STATIC : MU_KINETIC + 1]
+        frictions[:] = load.friction * self._frictions
+
+    def advance(
+        self, command: Command, plan: Plan, anchor: Array, displacement: Array | None = None
+    ) -> None:
+        """Advance by one sample, seven physics steps.
+
+        Args:
+            command: set-points of the fingers and action of the operator.
+            plan: plan of the grasp.
+            anchor: (12,) position and rotation at which the operator holds the object.
+            displacement: (16,) of the set-points of the joints [rad]; None for none.
+        """
         data = self.hand.data
         target = self.path.targets(command.depths)
+        if displacement is not None:
+            target = target + displacement
         self.set_point_error = 0.0
         if command.disturbance != self._disturbance:
             self._disturbance = command.disturbance
@@ -90,6 +115,8 @@ class World:
                 style, duration, command.elapsed + k * TIMESTEP, self.contact.wrench,
                 self.outside, self._wrench,
             )  # fmt: skip
+            self.outside[:3] += self._pull
+            self._wrench[:3] += self._pull
             self.hand.apply(self.contact.tips, self._wrench, self.bodies)
             if self._tick % STEPS_PER_CONTROL == 0:
                 tick = self._tick // STEPS_PER_CONTROL

@@ -1,0 +1,110 @@
+"""The twin as a source and a hand at once: the simulation runs, and takes commands."""
+
+import time
+from collections.abc import Mapping
+from typing import Any
+
+import numpy as np
+
+from holdfast.control.command import GripCommand
+from holdfast.control.hands import Hand
+from holdfast.errors import HandError
+from holdfast.sensors import Sensor
+from holdfast.sources import Arrival, Source
+from holdfast.sources.twin import grasp_of
+from holdfast.sources.uri import parse
+from holdfast.twin.hand import FINGERS, RATE
+from holdfast.twin.simulation import Simulation
+
+
+class LiveTwin(Source, Hand):
+    """Twin that simulates each sample when it is read, with the last command that it got.
+
+    It is a source like any other, and a hand like any other. A grasp without commands gives the
+    samples of its recording.
+
+    Args:
+        uri: as of the source: `twin:?object=can&seed=0&case=2&repeat=1&profile=reference`.
+        speed: 1 is real time, 0 is as fast as samples are read.
+
+    Attributes:
+        simulation: the simulation; None while the twin is closed.
+
+    Raises:
+        ValueError: the URI is not valid, or asks for the effects of a server.
+
+    Example:
+        >>> from holdfast.control import FingerCommand, LoopState
+        >>> with LiveTwin("twin:?object=ball", speed=0) as twin:
+        ...     arrival = twin.read(0.0)
+        ...     twin.send(GripCommand(0.0, LoopState.HOLD, {"thumb": FingerCommand(1.2)}))
+        ...     arrival.samples["thumb"].shape
+        (30, 3)
+    """
+
+    def __init__(self, uri: str = "twin:", *, speed: float = 1.0) -> None:
+        self.grasp = grasp_of(parse(uri)[1])
+        if self.grasp.server:
+            raise ValueError(f"{uri}: server=false expected while the twin takes commands")
+        self.name, self.speed, self.paced = uri, speed, speed > 0
+        self.simulation: Simulation | None = None
+        self._scales = np.ones(len(FINGERS))
+        self._begun_at = 0.0
+
+    @property
+    def sensors(self) -> Mapping[str, Sensor]:  # type: ignore[override]
+        """Sensors by finger."""
+        if self.simulation is None:
+            return {}
+        return {finger: uskin.sensor for finger, uskin in self.simulation.uskins.items()}
+
+    @property
+    def metadata(self) -> Mapping[str, Any]:  # type: ignore[override]
+        """Object, case and seed of the grasp."""
+        grasp = self.grasp
+        names = ("object", "case", "repeat", "profile", "seed")
+        return {name: getattr(grasp, name) for name in names} | {"source": self.name}
+
+    @property
+    def ended(self) -> bool:
+        """Whether the grasp is complete."""
+        return self.simulation is None or self.simulation.is_over
+
+    def open(self) -> None:
+        """Begin the grasp."""
+        self.simulation = Simulation(self.grasp)
+        self._scales = np.ones(len(FINGERS))
+        self._begun_at = time.monotonic()
+
+    def read(self, timeout: float) -> Arrival | None:
+        """Simulate the next sample, and return it when it is due."""
+        if self.simulation is None or self.simulation.is_over:
+            return None
+        if self.paced:
+            due = self._begun_at + self.simulation.n_samples / (RATE * self.speed)
+            wait = due - time.monotonic()
+            time.sleep(max(min(wait, timeout), 0.0))
+            if wait > timeout:
+                return None
+        at = self.simulation.time
+        self.simulation.step(self._scales)
+        return Arrival(at, self.simulation.read(), time.monotonic())
+
+    def send(self, command: GripCommand) -> None:
+        """Set the force scales from the next sample on, or release the object.
+
+        Raises:
+            HandError: the twin is closed, or the command names another finger.
+        """
+        if self.simulation is None:
+            raise HandError(f"{self.name} is not open")
+        for finger, one in command.fingers.items():
+            if finger not in FINGERS:
+                raise HandError(f"{self.name} has {', '.join(FINGERS)}; {finger!r} commanded")
+            self._scales[FINGERS.index(finger)] = one.scale
+        if command.release:
+            self.simulation.protocol.release(self.simulation.time)
+
+    def close(self) -> None:
+        """End the grasp."""
+        self.simulation = None

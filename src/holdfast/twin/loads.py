@@ -1,0 +1,96 @@
+"""Loads on a held object: weight, pulls, dropping friction, shakes and transport of the hand."""
+
+from collections.abc import Sequence
+from enum import StrEnum
+from typing import NamedTuple
+
+import numpy as np
+
+from holdfast.sensors.types import Array
+from holdfast.twin.hand import GRAVITY
+
+RISE_TIME = 0.2
+"""Time in which a weight is added, or friction falls [s]."""
+
+
+class LoadKind(StrEnum):
+    """Kind of a load, which says what its size means.
+
+    WEIGHT: added mass [kg]; it stays. PULL: largest force [N] of a pull that swells and fades.
+    FRICTION: factor of the friction; it stays. SHAKE: amplitude of the hand's acceleration
+    [m/s^2], at the rate. TRANSPORT: largest acceleration [m/s^2] of the hand, which moves once
+    and stops.
+    """
+
+    WEIGHT = "weight"
+    PULL = "pull"
+    FRICTION = "friction"
+    SHAKE = "shake"
+    TRANSPORT = "transport"
+
+
+class Load(NamedTuple):
+    """One load.
+
+    Attributes:
+        kind: kind of the load.
+        start: time after the lock [s].
+        duration: duration [s]; weight and friction stay.
+        size: size, see `LoadKind`.
+        direction: unit vector in the world, of a pull, shake or transport.
+        rate: rate of a shake [Hz].
+    """
+
+    kind: LoadKind
+    start: float
+    duration: float
+    size: float
+    direction: tuple[float, float, float] = (0.0, 0.0, -1.0)
+    rate: float = 0.0
+
+
+class LoadState(NamedTuple):
+    """Sum of all loads at one instant.
+
+    Attributes:
+        force: (3,) force on the object in the world [N].
+        acceleration: (3,) acceleration of the hand [m/s^2].
+        friction: factor of the friction.
+    """
+
+    force: Array
+    acceleration: Array
+    friction: float
+
+
+def load_state(loads: Sequence[Load], held_for: float) -> LoadState:
+    """Return the sum of loads at a time after the lock [s].
+
+    Example:
+        >>> weight = Load(LoadKind.WEIGHT, start=1.0, duration=0.0, size=0.1)
+        >>> load_state([weight], 2.0).force.tolist()
+        [0.0, 0.0, -0.9810000000000001]
+    """
+    force, acceleration, friction = np.zeros(3), np.zeros(3), 1.0
+    for load in loads:
+        elapsed = held_for - load.start
+        if elapsed < 0:
+            continue
+        along = np.array(load.direction)
+        if load.kind is LoadKind.WEIGHT:
+            force += [0.0, 0.0, -GRAVITY * load.size * _risen(elapsed)]
+        elif load.kind is LoadKind.FRICTION:
+            friction *= 1.0 - (1.0 - load.size) * _risen(elapsed)
+        elif elapsed < load.duration and load.kind is LoadKind.PULL:
+            force += load.size * np.sin(np.pi * elapsed / load.duration) ** 2 * along
+        elif elapsed < load.duration and load.kind is LoadKind.SHAKE:
+            swell = min(1.0, 4 * min(elapsed, load.duration - elapsed) / load.duration)
+            acceleration += load.size * swell * np.sin(2 * np.pi * load.rate * elapsed) * along
+        elif elapsed < load.duration:
+            acceleration += load.size * np.sin(2 * np.pi * elapsed / load.duration) * along
+    return LoadState(force, acceleration, friction)
+
+
+def _risen(elapsed: float) -> float:
+    """Return how much of a load that stays acts, from 0 to 1."""
+    return float(0.5 - 0.5 * np.cos(np.pi * min(elapsed / RISE_TIME, 1.0)))
