@@ -323,7 +323,7 @@ def test_real_uskin(capsys, data_folder, tmp_path):
 def test_a_live_source(capsys, save):
     grasp = save(synthetic_recording("a", 1, ("thumb", "index")))
     with (
-        open_source(str(grasp), speed=1.5) as source,
+        open_source(str(grasp)) as source,
         XelaServer(source, port=0, wait=True) as server,
     ):
         got, _ = lines(capsys, NOISE_FLOOR, f"{server.uri}", "--seconds", "3")
@@ -385,7 +385,7 @@ def test_faults_that_last_are_printed_once(capsys, monkeypatch, save):
     monkeypatch.setattr(ArrivalDetector, "update", late)
     monkeypatch.setattr("sys.stdout.isatty", lambda: True, raising=False)
     with (
-        open_source(str(grasp), speed=1.5) as source,
+        open_source(str(grasp)) as source,
         XelaServer(source, port=0, wait=True) as server,
     ):
         assert main(["detect", NOISE_FLOOR, server.uri, "--seconds", "2.5"]) == 0
