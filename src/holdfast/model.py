@@ -126,6 +126,20 @@ class Training(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     versions: dict[str, str] = {}
 
 
+class ThresholdPoint(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
+    """Errors of the hand at one threshold.
+
+    Attributes:
+        threshold: probability from which a contact is stable.
+        false_alarms_per_minute: per minute of stable label.
+        missed: share of the events without an alarm within 0.2 s [%]; None without events.
+    """
+
+    threshold: float
+    false_alarms_per_minute: float
+    missed: float | None
+
+
 class Tuning(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     """How the threshold of a model was chosen, and the metrics of the hand that it gave.
 
@@ -138,6 +152,7 @@ class Tuning(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
         delay_median: of the alarms [s]; None if it is infinite, or without events.
         n_events: number of events in the recordings.
         stable_minutes: duration of stable labels [min].
+        points: errors at the thresholds that were tried, lowest first.
     """
 
     recordings: dict[str, str]
@@ -148,6 +163,7 @@ class Tuning(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     delay_median: float | None
     n_events: int
     stable_minutes: float
+    points: tuple[ThresholdPoint, ...] = ()
 
 
 class Model(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):

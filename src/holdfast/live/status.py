@@ -146,8 +146,17 @@ def hello_document(
 
 
 def operating_points(model: Model) -> list[schema.OperatingPoint]:
-    """Return what the model's own validation expects at each threshold that it has tried."""
-    return []
+    """Return the errors at each threshold that was tried when the model was tuned."""
+    if model.tuning is None:
+        return []
+    return [
+        schema.OperatingPoint(
+            threshold=point.threshold,
+            false_alarms_per_minute=point.false_alarms_per_minute,
+            missed=point.missed,
+        )
+        for point in model.tuning.points
+    ]
 
 
 def finger_document(

@@ -11,7 +11,7 @@ import numpy.typing as npt
 
 from holdfast.errors import ModelError, TrainingError
 from holdfast.metrics import AlarmMatch, EventMetrics, FingerDecisions, pool_events
-from holdfast.model import Model, Tuning
+from holdfast.model import Model, ThresholdPoint, Tuning
 from holdfast.recordings import Recording
 from holdfast.training.evaluation import compute_decisions
 from holdfast.training.replay import Replay, alarms, stable_counts, with_threshold
@@ -112,7 +112,7 @@ def tune(
     tuned = with_threshold(model, chosen.threshold)
     own = max(part.classifier.threshold for part in model.fingers.values())
     return Tuned(
-        msgspec.structs.replace(tuned, tuning=_record(chosen, digests, false_alarms)),
+        msgspec.structs.replace(tuned, tuning=_record(chosen, points, digests, false_alarms)),
         chosen,
         _point(replays, own),
         _around(points, chosen),
@@ -216,7 +216,12 @@ def _around(points: Sequence[OperatingPoint], chosen: OperatingPoint) -> tuple[O
     return (*below, chosen, *above)
 
 
-def _record(chosen: OperatingPoint, digests: dict[str, str], false_alarms: float) -> Tuning:
+def _record(
+    chosen: OperatingPoint,
+    points: Sequence[OperatingPoint],
+    digests: dict[str, str],
+    false_alarms: float,
+) -> Tuning:
     events = chosen.events
     return Tuning(
         recordings=digests,
@@ -227,4 +232,9 @@ def _record(chosen: OperatingPoint, digests: dict[str, str], false_alarms: float
         delay_median=events.delay_median,
         n_events=events.n_events,
         stable_minutes=events.stable_minutes,
+        points=tuple(_threshold_point(point) for point in _in_order([*points, chosen])),
     )
+
+
+def _threshold_point(point: OperatingPoint) -> ThresholdPoint:
+    return ThresholdPoint(point.threshold, round(point.false_alarms, 3), point.events.missed["0.2"])

@@ -12,13 +12,21 @@ from holdfast.contact import Fault
 from holdfast.detector import detect
 from holdfast.io import load_recording
 from holdfast.live.session import Session
-from holdfast.live.stream_detector import StreamDetector
+from holdfast.live.status import operating_points
+from holdfast.live.stream_detector import StreamDetector, compile_kernels
 from holdfast.live.web import schema
 from holdfast.live.web.service import LiveService
+from holdfast.model import ThresholdPoint, Tuning
 from holdfast.web.guard import Guard
 from live import build
 
 PATIENCE = 30.0
+
+
+@pytest.fixture(autouse=True, scope="module")
+def kernels():
+    """Compile the kernels before a test waits for an estimate."""
+    compile_kernels()
 
 
 @asynccontextmanager
@@ -78,6 +86,16 @@ def test_the_first_document_describes_model_and_source(tmp_path):
     assert np.shape(thumb["rotations"]) == (30, 3, 3)
     assert hello["can_record"] is True
     msgspec.convert(hello, schema.HelloDocument)
+
+
+def test_the_errors_of_a_tuned_model_are_in_the_first_document():
+    points = (ThresholdPoint(0.5, 2.0, 10.0), ThresholdPoint(0.9, 0.5, None))
+    tuning = Tuning({}, 1.0, 0.9, 0.5, {"0.2": None}, None, 0, 1.0, points)
+    found = operating_points(msgspec.structs.replace(build.model(), tuning=tuning))
+    assert [(one.threshold, one.false_alarms_per_minute, one.missed) for one in found] == [
+        (0.5, 2.0, 10.0), (0.9, 0.5, None),
+    ]  # fmt: skip
+    assert operating_points(build.model()) == []
 
 
 def test_documents_have_every_sample_once_and_the_newest_values():

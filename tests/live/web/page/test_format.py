@@ -23,7 +23,8 @@ CALL = "async ([name, value]) => (await import('/page/format.js'))[name](value)"
         ("stateKey", "<b>", "unknown"), ("stateWord", "NO_CONTACT", "NO CONTACT"),
         ("reasonWord", "warm_up", "warming up"), ("reasonWord", "", ""),
         ("faultWord", "a_new_one", "a new one"), ("share", 0.5, "50\u202f%"),
-        ("share", 0.995, "99.5\u202f%"), ("share", None, "–"),
+        ("share", 0.995, "99.5\u202f%"),
+        ("share", 0.99954, "99.95\u202f%"), ("share", 0.68997, "69\u202f%"), ("share", None, "–"),
         ("unitWord", "count", "counts"), ("unitWord", "N", "N"),
     ],
 )  # fmt: skip

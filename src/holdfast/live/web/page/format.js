@@ -24,8 +24,12 @@ export const reasonWord = (reason) => (reason ? REASONS[reason] ?? withSpaces(re
 /** Return the name of a fault; `texts` are those of the service, by fault. */
 export const faultWord = (fault, texts) => texts?.[fault]?.words ?? withSpaces(fault);
 
-/** Format a fraction as percent, with a decimal if it has one: "50 %", "99.5 %". */
-export const share = (fraction) => (Number.isFinite(fraction) ? `${Number((100 * fraction).toFixed(1))}\u202f%` : NO_VALUE);
+/** Format a fraction as percent, with decimals where they matter: "50 %", "68.5 %", "99.95 %". */
+export function share(fraction) {
+  if (!Number.isFinite(fraction)) return NO_VALUE;
+  const digits = Math.abs(fraction - 0.5) > 0.485 ? 2 : 1;
+  return `${Number((100 * fraction).toFixed(digits))}\u202f%`;
+}
 
 /**
  * Return why the state of a finger differs from what its probability says, in few words and in

@@ -11,12 +11,18 @@ export function nearestPoint(points, threshold) {
   return points.reduce((best, point) => (best === null || distance(point) < distance(best) ? point : best), null);
 }
 
+/** Return the probability of log odds; five digits, as `holdfast tune` has them. */
+export const probabilityOf = (logOdds) => Number((1 / (1 + Math.exp(-logOdds))).toPrecision(5));
+
+/** Return the log odds of a probability; at most 8, the end of the slider. */
+export const logOddsOf = (probability) => Math.max(-8, Math.min(8, Math.log(probability / (1 - probability))));
+
 /** Return what the validation of the model expects at a threshold, as a sentence. */
 export function expectation(points, threshold) {
   const point = nearestPoint(points, threshold);
-  if (point === null) return "This model has no table of thresholds, so the errors to expect are not known.";
+  if (point === null) return "The errors to expect are not known: holdfast tune adds them to the model.";
   const missed = point.missed === null ? "" : `, ${number(point.missed).replace(/\.?0+$/, "")}\u202f% of events missed`;
-  return `Expected at ${share(point.threshold)}: ${number(point.false_alarms_per_minute)} false alarms a minute${missed} (validation of the model)`;
+  return `Expected at ${share(point.threshold)}: ${number(point.false_alarms_per_minute)} false alarms a minute${missed} (measured by holdfast tune)`;
 }
 
 /** Return thresholds as text: one value, or the range of those of the fingers. */
@@ -34,12 +40,15 @@ export class ThresholdPanel {
     this.moving = false; // the user moves the slider, or the service has not answered yet
     this.connected = false;
     byId("threshold-toggle").addEventListener("click", () => this.toggle());
-    this.slider.addEventListener("input", () => { this.moving = true; this.showValue([Number(this.slider.value)]); });
-    this.slider.addEventListener("change", () => this.send("POST", { value: Number(this.slider.value) }));
+    this.slider.addEventListener("input", () => { this.moving = true; this.showValue([this.chosen]); });
+    this.slider.addEventListener("change", () => this.send("POST", { value: this.chosen }));
     // Remove the focus after a drag, so that keys are shortcuts again.
     this.slider.addEventListener("pointerup", () => this.slider.blur());
     byId("threshold-own").addEventListener("click", () => this.send("DELETE"));
   }
+
+  /** Probability at which the slider is; its scale is that of log odds. */
+  get chosen() { return probabilityOf(Number(this.slider.value)); }
 
   start(hello) {
     this.own = Object.values(hello.fingers).map((finger) => finger.probability_threshold);
@@ -59,7 +68,8 @@ export class ThresholdPanel {
     this.values = values.length ? values : this.own;
     if (this.moving) return;
     const middle = this.values.reduce((sum, value) => sum + value, 0) / this.values.length;
-    if (Number(this.slider.value) !== middle) this.slider.value = String(middle);
+    if (middle !== this.middle) this.slider.value = String(logOddsOf(middle));
+    this.middle = middle;
     this.showValue(this.values);
     this.show();
   }
@@ -68,6 +78,7 @@ export class ThresholdPanel {
     const word = thresholdWord(values);
     setText(byId("threshold-value"), word);
     setText(byId("threshold-now"), word);
+    this.slider.setAttribute("aria-valuetext", word);
     const errors = values.length === 1 || new Set(values).size === 1
       ? expectation(this.points, values[0]) : "The fingers have different thresholds.";
     setText(byId("threshold-expected"), errors);
@@ -86,6 +97,7 @@ export class ThresholdPanel {
       toast(error.message, "bad");
     } finally {
       this.moving = false;
+      this.middle = null; // show the service's value, whatever it is
     }
   }
 
