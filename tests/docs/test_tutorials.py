@@ -53,6 +53,15 @@ def test_from_python(folder, short_grasps, capsys):
     assert "{'window': " in out
 
 
+def test_your_own_sensor(folder, capsys):
+    assert blocks.run_page(DOCS / "tutorials" / "own-sensor.md") == 7
+    out, err = capsys.readouterr()
+    assert "finger1 9 taxels; columns that are not used: temperature" in err
+    assert "--columns 'time=timestamp:ms,taxels=F{axis}{taxel}'" in err
+    assert "5.020  finger1  UNSTABLE    STABLE" in out
+    assert "findings" not in out
+
+
 def test_from_ros2(folder):
     pytest.importorskip("cyclonedds")
     replace = {"--ros2": "--ros2 --port 0"}
