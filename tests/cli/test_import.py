@@ -238,6 +238,22 @@ class TestASensorOfOnesOwn:
         assert main(["import", str(press), str(tmp_path / "out"), *words]) == 0
         assert (tmp_path / "out" / "press.parquet").exists()
 
+    def test_findings_are_reported_once(self, capsys, press, grid, tmp_path):
+        for name in ("a.csv", "b.csv"):
+            lines = press.read_text().splitlines()
+            rows = [line.split(",") for line in lines[1:]]
+            still = [",".join([row[0], *("7" if k % 3 < 2 else v for k, v in enumerate(row[1:]))])
+                     for row in rows]  # fmt: skip
+            (tmp_path / "in").mkdir(exist_ok=True)
+            (tmp_path / "in" / name).write_text("\n".join([lines[0], *still]) + "\n")
+        words = [str(tmp_path / "in"), str(tmp_path / "out"), "--sensor", str(grid)]
+        assert main(["import", *words]) == 0
+        err = capsys.readouterr().err.splitlines()
+        assert err[2:] == [
+            "a (and 1 more): finger1: readings along x and y never change; 3 axes are expected",
+            "a (and 1 more): no finger is in contact in the whole recording",
+        ]
+
     def test_without_a_sensor(self, capsys, press, tmp_path):
         assert main(["import", str(press), str(tmp_path / "out")]) == 2
         err = capsys.readouterr().err

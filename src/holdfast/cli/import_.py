@@ -16,6 +16,7 @@ from holdfast.cli.terminal.console import print_json, print_line, print_message,
 from holdfast.cli.terminal.progress import progress
 
 if TYPE_CHECKING:
+    from holdfast.labelling.review.findings import Finding
     from holdfast.recordings import Recording
     from holdfast.sensors import Sensor
 
@@ -37,6 +38,7 @@ class _Imported:
     duration: float
     n_labels: int
     complete: bool
+    findings: "tuple[Finding, ...]"
 
     @property
     def n_samples(self) -> int:
@@ -110,6 +112,7 @@ def import_(
         for one in imported:
             (folder / one.path.name).replace(one.path)
     _print(imported, out, as_json)
+    _report_findings(imported)
 
 
 def _recordings(
@@ -195,6 +198,7 @@ def _write(
     from holdfast.errors import RecordingError
     from holdfast.files import file_stem, refuse_overwrite
     from holdfast.io import save_recording
+    from holdfast.labelling.review.findings import findings_of
 
     file_name = f"{file_stem(recording.name)}.{suffix}"
     refuse_overwrite(out / file_name, force=force)
@@ -210,7 +214,21 @@ def _write(
         recording.duration,
         sum(len(module.labels) for module in recording.modules.values()),
         recording.complete,
+        tuple(findings_of(recording)),
     )
+
+
+def _report_findings(imported: Sequence[_Imported]) -> None:
+    """Print each kind of finding once, for the first recording that has it."""
+    by_kind: dict[str, list[tuple[str, Finding]]] = {}
+    for one in imported:
+        for kind, finding in {finding.kind: finding for finding in one.findings}.items():
+            by_kind.setdefault(kind, []).append((one.name, finding))
+    for found in by_kind.values():
+        name, finding = found[0]
+        module = f"{finding.module}: " if finding.module else ""
+        more = f" (and {len(found) - 1} more)" if len(found) > 1 else ""
+        print_message(f"{name}{more}: {module}{finding.text}")
 
 
 def _print(imported: list[_Imported], out: Path, as_json: bool) -> None:

@@ -1,3 +1,4 @@
+import re
 from dataclasses import replace
 
 import numpy as np
@@ -67,6 +68,20 @@ def test_one_taxel_and_an_odd_rate():
         "one_taxel": "one taxel: taxels cannot be compared, only its force is judged",
         "no_contact": "no finger is in contact in the whole recording",
     }
+
+
+@pytest.mark.parametrize(
+    ("unit", "factor", "text"),
+    [
+        ("count", 1e-6, r"readings between -?[\d.e-]+ and [\d.e-]+ are less than one count apart"),
+        ("N", 1.0, r"readings up to [\d.e+]+ N on a taxel: is their unit count\?"),
+    ],
+)
+def test_readings_in_another_unit(thumb, unit, factor, text):
+    module = Tactile(thumb.sensor, thumb.times, thumb.readings * factor, unit)
+    ((_, kind, given),) = [one for one in found(module) if one[1] == "unit"]
+    assert kind == "unit"
+    assert re.match(text, given)
 
 
 def test_a_start_in_contact(thumb):

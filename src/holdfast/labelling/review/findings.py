@@ -18,9 +18,21 @@ from holdfast.recordings import Recording, Tactile
 CONSTANT_SECONDS = 0.5
 """Shortest stretch without any change of the readings that is reported [s]."""
 AXES = "xyz"
+MAX_TAXEL_FORCE = 100.0
+"""Force on one taxel above which the unit of the readings is in doubt [N]."""
+MAX_SAMPLES = 10_000
+"""Number of samples from which the unit is judged."""
 
 Kind = Literal[
-    "constant", "dead", "axes", "one_taxel", "rate", "starts_loaded", "no_contact", "hidden_labels"
+    "constant",
+    "dead",
+    "axes",
+    "unit",
+    "one_taxel",
+    "rate",
+    "starts_loaded",
+    "no_contact",
+    "hidden_labels",
 ]
 
 
@@ -121,6 +133,8 @@ def _of_module(module: Tactile) -> Iterator[tuple[Kind, str]]:
         yield "axes", f"readings along {' and '.join(still)} never change; 3 axes are expected"
     if text := _constant(module):
         yield "constant", text
+    if text := _odd_unit(module):
+        yield "unit", text
 
 
 def _still_axes(module: Tactile) -> list[str]:
@@ -145,6 +159,20 @@ def _constant(module: Tactile) -> str:
     if long[0][0] > times[0]:
         return text
     return f"{text}: the tare shows no noise; give train a --contact-threshold"
+
+
+def _odd_unit(module: Tactile) -> str:
+    """Return a text about readings that cannot be counts, or hardly newtons; empty otherwise."""
+    readings = module.readings[:: max(1, module.n_samples // MAX_SAMPLES)]
+    low, high = np.nanmin(readings), np.nanmax(readings)
+    if module.unit == "count" and high - low < 1:
+        return (
+            f"readings between {low:.4g} and {high:.4g} are less than one count apart, and so "
+            "taken for noise: is their unit N? (--unit N of holdfast sensors --template)"
+        )
+    if module.unit == "N" and max(abs(low), abs(high)) > MAX_TAXEL_FORCE:
+        return f"readings up to {max(abs(low), abs(high)):.4g} N on a taxel: is their unit count?"
+    return ""
 
 
 def _without_contact(recording: Recording) -> bool:
