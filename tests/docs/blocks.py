@@ -17,7 +17,7 @@ import shlex
 import signal
 import subprocess
 import sys
-from collections.abc import Iterator, Mapping
+from collections.abc import Collection, Iterator, Mapping
 from pathlib import Path
 from typing import NamedTuple
 
@@ -41,6 +41,7 @@ class Block(NamedTuple):
     language: str
     text: str
     note: str
+    section: str
 
     @property
     def place(self) -> str:
@@ -51,9 +52,14 @@ def blocks_of(path: Path) -> list[Block]:
     text = path.read_text("utf-8")
     return [
         Block(path.name, text.count("\n", 0, found.start()) + 1, found["language"],
-              found["text"], found["note"] or "")
+              found["text"], found["note"] or "", section_at(text, found.start()))
         for found in FENCE.finditer(text)
     ]  # fmt: skip
+
+
+def section_at(text: str, place: int) -> str:
+    """The last heading of the second level before a place in a page."""
+    return ["", *re.findall(r"^## (.*)$", text[:place], re.M)][-1]
 
 
 def links_of(path: Path) -> list[tuple[str, str]]:
@@ -70,16 +76,21 @@ def anchors_of(path: Path) -> set[str]:
     return {re.sub(r"[^\w\- ]", "", title.lower()).replace(" ", "-") for title in titles}
 
 
-def run_page(path: Path, replace: Mapping[str, str] | None = None) -> int:
+def run_page(
+    path: Path, replace: Mapping[str, str] | None = None, sections: Collection[str] | None = None
+) -> int:
     """Run the blocks of a page in the working folder; return how many ran.
 
     Args:
         path: of the page.
         replace: texts that stand for something else here, such as the address of a hand.
+        sections: only blocks under these headings; by default all blocks.
     """
     names: dict[str, object] = {"__name__": "__main__"}
     n_run = 0
     for block in blocks_of(path):
+        if sections is not None and block.section not in sections:
+            continue
         text = block.text
         for old, new in (replace or {}).items():
             text = text.replace(old, new)

@@ -20,6 +20,14 @@ def test_blocks_and_their_notes(folder):
     ]
 
 
+def test_only_some_sections(folder):
+    page = write(
+        folder, "```python\n1\n```\n## A\n```python\n1\n```\n## B\n```python\n1 / 0\n```\n"
+    )
+    assert [block.section for block in blocks.blocks_of(page)] == ["", "A", "B"]
+    assert blocks.run_page(page, {}, ("", "A")) == 2
+
+
 def test_python_blocks_share_their_names(folder):
     page = write(folder, "```python\nx = 1\n```\n```python\nassert x == 1\n```\n```json\n{\n```\n")
     assert blocks.run_page(page) == 2

@@ -16,6 +16,8 @@ from . import blocks
 
 STUDY = json.loads((blocks.ROOT / "docs" / "study" / "study.json").read_text("utf-8"))
 README = blocks.ROOT / "README.md"
+DEMO, RECORDINGS = ("", "Look at what the demo made"), ("Your own recordings",)
+HAND = ("Your own hand", "Python")
 SHORT = replace(profile("reference"), idle=(0.7, 0.8), hold=6.0)
 
 
@@ -32,20 +34,31 @@ def short_demo(monkeypatch):
     )
 
 
-def test_every_block_works_as_printed(folder, csv_recordings, hand, short_demo):
-    csv_recordings("my-data")
-    save_recording(synthetic_recording("live", 0), folder / "live.parquet")
-    n_run = blocks.run_page(
-        README,
-        {
-            "uv run holdfast demo": "holdfast demo --no-browser --speed 0",
-            'open_source("xela://auto")': 'open_source("live.parquet", speed=0)',
-            "xela://auto": f"'{hand}' --port 0",
-            "holdfast play": "holdfast play --port 0",
-        },
-    )
-    assert n_run == 6
+def test_the_demo_and_what_it_made(folder, short_demo):
+    replaced = {"uv run holdfast demo": "holdfast demo --no-browser --speed 0"}
+    assert blocks.run_page(README, replaced, DEMO) == 2
+    assert (folder / "mug.png").exists()
+
+
+def test_recordings_of_ones_own(folder, csv_recordings):
+    csv_recordings("my-data", fingers=("thumb",))
+    assert blocks.run_page(README, {}, RECORDINGS) == 1
     assert (folder / "model.json").exists()
+
+
+def test_a_hand_of_ones_own(folder, hand):
+    save_recording(synthetic_recording("live", 0), folder / "live.parquet")
+    replaced = {
+        'open_source("xela://auto")': 'open_source("live.parquet", speed=0)',
+        "xela://auto": f"'{hand}' --port 0",
+        "holdfast play": "holdfast play --port 0",
+    }
+    assert blocks.run_page(README, replaced, HAND) == 3
+
+
+def test_every_section_is_run():
+    sections = {block.section for block in blocks.blocks_of(README)}
+    assert sections == {*DEMO, *RECORDINGS, *HAND}
 
 
 def figure(table, **keys):

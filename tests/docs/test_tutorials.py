@@ -27,7 +27,7 @@ def save_grasps(folder, fingers=("thumb", "index")):
 
 
 def test_your_hand(folder, hand):
-    save_grasps(folder / "grasps")
+    save_grasps(folder / "grasps", ("thumb",))
     save_recording(synthetic_recording("live", 0), folder / "live.parquet")
     host = hand.removeprefix("xela://").partition("?")[0]
     live = 'open_source("xela://auto?fingers=1:thumb,2:index")'
