@@ -105,7 +105,7 @@ def print_metrics(metrics: "Metrics") -> None:
         ("", "n", "accuracy %", "FDR %", "FPR %", "FNR %", "AUC", "AUC in contact"),
         [*rows, _sample_row("all", metrics.pooled)],
     )
-    print_line("\nby event (onset of instability in a held contact)")
+    print_line(f"\nby event (onset of instability in a held contact, {_onsets(metrics)})")
     events = [*metrics.events.fingers.items(), ("hand", metrics.events.hand)]
     print_table(
         ("", "events", "missed in 0.05 s %", "0.1 s %", "0.2 s %", "median delay s", "p95 s",
@@ -114,6 +114,12 @@ def print_metrics(metrics: "Metrics") -> None:
     )  # fmt: skip
     if metrics.intervals is not None:
         _print_intervals(metrics.intervals)
+
+
+def _onsets(metrics: "Metrics") -> str:
+    """Return where the onsets of the events come from."""
+    found = metrics.events.hand.onsets
+    return "by truth or labels" if found == "mixed" else f"by the {found}"
 
 
 def _sample_row(name: str, metrics: "SampleMetrics") -> tuple[str, ...]:
