@@ -40,8 +40,9 @@ with its features, but fitted to all other recordings without its weights."""
 def model_estimates(making: Making, real: Corpus, seed: int) -> list[RecordingEstimates]:
     """Return the estimates of the model about each recording, made without that recording.
 
-    Adapting is `holdfast train --init builtin:any --trials 0`. Where the other recordings cannot
-    adapt the model, because a class is missing, it stays as it ships.
+    Adapting is `holdfast train --init builtin:any`. Where the other recordings cannot adapt the
+    model, because a class is missing, it stays as it ships. A model from nothing has the reference
+    parameters, as the methods of the study have.
 
     Args:
         making: how the model is made.
@@ -67,7 +68,7 @@ def _folds(recordings: Sequence[Recording], real: Corpus, seed: int) -> Iterator
 def _model(making: Making, others: Sequence[Recording], seed: int) -> Model | None:
     """Return the model for a fold; None if it cannot be fitted from nothing."""
     shipped = Model.load(SHIPPED)
-    adapting = Setting.adapting(shipped, trials=0)
+    adapting = Setting.adapting(shipped)
     match making:
         case "untouched":
             return shipped
@@ -76,7 +77,7 @@ def _model(making: Making, others: Sequence[Recording], seed: int) -> Model | No
         case "adapted to all":
             return _trained(others, adapting) or shipped
         case "from nothing":
-            return _trained(others, replace(adapting, init=None))
+            return _trained(others, replace(adapting, init=None, trials=0))
 
 
 def _one_with_both_classes(others: Sequence[Recording], seed: int) -> list[Recording]:

@@ -77,9 +77,9 @@ scales agree; the mean AUC, over the recordings with slip, does not depend on th
 slips: of the slips that begin after 0.5 s of stable, those without an alarm {MISSED_AFTER:g} s
 after the onset. False alarms: under a stable label, per minute of it. Both are of the hand, at
 each line's own threshold. {SHIPPED} brings its features, tare, contact threshold and hold time;
-decisions of the methods are held for {HOLD_TIME:g} s. It is adapted by "holdfast train --init"
-without a search, and stays as it ships where the others lack a class. Intervals: from
-{MIN_RECORDINGS} recordings on.""".replace("\n", " ")
+decisions of the methods are held for {HOLD_TIME:g} s. It is adapted by "holdfast train --init",
+and stays as it ships where the others lack a class. Intervals: from {MIN_RECORDINGS} recordings
+on.""".replace("\n", " ")
 BY_RECORDING = "The figures of the table of pooled recordings, by recording."
 BY_FINGER = (
     "Stable against slip, by finger, on the same samples; recordings with both classes only."
