@@ -2,9 +2,10 @@
 
 A packet of 368 taxels is decoded as from XELA's server, detected, recorded to MCAP, and shown on
 the page to two WebSocket clients, one of which never reads. Packets follow each other as fast as
-they are processed; their stamps are 1/150 s apart. A recording ends after each hour of stamps, and
-its file is removed. The report compares the first tenth of the run with the last one: memory, file
-descriptors, threads, and the time from packet to estimate.
+they are processed; their stamps are 1/150 s apart. A recording ends after `--recording` seconds of
+stamps, and its file is removed: the index of an MCAP file stays in memory until it ends. The
+report has, for each tenth of the run, memory, file descriptors, threads, and the time from packet
+to estimate.
 
     uv run python benchmarks/soak.py                      # the whole day
     nice -n 15 uv run python benchmarks/soak.py --minutes 10
@@ -120,8 +121,9 @@ def templates() -> list[tuple[bytes, bytes]]:
 class Soak:
     """Run of a day, with the figures of each of its windows."""
 
-    def __init__(self, folder: Path, seconds: float, minutes: float) -> None:
+    def __init__(self, folder: Path, seconds: float, minutes: float, recording: float) -> None:
         self._folder, self._minutes = folder, minutes
+        self._recording_length = round(recording * RATE)
         self._source = Day(round(seconds * RATE))
         model = Model.load("builtin:twin")
         self._session = Session(StreamDetector(model, self._source))
@@ -164,7 +166,7 @@ class Soak:
         self._times[self._source.n % len(self._times)] = time.perf_counter() - self._source.begun
         if self._source.recorder is not None and update.arrival is not None:
             self._source.recorder.put(update.arrival)
-        if self._source.n % round(HOUR * RATE) == 0:
+        if self._source.n % self._recording_length == 0:
             self._next_recording()
 
     def _next_recording(self) -> None:
@@ -233,9 +235,10 @@ def main() -> None:
     )
     parser.add_argument("--minutes", type=float, default=float("inf"))
     parser.add_argument("--hours", type=float, default=24.0, help="length of the day")
+    parser.add_argument("--recording", type=float, default=HOUR, help="length of recordings [s]")
     options = parser.parse_args()
     with TemporaryDirectory() as folder:
-        report = Soak(Path(folder), options.hours * HOUR, options.minutes).run()
+        report = Soak(Path(folder), options.hours * HOUR, options.minutes, options.recording).run()
     print(json.dumps(report, indent=1))
 
 

@@ -203,7 +203,9 @@ def _send(server: Process, data: bytes, result: Result) -> bool:
 
 def attack_play(clients: int, seconds: float) -> Result:
     """Clients of `play` that never read; memory stays bounded, and a good client loses nothing."""
-    result = Result("play: clients that never read")
+    result = Result(
+        "play: clients that never read", limit=2.0
+    )  # a repeated recording pauses for 1 s
     with recording() as path, running("play", path, "--whole-hand", descriptors=512) as server:
         with ExitStack() as stack:
             source = stack.enter_context(open_source(f"xela://127.0.0.1:{server.port}"))

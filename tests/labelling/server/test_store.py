@@ -150,6 +150,7 @@ def test_labels_in_the_file_that_do_not_fit(bare, finger, spans, text):
     recording, path = bare
     save(bare, {})
     document = json.loads(labels_path(path).read_bytes())
+    document.pop("digest", None)
     document["modules"][finger] = [
         {"start": start, "end": end, "state": "stable"} for start, end in spans
     ]
