@@ -7,6 +7,7 @@ import sys
 import threading
 import time
 from pathlib import Path
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -339,6 +340,46 @@ def test_with_fsync_what_was_written_a_second_ago_is_on_the_disk(path, monkeypat
     assert waits[-1][1] == path.stat().st_size
     assert len(waits) >= 5  # the file, its folder, while recording, and the end
     assert module.FLUSH_INTERVAL + module.SYNC_INTERVAL < 1.0
+
+
+def test_with_fsync_there_is_less_than_a_second_between_two_waits(path, monkeypatch):
+    """By a clock of the test: the steps of the recorder's thread, one flush interval apart."""
+    recorder = Recorder(path, {"thumb": sensor("anyskin")}, fsync=True)
+    recorder._closing = True
+    recorder._wake.set()
+    recorder._thread.join()
+    now, waits = [recorder._synced_at], [recorder._synced_at]
+    clock = SimpleNamespace(monotonic=lambda: now[0], sleep=lambda _: None)
+    monkeypatch.setattr(module, "time", clock)
+    monkeypatch.setattr(os, "fsync", lambda _: waits.append(now[0]))
+    for k in range(100):
+        now[0] += module.FLUSH_INTERVAL
+        recorder._queue.append(Arrival(k, {"thumb": np.zeros((5, 3))}, received=now[0]))
+        recorder._write_queue()
+    assert len(waits) > 20
+    assert max(np.diff(waits)) <= module.SYNC_INTERVAL + module.FLUSH_INTERVAL + 1e-9 < 1.0
+    recorder._writer.close()
+
+
+@pytest.mark.skipif(shutil.which("strace") is None, reason="strace is not installed")
+def test_the_system_is_called_to_write_to_the_disk(path):
+    """The last call that writes to the file is followed by one that waits for the disk."""
+    code = f"""
+import numpy as np
+from holdfast.live.recorder import Recorder
+from holdfast.sensors import sensor
+from holdfast.sources import Arrival
+
+with Recorder({str(path)!r}, {{"thumb": sensor("anyskin")}}, fsync=True) as recorder:
+    recorder.put(Arrival(0.0, {{"thumb": np.zeros((5, 3))}}, received=0.0))
+"""
+    words = ["strace", "-f", "-y", "-e", "trace=write,fsync", sys.executable, "-c", code]
+    done = subprocess.run(words, capture_output=True, text=True, check=True)
+    calls = [line for line in done.stderr.splitlines() if f"{path.name}>" in line]
+    kinds = [re.search(r"(write|fsync)\(", line)[1] for line in calls]
+    assert kinds[-1] == "fsync"
+    assert kinds.count("fsync") >= 2
+    assert kinds[0] == "write"
 
 
 def test_an_error_in_the_thread_is_raised_by_close(path, monkeypatch):

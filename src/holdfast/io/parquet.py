@@ -44,6 +44,8 @@ BLANK_CHECKSUM = "0" * 64
 MAGIC = b"PAR1"
 FOOTER_END_SIZE = 8
 """A Parquet file ends with the length of its footer (4 bytes) and the magic (4 bytes)."""
+MAX_FOOTER_SIZE = 1 << 30
+"""Number of bytes that are searched for the checksum; a day of a whole hand has 0.3 GB."""
 GROUP_SECONDS = 60.0
 """Maximum duration of a row group [s]."""
 GROUP_ROWS = 1 << 16
@@ -206,6 +208,7 @@ def _read_footer(path: Path) -> tuple[int, bytes]:
     with path.open("rb") as file:
         file.seek(max(0, size - FOOTER_END_SIZE))
         footer_size = int.from_bytes(file.read()[:4], "little") + FOOTER_END_SIZE
+        footer_size = min(footer_size, MAX_FOOTER_SIZE)
         file.seek(max(0, size - footer_size))
         start = file.tell()
         return start, file.read()
