@@ -96,7 +96,7 @@ def load_config(path: Path) -> Config:
     """
     try:
         content: dict[str, Any] = tomllib.loads(path.read_text("utf-8"))
-    except (tomllib.TOMLDecodeError, UnicodeDecodeError) as cause:
+    except (tomllib.TOMLDecodeError, UnicodeDecodeError, RecursionError) as cause:
         raise ValueError(f"{path} is not TOML: {cause}") from cause
     known = Config.__struct_fields__
     if unknown := sorted(set(content) - set(known)):

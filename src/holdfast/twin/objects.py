@@ -154,7 +154,7 @@ def load_objects(path: str | Path | None = None) -> dict[str, GraspObject]:
         return dict(_built_in())
     try:
         table = tomllib.loads(read_input(path, MAX_FILE_SIZE).decode())
-    except (tomllib.TOMLDecodeError, UnicodeDecodeError) as cause:
+    except (tomllib.TOMLDecodeError, UnicodeDecodeError, RecursionError) as cause:
         raise ValueError(f"{path} is no TOML table of objects: {cause}") from cause
     if not table:
         raise ValueError(f"{path} has no objects")
