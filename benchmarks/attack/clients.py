@@ -88,7 +88,17 @@ def attack_serve(held: int) -> list[Result]:
     """Hold connections, send invalid requests and unfinished bodies, and never read."""
     with (
         recording() as path,
-        running("serve", "builtin:twin", path, "--token", TOKEN, descriptors=256) as server,
+        TemporaryDirectory() as folder,
+        running(
+            "serve",
+            "builtin:twin",
+            path,
+            "--token",
+            TOKEN,
+            "--record-to",
+            folder,
+            descriptors=256,
+        ) as server,
     ):
         return [
             _hold(server, "serve: half-open connections", b"GET / HTTP/1.1\r\n" + HOST, held),
