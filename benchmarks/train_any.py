@@ -11,6 +11,7 @@ nine of ten stable samples are called STABLE, with the hold time.
 """
 
 import argparse
+from collections import Counter
 from collections.abc import Iterator
 from importlib.metadata import version
 from pathlib import Path
@@ -21,8 +22,10 @@ from msgspec.structs import replace
 from scipy.ndimage import minimum_filter1d
 from scipy.optimize import minimize
 from scipy.special import expit
+from sklearn.linear_model import LogisticRegression
 from sklearn.metrics import roc_auc_score
 
+from holdfast.classifiers.cause import CauseClassifier
 from holdfast.classifiers.linear import LinearClassifier
 from holdfast.contact import NO_CONTACT, STABLE, UNKNOWN, Cause
 from holdfast.features import Tare, parse_features
@@ -40,17 +43,24 @@ CONTACT_LOAD = 10.0
 """Threshold of contact, in multiples of the noise of the force: 6 standard deviations."""
 HOLD = 0.1
 N_FOLDS = 5
+CAUSES = (Cause.CLOSING, Cause.DISTURBANCE, Cause.GLITCH, Cause.LOST, Cause.SLIP)
+NAMED_AS = {Cause.RELEASED: Cause.LOST}
+"""Causes that look alike to a finger: it loses contact."""
 SHARE = 0.9
 """Of the stable samples of a hand, and of the hands, for the threshold."""
 
 
 class HandSamples(NamedTuple):
-    """Samples of one recording: features, label states, slips, and the kind of sensor."""
+    """Samples of one recording: features, labels (`cause` as text), and the kind of sensor."""
 
     features: np.ndarray
     stable: np.ndarray
-    slip: np.ndarray
+    cause: np.ndarray
     kind: str
+
+    @property
+    def slip(self) -> np.ndarray:
+        return self.cause == Cause.SLIP
 
 
 def main(folder: Path, out: Path | None) -> None:
@@ -69,6 +79,7 @@ def main(folder: Path, out: Path | None) -> None:
         chosen = kinds == kind
         report(f"{kind}, of a fifth of the hands", hands, by_hand, chosen)
         report(f"{kind}, all hands with it", hands, np.where(chosen, 0, -1), chosen)
+    report_causes(hands, by_hand)
     threshold = choose_threshold(recordings, hands, by_hand)
     print(f"threshold of the probability: {threshold:.3f}")
     if out is not None:
@@ -81,23 +92,23 @@ def samples_of(recording: Recording) -> HandSamples:
         sensors, dict.fromkeys(sensors, FEATURES), 14, Tare.parse("first"), recording.rate
     )
     found = extract(plan, recording) if sensors else {}
-    rows, stable, slip = [np.empty((0, len(FEATURES)))], [np.empty(0, bool)], [np.empty(0, bool)]
+    rows, stable, cause = [np.empty((0, len(FEATURES)))], [np.empty(0, bool)], [np.empty(0, "U12")]
     step = max(1, round(recording.rate / MAX_RATE))
     for name, finger in found.items():
         module = recording.modules[name]
         states = module.label_states
-        causes = np.zeros(len(states), dtype=bool)
+        causes = np.full(len(states), "", dtype="U12")
         for label in module.labels:
             inside = slice(*np.searchsorted(module.times, (label.start, label.end)))
-            causes[inside] = label.cause is Cause.SLIP
+            causes[inside] = NAMED_AS.get(label.cause, label.cause) or ""
         kept = np.arange(len(states)) % step == 1 % step
         kept &= (states != UNKNOWN) & (states != NO_CONTACT)
         kept &= np.isfinite(finger.features).all(axis=1)
         rows.append(finger.features[kept])
         stable.append(states[kept] == STABLE)
-        slip.append(causes[kept])
+        cause.append(causes[kept])
     kind = str(recording.metadata["sensor_kind"])
-    return HandSamples(np.concatenate(rows), np.concatenate(stable), np.concatenate(slip), kind)
+    return HandSamples(np.concatenate(rows), np.concatenate(stable), np.concatenate(cause), kind)
 
 
 def choose_threshold(recordings, hands: list[HandSamples], folds: np.ndarray) -> float:
@@ -152,6 +163,43 @@ def fit(hands: list[HandSamples], chosen: np.ndarray) -> LinearClassifier:
     return LinearClassifier(tuple(mean), tuple(scale), tuple(found.x[1:]), found.x[0])
 
 
+def fit_causes(hands: list[HandSamples], chosen: np.ndarray) -> CauseClassifier:
+    """Fit a multinomial logistic regression to unstable samples; the causes weigh alike."""
+    used = [hands[k] for k in np.flatnonzero(chosen)]
+    features = np.concatenate([hand.features for hand in used])
+    causes = np.concatenate([hand.cause for hand in used])
+    known = np.isin(causes, CAUSES)
+    mean, scale = features[known].mean(axis=0), features[known].std(axis=0)
+    fitted = LogisticRegression(C=C, class_weight="balanced", max_iter=500).fit(
+        (features[known] - mean) / scale, causes[known]
+    )
+    return CauseClassifier(
+        causes=tuple(map(Cause, fitted.classes_.tolist())),
+        mean=tuple(mean),
+        scale=tuple(scale),
+        coefficients=tuple(map(tuple, fitted.coef_.tolist())),
+        intercepts=tuple(fitted.intercept_.tolist()),
+    )
+
+
+def report_causes(hands: list[HandSamples], folds: np.ndarray) -> None:
+    """Print the confusion of causes on single samples of hands left out, in percent of a row."""
+    counts = {cause: Counter[str]() for cause in CAUSES}
+    for fold in sorted(set(folds)):
+        model = fit_causes(hands, folds != fold)
+        weights = model.weights()[model.codes() - 1]
+        for k in np.flatnonzero(folds == fold):
+            scores = hands[k].features @ weights[:, 1:].T + weights[:, 0]
+            for true, place in zip(hands[k].cause, scores.argmax(axis=1), strict=True):
+                if true in counts:
+                    counts[true][model.causes[place]] += 1
+    print(f"\n| cause | samples | {' | '.join(CAUSES)} |\n|---|---|{'---|' * len(CAUSES)}")
+    for cause, found in counts.items():
+        shares = " | ".join(f"{100 * found[c] / max(found.total(), 1):.0f}" for c in CAUSES)
+        print(f"| {cause} | {found.total()} | {shares} |")
+    print(flush=True)
+
+
 def report(
     title: str, hands: list[HandSamples], folds: np.ndarray, shown: np.ndarray | None = None
 ) -> dict[str, float]:
@@ -180,8 +228,10 @@ def out_of_fold(hands, folds, shown) -> Iterator[tuple[np.ndarray, np.ndarray, n
                 yield classifier.probability(hands[k].features), hands[k].stable, hands[k].slip
 
 
-def model_of(classifier, training: Training | None = None) -> Model:
-    finger = FingerModel(features=FEATURES, classifier=classifier, contact_load=CONTACT_LOAD)
+def model_of(classifier, training: Training | None = None, causes=None) -> Model:
+    finger = FingerModel(
+        features=FEATURES, classifier=classifier, contact_load=CONTACT_LOAD, causes=causes
+    )
     return Model(
         fingers={"*": finger},
         tare="first",
@@ -207,7 +257,9 @@ def save(
         figures=figures,
         versions={name: version(name) for name in ("holdfast", "numpy", "scikit-learn")},
     )
-    model_of(classifier, training).save(out, force=True)
+    model_of(classifier, training, fit_causes(hands, np.ones(len(hands), dtype=bool))).save(
+        out, force=True
+    )
     print(f"{out} written")
 
 

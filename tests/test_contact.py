@@ -104,6 +104,7 @@ def test_estimates_can_be_written_as_json():
         "force": [1.0, 0.0, 0.0],
         "faults": [],
         "faulty_taxels": [],
+        "cause": None,
     }
     with pytest.raises(AttributeError):
         finger.state = ContactState.UNSTABLE

@@ -126,6 +126,7 @@ class ContactEstimate(msgspec.Struct, frozen=True, gc=False):
         faults: faults of the readings, or of their arrival.
         faulty_taxels: indices in the module, from 0, of the taxels that are faulty by
             themselves; empty where the finger as a whole is faulty.
+        cause: the likely cause while UNSTABLE, for a model that tells causes apart; else None.
     """
 
     time: float
@@ -136,6 +137,7 @@ class ContactEstimate(msgspec.Struct, frozen=True, gc=False):
     force: tuple[float, float, float]
     faults: tuple[Fault, ...] = ()
     faulty_taxels: tuple[int, ...] = ()
+    cause: Cause | None = None
 
 
 class HandEstimate(msgspec.Struct, frozen=True, gc=False):

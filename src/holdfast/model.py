@@ -11,6 +11,7 @@ import numpy as np
 import numpy.typing as npt
 
 from holdfast.classifiers import LinearClassifier
+from holdfast.classifiers.cause import CauseClassifier
 from holdfast.errors import ModelError, OutputError
 from holdfast.features import DEFAULT_WINDOW, FeatureSpec, Tare
 from holdfast.features.stream import StreamPlan, extract
@@ -52,6 +53,7 @@ class FingerModel(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_on
             `contact_threshold` is None.
         contact_load: threshold of contact on the load, as a multiple of the noise of the stream,
             for relative features; used instead of the others if it is given.
+        causes: tells the causes of an unstable contact apart; None for none.
 
     Raises:
         ModelError: the fields contradict each other.
@@ -63,8 +65,13 @@ class FingerModel(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_on
     contact_threshold: float | None = None
     contact_noise: float | None = None
     contact_load: float | None = None
+    causes: CauseClassifier | None = None
 
     def __post_init__(self) -> None:
+        if self.causes is not None and self.causes.n_features != len(self.features):
+            raise ModelError(
+                f"{len(self.features)} features given, the causes expect {self.causes.n_features}"
+            )
         _check_limit("features of a finger", len(self.features), MAX_FEATURES)
         _check_limit(
             "samples in a window", max((x.window for x in self.features), default=0), MAX_WINDOW

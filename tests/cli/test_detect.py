@@ -27,7 +27,7 @@ from holdfast.synthetic import synthetic_recording
 
 FIELDS = [
     "time", "finger", "state", "reason", "stable_probability", "instability", "force", "faults",
-    "faulty_taxels",
+    "faulty_taxels", "cause",
 ]  # fmt: skip
 NOISE_FLOOR = "builtin:noise-floor"
 
@@ -107,6 +107,7 @@ def plain(estimate):
         "force": force,
         "faults": [fault.value for fault in estimate.faults],
         "faulty_taxels": list(estimate.faulty_taxels),
+        "cause": estimate.cause,
     }
 
 

@@ -61,8 +61,8 @@ def detect(
     On a terminal, print one line for each change of state that lasted 0.1 s. In a pipe or file,
     or with --json, print one line of JSON per finger and sample, in the order of time: time [s],
     finger, state, reason (why the state is UNKNOWN), stable_probability, instability (sigma) and
-    force (both in the unit of the readings), faults, and faulty_taxels. Values that are not known
-    are null. The memory does not grow with the length of the recording.
+    force (both in the unit of the readings), faults, faulty_taxels and cause. Values that are not
+    known are null. The memory does not grow with the length of the recording.
 
     SOURCE is the path of a recording, or the URI of a live source, which is read until Ctrl-C:
     xela://HOST:PORT (or xela://auto), twin:?object=can, ros2:///xServTopic, ros1:///xServTopic

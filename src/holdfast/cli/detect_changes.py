@@ -75,4 +75,5 @@ def why(estimate: ContactEstimate) -> str:
     if estimate.state is ContactState.NO_CONTACT:
         return ""
     percent = 100 * estimate.stable_probability
-    return f"P(stable) {percent:.0f} %, sigma {estimate.instability:.4g}"
+    cause = f"{estimate.cause}, " if estimate.cause else ""
+    return f"{cause}P(stable) {percent:.0f} %, sigma {estimate.instability:.4g}"

@@ -11,6 +11,7 @@ from msgspec.json import Encoder
 
 from holdfast.cli.terminal.console import print_line, print_table, visible_json
 from holdfast.contact import (
+    Cause,
     ContactEstimate,
     ContactEvent,
     ContactState,
@@ -77,6 +78,7 @@ class EstimateLine(Struct, gc=False):
     force: tuple[float, float, float]
     faults: tuple[Fault, ...]
     faulty_taxels: tuple[int, ...]
+    cause: Cause | None
 
 
 def json_lines(chunk: EstimateChunk) -> Iterator[str]:
@@ -84,7 +86,7 @@ def json_lines(chunk: EstimateChunk) -> Iterator[str]:
     lines = [
         EstimateLine(
             one.time, finger, one.state, one.reason, one.stable_probability, one.instability,
-            one.force, one.faults, one.faulty_taxels,
+            one.force, one.faults, one.faulty_taxels, one.cause,
         )
         for finger, estimates in chunk.fingers.items()
         for one in estimates

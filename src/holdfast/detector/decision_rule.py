@@ -1,12 +1,14 @@
 """The decision rule: from features to contact states, compiled, for one sample or for many."""
 
 import math
+from collections.abc import Sequence
 from typing import NamedTuple, Self
 
 import numpy as np
 import numpy.typing as npt
 
 from holdfast import contact
+from holdfast.classifiers.cause import CAUSES, add_scores
 from holdfast.classifiers.linear import linear_probability
 from holdfast.compiled import compiled
 from holdfast.features import kernel
@@ -36,7 +38,7 @@ from holdfast.features.arrays import LOAD as MOTION_LOAD
 from holdfast.features.faults import TARE_DRIFT
 from holdfast.features.motion import RELEASED_SHARE
 from holdfast.features.stream import StreamPlan
-from holdfast.model import ANY_FINGER, Model
+from holdfast.model import ANY_FINGER, FingerModel, Model
 
 UNKNOWN, NO_CONTACT, UNSTABLE, STABLE = (
     contact.UNKNOWN,
@@ -58,7 +60,8 @@ STATE = 0  # the state that is reported, as a code of holdfast.contact
 CANDIDATE = 1  # the state of the last sample, which may not have lasted long enough yet
 LOAD = 2  # how F_a came over the threshold of contact: one of the next three
 NO_LOAD, TOUCH, DRIFT = range(3)
-CODES_WIDTH = 3
+CAUSE = 3  # code of the cause while unstable; 0 for none
+CODES_WIDTH = 4
 
 # Columns of DecisionMemory.values.
 PROBABILITY = 0
@@ -85,6 +88,7 @@ class DecisionRule(NamedTuple):
 
     weights: Array  # (n_fingers, n_features + 1)
     n_weights: Integers  # (n_fingers,)
+    causes: Array  # (n_fingers, n_causes, n_features + 1); n_causes is 0 without them
     limits: Array  # (n_fingers, LIMITS_WIDTH)
     hysteresis: float
     min_duration: float
@@ -97,6 +101,7 @@ class DecisionMemory(NamedTuple):
 
     codes: Integers  # (n_fingers, CODES_WIDTH)
     values: Array  # (n_fingers, DECIDED_WIDTH)
+    scores: Array  # (n_fingers, n_causes) sums since the contact became unstable
 
 
 class TraceRows(NamedTuple):
@@ -108,6 +113,7 @@ class TraceRows(NamedTuple):
     taxels: Integers  # bits of faulty taxels
     probability: Array
     values: Array  # (n, n_fingers, VALUES_WIDTH), as in Output
+    cause: npt.NDArray[np.int8]  # codes of the causes
     hand: npt.NDArray[np.int8]  # (n,)
 
     @classmethod
@@ -121,6 +127,7 @@ class TraceRows(NamedTuple):
             taxels=np.zeros(shape, dtype=np.int64),
             probability=np.zeros(shape),
             values=np.zeros((*shape, VALUES_WIDTH)),
+            cause=np.zeros(shape, dtype=np.int8),
             hand=np.zeros(n, dtype=np.int8),
         )
 
@@ -145,6 +152,7 @@ def rule_of(model: Model, plan: StreamPlan) -> DecisionRule:
     return DecisionRule(
         weights=weights,
         n_weights=np.array([part.classifier.n_features + 1 for part in parts]),
+        causes=_cause_weights(parts, width),
         limits=np.array(limits, dtype=np.float64),  # None becomes NaN
         hysteresis=float(model.debounce.hysteresis),
         min_duration=float(model.debounce.min_duration),
@@ -153,11 +161,23 @@ def rule_of(model: Model, plan: StreamPlan) -> DecisionRule:
     )
 
 
-def new_decision_memory(n_fingers: int) -> DecisionMemory:
+def _cause_weights(parts: Sequence[FingerModel], width: int) -> Array:
+    """Return (n_fingers, n_causes, width); a finger without causes has the scores 0."""
+    if all(part.causes is None for part in parts):
+        return np.zeros((len(parts), 0, width))
+    weights = np.zeros((len(parts), len(CAUSES), width))
+    for row, part in zip(weights, parts, strict=True):
+        if part.causes is not None:
+            row[:, : part.causes.n_features + 1] = part.causes.weights()
+    return weights
+
+
+def new_decision_memory(n_fingers: int, n_causes: int = 0) -> DecisionMemory:
     """Return the memory before the first sample."""
     return DecisionMemory(
         codes=np.full((n_fingers, CODES_WIDTH), UNKNOWN, dtype=np.int64),
         values=np.full((n_fingers, DECIDED_WIDTH), np.nan),
+        scores=np.zeros((n_fingers, n_causes)),
     )
 
 
@@ -200,6 +220,7 @@ def step(
         if not ready:
             codes[STATE] = codes[CANDIDATE] = UNKNOWN
             decided[PROBABILITY] = decided[LAST_UNSTABLE] = math.nan
+            _forget_cause(codes, decision.scores, finger)
         elif present[finger]:
             limit = rule.limits[finger, CONTACT_LOAD]
             if by_load and _is_unloaded(memory.motion[finger], limit, codes[STATE], time):
@@ -214,9 +235,23 @@ def step(
                 decided[PROBABILITY] = linear_probability(output.features[finger], weights)
                 limit = rule.limits[finger, THRESHOLD]
                 state = _contact_state(decided[PROBABILITY], limit, rule.hysteresis, codes[STATE])
+                if state == UNSTABLE and rule.causes.shape[1] > 0:
+                    codes[CAUSE] = add_scores(
+                        output.features[finger], rule.causes[finger], decision.scores[finger]
+                    )
                 state = _hold(state, decided, rule.hold, time, layout.period)
+            if state != UNSTABLE:
+                _forget_cause(codes, decision.scores, finger)
             _debounce(codes, decided, state, rule.min_duration, time, layout.period)
     return _hand_state(decision.codes[:, STATE], rule.n_model_fingers)
+
+
+@compiled
+def _forget_cause(codes: Integers, scores: Array, finger: int) -> None:
+    """Reset the cause of a finger that is not unstable."""
+    codes[CAUSE] = 0
+    for place in range(scores.shape[1]):
+        scores[finger, place] = 0.0
 
 
 @compiled
@@ -253,6 +288,9 @@ def run(
         rows.faults[k] = output.status[:, FAULTS]
         rows.taxels[k] = output.status[:, TAXELS]
         rows.probability[k] = decision.values[:, PROBABILITY]
+        for finger in range(len(decision.codes)):
+            if decision.codes[finger, STATE] == UNSTABLE:
+                rows.cause[k, finger] = decision.codes[finger, CAUSE]
         rows.values[k] = output.values
 
 

@@ -7,8 +7,10 @@ from typing import NamedTuple
 import numpy as np
 import numpy.typing as npt
 
+from holdfast.classifiers.cause import CAUSES
 from holdfast.contact import (
     SIGNAL_FAULTS,
+    Cause,
     ContactEstimate,
     ContactState,
     Fault,
@@ -22,6 +24,7 @@ from holdfast.features.arrays import SIGMA, Array
 
 STATES = tuple(ContactState)
 REASONS = tuple(Reason)
+CAUSES_BY_CODE: tuple[Cause | None, ...] = (None, *CAUSES)
 ESTIMATES: dict[float, tuple[ContactState, Reason, tuple[Fault, ...]]] = {
     estimate_code(state.code, reason, mask): (state, REASONS[reason], faults_of(mask))
     for state in STATES
@@ -43,6 +46,7 @@ class FingerTrace(NamedTuple):
         force: (n, 3) F_tip in the fingertip frame [unit of the readings].
         faults: (n,) bits in the order of `Fault`.
         faulty_taxels: (n,) bit i is set if taxel i is faulty by itself.
+        cause: (n,) codes of the causes while UNSTABLE: 1 is the first of `Cause`; 0 for none.
     """
 
     times: Array
@@ -53,6 +57,7 @@ class FingerTrace(NamedTuple):
     force: Array
     faults: npt.NDArray[np.int16]
     faulty_taxels: npt.NDArray[np.int64]
+    cause: npt.NDArray[np.int8]
 
     def __len__(self) -> int:
         return len(self.times)
@@ -74,6 +79,7 @@ class FingerTrace(NamedTuple):
                 map(tuple, self.force[rows].tolist()),
                 map(faults_of, self.faults[rows].tolist()),
                 map(taxels_of, self.faulty_taxels[rows].tolist()),
+                [CAUSES_BY_CODE[code] for code in self.cause[rows].tolist()],
             )
         )
 
@@ -125,5 +131,6 @@ def detection_of(
                 rows.values[own, place, :3],
                 rows.faults[own, place],
                 rows.taxels[own, place],
+                rows.cause[own, place],
             )
     return Detection(name, found, times, rows.hand)

@@ -22,7 +22,7 @@ from holdfast.contact import (
     taxels_of,
 )
 from holdfast.detector.decision_rule import TraceRows, new_decision_memory, rule_of, run
-from holdfast.detector.detection import ESTIMATES, STATES, Detection, detection_of
+from holdfast.detector.detection import CAUSES_BY_CODE, ESTIMATES, STATES, Detection, detection_of
 from holdfast.detector.fast_step import REPORT_WIDTH, StepArrays, fast_step
 from holdfast.errors import ModelError, StreamError
 from holdfast.features.arrays import TAXELS, Array
@@ -123,7 +123,7 @@ class Detector:
     def _use(self, stream: FeatureStream) -> None:
         """Set a new feature stream, and an empty decision memory."""
         self._stream = stream
-        self._decision = new_decision_memory(len(stream.plan.fingers))
+        self._decision = new_decision_memory(*self._rule.causes.shape[:2])
         arrays = StepArrays(
             stream.layout, stream.memory, stream.output, self._rule, self._decision,
             self._readings, self._present, self._report,
@@ -253,14 +253,15 @@ class Detector:
         changes, events = self._changes, self._events
         previous = changes.states
         for place, row in enumerate(self._report.tolist()):
-            sample_time, code, probability, sigma, x, y, z = row
+            sample_time, code, probability, sigma, x, y, z, cause = row
             state, reason, faults = ESTIMATES[code]
             taxels = taxels_of(int(self._status[place, TAXELS])) if faults else ()
             if state is not previous[place]:
                 events.append(changes.change(place, state, time))
             fingers[self._names[place]] = ContactEstimate(
-                sample_time, state, reason, probability, sigma, (x, y, z), faults, taxels
-            )
+                sample_time, state, reason, probability, sigma, (x, y, z), faults, taxels,
+                CAUSES_BY_CODE[int(cause)],
+            )  # fmt: skip
         hand = STATES[hand_code]
         if hand is not previous[-1]:
             events.append(changes.change(len(previous) - 1, hand, time))

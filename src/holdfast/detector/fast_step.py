@@ -16,8 +16,10 @@ from numba.np.numpy_support import carray
 
 from holdfast.compiled import compiled
 from holdfast.detector.decision_rule import (
+    CAUSE,
     PROBABILITY,
     STATE,
+    UNSTABLE,
     DecisionMemory,
     DecisionRule,
     step,
@@ -36,7 +38,7 @@ from holdfast.features.arrays import (
 )
 
 MAX_AXES = 3
-REPORT_WIDTH = 7
+REPORT_WIDTH = 8
 
 
 def estimate_code(state: int, reason: int, faults: int) -> int:
@@ -57,7 +59,7 @@ class StepArrays(NamedTuple):
     decision: DecisionMemory
     readings: Array  # (n_taxels, 3) of all fingers
     present: Flags  # (n_fingers,)
-    report: Array  # (n_fingers, REPORT_WIDTH) time, estimate code, probability, sigma and force
+    report: Array  # (n_fingers, REPORT_WIDTH) time, estimate code, probability, sigma, force, cause
 
     def table(self) -> tuple[Integers, list[npt.NDArray[Any]]]:
         """Return the table for `fast_step`, and the arrays that must live as long."""
@@ -67,9 +69,10 @@ class StepArrays(NamedTuple):
             [layout.tare_seconds, layout.period, rule.hysteresis, rule.min_duration, rule.hold]
         )
         arrays = [
-            integers, floats, *layout[:7], *self.memory[:7], *self.output, *rule[:3],
-            *self.decision, self.readings, self.present, self.report, *layout[11:],
-            *self.memory[7:],
+            integers, floats, *layout[:7], *self.memory[:7], *self.output,
+            rule.weights, rule.n_weights, rule.limits, *self.decision[:2],
+            self.readings, self.present, self.report,
+            *layout[11:], *self.memory[7:], rule.causes, self.decision.scores,
         ]  # fmt: skip
         return table_of(arrays), arrays
 
@@ -167,10 +170,10 @@ def fast_step(table: Integers, time: float) -> int:
     )  # fmt: skip
     output = Output(floats2(table, 16), floats2(table, 17), integers2(table, 18))
     rule = DecisionRule(
-        floats2(table, 19), integers1(table, 20), floats2(table, 21), numbers[2], numbers[3],
-        numbers[4], kind[1],
+        floats2(table, 19), integers1(table, 20), floats3(table, 35), floats2(table, 21),
+        numbers[2], numbers[3], numbers[4], kind[1],
     )  # fmt: skip
-    decision = DecisionMemory(integers2(table, 22), floats2(table, 23))
+    decision = DecisionMemory(integers2(table, 22), floats2(table, 23), floats2(table, 36))
     readings, present, report = floats2(table, 24), flags1(table, 25), floats2(table, 26)
     hand = step(layout, memory, output, rule, decision, readings, present, time)
     for f in range(len(present)):
@@ -181,4 +184,5 @@ def fast_step(table: Integers, time: float) -> int:
         report[f, 3] = output.values[f, SIGMA]
         for axis in range(3):
             report[f, 4 + axis] = output.values[f, axis]
+        report[f, 7] = decision.codes[f, CAUSE] if state == UNSTABLE else 0
     return hand

@@ -172,6 +172,7 @@ def finger_document(
         force=estimate.force,
         faults=estimate.faults,
         faulty_taxels=estimate.faulty_taxels,
+        cause=estimate.cause,
         taxels=taxels,
     )
 

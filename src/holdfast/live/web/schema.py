@@ -4,7 +4,7 @@ from typing import Literal
 
 from msgspec import Struct
 
-from holdfast.contact import ContactState, Fault, Reason
+from holdfast.contact import Cause, ContactState, Fault, Reason
 
 SCHEMA = "holdfast.live/1"
 """Name of the schema. New fields may be added under this name; existing ones do not change."""
@@ -112,6 +112,7 @@ class FingerDocument(Struct, frozen=True, kw_only=True, gc=False):
     force: tuple[Number, Number, Number]
     faults: tuple[Fault, ...]
     faulty_taxels: tuple[int, ...]
+    cause: Cause | None
     taxels: list[Vector] | None = None
 
 
