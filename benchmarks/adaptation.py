@@ -1,198 +1,190 @@
-"""Measure how much a few own recordings improve a model: table of docs/training.md, as Markdown.
+"""Measure what labelled recordings of a hand add to builtin:any: tables of docs/training.md.
 
-    holdfast simulate twin/vigorous --profile finger-vigorous --seed 0
-    holdfast simulate twin/gentle --profile finger-gentle --seed 0
-    python benchmarks/adaptation.py twin/vigorous twin/gentle
+    holdfast simulate adaptation/ --randomize --repeats 12 --grasps 24 --seed 200
+    python benchmarks/adaptation.py adaptation/ --real "$HOLDFAST_DATA"
 
-For each folder, N of its recordings are drawn at random. builtin:twin is adapted to them
-(`holdfast train --init builtin:twin`), and a new model is trained on them
-(`holdfast train --features holdfast --hold 0.1`); both with a search of 30 trials and with
-`--trials 0`. These models, and builtin:twin without adaptation, are evaluated on all other
-recordings of the folder. This is repeated for `--draws` draws. Metrics are pooled over the draws;
-intervals are by bootstrap over the evaluated recordings.
+Every hand is a randomized hand of the twin, with 24 grasps. The last 4 are tested. `adapted` is
+what `holdfast train --init builtin:any` makes from the first 1, 2, 5 or 20 of the others, and
+`new` what `holdfast train --features any --hold 0.1 --trials 0` makes from them. All differences
+are to builtin:any on the same grasps; their intervals are by bootstrap over the hands.
 
-Metrics by sample use the labels of the recordings. Metrics by event use labels without margin,
-because a disturbance cannot be detected before its first touch.
+`--real` reads the folder with the real uSkin recordings. Two of the five have a slip; each is
+tested by models of the other one alone, and of the other one and one recording without slip.
+They were not used to choose anything.
 """
 
 import argparse
+from collections import defaultdict
 from collections.abc import Iterator, Sequence
-from dataclasses import replace
-from itertools import chain
+from itertools import groupby
 from pathlib import Path
 from typing import NamedTuple
 
 import numpy as np
 
-from holdfast.classifiers import Parameters
 from holdfast.features import parse_features
 from holdfast.io import load_dataset
-from holdfast.metrics import Decisions, bootstrap_interval, ratio_of_sums, summarise
-from holdfast.metrics.truth_labels import LabelRule, labels_from_truth
+from holdfast.io.importers import import_recordings
+from holdfast.metrics import bootstrap_interval, ratio_of_sums, summarise
 from holdfast.model import Model
-from holdfast.recordings import Recording, label_states
+from holdfast.recordings import Recording
 from holdfast.training import Setting, compute_decisions
+from holdfast.training.adaptation import choose_adaptation
 from holdfast.training.dataset_scan import scan_dataset
-from holdfast.training.model_fit import TrainingData, fit_full_model
-from holdfast.training.setting import SEARCH_SAMPLES
-from holdfast.training.splits import inner_folds, split_data
-from holdfast.training.training_samples import FingerSamples, gather_samples
-from holdfast.training.tuning import INNER_FOLDS, search
+from holdfast.training.model_fit import TrainingData, fit_model
+from holdfast.training.setting import Split
+from holdfast.training.splits import split_data
+from holdfast.training.training_samples import gather_samples
 
-START = "builtin:twin"
-HEADER = (
-    "own recordings", "model", "accuracy %", "difference to builtin:twin, points",
-    "worst to best draw", "events missed in 0.1 s %", "false alarms/min",
-)  # fmt: skip
+START = Model.load("builtin:any")
+SETTINGS = {
+    "adapted": Setting.adapting(START),
+    "new": Setting(features=parse_features("any"), hold=0.1, trials=0),
+}
+N_TESTED = 4
+HEADER = ("recordings", "model", "AUC", "difference", "accuracy %", "difference, points",
+          "false alarms/min", "difference", "hands; changed")  # fmt: skip
 
 
-class Counts(NamedTuple):
-    """Counts of one recording, from which its metrics are computed."""
+class Figures(NamedTuple):
+    """Metrics of one model on one hand: AUC in contact, accuracy [%], false alarms per minute."""
 
-    right: float
-    samples: float
-    missed: float
-    events: float
+    auc: float
+    accuracy: float
     false_alarms: float
-    minutes: float
 
 
-def main() -> None:
-    arguments = parse()
-    for folder in arguments.folders:
-        print(f"\n{folder.name}, {arguments.draws} draws\n")
-        for row in chain((HEADER, ("---",) * len(HEADER)), table_rows(folder, arguments)):
-            print("| " + " | ".join(row) + " |", flush=True)
-
-
-def parse() -> argparse.Namespace:
-    parser = argparse.ArgumentParser(
-        description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
-    )
-    parser.add_argument("folders", type=Path, nargs="+")
-    parser.add_argument("--draws", type=int, default=5)
-    parser.add_argument("--seed", type=int, default=0)
-    parser.add_argument("--sizes", type=int, nargs="+", default=(2, 4, 8))
-    return parser.parse_args()
-
-
-def table_rows(folder: Path, arguments: argparse.Namespace) -> Iterator[tuple[str, ...]]:
-    recordings = list(load_dataset(folder))
-    n = len(recordings)
-    rng = np.random.default_rng(arguments.seed)
-    draws = [rng.permutation(n).tolist() for _ in range(arguments.draws)]
-    start = dict(enumerate(count_all(Model.load(START), recordings)))
-    yield ("none", START, *row_cells([start], [start], n))
-    for size in arguments.sizes:
-        for name, setting in settings().items():
-            counts = [evaluate_draw(recordings, draw, size, setting) for draw in draws]
-            same = [{place: start[place] for place in evaluated} for evaluated in counts]
-            yield (str(size), name, *row_cells(counts, same, n))
-
-
-def settings() -> dict[str, Setting]:
-    model = Model.load(START)
-    own = {"features": parse_features("holdfast"), "hold": 0.1}
-    return {
-        "adapted": Setting.adapting(model),
-        "adapted, `--trials 0`": Setting.adapting(model, trials=0),
-        "new": Setting(**own),
-        "new, `--trials 0`": Setting(**own, trials=0),
-    }
-
-
-def evaluate_draw(
-    recordings: Sequence[Recording], draw: Sequence[int], size: int, setting: Setting
-) -> dict[int, Counts]:
-    """Train on the first `size` recordings of the draw; return the counts of all others."""
-    model = train_model([recordings[place] for place in draw[:size]], setting)
-    rest = draw[size:]
-    return dict(zip(rest, count_all(model, [recordings[place] for place in rest]), strict=True))
-
-
-def train_model(recordings: Sequence[Recording], setting: Setting) -> Model:
-    """Train a model as `holdfast train` does, without cross-validation."""
-    found = scan_dataset(recordings, setting.rate)
-    data_split = split_data(found.recordings, "recording", setting.seed)
-    fingers = gather_samples(recordings, found, setting, data_split)
-    parameters = {
-        finger: search_parameters(each, setting, finger) for finger, each in fingers.items()
-    }
-    return fit_full_model(TrainingData(found, data_split, fingers), setting, parameters)
-
-
-def search_parameters(own: FingerSamples, setting: Setting, finger: str) -> Parameters:
-    recipe, samples = setting.recipe_of(finger), own.samples
-    chosen = np.arange(len(samples.stable)) % -(-len(samples.stable) // SEARCH_SAMPLES) == 0
-    some = samples.take(chosen)
-    folds = inner_folds(some, INNER_FOLDS, setting.seed)
-    if not setting.trials or len(folds) < 2:
-        return recipe.reference
-    return search(some, folds, recipe, n_trials=setting.trials, seed=setting.seed)
-
-
-def count_all(model: Model, recordings: Sequence[Recording]) -> list[Counts]:
-    return [count(model, recording) for recording in recordings]
-
-
-def count(model: Model, recording: Recording) -> Counts:
-    decisions = compute_decisions(model, recording)
-    pooled = summarise([decisions]).pooled
-    events = summarise([without_margin(decisions, recording)]).events.hand
-    (tn, _), (_, tp) = pooled.confusion
-    return Counts(
-        right=tn + tp,
-        samples=pooled.n,
-        missed=(events.missed["0.1"] or 0.0) / 100 * events.n_events,
-        events=events.n_events,
-        false_alarms=(events.false_alarms_per_minute or 0.0) * events.stable_minutes,
-        minutes=events.stable_minutes,
-    )
-
-
-def without_margin(decisions: Decisions, recording: Recording) -> Decisions:
-    """Return the decisions with labels without margin."""
-    rule = LabelRule(margin=0.0, glitch=None)
-    fingers = {
-        name: replace(
-            finger,
-            labels=label_states(labels_from_truth(recording.truth, name, rule), finger.times),
+def main(folder: Path, sizes: Sequence[int], real: Path | None) -> None:
+    shipped: dict[tuple[int, str], list[Figures]] = defaultdict(list)
+    others: dict[tuple[int, str], list[Figures]] = defaultdict(list)
+    changes: dict[int, list[str]] = defaultdict(list)
+    for grasps in hands_of(folder):
+        tested = grasps[-N_TESTED:]
+        start = figures_of(START, tested)
+        for (size, name), (model, change) in models_of(grasps[:-N_TESTED], sizes).items():
+            shipped[size, name].append(start)
+            others[size, name].append(figures_of(model, tested))
+            changes[size] += [change] if change else []
+    print_rows([HEADER, ("---",) * len(HEADER)])
+    first = next(iter(shipped.values()))
+    print_rows([("none", "shipped", *cells(first, first), str(len(first)))])
+    for (size, name), found in others.items():
+        text = (
+            f"{len(found)}; {count_text(changes[size])}" if name == "adapted" else str(len(found))
         )
-        for name, finger in decisions.fingers.items()
-    }
-    return Decisions.of(decisions.name, fingers, len(fingers))
+        print_rows([(str(size), name, *cells(found, shipped[size, name]), text)])
+    if real is not None:
+        print_real(real)
 
 
-def row_cells(
-    counts: Sequence[dict[int, Counts]], start: Sequence[dict[int, Counts]], n: int
-) -> tuple[str, ...]:
-    """Return the cells of a row from the counts of each draw: the model, and the start model."""
-    table, other = sum_draws(counts, n), sum_draws(start, n)
-    per_draw = [100 * right / samples for right, samples, *_ in map(sum_counts, counts)]
-    return (
-        with_interval(100 * table[0], table[1]),
-        "" if counts == start else with_interval(100 * (table[0] - other[0]), table[1], "+.2f"),
-        "" if len(counts) == 1 else f"{min(per_draw):.1f} to {max(per_draw):.1f}",
-        with_interval(100 * table[2], table[3]),
-        with_interval(table[4], table[5]),
-    )
+def hands_of(folder: Path) -> Iterator[list[Recording]]:
+    """Yield the grasps of one hand at a time."""
+    for _, grasps in groupby(load_dataset(folder), key=lambda each: each.metadata["hand"]):
+        yield list(grasps)
 
 
-def sum_draws(draws: Sequence[dict[int, Counts]], n: int) -> np.ndarray:
-    """Return (6, n) counts of n recordings, summed over the draws."""
-    nothing = Counts(*(0.0,) * 6)
-    return np.array([[draw.get(k, nothing) for k in range(n)] for draw in draws]).sum(axis=0).T
+def models_of(
+    recordings: Sequence[Recording], sizes: Sequence[int]
+) -> dict[tuple[int, str], tuple[Model, str]]:
+    """Return the models of the first recordings, and what was changed of an adapted one.
+
+    Without both classes there is no new model, and the shipped one is kept.
+    """
+    found = {}
+    for name, setting in SETTINGS.items():
+        scan = scan_dataset(recordings, relative=True)
+        split: Split = "recording" if len(recordings) > 1 else "time"
+        data_split = split_data(scan.recordings, split, 0)
+        fingers = gather_samples(recordings, scan, setting, data_split)
+        data = TrainingData(scan, data_split, fingers)
+        own = fingers["*"]
+        for size in sizes:
+            held = set(range(size, len(recordings)))
+            if own.without(held).one_class:
+                found[size, name] = START, "kept" if setting.init else ""
+                continue
+            parameters = setting.recipe_of("*").reference
+            if setting.init is not None:
+                parameters = choose_adaptation(own, START.fingers["*"].classifier, held).parameters
+            model = fit_model(data, setting, {"*": parameters}, held)
+            found[size, name] = model or START, str(parameters.get("change", ""))
+    return dict(sorted(found.items(), key=lambda item: item[0][0]))
 
 
-def sum_counts(draw: dict[int, Counts]) -> np.ndarray:
-    return np.sum(list(draw.values()), axis=0)
+def figures_of(model: Model, recordings: Sequence[Recording]) -> Figures:
+    decisions = (compute_decisions(model, recording) for recording in recordings)
+    metrics = summarise(decisions, n_resamples=1)
+    pooled, hand = metrics.pooled, metrics.events.hand
+    return Figures(*(np.nan if x is None else x for x in (
+        pooled.auc_contact, pooled.accuracy, hand.false_alarms_per_minute
+    )))  # fmt: skip
 
 
-def with_interval(parts: np.ndarray, wholes: np.ndarray, form: str = ".1f") -> str:
-    low, high = bootstrap_interval(ratio_of_sums(parts, wholes), n_recordings=len(parts))
-    value = parts.sum() / wholes.sum()
-    return f"{value:{form}} ({low:{form}} to {high:{form}})"
+def cells(found: Sequence[Figures], start: Sequence[Figures]) -> list[str]:
+    """Return mean and paired difference of every metric; hands without it are left out."""
+    table = []
+    for own, other, form in zip(zip(*found, strict=True), zip(*start, strict=True),
+                                (".3f", ".1f", ".1f"), strict=True):  # fmt: skip
+        known = np.isfinite(own) & np.isfinite(other)
+        difference = (np.array(own) - np.array(other))[known]
+        table += [f"{np.array(own)[known].mean():{form}}", with_interval(difference, "+" + form)]
+    return table
+
+
+def with_interval(values: np.ndarray, form: str) -> str:
+    if not values.any():
+        return ""
+    mean = ratio_of_sums(values, np.ones(len(values)))
+    low, high = bootstrap_interval(mean, n_recordings=len(values)) or (np.nan, np.nan)
+    return f"{values.mean():{form}} ({low:{form}} to {high:{form}})"
+
+
+def count_text(changes: Sequence[str]) -> str:
+    counts = {name: changes.count(name) for name in sorted(set(changes))}
+    return ", ".join(f"{'kept' if name == 'none' else name} {n}" for name, n in counts.items())
+
+
+def print_real(data: Path) -> None:
+    every = list(import_recordings(data / "uskin_pick_move", "uskin-pick-move"))
+    slips = [each for each in every if has_slip(each)]
+    quiet = [each for each in every if not has_slip(each)]
+    print()
+    print_rows([("tested", "recordings", "model", "AUC", "accuracy %", "false alarms/min")])
+    print_rows([("---",) * 6])
+    for tested in slips:
+        others = [each for each in slips if each is not tested]
+        print_rows([real_row(tested, "none", "shipped", [START])])
+        for size, sets in ((1, [others]), (2, [[*others, one] for one in quiet])):
+            fits = [models_of(own, [size]) for own in sets]
+            for name in SETTINGS:
+                models = [fit[size, name][0] for fit in fits]
+                taken = count_text([fit[size, name][1] for fit in fits])
+                text = f"{name} ({taken})" if name == "adapted" else name
+                print_rows([real_row(tested, str(size), text, models)])
+
+
+def real_row(tested: Recording, size: str, name: str, models: Sequence[Model]) -> tuple[str, ...]:
+    """Return the row of one left-out recording: the mean over the models."""
+    auc, accuracy, alarms = np.mean([figures_of(model, [tested]) for model in models], axis=0)
+    return tested.name[-8:], size, name, f"{auc:.3f}", f"{accuracy:.1f}", f"{alarms:.1f}"
+
+
+def has_slip(recording: Recording) -> bool:
+    modules = recording.modules.values()
+    return any(label.state == "UNSTABLE" for module in modules for label in module.labels)
+
+
+def print_rows(rows: Sequence[Sequence[str]]) -> None:
+    for row in rows:
+        print("| " + " | ".join(row) + " |", flush=True)
 
 
 if __name__ == "__main__":
-    main()
+    parser = argparse.ArgumentParser(
+        description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
+    )
+    parser.add_argument("folder", type=Path)
+    parser.add_argument("--sizes", type=int, nargs="+", default=(1, 2, 5, 20))
+    parser.add_argument("--real", type=Path)
+    given = parser.parse_args()
+    main(given.folder, given.sizes, given.real)

@@ -1,6 +1,8 @@
 """`holdfast evaluate`: metrics of a model on labelled recordings."""
 
 from pathlib import Path
+from shutil import get_terminal_size
+from textwrap import fill
 from typing import TYPE_CHECKING, Annotated
 
 import typer
@@ -38,8 +40,9 @@ def evaluate(
 
     Print metrics by sample (accuracy, FDR, FPR, FNR, AUC) and by event (missed events, detection
     delay, false alarms), for each finger and for the hand, with bootstrap intervals over the
-    recordings. Recordings that the model was trained on are named, because their metrics are
-    optimistic. The figure shows errors and delays.
+    recordings. A sentence before them says what the model is good for. Recordings that the model
+    was trained on are named, because their metrics are optimistic. The figure shows errors and
+    delays.
 
     Example:
       holdfast evaluate model.json recordings/
@@ -51,20 +54,23 @@ def evaluate(
     from holdfast.io import load_dataset
     from holdfast.metrics import summarise
     from holdfast.model import Model
-    from holdfast.training import compute_decisions
+    from holdfast.training.evaluation import judge
+    from holdfast.training.verdict import LoadedTares, verdict
 
     if plot is not None:
         check_plot(plot, force)
     loaded = Model.load(model)
     trained_on: list[str] = []
+    tares: list[bool] = []
     plotted = []
     recordings = load_dataset(data)
 
     def decisions_of_all() -> "Iterator[Decisions]":
         for recording in progress(recordings, "evaluating"):
-            if _was_trained_on(loaded, recording):
+            if was_trained_on(loaded, recording):
                 trained_on.append(recording.name)
-            decisions = compute_decisions(loaded, recording)
+            decisions, tare_loaded = judge(loaded, recording)
+            tares.append(tare_loaded)
             if plot is not None:
                 plotted.append(decisions)
             yield decisions
@@ -72,29 +78,38 @@ def evaluate(
     metrics = summarise(decisions_of_all(), seed=seed)
     if metrics.pooled.n + metrics.pooled.n_undecided == 0:
         raise TrainingError(f"{data}: {len(recordings)} recordings without labels; labels expected")
-    _warn_about_training(trained_on, len(recordings))
+    warn_about_training(trained_on, len(recordings))
     if plot is not None:
         from holdfast.plots.evaluation import draw_evaluation
 
         save_plot(draw_evaluation(metrics, plotted), plot, force)
+    sentence = verdict(metrics, LoadedTares(sum(tares), len(tares)))
     if as_json:
-        print_json({**msgspec.to_builtins(metrics), "trained_on": trained_on})
+        print_json({**msgspec.to_builtins(metrics), "trained_on": trained_on, "verdict": sentence})
         return
+    print_verdict(sentence)
     print_metrics(metrics)
     print_line(f"\n{model} on {len(recordings)} recordings")
 
 
-def _was_trained_on(model: "Model", recording: "Recording") -> bool:
+def was_trained_on(model: "Model", recording: "Recording") -> bool:
+    """Return whether a model was trained on a recording, by the digest of its samples."""
     return model.training is not None and recording.digest in model.training.recordings.values()
 
 
-def _warn_about_training(trained_on: list[str], n_recordings: int) -> None:
+def warn_about_training(trained_on: list[str], n_recordings: int) -> None:
+    """Print the names of recordings on which the model was trained, if there are any."""
     if trained_on:
         names = ", ".join(trained_on[:5]) + (" ..." if len(trained_on) > 5 else "")
         print_message(
             f"the model was trained on {len(trained_on)} of these {n_recordings} recordings "
             f"({names}): their metrics are optimistic"
         )
+
+
+def print_verdict(sentence: str) -> None:
+    """Print the sentence on what a model is good for, as wide as the terminal."""
+    print_line(fill(sentence, get_terminal_size().columns) + "\n")
 
 
 def print_metrics(metrics: "Metrics") -> None:

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
+from holdfast.cli.model_info import is_model, print_model
 from holdfast.cli.options import (
     ForcePlotOption,
     JsonOption,
@@ -29,13 +30,13 @@ MAX_VALUE_LENGTH = 90
 
 
 def info(
-    path: Annotated[Path, typer.Argument(help="A recording, or a folder of recordings.")],
+    path: Annotated[Path, typer.Argument(help="A recording, a folder of recordings, or a model.")],
     plot: PlotOption = None,
     tare: TareOption = "0.5",
     force: ForcePlotOption = False,
     as_json: JsonOption = False,
 ) -> None:
-    """Show the content of a recording, or of a folder of recordings.
+    """Show the content of a recording, of a folder of recordings, or of a model.
 
     Print modules, sensors, number of samples, rates, gaps (steps in time of over three periods),
     repeats (samples equal to the one before), seconds of each label, number of samples with
@@ -46,13 +47,22 @@ def info(
     finger over time. The tare is used for the figure and the faults; choose a time without
     contact.
 
+    Of a model, print sensor, rate, features, threshold, contact and hold, and the recordings on
+    which it was trained and tuned.
+
     Example:
       holdfast info real/
+      holdfast info builtin:any
       holdfast info grasp.parquet --plot grasp.pdf
       holdfast info grasp.mcap --plot grasp.svg --tare first --json
     """
     from holdfast.features import Tare
 
+    if is_model(path):
+        if plot is not None:
+            raise ValueError(f"--plot draws one recording; the model {path} given")
+        print_model(path, as_json)
+        return
     chosen = Tare.parse(tare)
     if path.is_dir():
         if plot is not None:

@@ -120,7 +120,7 @@ def train(
       holdfast train recordings/ -o model.json --features holdfast --hold 0.1
       holdfast train recordings/ -o model.json --init builtin:twin
     """
-    from holdfast.cli.evaluate import print_metrics
+    from holdfast.cli.evaluate import print_metrics, print_verdict
     from holdfast.files import refuse_overwrite
     from holdfast.io import load_dataset
     from holdfast.labelling.review.findings import report_hidden_labels
@@ -158,10 +158,12 @@ def train(
             {
                 "model": model,
                 "split": trained.split,
+                "verdict": trained.verdict,
                 "cross_validation": trained.cross_validation,
             }
         )
         return
+    print_verdict(trained.verdict)
     print_metrics(trained.cross_validation)
     print_line(
         f"\n{model}: trained on {len(recordings)} recordings; "

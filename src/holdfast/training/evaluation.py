@@ -5,7 +5,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from holdfast.contact import UNKNOWN
+from holdfast.contact import SIGNAL_FAULTS, UNKNOWN, Fault
 from holdfast.detector import detect
 from holdfast.metrics import Decisions, FingerDecisions, Metrics, summarise
 from holdfast.metrics.decisions import hand_decisions
@@ -13,6 +13,9 @@ from holdfast.metrics.truth_labels import LabelRule, labels_by_truth
 from holdfast.model import Model
 from holdfast.recordings import Recording, label_states
 from holdfast.training.splits import Integers
+
+TARE_LOADED = 1 << SIGNAL_FAULTS.index(Fault.TARE_LOADED)
+"""Bit of the fault of a tare that was taken under load."""
 
 
 def compute_decisions(model: Model, recording: Recording) -> Decisions:
@@ -23,7 +26,17 @@ def compute_decisions(model: Model, recording: Recording) -> Decisions:
     Raises:
         ModelError: the recording has other fingers or sensors.
     """
+    return judge(model, recording)[0]
+
+
+def judge(model: Model, recording: Recording) -> tuple[Decisions, bool]:
+    """Return the decisions as `compute_decisions`, and whether the tare was taken under load.
+
+    Raises:
+        ModelError: the recording has other fingers or sensors.
+    """
     detection = detect(model, recording)
+    loaded = any((trace.faults & TARE_LOADED).any() for trace in detection.fingers.values())
     exact = labels_by_truth(recording, LabelRule(margin=0.0))
     fingers = {
         name: FingerDecisions(
@@ -36,7 +49,7 @@ def compute_decisions(model: Model, recording: Recording) -> Decisions:
         for name, trace in detection.fingers.items()
     }
     hand = replace(hand_decisions(fingers, len(model.fingers)), states=detection.hand)
-    return Decisions(recording.name, fingers, hand)
+    return Decisions(recording.name, fingers, hand), loaded
 
 
 def evaluate(model: Model, recordings: Iterable[Recording], seed: int = 0) -> Metrics:

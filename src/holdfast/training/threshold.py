@@ -112,7 +112,11 @@ def tune(
     tuned = with_threshold(model, chosen.threshold)
     own = max(part.classifier.threshold for part in model.fingers.values())
     return Tuned(
-        msgspec.structs.replace(tuned, tuning=_record(chosen, points, digests, false_alarms)),
+        msgspec.structs.replace(
+            tuned,
+            name=f"{model.name}, tuned" if model.name else "",
+            tuning=_record(chosen, points, digests, false_alarms),
+        ),
         chosen,
         _point(replays, own),
         _around(points, chosen),

@@ -14,13 +14,14 @@ from holdfast.parallel import map_ordered
 from holdfast.recordings import Recording
 from holdfast.training.adaptation import choose_adaptation
 from holdfast.training.dataset_scan import scan_dataset
-from holdfast.training.evaluation import combine_decisions, compute_decisions
+from holdfast.training.evaluation import combine_decisions, judge
 from holdfast.training.model_fit import TrainingData, fit_full_model, fit_model
 from holdfast.training.provenance import adaptation_warnings, training_record
 from holdfast.training.setting import SEARCH_SAMPLES, Setting, Split
 from holdfast.training.splits import inner_folds, split_data
 from holdfast.training.training_samples import gather_samples, thin
 from holdfast.training.tuning import INNER_FOLDS, search
+from holdfast.training.verdict import LoadedTares, verdict
 
 MAX_SEARCHES = 5
 """Maximum number of parameter searches for the cross-validation.
@@ -56,11 +57,18 @@ class Trained:
         model: fitted to all recordings.
         cross_validation: metrics of predictions out of fold.
         split: unit that the cross-validation left out.
+        tares: recordings whose tare was taken under load, of all.
     """
 
     model: Model
     cross_validation: Metrics
     split: Split = "recording"
+    tares: LoadedTares | None = None
+
+    @property
+    def verdict(self) -> str:
+        """What the model is good for, in one sentence."""
+        return verdict(self.cross_validation, self.tares)
 
 
 def train(
@@ -99,9 +107,8 @@ def train(
     metrics = trainer.cross_validate(held_out or [final])
     _warn_of_undecided(metrics, warn)
     provenance = training_record(trainer.setting, trainer.scan, final, metrics.pooled)
-    return Trained(
-        msgspec.structs.replace(model, training=provenance), metrics, trainer.setting.split
-    )
+    model = msgspec.structs.replace(model, training=provenance)
+    return Trained(model, metrics, trainer.setting.split, trainer.tares)
 
 
 class _Trainer:
@@ -115,6 +122,7 @@ class _Trainer:
         n_jobs: int,
     ) -> None:
         self.recordings, self.journal = recordings, journal
+        self.n_loaded = 0
         self.warn, self.progress, self.n_jobs = warn, progress, n_jobs
         self.scan = scan_dataset(self._read("reading"), setting.rate, relative=setting.relative)
         self.setting = setting = self._with_split(setting)
@@ -132,6 +140,11 @@ class _Trainer:
             "and too good; the next grasp is another"
         )
         return replace(setting, split="time")
+
+    @property
+    def tares(self) -> LoadedTares:
+        """Recordings whose tare was taken under load, after the cross-validation."""
+        return LoadedTares(self.n_loaded, len(self.scan.recordings))
 
     def check(self) -> None:
         """Check the samples, and warn of metrics that are missing or may be wrong.
@@ -226,8 +239,12 @@ class _Trainer:
             return empty
         if self.data_split.split not in ("time", "random"):
             model = models[self.data_split.group_of[place]]
-            return empty if model is None else _decisions(model, recording)
-        each = [_decisions(model, recording) for model in models if model is not None]
+            models = [model]
+        judged = [_judge(model, recording) for model in models if model is not None]
+        each = [decisions for decisions, _ in judged]
+        self.n_loaded += any(loaded for _, loaded in judged)
+        if self.data_split.split not in ("time", "random"):
+            return each[0] if each else empty
         if len(each) < len(models) or len({tuple(one.fingers) for one in each}) > 1:
             return empty
         return combine_decisions(
@@ -235,11 +252,11 @@ class _Trainer:
         )
 
 
-def _decisions(model: Model, recording: Recording) -> Decisions:
-    """Return the decisions of a model; empty if the recording has none of its fingers."""
+def _judge(model: Model, recording: Recording) -> tuple[Decisions, bool]:
+    """Return decisions, and whether the tare is loaded; none without the fingers of the model."""
     if ANY_FINGER not in model.fingers and not set(model.fingers) & set(recording.modules):
-        return Decisions(recording.name, {})
-    return compute_decisions(model, recording)
+        return Decisions(recording.name, {}), False
+    return judge(model, recording)
 
 
 def _search(

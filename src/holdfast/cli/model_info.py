@@ -1,0 +1,128 @@
+"""What `holdfast info` prints of a model file."""
+
+from collections.abc import Iterator
+from pathlib import Path
+from shutil import get_terminal_size
+from textwrap import wrap
+from typing import TYPE_CHECKING, Any
+
+from holdfast.cli.terminal.console import print_json, print_table
+
+if TYPE_CHECKING:
+    from holdfast.model import FingerModel, Model
+
+LABEL_WIDTH = 14
+"""Columns of the table before the text."""
+N_NAMES = 3
+"""Number of names that are printed of a long list."""
+
+
+def is_model(path: Path) -> bool:
+    """Return whether a path names a model: a built-in one, or a JSON file."""
+    return str(path).startswith("builtin:") or (path.suffix == ".json" and path.is_file())
+
+
+def print_model(path: Path, as_json: bool) -> None:
+    """Print what a model is for, how it decides, and what it was trained and tuned on."""
+    from holdfast.model import Model
+
+    document = model_document(Model.load(path))
+    if as_json:
+        print_json(document)
+        return
+    width = max(get_terminal_size().columns - LABEL_WIDTH, 30)
+    rows = [
+        (label if k == 0 else "", line)
+        for label, text in _rows(document)
+        for k, line in enumerate(wrap(text, width))
+    ]
+    print_table(("model", document["name"] or path.name), rows)
+
+
+def model_document(model: "Model") -> dict[str, Any]:
+    """Return the facts about a model, for JSON and for the table."""
+    import msgspec
+
+    training = None
+    if model.training is not None:
+        training = msgspec.to_builtins(model.training)
+        training["recordings"] = list(model.training.recordings)
+    tuning = None
+    if model.tuning is not None:
+        tuning = msgspec.to_builtins(model.tuning)
+        tuning["recordings"] = list(model.tuning.recordings)
+    return {
+        "name": model.name,
+        "rate": model.rate,
+        "tare": model.tare,
+        "debounce": msgspec.to_builtins(model.debounce),
+        "fingers": {name: _finger(model, part) for name, part in model.fingers.items()},
+        "training": training,
+        "tuning": tuning,
+    }
+
+
+def _finger(model: "Model", part: "FingerModel") -> dict[str, Any]:
+    sensor = None if part.sensor is None else model.sensors[part.sensor]
+    return {
+        "sensor": part.sensor,
+        "unit": None if sensor is None else sensor.unit,
+        "features": [str(spec) for spec in part.features],
+        "classifier": f"linear, {part.classifier.n_features} features",
+        "threshold": part.classifier.threshold,
+        "contact_threshold": part.contact_threshold,
+        "contact_noise": part.contact_noise,
+        "contact_load": part.contact_load,
+    }
+
+
+def _rows(document: dict[str, Any]) -> Iterator[tuple[str, str]]:
+    debounce, rate = document["debounce"], document["rate"]
+    yield "rate", "any" if rate is None else f"{rate:g} Hz"
+    yield "tare", document["tare"]
+    yield (
+        "debouncing",
+        f"hold {debounce['hold']:g} s, minimum {debounce['min_duration']:g} s, hysteresis "
+        f"{debounce['hysteresis']:g}",
+    )
+    for name, part in document["fingers"].items():
+        finger = "any finger" if name == "*" else name
+        sensor = f"{part['sensor']} ({part['unit']})" if part["sensor"] else "any"
+        yield finger, f"sensor {sensor}; {part['classifier']}"
+        yield "", f"features {_few(part['features'])}"
+        yield "", f"STABLE from a probability of {part['threshold']:.3g} on; {_contact(part)}"
+    training, tuning = document["training"], document["tuning"]
+    yield "trained on", "nothing" if training is None else _trained(training)
+    yield "tuned on", "nothing" if tuning is None else _tuned(tuning)
+
+
+def _contact(part: dict[str, Any]) -> str:
+    """Return the threshold of contact."""
+    for field, text in (
+        ("contact_load", "contact from a load of {:g} times its noise"),
+        ("contact_threshold", "contact from F_a = {:.3g}"),
+        ("contact_noise", "contact from F_a = {:g} times the noise of the tare"),
+    ):
+        if part[field] is not None:
+            return text.format(part[field])
+    return "no threshold of contact"
+
+
+def _trained(training: dict[str, Any]) -> str:
+    auc = training["figures"].get("auc")
+    figure = "" if auc is None else f"; AUC {auc:.3f} out of fold, by {training['split']}"
+    names = training["recordings"]
+    return f"{len(names)} recordings ({_few(names)}){figure}"
+
+
+def _tuned(tuning: dict[str, Any]) -> str:
+    names, missed = tuning["recordings"], tuning["missed"]["0.2"]
+    share = "no event" if missed is None else f"{missed:.0f} % missed within 0.2 s"
+    return (
+        f"{len(names)} recordings ({_few(names)}): {tuning['false_alarms_per_minute']:.2g} false "
+        f"alarms a minute (at most {tuning['requested']:g} wanted), {share}"
+    )
+
+
+def _few(names: list[str]) -> str:
+    return ", ".join(names[:N_NAMES]) + (", ..." if len(names) > N_NAMES else "")

@@ -1,0 +1,141 @@
+"""Choice of the threshold for a wanted rate of false alarms."""
+
+from dataclasses import replace
+
+import msgspec
+import numpy as np
+import pytest
+
+from holdfast.contact import ContactState
+from holdfast.errors import ModelError, TrainingError
+from holdfast.features import parse_features
+from holdfast.metrics import summarise
+from holdfast.model import Model
+from holdfast.training import Setting, compute_decisions, train, tune
+
+from .build import tiny_recording
+
+HELD = (ContactState.NO_CONTACT, ContactState.STABLE, ContactState.UNSTABLE, ContactState.STABLE)
+
+
+@pytest.fixture(scope="module")
+def model(grasps):
+    setting = Setting(window=6, features=parse_features("F_a,F_x,sigma", 6), trials=0)
+    return train(grasps, setting).model
+
+
+@pytest.fixture(scope="module")
+def others():
+    return [tiny_recording(seed, n=800) for seed in range(30, 36)]
+
+
+def hand_events(model, recordings):
+    return summarise([compute_decisions(model, each) for each in recordings]).events.hand
+
+
+@pytest.mark.parametrize("wanted", [20.0, 60.0])
+def test_the_detector_keeps_to_the_rate(model, others, wanted):
+    tuned = tune(model, others, wanted)
+    events = hand_events(tuned.model, others)
+    assert events.false_alarms_per_minute <= wanted
+    assert events.n_events == tuned.chosen.events.n_events > 0
+    assert events.missed == tuned.chosen.events.missed
+    assert tuned.chosen.false_alarms == events.false_alarms_per_minute
+
+
+def test_no_other_threshold_shown_misses_less_for_that_rate(model, others):
+    tuned = tune(model, others, 30.0)
+    allowed = [point for point in tuned.points if point.false_alarms <= 30.0]
+    assert min(point.missed for point in allowed) == tuned.chosen.missed
+    thresholds = [point.threshold for point in tuned.points]
+    assert thresholds == sorted(thresholds)
+    assert tuned.chosen.threshold in thresholds
+
+
+def test_the_model_keeps_how_it_was_tuned(model, others, tmp_path):
+    named = msgspec.structs.replace(model, name="mine")
+    tuned = tune(named, others, 30.0).model
+    tuned.save(tmp_path / "tuned.json")
+    found = Model.load(tmp_path / "tuned.json")
+    assert found.tuning == tuned.tuning
+    assert found.name == "mine, tuned"
+    assert found.tuning.requested == 30.0
+    assert found.tuning.recordings == {each.name: each.digest for each in others}
+    assert {p.classifier.threshold for p in found.fingers.values()} == {found.tuning.threshold}
+    assert found.training == model.training
+
+
+def test_without_events_the_most_sensitive_threshold_is_taken(model):
+    states = (ContactState.NO_CONTACT, None, ContactState.STABLE, ContactState.STABLE)
+    quiet = [tiny_recording(seed, states=states) for seed in (40, 41)]
+    tuned = tune(model, quiet, 70.0)
+    assert tuned.chosen.events.n_events == 0
+    above = [p for p in tuned.points if p.threshold > tuned.chosen.threshold]
+    assert all(point.false_alarms > 70.0 for point in above)
+
+
+# --- what is refused -------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("wanted", [-1.0, np.nan, np.inf])
+def test_a_rate_below_0(model, others, wanted):
+    with pytest.raises(ValueError) as refusal:
+        tune(model, others, wanted)
+    assert str(refusal.value) == (
+        f"false alarms per minute of at least 0 expected, {wanted:g} given"
+    )
+
+
+def test_recordings_without_labels(model):
+    with pytest.raises(TrainingError) as refusal:
+        tune(model, [tiny_recording(50, states=[None] * 4)], 1.0)
+    assert str(refusal.value) == "1 recordings without labels; labels expected"
+
+
+def test_recordings_without_a_stable_hold(model):
+    states = (ContactState.NO_CONTACT, None, ContactState.UNSTABLE, ContactState.UNSTABLE)
+    with pytest.raises(TrainingError) as refusal:
+        tune(model, [tiny_recording(51, states=states)], 1.0)
+    assert str(refusal.value) == (
+        "no time in which the hand is labelled stable; false alarms are counted per minute of it"
+    )
+
+
+def test_a_model_that_is_never_stable(model, others):
+    blind = {
+        name: msgspec.structs.replace(part, contact_threshold=1e9)
+        for name, part in model.fingers.items()
+    }
+    with pytest.raises(ModelError) as refusal:
+        tune(msgspec.structs.replace(model, fingers=blind), others, 1.0)
+    assert str(refusal.value) == (
+        "the model cannot be tuned: the hand is never STABLE at any threshold while it is "
+        "labelled stable (see holdfast detect --summary)"
+    )
+
+
+def test_a_rate_that_no_threshold_reaches(model):
+    """The hand loses contact in a hold that is labelled stable."""
+    held = tiny_recording(52, n=800)
+    labelled = replace(
+        held,
+        modules={
+            name: replace(module, readings=with_breaks(module.readings), labels=module.labels)
+            for name, module in held.modules.items()
+        },
+    )
+    with pytest.raises(TrainingError) as refusal:
+        tune(model, [labelled], 0.5)
+    message = str(refusal.value)
+    assert message.startswith(
+        "no threshold gives at most 0.5 false alarms a minute on these recordings; the least is "
+    )
+    assert "which misses" in message
+
+
+def with_breaks(readings):
+    """Readings without contact, in the middle of the holds."""
+    changed = np.array(readings)
+    for start in (280, 320, 680, 720):
+        changed[start : start + 10] = changed[:10]
+    return changed
