@@ -68,7 +68,7 @@ def _finger(model: "Model", part: "FingerModel") -> dict[str, Any]:
         "sensor": part.sensor,
         "unit": None if sensor is None else sensor.unit,
         "features": [str(spec) for spec in part.features],
-        "classifier": f"linear, {part.classifier.n_features} features",
+        "classifier": f"linear, {part.classifier.n_features} feature{'s' * (part.classifier.n_features > 1)}",
         "threshold": part.classifier.threshold,
         "contact_threshold": part.contact_threshold,
         "contact_noise": part.contact_noise,
