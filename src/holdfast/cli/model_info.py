@@ -64,11 +64,12 @@ def model_document(model: "Model") -> dict[str, Any]:
 
 def _finger(model: "Model", part: "FingerModel") -> dict[str, Any]:
     sensor = None if part.sensor is None else model.sensors[part.sensor]
+    n = part.classifier.n_features
     return {
         "sensor": part.sensor,
         "unit": None if sensor is None else sensor.unit,
         "features": [str(spec) for spec in part.features],
-        "classifier": f"linear, {part.classifier.n_features} feature{'s' * (part.classifier.n_features > 1)}",
+        "classifier": f"linear, {n} feature{'s' * (n > 1)}",
         "threshold": part.classifier.threshold,
         "contact_threshold": part.contact_threshold,
         "contact_noise": part.contact_noise,
