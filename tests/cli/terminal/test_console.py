@@ -2,7 +2,7 @@ import json
 
 import numpy as np
 import pytest
-from hypothesis import given
+from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from holdfast.cli.terminal.console import (
@@ -39,6 +39,7 @@ def test_json_has_no_control_characters(capsys):
     assert json.loads(out) == {"name": name}
 
 
+@settings(deadline=None)
 @given(st.text())
 def test_visible_text_is_printable_and_json_keeps_its_value(text):
     assert visible(text, allowed="").isprintable()
