@@ -5,9 +5,6 @@
 
 Nothing here reads a real recording. Samples labelled no contact are left out: the threshold on
 the load separates them.
-
-The threshold of the probability follows from one rule: in nine of ten hands that were left out,
-nine of ten stable samples are called STABLE, with the hold time.
 """
 
 import argparse
@@ -18,8 +15,6 @@ from pathlib import Path
 from typing import NamedTuple
 
 import numpy as np
-from msgspec.structs import replace
-from scipy.ndimage import minimum_filter1d
 from scipy.optimize import minimize
 from scipy.special import expit
 from sklearn.linear_model import LogisticRegression
@@ -46,8 +41,6 @@ N_FOLDS = 5
 CAUSES = (Cause.CLOSING, Cause.DISTURBANCE, Cause.GLITCH, Cause.LOST, Cause.SLIP)
 NAMED_AS = {Cause.RELEASED: Cause.LOST}
 """Causes that look alike to a finger: it loses contact."""
-SHARE = 0.9
-"""Of the stable samples of a hand, and of the hands, for the threshold."""
 
 
 class HandSamples(NamedTuple):
@@ -80,10 +73,8 @@ def main(folder: Path, out: Path | None) -> None:
         report(f"{kind}, of a fifth of the hands", hands, by_hand, chosen)
         report(f"{kind}, all hands with it", hands, np.where(chosen, 0, -1), chosen)
     report_causes(hands, by_hand)
-    threshold = choose_threshold(recordings, hands, by_hand)
-    print(f"threshold of the probability: {threshold:.3f}")
     if out is not None:
-        save(hands, digests, pooled, threshold, out)
+        save(hands, digests, pooled, out)
 
 
 def samples_of(recording: Recording) -> HandSamples:
@@ -109,32 +100,6 @@ def samples_of(recording: Recording) -> HandSamples:
         cause.append(causes[kept])
     kind = str(recording.metadata["sensor_kind"])
     return HandSamples(np.concatenate(rows), np.concatenate(stable), np.concatenate(cause), kind)
-
-
-def choose_threshold(recordings, hands: list[HandSamples], folds: np.ndarray) -> float:
-    """Return the largest threshold that keeps to the rule, from predictions out of fold."""
-    classifiers = {fold: fit(hands, folds != fold) for fold in sorted(set(folds))}
-    lowest = []
-    for recording, fold in zip(recordings, folds, strict=True):
-        model = model_of(classifiers[fold])
-        least = [
-            held_probability(probability, recording.rate)[
-                recording.modules[name].label_states == STABLE
-            ]
-            for name, probability in model.predict_proba(recording).items()
-        ]
-        values = np.concatenate(least)
-        values = values[np.isfinite(values)]
-        if len(values):
-            lowest.append(np.quantile(values, 1 - SHARE))
-    return float(np.quantile(lowest, 1 - SHARE))
-
-
-def held_probability(probability: np.ndarray, rate: float) -> np.ndarray:
-    """Return the least probability within the hold time before each sample."""
-    n = max(1, round(HOLD * rate))
-    known = np.where(np.isnan(probability), np.inf, probability)
-    return minimum_filter1d(known, n + 1, origin=n // 2, mode="nearest")
 
 
 def fit(hands: list[HandSamples], chosen: np.ndarray) -> LinearClassifier:
@@ -245,11 +210,9 @@ def save(
     hands: list[HandSamples],
     digests: dict[str, str],
     figures: dict[str, float],
-    threshold: float,
     out: Path,
 ) -> None:
     classifier = fit(hands, np.ones(len(hands), dtype=bool))
-    classifier = replace(classifier, threshold=round(threshold, 3))
     training = Training(
         recordings=digests,
         split="a fifth of the hands",
