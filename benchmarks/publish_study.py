@@ -23,6 +23,10 @@ DOCS = Path(__file__).parents[1] / "docs"
 PAGES = ("study.md", "study-changes.md")
 MISSING = "–"
 OWN_FIELDS = ("ours", "paper", "difference", "n", "interval", "infinite")
+MAY_BE_MISSING = ("paper", "difference", "interval", "infinite")
+"""Fields that are left out of the published rows where they are null."""
+DIGITS = 6
+"""Significant digits of published numbers."""
 
 Row = dict[str, Any]
 Where = Mapping[str, object]
@@ -39,7 +43,10 @@ class Figures:
     """
 
     def __init__(self, summary: Mapping[str, Any]) -> None:
-        self.tables: Mapping[str, list[Row]] = summary["tables"]
+        self.tables: Mapping[str, list[Row]] = {
+            name: [dict.fromkeys(MAY_BE_MISSING) | row for row in rows]
+            for name, rows in summary["tables"].items()
+        }
 
     def rows(self, table: str, where: Where) -> list[Row]:
         """Return the rows of a table that meet a condition; none if there is no such table."""
@@ -210,7 +217,7 @@ def _compact(summary: Mapping[str, Any]) -> str:
     """Return the summary as JSON with one row of a table a line."""
     tables = ",\n".join(
         f"{json.dumps(name)}: [\n"
-        + ",\n".join(json.dumps(row, ensure_ascii=False) for row in rows)
+        + ",\n".join(json.dumps(_short(row), ensure_ascii=False) for row in rows)
         + "\n]"
         for name, rows in summary["tables"].items()
     )
@@ -220,6 +227,21 @@ def _compact(summary: Mapping[str, Any]) -> str:
         for name, value in rest.items()
     )
     return f'{{"tables": {{\n{tables}\n}}{body}}}\n'
+
+
+def _short(row: Row) -> Row:
+    """Return a row with rounded numbers, without the fields that are null and may be missing."""
+    return {
+        key: _rounded(value)
+        for key, value in row.items()
+        if value is not None or key not in MAY_BE_MISSING
+    }
+
+
+def _rounded(value: object) -> object:
+    if isinstance(value, float):
+        return float(f"{value:.{DIGITS}g}")
+    return [_rounded(each) for each in value] if isinstance(value, list) else value
 
 
 def _cell_text(row: Row, digits: int) -> str:
