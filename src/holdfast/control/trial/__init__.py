@@ -1,0 +1,1 @@
+"""Trials of grip laws against each other on the twin."""
