@@ -98,7 +98,7 @@ def samples_of(recording: Recording) -> HandSamples:
         rows.append(finger.features[kept])
         stable.append(states[kept] == STABLE)
         cause.append(causes[kept])
-    kind = str(recording.metadata["sensor_kind"])
+    kind = str(recording.metadata.get("sensor_kind", ""))
     return HandSamples(np.concatenate(rows), np.concatenate(stable), np.concatenate(cause), kind)
 
 
@@ -113,6 +113,7 @@ def fit(hands: list[HandSamples], chosen: np.ndarray) -> LinearClassifier:
     features = np.concatenate([hand.features for hand in used])
     sign = np.where(np.concatenate([hand.stable for hand in used]), 1.0, -1.0)
     mean, scale = features.mean(axis=0), features.std(axis=0)
+    scale[scale == 0] = 1.0  # a feature that an ablation leaves out
     standardised = (features - mean) / scale
 
     def loss(weights: np.ndarray) -> tuple[float, np.ndarray]:
