@@ -132,7 +132,7 @@ class TestReaction:
         assert scales(commands[-1])["index"] == raised
         commands, time = run(controller, time, 1.0)
         assert commands[-1].state is LoopState.RELAX
-        assert raised - 0.3 <= scales(commands[-1])["index"] < raised - 0.2
+        assert raised - 0.3001 <= scales(commands[-1])["index"] < raised - 0.2
 
     def test_the_debounced_state_does_not_matter(self):
         """The state of a display is held; the probability of the sample counts."""

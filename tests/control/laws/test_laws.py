@@ -15,7 +15,7 @@ def touch(normal=2.0, tangential=0.6, probability=0.95, instability=0.001, name=
     made.known = made.touching = True
     made.probability, made.instability = probability, instability
     made.force, made.normal, made.tangential = (normal, tangential, 0.0), normal, tangential
-    made.start_normal, made.start_tangential = 2.0, 0.6
+    made.start_normal = 2.0
     return made
 
 
@@ -106,9 +106,17 @@ class TestFrictionMargin:
 
 
 class TestStability:
+    def settled(self, touches):
+        """A law whose first second, of a quiet grip, is over."""
+        law = started("holdfast", touches)
+        unstable, touches[0].probability = touches[0].probability, 0.95
+        wanted(law, touches, -1.0, 1.0)
+        touches[0].probability = unstable
+        return law
+
     def test_a_load_that_grows_is_followed_before_anything_slips(self):
         touches = [touch()]
-        law = started("holdfast", touches)
+        law = self.settled(touches)
         touches[0].tangential = 0.9
         for k in range(1, 60):
             (wish,) = wanted(law, touches, k * DT, DT)
@@ -134,8 +142,9 @@ class TestStability:
         assert second.scale > first.scale
 
     def test_friction_that_dropped_is_remembered_and_forgotten(self):
-        touches = [touch(probability=0.0, tangential=0.4)]
-        law = started("holdfast", touches)
+        touches = [touch()]
+        law = self.settled(touches)
+        touches[0].probability, touches[0].tangential = 0.0, 0.4
         wanted(law, touches, 0.0, DT)
         touches[0].probability, touches[0].scale = 0.95, 1.1
         (after,) = wanted(law, touches, 0.2, DT)
@@ -144,6 +153,15 @@ class TestStability:
         for k in range(3000):
             (later,) = wanted(law, touches, 0.2 + k * DT, DT)
         assert later.scale < 0.8
+
+    def test_a_load_that_someone_else_carries_at_first_is_no_reaction(self):
+        """The ratio of the grip is measured while the object is handed over."""
+        touches = [touch(tangential=0.05)]
+        law = started("holdfast", touches)
+        for k in range(300):
+            touches[0].tangential = min(0.05 + 0.01 * k, 0.6)
+            (wish,) = wanted(law, touches, k * DT, DT)
+            assert wish.scale <= 1.001
 
     def test_a_finger_without_contact_is_pressed(self):
         touches = [touch()]

@@ -30,7 +30,6 @@ class Touch:
         normal: force along the normal of the skin, at least 0 [as `force`].
         tangential: force along the skin [as `force`].
         start_normal: `normal` when the grip began [as `force`].
-        start_tangential: `tangential` when the grip began [as `force`].
         scale: force scale that was commanded last.
     """
 
@@ -45,7 +44,6 @@ class Touch:
         "probability",
         "scale",
         "start_normal",
-        "start_tangential",
         "tangential",
         "touching",
     )
@@ -59,7 +57,7 @@ class Touch:
         self.probability = self.instability = math.nan
         self.force = (0.0, 0.0, 0.0)
         self.normal = self.tangential = 0.0
-        self.start_normal = self.start_tangential = 0.0
+        self.start_normal = 0.0
         self.scale = 1.0
 
     def read(self, estimate: ContactEstimate) -> bool:
@@ -81,8 +79,8 @@ class Touch:
         return square < math.inf and abs(probability) < math.inf
 
     def start(self) -> None:
-        """Take the present forces as those of the start of the grip."""
-        self.start_normal, self.start_tangential = self.normal, self.tangential
+        """Take the present force as that of the start of the grip."""
+        self.start_normal = self.normal
 
 
 Wish = tuple[float, GripReason]

@@ -3,7 +3,9 @@
 Three rules, each without units, so that they carry over between counts and newtons:
 
 1. Load. A grip that was stable at a ratio of tangential to normal force T/N is kept at that ratio:
-   a finger whose tangential force grows presses more, before anything slips. People do the same
+   a finger whose tangential force grows presses more, before anything slips. The ratio is the
+   largest stable one of the first second, in which a person or a table may still carry the
+   object; until then this rule does not act. People do the same
    (R. S. Johansson and G. Westling, Exp. Brain Res. 56 (1984) 550-564: grip and load force rise
    in parallel).
 2. Instability. If the detector's probability of stability falls below its threshold, the force
@@ -25,6 +27,9 @@ from holdfast.control.laws.base import Law, Touch, Wish
 
 _NONE, _RELAX = GripReason.NONE, GripReason.RELAX
 
+SLIP_SHARE = 0.9
+"""Factor of the ratio at which a finger became unstable, for its new limit."""
+
 
 class Stability(Law):
     """Law that reacts to the probability of stability, and follows the load.
@@ -38,6 +43,7 @@ class Stability(Law):
         memory: time constant with which a limit of the ratio T/N is forgotten [s].
         lowest_limit: lowest limit of the ratio T/N, as a share of the first.
         smoothing: time constant of the tangential force [s].
+        settling: time from the start of the grip in which its ratio T/N is measured [s].
     """
 
     def __init__(
@@ -49,14 +55,17 @@ class Stability(Law):
         memory: float = 4.0,
         lowest_limit: float = 0.5,
         smoothing: float = 0.02,
+        settling: float = 1.0,
     ) -> None:
         self.threshold, self.gain, self.vibration_gain = threshold, gain, vibration_gain
         self.dead_time, self.memory = dead_time, memory
-        self.lowest_limit, self.smoothing = lowest_limit, smoothing
+        self.lowest_limit, self.smoothing, self.settling = lowest_limit, smoothing, settling
 
     def start(self, touches: Sequence[Touch], thumb: int) -> None:
-        """Take the ratios T/N of the first grip as limits."""
+        """Begin to measure the ratios T/N of the first grip."""
         self._thumb = thumb
+        self._age = 0.0
+        self._ratios = [_ratio(touch) for touch in touches]
         self._forces = [touch.start_normal for touch in touches]
         self._load = [touch.tangential for touch in touches]
         self._shares = [1.0] * len(touches)
@@ -65,6 +74,7 @@ class Stability(Law):
 
     def wishes(self, touches: Sequence[Touch], time: float, dt: float) -> list[Wish]:
         """Return what load and stability need, balanced over the fingers."""
+        self._age += dt
         follow, forget = min(dt / self.smoothing, 1.0), min(dt / self.memory, 1.0)
         load, shares = self._load, self._shares
         wishes = []
@@ -78,8 +88,11 @@ class Stability(Law):
         return wishes if self._thumb < 0 else self._balance(touches, wishes)
 
     def _wish(self, k: int, touch: Touch, time: float) -> Wish:
-        first = touch.start_tangential
-        needed = self._load[k] / (first * self._shares[k]) if first > 0 else 1.0
+        needed = 1.0
+        if self._age < self.settling:
+            self._settle(k, touch)
+        elif self._ratios[k] > 0:
+            needed = self._load[k] / (self._ratios[k] * self._shares[k] * touch.start_normal)
         scale = touch.scale
         unstable = touch.probability < self.threshold or not touch.touching
         if unstable and time >= self._ready_at[k]:
@@ -99,11 +112,14 @@ class Stability(Law):
         step = self.gain * max(lack, 0.0)
         return step + self.vibration_gain * min(shaking, 0.25) if shaking > 0 else step
 
+    def _settle(self, k: int, touch: Touch) -> None:
+        if touch.probability >= self.threshold:
+            self._ratios[k] = max(self._ratios[k], _ratio(touch))
+
     def _learn(self, k: int, touch: Touch) -> None:
-        if touch.normal > 0 and touch.start_tangential > 0:
-            ratio = touch.tangential / touch.normal
-            first = touch.start_tangential / touch.start_normal
-            self._shares[k] = max(self.lowest_limit, min(self._shares[k], 0.9 * ratio / first))
+        if self._age >= self.settling and self._ratios[k] > 0:
+            share = SLIP_SHARE * _ratio(touch) / self._ratios[k]
+            self._shares[k] = max(self.lowest_limit, min(self._shares[k], share))
 
     def _balance(self, touches: Sequence[Touch], wishes: list[Wish]) -> list[Wish]:
         own = [scale for scale, _ in wishes]
@@ -113,3 +129,8 @@ class Stability(Law):
                 raised = scale > touches[k].scale
                 wishes[k] = scale, GripReason.BALANCE if raised else wishes[k][1]
         return wishes
+
+
+def _ratio(touch: Touch) -> float:
+    """Return T/N; 0 without a normal force."""
+    return touch.tangential / touch.normal if touch.normal > 0 and touch.start_normal > 0 else 0.0
