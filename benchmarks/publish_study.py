@@ -1,12 +1,17 @@
 """Publish the results of a study in docs/, and write the pages that quote them.
 
-    python benchmarks/publish_study.py publish STUDY     copy the results of a run, write the pages
-    python benchmarks/publish_study.py render            write the pages again
+    python benchmarks/publish_study.py publish STUDY --real REAL
+    python benchmarks/publish_study.py render
+
+The first copies the results of a run and writes the pages, the second writes the pages again.
+The tables of real recordings (`real*`) are those of another run, `holdfast study` of the real
+recordings alone, so that they can be made anew with each model that ships.
 
 `publish` copies `study.json` and all tables as CSV from the folder of a finished study to
-docs/study/, in place of the old ones. The pages docs/study.md and docs/study-changes.md are
-written from templates in docs/study/ (`*.md.j2`). Change the templates, not the pages: every
-figure in them is taken from `study.json`, and tests/test_docs_study.py renders them again.
+docs/study/, in place of the old ones. The pages docs/study.md, docs/study-changes.md and
+docs/real-data.md are written from templates in docs/study/ (`*.md.j2`). Change the templates, not
+the pages: every figure in them is taken from `study.json`, and tests/test_docs_study.py renders
+them again.
 """
 
 import argparse
@@ -20,7 +25,7 @@ from typing import Any
 from jinja2 import Environment, FileSystemLoader, StrictUndefined
 
 DOCS = Path(__file__).parents[1] / "docs"
-PAGES = ("study.md", "study-changes.md")
+PAGES = ("study.md", "study-changes.md", "real-data.md")
 MISSING = "–"
 OWN_FIELDS = ("ours", "paper", "difference", "n", "interval", "infinite")
 MAY_BE_MISSING = ("paper", "difference", "interval", "infinite")
@@ -191,18 +196,29 @@ def render(summary: Mapping[str, Any], templates: Path) -> dict[str, str]:
     }
 
 
-def publish(run: Path, docs: Path) -> None:
-    """Copy `study.json` and the tables of a run to docs/study/, in place of the old ones.
+def publish(run: Path, docs: Path, real: Path | None = None) -> None:
+    """Copy `study.json` and all tables of a run to docs/study/, in place of the old ones.
+
+    Args:
+        run: folder of a finished study.
+        docs: folder of the documentation.
+        real: folder of a finished study of the real recordings, for the tables of them.
 
     Raises:
-        FileNotFoundError: the folder has no finished study.
+        FileNotFoundError: a folder has no finished study.
     """
     summary = json.loads((run / "study.json").read_text("utf-8"))
+    folders = dict.fromkeys(summary["tables"], run)
+    if real is not None:
+        tables = json.loads((real / "study.json").read_text("utf-8"))["tables"]
+        of_real = {name: rows for name, rows in tables.items() if name.startswith("real")}
+        summary["tables"] |= of_real
+        folders |= dict.fromkeys(of_real, real)
     target = docs / "study"
     for old in [*target.glob("*.csv"), *target.glob("*.md")]:
         old.unlink()
-    for name in summary["tables"]:
-        shutil.copyfile(run / "tables" / f"{name}.csv", target / f"{name}.csv")
+    for name, folder in folders.items():
+        shutil.copyfile(folder / "tables" / f"{name}.csv", target / f"{name}.csv")
     (target / "study.json").write_text(_compact(summary), encoding="utf-8")
 
 
@@ -258,11 +274,13 @@ def main() -> None:
     """Run the command line."""
     parser = argparse.ArgumentParser(description="Publish a study in docs/.")
     commands = parser.add_subparsers(dest="command", required=True)
-    commands.add_parser("publish").add_argument("run", type=Path)
+    command = commands.add_parser("publish")
+    command.add_argument("run", type=Path)
+    command.add_argument("--real", type=Path)
     commands.add_parser("render")
     given = parser.parse_args()
     if given.command == "publish":
-        publish(given.run, DOCS)
+        publish(given.run, DOCS, given.real)
     write_pages(DOCS)
 
 

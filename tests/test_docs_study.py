@@ -130,3 +130,19 @@ def test_publishing_replaces_the_old_tables(tmp_path):
     assert "paper" not in written["tables"]["t"][1]
     with pytest.raises(FileNotFoundError):
         script.publish(tmp_path / "none", docs)
+
+
+def test_the_tables_of_real_recordings_may_come_from_another_run(tmp_path):
+    (tmp_path / "docs" / "study").mkdir(parents=True)
+    for run, tables in (("twin", ["t", "real"]), ("real", ["t", "real", "real_pairs"])):
+        (tmp_path / run / "tables").mkdir(parents=True)
+        summary = {"tables": {key: [ROWS[0] | {"method": run}] for key in tables}}
+        (tmp_path / run / "study.json").write_text(json.dumps(summary))
+        for name in tables:
+            (tmp_path / run / "tables" / f"{name}.csv").write_text(run)
+    script.publish(tmp_path / "twin", tmp_path / "docs", tmp_path / "real")
+    published = tmp_path / "docs" / "study"
+    tables = json.loads((published / "study.json").read_text())["tables"]
+    sources = {"t": "twin", "real": "real", "real_pairs": "real"}
+    assert {name: rows[0]["method"] for name, rows in tables.items()} == sources
+    assert {path.stem: path.read_text() for path in published.glob("*.csv")} == sources
