@@ -51,6 +51,19 @@ def test_the_file_says_who_when_and_what(saved):
     assert file.recording == recording.digest
 
 
+@pytest.mark.parametrize("cause", [Cause.GLITCH, Cause.SLIP])
+@pytest.mark.parametrize("state", [ContactState.UNSTABLE, ContactState.STABLE])
+def test_a_cause_in_a_file_of_an_older_version_reads_as_what_it_was(saved, cause, state):
+    recording, path = saved
+    label = Label(0.5, 1.0, state, cause)
+    save_labels(recording.with_labels({"thumb": [label]}), path, force=True)
+    beside = labels_path(path)
+    older = msgspec.json.decode(beside.read_bytes())
+    del older["digest"]  # older versions wrote none
+    beside.write_bytes(msgspec.json.encode(older))
+    assert load_recording(path).modules["thumb"].labels == (label,)
+
+
 def test_they_fit_the_recording_in_the_other_format(saved, tmp_path):
     recording, _ = saved
     (tmp_path / "other").mkdir()
