@@ -70,7 +70,7 @@ def detect(
 
     Example:
       holdfast detect model.json grasp.parquet > states.jsonl
-      holdfast detect builtin:twin xela://auto
+      holdfast detect builtin:any xela://auto
       holdfast detect builtin:noise-floor grasp.mcap --summary
       holdfast detect model.json grasp.parquet --debounce 0.05 --hysteresis 0.1
     """

@@ -33,7 +33,7 @@ class RatePolicy(StrEnum):
 
 
 ModelArgument = Annotated[
-    str, typer.Argument(help="A model file, builtin:twin or builtin:noise-floor.")
+    str, typer.Argument(help="A model file, builtin:any, builtin:twin or builtin:noise-floor.")
 ]
 
 

@@ -60,7 +60,7 @@ def play(
     Example:
       holdfast play twin:?object=can
       holdfast play grasp.parquet --once --separate --version 1.7
-      holdfast detect builtin:twin xela://127.0.0.1:5000
+      holdfast detect builtin:any xela://127.0.0.1:5000
     """
     from holdfast.live.xela_server import XelaServer
     from holdfast.sources import open_source

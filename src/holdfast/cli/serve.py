@@ -77,7 +77,7 @@ def serve(
     ros2:///xServTopic, ros1:///xServTopic or serial:///dev/ttyACM0?sensor=anyskin.
 
     Example:
-      holdfast serve builtin:twin twin:?object=can
+      holdfast serve builtin:any twin:?object=can
       holdfast serve model.json xela://auto --ros2
       holdfast serve model.json grasp.parquet --host 0.0.0.0 --token-file secret.txt
     """

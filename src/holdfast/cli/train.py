@@ -91,7 +91,7 @@ def train(
     ] = None,
     init: Annotated[
         str | None,
-        typer.Option(help="Model to adapt, with its features: a file, or builtin:twin."),
+        typer.Option(help="Model to adapt, with its features: a file, or builtin:any."),
     ] = None,
     resume: Annotated[
         bool, typer.Option("--resume", help="Continue a search that was stopped.")
@@ -118,7 +118,7 @@ def train(
       holdfast train recordings/ -o model.json
       holdfast train recordings/ -o model.json --split object --classifier svm
       holdfast train recordings/ -o model.json --features holdfast --hold 0.1
-      holdfast train recordings/ -o model.json --init builtin:twin
+      holdfast train recordings/ -o model.json --init builtin:any
     """
     from holdfast.cli.evaluate import print_metrics, print_verdict
     from holdfast.files import refuse_overwrite
