@@ -338,7 +338,7 @@ class TestTwin:
         assert part.sensor == "uskin-curved"
         assert hand_model.sensors == {"uskin-curved": built_in_sensor("uskin-curved")}
         assert hand_model.rate == pytest.approx(150.0, rel=1e-3)
-        assert hand_model.debounce == Debounce(hold=0.1)
+        assert hand_model.debounce == Debounce(hysteresis=0.1, hold=0.1)
 
     def test_it_detects_a_grasp(self):
         grasp = synthetic_recording("grasp", 5, ("thumb", "ring"))

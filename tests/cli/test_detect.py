@@ -188,6 +188,14 @@ class TestSummary:
         held = summary(capsys, model, grasp, "--debounce", "0.2", "--hysteresis", "0.2")["events"]
         assert 0 < len(held) < len(raw)
 
+    def test_raw_decisions_have_no_debouncing(self, capsys, model, grasp, tmp_path):
+        raw = summary(capsys, model, grasp)["events"]
+        path = tmp_path / "held.json"
+        steady = msgspec.structs.replace(Model.load(model), debounce=Debounce(0.3, 0.2, 0.4))
+        steady.save(path)
+        assert summary(capsys, path, grasp)["events"] != raw
+        assert summary(capsys, path, grasp, "--raw")["events"] == raw
+
 
 class TestRate:
     @pytest.fixture
@@ -282,6 +290,9 @@ def test_refusals(capsys, model, grasp, save, tmp_path):
     )
     assert refusal(capsys, model, grasp, "--debounce=-1") == (
         "a duration of at least 0 s expected, -1.0 given"
+    )
+    assert refusal(capsys, model, grasp, "--raw", "--debounce", 0) == (
+        "--raw decides without debouncing; leave out --debounce and --hysteresis"
     )
     assert refusal(capsys, model, grasp, "--hysteresis", "nan") == (
         "a hysteresis from 0 to 1 expected, nan given"

@@ -12,7 +12,7 @@ import pytest
 from holdfast import files
 from holdfast.cli import main
 from holdfast.io import labels_path, load_dataset, load_recording, save_labels, save_recording
-from holdfast.model import Model
+from holdfast.model import Debounce, Model
 from holdfast.recordings import Recording
 from holdfast.synthetic import synthetic_recording
 from holdfast.training import Setting, train
@@ -98,6 +98,8 @@ def test_it_is_the_library_that_trains(capsys, data, model):
         shared=True,
         contact_threshold=9.5,
         max_samples=900,
+        hold=0.1,
+        hysteresis=0.1,
     )
     assert Model.load(model) == train(load_dataset(data), setting).model
 
@@ -293,18 +295,19 @@ def test_a_model_is_adapted(capsys, data, model):
 
 
 def test_tare_and_hold_override_the_model_to_adapt(capsys, data, model):
-    words = ["--init", TWIN, "--trials", 0, "--tare", 0.3, "--hold", 0.25, "--shared"]
+    words = ["--init", TWIN, "--trials", 0, "--tare", 0.3, "--hold", 0.25, "--hysteresis", 0.2]
+    words += ["--shared"]
     assert run(capsys, data, "-o", model, *words)[0] == 0
     adapted = Model.load(model)
     assert list(adapted.fingers) == ["*"]
-    assert (adapted.tare, adapted.debounce.hold) == ("0.3", 0.25)
+    assert (adapted.tare, adapted.debounce) == ("0.3", Debounce(0.0, 0.2, 0.25))
 
 
 def test_hold_and_our_own_features(capsys, data, model):
-    words = ["--features", "holdfast", "--hold", 0.1, "--trials", 0]
+    words = ["--features", "holdfast", "--hold", 0.2, "--trials", 0]
     assert run(capsys, data, "-o", model, *words)[0] == 0
     made = Model.load(model)
-    assert made.debounce.hold == 0.1
+    assert made.debounce == Debounce(0.0, 0.1, 0.2)  # the hysteresis by default
     assert made.fingers["thumb"].features == Model.load(TWIN).fingers["*"].features
 
 

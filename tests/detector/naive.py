@@ -59,6 +59,7 @@ class Finger:
         self.wrong, self.wrong_taxels = set(), set()
         self.faulty_taxels = ()
         self.slow = self.roused = NAN
+        self.rest, self.peak, self.shaken = np.zeros(3), 0.0, -math.inf
         self.above = "under"
         self.sensor, self.part, self.window, self.period = sensor, part, window, period
         self.kind, self.seconds = tare.kind, tare.seconds
@@ -262,19 +263,37 @@ class Finger:
             elif self.drifted(time):
                 self.status, self.faults = "fault", ("tare_drift",)
         if self.status != "":
-            self.state = self.candidate = "UNKNOWN"
-            self.probability = self.unstable_at = NAN
+            if self.status == "fault" and not math.isnan(self.force[0]):
+                self.debounce("UNKNOWN", time, debounce.min_duration)
+            else:
+                self.state = self.candidate = "UNKNOWN"
+            if self.state == "UNKNOWN":
+                self.probability = self.unstable_at = NAN
+            else:
+                self.status = ""
             return
         state = self.contact_state(features, debounce.hysteresis)
         if state == "UNSTABLE":
             self.unstable_at = time
         elif state == "STABLE" and time - self.unstable_at + self.period / 2 < debounce.hold:
             state = "UNSTABLE"
+        self.debounce(state, time, debounce.min_duration)
+        if state == "NO_CONTACT":
+            self.rest += min(1, self.period / 3) * (np.array(self.force) - self.rest)
+
+    def debounce(self, state, time, min_duration):
         if state != self.candidate:
             self.candidate, self.since = state, time
-        held = time - self.since + self.period / 2
-        if self.state == "UNKNOWN" or held >= debounce.min_duration:
+        lasted = time - self.since + self.period / 2
+        if self.state == "UNKNOWN" or lasted >= min_duration:
             self.state = state
+
+    def is_empty(self, time):
+        """Whether nothing touches; with hysteresis, and a share of the peak once it is still."""
+        touching = self.candidate in ("STABLE", "UNSTABLE")
+        least = self.contact() * (0.7 if touching else 1)
+        share = (0.08 if touching else 0.12) if time - self.shaken > 0.2 else 0
+        return self.load < least or (least > 0 and self.load < share * self.peak)
 
     def contact(self):
         if self.part.contact_threshold is not None:
@@ -283,16 +302,21 @@ class Finger:
 
     def drifted(self, time):
         amplitude, threshold = math.hypot(*self.force), self.contact()
+        self.load = math.dist(self.force, self.rest)
+        self.peak = max(self.load, self.peak * (1 - min(1, self.period / 5)))
         mean = sum(math.hypot(*force) for force in self.stretch[-self.window :]) / self.window
         if math.isnan(self.slow):
             self.slow, self.roused = amplitude, time
         away, jump = abs(mean - self.slow), abs(amplitude - self.slow)
         self.slow += min(1, self.period) * (amplitude - self.slow)
         quiet = self.noise * math.sqrt((self.window - 2) / (2 * self.window))
+        if not (self.window > 2 and self.sigma <= 3 * quiet):
+            self.shaken = time
+        self.empty = self.is_empty(time)
         calm = self.window > 2 and self.sigma <= 3 * quiet and away <= threshold / 2
         if not calm:
             self.roused = time
-        if amplitude < threshold:
+        if self.load < threshold:
             self.above = "under"
         elif not calm:
             self.above = "touch"
@@ -302,7 +326,7 @@ class Finger:
         return self.above == "drift"
 
     def contact_state(self, features, hysteresis):
-        if math.hypot(*self.force) < self.contact():
+        if self.empty:
             self.probability = 0.0
             return "NO_CONTACT"
         rule = self.part.classifier

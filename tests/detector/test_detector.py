@@ -3,6 +3,7 @@ import itertools
 import pickle
 import sys
 import tracemalloc
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -143,10 +144,15 @@ class TestReasons:
 class TestContactThreshold:
     def test_absolute(self):
         hand_model = by_force()
-        forces = [200, 200, 4.9, 5.0, 5.1, 101, 99]
+        forces = [200, 200, 3.4, 4.9, 5.1, 101, 99]
         found = pushes(Detector(hand_model, {"finger1": FLAT}), forces)
-        expected = [STABLE, STABLE, NO_CONTACT, UNSTABLE, UNSTABLE, STABLE, UNSTABLE]
+        expected = [STABLE, STABLE, NO_CONTACT, NO_CONTACT, UNSTABLE, STABLE, UNSTABLE]
         assert found[1:] == expected[1:]
+
+    def test_it_is_lower_while_in_contact(self):
+        forces = [200, 200, 4.9, 3.6, 3.4, 4.9]
+        found = pushes(Detector(by_force(), {"finger1": FLAT}), forces)
+        assert found[1:] == [STABLE, UNSTABLE, UNSTABLE, NO_CONTACT, NO_CONTACT]
 
     def test_the_probability_without_contact_is_zero(self):
         estimates = feed(Detector(by_force(), {"f": FLAT}), [[[1.0, 0, 0]]] * 3, "f")
@@ -188,6 +194,21 @@ class TestDebounce:
         assert pushes(detector, [150, 150, 50, np.nan, 50, 50]) == [
             UNKNOWN, STABLE, STABLE, UNKNOWN, UNKNOWN, UNSTABLE,
         ]  # fmt: skip
+
+    def test_a_fault_is_reported_when_it_has_lasted(self):
+        hand_model = by_force(debounce=Debounce(min_duration=0.03))
+        detector = Detector(hand_model, {"finger1": replace(FLAT, limits=(-500.0, 500.0))}, RATE)
+        readings = np.zeros((30, 1, 3))
+        readings[:, 0, 0] = 150.0 + np.arange(30) % 2
+        readings[[10, 11], 0, 1] = 500.0
+        readings[20:25, 0, 1] = 500.0
+        found = feed(detector, readings, "finger1")
+        assert {(e.state, e.reason) for e in found[8:20]} == {(STABLE, Reason.NONE)}
+        assert [e.faults for e in found[9:13]] == [(), *[(Fault.SATURATED,)] * 2, ()]
+        assert {e.stable_probability for e in found[10:12]} == {found[9].stable_probability}
+        unknown = [e.state is UNKNOWN for e in found[20:26]]
+        assert unknown == [False, False, False, True, True, False]
+        assert found[23].reason is Reason.FAULT
 
     def test_instability_is_held(self):
         hand_model = by_force(debounce=Debounce(hold=0.05))

@@ -291,10 +291,16 @@ class TestTareDrift:
         hand_model = model(("thumb",), which=which, threshold=100.0, window=14)
         return feed(Detector(hand_model), values)
 
-    @pytest.mark.parametrize("seconds", [10.0, 14.0])
-    def test_a_slow_rise_over_the_threshold_is_drift(self, seconds):
+    @pytest.mark.parametrize("seconds", [14.0, 40.0])
+    def test_a_tare_follows_a_slow_rise(self, seconds):
+        estimates = self.feed(self.crept(seconds, n=round(seconds + 10) * 100))
+        assert {e.state for e in estimates[70:]} == {ContactState.NO_CONTACT}
+        assert np.hypot.reduce(estimates[-1].force) > 300.0
+
+    @pytest.mark.parametrize("seconds", [9.0, 10.0])
+    def test_a_faster_rise_over_the_threshold_is_drift(self, seconds):
         estimates = self.feed(self.crept(seconds))
-        above = [e for e in estimates[30:] if np.hypot.reduce(e.force) >= 100.0]
+        above = [e for e in estimates[30:] if np.hypot.reduce(e.force) >= 280.0]
         drifted = [e for e in above if e.faults]
         assert len(drifted) > 0.98 * len(above) > 100  # but for noise, far under the threshold
         assert {(e.state, e.reason, e.faults, e.faulty_taxels) for e in drifted} == {

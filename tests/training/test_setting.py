@@ -40,6 +40,7 @@ def test_the_defaults_are_those_of_the_deployed_model():
         ),
         ({"hold": -0.1}, "a hold of at least 0 s expected, -0.1 given"),
         ({"hold": float("inf")}, "a hold of at least 0 s expected, inf given"),
+        ({"hysteresis": 1.0}, "a hysteresis from 0 to 1 expected, 1.0 given"),
     ],
 )
 def test_refusals(given, message):

@@ -17,6 +17,7 @@ from holdfast.cli.options import (
     ModelArgument,
     RateOption,
     RatePolicy,
+    RawOption,
     SourceArgument,
     create_stream_detector,
     load_model,
@@ -47,6 +48,7 @@ def detect(
     rate: RateOption = RatePolicy.RESAMPLE,
     debounce: DebounceOption = None,
     hysteresis: HysteresisOption = None,
+    raw: RawOption = False,
     seconds: Annotated[
         float | None, typer.Option(help="Stop a live source after this time [s].")
     ] = None,
@@ -78,7 +80,7 @@ def detect(
 
     live = is_uri(source)
     _check_seconds(seconds, source, live=live)
-    loaded = load_model(model, debounce, hysteresis)
+    loaded = load_model(model, debounce, hysteresis, raw=raw)
     if live:
         chunks = _detect_live(loaded, source, rate, ignore, seconds)
     else:

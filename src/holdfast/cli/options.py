@@ -94,6 +94,12 @@ HysteresisOption = Annotated[
         show_default="as in the model",
     ),
 ]
+RawOption = Annotated[
+    bool,
+    typer.Option(
+        "--raw", help="Decide every sample by itself: no hold, minimum duration or hysteresis."
+    ),
+]
 IgnoreOption = Annotated[
     str,
     typer.Option("--ignore", help="Taxels to ignore, counted from 0: index:7,index:12."),
@@ -153,14 +159,29 @@ def find_token(token: str | None, file: Path | None) -> str | None:
         raise ValueError(f"--token-file {file}: text expected, other bytes given") from cause
 
 
-def load_model(name: str, debounce: float | None, hysteresis: float | None) -> "Model":
-    """Load a model and apply `--debounce` and `--hysteresis`, if given."""
+def load_model(
+    name: str, debounce: float | None, hysteresis: float | None, *, raw: bool = False
+) -> "Model":
+    """Load a model and apply `--debounce` and `--hysteresis`, if given.
+
+    Args:
+        name: path of the model, or the name of a built-in one.
+        debounce: minimum time that a new state must last [s]; None for that of the model.
+        hysteresis: of the probability; None for that of the model.
+        raw: leave the debouncing out.
+
+    Raises:
+        ValueError: `raw` and another value are given.
+        ModelError: the model cannot be read.
+    """
     from msgspec.structs import replace
 
     from holdfast.model import Debounce, Model
 
+    if raw and (debounce, hysteresis) != (None, None):
+        raise ValueError("--raw decides without debouncing; leave out --debounce and --hysteresis")
     model = Model.load(name)
-    own = model.debounce
+    own = Debounce() if raw else model.debounce
     chosen = Debounce(
         own.min_duration if debounce is None else debounce,
         own.hysteresis if hysteresis is None else hysteresis,

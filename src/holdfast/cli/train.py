@@ -86,7 +86,15 @@ def train(
         float | None,
         typer.Option(
             help="Time for which UNSTABLE is kept after the last unstable sample [s].",
-            show_default="0, or as --init",
+            show_default="0.1, or as --init",
+        ),
+    ] = None,
+    hysteresis: Annotated[
+        float | None,
+        typer.Option(
+            help="Distance from the threshold that the probability must exceed to change the "
+            "state.",
+            show_default="0.1, 0 with --features any, or as --init",
         ),
     ] = None,
     init: Annotated[
@@ -137,6 +145,7 @@ def train(
         shared=shared,
         contact_threshold=contact_threshold,
         hold=hold,
+        hysteresis=hysteresis,
         max_samples=max_samples,
     )
     refuse_overwrite(model, force=force)
@@ -185,6 +194,7 @@ def _setting(
     """
     from holdfast.features import DEPLOYED_FEATURES, Tare, parse_features
     from holdfast.training import Setting
+    from holdfast.training.setting import DEFAULT_HOLD, DEFAULT_HYSTERESIS
 
     given, chosen = (
         {name: value for name, value in group.items() if value is not None}
@@ -196,7 +206,9 @@ def _setting(
         return Setting.adapting(_model_to_adapt(init, given), **chosen)
     names = given.get("features", ",".join(DEPLOYED_FEATURES))
     given["features"] = parse_features(names, given.get("window", Setting.window))
-    return Setting(**given, **chosen)
+    relative = all(spec.seconds for spec in given["features"])
+    steady = {"hold": DEFAULT_HOLD, "hysteresis": 0.0 if relative else DEFAULT_HYSTERESIS}
+    return Setting(**given, **(steady | chosen))
 
 
 def _model_to_adapt(init: str, given: dict[str, Any]) -> "Model":

@@ -10,20 +10,28 @@ import numpy.typing as npt
 from holdfast import contact
 from holdfast.classifiers.cause import CAUSES, add_scores
 from holdfast.classifiers.linear import linear_probability
-from holdfast.compiled import compiled
+from holdfast.compiled import compiled, inlined
+from holdfast.detector.contact_rule import (
+    CONTACT_LOAD,
+    PEAK,
+    REST,
+    SHAKEN_AT,
+    THRESHOLD,
+    contact_threshold,
+    follow,
+    has_drifted,
+    is_at_rest,
+    is_empty,
+    update_load,
+)
 from holdfast.features import kernel
 from holdfast.features.arrays import (
     AMPLITUDE,
     FAULT,
     FAULTS,
-    MEAN,
-    MOVED_AT,
     NOISE,
-    NOISE_NOW,
-    PEAK_LOAD,
     READY,
     REASON,
-    SIGMA,
     SIGMA_WINDOW,
     TAXELS,
     VALUES_WIDTH,
@@ -34,9 +42,7 @@ from holdfast.features.arrays import (
     Memory,
     Output,
 )
-from holdfast.features.arrays import LOAD as MOTION_LOAD
 from holdfast.features.faults import TARE_DRIFT
-from holdfast.features.motion import RELEASED_SHARE
 from holdfast.features.stream import StreamPlan
 from holdfast.model import ANY_FINGER, FingerModel, Model
 
@@ -49,38 +55,17 @@ UNKNOWN, NO_CONTACT, UNSTABLE, STABLE = (
 _hand_state = compiled(contact.hand_state)
 _is_held = compiled(contact.is_held)
 
-# Columns of DecisionRule.limits.
-THRESHOLD = 0  # of the probability
-CONTACT, CONTACT_NOISE = 1, 2  # of F_a: absolute, and as a multiple of the noise; NaN for none
-CONTACT_LOAD = 3  # of the load, as a multiple of its noise; NaN for none
-LIMITS_WIDTH = 4
-
-# Columns of DecisionMemory.codes.
+# Columns of DecisionMemory.codes; LOAD is one of holdfast.detector.contact_rule.
 STATE = 0  # the state that is reported, as a code of holdfast.contact
 CANDIDATE = 1  # the state of the last sample, which may not have lasted long enough yet
-LOAD = 2  # how F_a came over the threshold of contact: one of the next three
-NO_LOAD, TOUCH, DRIFT = range(3)
 CAUSE = 3  # code of the cause while unstable; 0 for none
 CODES_WIDTH = 4
 
-# Columns of DecisionMemory.values.
+# Columns of DecisionMemory.values; those from SMOOTHED on are of holdfast.detector.contact_rule.
 PROBABILITY = 0
 CANDIDATE_SINCE = 1  # when the candidate began [s]
 LAST_UNSTABLE = 2  # time of the last sample that was unstable before the hold time [s]
-SMOOTHED = 3  # F_a, smoothed over DRIFT_SECONDS [unit of the readings]
-RESTLESS_AT = 4  # when the finger was last not calm [s]
-DECIDED_WIDTH = 5
-
-DRIFT_SECONDS = 1.0
-"""A touch brings F_a over the threshold of contact in less time than this; a drift does not [s]."""
-CONTACT_RELEASE_RATIO = 0.7
-"""Share of the threshold of contact on the load below which a contact ends."""
-TOUCH_SHARE = 1.5 * RELEASED_SHARE
-"""Share of the largest load so far that a touch exceeds."""
-REST_SECONDS = 0.2
-"""A force is at rest if it has not moved for this time [s]."""
-CALM_RATIO = 3.0
-"""A finger is calm while sigma is at most this many times the sigma of noise alone."""
+DECIDED_WIDTH = 10
 
 
 class DecisionRule(NamedTuple):
@@ -174,9 +159,12 @@ def _cause_weights(parts: Sequence[FingerModel], width: int) -> Array:
 
 def new_decision_memory(n_fingers: int, n_causes: int = 0) -> DecisionMemory:
     """Return the memory before the first sample."""
+    values = np.full((n_fingers, DECIDED_WIDTH), np.nan)
+    values[:, REST : PEAK + 1] = 0.0
+    values[:, SHAKEN_AT] = -np.inf
     return DecisionMemory(
         codes=np.full((n_fingers, CODES_WIDTH), UNKNOWN, dtype=np.int64),
-        values=np.full((n_fingers, DECIDED_WIDTH), np.nan),
+        values=values,
         scores=np.zeros((n_fingers, n_causes)),
     )
 
@@ -205,45 +193,97 @@ def step(
         time: of the sample [s].
     """
     kernel.advance(layout, memory, output, readings, present, time)
-    for finger in range(len(present)):
-        codes, decided = decision.codes[finger], decision.values[finger]
-        noise, values = memory.levels[finger, NOISE], output.values[finger]
-        threshold = _contact_threshold(noise, rule.limits[finger])
-        ready = output.status[finger, REASON] == READY
-        by_load = not math.isnan(rule.limits[finger, CONTACT_LOAD])
-        if ready and present[finger] and not by_load:
-            quiet = kernel.noise_sigma(noise, layout.windows[finger, SIGMA_WINDOW])
-            if _has_drifted(values, codes, decided, threshold, quiet, time, layout.period):
-                output.status[finger, REASON] = FAULT
-                output.status[finger, FAULTS] = TARE_DRIFT
-                ready = False
-        if not ready:
-            codes[STATE] = codes[CANDIDATE] = UNKNOWN
-            decided[PROBABILITY] = decided[LAST_UNSTABLE] = math.nan
-            _forget_cause(codes, decision.scores, finger)
-        elif present[finger]:
-            limit = rule.limits[finger, CONTACT_LOAD]
-            if by_load and _is_unloaded(memory.motion[finger], limit, codes[STATE], time):
-                weights = rule.weights[finger, : rule.n_weights[finger]]
-                decided[PROBABILITY] = linear_probability(output.features[finger], weights)
-                state = NO_CONTACT
-            elif values[AMPLITUDE] < threshold:
-                decided[PROBABILITY] = 0.0
-                state = NO_CONTACT
-            else:
-                weights = rule.weights[finger, : rule.n_weights[finger]]
-                decided[PROBABILITY] = linear_probability(output.features[finger], weights)
-                limit = rule.limits[finger, THRESHOLD]
-                state = _contact_state(decided[PROBABILITY], limit, rule.hysteresis, codes[STATE])
-                if state == UNSTABLE and rule.causes.shape[1] > 0:
-                    codes[CAUSE] = add_scores(
-                        output.features[finger], rule.causes[finger], decision.scores[finger]
-                    )
-                state = _hold(state, decided, rule.hold, time, layout.period)
-            if state != UNSTABLE:
-                _forget_cause(codes, decision.scores, finger)
-            _debounce(codes, decided, state, rule.min_duration, time, layout.period)
+    for f in range(len(present)):
+        unloaded = False
+        if present[f] and output.status[f, REASON] == READY:
+            unloaded = _find_contact(layout, memory, output, rule, decision, f, time)
+        if output.status[f, REASON] != READY:
+            _decide_unready(output, rule, decision, f, present[f], time, layout.period)
+        elif present[f]:
+            _decide(output, rule, decision, f, unloaded, time, layout.period)
     return _hand_state(decision.codes[:, STATE], rule.n_model_fingers)
+
+
+@inlined
+def _find_contact(
+    layout: Layout,
+    memory: Memory,
+    output: Output,
+    rule: DecisionRule,
+    decision: DecisionMemory,
+    f: int,
+    time: float,
+) -> bool:
+    """Return whether a finger with features is without contact. Report a drift of its tare."""
+    codes, decided, limits = decision.codes[f], decision.values[f], rule.limits[f]
+    if not math.isnan(limits[CONTACT_LOAD]):
+        return is_at_rest(memory.motion[f], limits[CONTACT_LOAD], codes[CANDIDATE], time)
+    noise, values = memory.levels[f, NOISE], output.values[f]
+    threshold = contact_threshold(noise, limits)
+    quiet = kernel.noise_sigma(noise, layout.windows[f, SIGMA_WINDOW])
+    load = update_load(values, decided, quiet, time, layout.period)
+    if has_drifted(load, values, codes, decided, threshold, quiet, time, layout.period):
+        output.status[f, REASON] = FAULT
+        output.status[f, FAULTS] = TARE_DRIFT
+    return is_empty(load, decided, threshold, codes[CANDIDATE], time)
+
+
+@inlined
+def _decide_unready(
+    output: Output,
+    rule: DecisionRule,
+    decision: DecisionMemory,
+    f: int,
+    is_present: bool,
+    time: float,
+    period: float,
+) -> None:
+    """Report UNKNOWN for a finger without features, at once.
+
+    A fault that leaves a force is reported when it has lasted; the probability is kept until then.
+    """
+    codes, decided = decision.codes[f], decision.values[f]
+    if output.status[f, REASON] != FAULT or math.isnan(output.values[f, AMPLITUDE]):
+        codes[STATE] = codes[CANDIDATE] = UNKNOWN
+    elif is_present:
+        _debounce(codes, decided, UNKNOWN, rule.min_duration, time, period)
+    if codes[STATE] == UNKNOWN:
+        decided[PROBABILITY] = decided[LAST_UNSTABLE] = math.nan
+        _forget_cause(codes, decision.scores, f)
+    else:
+        output.status[f, REASON] = READY
+
+
+@inlined
+def _decide(
+    output: Output,
+    rule: DecisionRule,
+    decision: DecisionMemory,
+    f: int,
+    unloaded: bool,
+    time: float,
+    period: float,
+) -> None:
+    """Decide the state of a finger from its features, and report it when it has lasted."""
+    codes, decided, limits = decision.codes[f], decision.values[f], rule.limits[f]
+    by_load = not math.isnan(limits[CONTACT_LOAD])
+    state = NO_CONTACT
+    decided[PROBABILITY] = 0.0
+    if by_load or not unloaded:
+        weights = rule.weights[f, : rule.n_weights[f]]
+        decided[PROBABILITY] = linear_probability(output.features[f], weights)
+    if not unloaded:
+        state = _contact_state(
+            decided[PROBABILITY], limits[THRESHOLD], rule.hysteresis, codes[STATE]
+        )
+        if state == UNSTABLE and rule.causes.shape[1] > 0:
+            codes[CAUSE] = add_scores(output.features[f], rule.causes[f], decision.scores[f])
+        state = _hold(state, decided, rule.hold, time, period)
+    elif not by_load:
+        follow(output.values[f], decided, period)
+    if state != UNSTABLE:
+        _forget_cause(codes, decision.scores, f)
+    _debounce(codes, decided, state, rule.min_duration, time, period)
 
 
 @compiled
@@ -292,74 +332,6 @@ def run(
             if decision.codes[finger, STATE] == UNSTABLE:
                 rows.cause[k, finger] = decision.codes[finger, CAUSE]
         rows.values[k] = output.values
-
-
-@compiled
-def _contact_threshold(noise: float, limits: Array) -> float:
-    """Return the threshold of contact of F_a; NaN, which no value is under, if there is none."""
-    if math.isnan(limits[CONTACT]):
-        return float(limits[CONTACT_NOISE] * noise)
-    return float(limits[CONTACT])
-
-
-@compiled
-def _is_unloaded(motion: Array, limit: float, reported: int, time: float) -> bool:
-    """Return whether a finger is without contact: its load is small, and its force is at rest.
-
-    The threshold of the load is lower while in contact.
-
-    Args:
-        motion: of the finger, as in `Memory`.
-        limit: threshold of contact, as a multiple of the noise.
-        reported: the state that is reported.
-        time: of the sample [s].
-    """
-    threshold = max(limit * motion[NOISE_NOW], TOUCH_SHARE * motion[PEAK_LOAD])
-    if reported in (STABLE, UNSTABLE):
-        released = RELEASED_SHARE * motion[PEAK_LOAD]
-        threshold = max(CONTACT_RELEASE_RATIO * limit * motion[NOISE_NOW], released)
-    at_rest = time - motion[MOVED_AT] > REST_SECONDS
-    return bool(at_rest and motion[MOTION_LOAD] < threshold)
-
-
-@compiled
-def _has_drifted(
-    values: Array,
-    codes: Integers,
-    decided: Array,
-    threshold: float,
-    quiet: float,
-    time: float,
-    period: float,
-) -> bool:
-    """Return whether F_a crept over the threshold of contact, slower and calmer than a touch.
-
-    Args:
-        values: of the finger, as in `Output`.
-        codes: of the finger, as in `DecisionMemory`; is changed.
-        decided: of the finger, as in `DecisionMemory`; is changed.
-        threshold: of contact; NaN for none.
-        quiet: the sigma of noise alone; 0 for a window of two samples.
-        time: of the sample [s].
-        period: of the samples [s].
-    """
-    amplitude, mean = values[AMPLITUDE], math.sqrt(2.0) * values[MEAN]
-    if math.isnan(decided[SMOOTHED]):
-        decided[SMOOTHED], decided[RESTLESS_AT] = amplitude, time
-    away = abs(mean - decided[SMOOTHED])
-    jumped = abs(amplitude - decided[SMOOTHED]) > 0.5 * threshold
-    decided[SMOOTHED] += min(1.0, period / DRIFT_SECONDS) * (amplitude - decided[SMOOTHED])
-    calm = quiet > 0.0 and values[SIGMA] <= CALM_RATIO * quiet and away <= 0.5 * threshold
-    if not calm:
-        decided[RESTLESS_AT] = time
-    if amplitude < threshold:
-        codes[LOAD] = NO_LOAD
-    elif not calm:
-        codes[LOAD] = TOUCH
-    elif codes[LOAD] == NO_LOAD:
-        long = time - decided[RESTLESS_AT] + 0.5 * period >= DRIFT_SECONDS
-        codes[LOAD] = DRIFT if long and not jumped else TOUCH
-    return bool(codes[LOAD] == DRIFT)
 
 
 @compiled

@@ -3,7 +3,7 @@
 from collections.abc import Mapping
 
 from holdfast.detector import Detector
-from holdfast.detector.decision_rule import THRESHOLD
+from holdfast.detector.contact_rule import THRESHOLD
 
 
 class AdjustableDetector(Detector):

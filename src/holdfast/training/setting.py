@@ -21,6 +21,8 @@ Of larger data it uses every n-th sample. Neighbouring samples are nearly equal,
 loses little."""
 CONTACT_LOAD = 10.0
 """Threshold of contact on the load for relative features, in multiples of its noise."""
+DEFAULT_HOLD, DEFAULT_HYSTERESIS = 0.1, 0.1
+"""Hold [s] and hysteresis of the models that `holdfast train` writes, see decision 12."""
 SEARCH_SAMPLES = 10_000
 """Maximum number of samples per finger in the search for hyper-parameters, at even steps."""
 
@@ -49,6 +51,7 @@ class Setting:
             5 standard deviations over the tare intervals, if they are without contact.
         max_samples: maximum number of samples per finger that are kept in memory.
         hold: time for which UNSTABLE is still reported after the last unstable sample [s].
+        hysteresis: distance past its threshold that a probability needs to change the state.
         init: model to adapt to the data, with its features and window; None for none.
 
     Raises:
@@ -70,6 +73,7 @@ class Setting:
     contact_threshold: float | None = None
     max_samples: int = MAX_SAMPLES
     hold: float = 0.0
+    hysteresis: float = 0.0
     init: Model | None = None
 
     def __post_init__(self) -> None:
@@ -93,6 +97,8 @@ class Setting:
             raise ValueError(f"a contact threshold of at least 0 expected, {threshold} given")
         if not (math.isfinite(self.hold) and self.hold >= 0):
             raise ValueError(f"a hold of at least 0 s expected, {self.hold} given")
+        if not 0 <= self.hysteresis < 1:
+            raise ValueError(f"a hysteresis from 0 to 1 expected, {self.hysteresis} given")
         if self.shared and self.init is not None and ANY_FINGER not in self.init.fingers:
             raise ModelError(
                 f"one classifier for all fingers (shared) cannot be adapted from "
@@ -118,7 +124,7 @@ class Setting:
                 "features for all fingers can be adapted"
             )
         own = {"features": features.pop(), "window": init.window, "tare": Tare.parse(init.tare)}
-        own["hold"] = init.debounce.hold
+        own |= {"hold": init.debounce.hold, "hysteresis": init.debounce.hysteresis}
         return cls(**{**own, **chosen}, init=init)
 
     def recipe_of(self, finger: str) -> LinearRecipe:
@@ -169,9 +175,9 @@ class Setting:
 
     @property
     def debounce(self) -> Debounce:
-        """Debouncing of the model: that of the adapted model, except for the hold time."""
+        """Debouncing of the model; its minimum duration is that of the adapted model."""
         known = Debounce() if self.init is None else self.init.debounce
-        return Debounce(known.min_duration, known.hysteresis, self.hold)
+        return Debounce(known.min_duration, self.hysteresis, self.hold)
 
     @property
     def rate(self) -> float | None:

@@ -384,7 +384,7 @@ def test_a_fault_that_lasts_is_a_problem_and_a_notice():
     assert document["problems"] == [{"fault": "late", "fingers": ["thumb"], "text": text}]
     assert [notice["text"] for notice in notices] == [text]
     assert set(hello["faults"]) == set(map(str, Fault))
-    assert hello["debounce"] == {"min_duration": 0.0, "hysteresis": 0.0, "hold": 0.1}
+    assert hello["debounce"] == {"min_duration": 0.0, "hysteresis": 0.1, "hold": 0.1}
 
 
 @pytest.mark.parametrize("body", [b"{", b"[" * 50_000, b"[]", b'{"name": 3}', b'{"nam": "a"}'])

@@ -1,0 +1,187 @@
+"""The rule of contact: whether a finger touches anything. Compiled, one sample at a time.
+
+A finger without contact has a small load. What counts as none follows a slow drift, and a skin
+that is released and relaxes.
+"""
+
+import math
+
+from holdfast import contact
+from holdfast.compiled import compiled, inlined
+from holdfast.features.arrays import (
+    AMPLITUDE,
+    MEAN,
+    MOVED_AT,
+    NOISE_NOW,
+    PEAK_LOAD,
+    SIGMA,
+    Array,
+    Integers,
+)
+from holdfast.features.arrays import LOAD as MOTION_LOAD
+from holdfast.features.motion import LOAD_DECAY_SECONDS, RELEASED_SHARE
+
+UNSTABLE, STABLE = contact.UNSTABLE, contact.STABLE
+
+# Columns of DecisionRule.limits.
+THRESHOLD = 0  # of the probability
+CONTACT, CONTACT_NOISE = 1, 2  # of F_a: absolute, and as a multiple of the noise; NaN for none
+CONTACT_LOAD = 3  # of the load, as a multiple of its noise; NaN for none
+LIMITS_WIDTH = 4
+
+# Columns of DecisionMemory.codes.
+LOAD = 2  # how the load came over the threshold of contact: one of the next three
+NO_LOAD, TOUCH, DRIFT = range(3)
+
+# Columns of DecisionMemory.values.
+SMOOTHED = 3  # F_a, smoothed over DRIFT_SECONDS [unit of the readings]
+RESTLESS_AT = 4  # when the finger was last not calm [s]
+REST = 5  # F_tip without contact, beyond the tare, in three components [unit of the readings]
+PEAK = 8  # largest load so far, slowly forgotten [unit of the readings]
+SHAKEN_AT = 9  # when sigma was last much larger than that of noise [s]
+
+DRIFT_SECONDS = 1.0
+"""A touch brings F_a over the threshold of contact in less time than this; a drift does not [s]."""
+CONTACT_RELEASE_RATIO = 0.7
+"""Share of the threshold of contact below which a contact ends."""
+FOLLOW_SECONDS = 3.0
+"""Time constant with which the tare follows the force of a finger without contact [s]."""
+TOUCH_SHARE = 1.5 * RELEASED_SHARE
+"""Share of the largest load so far that a touch exceeds."""
+REST_SECONDS = 0.2
+"""A force is at rest if it has not moved, or not been shaken, for this time [s]."""
+CALM_RATIO = 3.0
+"""A finger is calm while sigma is at most this many times the sigma of noise alone."""
+
+
+@compiled
+def contact_threshold(noise: float, limits: Array) -> float:
+    """Return the threshold of contact of F_a; NaN, which no value is under, if there is none."""
+    if math.isnan(limits[CONTACT]):
+        return float(limits[CONTACT_NOISE] * noise)
+    return float(limits[CONTACT])
+
+
+@compiled
+def is_at_rest(motion: Array, limit: float, latest: int, time: float) -> bool:
+    """Return whether a finger is without contact: its load is small, and its force is at rest.
+
+    Args:
+        motion: of the finger, as in `Memory`.
+        limit: threshold of contact, as a multiple of the noise.
+        latest: the state of the last sample, before debouncing.
+        time: of the sample [s].
+    """
+    at_rest = time - motion[MOVED_AT] > REST_SECONDS
+    threshold = limit * motion[NOISE_NOW]
+    return bool(at_rest and _is_unloaded(motion[MOTION_LOAD], motion[PEAK_LOAD], threshold, latest))
+
+
+@inlined
+def is_empty(load: float, decided: Array, threshold: float, latest: int, time: float) -> bool:
+    """Return whether a finger is without contact: below the threshold of contact, or relaxing.
+
+    A released skin relaxes slowly: its load is a small share of the largest one, and at rest.
+
+    Args:
+        load: of the finger, beyond its rest [unit of the readings].
+        decided: of the finger, as in `DecisionMemory`.
+        threshold: of contact; NaN for none, and then there is always contact.
+        latest: the state of the last sample, before debouncing.
+        time: of the sample [s].
+    """
+    if not threshold > 0.0:
+        return False
+    at_rest = time - decided[SHAKEN_AT] > REST_SECONDS
+    peak = decided[PEAK] if at_rest else 0.0
+    return bool(_is_unloaded(load, peak, threshold, latest))
+
+
+@compiled
+def _is_unloaded(load: float, peak: float, threshold: float, latest: int) -> bool:
+    """Return whether a load is below the threshold of contact, which is lower while in contact.
+
+    Args:
+        load: of the finger.
+        peak: its largest load of the last seconds.
+        threshold: that a touch exceeds.
+        latest: the state of the last sample, before debouncing.
+    """
+    if latest in (STABLE, UNSTABLE):
+        return bool(load < max(CONTACT_RELEASE_RATIO * threshold, RELEASED_SHARE * peak))
+    return bool(load < max(threshold, TOUCH_SHARE * peak))
+
+
+@inlined
+def update_load(values: Array, decided: Array, quiet: float, time: float, period: float) -> float:
+    """Return the load of a finger: its force beyond that without contact. Update its peak.
+
+    Args:
+        values: of the finger, as in `Output`.
+        decided: of the finger, as in `DecisionMemory`; is changed.
+        quiet: the sigma of noise alone; 0 for a window of two samples.
+        time: of the sample [s].
+        period: of the samples [s].
+    """
+    x, y, z = (
+        values[0] - decided[REST],
+        values[1] - decided[REST + 1],
+        values[2] - decided[REST + 2],
+    )
+    load = math.sqrt(x * x + y * y + z * z)
+    decided[PEAK] = max(load, (1.0 - min(1.0, period / LOAD_DECAY_SECONDS)) * decided[PEAK])
+    if not (quiet > 0.0 and values[SIGMA] <= CALM_RATIO * quiet):
+        decided[SHAKEN_AT] = time
+    return load
+
+
+@compiled
+def follow(values: Array, decided: Array, period: float) -> None:
+    """Let the force without contact follow slowly."""
+    share = min(1.0, period / FOLLOW_SECONDS)
+    for axis in range(3):
+        decided[REST + axis] += share * (values[axis] - decided[REST + axis])
+
+
+@compiled
+def has_drifted(
+    load: float,
+    values: Array,
+    codes: Integers,
+    decided: Array,
+    threshold: float,
+    quiet: float,
+    time: float,
+    period: float,
+) -> bool:
+    """Return whether the load crept over the threshold, slower and calmer than a touch.
+
+    The tare follows a slower drift, so that its load stays below the threshold.
+
+    Args:
+        load: beyond that without contact [unit of the readings].
+        values: of the finger, as in `Output`.
+        codes: of the finger, as in `DecisionMemory`; is changed.
+        decided: of the finger, as in `DecisionMemory`; is changed.
+        threshold: of contact; NaN for none.
+        quiet: the sigma of noise alone; 0 for a window of two samples.
+        time: of the sample [s].
+        period: of the samples [s].
+    """
+    amplitude, mean = values[AMPLITUDE], math.sqrt(2.0) * values[MEAN]
+    if math.isnan(decided[SMOOTHED]):
+        decided[SMOOTHED], decided[RESTLESS_AT] = amplitude, time
+    away = abs(mean - decided[SMOOTHED])
+    jumped = abs(amplitude - decided[SMOOTHED]) > 0.5 * threshold
+    decided[SMOOTHED] += min(1.0, period / DRIFT_SECONDS) * (amplitude - decided[SMOOTHED])
+    calm = quiet > 0.0 and values[SIGMA] <= CALM_RATIO * quiet and away <= 0.5 * threshold
+    if not calm:
+        decided[RESTLESS_AT] = time
+    if load < threshold:
+        codes[LOAD] = NO_LOAD
+    elif not calm:
+        codes[LOAD] = TOUCH
+    elif codes[LOAD] == NO_LOAD:
+        long = time - decided[RESTLESS_AT] + 0.5 * period >= DRIFT_SECONDS
+        codes[LOAD] = DRIFT if long and not jumped else TOUCH
+    return bool(codes[LOAD] == DRIFT)
