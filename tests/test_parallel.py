@@ -240,5 +240,5 @@ class TestCluster:
 
     def test_without_dask(self, monkeypatch):
         monkeypatch.setitem(sys.modules, "distributed", None)
-        with pytest.raises(MissingExtra, match=r"needs the package distributed.*holdfast\[cluster"):
+        with pytest.raises(MissingExtra, match=r"needs the package distributed.*cluster"):
             list(Engine.parse("dask:127.0.0.1:1").map_ordered(power, [(1, 1)]))

@@ -54,7 +54,7 @@ def refusal(capsys, *words):
 def test_own_recordings(capsys, data, tmp_path):
     out = tmp_path / "out"
     code, printed, err = run(capsys, data, "--out", out, "--quick", "--jobs", 1)
-    assert code == 0
+    assert code == 0, err
     assert printed.startswith("The paper's Table I: confusion [%] (in parentheses: the paper)\n")
     assert printed.endswith(f"{out / 'report.html'}: all 7 tables and the figures\n")
     assert "making tables and figures\n" in err
@@ -66,7 +66,7 @@ def test_own_recordings(capsys, data, tmp_path):
     assert summary["data"]["real"] == summary["data"]["main"]
     assert "already holds a study" in refusal(capsys, data, "--out", out, "--quick")
     code, printed, _ = run(capsys, data, "--out", out, "--quick", "--force", "--json")
-    assert code == 0
+    assert code == 0, err
     assert json.loads(printed) == json.loads((out / "study.json").read_text())
 
 
@@ -107,7 +107,7 @@ def test_the_twin_simulates_the_recordings_first(capsys, monkeypatch, tmp_path):
     out = tmp_path / "out"
     words = ("--twin", "--quick", "--jobs", 1, "--out", out, "--json")
     code, printed, err = run(capsys, *words)
-    assert code == 0
+    assert code == 0, err
     assert "recordings of the twin, 1 of 1: main\n" in err
     names = {path.stem for path in (out / "data/quick/main").iterdir()}
     assert {"can-case1-1", "can-case2-1"} <= names
