@@ -21,6 +21,9 @@ if TYPE_CHECKING:
     from holdfast.labelling.review.audit import Suspect
     from holdfast.labelling.server.workspace import Workspace
 
+END_TIMEOUT = 10.0
+"""Time for which the preparation may go on after Ctrl-C [s]."""
+
 
 def show_label_page(
     paths: Sequence[Path],
@@ -68,11 +71,17 @@ def show_label_page(
         where = "is open in the browser" if opened else "is the page"
         print_message(f"{page} {where} for {_describe(files)}; Ctrl-C stops it")
 
-    for work in (_prepare, Workspace.warm_up):
-        Thread(target=work, args=(workspace,), daemon=True).start()
+    threads = [
+        Thread(target=work, args=(workspace,), daemon=True)
+        for work in (_prepare, Workspace.warm_up)
+    ]
+    for thread in threads:
+        thread.start()
     run_server(
         LabellingService(workspace, guard).app, page_options.host, page_options.port, announce
     )
+    for thread in threads:  # a library that is at work when Python ends stops with a fatal error
+        thread.join(END_TIMEOUT)
 
 
 def _describe(files: Sequence[Path]) -> str:
