@@ -11,12 +11,11 @@ from pathlib import Path
 
 import numpy as np
 from sklearn.metrics import roc_auc_score
+from train_any import calibration_error
 
 from holdfast import Model, Recording, evaluate
 from holdfast.contact import STABLE, UNSTABLE
 from holdfast.io import load_dataset
-
-N_BINS = 10
 
 
 def main(folder: Path) -> None:
@@ -59,15 +58,6 @@ def samples(model: Model, recording: Recording) -> tuple[np.ndarray, np.ndarray]
         found.append((probability[kept], states[kept] == STABLE))
     probabilities, stable = zip(*found, strict=True)
     return np.concatenate(probabilities), np.concatenate(stable)
-
-
-def calibration_error(probability: np.ndarray, stable: np.ndarray) -> float:
-    """Mean distance of probability and share of stable samples over ten bins."""
-    bins = np.minimum((N_BINS * probability).astype(int), N_BINS - 1)
-    return sum(
-        abs(probability[bins == b].mean() - stable[bins == b].mean()) * (bins == b).mean()
-        for b in np.unique(bins)
-    )
 
 
 if __name__ == "__main__":

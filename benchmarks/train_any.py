@@ -176,14 +176,18 @@ def report(
     )
     contact = roc_auc_score(stable, probability)
     of_slip = roc_auc_score(stable[stable | slip], probability[stable | slip])
-    bins = np.minimum((10 * probability).astype(int), 9)
-    error = sum(
-        abs(probability[bins == b].mean() - stable[bins == b].mean()) * (bins == b).mean()
-        for b in range(10)
-        if (bins == b).any()
-    )
+    error = calibration_error(probability, stable)
     print(f"| {title} | {contact:.3f} | {of_slip:.3f} | {error:.3f} | {shown.sum()} |", flush=True)
     return {"auc": float(contact), "auc_slip": float(of_slip)}
+
+
+def calibration_error(probability: np.ndarray, stable: np.ndarray) -> float:
+    """Mean distance of probability and share of stable samples over ten bins."""
+    bins = np.minimum((10 * probability).astype(int), 9)
+    return sum(
+        abs(probability[bins == b].mean() - stable[bins == b].mean()) * (bins == b).mean()
+        for b in np.unique(bins)
+    )
 
 
 def out_of_fold(hands, folds, shown) -> Iterator[tuple[np.ndarray, np.ndarray, np.ndarray]]:

@@ -93,7 +93,7 @@ def run_trial(trial: Trial, law: str, model: str = "builtin:any") -> TrialResult
     calibration = NEWTONS_PER_COUNT
     controller = GripController(LIMITS, law, sensors=sensors, newtons_per_unit=calibration)
     scales = np.ones(len(FINGERS))
-    log = _Log(trial)
+    log = _TrialLog(trial)
     while not (simulation.is_over or simulation.protocol.lost_at is not None):
         if simulation.held_for > trial.duration:
             break
@@ -130,7 +130,7 @@ def least_force_at(trial: Trial, held_for: float) -> float:
     return max(across / (item.mu_static * load.friction), abs(along))
 
 
-class _Log:
+class _TrialLog:
     """Numbers of a trial, sample by sample."""
 
     def __init__(self, trial: Trial) -> None:
