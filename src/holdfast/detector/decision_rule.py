@@ -246,7 +246,7 @@ def _decide_unready(
     if output.status[f, REASON] != FAULT or math.isnan(output.values[f, AMPLITUDE]):
         codes[STATE] = codes[CANDIDATE] = UNKNOWN
     elif is_present:
-        _debounce(codes, decided, UNKNOWN, rule.min_duration, time, period)
+        debounce(codes, decided, UNKNOWN, rule.min_duration, time, period)
     if codes[STATE] == UNKNOWN:
         decided[PROBABILITY] = decided[LAST_UNSTABLE] = math.nan
         _forget_cause(codes, decision.scores, f)
@@ -273,17 +273,17 @@ def _decide(
         weights = rule.weights[f, : rule.n_weights[f]]
         decided[PROBABILITY] = linear_probability(output.features[f], weights)
     if not unloaded:
-        state = _contact_state(
+        state = classify_contact(
             decided[PROBABILITY], limits[THRESHOLD], rule.hysteresis, codes[STATE]
         )
         if state == UNSTABLE and rule.causes.shape[1] > 0:
             codes[CAUSE] = add_scores(output.features[f], rule.causes[f], decision.scores[f])
-        state = _hold(state, decided, rule.hold, time, period)
+        state = hold_unstable(state, decided, rule.hold, time, period)
     elif not by_load:
         follow(output.values[f], decided, period)
     if state != UNSTABLE:
         _forget_cause(codes, decision.scores, f)
-    _debounce(codes, decided, state, rule.min_duration, time, period)
+    debounce(codes, decided, state, rule.min_duration, time, period)
 
 
 @compiled
@@ -335,7 +335,7 @@ def run(
 
 
 @compiled
-def _contact_state(probability: float, threshold: float, hysteresis: float, reported: int) -> int:
+def classify_contact(probability: float, threshold: float, hysteresis: float, reported: int) -> int:
     """Return STABLE from the threshold on. Hysteresis moves it away from the reported state."""
     if reported == STABLE:
         threshold -= hysteresis
@@ -345,7 +345,7 @@ def _contact_state(probability: float, threshold: float, hysteresis: float, repo
 
 
 @compiled
-def _hold(state: int, decided: Array, hold: float, time: float, period: float) -> int:
+def hold_unstable(state: int, decided: Array, hold: float, time: float, period: float) -> int:
     """Return UNSTABLE while it is held, else the state."""
     if state == UNSTABLE:
         decided[LAST_UNSTABLE] = time
@@ -355,7 +355,7 @@ def _hold(state: int, decided: Array, hold: float, time: float, period: float) -
 
 
 @compiled
-def _debounce(
+def debounce(
     codes: Integers, decided: Array, state: int, min_duration: float, time: float, period: float
 ) -> None:
     """Report the state if it has lasted long enough, or if the reported state is UNKNOWN."""

@@ -13,9 +13,9 @@ from holdfast.detector.decision_rule import (
     CANDIDATE,
     LAST_UNSTABLE,
     STATE,
-    _contact_state,
-    _debounce,
-    _hold,
+    classify_contact,
+    debounce,
+    hold_unstable,
     new_decision_memory,
 )
 from holdfast.features.arrays import Array, Integers
@@ -97,7 +97,7 @@ def _replay(
     decided: Array,
     out: Codes,
 ) -> None:
-    """Fill the states of a finger, as the step of the detector decides them.
+    """Fill the states of a finger, by the steps of the detector.
 
     Args:
         times: (n,) [s].
@@ -116,9 +116,9 @@ def _replay(
         else:
             state = NO_CONTACT
             if raw[k] != NO_CONTACT:
-                state = _contact_state(probability[k], threshold, hysteresis, codes[STATE])
-                state = _hold(state, decided, hold, times[k], period)
-            _debounce(codes, decided, state, min_duration, times[k], period)
+                state = classify_contact(probability[k], threshold, hysteresis, codes[STATE])
+                state = hold_unstable(state, decided, hold, times[k], period)
+            debounce(codes, decided, state, min_duration, times[k], period)
         out[k] = codes[STATE]
 
 
