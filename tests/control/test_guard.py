@@ -69,3 +69,24 @@ def test_the_safe_command_keeps_the_scales():
     assert safe.fingers["thumb"].scale == 1.4
     assert safe.release
     assert safe.state is LoopState.FAULT
+
+
+@pytest.mark.parametrize("on_fault", ["hold", "open"])
+def test_a_stop_replaces_every_command_at_once_until_it_is_ended(on_fault):
+    guard = CommandGuard(Limits(min_scale=0.5, max_scale=2.0, rise=10.0, on_fault=on_fault))
+    guard.admit(command(1.0))
+    guard.admit(command(1.4, 0.1))
+    guard.stop()
+    # Less than a period of the highest rate later.
+    stopped = guard.admit(command(1.4, 0.1001))
+    assert (stopped.state, stopped.reason) == (LoopState.FAULT, GripReason.STOPPED)
+    assert stopped.release is (on_fault == "open")
+    assert guard.admit(command(1.9, 0.2)).fingers["thumb"].scale == 1.4
+    guard.resume()
+    assert guard.admit(command(1.45, 0.3)) == command(1.45, 0.3)
+
+
+def test_commands_pass_after_the_clock_went_back():
+    guard = CommandGuard(LIMITS)
+    guard.admit(command(1.0, 100.0))
+    assert guard.admit(command(1.0, 0.5)) is not None

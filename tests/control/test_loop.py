@@ -1,8 +1,15 @@
 import pytest
 
 from control.build import FINGERS, RATE, hand, holding, scales
-from holdfast.contact import ContactState
-from holdfast.control import FingerCommand, GripCommand, LoopState
+from holdfast.contact import ContactState, HandEstimate
+from holdfast.control import (
+    FingerCommand,
+    GripCommand,
+    GripController,
+    GripReason,
+    Limits,
+    LoopState,
+)
 from holdfast.control.hands.base import Hand
 from holdfast.control.loop import GripLoop
 from holdfast.errors import HandError
@@ -109,3 +116,102 @@ def test_a_controller_beyond_its_limits_is_stopped_by_the_guard(tape):
     assert {one.scale for one in tape.commands[0].fingers.values()} == {1.0}
     assert tape.commands[0].state is LoopState.FAULT
     assert texts == ["grip FAULT (limit): thumb: a scale of 99 given, 1 to 3 expected"]
+
+
+class TestStop:
+    @pytest.mark.parametrize("on_fault", ["hold", "open"])
+    def test_the_next_step_sends_the_safe_command(self, tape, on_fault):
+        controller, time = holding(on_fault=on_fault)
+        texts = []
+        loop = GripLoop(controller, tape, armed=True, log=lambda text, _: texts.append(text))
+        time = stepped(loop, stepped(loop, time), index=SLIPPING)
+        held = scales(tape.commands[-1])
+        assert held["index"] > 1.1
+        loop.stop()
+        loop.step(hand(time, index=SLIPPING), time + 1e-4)  # sooner than the highest rate allows
+        sent = tape.commands[-1]
+        assert (sent.state, sent.reason) == (LoopState.FAULT, GripReason.STOPPED)
+        assert sent.release is (on_fault == "open")
+        assert scales(sent) == held
+        assert controller.state is LoopState.FAULT
+        assert texts[-1] == "grip FAULT (stopped)"
+
+    def test_it_lasts_whatever_the_estimates_are(self, tape):
+        controller, time = holding(recovery=0.0)
+        loop = GripLoop(controller, tape, armed=True)
+        time = stepped(loop, time)
+        loop.stop()
+        stepped(loop, time, n=300, index=SLIPPING)
+        assert {command.reason for command in tape.commands[10:]} == {GripReason.STOPPED}
+        assert scales(tape.commands[-1]) == dict.fromkeys(FINGERS, 1.0)
+
+    def test_it_needs_no_data(self, tape):
+        beats = Beats()
+        loop = GripLoop(GripController(Limits(on_fault="open")), tape, armed=True, watchdog=beats)
+        loop.stop()
+        loop.step(HandEstimate(0.0, ContactState.UNKNOWN, {}), 0.0)
+        assert [command.release for command in tape.commands] == [True]
+        loop.step(HandEstimate(0.0, ContactState.UNKNOWN, {}), 0.0)
+        assert len(beats.commands) == 2
+
+    def test_a_grip_that_still_holds_goes_on_with_its_scales(self, tape):
+        controller, time = holding()
+        texts = []
+        loop = GripLoop(controller, tape, armed=True, log=lambda text, _: texts.append(text))
+        time = stepped(loop, stepped(loop, time), index=SLIPPING)
+        held = scales(tape.commands[-1])
+        assert held["index"] > 1.1
+        loop.stop()
+        time = stepped(loop, time)
+        loop.resume()
+        assert not loop.stopped
+        time = stepped(loop, time, n=1)
+        assert loop.last.state is LoopState.HOLD
+        assert scales(loop.last) == held
+        assert texts[-1] == "grip HOLD"
+        stepped(loop, time, n=30, index=SLIPPING)
+        assert scales(loop.last)["index"] > held["index"]
+
+    def test_without_contact_it_begins_from_idle(self, tape):
+        controller, time = holding()
+        loop = GripLoop(controller, tape, armed=True)
+        loop.stop()
+        gone = {name: {"state": ContactState.NO_CONTACT} for name in FINGERS}
+        time = stepped(loop, time, n=20, **gone)
+        loop.resume()
+        stepped(loop, time, n=20, **gone)
+        assert loop.last.state is LoopState.IDLE
+
+    def test_a_hand_that_opened_gets_no_command_until_it_holds_again(self, tape):
+        controller, time = holding(on_fault="open")
+        loop = GripLoop(controller, tape, armed=True)
+        with loop:
+            loop.stop()
+            time = stepped(loop, time)
+            loop.resume()
+            n = len(tape.commands)
+            time = stepped(loop, time, n=20)
+            assert loop.last.state is LoopState.IDLE
+            assert len(tape.commands) == n
+        assert tape.commands[-1].release
+        stepped(loop, time, n=40)
+        assert tape.commands[-1].state is LoopState.HOLD
+        assert not tape.commands[-1].release
+
+    def test_resuming_what_was_not_stopped_changes_nothing(self, tape):
+        controller, time = holding()
+        loop = GripLoop(controller, tape, armed=True)
+        time = stepped(loop, stepped(loop, time), index=SLIPPING)
+        before = scales(loop.last)
+        loop.resume()
+        stepped(loop, time, n=1)
+        assert loop.last.state is not LoopState.IDLE
+        assert scales(loop.last) == pytest.approx(before, rel=0.05)
+
+
+def test_an_orderly_end_leaves_an_open_hand_open(tape):
+    controller, time = holding(on_fault="open")
+    with GripLoop(controller, tape, armed=True) as loop:
+        loop.stop()
+        stepped(loop, time)
+    assert tape.commands[-1].release

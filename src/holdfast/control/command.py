@@ -39,6 +39,7 @@ class GripReason(StrEnum):
     OVERLOAD = "overload"
     LIMIT = "limit"
     WATCHDOG = "watchdog"
+    STOPPED = "stopped"
 
 
 class FingerCommand(msgspec.Struct, frozen=True, gc=False):

@@ -88,7 +88,7 @@ class GripController:
         self._bad_since: list[float] = []
         self._highest: list[float] = []
         self._commands: dict[str, FingerCommand] = {}
-        self._latched = False
+        self._latched = self._stopped = False
         self._all_known = False
         self._time = math.nan
         self._stable_since = math.nan
@@ -96,6 +96,27 @@ class GripController:
         self._raised_at = -math.inf
         self._fault = GripReason.NONE
         self._events: deque[GripEvent] = deque(maxlen=MAX_EVENTS)
+
+    def stop(self) -> None:
+        """Stop: from the next update on, in FAULT (stopped) until `resume` or `reset`."""
+        if not self._stopped:
+            self._stopped, self._fault = True, _NONE
+
+    def resume(self) -> None:
+        """End a stop or a fault, by the decision of a person. It has no effect elsewhere.
+
+        A grip that still touches the object goes on with its scales. After "open", or without
+        contact, the controller returns to IDLE, as by `reset`.
+        """
+        if not self._stopped and self._fault is _NONE:
+            return
+        touching = any(touch.touching for touch in self._touches)
+        if self.limits.on_fault == "open" or not touching:
+            self.reset()
+            return
+        self._latched = self._stopped = False
+        self._fault = _NONE
+        self._change(_HOLD, self._time)
 
     @property
     def loaded_fingers(self) -> tuple[str, ...]:
@@ -120,6 +141,8 @@ class GripController:
             The command. Its scales change only in the states REACT and RELAX.
         """
         dt = time - self._time
+        if self._stopped:
+            return self._in_stop(estimate, time, dt)
         if self.state is LoopState.IDLE:
             return self._idle(estimate, time)
         problem = self._problem(estimate, time, dt)
@@ -199,6 +222,12 @@ class GripController:
         self._bad_since[k] = min(self._bad_since[k], time)
         return time - self._bad_since[k] >= self.limits.fault_after
 
+    def _in_stop(self, estimate: HandEstimate, time: float, dt: float) -> GripCommand:
+        """Hold or open, and follow the contacts of the grip, if there is one."""
+        if self._touches:
+            self._problem(estimate, time, dt)
+        return self._in_fault(GripReason.STOPPED, time)
+
     def _in_fault(self, problem: GripReason, time: float) -> GripCommand:
         """Hold or open; recover after enough valid data, where that is allowed."""
         if problem is not GripReason.CLOCK:
@@ -208,7 +237,8 @@ class GripController:
             if self._fault is GripReason.NONE:
                 self._fault = problem
                 self._change(LoopState.FAULT, time, problem)
-            self._latched |= self.limits.on_fault == "open" or problem is GripReason.LOST
+            lasting = problem in (GripReason.LOST, GripReason.STOPPED)
+            self._latched |= self.limits.on_fault == "open" or lasting
         elif not self._valid_since <= time:
             self._valid_since = time
         if not self._latched and time - self._valid_since >= self.limits.recovery:

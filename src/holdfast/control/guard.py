@@ -21,6 +21,7 @@ class CommandGuard:
 
     Attributes:
         violation: what the first refused command violated; empty if none was.
+        stopped: whether every command is replaced by the safe one, because of `stop`.
 
     Example:
         >>> guard = CommandGuard(Limits(max_scale=2.0))
@@ -35,30 +36,40 @@ class CommandGuard:
 
     def reset(self) -> None:
         """Forget all commands."""
-        self.violation = ""
+        self.resume()
         self._scales: dict[str, float] = {}
         self._checked_at = -math.inf
         self._sent_at = -math.inf
-        self._state = LoopState.IDLE
+        self._sent = LoopState.IDLE, GripReason.NONE
+
+    def stop(self) -> None:
+        """Replace every command by the safe one from now on, until `resume` or `reset`."""
+        self.stopped = True
+
+    def resume(self) -> None:
+        """End a stop or a violation; the last scales stay those from which a rise is measured."""
+        self.violation, self.stopped = "", False
 
     def admit(self, command: GripCommand) -> GripCommand | None:
         """Return the command to send.
 
         Returns:
             The command; the safe command in its place; or None if the last one was sent less
-            than a period of `Limits.max_rate` ago. A new FAULT is never held back.
+            than a period of `Limits.max_rate` ago. A new FAULT, or a new reason of it, is
+            never held back.
         """
         self.violation = self.violation or self._violation(command)
-        if self.violation:
+        if self.stopped or self.violation:
             command = self._safe(command)
         self._scales = {name: one.scale for name, one in command.fingers.items()}
         if math.isfinite(command.time):
             self._checked_at = max(self._checked_at, command.time)
-        early = command.time - self._sent_at < (1.0 - SLACK) / self.limits.max_rate
-        new_fault = command.state is LoopState.FAULT and self._state is not LoopState.FAULT
-        if early and not new_fault:
+        elapsed = command.time - self._sent_at
+        early = 0.0 <= elapsed < (1.0 - SLACK) / self.limits.max_rate
+        kind = command.state, command.reason
+        if early and (command.state is not LoopState.FAULT or kind == self._sent):
             return None
-        self._sent_at, self._state = command.time, command.state
+        self._sent_at, self._sent = command.time, kind
         return command
 
     def _violation(self, command: GripCommand) -> str:
@@ -82,7 +93,8 @@ class CommandGuard:
         names: Mapping[str, object] = self._scales or command.fingers
         fingers = {name: FingerCommand(self._scales.get(name, 1.0)) for name in names}
         release = self.limits.on_fault == "open"
-        return GripCommand(command.time, LoopState.FAULT, fingers, release, GripReason.LIMIT)
+        reason = GripReason.STOPPED if self.stopped else GripReason.LIMIT
+        return GripCommand(command.time, LoopState.FAULT, fingers, release, reason)
 
 
 def safe_command(last: GripCommand, reason: GripReason, *, release: bool) -> GripCommand:

@@ -6,7 +6,7 @@ from types import TracebackType
 from typing import Self
 
 from holdfast.contact import HandEstimate
-from holdfast.control.command import GripCommand, GripReason
+from holdfast.control.command import GripCommand, GripReason, LoopState
 from holdfast.control.controller import GripController
 from holdfast.control.guard import CommandGuard, safe_command
 from holdfast.control.hands import Hand
@@ -48,8 +48,32 @@ class GripLoop:
         self.guard = CommandGuard(controller.limits)
         self.last: GripCommand | None = None
         self.n_sent = 0
+        self._released = False  # by a stop or fault that a person has ended
         self._watchdog = watchdog
         self._log = log or (lambda text, time: None)
+
+    @property
+    def stopped(self) -> bool:
+        """Whether `stop` was called, and not `resume` after it."""
+        return self.guard.stopped
+
+    def stop(self) -> None:
+        """Replace every command by the safe one, from the next step until `resume`.
+
+        It may be called in any thread, also while `step` runs. Only `step` sends: call it next,
+        without data with an estimate that has no fingers.
+        """
+        self.guard.stop()
+
+    def resume(self) -> None:
+        """End a stop or a fault, by the decision of a person.
+
+        A hand that was opened gets no command until it holds something again: a reset must not
+        close it.
+        """
+        self._released = self.last is not None and self.last.release
+        self.controller.resume()
+        self.guard.resume()
 
     def step(self, estimate: HandEstimate, time: float) -> GripCommand:
         """Update the controller, check its command and send it.
@@ -61,6 +85,8 @@ class GripLoop:
         Raises:
             HandError: the hand refuses the command, or the watchdog has taken over.
         """
+        if self.stopped:
+            self.controller.stop()
         command = self.controller.update(estimate, time)
         for event in self.controller.events():
             self._log(str(event), event.time)
@@ -69,8 +95,9 @@ class GripLoop:
         if self.guard.violation != violated:
             self._log(f"grip FAULT (limit): {self.guard.violation}", time)
         self.last = admitted or self.last or command
+        self._released = self._released and self.last.state is LoopState.IDLE
         if self.armed:
-            self._send(self.last, is_new=admitted is not None)
+            self._send(self.last, is_new=admitted is not None and not self._released)
         return self.last
 
     def _send(self, command: GripCommand, *, is_new: bool) -> None:
@@ -93,6 +120,7 @@ class GripLoop:
         """Leave the hand in a safe state."""
         if not self.armed or self.last is None:
             return
-        release = kind is not None and self.controller.limits.on_fault == "open"
+        failed = kind is not None and self.controller.limits.on_fault == "open"
+        release = failed or self.last.release or self._released
         with suppress(HandError) if kind else nullcontext():
             self.hand.send(safe_command(self.last, GripReason.NONE, release=release))
