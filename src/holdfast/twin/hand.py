@@ -6,7 +6,9 @@ skin and object, which are applied as external forces.
 
 import csv
 from dataclasses import dataclass, field
+from functools import cached_property
 from importlib import resources
+from typing import NamedTuple
 
 import mujoco
 import numpy as np
@@ -53,6 +55,36 @@ SHELL_COLOUR, FRAME_COLOUR = ".74 .75 .78 1", ".25 .27 .31 1"
 SKIN_COLOUR, OBJECT_COLOUR = ".95 .55 .18 1", ".36 .62 .80 1"
 
 Rows = list[dict[str, str]]
+
+
+class HandArrays(NamedTuple):
+    """Arrays of MuJoCo's state, which change in place, and what compiled code needs with them.
+
+    Attributes:
+        xpos, xmat, xipos, ximat, cvel, subtree_com: poses and motion of all bodies.
+        qpos, qfrc_bias, qfrc_applied: joints, torques that balance gravity and motion, and
+            torques of the motors.
+        xfrc_applied: forces and torques on all bodies.
+        roots: (n_bodies,) root of the tree of each body.
+        tips: (4,) bodies of the last links.
+        mounts: (4, 3) origin of each fingertip frame in its last link [m].
+        object_body: body of the object.
+    """
+
+    xpos: Array
+    xmat: Array
+    xipos: Array
+    ximat: Array
+    cvel: Array
+    subtree_com: Array
+    qpos: Array
+    qfrc_bias: Array
+    qfrc_applied: Array
+    xfrc_applied: Array
+    roots: np.ndarray
+    tips: np.ndarray
+    mounts: Array
+    object_body: int
 
 
 def hand_xml(side: str = "right", item: GraspObject | None = None) -> str:
@@ -130,13 +162,19 @@ class HandModel:
         """Return the limits of the joints, (16, 2) [rad]."""
         return np.array(self.model.jnt_range[:N_JOINTS])
 
+    @cached_property
+    def arrays(self) -> HandArrays:
+        """Arrays of the state, which change with it."""
+        data = self.data
+        return HandArrays(
+            data.xpos, data.xmat, data.xipos, data.ximat, data.cvel, data.subtree_com,
+            data.qpos, data.qfrc_bias, data.qfrc_applied, data.xfrc_applied,
+            self.model.body_rootid, self.tips, self.mounts, self.object_body,
+        )  # fmt: skip
+
     def bodies(self, out: Array) -> None:
         """Write pose and motion of the fingertip frames and the object in the world, (5, 18)."""
-        data = self.data
-        _bodies(
-            data.xpos, data.xmat, data.xipos, data.ximat, data.cvel, data.subtree_com,
-            self.tips, self.object_body, self.model.body_rootid, self.mounts, out,
-        )  # fmt: skip
+        fill_bodies(self.arrays, out)
 
     def apply(self, tips: Array, object_wrench: Array, bodies: Array) -> None:
         """Apply force and torque on fingertips and object in MuJoCo.
@@ -148,41 +186,27 @@ class HandModel:
                 in the world frame.
             bodies: poses as `bodies` writes them.
         """
-        _apply(
-            tips, object_wrench, bodies, self.data.xipos, self.tips, self.object_body,
-            self.data.xfrc_applied,
-        )  # fmt: skip
+        apply_forces(self.arrays, tips, object_wrench, bodies)
 
 
 @compiled
-def _bodies(
-    xpos: Array,
-    xmat: Array,
-    xipos: Array,
-    ximat: Array,
-    cvel: Array,
-    subtree_com: Array,
-    tips: Array,
-    object_body: int,
-    roots: Array,
-    mounts: Array,
-    out: Array,
-) -> None:
-    for i in range(len(tips)):
-        b = tips[i]
+def fill_bodies(hand: HandArrays, out: Array) -> None:
+    """Write the rows of `HandModel.bodies`."""
+    for i in range(len(hand.tips)):
+        b = hand.tips[i]
         for r in range(3):
-            place = xpos[b, r]
+            place = hand.xpos[b, r]
             for c in range(3):
-                place += xmat[b, 3 * r + c] * mounts[i, c]
-                out[i, 3 + 3 * r + c] = xmat[b, 3 * r + c]
+                place += hand.xmat[b, 3 * r + c] * hand.mounts[i, c]
+                out[i, 3 + 3 * r + c] = hand.xmat[b, 3 * r + c]
             out[i, r] = place
-        _fill_motion(cvel[b], subtree_com[roots[b]], out[i])
-    last = len(tips)
+        _fill_motion(hand.cvel[b], hand.subtree_com[hand.roots[b]], out[i])
+    last, b = len(hand.tips), hand.object_body
     for r in range(3):
-        out[last, r] = xipos[object_body, r]
+        out[last, r] = hand.xipos[b, r]
         for c in range(3):
-            out[last, 3 + 3 * r + c] = ximat[object_body, 3 * r + c]
-    _fill_motion(cvel[object_body], subtree_com[roots[object_body]], out[last])
+            out[last, 3 + 3 * r + c] = hand.ximat[b, 3 * r + c]
+    _fill_motion(hand.cvel[b], hand.subtree_com[hand.roots[b]], out[last])
 
 
 @compiled
@@ -197,27 +221,21 @@ def _fill_motion(cvel: Array, com: Array, row: Array) -> None:
 
 
 @compiled
-def _apply(
-    tips: Array,
-    object_wrench: Array,
-    bodies: Array,
-    xipos: Array,
-    ids: Array,
-    object_body: int,
-    out: Array,
-) -> None:
-    for i in range(len(ids)):
-        b = ids[i]
-        x = bodies[i, 0] - xipos[b, 0]
-        y = bodies[i, 1] - xipos[b, 1]
-        z = bodies[i, 2] - xipos[b, 2]
+def apply_forces(hand: HandArrays, tips: Array, object_wrench: Array, bodies: Array) -> None:
+    """Write MuJoCo's forces on bodies, see `HandModel.apply`."""
+    out = hand.xfrc_applied
+    for i in range(len(hand.tips)):
+        b = hand.tips[i]
+        x = bodies[i, 0] - hand.xipos[b, 0]
+        y = bodies[i, 1] - hand.xipos[b, 1]
+        z = bodies[i, 2] - hand.xipos[b, 2]
         fx, fy, fz = tips[i, 0], tips[i, 1], tips[i, 2]
         out[b, 0], out[b, 1], out[b, 2] = fx, fy, fz
         out[b, 3] = tips[i, 3] + y * fz - z * fy
         out[b, 4] = tips[i, 4] + z * fx - x * fz
         out[b, 5] = tips[i, 5] + x * fy - y * fx
     for k in range(6):
-        out[object_body, k] = object_wrench[k]
+        out[hand.object_body, k] = object_wrench[k]
 
 
 def _table() -> Rows:

@@ -145,7 +145,7 @@ class Simulation:
         self.n_samples = 0
         self._pressing: Pressing | None = None
         self._truth_log = TruthLog()
-        self._taxel_forces: dict[str, list[Array]] = {finger: [] for finger in FINGERS}
+        self._taxel_forces: list[Array] = []  # (4, n_taxels, 3) of each sample [N]
         self._readouts: dict[str, Readout] = {}
 
     @property
@@ -184,9 +184,8 @@ class Simulation:
             moved = self._pressing.displacement(scales)
         world.advance(command, self.plan, protocol.anchor, moved)
         self._truth_log.add(world, command)
-        nodes = world.contact.node_forces
-        for (finger, uskin), forces in zip(self.uskins.items(), nodes, strict=True):
-            self._taxel_forces[finger].append(uskin.taxel_forces(forces[None])[0])
+        one = self.uskins[FINGERS[0]]  # all fingertips have the same nodes and taxels
+        self._taxel_forces.append(one.taxel_forces(world.contact.node_forces))
         self.command = command
         self.n_samples += 1
 
@@ -194,10 +193,11 @@ class Simulation:
         """Return the counts (n_taxels, 3) of the last sample; call it after every `step`."""
         time = np.array([(self.n_samples - 1) / RATE])
         counts = {}
-        for finger, uskin in self.uskins.items():
+        for (finger, uskin), forces in zip(
+            self.uskins.items(), self._taxel_forces[-1], strict=True
+        ):
             if finger not in self._readouts:
                 self._readouts[finger] = uskin.readout(self.grasp.generator(f"skin {finger}"))
-            forces = self._taxel_forces[finger][-1]
             counts[finger] = self._readouts[finger].counts(forces[None], time)[0]
         return counts
 
@@ -205,10 +205,11 @@ class Simulation:
         """Return the recording so far, with truth and labels."""
         grasp, times = self.grasp, np.arange(self.n_samples) / RATE
         truth = self._truth_log.truth(times)
+        taxel_forces = np.array(self._taxel_forces)
         modules = {}
-        for finger, uskin in self.uskins.items():
-            forces = np.array(self._taxel_forces[finger])
-            counts = uskin.counts(forces, times, grasp.generator(f"skin {finger}"))
+        for place, (finger, uskin) in enumerate(self.uskins.items()):
+            generator = grasp.generator(f"skin {finger}")
+            counts = uskin.counts(taxel_forces[:, place], times, generator)
             stamps = times
             if grasp.server:
                 server = grasp.generator(f"server {finger}")

@@ -3,15 +3,14 @@
 import mujoco
 import numpy as np
 
-from holdfast.compiled import compiled
 from holdfast.sensors.types import Array
-from holdfast.twin.contact import LOAD, SLIP, constants_of, new_contact, touch
-from holdfast.twin.control import STEPS_PER_CONTROL, Controller, control
+from holdfast.twin.contact import LOAD, SLIP, constants_of, new_contact
+from holdfast.twin.control import STEPS_PER_CONTROL, Controller
 from holdfast.twin.grasp import ClosingPath, object_pose
 from holdfast.twin.hand import FINGERS, GRAVITY, N_JOINTS, SUBSTEPS, TIMESTEP, HandModel
 from holdfast.twin.loads import LoadState
 from holdfast.twin.objects import GraspObject
-from holdfast.twin.operator import MOVE, hold_wrench, move_wrench, push_wrench
+from holdfast.twin.physics import Action, Steps, Wrenches, advance_sample, engine_of
 from holdfast.twin.protocol import OPEN_GAP, Command, Plan
 from holdfast.twin.shapes import MU_KINETIC, MU_STATIC
 from holdfast.twin.surface import curved_fingertip
@@ -52,7 +51,9 @@ class World:
         self.bodies = np.zeros((len(FINGERS) + 1, 18))
         self.outside = np.zeros(6)
         self.set_point_error = 0.0
-        self._wrench = np.zeros(6)
+        self._engine = engine_of(hand)
+        self._steps = Steps(SUBSTEPS, TIMESTEP, STEPS_PER_CONTROL)
+        self._wrenches = Wrenches(self.outside, np.zeros(6))
         self._pull = np.zeros(3)
         self._frictions = self.constants.solid[MU_STATIC : MU_KINETIC + 1].copy()
         self._parameters = np.zeros(9)
@@ -92,11 +93,19 @@ class World:
             anchor: (12,) position and rotation at which the operator holds the object.
             displacement: (16,) of the set-points of the joints [rad]; None for none.
         """
-        data = self.hand.data
         target = self.path.targets(command.depths)
         if displacement is not None:
             target = target + displacement
-        self.set_point_error = 0.0
+        self.set_point_error = advance_sample(
+            self._engine, self._steps, self.hand.arrays, self.contact, self.constants,
+            self.controller, self._tick, target, self._action(command, plan, anchor),
+            self.bodies, self._wrenches,
+        )  # fmt: skip
+        self._tick += self._steps.n
+        if self.bodies[-1, 2] < MIN_HEIGHT:
+            self._freeze()
+
+    def _action(self, command: Command, plan: Plan, anchor: Array) -> Action:
         if command.disturbance != self._disturbance:
             self._disturbance = command.disturbance
             self._origin[:] = self.bodies[-1, :12]
@@ -105,35 +114,11 @@ class World:
             disturbance = plan.disturbances[command.disturbance]
             style, duration = disturbance.style, disturbance.duration
             self._parameters[:] = disturbance.parameters
-        for k in range(SUBSTEPS):
-            mujoco.mj_step1(self.hand.model, data)
-            self.hand.bodies(self.bodies)
-            touch(self.contact, self.constants, self.bodies, TIMESTEP)
-            _operate(
-                self.bodies[-1], anchor, command.hold, GRAVITY * self.item.mass, self.tremors,
-                plan.profile.tremor, data.time, self._parameters, self._origin,
-                style, duration, command.elapsed + k * TIMESTEP, self.contact.wrench,
-                self.outside, self._wrench,
-            )  # fmt: skip
-            self.outside[:3] += self._pull
-            self._wrench[:3] += self._pull
-            self.hand.apply(self.contact.tips, self._wrench, self.bodies)
-            if self._tick % STEPS_PER_CONTROL == 0:
-                tick = self._tick // STEPS_PER_CONTROL
-                self._note_glitch(tick)
-                control(
-                    self.controller, tick, data.qpos, data.qfrc_bias, target,
-                    STEPS_PER_CONTROL * TIMESTEP, data.qfrc_applied,
-                )  # fmt: skip
-            self._tick += 1
-            mujoco.mj_step2(self.hand.model, data)
-        if self.bodies[-1, 2] < MIN_HEIGHT:
-            self._freeze()
-
-    def _note_glitch(self, tick: int) -> None:
-        errors = self.controller.errors
-        error = float(np.abs(errors[min(tick, len(errors) - 1)]).max())
-        self.set_point_error = max(self.set_point_error, error)
+        return Action(
+            anchor, command.hold, GRAVITY * self.item.mass, self.tremors, plan.profile.tremor,
+            self.hand.data.time, self._parameters, self._origin, style, duration,
+            command.elapsed, self._pull,
+        )  # fmt: skip
 
     def _place(self, start: Array, side: str) -> None:
         place, turn = object_pose(self.item, side)
@@ -149,39 +134,3 @@ class World:
     def _freeze(self) -> None:
         self.hand.data.qvel[N_JOINTS:] = 0.0
         self.hand.data.qpos[N_JOINTS + 2] = MIN_HEIGHT - 0.1
-
-
-@compiled
-def _operate(
-    body: Array,
-    anchor: Array,
-    hold: float,
-    weight: float,
-    tremors: Array,
-    rms: float,
-    time: float,
-    parameters: Array,
-    origin: Array,
-    style: int,
-    duration: float,
-    elapsed: float,
-    fingers: Array,
-    outside: Array,
-    wrench: Array,
-) -> None:
-    """Write force and torque of the operator on the object, alone and with the fingers'."""
-    outside[:] = 0.0
-    if hold > 0.0:
-        held = hold_wrench(body, anchor, hold, weight, tremors[0], rms, time)
-        for k in range(6):
-            outside[k] += held[k]
-    if style == MOVE:
-        moved = move_wrench(body, origin, parameters, duration, tremors[1], rms, elapsed)
-        for k in range(6):
-            outside[k] += moved[k]
-    elif style >= 0:
-        pushed = push_wrench(body, origin, parameters, style, duration, tremors[1], rms, elapsed)
-        for k in range(6):
-            outside[k] += pushed[k]
-    for k in range(6):
-        wrench[k] = outside[k] + fingers[k]

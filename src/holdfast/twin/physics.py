@@ -1,0 +1,233 @@
+"""One sample of physics, compiled: seven steps of MuJoCo, contact, operator and controller.
+
+MuJoCo's half steps are called from compiled code by their addresses, because a call from Python
+with its arrays costs as much as the half step.
+"""
+
+import ctypes
+import sys
+from collections.abc import Callable, Sequence
+from pathlib import Path
+from typing import NamedTuple, cast
+
+import mujoco
+from llvmlite import ir
+from mujoco import _functions
+from numba import types
+from numba.core import cgutils
+from numba.extending import intrinsic
+
+from holdfast.compiled import compiled
+from holdfast.sensors.types import Array
+from holdfast.twin.contact import Constants, Contact, touch
+from holdfast.twin.control import Controller, control
+from holdfast.twin.hand import HandArrays, HandModel, apply_forces, fill_bodies
+from holdfast.twin.operator import MOVE, hold_wrench, move_wrench, push_wrench
+
+
+class Engine(NamedTuple):
+    """Addresses of MuJoCo's half steps, of a model and of its state.
+
+    Attributes:
+        first_half: address of `mj_step1`.
+        second_half: address of `mj_step2`.
+        model: address of the model.
+        data: address of the state; the model and the state must live as long as this.
+    """
+
+    first_half: int
+    second_half: int
+    model: int
+    data: int
+
+
+class Steps(NamedTuple):
+    """Steps of a sample.
+
+    Attributes:
+        n: number of steps.
+        period: duration of a step [s], that of the model.
+        per_control: steps in a step of the controller.
+    """
+
+    n: int
+    period: float
+    per_control: int
+
+
+class Action(NamedTuple):
+    """What the operator does during a sample, and the loads on the object.
+
+    Attributes:
+        anchor: (12,) position and rotation at which the operator holds the object.
+        hold: grip of the operator, from 0 (released) to 1.
+        weight: weight of the object, which the operator carries [N].
+        tremors: (2, 3, n, 3) tremor of the hand that holds, and of the hand or finger that
+            disturbs.
+        rms: rms of both tremors [m].
+        time: time at the begin of the sample [s].
+        parameters: (9,) parameters of the `Disturbance`.
+        origin: (12,) position and rotation of the object when the disturbance began.
+        style: style of the disturbance; -1 for none.
+        duration: duration of the disturbance [s].
+        elapsed: time since it began [s].
+        pull: (3,) force of the loads on the object [N].
+    """
+
+    anchor: Array
+    hold: float
+    weight: float
+    tremors: Array
+    rms: float
+    time: float
+    parameters: Array
+    origin: Array
+    style: int
+    duration: float
+    elapsed: float
+    pull: Array
+
+
+class Wrenches(NamedTuple):
+    """Force [N] and torque about the centre of mass [N m] on the object, in the world frame.
+
+    Attributes:
+        outside: (6,) of operator and loads.
+        total: (6,) of operator, loads and fingers.
+    """
+
+    outside: Array
+    total: Array
+
+
+def engine_of(hand: HandModel) -> Engine:
+    """Return the addresses with which compiled code steps a model."""
+    # The extension module finds the library that it was linked to, except on Windows.
+    windows = Path(mujoco.__file__).with_name("mujoco.dll")
+    library = ctypes.CDLL(str(windows) if sys.platform == "win32" else _functions.__file__)
+    return Engine(
+        _address(library.mj_step1),
+        _address(library.mj_step2),
+        hand.model._address,
+        hand.data._address,
+    )
+
+
+def _address(function: object) -> int:
+    return int(ctypes.cast(function, ctypes.c_void_p).value or 0)  # type: ignore[arg-type]
+
+
+def _declare_call(
+    _: object, function: object, model: object, data: object
+) -> tuple[object, object]:
+    """Return the signature of `_call`, and a function that generates its code."""
+
+    def generate(
+        _: object, builder: ir.IRBuilder, signature: object, addresses: Sequence[ir.Value]
+    ) -> ir.Constant:
+        pointer = cgutils.voidptr_t
+        kind = ir.FunctionType(ir.VoidType(), [pointer, pointer]).as_pointer()
+        entry = builder.inttoptr(addresses[0], kind)
+        builder.call(entry, [builder.inttoptr(address, pointer) for address in addresses[1:]])
+        return pointer(None)
+
+    return types.void(types.intp, types.intp, types.intp), generate
+
+
+_call = cast("Callable[[int, int, int], None]", intrinsic(_declare_call))
+"""Call a C function of two pointers; all three are addresses."""
+
+
+@compiled
+def advance_sample(
+    engine: Engine,
+    steps: Steps,
+    arrays: HandArrays,
+    contact: Contact,
+    constants: Constants,
+    controller: Controller,
+    tick: int,
+    target: Array,
+    action: Action,
+    bodies: Array,
+    wrenches: Wrenches,
+) -> float:
+    """Advance the physics by one sample.
+
+    Args:
+        engine: model and state of MuJoCo.
+        steps: steps of the sample.
+        arrays: arrays of this state.
+        contact: state of the contact; it is written.
+        constants: skin and object.
+        controller: controller of the hand; it is written.
+        tick: number of the first step.
+        target: (16,) set-points of the joints [rad].
+        action: what the operator does.
+        bodies: (5, 18) fingertip frames and object; they are written.
+        wrenches: force and torque on the object; they are written.
+
+    Returns:
+        The largest error of a set-point, in a glitch of the controller [rad].
+    """
+    worst, time, dt = 0.0, action.time, steps.period
+    for k in range(steps.n):
+        _call(engine.first_half, engine.model, engine.data)
+        fill_bodies(arrays, bodies)
+        touch(contact, constants, bodies, dt)
+        _operate(action, bodies[-1], contact.wrench, time, action.elapsed + k * dt, wrenches)
+        apply_forces(arrays, contact.tips, wrenches.total, bodies)
+        if (tick + k) % steps.per_control == 0:
+            number = (tick + k) // steps.per_control
+            worst = max(worst, _glitch(controller, number))
+            control(
+                controller, number, arrays.qpos, arrays.qfrc_bias, target,
+                steps.per_control * dt, arrays.qfrc_applied,
+            )  # fmt: skip
+        _call(engine.second_half, engine.model, engine.data)
+        time += dt  # as MuJoCo adds it
+    return worst
+
+
+@compiled
+def _glitch(controller: Controller, tick: int) -> float:
+    """Return the largest error of a set-point in a step of the controller [rad]."""
+    row = min(tick, len(controller.errors) - 1)
+    worst = 0.0
+    for error in controller.errors[row]:
+        worst = max(worst, abs(error))
+    return worst
+
+
+@compiled
+def _operate(
+    action: Action, body: Array, fingers: Array, time: float, elapsed: float, out: Wrenches
+) -> None:
+    """Write force and torque on the object: of operator and loads, and with the fingers'."""
+    outside = out.outside
+    outside[:] = 0.0
+    if action.hold > 0.0:
+        held = hold_wrench(
+            body, action.anchor, action.hold, action.weight, action.tremors[0], action.rms, time
+        )
+        for k in range(6):
+            outside[k] += held[k]
+    if action.style == MOVE:
+        moved = move_wrench(
+            body, action.origin, action.parameters, action.duration, action.tremors[1],
+            action.rms, elapsed,
+        )  # fmt: skip
+        for k in range(6):
+            outside[k] += moved[k]
+    elif action.style >= 0:
+        pushed = push_wrench(
+            body, action.origin, action.parameters, action.style, action.duration,
+            action.tremors[1], action.rms, elapsed,
+        )  # fmt: skip
+        for k in range(6):
+            outside[k] += pushed[k]
+    for k in range(6):
+        out.total[k] = outside[k] + fingers[k]
+    for k in range(3):
+        outside[k] += action.pull[k]
+        out.total[k] += action.pull[k]

@@ -1,0 +1,121 @@
+"""Seven steps in compiled code against the same steps called from Python, bit by bit."""
+
+import mujoco
+import numpy as np
+import pytest
+
+from holdfast.twin.contact import touch
+from holdfast.twin.control import STEPS_PER_CONTROL, control, draw_controller
+from holdfast.twin.grasp import closing_path
+from holdfast.twin.hand import GRAVITY, SUBSTEPS, TIMESTEP, HandModel
+from holdfast.twin.objects import object_named
+from holdfast.twin.operator import (
+    JERK,
+    MOVE,
+    PUSH,
+    draw_tremor,
+    hold_wrench,
+    move_wrench,
+    push_wrench,
+)
+from holdfast.twin.physics import Action, Steps, advance_sample, engine_of
+from holdfast.twin.world import World
+
+ITEM = object_named("can")
+PATH = closing_path(ITEM)
+STEPS = Steps(SUBSTEPS, TIMESTEP, STEPS_PER_CONTROL)
+PUSHED = np.array([0.0, 0, -1, 0.01, 0, 0.02, 0.006, 700, 4])
+
+
+def made_world():
+    random = np.random.default_rng(4)
+    controller = draw_controller(random, 5.0, STEPS_PER_CONTROL * TIMESTEP, 20.0)
+    tremors = np.stack([draw_tremor(random), draw_tremor(random)])
+    return World(HandModel.build(ITEM), ITEM, PATH, controller, tremors, np.zeros(4))
+
+
+def action(made, style=-1, hold=1.0, elapsed=0.0, pull=(0.0, 0.0, 0.0)):
+    anchor = made.bodies[-1, :12].copy()
+    return Action(
+        anchor, hold, GRAVITY * ITEM.mass, made.tremors, 1e-4, made.hand.data.time, PUSHED,
+        anchor, style, 0.6, elapsed, np.array(pull),
+    )  # fmt: skip
+
+
+def step_from_python(made, tick, target, given):
+    """Advance by one step, as the equations say; return the error of the set-points."""
+    data, error = made.hand.data, 0.0
+    mujoco.mj_step1(made.hand.model, data)
+    made.hand.bodies(made.bodies)
+    touch(made.contact, made.constants, made.bodies, TIMESTEP)
+    body, rms = made.bodies[-1], given.rms
+    elapsed = given.elapsed + tick % SUBSTEPS * TIMESTEP
+    outside = np.zeros(6)
+    if given.hold > 0:
+        weight, tremor = given.weight, given.tremors[0]
+        outside += hold_wrench(body, given.anchor, given.hold, weight, tremor, rms, data.time)
+    disturbing = (given.duration, given.tremors[1], rms, elapsed)
+    if given.style == MOVE:
+        outside += move_wrench(body, given.origin, given.parameters, *disturbing)
+    elif given.style >= 0:
+        outside += push_wrench(body, given.origin, given.parameters, given.style, *disturbing)
+    total = outside + made.contact.wrench
+    pull = np.array([*given.pull, 0, 0, 0])
+    made.outside[:] = outside + pull
+    made.hand.apply(made.contact.tips, total + pull, made.bodies)
+    if tick % STEPS_PER_CONTROL == 0:
+        number, period = tick // STEPS_PER_CONTROL, STEPS_PER_CONTROL * TIMESTEP
+        error = np.abs(made.controller.errors[number]).max()
+        torques = data.qfrc_applied
+        control(made.controller, number, data.qpos, data.qfrc_bias, target, period, torques)
+    mujoco.mj_step2(made.hand.model, data)
+    return error
+
+
+ACTIONS = {
+    "held": {},
+    "pushed": {"style": PUSH, "hold": 0.0, "elapsed": 0.2},
+    "struck while held": {"style": JERK, "hold": 0.5, "elapsed": 0.3},
+    "moved": {"style": MOVE, "hold": 0.0, "elapsed": 0.1},
+    "pulled": {"hold": 0.0, "pull": (0.1, -0.2, 0.3)},
+}
+
+
+@pytest.mark.parametrize("words", ACTIONS.values(), ids=ACTIONS)
+def test_a_sample_is_its_steps_called_from_python(words):
+    compiled, plain = made_world(), made_world()
+    engine = engine_of(compiled.hand)
+    worst, loads = [], 0.0
+    for sample in range(60):
+        target = PATH.targets(np.full(4, 0.003 - 6e-4 * sample))  # closes until it presses
+        given = [action(one, **words) for one in (compiled, plain)]
+        error = advance_sample(
+            engine, STEPS, compiled.hand.arrays, compiled.contact, compiled.constants,
+            compiled.controller, sample * SUBSTEPS, target, given[0], compiled.bodies,
+            compiled._wrenches,
+        )  # fmt: skip
+        ticks = range(sample * SUBSTEPS, (sample + 1) * SUBSTEPS)
+        worst.append(max(step_from_python(plain, tick, target, given[1]) for tick in ticks))
+        assert error == worst[-1]
+        assert compiled.hand.data.time == plain.hand.data.time
+        for name in ("qpos", "qvel"):
+            ours, theirs = (getattr(one.hand.data, name) for one in (compiled, plain))
+            np.testing.assert_array_equal(ours, theirs)
+        np.testing.assert_array_equal(compiled.outside, plain.outside)
+        loads += compiled.loads.sum()
+    for ours, theirs in zip(compiled.contact, plain.contact, strict=True):
+        np.testing.assert_array_equal(ours, theirs)
+    assert loads > 0
+    assert 0 < np.count_nonzero(worst) < len(worst)
+
+
+def test_worlds_beside_each_other_do_not_share_anything():
+    first, second = made_world(), made_world()
+    target = PATH.targets(np.full(4, 0.01))
+    for one in (first, second, second, first):
+        advance_sample(
+            engine_of(one.hand), STEPS, one.hand.arrays, one.contact, one.constants, one.controller,
+            0, target, action(one), one.bodies, one._wrenches,
+        )  # fmt: skip
+    np.testing.assert_array_equal(first.hand.data.qpos, second.hand.data.qpos)
+    assert first.hand.data.qpos is not second.hand.data.qpos
