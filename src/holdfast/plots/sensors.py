@@ -72,14 +72,15 @@ def _draw_space(axes: Axes3D, sensor: Sensor, colours: Array, up: Array) -> None
     places = sensor.positions * MM_PER_M
     size = float(np.ptp(places, axis=0).max()) or 10.0
     normals = sensor.rotations[:, :, 2] * 0.16 * size
+    drawn = np.vstack([places, places + normals, np.zeros(3), np.full(3, 0.36 * size)])
     axes.scatter(*places.T, c=colours, s=22, depthshade=False, edgecolors="black", linewidths=0.4)
     axes.quiver(*places.T, *normals.T, color="#444444", linewidth=0.8, arrow_length_ratio=0.3)
-    _draw_frame(axes, places, size)
-    _same_scale(axes, places, size)
+    _draw_frame(axes, size)
+    _same_scale(axes, drawn)
     _look_from_outside(axes, sensor.normal, up)
 
 
-def _draw_frame(axes: Axes3D, places: Array, size: float) -> None:
+def _draw_frame(axes: Axes3D, size: float) -> None:
     """Draw the axes of the fingertip frame at its origin."""
     for axis, (name, colour) in enumerate(zip("xyz", AXIS_COLOURS, strict=True)):
         arrow = np.zeros(3)
@@ -88,11 +89,12 @@ def _draw_frame(axes: Axes3D, places: Array, size: float) -> None:
         axes.text(*(1.2 * arrow), name, color=colour, fontsize=8, ha="center", va="center")
 
 
-def _same_scale(axes: Axes3D, places: Array, size: float) -> None:
-    both = np.vstack([places, np.zeros(3), np.full(3, 0.3 * size)])
-    low, high = both.min(axis=0) - 0.08 * size, both.max(axis=0) + 0.08 * size
+def _same_scale(axes: Axes3D, drawn: Array) -> None:
+    """Set one scale for all axes, with room for all points that are drawn, from any side."""
+    low, high = drawn.min(axis=0), drawn.max(axis=0)
     axes.set(xlim=(low[0], high[0]), ylim=(low[1], high[1]), zlim=(low[2], high[2]))
-    axes.set_box_aspect(high - low, zoom=1.25)
+    axes.set_proj_type("ortho")
+    axes.set_box_aspect(high - low, zoom=0.95)
     axes.set_axis_off()
 
 

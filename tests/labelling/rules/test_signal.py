@@ -5,7 +5,7 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 
-from holdfast.contact import Cause
+from holdfast.contact import STABLE, Cause
 from holdfast.errors import RecordingError
 from holdfast.io import import_recordings
 from holdfast.labelling.rules import signal
@@ -17,6 +17,7 @@ from .build import (
     FREE,
     GRIP,
     NOISE,
+    PATCH,
     PUSH,
     PUSHED,
     RELEASE,
@@ -212,6 +213,17 @@ def test_a_tare_stretch_without_any_noise():
         assert all(0 < label.confidence < 1 for label in labels)
 
 
+def test_noise_that_a_dead_band_hides_in_the_tare_is_no_disturbance():
+    times = clock()
+    loaded = np.linalg.norm(profile(times), axis=1)[:, None, None] > 0.01
+    noise = np.random.default_rng(2).normal(0, 0.02 * GRIP / PATCH.n_taxels, (len(times), 1, 3))
+    noisy = grasp(fingers=("thumb",))
+    (thumb,) = noisy.modules.values()
+    shaken = replace(thumb, readings=thumb.readings + loaded * noise)
+    recording = with_dead_band(Recording("noisy", {"thumb": shaken}), 5 * NOISE)
+    check(signal.propose(recording)["thumb"], EDGE)
+
+
 def test_readings_that_never_change_are_no_contact_without_evidence():
     readings = np.full((300, 16, 3), 1000)
     still = replace(module(clock()[:300], np.zeros((300, 3))), readings=readings)
@@ -224,3 +236,5 @@ def test_real_recordings_with_a_constant_tare_stretch(data_folder):
         labels = signal.propose(recording)["finger1"]
         assert labels[0].state == "NO_CONTACT"
         assert all(0 < label.confidence < 1 for label in labels)
+        if recording.name.startswith("egg"):  # held still from 2 to 14 s
+            assert (label_states(labels, np.linspace(4.2, 13.8, 50)) == STABLE).all()

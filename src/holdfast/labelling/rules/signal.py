@@ -47,7 +47,8 @@ NOISE_FACTOR = 6.0
 """Least change in standard deviations of a component of the smoothed force. Noise exceeds it in
 less than one window an hour: three components of about ten independent values each."""
 REST_FACTOR = 3.0
-"""Least change in multiples of the change in the calmest fifth, where the noise is unknown."""
+"""Least change in multiples of the change in the calmest fifth, where the noise is unknown: there
+is no tare without contact, or the readings do not change in it (a sensor with a dead band)."""
 UNMEASURED_RATIO = 2.0
 """Evidence ratio of a state without a threshold."""
 
@@ -117,10 +118,9 @@ def _change_ratio(finger: FingerForce, rule: SignalRule) -> Array:
     touching = finger.contact
     if not touching.any():
         return np.zeros_like(change)
-    if finger.threshold is None:
-        least = REST_FACTOR * float(np.quantile(change[touching], 0.2))
-    else:
-        least = max(rule.share * grip_force(finger, touching), NOISE_FACTOR * finger.noise)
+    least = NOISE_FACTOR * finger.noise or REST_FACTOR * float(np.quantile(change[touching], 0.2))
+    if finger.threshold is not None:
+        least = max(rule.share * grip_force(finger, touching), least)
     return np.where(touching, evidence_ratio(change, least), 0.0)
 
 

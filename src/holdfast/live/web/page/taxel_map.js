@@ -7,6 +7,8 @@ import { number, unitWord } from "./format.js";
 const FONT = font(11);
 // Minimum full scale by unit: smaller readings are noise.
 const MIN_SCALES = { count: 50, N: 0.1 };
+// Length of an arrow at full scale, in radii of a disc; the margin of the map has room for it.
+const ARROW = 2.2;
 // Time constant of the scale [s]: long enough that discs stay comparable while a grasp changes.
 const DECAY_TIME = 6;
 // Colour scales from dim to bright, in equal steps of lightness: readable for colour-blind people
@@ -97,7 +99,7 @@ export class TaxelMap {
       const values = places.map((place) => place[axis]);
       return [Math.min(...values), Math.max(...values)];
     });
-    const margin = 0.75 * spacing, label = 14;
+    const margin = 0.5 * ARROW * spacing, label = 14;
     const zoom = Math.min(
       (width - 4) / (ends[0][1] - ends[0][0] + 2 * margin),
       (height - 4 - label) / (ends[1][1] - ends[1][0] + 2 * margin),
@@ -172,8 +174,8 @@ export class TaxelMap {
 
   drawArrow(context, [x, y], k, radius) {
     const [right, up] = this.values[k], size = Math.hypot(right, up) / this.scales.arrow.full;
-    // One and a half discs long at full scale; too short an arrow is only its head.
-    const length = 3 * radius * Math.min(1, size);
+    // Too short an arrow is only its head.
+    const length = ARROW * radius * Math.min(1, size);
     if (this.faulty.has(k) || !(length > 3)) return;
     const head = Math.min(6, 0.45 * length), angle = Math.atan2(-up, right);
     context.save();
