@@ -2,6 +2,7 @@
 
 import math
 from collections.abc import Mapping
+from hashlib import sha256
 from importlib import resources
 from pathlib import Path
 from typing import Any, Literal, Self
@@ -260,6 +261,11 @@ class Model(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=Tru
             raise OutputError(f"{path} is the name of a built-in model; a file expected")
         data = msgspec.json.encode(self, enc_hook=_encode)
         write_whole(path, msgspec.json.format(data, indent=1) + b"\n", force=force)
+
+    @property
+    def digest(self) -> str:
+        """Digest of the content, for results that depend on the model."""
+        return sha256(msgspec.json.encode(self, enc_hook=_encode)).hexdigest()
 
     def finger(self, name: str) -> FingerModel:
         """Return the model of a finger.

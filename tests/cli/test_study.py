@@ -10,9 +10,9 @@ from holdfast.cli import study as verb
 from holdfast.contact import ContactState
 from holdfast.io import save_recording
 from holdfast.recordings import Label
+from holdfast.report.result_tables import ResultTable, Row
 from holdfast.study import run as study_run
 from holdfast.study.paper import experiments, paper_tables
-from holdfast.study.report.result_tables import ResultTable, Row
 from holdfast.synthetic import synthetic_recording
 from holdfast.twin import simulation
 from holdfast.twin.profile import profile

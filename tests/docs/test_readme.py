@@ -7,7 +7,7 @@ from msgspec.structs import replace
 from holdfast.cli import demo
 from holdfast.cli import simulate as simulate_verb
 from holdfast.io import save_recording
-from holdfast.study.report.summary import STRONGEST
+from holdfast.study.summary import STRONGEST
 from holdfast.synthetic import synthetic_recording
 from holdfast.twin import simulation
 from holdfast.twin.profile import profile

@@ -1,6 +1,6 @@
+from holdfast.report.html_report import ReportFigure
+from holdfast.report.result_tables import ResultTable, Row
 from holdfast.study.paper.published import discrepancies
-from holdfast.study.report.html_report import ReportFigure
-from holdfast.study.report.result_tables import ResultTable, Row
 from holdfast.study.sections import OUTLINES, TWIN_NOTE, PartOutput, report_sections
 
 

@@ -15,8 +15,8 @@ from holdfast.cli.terminal.progress import progress
 
 if TYPE_CHECKING:
     from holdfast.parallel import Engine
+    from holdfast.report.result_tables import ResultTable, Row, TableLine
     from holdfast.study.plan import Corpus, StudyPlan
-    from holdfast.study.report.result_tables import ResultTable, Row, TableLine
 
 PRINTED_COLUMNS: dict[str, tuple[str, ...]] = {
     "confusion": (),
@@ -165,7 +165,8 @@ def _check_arguments(
     """
     from holdfast.features import Tare
     from holdfast.parallel import Engine
-    from holdfast.study.report.folder import check_output_folder
+    from holdfast.report.folder import check_output_folder
+    from holdfast.study.run import STUDY
 
     if (data is None) != twin:
         given = "both" if twin else "neither"
@@ -176,7 +177,7 @@ def _check_arguments(
         )
     Tare.parse(tare)
     chosen = Engine.parse(engine, jobs)
-    check_output_folder(out, force=force)
+    check_output_folder(out, STUDY, force=force)
     if chosen.scheduler is not None:
         list(chosen.map_ordered(abs, [(0,)]))
     return chosen
@@ -204,7 +205,7 @@ def _plan(
 
 def _print_result_table(table: "ResultTable") -> None:
     """Print a table on the terminal, with the values of the paper in parentheses."""
-    from holdfast.study.report.result_tables import digits_of, pivot
+    from holdfast.report.result_tables import digits_of, pivot
 
     grid = pivot(_printed_rows(table))
     paper = (
@@ -244,7 +245,7 @@ def _texts(line: "TableLine", digits: list[int]) -> list[str]:
 
 
 def _text(row: "Row | None", digits: int) -> str:
-    from holdfast.study.report.result_tables import number_text
+    from holdfast.report.result_tables import number_text
 
     if row is None:
         return "-"

@@ -98,7 +98,7 @@ def _document(
     import msgspec
 
     from holdfast.control.trial.summary import summarize
-    from holdfast.study.environment import versions
+    from holdfast.report.environment import versions
 
     by_law = {law: [one for one in results if one.law == law] for law in laws}
     unseen = {law: [one for one in each if one.unseen] for law, each in by_law.items()}

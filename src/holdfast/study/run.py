@@ -6,6 +6,10 @@ from pathlib import Path
 from typing import Any, Protocol
 
 from holdfast.parallel import Engine
+from holdfast.report.environment import machine, versions
+from holdfast.report.folder import ReportKind, check_output_folder, write_report
+from holdfast.report.html_report import ReportFigure
+from holdfast.report.result_tables import ResultTable, to_json
 from holdfast.study import environment
 from holdfast.study.comparison import all_methods, real_recordings, sensitivity
 from holdfast.study.methods import METHODS
@@ -18,12 +22,10 @@ from holdfast.study.paper import (
     verdicts,
 )
 from holdfast.study.plan import StudyPlan
-from holdfast.study.report.folder import check_output_folder, write_study
-from holdfast.study.report.html_report import ReportFigure
-from holdfast.study.report.result_tables import ResultTable
 from holdfast.study.sections import PartOutput, report_sections
-from holdfast.study.tasks import Notify, ShowProgress, Task, TaskRunner
+from holdfast.tasks import Notify, ShowProgress, Task, TaskRunner
 
+STUDY = ReportKind("study", "study.json")
 TITLE = "Slip and disturbance at the fingertips: the study"
 
 
@@ -91,7 +93,7 @@ def run_study(
         TrainingError: the data are not enough to train a method.
         EngineError: as `TaskRunner.run`.
     """
-    check_output_folder(out, force=force)
+    check_output_folder(out, STUDY, force=force)
     start = time.perf_counter()
     tasks = [task for part in PARTS.values() for task in part.tasks(plan)]
     results = TaskRunner(Path(out), engine, progress, notify).run(tasks)
@@ -103,8 +105,11 @@ def run_study(
     seconds = {"data": made_in, "study": time.perf_counter() - start}
     summary = _summary(plan, seconds, len(tasks), [*left_out, *whole_hand_note(plan)])
     sections = report_sections(outputs, environment.run_notes(summary), twin=plan.main.is_simulated)
-    write_study(out, TITLE, environment.report_facts(summary), sections, summary, force=force)
-    return [table for section in sections for table in section.tables]
+    tables = [table for section in sections for table in section.tables]
+    document = {"tables": {table.name: to_json(table) for table in tables}, **summary}
+    facts = environment.report_facts(summary)
+    write_report(out, STUDY, TITLE, facts, sections, document, force=force)
+    return tables
 
 
 def whole_hand_note(plan: StudyPlan) -> list[str]:
@@ -123,8 +128,8 @@ def _summary(
         "seed": plan.seed,
         "quick": plan.quick,
         "data": environment.data(plan),
-        "versions": environment.versions(),
-        "machine": environment.machine(),
+        "versions": versions(),
+        "machine": machine(),
         "seconds": {name: round(value, 1) for name, value in seconds.items()},
         "tasks": n_tasks,
         "left_out": list(left_out),

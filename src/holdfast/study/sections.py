@@ -5,9 +5,9 @@ from typing import NamedTuple, TypeVar
 
 import msgspec
 
-from holdfast.study.report.html_report import SUMMARY, ReportFigure, Section
-from holdfast.study.report.result_tables import ResultTable
-from holdfast.study.report.summary import summary_text
+from holdfast.report.html_report import SUMMARY, ReportFigure, Section
+from holdfast.report.result_tables import ResultTable
+from holdfast.study.summary import summary_text
 
 E = TypeVar("E", ResultTable, ReportFigure)
 

@@ -3,7 +3,7 @@ import math
 import pytest
 
 from holdfast.control.trial.run import TrialResult
-from holdfast.control.trial.summary import summarize
+from holdfast.control.trial.summary import compare, summarize
 
 
 def result(**given):
@@ -44,3 +44,44 @@ def test_no_trials_give_no_numbers():
     found = summarize([])
     assert found["n"] == 0
     assert found["dropped"] == {"value": None, "interval": None}
+
+
+def test_a_drop_counts_as_no_reaction_even_if_the_force_rose():
+    found = summarize([result(dropped=True, slip=math.inf, reaction=0.01)] * 3)
+    assert found["reaction_median"]["value"] is None
+    assert found["n_slipped"] == 3
+
+
+class TestCompare:
+    def test_differences_are_of_the_same_trials(self):
+        ours = [result(number=0), result(number=1, slip=0.002), result(number=2, held=False)]
+        lost = {"dropped": True, "slip": math.inf, "reaction": 0.01, "force_ratio": 1.0}
+        theirs = [result(number=2), result(number=1, **lost), result(number=0, n_false=1)]
+        found = compare(ours, theirs)
+        assert found["n"] == 2
+        assert found["dropped"]["value"] == -50.0
+        assert found["slid_less"]["value"] == 50.0
+        assert found["slid_more"]["value"] == 0.0
+        assert found["reacted_sooner"]["value"] == 50.0
+        assert found["force_ratio_mean"]["value"] == pytest.approx(0.25)
+        assert found["false_reactions_per_minute"]["value"] == pytest.approx(-10.0)
+
+    def test_two_infinite_values_are_equal(self):
+        lost = [result(number=k, dropped=True, slip=math.inf, reaction=math.inf) for k in range(3)]
+        found = compare(lost, lost)
+        assert found["slid_less"] == {"value": 0.0, "interval": [0.0, 0.0]}
+        assert found["reacted_later"] == {"value": 0.0, "interval": [0.0, 0.0]}
+
+    def test_the_other_way_round_is_the_negative(self):
+        a = [result(number=k, force_ratio=1 + k / 4, slip=k / 1e3) for k in range(4)]
+        b = [result(number=k, dropped=k > 1, slip=0.0015) for k in range(4)]
+        there, back = compare(a, b), compare(b, a)
+        for name in ("dropped", "force_ratio_mean"):
+            assert there[name]["value"] == -back[name]["value"]
+            assert there[name]["interval"] == [-end for end in back[name]["interval"][::-1]]
+        assert there["slid_less"] == back["slid_more"]
+
+    def test_trials_without_slip_have_no_reaction_to_compare(self):
+        quiet = [result(number=k, slipped=False, reaction=math.nan) for k in range(2)]
+        found = compare(quiet, [result(number=0), result(number=1)])
+        assert found["reacted_sooner"] == {"value": None, "interval": None}

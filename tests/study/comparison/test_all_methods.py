@@ -4,6 +4,8 @@ import msgspec
 import numpy as np
 import pytest
 
+from holdfast.report.result_tables import to_json
+from holdfast.report.table_layouts import to_html, to_latex
 from holdfast.study.comparison import (
     all_methods,
     costs,
@@ -19,8 +21,6 @@ from holdfast.study.evaluation.error_breakdown import ErrorBreakdown, GripErrors
 from holdfast.study.evaluation.evaluate_method import EvaluationEffort
 from holdfast.study.methods import METHODS
 from holdfast.study.plan import StudyPlan, scan_corpus
-from holdfast.study.report.result_tables import to_json
-from holdfast.study.report.table_layouts import to_html, to_latex
 from study.example_recordings import recording_with_truth, save_all
 
 FEW = ("logreg", "logreg_unweighted", "holdfast", "zhang", "jl_global_logreg")

@@ -6,11 +6,11 @@ import pytest
 
 from holdfast.contact import ContactState
 from holdfast.recordings import Label
+from holdfast.report.result_tables import pivot
+from holdfast.report.table_layouts import to_html
 from holdfast.study.comparison import jobs, real_recordings
 from holdfast.study.methods import METHODS
 from holdfast.study.plan import StudyPlan, scan_corpus
-from holdfast.study.report.result_tables import pivot
-from holdfast.study.report.table_layouts import to_html
 from holdfast.synthetic import synthetic_recording
 from study.example_recordings import save_all
 

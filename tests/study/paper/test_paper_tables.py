@@ -2,10 +2,10 @@ import msgspec
 import pytest
 
 from holdfast.features import DEPLOYED_FEATURES, FEATURE_NAMES
+from holdfast.report.result_tables import to_json
 from holdfast.study.paper import paper_tables, published, random_split
 from holdfast.study.paper.random_split import FitBudget
 from holdfast.study.plan import Corpus, StudyPlan, scan_corpus
-from holdfast.study.report.result_tables import to_json
 from study.example_recordings import save_synthetic
 
 NAMES = ("confusion", "window", "ablation", "unseen", "fingers", "zhang", "discrepancies")

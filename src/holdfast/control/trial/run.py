@@ -79,30 +79,64 @@ class TrialResult(msgspec.Struct, frozen=True, kw_only=True):
 def run_trial(trial: Trial, law: str, model: str = "builtin:any") -> TrialResult:
     """Run a trial with a law.
 
-    The command that follows from a sample acts from the next sample on, 6.7 ms later.
-
     Args:
         trial: the trial.
         law: name of the law.
         model: name of the model of the detector. `builtin:any` was trained on any grip;
             `builtin:twin` calls the light grips of the trials unstable.
     """
-    simulation = Simulation(trial.grasp, plan=trial.plan(), loads=[trial.load])
-    sensors = {finger: uskin.sensor for finger, uskin in simulation.uskins.items()}
-    detector = Detector(_model(model), sensors)
-    calibration = NEWTONS_PER_COUNT
-    controller = GripController(LIMITS, law, sensors=sensors, newtons_per_unit=calibration)
-    scales = np.ones(len(FINGERS))
+    running = RunningTrial(trial, law, model)
     log = _TrialLog(trial)
-    while not (simulation.is_over or simulation.protocol.lost_at is not None):
-        if simulation.held_for > trial.duration:
-            break
-        simulation.step(scales)
-        time = (simulation.n_samples - 1) / RATE
-        command = controller.update(detector.update(simulation.read(), time), time)
-        scales = np.array([_scale(command, finger) for finger in FINGERS])
-        log.add(simulation, command, scales)
-    return log.result(law, lost=simulation.protocol.lost_at is not None)
+    while not (running.is_over or running.is_lost):
+        command = running.step()
+        log.add(running.simulation, command, running.scales)
+    return log.result(law, lost=running.is_lost)
+
+
+class RunningTrial:
+    """One trial with one law, sample by sample.
+
+    The command that follows from a sample acts from the next sample on, 6.7 ms later.
+
+    Args:
+        trial: the trial.
+        law: name of the law.
+        model: name of the model of the detector.
+
+    Attributes:
+        trial: the trial.
+        simulation: the twin.
+        scales: (4,) force scales of the last command.
+    """
+
+    def __init__(self, trial: Trial, law: str, model: str) -> None:
+        self.trial = trial
+        self.simulation = Simulation(trial.grasp, plan=trial.plan(), loads=[trial.load])
+        sensors = {finger: uskin.sensor for finger, uskin in self.simulation.uskins.items()}
+        self._detector = Detector(_model(model), sensors)
+        self._controller = GripController(
+            LIMITS, law, sensors=sensors, newtons_per_unit=NEWTONS_PER_COUNT
+        )
+        self.scales = np.ones(len(FINGERS))
+
+    @property
+    def is_lost(self) -> bool:
+        """Whether the object is lost."""
+        return self.simulation.protocol.lost_at is not None
+
+    @property
+    def is_over(self) -> bool:
+        """Whether the time of the trial is over, or the grasp."""
+        return self.simulation.is_over or self.simulation.held_for > self.trial.duration
+
+    def step(self) -> GripCommand:
+        """Simulate one sample and return the command that follows from it."""
+        self.simulation.step(self.scales)
+        time = (self.simulation.n_samples - 1) / RATE
+        estimate = self._detector.update(self.simulation.read(), time)
+        command = self._controller.update(estimate, time)
+        self.scales = np.array([_scale(command, finger) for finger in FINGERS])
+        return command
 
 
 @cache

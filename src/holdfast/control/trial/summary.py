@@ -1,9 +1,11 @@
 """Numbers of each law over all trials, with intervals by bootstrap over trials.
 
 All laws run on the same trials, and the same resamples serve all of them. A drop counts as an
-infinite slip, and no reaction as an infinite reaction time.
+infinite slip and an infinite reaction time, and so does no reaction. A trial in which nothing
+slipped has no onset of slip, so it has no reaction time; `n_slipped` counts the others.
 """
 
+import math
 from collections.abc import Sequence
 from typing import Any
 
@@ -14,15 +16,17 @@ from holdfast.metrics.intervals import bootstrap_interval, quantile_of, ratio_of
 from holdfast.metrics.statistics import finite_or_none, quantile
 from holdfast.sensors.types import Array
 
+Summary = dict[str, Any]
 
-def summarize(results: Sequence[TrialResult]) -> dict[str, Any]:
+
+def summarize(results: Sequence[TrialResult]) -> Summary:
     """Return the numbers of one law, as `trial.json` has them.
 
     Trials whose object was lost before the load, or in which the loop had not begun by then,
     are counted in `n_not_held`, and in nothing else.
 
     Returns:
-        `n`, `n_not_held`, `dropped` [%], `slip_median` [m], `reaction_median` [s],
+        `n`, `n_not_held`, `n_slipped`, `dropped` [%], `slip_median` [m], `reaction_median` [s],
         `force_ratio_mean`, `peak_ratio_mean` and `false_reactions_per_minute`. Each number is
         {"value": x, "interval": [low, high]}, null where it is infinite or not known.
 
@@ -34,14 +38,15 @@ def summarize(results: Sequence[TrialResult]) -> dict[str, Any]:
         {'value': 100.0, 'interval': [100.0, 100.0]}
     """
     held = [one for one in results if one.held]
-    slipped = [one for one in held if one.slipped]
+    reactions = [time for one in held if not math.isnan(time := reaction_time(one))]
     ones = [1.0] * len(held)
     return {
         "n": len(held),
         "n_not_held": len(results) - len(held),
+        "n_slipped": len(reactions),
         "dropped": _ratio([100.0 * one.dropped for one in held], ones),
         "slip_median": _median([one.slip for one in held]),
-        "reaction_median": _median([one.reaction for one in slipped]),
+        "reaction_median": _median(reactions),
         "force_ratio_mean": _ratio([one.force_ratio for one in held], ones),
         "peak_ratio_mean": _ratio([one.peak_ratio for one in held], ones),
         "false_reactions_per_minute": _ratio(
@@ -50,21 +55,73 @@ def summarize(results: Sequence[TrialResult]) -> dict[str, Any]:
     }
 
 
-def _ratio(parts: Sequence[float], wholes: Sequence[float]) -> dict[str, Any]:
+def reaction_time(result: TrialResult) -> float:
+    """Return the reaction time [s]: infinite after a drop, NaN if nothing slipped."""
+    return math.inf if result.dropped else result.reaction
+
+
+def compare(results: Sequence[TrialResult], others: Sequence[TrialResult]) -> Summary:
+    """Return the paired differences of a law to another, on the trials that both held.
+
+    Slip and reaction may be infinite, so their difference is not always known. The shares of
+    trials in which one law was better are: two infinite values are equal.
+
+    Args:
+        results: of the law.
+        others: of the law that it is compared with, on the same trials.
+
+    Returns:
+        `n`; the differences `dropped` [percentage points], `force_ratio_mean`,
+        `peak_ratio_mean` and `false_reactions_per_minute`; and the shares of trials
+        `slid_less`, `slid_more` [%] and, of those in which something slipped under both laws,
+        `reacted_sooner` and `reacted_later` [%]. Each number is {"value": x, "interval": ...}.
+    """
+    by_number = {one.number: one for one in others if one.held}
+    pairs = [
+        (one, by_number[one.number]) for one in results if one.held and one.number in by_number
+    ]
+    ones = [1.0] * len(pairs)
+    reactions = [(reaction_time(one), reaction_time(other)) for one, other in pairs]
+    known = [times for times in reactions if not np.isnan(times).any()]
+    return {
+        "n": len(pairs),
+        "dropped": _ratio(
+            [100.0 * one.dropped - 100.0 * other.dropped for one, other in pairs], ones
+        ),
+        "slid_less": _share([one.slip < other.slip for one, other in pairs]),
+        "slid_more": _share([one.slip > other.slip for one, other in pairs]),
+        "reacted_sooner": _share([one < other for one, other in known]),
+        "reacted_later": _share([one > other for one, other in known]),
+        "force_ratio_mean": _ratio(
+            [one.force_ratio - other.force_ratio for one, other in pairs], ones
+        ),
+        "peak_ratio_mean": _ratio(
+            [one.peak_ratio - other.peak_ratio for one, other in pairs], ones
+        ),
+        "false_reactions_per_minute": _ratio(
+            [60.0 * (one.n_false - other.n_false) for one, other in pairs],
+            [one.quiet_time for one, _ in pairs],
+        ),
+    }
+
+
+def _share(hits: Sequence[bool]) -> Summary:
+    return _ratio([100.0 * hit for hit in hits], [1.0] * len(hits))
+
+
+def _ratio(parts: Sequence[float], wholes: Sequence[float]) -> Summary:
     whole = sum(wholes)
     value = sum(parts) / whole if whole > 0 else None
     interval = bootstrap_interval(ratio_of_sums(parts, wholes), len(parts)) if parts else None
     return _number(value, interval)
 
 
-def _median(values: Sequence[float]) -> dict[str, Any]:
+def _median(values: Sequence[float]) -> Summary:
     each: list[Array] = [np.array([value]) for value in values]
     value = quantile(np.sort(np.array(values)), 0.5)
     return _number(value, bootstrap_interval(quantile_of(each, 0.5), len(values)))
 
 
-def _number(
-    value: float | None, interval: tuple[float | None, float | None] | None
-) -> dict[str, Any]:
+def _number(value: float | None, interval: tuple[float | None, float | None] | None) -> Summary:
     ends = None if interval is None else list(interval)
     return {"value": finite_or_none(value), "interval": ends}

@@ -18,6 +18,8 @@ Sizes of the loads, on physical grounds, relative to the weight W and mass m of 
 """
 
 from dataclasses import dataclass
+from functools import cache
+from pathlib import Path
 
 import msgspec
 import numpy as np
@@ -103,22 +105,35 @@ def draw_trials(n: int, seed: int = 0) -> list[Trial]:
         >>> len({(trial.grasp.object, trial.load.kind) for trial in trials})
         60
     """
-    objects = [
+    return [draw_trial(number, seed) for number in range(n)]
+
+
+def draw_trial(number: int, seed: int = 0) -> Trial:
+    """Draw one trial of a set, which does not depend on the others.
+
+    Args:
+        number: number of the trial, from 0.
+        seed: of all random numbers.
+    """
+    objects = _objects()
+    name, item, table = objects[number % len(objects)]
+    kind = KINDS[(number + number // len(objects)) % len(KINDS)]
+    generator = np.random.default_rng([seed, number])
+    grasp = Grasp(name, 1, 1 + number, PROFILE, seed, table=table)
+    load = _draw_load(generator, kind, item.mass)
+    three = item.shape != "sphere" and number // len(objects) % 2 == 1
+    speed = float(generator.uniform(*CLOSING_SPEED))
+    return Trial(number, grasp, 3 if three else 4, load, speed)
+
+
+@cache
+def _objects() -> list[tuple[str, GraspObject, Path | None]]:
+    """Return all objects with their names and tables: the six, then the six others."""
+    return [
         (name, item, table)
         for table in (None, OTHER_OBJECTS)
         for name, item in load_objects(table).items()
     ]
-    trials = []
-    for number in range(n):
-        name, item, table = objects[number % len(objects)]
-        kind = KINDS[(number + number // len(objects)) % len(KINDS)]
-        generator = np.random.default_rng([seed, number])
-        grasp = Grasp(name, 1, 1 + number, PROFILE, seed, table=table)
-        load = _draw_load(generator, kind, item.mass)
-        three = item.shape != "sphere" and number // len(objects) % 2 == 1
-        speed = float(generator.uniform(*CLOSING_SPEED))
-        trials.append(Trial(number, grasp, 3 if three else 4, load, speed))
-    return trials
 
 
 def _draw_load(generator: np.random.Generator, kind: LoadKind, mass: float) -> Load:

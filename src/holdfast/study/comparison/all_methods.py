@@ -7,6 +7,8 @@ import numpy as np
 from holdfast.metrics.events import POST_DURATIONS
 from holdfast.plots.curves import Curve, draw_alarms, draw_reliability
 from holdfast.plots.dots import IntervalEstimate, draw_dots, draw_groups
+from holdfast.report.html_report import ReportFigure
+from holdfast.report.result_tables import ResultTable, Row
 from holdfast.sensors.types import Array
 from holdfast.study.comparison import costs, error_tables, event_tables, sample_tables, strongest
 from holdfast.study.comparison.jobs import (
@@ -30,9 +32,7 @@ from holdfast.study.evaluation.evaluate_method import (
 from holdfast.study.methods import METHODS
 from holdfast.study.paper.random_split import ConfusionCounts
 from holdfast.study.plan import StudyPlan
-from holdfast.study.report.html_report import ReportFigure
-from holdfast.study.report.result_tables import ResultTable, Row
-from holdfast.study.tasks import Task
+from holdfast.tasks import Task
 
 TABLES = (
     strongest.table,

@@ -12,14 +12,14 @@ from holdfast.features import DEFAULT_WINDOW, DEPLOYED_FEATURES, Tare, parse_fea
 from holdfast.features.specs import HOLDFAST_FEATURES, FeatureSpec
 from holdfast.model import FingerModel, Model
 from holdfast.recordings import Recording
+from holdfast.report.result_tables import Key, ResultTable, Row
 from holdfast.study.comparison.jobs import Results, method_titles
 from holdfast.study.evaluation.fitted_method import FittedMethod, gather_training_samples
 from holdfast.study.evaluation.recording_features import corpus_features
 from holdfast.study.evaluation.variation import Variation
 from holdfast.study.methods import METHODS, hand_signal
 from holdfast.study.plan import Corpus, StudyPlan
-from holdfast.study.report.result_tables import Key, ResultTable, Row
-from holdfast.study.tasks import Task
+from holdfast.tasks import Task
 
 TASK = "cost"
 N_RECORDINGS = 4

@@ -6,6 +6,7 @@ from itertools import chain
 import numpy as np
 
 from holdfast.contact import CONTACT_FORCE, Phase
+from holdfast.report.result_tables import Key, ResultTable, Row
 from holdfast.sensors.types import Array
 from holdfast.study.comparison.jobs import SPLIT_TITLES, Results, method_results, method_titles
 from holdfast.study.comparison.rows import ratio_row
@@ -18,7 +19,6 @@ from holdfast.study.evaluation.error_breakdown import (
     GripErrors,
 )
 from holdfast.study.plan import StudyPlan
-from holdfast.study.report.result_tables import Key, ResultTable, Row
 
 QUARTERS = ("lightest quarter", "second", "third", "firmest quarter")
 SHOWN_SPLITS = ("recording", "others")

@@ -5,6 +5,7 @@ from collections.abc import Callable, Iterator, Sequence
 import numpy as np
 
 from holdfast.metrics.events import EARLY_TOLERANCE, LATE_TOLERANCE, POST_DURATIONS
+from holdfast.report.result_tables import Key, ResultTable, Row
 from holdfast.study.comparison.jobs import (
     GLITCH_RATE_SPLITS,
     REFERENCE_METHOD,
@@ -19,7 +20,6 @@ from holdfast.study.evaluation.evaluate_method import COMPARED_RATE, HOLD_TIME, 
 from holdfast.study.evaluation.glitch_readings import READINGS
 from holdfast.study.evaluation.slips import MIN_SLIP_DISTANCE, MIN_SLIP_DURATION, GlitchCount
 from holdfast.study.plan import StudyPlan
-from holdfast.study.report.result_tables import Key, ResultTable, Row
 
 COMPARED = f"for {COMPARED_RATE:g}/min"
 HELD = f"own, held {HOLD_TIME:g} s"

@@ -14,7 +14,7 @@ from holdfast.study.evaluation.evaluate_method import (
 from holdfast.study.evaluation.variation import Variation
 from holdfast.study.methods import METHODS, PAPER_FAMILY
 from holdfast.study.plan import StudyPlan
-from holdfast.study.tasks import Task
+from holdfast.tasks import Task
 
 REFERENCE_METHOD = "logreg"
 """The paper's method, which all others are compared with."""

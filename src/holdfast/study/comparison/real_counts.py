@@ -13,6 +13,7 @@ from holdfast.metrics.events import TIME_TOLERANCE
 from holdfast.metrics.intervals import auc_of
 from holdfast.metrics.masks import Mask
 from holdfast.metrics.statistics import mann_whitney_u
+from holdfast.report.result_tables import Row
 from holdfast.sensors.types import Array
 from holdfast.study.comparison.real_estimates import (
     RecordingEstimates,
@@ -22,7 +23,6 @@ from holdfast.study.comparison.real_estimates import (
 )
 from holdfast.study.comparison.real_models import SHIPPED
 from holdfast.study.comparison.rows import WITHOUT_ESTIMATE, Keys, count_row, ratio_row
-from holdfast.study.report.result_tables import Row
 
 MIN_RECORDINGS = 3
 """Minimum number of recordings for an interval."""

@@ -8,6 +8,8 @@ from collections.abc import Iterator, Mapping, Sequence
 from typing import NamedTuple
 
 from holdfast.io.importers import uskin_pick_move
+from holdfast.report.html_report import ReportFigure
+from holdfast.report.result_tables import Key, ResultTable, Row
 from holdfast.study.comparison.jobs import NETWORK, Results, method_titles
 from holdfast.study.comparison.real_counts import (
     AUC,
@@ -33,9 +35,7 @@ from holdfast.study.comparison.real_models import SHIPPED, Making, model_estimat
 from holdfast.study.evaluation.evaluate_method import HOLD_TIME
 from holdfast.study.methods import METHODS
 from holdfast.study.plan import Corpus, StudyPlan
-from holdfast.study.report.html_report import ReportFigure
-from holdfast.study.report.result_tables import Key, ResultTable, Row
-from holdfast.study.tasks import Task
+from holdfast.tasks import Task
 
 QUICK_METHODS = ("logreg", "holdfast", "zhang", "spectrum", "difference", "anyskin")
 """Methods of a quick study: one or two of each kind."""

@@ -8,9 +8,9 @@ import numpy.typing as npt
 from holdfast.metrics import Interval, Metrics, SampleMetrics, bootstrap_interval, ratio_of_sums
 from holdfast.metrics.intervals import Statistic, quantile_of
 from holdfast.metrics.statistics import quantile
+from holdfast.report.result_tables import Key, Row
 from holdfast.sensors.types import Array
 from holdfast.study.evaluation.evaluate_method import MethodEvaluation
-from holdfast.study.report.result_tables import Key, Row
 
 Keys = Mapping[str, Key]
 

@@ -2,6 +2,7 @@
 
 from collections.abc import Mapping
 
+from holdfast.report.result_tables import Key, ResultTable, Row
 from holdfast.study.comparison.jobs import (
     REFERENCE_METHOD,
     SPLIT_TITLES,
@@ -22,7 +23,6 @@ from holdfast.study.methods import METHODS
 from holdfast.study.paper import published
 from holdfast.study.paper.random_split import ConfusionCounts, rate_rows
 from holdfast.study.plan import StudyPlan
-from holdfast.study.report.result_tables import Key, ResultTable, Row
 
 POOLED_METHODS = (
     "logreg", "logreg_unweighted", "svm", "svm_unweighted", "trees", "holdfast",

@@ -12,6 +12,8 @@ import numpy as np
 from holdfast.contact import UNSTABLE_MARGIN
 from holdfast.metrics.events import POST_DURATIONS
 from holdfast.plots.curves import Curve, draw_lines
+from holdfast.report.html_report import ReportFigure
+from holdfast.report.result_tables import Key, ResultTable, Row
 from holdfast.study.comparison.event_tables import FALSE_ALARMS_UNDER_STABLE
 from holdfast.study.comparison.jobs import (
     SPLIT_TITLES,
@@ -26,9 +28,7 @@ from holdfast.study.evaluation.variation import Variation
 from holdfast.study.methods import METHODS
 from holdfast.study.methods.wavelets import CUTS
 from holdfast.study.plan import StudyPlan
-from holdfast.study.report.html_report import ReportFigure
-from holdfast.study.report.result_tables import Key, ResultTable, Row
-from holdfast.study.tasks import Task
+from holdfast.tasks import Task
 from holdfast.twin.profile import profile, profiles
 
 VARIED_METHODS = ("logreg", "zhang", "holdfast")

@@ -12,6 +12,7 @@ import numpy as np
 from holdfast.contact import HELD_PHASES
 from holdfast.metrics import Metrics
 from holdfast.metrics.events import POST_DURATIONS
+from holdfast.report.result_tables import Key, ResultTable, Row
 from holdfast.study.comparison.event_tables import FALSE_ALARMS_UNDER_STABLE
 from holdfast.study.comparison.jobs import (
     SPLIT_TITLES,
@@ -25,7 +26,6 @@ from holdfast.study.evaluation.evaluate_method import COMPARED_RATE, MethodEvalu
 from holdfast.study.evaluation.glitch_readings import EVENT, FALSE_ALARM, LEFT_OUT
 from holdfast.study.methods import PAPER_FAMILY
 from holdfast.study.plan import StudyPlan
-from holdfast.study.report.result_tables import Key, ResultTable, Row
 
 OURS = "holdfast"
 """Name of our own method."""

@@ -10,6 +10,8 @@ import numpy as np
 from holdfast.features import DEFAULT_WINDOW, DEPLOYED_FEATURES
 from holdfast.metrics import bootstrap_interval
 from holdfast.metrics.intervals import Statistic
+from holdfast.report.html_report import ReportFigure
+from holdfast.report.result_tables import Key, ResultTable, Row
 from holdfast.sensors.types import Array
 from holdfast.study.paper import published
 from holdfast.study.paper.label_sources import has_truth
@@ -25,9 +27,7 @@ from holdfast.study.paper.random_split import (
     rate_rows,
 )
 from holdfast.study.plan import Corpus, StudyPlan
-from holdfast.study.report.html_report import ReportFigure
-from holdfast.study.report.result_tables import Key, ResultTable, Row
-from holdfast.study.tasks import Task
+from holdfast.tasks import Task
 from holdfast.twin.uskin_parameters import UskinParameters
 
 N_FIT = 40_000

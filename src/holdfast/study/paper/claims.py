@@ -19,14 +19,14 @@ from holdfast.metrics.intervals import Statistic
 from holdfast.metrics.masks import Mask
 from holdfast.metrics.truth_labels import LabelRule, glitches
 from holdfast.recordings import Truth
+from holdfast.report.html_report import ReportFigure
+from holdfast.report.result_tables import Key, ResultTable, Row
 from holdfast.sensors.types import Array
 from holdfast.study.methods import FingerSignal, hand_signal
 from holdfast.study.methods.wavelets import detail_energy
 from holdfast.study.paper.label_sources import has_truth
 from holdfast.study.plan import Corpus, StudyPlan
-from holdfast.study.report.html_report import ReportFigure
-from holdfast.study.report.result_tables import Key, ResultTable, Row
-from holdfast.study.tasks import Task
+from holdfast.tasks import Task
 
 ROLES = ("main", "fresh", "others", "gentle", "vigorous")
 """Corpora whose recordings are used, if they exist; nothing is fitted to a classifier."""

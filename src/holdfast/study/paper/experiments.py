@@ -13,6 +13,8 @@ from holdfast.errors import TrainingError
 from holdfast.features import Tare
 from holdfast.plots.experiment import draw_experiment, draw_features, draw_forces
 from holdfast.plots.time_series import Codes, FingerSeries, finger_series
+from holdfast.report.html_report import ReportFigure
+from holdfast.report.result_tables import ResultTable
 from holdfast.study.evaluation.fitted_method import (
     FittedMethod,
     TrainingSamples,
@@ -23,9 +25,7 @@ from holdfast.study.evaluation.variation import Variation
 from holdfast.study.methods import METHODS, Method
 from holdfast.study.paper.paper_tables import first_finger
 from holdfast.study.plan import Corpus, StudyPlan
-from holdfast.study.report.html_report import ReportFigure
-from holdfast.study.report.result_tables import ResultTable
-from holdfast.study.tasks import Task
+from holdfast.tasks import Task
 
 TASK = "figures/experiments"
 TITLES = {"logreg": "LogReg", "svm": "SVM"}

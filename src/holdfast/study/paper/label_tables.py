@@ -10,6 +10,8 @@ import numpy as np
 from holdfast.contact import STABLE, UNKNOWN
 from holdfast.metrics import Decisions, Metrics, summarise
 from holdfast.recordings import Recording
+from holdfast.report.html_report import ReportFigure
+from holdfast.report.result_tables import Key, ResultTable, Row
 from holdfast.study.comparison.rows import DIGITS, ratio_row, sample_rows
 from holdfast.study.evaluation.evaluate_method import held_out_folds
 from holdfast.study.evaluation.fitted_method import FittedMethod, gather_training_samples
@@ -20,9 +22,7 @@ from holdfast.study.paper.label_sources import LabelSource, has_truth, relabelle
 from holdfast.study.paper.random_split import ConfusionCounts, rate_rows
 from holdfast.study.paper.visible_changes import HELD_CAUSES, HiddenCounts, count_hidden
 from holdfast.study.plan import Corpus, StudyPlan
-from holdfast.study.report.html_report import ReportFigure
-from holdfast.study.report.result_tables import Key, ResultTable, Row
-from holdfast.study.tasks import Task
+from holdfast.tasks import Task
 
 SOURCES: dict[LabelSource, str] = {"exact": "exact truth", "drawn": "drawn from the plot"}
 """Conventions of the table of four, with their titles."""

@@ -8,6 +8,8 @@ import numpy as np
 from holdfast.features import DEFAULT_WINDOW, DEPLOYED_FEATURES, FEATURE_NAMES
 from holdfast.plots.curves import Curve, draw_lines
 from holdfast.plots.style import PAPER
+from holdfast.report.html_report import ReportFigure
+from holdfast.report.result_tables import Key, ResultTable, Row
 from holdfast.study.paper import published
 from holdfast.study.paper.pooled_samples import ENERGY
 from holdfast.study.paper.random_split import (
@@ -22,9 +24,7 @@ from holdfast.study.paper.random_split import (
     rate_rows,
 )
 from holdfast.study.plan import StudyPlan
-from holdfast.study.report.html_report import ReportFigure
-from holdfast.study.report.result_tables import Key, ResultTable, Row
-from holdfast.study.tasks import Task
+from holdfast.tasks import Task
 
 ABLATION_WINDOWS = (14, 18)
 QUICK_WINDOWS = (4, 10, 14, 18)

@@ -2,7 +2,7 @@
 
 from typing import NamedTuple
 
-from holdfast.study.report.result_tables import ResultTable, Row
+from holdfast.report.result_tables import ResultTable, Row
 
 WINDOWS = (4, 6, 8, 10, 12, 14, 16, 18)
 RATES = ("FPR", "FNR", "FDR", "accuracy")

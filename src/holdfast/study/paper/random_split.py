@@ -16,6 +16,7 @@ from holdfast.classifiers import RECIPES, Classifier, Parameters, Recipe, Sample
 from holdfast.metrics import bootstrap_interval, ratio_of_sums
 from holdfast.metrics.intervals import Interval
 from holdfast.metrics.statistics import percent
+from holdfast.report.result_tables import Row
 from holdfast.study.paper.pooled_samples import (
     UNTREATED,
     Integers,
@@ -24,7 +25,6 @@ from holdfast.study.paper.pooled_samples import (
     pool_samples,
 )
 from holdfast.study.plan import Corpus
-from holdfast.study.report.result_tables import Row
 from holdfast.training.setting import SEARCH_SAMPLES
 from holdfast.training.splits import inner_folds
 from holdfast.training.training_samples import thin, thinning_step

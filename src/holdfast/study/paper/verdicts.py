@@ -13,6 +13,8 @@ from holdfast.metrics.decisions import Codes
 from holdfast.metrics.events import MIN_STABLE_DURATION, TIME_TOLERANCE
 from holdfast.metrics.masks import join_runs, runs
 from holdfast.recordings import Truth
+from holdfast.report.html_report import ReportFigure
+from holdfast.report.result_tables import Key, ResultTable, Row
 from holdfast.sensors.types import Array
 from holdfast.study.comparison.rows import count_row, quantile_row, ratio_row
 from holdfast.study.evaluation.evaluate_method import held_out_folds
@@ -22,9 +24,7 @@ from holdfast.study.evaluation.variation import Variation
 from holdfast.study.methods import METHODS
 from holdfast.study.paper.label_sources import has_truth
 from holdfast.study.plan import Corpus, StudyPlan
-from holdfast.study.report.html_report import ReportFigure
-from holdfast.study.report.result_tables import Key, ResultTable, Row
-from holdfast.study.tasks import Task
+from holdfast.tasks import Task
 
 VERDICT_METHODS = ("logreg", "svm", "holdfast")
 QUICK_VERDICT_METHODS = ("logreg", "holdfast")

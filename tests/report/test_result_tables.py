@@ -8,7 +8,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from holdfast.study.report.result_tables import (
+from holdfast.report.result_tables import (
     ResultTable,
     Row,
     number_text,
@@ -150,3 +150,13 @@ def test_an_inconsistent_table_is_rejected(build, message):
     with pytest.raises(ValueError) as caught:
         build()
     assert str(caught.value) == message
+
+
+def test_a_table_without_a_paper_has_values_only():
+    rows = [Row({"law": "a", "figure": "x"}, math.inf, n=4, interval=(1.0, math.inf))]
+    table = ResultTable("t", "T", "", rows, ("law",), counted="trials", has_paper=False)
+    assert to_csv(table) == "law,figure,value,n,low,high\na,x,inf,4,1.0,inf\n"
+    assert to_json(table) == [
+        {"law": "a", "figure": "x", "value": None, "n": 4, "interval": [1.0, None],
+         "infinite": True}
+    ]  # fmt: skip

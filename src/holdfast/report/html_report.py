@@ -6,10 +6,10 @@ from typing import NamedTuple
 
 from matplotlib.figure import Figure
 
-from holdfast.study.report.images import InlineImage, inline_image
-from holdfast.study.report.rendering import render
-from holdfast.study.report.result_tables import FILE_NAME, ResultTable
-from holdfast.study.report.table_layouts import TableText, table_text
+from holdfast.report.images import InlineImage, inline_image
+from holdfast.report.rendering import render
+from holdfast.report.result_tables import FILE_NAME, ResultTable
+from holdfast.report.table_layouts import TableText, table_text
 
 SUMMARY = "Summary"
 """Title of the section that comes before the contents."""

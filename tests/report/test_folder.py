@@ -3,14 +3,16 @@ import json
 import pytest
 
 from holdfast.errors import OutputError
-from holdfast.study.report.folder import check_output_folder, write_study
-from holdfast.study.report.html_report import ReportFigure, Section
+from holdfast.report.folder import ReportKind, check_output_folder, write_report
+from holdfast.report.html_report import ReportFigure, Section
 
 from .test_html_report import drawn, sections
 
+STUDY = ReportKind("study", "study.json", ("extra.bin",))
+
 
 def write(out, **options):
-    write_study(out, "Study", {"seed": 0}, sections(), {"seed": 0, "data": {}}, **options)
+    write_report(out, STUDY, "Study", {"seed": 0}, sections(), {"seed": 0}, **options)
 
 
 def files(folder):
@@ -33,15 +35,11 @@ def test_files_of_the_folder(tmp_path):
             for kind in ("csv", "json", "md", "tex")
         ),
     ]
-    document = json.loads((out / "study.json").read_text())
-    assert document["seed"] == 0
-    assert document["tables"]["first"][0] == {
+    assert json.loads((out / "study.json").read_text()) == {"seed": 0}
+    assert json.loads((out / "tables/first.json").read_text())["rows"][0] == {
         "m": "a", "figure": "x", "ours": 1.0, "paper": 2.0, "difference": -1.0, "n": None,
         "interval": None,
     }  # fmt: skip
-    assert (
-        json.loads((out / "tables/first.json").read_text())["rows"] == document["tables"]["first"]
-    )
     assert (out / "figures/curve.png").read_bytes()[:4] == b"\x89PNG"
     assert (out / "figures/curve.svg").read_text().startswith("<?xml")
 
@@ -49,7 +47,7 @@ def test_files_of_the_folder(tmp_path):
 def test_stored_results_of_a_stopped_study_stay(tmp_path):
     (tmp_path / "out/work").mkdir(parents=True)
     (tmp_path / "out/work/a.msgpack").write_bytes(b"x")
-    check_output_folder(tmp_path / "out")
+    check_output_folder(tmp_path / "out", STUDY)
     write(tmp_path / "out")
     assert (tmp_path / "out/work/a.msgpack").read_bytes() == b"x"
 
@@ -67,6 +65,14 @@ def test_a_study_is_only_replaced_by_force(tmp_path):
     assert "tables/old.csv" not in files(out) and "notes.txt" in files(out)
 
 
+def test_other_files_of_a_kind_are_replaced_too(tmp_path):
+    out = tmp_path / "out"
+    write(out, others={"extra.bin": b"x"})
+    assert (out / "extra.bin").read_bytes() == b"x"
+    write(out, force=True)
+    assert "extra.bin" not in files(out)
+
+
 def test_a_folder_of_other_files_is_not_changed(tmp_path):
     (tmp_path / "notes.txt").touch()
     message = (
@@ -76,9 +82,9 @@ def test_a_folder_of_other_files_is_not_changed(tmp_path):
     with pytest.raises(OutputError, match=message):
         write(tmp_path, force=True)
     with pytest.raises(OutputError, match=r"is a file; a study is written to a folder$"):
-        check_output_folder(tmp_path / "notes.txt", force=True)
+        check_output_folder(tmp_path / "notes.txt", STUDY, force=True)
     with pytest.raises(OutputError, match=r"no does not exist$"):
-        check_output_folder(tmp_path / "no/out")
+        check_output_folder(tmp_path / "no/out", STUDY)
 
 
 def test_a_failed_write_changes_nothing(tmp_path):
@@ -87,5 +93,5 @@ def test_a_failed_write_changes_nothing(tmp_path):
     before = {name: (out / name).read_bytes() for name in files(out)}
     broken = [Section("x", "", [], [ReportFigure("a b", "", drawn())])]
     with pytest.raises(ValueError, match="figure's name"):
-        write_study(out, "Other", {}, broken, {}, force=True)
+        write_report(out, STUDY, "Other", {}, broken, {}, force=True)
     assert {name: (out / name).read_bytes() for name in files(out)} == before

@@ -2,7 +2,7 @@
 
 from collections.abc import Iterable, Iterator
 
-from holdfast.study.report.result_tables import ResultTable, Row
+from holdfast.report.result_tables import ResultTable, Row
 
 CLASSIFIERS = ("LogReg", "SVM")
 STRONGEST = {

@@ -5,8 +5,8 @@ import subprocess
 
 import pytest
 
-from holdfast.study.report.result_tables import ResultTable, Row
-from holdfast.study.report.table_layouts import notes, to_html, to_latex, to_markdown
+from holdfast.report.result_tables import ResultTable, Row
+from holdfast.report.table_layouts import notes, to_html, to_latex, to_markdown
 
 
 def confusion(**options):
@@ -163,3 +163,14 @@ def test_a_value_of_the_paper_alone_has_no_difference():
     assert "| Table II | *paper 95.3* |" in to_markdown(alone)
     assert "95.3</span>" in to_html(alone)
     assert "95.3 (" not in to_latex(alone)
+
+
+def test_notes_name_what_is_counted():
+    rows = [Row({"law": "a", "figure": "x"}, 1.0, n=n, interval=(0.0, 2.0)) for n in (4, 1)]
+    rows = [Row({**row.keys, "law": str(k)}, row.ours, n=row.n, interval=row.interval)
+            for k, row in enumerate(rows)]  # fmt: skip
+    table = ResultTable("t", "T", "", rows, ("law",), counted="trials", has_paper=False)
+    assert notes(table) == ["Small print: 95 % interval, by bootstrap over trials."]
+    assert "trials" in to_markdown(table).splitlines()[2]
+    one = ResultTable("t", "T", "", rows[1:], ("law",), counted="trials", has_paper=False)
+    assert notes(one)[0].startswith("On 1 trial. ")

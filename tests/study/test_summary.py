@@ -1,5 +1,5 @@
-from holdfast.study.report.result_tables import ResultTable, Row
-from holdfast.study.report.summary import EVENTS, STRONGEST, summary_text
+from holdfast.report.result_tables import ResultTable, Row
+from holdfast.study.summary import EVENTS, STRONGEST, summary_text
 
 
 def table(name, rows):

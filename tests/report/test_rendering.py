@@ -5,7 +5,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from holdfast.study.report.rendering import escape_html, escape_latex, escape_markdown
+from holdfast.report.rendering import escape_html, escape_latex, escape_markdown
 
 
 @pytest.mark.parametrize(

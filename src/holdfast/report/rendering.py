@@ -107,7 +107,7 @@ def escape_markdown(text: str) -> str:
 @cache
 def _html_environment() -> Environment:
     environment = Environment(
-        loader=PackageLoader("holdfast.study.report"),
+        loader=PackageLoader("holdfast.report"),
         autoescape=select_autoescape(["html"]),
         undefined=StrictUndefined,
         trim_blocks=True,
@@ -122,7 +122,7 @@ def _html_environment() -> Environment:
 def _latex_environment() -> Environment:
     """Return an environment whose delimiters LaTeX does not use; every value is escaped."""
     return Environment(
-        loader=PackageLoader("holdfast.study.report"),
+        loader=PackageLoader("holdfast.report"),
         autoescape=True,
         finalize=_finalize_latex,
         undefined=StrictUndefined,

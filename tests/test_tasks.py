@@ -12,11 +12,11 @@ import numpy as np
 import pytest
 from threadpoolctl import threadpool_info
 
+from holdfast import tasks as work
 from holdfast.cli.terminal.progress import progress
 from holdfast.errors import EngineError, OutputError
 from holdfast.parallel import Engine
-from holdfast.study import tasks as work
-from holdfast.study.tasks import Task, TaskRunner, source_digest
+from holdfast.tasks import Task, TaskRunner, source_digest
 
 ENGINES = [Engine(1), Engine(2)]
 
@@ -144,10 +144,10 @@ def test_a_killed_study_continues_with_the_missing_tasks(tmp_path, log):
     code = f"""if True:
         from pathlib import Path
         from holdfast.parallel import Engine
-        from study.test_tasks import TaskRunner, noted_tasks
+        from test_tasks import TaskRunner, noted_tasks
         TaskRunner(Path({str(tmp_path)!r}), Engine(2)).run(noted_tasks({str(log)!r}))
     """
-    tests = str(Path(__file__).parents[1])
+    tests = str(Path(__file__).parent)
     with subprocess.Popen(
         [sys.executable, "-c", code],
         env=os.environ | {"PYTHONPATH": tests},
@@ -203,36 +203,64 @@ def test_other_arguments_or_another_function_are_another_result(tmp_path):
 
 def test_another_source_is_another_result(tmp_path, log, monkeypatch):
     TaskRunner(tmp_path).run(noted_tasks(log, 2))
-    monkeypatch.setattr(work, "source_digest", lambda: "another")
+    monkeypatch.setattr(work, "source_digest", lambda *_: "another")
     TaskRunner(tmp_path).run(noted_tasks(log, 2))
     assert set(calls(log).values()) == {2}
 
 
 def test_a_worker_with_another_source_is_rejected(tmp_path, monkeypatch):
-    monkeypatch.setattr(work, "source_digest", lambda: "another")
+    monkeypatch.setattr(work, "source_digest", lambda *_: "another")
     with pytest.raises(
         EngineError, match=r"^figure/\d: the version of holdfast of its worker diff"
     ):
         TaskRunner(tmp_path, Engine(2)).run(tasks(2))
 
 
-def test_the_source_digest_ignores_the_command_line(tmp_path, monkeypatch):
-    def digest(**files):
-        for name, text in files.items():
-            path = tmp_path / name.replace("__", "/")
-            path.parent.mkdir(exist_ok=True)
-            path.write_text(text)
-        source_digest.cache_clear()
-        return source_digest()
+@pytest.fixture
+def digest(tmp_path, monkeypatch):
+    """Function that writes files of a package, a__b for a/b, and returns their digest."""
 
-    monkeypatch.setattr(work, "__file__", str(tmp_path / "study" / "work.py"))
-    try:
-        first = digest(a="1", study__b="2")
-        assert digest(cli__c="3") == first
-        assert digest(study__b="3") != first
-    finally:
-        monkeypatch.undo()
-        source_digest.cache_clear()
+    def written(*unused, **files):
+        for name, text in files.items():
+            path = tmp_path / "package" / name.replace("__", "/")
+            path.parent.mkdir(parents=True, exist_ok=True)
+            path.write_text(text)
+        clear()
+        return source_digest(unused)
+
+    def clear():
+        work.source_digest.cache_clear()
+        work._file_digests.cache_clear()
+
+    monkeypatch.setattr(work, "__file__", str(tmp_path / "package" / "tasks.py"))
+    yield written
+    monkeypatch.undo()
+    clear()
+
+
+def test_the_source_digest_ignores_the_command_line_and_reports(digest):
+    first = digest(a="1", study__b="2")
+    assert digest(cli__c="3", report__d="4") == first
+    assert digest(study__b="3") != first
+
+
+def test_the_source_digest_ignores_files_that_are_not_used(digest):
+    first = digest("laws/b", "study", a="1", laws__b="2", laws__c="3")
+    assert digest("laws/b", "study", laws__b="4", study__d="5") == first
+    assert digest("laws/b", "study", laws__c="6") != first
+    assert digest("laws/b", "study", study_plan="7") != first
+
+
+def test_a_task_may_have_a_version_of_its_own(tmp_path, log, monkeypatch):
+    def run(version):
+        return TaskRunner(tmp_path).run([Task("a", noted, (1, str(log)), int, version=version)])
+
+    assert run("first") == {"a": 1}
+    monkeypatch.setattr(work, "source_digest", lambda *_: "another")
+    run("first")
+    assert calls(log) == {"1": 1}
+    run("second")
+    assert calls(log) == {"1": 2}
 
 
 def test_the_same_call_under_two_names_is_made_once(tmp_path, log):

@@ -1,4 +1,4 @@
-"""Tasks whose results are stored, so that a stopped study continues where it stopped."""
+"""Tasks whose results are stored, so that a stopped command continues where it stopped."""
 
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
@@ -18,6 +18,8 @@ from holdfast.parallel import Engine
 
 T = TypeVar("T")
 Notify = Callable[[str], None]
+NEVER_USED = ("cli", "report")
+"""Folders of the package on which no result depends."""
 
 
 class Task(NamedTuple):
@@ -29,6 +31,7 @@ class Task(NamedTuple):
         arguments: values that msgspec can encode: Structs, numbers, text, None, lists of them.
         result: type of the result, for decoding by msgspec.
         cost: expected duration, in a unit that is the same for all tasks.
+        version: digest of what else the result depends on; empty for the source of the package.
     """
 
     name: str
@@ -36,6 +39,7 @@ class Task(NamedTuple):
     arguments: tuple[Any, ...]
     result: Any
     cost: float = 1.0
+    version: str = ""
 
 
 class ShowProgress(Protocol):
@@ -59,12 +63,12 @@ class ShowProgress(Protocol):
 class TaskRunner:
     """Runs tasks and stores the result of each in its own file.
 
-    The name of the file is a digest of what the result depends on: the source of the package,
-    the function and the arguments. A stored result is therefore never outdated, and a study that
-    is stopped loses only the tasks that were running.
+    The name of the file is a digest of what the result depends on: the source of the package or
+    the version of the task, the function and the arguments. A stored result is therefore never
+    outdated, and a command that is stopped loses only the tasks that were running.
 
     Attributes:
-        folder: of the study; results are stored in `folder/work`.
+        folder: of the outputs; results are stored in `folder/work`.
         engine: that runs the tasks.
         progress: that passes on the finished tasks.
         notify: that is called with messages for the user.
@@ -132,16 +136,30 @@ class TaskRunner:
 
 
 @lru_cache
-def source_digest() -> str:
-    """Return a digest of all files of the package, except those of the command line."""
-    package = Path(__file__).parents[1]
+def source_digest(unused: tuple[str, ...] = ()) -> str:
+    """Return a digest of the files of the package that a result depends on.
+
+    Args:
+        unused: files and folders that are left out, beside those of the command line and of
+            reports: `control/laws/pr2.py`, `labelling`.
+    """
+    left_out = (*NEVER_USED, *unused)
     digest = sha256()
-    for path in sorted(package.rglob("*")):
-        name = path.relative_to(package)
-        if path.is_file() and name.parts[0] != "cli" and "__pycache__" not in name.parts:
-            content = sha256(path.read_bytes()).hexdigest()
+    for name, content in _file_digests().items():
+        if not any(name.is_relative_to(each) for each in left_out):
             digest.update(f"{name.as_posix()} {content}\n".encode())
     return digest.hexdigest()
+
+
+@lru_cache
+def _file_digests() -> dict[Path, str]:
+    """Return a digest of each file of the package, by its path in the package."""
+    package = Path(__file__).parent
+    return {
+        path.relative_to(package): sha256(path.read_bytes()).hexdigest()
+        for path in sorted(package.rglob("*"))
+        if path.is_file() and "__pycache__" not in path.parts
+    }
 
 
 class StoredResult(Struct, frozen=True):
@@ -164,7 +182,7 @@ def _keys(tasks: Sequence[Task]) -> dict[str, str]:
 
 def _key(task: Task) -> str:
     function = f"{task.function.__module__}.{task.function.__qualname__}"
-    given = (source_digest(), function, task.arguments)
+    given = (task.version or source_digest(), function, task.arguments)
     return sha256(msgpack.encode(given, order="deterministic")).hexdigest()
 
 

@@ -7,8 +7,8 @@ difference, ours minus the paper's.
 from collections.abc import Iterable
 from typing import NamedTuple
 
-from holdfast.study.report.rendering import escape_markdown, render
-from holdfast.study.report.result_tables import (
+from holdfast.report.rendering import escape_markdown, render
+from holdfast.report.result_tables import (
     INFINITE,
     MINUS,
     MISSING,
@@ -20,9 +20,7 @@ from holdfast.study.report.result_tables import (
     pivot,
 )
 
-N_RECORDINGS = "recordings"
-"""Head of the column with the number of recordings of each line."""
-INTERVAL_NOTE = "Small print: 95 % interval, by bootstrap over recordings."
+INTERVAL_NOTE = "Small print: 95 % interval, by bootstrap over {counted}."
 PAPER_NOTE = "Paper: the value in the paper, and our value minus it."
 WIDE_COLUMNS = 7
 """A LaTeX table with more columns is as wide as both columns of a page."""
@@ -157,7 +155,7 @@ def table_text(table: ResultTable) -> TableText:
         title=table.title,
         keys=list(table.lines),
         over="" if table.column == "figure" else table.column,
-        columns=[*grid.columns, *[N_RECORDINGS] * n_varies],
+        columns=[*grid.columns, *[table.counted] * n_varies],
         n_values=len(grid.columns),
         lines=lines,
         notes=notes(table),
@@ -170,9 +168,9 @@ def notes(table: ResultTable) -> list[str]:
     sentences = []
     if len(counts) == 1:
         (n,) = counts
-        sentences.append(f"On {n} recording{'s' * (n != 1)}.")
+        sentences.append(f"On {n} {table.counted if n != 1 else table.counted.removesuffix('s')}.")
     if any(row.interval for row in table.rows):
-        sentences.append(INTERVAL_NOTE)
+        sentences.append(INTERVAL_NOTE.format(counted=table.counted))
     if any(row.paper is not None for row in table.rows):
         sentences.append(PAPER_NOTE)
     return [note for note in (table.note.strip(), " ".join(sentences)) if note]

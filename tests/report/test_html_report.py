@@ -5,9 +5,9 @@ from html.parser import HTMLParser
 import pytest
 from matplotlib.figure import Figure
 
-from holdfast.study.report import images
-from holdfast.study.report.html_report import ReportFigure, Section, html_report
-from holdfast.study.report.result_tables import ResultTable, Row
+from holdfast.report import images
+from holdfast.report.html_report import ReportFigure, Section, html_report
+from holdfast.report.result_tables import ResultTable, Row
 
 VOID = {"meta", "br", "img", "link", "hr", "input"}
 

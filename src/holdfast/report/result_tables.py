@@ -1,7 +1,7 @@
-"""Tables of the study: rows of values, and how they are written as data.
+"""Tables of results: rows of values, and how they are written as data.
 
 A row is one value: what it is about, ours, the paper's. CSV and JSON write the rows as they are;
-`holdfast.study.report.table_layouts` lays them out as lines and columns.
+`holdfast.report.table_layouts` lays them out as lines and columns.
 """
 
 import csv
@@ -14,7 +14,9 @@ from typing import Any, NamedTuple
 import msgspec
 
 Key = str | int | float
-RESERVED_KEYS = ("ours", "paper", "difference", "n", "low", "high", "interval", "infinite")
+RESERVED_KEYS = (
+    "ours", "paper", "difference", "value", "n", "low", "high", "interval", "infinite",
+)  # fmt: skip
 """Names of a row's own columns, which no key may have."""
 FILE_NAME = re.compile(r"[A-Za-z0-9][A-Za-z0-9_-]*")
 MISSING = "–"
@@ -29,8 +31,8 @@ class Row(msgspec.Struct, frozen=True):
         keys: what it is about: {"classifier": "LogReg", "figure": "accuracy [%]"}.
         ours: our value; None or NaN if there is none, infinity for a delay that never ends.
         paper: the value in the paper.
-        n: number of recordings behind the value.
-        interval: 95 %, by bootstrap over recordings; an end may be None or infinite.
+        n: number of recordings or trials behind the value.
+        interval: 95 %, by bootstrap over recordings or trials; an end may be None or infinite.
     """
 
     keys: dict[str, Key]
@@ -60,6 +62,9 @@ class ResultTable(msgspec.Struct, frozen=True):
         column: key whose values are the columns of the layout.
         digits: after the decimal point.
         digits_of: the same of single columns that differ.
+        counted: what `n` of the rows counts, in the plural.
+        has_paper: whether values of the paper are compared with ours. Without them, a row of
+            CSV and JSON has `value` instead of `ours`, `paper` and `difference`.
 
     Raises:
         ValueError: the name is no file name, no key names a line, a key has a reserved name, a
@@ -74,6 +79,8 @@ class ResultTable(msgspec.Struct, frozen=True):
     column: str = "figure"
     digits: int = 1
     digits_of: dict[str, int] = {}
+    counted: str = "recordings"
+    has_paper: bool = True
 
     def __post_init__(self) -> None:
         if not FILE_NAME.fullmatch(self.name):
@@ -164,36 +171,44 @@ def digits_of(table: ResultTable, column: str) -> int:
 def to_json(table: ResultTable) -> list[dict[str, Any]]:
     """Return the rows for JSON: their keys, `ours`, `paper`, `difference`, `n`, `interval`.
 
-    JSON has no infinity: it is null, as in every output of the commands. A row whose `ours` is
-    infinite has `"infinite": true`.
+    Without a paper they have `value` instead of the first three. JSON has no infinity: it is
+    null, as in every output of the commands. A row whose value is infinite has
+    `"infinite": true`.
     """
-    return [_flat(row) for row in table.rows]
+    return [_flat(table, row) for row in table.rows]
 
 
 def to_csv(table: ResultTable) -> str:
     """Return the rows as comma-separated text with a header.
 
-    The columns are the keys, then `ours,paper,difference,n,low,high`. An empty field is unknown,
-    `inf` is infinite.
+    The columns are the keys, then `ours,paper,difference,n,low,high`, or without a paper
+    `value,n,low,high`. An empty field is unknown, `inf` is infinite.
     """
     keys = _keys(table.rows)
     file = io.StringIO()
     writer = csv.writer(file, lineterminator="\n")
-    writer.writerow([*keys, "ours", "paper", "difference", "n", "low", "high"])
+    names = list(_values(table, Row({}, None)))
+    writer.writerow([*keys, *names, "n", "low", "high"])
     for row in table.rows:
-        low, high = row.interval or (None, None)
-        values = (row.ours, row.paper, row.difference, row.n, low, high)
+        values = (*_values(table, row).values(), row.n, *(row.interval or (None, None)))
         writer.writerow(
             [*(row.keys.get(key, "") for key in keys), *(_csv_field(value) for value in values)]
         )
     return file.getvalue()
 
 
-def _flat(row: Row) -> dict[str, Any]:
+def _values(table: ResultTable, row: Row) -> dict[str, float | None]:
+    """Return the values of a row, by the names that they have in files."""
+    if table.has_paper:
+        return {"ours": row.ours, "paper": row.paper, "difference": row.difference}
+    return {"value": row.ours}
+
+
+def _flat(table: ResultTable, row: Row) -> dict[str, Any]:
     interval = None if row.interval is None else [_finite(end) for end in row.interval]
     flat: dict[str, Any] = {key: _json_key(value) for key, value in row.keys.items()}
-    flat |= {"ours": _finite(row.ours), "paper": _finite(row.paper)}
-    flat |= {"difference": row.difference, "n": row.n, "interval": interval}
+    flat |= {name: _finite(value) for name, value in _values(table, row).items()}
+    flat |= {"n": row.n, "interval": interval}
     if row.ours is not None and math.isinf(row.ours):
         flat["infinite"] = True
     return flat

@@ -1,0 +1,85 @@
+"""How results were made: versions, machine and time, without names of people."""
+
+import os
+import platform
+from collections.abc import Mapping
+from importlib.metadata import PackageNotFoundError, version
+from pathlib import Path
+from typing import Any
+
+PACKAGES = (
+    "holdfast", "numpy", "scipy", "scikit-learn", "numba", "optuna", "mujoco", "msgspec",
+    "matplotlib", "torch",
+)  # fmt: skip
+GIB = 2**30
+
+
+def versions() -> dict[str, str | None]:
+    """Return the versions of Python and of the packages; None if one is not installed."""
+    return {"python": platform.python_version(), **{name: _version(name) for name in PACKAGES}}
+
+
+def machine() -> dict[str, Any]:
+    """Return what the time depends on: processor, usable cores, memory [GiB], system."""
+    return {
+        "processor": _processor(),
+        "cores": _cores(),
+        "memory": _memory(),
+        "system": f"{platform.system()} {platform.machine()}",
+    }
+
+
+def fact_texts(summary: Mapping[str, Any]) -> dict[str, str]:
+    """Return the facts that all reports have: seed, versions, machine and time.
+
+    Args:
+        summary: with `seed`, `versions`, `machine`, and `seconds` by part of the work.
+    """
+    host = summary["machine"]
+    memory = "" if host["memory"] is None else f", {host['memory']:g} GiB"
+    return {
+        "seed": str(summary["seed"]),
+        "versions": ", ".join(
+            f"{name} {number or 'not installed'}" for name, number in summary["versions"].items()
+        ),
+        "machine": f"{host['processor']}, {host['cores']} cores{memory}, {host['system']}",
+        "time": ", ".join(
+            f"{name} {_duration(value)}" for name, value in summary["seconds"].items() if value
+        ),
+    }
+
+
+def _duration(seconds: float) -> str:
+    """Return a time as text.
+
+    Example:
+        >>> _duration(42.3), _duration(1500)
+        ('42 s', '25 min')
+    """
+    return f"{seconds:.0f} s" if seconds < 120 else f"{seconds / 60:.0f} min"
+
+
+def _version(package: str) -> str | None:
+    try:
+        return version(package)
+    except PackageNotFoundError:
+        return None
+
+
+def _processor() -> str:
+    cpuinfo = Path("/proc/cpuinfo")
+    lines = cpuinfo.read_text(errors="replace").splitlines() if cpuinfo.exists() else []
+    names = (line.partition(":")[2].strip() for line in lines if line.startswith("model name"))
+    return next(names, platform.processor() or platform.machine())
+
+
+def _cores() -> int:
+    if hasattr(os, "sched_getaffinity"):
+        return len(os.sched_getaffinity(0))
+    return os.cpu_count() or 1
+
+
+def _memory() -> float | None:
+    if "SC_PHYS_PAGES" not in getattr(os, "sysconf_names", {}):
+        return None
+    return round(os.sysconf("SC_PAGE_SIZE") * os.sysconf("SC_PHYS_PAGES") / GIB, 1)
