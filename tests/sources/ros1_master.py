@@ -31,13 +31,16 @@ def needs_ros1():
 
 
 class Master:
-    """A master on a port of its own, and the processes of its nodes."""
+    """A master on a port of its own, and the processes of its nodes.
+
+    `environment` is that of its nodes.
+    """
 
     def __init__(self, folder):
         with socket.create_server(("127.0.0.1", 0)) as free:
             self.port = free.getsockname()[1]
         self.uri = f"http://127.0.0.1:{self.port}"
-        self._environment = {
+        self.environment = {
             **{k: v for k, v in os.environ.items() if not k.startswith(("ROS", "PYTHONWARN"))},
             "ROS_MASTER_URI": self.uri,
             "ROS_IP": "127.0.0.1",
@@ -69,7 +72,7 @@ class Master:
 
     def _spawn(self, command):
         child = subprocess.Popen(
-            command, env=self._environment, text=True,
+            command, env=self.environment, text=True,
             stdout=subprocess.PIPE, stderr=subprocess.DEVNULL,
         )  # fmt: skip
         self._children.append(child)

@@ -51,7 +51,11 @@ def hold(
     source: SourceArgument,
     hand: Annotated[
         str,
-        typer.Option("--hand", help="URI of the hand: twin:, log:PATH or call:MODULE:FUNCTION."),
+        typer.Option(
+            "--hand",
+            help="URI of the hand: twin:, ros2:KIND?..., ros1:KIND?..., log:PATH or "
+            "call:MODULE:FUNCTION.",
+        ),
     ],
     law: Annotated[str, typer.Option("--law", help="Law of grip force.")] = "holdfast",
     armed: Annotated[
@@ -97,6 +101,11 @@ def hold(
     nothing is sent. With it, a second process watches this one, and brings the hand into its
     safe state if it dies. With SOURCE twin:... and --hand twin:, the twin is both.
 
+    Hands on topics of ROS 2 (no ROS needed): ros2:plexus, ros2:v4, ros2:v5, ros2:v5-envelop and
+    ros2:gripper. Of ROS 1 (with rospy): ros1:positions, ros1:efforts, ros1:envelop and
+    ros1:gripper. Another program closes the hand; the loop takes over when the grip begins.
+    docs/grip.md has their topics and parameters.
+
     No command was ever tried on a real hand: read docs/grip.md first.
 
     Example:
@@ -104,6 +113,7 @@ def hold(
       holdfast hold builtin:any xela://auto --hand log:commands.jsonl
       holdfast hold model.json xela://auto --hand call:my_gripper:set_force --armed \
         --confirm call:my_gripper:set_force --max-scale 1.2 --on-fault open
+      holdfast hold builtin:any xela://auto --hand "ros2:plexus?effort=0.1&max_effort=0.2"
     """
     from holdfast.control import GripController, Limits
 
@@ -119,6 +129,7 @@ def hold(
         stack.enter_context(opened)
         stream = create_stream_detector(loaded, opened, RatePolicy.RESAMPLE, ignore)
         controller = GripController(limits, law, sensors=stream.fingers, newtons_per_unit=newtons)
+        commanded.check(limits, stream.fingers)
         log = _new_log(stack, record, opened, as_json=as_json)
         loop = _new_loop(stack, controller, commanded, log, armed=armed)
         stop.graceful = True
@@ -206,7 +217,7 @@ def _new_loop(
 
     watchdog = None
     if armed and not hand.name.startswith(TWIN):
-        stack.enter_context(Claim(hand.name))
+        stack.enter_context(Claim(hand.resource))
         stack.enter_context(hand)
         watchdog = stack.enter_context(Watchdog(hand.name, controller.limits.on_fault))
     loop = GripLoop(controller, hand, armed=armed, watchdog=watchdog, log=log.event)

@@ -42,6 +42,8 @@ class LiveTwin(Source, Hand):
         (30, 3)
     """
 
+    fingers = FINGERS
+
     def __init__(self, uri: str = "twin:", *, speed: float = 1.0) -> None:
         self.grasp = grasp_of(parse(uri)[1])
         if self.grasp.server:
@@ -90,17 +92,11 @@ class LiveTwin(Source, Hand):
         self.simulation.step(self._scales)
         return Arrival(at, self.simulation.read(), time.monotonic())
 
-    def send(self, command: GripCommand) -> None:
-        """Set the force scales from the next sample on, or release the object.
-
-        Raises:
-            HandError: the twin is closed, or the command names another finger.
-        """
+    def _send(self, command: GripCommand) -> None:
+        """Set the force scales from the next sample on, or release the object."""
         if self.simulation is None:
             raise HandError(f"{self.name} is not open")
         for finger, one in command.fingers.items():
-            if finger not in FINGERS:
-                raise HandError(f"{self.name} has {', '.join(FINGERS)}; {finger!r} commanded")
             self._scales[FINGERS.index(finger)] = one.scale
         if command.release:
             self.simulation.protocol.release(self.simulation.time)

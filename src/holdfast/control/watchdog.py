@@ -137,7 +137,7 @@ def main(uri: str, on_fault: str, timeout: str) -> int:
         Exit code: 0 after a farewell, 1 after it took over, 2 if it cannot connect.
     """
     try:
-        hand = open_hand(uri)
+        hand = open_hand(uri, standby=True)
         hand.open()
     except (HoldfastError, ValueError) as failure:
         print(failure, flush=True)  # noqa: T201 (the other end of the pipe reads it)

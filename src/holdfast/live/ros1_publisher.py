@@ -1,10 +1,8 @@
 """Publish estimates on ROS 1 topics, with rospy."""
 
 from collections.abc import Iterable, Mapping
-from importlib import import_module
 from typing import Any
 
-from holdfast.errors import SourceError
 from holdfast.live.ros_publisher import DIAGNOSTICS, VECTOR, WRENCH, DiagnosticStatus, RosPublisher
 from holdfast.ros import rospy_node
 from holdfast.sensors.types import Unit
@@ -39,9 +37,9 @@ class Ros1Publisher(RosPublisher):
 
     def _connect(self, topics: Mapping[str, str]) -> None:
         self._rospy = rospy_node.start_node(self._master)
-        self._message_types = {name: _message_type(name) for name in set(topics.values())}
+        self._message_types = {name: rospy_node.message_type(name) for name in set(topics.values())}
         for name in ("DiagnosticStatus", "KeyValue"):
-            self._message_types[name] = _message_type(f"diagnostic_msgs/{name}")
+            self._message_types[name] = rospy_node.message_type(f"diagnostic_msgs/{name}")
         self._publishers = {
             topic: self._rospy.Publisher(topic, self._message_types[name], queue_size=QUEUE_SIZE)
             for topic, name in topics.items()
@@ -87,14 +85,3 @@ class Ros1Publisher(RosPublisher):
     def _stamp(self, header: Any, stamp: float, frame: str) -> None:  # noqa: ANN401
         header.stamp = self._rospy.Time.from_sec(stamp)
         header.frame_id = frame
-
-
-def _message_type(full_name: str) -> type[Any]:
-    """Return the class of a ROS message."""
-    package, name = full_name.split("/")
-    try:
-        found: type[Any] = getattr(import_module(f"{package}.msg"), name)
-    except ImportError as cause:
-        debian = f"python3-{package.replace('_', '-')}"
-        raise SourceError(f"this needs {package} of ROS 1: apt install {debian}") from cause
-    return found

@@ -2,14 +2,14 @@
 
 import re
 import time
-from abc import ABC, abstractmethod
+from abc import abstractmethod
 from collections import deque
 from collections.abc import Iterable, Mapping
 from threading import Condition, Thread
-from types import TracebackType
-from typing import TYPE_CHECKING, NamedTuple, Self
+from typing import TYPE_CHECKING, NamedTuple
 
 from holdfast.contact import ContactEstimate, ContactState, HandEstimate, Reason
+from holdfast.openable import Openable
 from holdfast.sensors.types import Unit
 
 if TYPE_CHECKING:
@@ -47,7 +47,7 @@ class DiagnosticStatus(NamedTuple):
     values: tuple[tuple[str, str], ...]
 
 
-class RosPublisher(ABC):
+class RosPublisher(Openable):
     """Publish estimates in a separate thread; it never delays the caller.
 
     The topics of each finger are `NAMESPACE/FINGER/state` (text), `stable_probability` and
@@ -195,18 +195,6 @@ class RosPublisher(ABC):
         self._levels = levels
         self._diagnostics_due = time.monotonic() + DIAGNOSTICS_PERIOD
         self._publish_diagnostics(now, statuses)
-
-    def __enter__(self) -> Self:
-        self.open()
-        return self
-
-    def __exit__(
-        self,
-        kind: type[BaseException] | None,
-        error: BaseException | None,
-        trace: TracebackType | None,
-    ) -> None:
-        self.close()
 
 
 def topic_names(fingers: Iterable[str], namespace: str) -> dict[str, str]:

@@ -1,7 +1,7 @@
 """Topics of ROS 2 without an installation of ROS: over DDS, by Cyclone DDS."""
 
 import os
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from functools import cache
 from typing import Any, Self
 
@@ -9,7 +9,11 @@ from holdfast.errors import MissingExtra, SourceError
 from holdfast.ros.definitions import NUMBER_CODES, Definition, Field
 
 try:
-    from cyclonedds.builtin import BuiltinDataReader, BuiltinTopicDcpsPublication
+    from cyclonedds.builtin import (
+        BuiltinDataReader,
+        BuiltinTopicDcpsPublication,
+        BuiltinTopicDcpsSubscription,
+    )
     from cyclonedds.core import (
         DDSException,
         InstanceState,
@@ -37,6 +41,8 @@ WRITER_QUEUE_SIZE = 10
 """Maximum number of messages that wait for a busy subscriber."""
 MAX_MESSAGES_PER_READ = 32
 """Maximum number of messages that are read at a time."""
+MAX_ENDPOINTS = 1000
+"""Maximum number of publishers, or of subscribers, that are listed."""
 MAX_DOMAIN = 232
 """Largest number of a ROS domain; larger ones have no ports."""
 TOPIC_PREFIX, TYPE_SEPARATOR = "rt/", "::msg::dds_::"
@@ -80,18 +86,27 @@ class Node:
                 _domains[domain] = Domain(domain, LOCALHOST_CONFIGURATION)
             self._participant = DomainParticipant(domain)
             self._publications = BuiltinDataReader(self._participant, BuiltinTopicDcpsPublication)
+            self._subscriptions = BuiltinDataReader(self._participant, BuiltinTopicDcpsSubscription)
         except DDSException as cause:
             raise SourceError(f"ROS domain {domain} cannot be joined: {cause.msg}") from cause
 
     def published_topics(self) -> dict[str, str]:
         """Return the types of all published topics by name, both as in ROS."""
-        alive = InstanceState.Alive | ViewState.Any | SampleState.Any
-        found = self._publications.read(1000, ReadCondition(self._publications, alive))
-        return {
-            one.topic_name.removeprefix(TOPIC_PREFIX[:-1]): ros_type(one.type_name)
-            for one in found
-            if not isinstance(one, InvalidSample) and one.topic_name.startswith(TOPIC_PREFIX)
-        }
+        return {_ros_topic(one): ros_type(one.type_name) for one in _endpoints(self._publications)}
+
+    def subscribed_topics(self) -> dict[str, str]:
+        """Return the types of all topics with a subscriber by name, both as in ROS."""
+        return {_ros_topic(one): ros_type(one.type_name) for one in _endpoints(self._subscriptions)}
+
+    def n_other_writers(self, topic: str) -> int:
+        """Return the number of publishers on a topic that do not belong to this node.
+
+        Those of a program that was killed count until DDS notices, 10 s by default.
+        """
+        mine = self._participant.guid
+        found = [one.participant_key for one in _endpoints(self._publications)
+                 if _ros_topic(one) == topic]  # fmt: skip
+        return sum(key != mine for key in found)
 
     def reader(self, topic: str, definition: Definition) -> "TopicReader":
         """Subscribe to a topic."""
@@ -101,13 +116,12 @@ class Node:
         reader = DataReader(self._participant, self._topic(topic, definition, qos), qos=qos)
         return TopicReader(reader, WaitSet(self._participant))
 
-    def writer(self, topic: str, definition: Definition) -> Callable[[bytes], None]:
+    def writer(self, topic: str, definition: Definition) -> "TopicWriter":
         """Return a function that publishes messages on a topic, with the defaults of ROS 2."""
         reliable = Policy.Reliability.Reliable(duration(milliseconds=0))  # never blocks
         qos = _qos(reliable, WRITER_QUEUE_SIZE)
         writer = DataWriter(self._participant, self._topic(topic, definition, qos), qos=qos)
-        raw = _raw(definition)
-        return lambda data: writer.write(raw(data))
+        return TopicWriter(writer, _raw(definition))
 
     def _topic(self, name: str, definition: Definition, qos: Qos) -> Topic[Any]:
         full = TOPIC_PREFIX + name.removeprefix("/")
@@ -134,6 +148,46 @@ class TopicReader:
     def n_writers(self) -> int:
         """Return the number of publishers on the topic."""
         return len(self._reader.get_matched_publications())
+
+
+class TopicWriter:
+    """Function that publishes messages on one topic, given as their bytes."""
+
+    def __init__(self, writer: DataWriter[Any], raw: type[Any]) -> None:
+        self._writer = writer
+        self._raw = raw
+
+    def __call__(self, data: bytes) -> None:
+        """Publish a message.
+
+        Raises:
+            SourceError: DDS refuses it.
+        """
+        try:
+            self._writer.write(self._raw(data))
+        except DDSException as cause:
+            topic = self._writer.topic.name
+            raise SourceError(f"DDS refuses a message on {topic}: {cause.msg}") from cause
+
+    def n_readers(self) -> int:
+        """Return the number of subscribers of the topic."""
+        return len(self._writer.get_matched_subscriptions())
+
+
+def _endpoints(reader: BuiltinDataReader) -> list[Any]:
+    """Return the publishers or subscribers of all topics of ROS."""
+    alive = InstanceState.Alive | ViewState.Any | SampleState.Any
+    found = reader.read(MAX_ENDPOINTS, ReadCondition(reader, alive))
+    return [
+        one
+        for one in found
+        if not isinstance(one, InvalidSample) and one.topic_name.startswith(TOPIC_PREFIX)
+    ]
+
+
+def _ros_topic(endpoint: Any) -> str:  # noqa: ANN401 (cyclonedds has no types)
+    name: str = endpoint.topic_name
+    return name.removeprefix(TOPIC_PREFIX[:-1])
 
 
 def _qos(reliability: object, depth: int) -> Qos:

@@ -115,6 +115,50 @@ def published_topics(master: str) -> dict[str, str]:
     return {name: kind for name, kind in call_master(master, "getTopicTypes") if name in names}
 
 
+def publishers_of(master: str, topic: str) -> list[str]:
+    """Return the names of the running nodes that publish a topic.
+
+    A node that was killed stays registered, so each is asked for an answer.
+
+    Raises:
+        SourceError: the ROS master does not answer.
+    """
+    topics = dict(call_master(master, "getSystemState")[0])
+    return [node for node in topics.get(topic, ()) if _answers(master, node)]
+
+
+def _answers(master: str, node: str) -> bool:
+    """Return whether a registered node runs."""
+    with suppress(SourceError):
+        call_master(call_master(master, "lookupNode", node), "getPid")
+        return True
+    return False
+
+
+def subscribed_topics(master: str) -> list[str]:
+    """Return the names of all topics with a subscriber.
+
+    Raises:
+        SourceError: the ROS master does not answer.
+    """
+    return [name for name, nodes in call_master(master, "getSystemState")[1] if nodes]
+
+
+def message_type(full_name: str) -> type[Any]:
+    """Return the class of a ROS message, `std_msgs/String`.
+
+    Raises:
+        SourceError: its package is not installed.
+    """
+    package, name = full_name.split("/")
+    try:
+        found: type[Any] = getattr(import_module(f"{package}.msg"), name)
+    except ImportError as cause:
+        debian = f"python3-{package.replace('_', '-')}"
+        raise SourceError(f"this needs {package} of ROS 1: apt install {debian}") from cause
+    return found
+
+
 def call_master(master: str, method: str, *arguments: str) -> Any:  # noqa: ANN401 (any value)
     """Call a method of the interface of a ROS master.
 

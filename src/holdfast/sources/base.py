@@ -2,16 +2,16 @@
 
 import math
 import time
-from abc import ABC, abstractmethod
+from abc import abstractmethod
 from collections import deque
 from collections.abc import Iterator, Mapping, Sequence
-from types import TracebackType
-from typing import Any, NamedTuple, Self
+from typing import Any, NamedTuple
 
 import numpy as np
 import numpy.typing as npt
 
 from holdfast.contact import Fault
+from holdfast.openable import Openable
 from holdfast.sensors import Sensor
 from holdfast.sources.timeline import clock_notice
 
@@ -59,7 +59,7 @@ def notice_arrival(
     return Arrival(np.nan, {}, received, faults or {}, n_refused=n_refused, notices=notices)
 
 
-class Source(ABC):
+class Source(Openable):
     """Source of the samples of a hand: a device, a recording or the twin.
 
     A source is a context manager. Entering it connects, and waits until the modules are known.
@@ -109,7 +109,7 @@ class Source(ABC):
         """Whether no arrival follows; a device never ends."""
         return False
 
-    def restart(self) -> None:  # noqa: B027 (most sources have no beginning)
+    def restart(self) -> None:
         """Begin again, where the source has a beginning; a device continues."""
 
     @abstractmethod
@@ -122,22 +122,6 @@ class Source(ABC):
             arrival = self.read(READ_TIMEOUT)
             if arrival is not None:
                 yield arrival
-
-    def __enter__(self) -> Self:
-        try:
-            self.open()
-        except BaseException:
-            self.close()
-            raise
-        return self
-
-    def __exit__(
-        self,
-        kind: type[BaseException] | None,
-        error: BaseException | None,
-        trace: TracebackType | None,
-    ) -> None:
-        self.close()
 
 
 class DeviceSource(Source):

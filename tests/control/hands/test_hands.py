@@ -1,4 +1,4 @@
-"""What every hand must fulfil, and each hand by itself."""
+"""Each hand by itself; what every hand must fulfil is in `test_contract.py`."""
 
 import builtins
 
@@ -14,29 +14,6 @@ COMMAND = GripCommand(
     1.0, LoopState.REACT, {"thumb": FingerCommand(1.3), "index": FingerCommand(1.1)}
 )
 RELEASE = msgspec.structs.replace(COMMAND, release=True)
-
-
-@pytest.fixture(params=["log:{}/hand", "call:builtins:abs"])
-def hand(request, tmp_path):
-    return open_hand(request.param.format(tmp_path))
-
-
-class TestContract:
-    def test_it_takes_commands_while_it_is_open(self, hand):
-        with hand as opened:
-            opened.send(COMMAND)
-            opened.send(RELEASE)
-            opened.send(GripCommand(2.0, LoopState.IDLE, {}))
-
-    def test_it_can_be_closed_twice_and_opened_again(self, hand):
-        for _ in range(2):
-            hand.open()
-            hand.send(COMMAND)
-            hand.close()
-            hand.close()
-
-    def test_its_name_is_its_uri(self, hand):
-        assert open_hand(hand.name).name == hand.name
 
 
 class TestLogFile:
@@ -59,14 +36,17 @@ class TestLogFile:
 class TestScalarGripper:
     def test_it_gets_the_largest_scale_and_0_to_open(self):
         given = []
-        gripper = ScalarGripper(given.append)
-        gripper.send(COMMAND)
-        gripper.send(RELEASE)
+        with ScalarGripper(given.append) as gripper:
+            gripper.send(COMMAND)
+            gripper.send(RELEASE)
         assert given == [1.3, 0.0]
 
     def test_a_function_that_fails_is_one_line(self):
-        with pytest.raises(HandError, match="call:: ZeroDivisionError: "):
-            ScalarGripper(lambda scale: scale / 0).send(COMMAND)
+        with (
+            pytest.raises(HandError, match="call:: ZeroDivisionError: "),
+            ScalarGripper(lambda scale: scale / 0) as gripper,
+        ):
+            gripper.send(COMMAND)
 
     @pytest.mark.parametrize("path", ["nothing:here", "builtins:nothing", "builtins", ":abs"])
     def test_a_function_that_does_not_exist_is_refused(self, path):

@@ -34,12 +34,7 @@ class LogFile(Hand):
         except OSError as cause:
             raise HandError(f"cannot write {self._path}: {cause.strerror}") from cause
 
-    def send(self, command: GripCommand) -> None:
-        """Append a line.
-
-        Raises:
-            HandError: the file is not open, or the disk is full.
-        """
+    def _send(self, command: GripCommand) -> None:
         try:
             if self._file is None:
                 raise HandError(f"{self.name} is not open")

@@ -28,6 +28,7 @@ class ScalarGripper(Hand):
     def __init__(self, function: Callable[[float], object], name: str = "call:") -> None:
         self.name = name
         self._function = function
+        self._is_open = False
 
     @classmethod
     def from_path(cls, path: str, name: str) -> "ScalarGripper":
@@ -46,19 +47,22 @@ class ScalarGripper(Hand):
         return cls(found, name)
 
     def open(self) -> None:
-        """Do nothing."""
+        """Take commands from now on."""
+        self._is_open = True
 
-    def send(self, command: GripCommand) -> None:
-        """Call the function.
-
-        Raises:
-            HandError: the function failed.
-        """
-        scale = max((one.scale for one in command.fingers.values()), default=1.0)
+    def _send(self, command: GripCommand) -> None:
+        if not self._is_open:
+            raise HandError(f"{self.name} is not open")
         try:
-            self._function(0.0 if command.release else scale)
+            self._function(0.0 if command.release else largest_scale(command))
         except Exception as cause:  # the function is the user's
             raise HandError(f"{self.name}: {type(cause).__name__}: {cause}") from cause
 
     def close(self) -> None:
-        """Do nothing."""
+        """Take no more commands."""
+        self._is_open = False
+
+
+def largest_scale(command: GripCommand) -> float:
+    """Return the force scale of a gripper: the largest of all fingers, 1 without any."""
+    return max((one.scale for one in command.fingers.values()), default=1.0)

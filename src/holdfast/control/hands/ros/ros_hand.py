@@ -1,0 +1,178 @@
+"""What all hands on topics share: how they are opened, and what is checked at each command."""
+
+import time
+from abc import abstractmethod
+from collections.abc import Callable, Mapping
+from functools import partial
+from typing import Any
+
+from holdfast.control.command import GripCommand, LoopState
+from holdfast.control.hands.base import Hand
+from holdfast.control.hands.ros.link import Link, Publisher, StateReader
+from holdfast.errors import HandError
+from holdfast.ros.hand_messages import JointStates
+
+OPEN_TIMEOUT = 5.0
+"""Longest wait until the hand listens and sends its joint states [s]."""
+DISCOVERY_TIME = 0.5
+"""Time in which other publishers are found [s]."""
+STATE_TIMEOUT = 0.5
+"""Time without joint states after which a hand does not answer any more [s]."""
+POLL_INTERVAL = 0.01
+"""Time between two checks while the hand is opened [s]."""
+
+
+class RosHand(Hand):
+    """Hand that takes commands on topics.
+
+    It commands nothing before the grip begins (state IDLE), because another program closes the
+    hand. What is in force then is the base that the scales multiply.
+
+    Args:
+        name: URI of the hand.
+        link: connection to ROS.
+        topics: message type of each topic that it publishes; the first one has the commands.
+        states: topic of the joint states; None if they are not needed.
+        shared: whether other publishers of these topics are allowed.
+        standby: whether it is opened beside the controller of the hand, to release it if that
+            one dies. Without a grip of its own it can release only, not hold: the drivers of
+            these hands keep their last command anyway.
+    """
+
+    def __init__(
+        self,
+        name: str,
+        link: Link,
+        topics: Mapping[str, str],
+        states: str | None,
+        *,
+        shared: bool,
+        standby: bool,
+    ) -> None:
+        self.name = name
+        self._link, self._topics = link, dict(topics)
+        self._states_topic = None if standby else states
+        self._shared, self._standby = shared or standby, standby
+        self._publishers: dict[str, Publisher] = {}
+        self._reader: StateReader | None = None
+        self._states: JointStates | None = None
+        self._state_at = 0.0
+        self._begun = False
+
+    @property
+    def resource(self) -> str:
+        """What only one controller may command: the topic of the commands."""
+        return f"{next(iter(self._topics))} {self._link.where}"
+
+    def open(self) -> None:
+        """Wait until the hand listens and sends joint states.
+
+        Raises:
+            HandError: it does not within 5 s, or another program publishes commands.
+        """
+        self.close()
+        self._link.open()
+        begun_at = time.monotonic()
+        self._publishers = {
+            topic: self._link.publisher(topic, kind) for topic, kind in self._topics.items()
+        }
+        if self._states_topic is not None:
+            self._reader = self._link.joint_states(self._states_topic)
+        for topic, publish in self._publishers.items():
+            self._wait(publish.n_listeners, begun_at, partial(self._not_heard, topic))
+        if self._reader is not None:
+            self._wait(self._poll, begun_at, self._no_states)
+        if not self._shared:
+            self._refuse_others(begun_at + DISCOVERY_TIME)
+
+    def close(self) -> None:
+        """Disconnect. It has no effect on a hand that is closed."""
+        self._publishers.clear()
+        self._reader = self._states = None
+        self._begun = False
+        self._link.close()
+
+    def _send(self, command: GripCommand) -> None:
+        if not self._publishers:
+            raise HandError(f"{self.name} is not open")
+        self._poll()
+        if not self._standby:
+            self._check_answers()
+        if command.state is LoopState.IDLE:
+            self._begun = False
+        elif command.state is not LoopState.FAULT and not self._begun:
+            self._begin()
+            self._begun = True
+        if command.release:
+            self._release()
+        elif self._begun:
+            self._press(command)
+
+    @abstractmethod
+    def _begin(self) -> None:
+        """Take what is in force when the grip begins.
+
+        Raises:
+            HandError: it is not known, or it exceeds a ceiling at the highest scale.
+        """
+
+    @abstractmethod
+    def _press(self, command: GripCommand) -> None:
+        """Send the forces of a command."""
+
+    @abstractmethod
+    def _release(self) -> None:
+        """Open the hand."""
+
+    def _publish(self, topic: str, message: Mapping[str, Any]) -> None:
+        self._publishers[topic](message)
+
+    def _poll(self) -> bool:
+        """Read the newest joint states; return whether there are any so far."""
+        found = None if self._reader is None else self._reader.take()
+        if found is not None:
+            self._states, self._state_at = found, time.monotonic()
+        return self._states is not None
+
+    def _check_answers(self) -> None:
+        for topic, publish in self._publishers.items():
+            if not publish.n_listeners():
+                raise HandError(
+                    f"{self.name}: nothing listens on {topic} any more; the hand keeps its last "
+                    "command"
+                )
+        silence = time.monotonic() - self._state_at
+        if self._reader is not None and silence > STATE_TIMEOUT:
+            raise HandError(
+                f"{self.name}: no joint states on {self._states_topic} for {silence:.1f} s; the "
+                "hand keeps its last command"
+            )
+
+    def _wait(self, done: Callable[[], object], begun_at: float, why: Callable[[], str]) -> None:
+        while not done():
+            if time.monotonic() - begun_at > OPEN_TIMEOUT:
+                raise HandError(why())
+            time.sleep(POLL_INTERVAL)
+
+    def _refuse_others(self, at: float) -> None:
+        time.sleep(max(at - time.monotonic(), 0.0))
+        for topic in self._topics:
+            if self._link.n_other_publishers(topic):
+                raise HandError(
+                    f"{self.name}: another program publishes {topic} {self._link.where}: stop it, "
+                    "or give shared=true if it is silent while the loop runs"
+                )
+
+    def _not_heard(self, topic: str) -> str:
+        others = ", ".join(self._link.subscribed_topics()) or "none"
+        return (
+            f"{self.name}: nothing listens on {topic} {self._link.where} after "
+            f"{OPEN_TIMEOUT:g} s; topics with a subscriber: {others}"
+        )
+
+    def _no_states(self) -> str:
+        others = ", ".join(self._link.published_topics()) or "none"
+        return (
+            f"{self.name}: no joint states on {self._states_topic} {self._link.where} in "
+            f"{OPEN_TIMEOUT:g} s; published topics: {others}"
+        )

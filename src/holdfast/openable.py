@@ -1,0 +1,47 @@
+"""Context manager of what is opened and closed: sources, hands, publishers."""
+
+from abc import ABC, abstractmethod
+from types import TracebackType
+from typing import Self
+
+
+class Openable(ABC):
+    """Base class of what has a connection. Entering it opens, leaving it closes.
+
+    If opening fails, it is closed, so that nothing stays half open.
+
+    Example:
+        >>> class Door(Openable):
+        ...     def open(self):
+        ...         print("open")
+        ...     def close(self):
+        ...         print("closed")
+        >>> with Door():
+        ...     pass
+        open
+        closed
+    """
+
+    @abstractmethod
+    def open(self) -> None:
+        """Connect."""
+
+    @abstractmethod
+    def close(self) -> None:
+        """Disconnect. It has no effect on what is closed."""
+
+    def __enter__(self) -> Self:
+        try:
+            self.open()
+        except BaseException:
+            self.close()
+            raise
+        return self
+
+    def __exit__(
+        self,
+        kind: type[BaseException] | None,
+        error: BaseException | None,
+        trace: TracebackType | None,
+    ) -> None:
+        self.close()
