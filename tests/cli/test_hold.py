@@ -5,10 +5,12 @@ import pytest
 
 from holdfast.cli import main
 from holdfast.control import GripCommand, watchdog
+from holdfast.control.hands.ros import ros_hand
 from holdfast.io import load_recording, save_recording
 from holdfast.synthetic import synthetic_recording
 
 TWIN = "twin:?object=ball&case=1&profile=finger-vigorous"
+PLEXUS = "ros2:plexus?effort=0.06&max_effort=0.1"
 
 
 @pytest.fixture(scope="module")
@@ -53,11 +55,38 @@ def test_armed_commands_reach_the_hand_and_stdout(tmp_path, grasp, capsys, monke
 
 
 @pytest.mark.parametrize(
+    ("hand", "message"),
+    [
+        ("ros2:plexus?effort=1", "max_effort: a number or 16 numbers"),
+        (PLEXUS, "at most 0.1 N m expected, 0.12 N m given at max_scale 2: lower"),
+    ],
+)
+def test_limits_that_the_hand_does_not_have_are_one_line(grasp, capsys, hand, message):
+    pytest.importorskip("cyclonedds", reason="cyclonedds is not installed")
+    assert main(["hold", "builtin:twin", str(grasp), "--hand", hand, "--speed", "0"]) == 2
+    assert message in capsys.readouterr().err.splitlines()[-1]
+
+
+def test_a_hand_that_does_not_answer_is_one_line(grasp, capsys, monkeypatch):
+    pytest.importorskip("cyclonedds", reason="cyclonedds is not installed")
+    monkeypatch.setenv("ROS_LOCALHOST_ONLY", "1")
+    monkeypatch.setattr(ros_hand, "OPEN_TIMEOUT", 0.1)
+    hand = "ros2:v4?domain=229"
+    words = ["hold", "builtin:twin", str(grasp), "--hand", hand, "--armed", "--confirm", hand]
+    assert main(words) == 2
+    (line,) = capsys.readouterr().err.splitlines()
+    assert "nothing listens on /allegro_hand_position_controller/commands in ROS domain 229" in line
+
+
+@pytest.mark.parametrize(
     ("words", "message"),
     [
         (["--hand", "log:h", "--armed"], "--armed moves the hand: confirm it with --confirm log:h"),
         (["--hand", "log:h", "--armed", "--confirm", "log:x"], "confirm it with --confirm log:h"),
         (["--hand", "magic:"], "'magic:' is no hand; there are twin:"),
+        (["--hand", "ros2:magic"], "there are the hands ros2:plexus, ros2:v4"),
+        (["--hand", "ros2:v4-envelop"], "as a goal, by services, which plain DDS does not have"),
+        (["--hand", "ros1:efforts", "--armed", "--confirm", "x"], "confirm it with --confirm ros1"),
         (["--hand", "twin:"], "--hand twin: needs the source twin:..."),
         (["--hand", "log:h", "--max-scale", "0.5"], "min_scale <= 1 <= max_scale expected"),
         (["--hand", "log:h", "--law", "magic"], "unknown law 'magic'"),

@@ -238,3 +238,11 @@ class TestRefusals:
             "holdfast: finger1: readings from 0 to 65535 counts expected, -2 to -2 given; "
             "packets of a XELA server hold no others"
         )
+
+
+def test_only_the_twin_takes_commands(capsys, path):
+    pytest.importorskip("cyclonedds", reason="cyclonedds is not installed")
+    text = refusal(capsys, path, "--hand", "ros2:plexus?effort=0.1&max_effort=0.3")
+    assert text == f"--hand needs the source twin:..., {path} given"
+    text = refusal(capsys, "twin:", "--hand", "log:x")
+    assert text == "ros2:plexus?effort=0.1&max_effort=0.3 expected, log:x given"

@@ -4,7 +4,7 @@ import math
 import sys
 import time
 from collections.abc import Iterator
-from contextlib import ExitStack
+from contextlib import ExitStack, contextmanager
 from enum import StrEnum
 from pathlib import Path
 from queue import Empty, SimpleQueue
@@ -26,10 +26,12 @@ from holdfast.cli.terminal.stopping import StopRequest, handle_stop_signals
 
 if TYPE_CHECKING:
     from holdfast.contact import HandEstimate
-    from holdfast.control import GripCommand, GripController
+    from holdfast.control import GripCommand, GripController, Limits
     from holdfast.control.hands import Hand
     from holdfast.control.loop import GripLoop
+    from holdfast.control.watchdog import Watchdog
     from holdfast.live.recorder import Recorder
+    from holdfast.live.session import Session
     from holdfast.live.stream_detector import StreamDetector, StreamUpdate
     from holdfast.sources import Source
 
@@ -126,15 +128,16 @@ def hold(
     _check_armed(hand, armed, confirm)
     with ExitStack() as stack:
         stop = stack.enter_context(handle_stop_signals())
+        watchdog = _connect(stack, commanded, limits) if armed and hand != TWIN else None
         stack.enter_context(opened)
         stream = create_stream_detector(loaded, opened, RatePolicy.RESAMPLE, ignore)
         controller = GripController(limits, law, sensors=stream.fingers, newtons_per_unit=newtons)
         commanded.check(limits, stream.fingers)
         log = _new_log(stack, record, opened, as_json=as_json)
-        loop = _new_loop(stack, controller, commanded, log, armed=armed)
+        updates = stack.enter_context(_reading(stream, threaded=opened.paced))
+        loop = _new_loop(stack, controller, commanded, log, watchdog, armed=armed)
         stop.graceful = True
-        updates = _updates(stream, seconds, stop, threaded=opened.paced)
-        _run(loop, updates, log, paced=opened.paced)
+        _run(loop, _until(updates, seconds, stop), log, paced=opened.paced)
     _report(loop, hand, armed=armed)
 
 
@@ -207,19 +210,36 @@ def _new_log(stack: ExitStack, record: Path | None, source: "Source", *, as_json
     return _Log(stack.enter_context(recorder), as_json=as_json)
 
 
-def _new_loop(
-    stack: ExitStack, controller: "GripController", hand: "Hand", log: _Log, *, armed: bool
-) -> "GripLoop":
-    """Return the loop, with claim and watchdog unless the hand is the twin or a dry run."""
+def _connect(stack: ExitStack, hand: "Hand", limits: "Limits") -> "Watchdog":
+    """Connect to the hand, and start its watchdog, which takes the longest time.
+
+    It is done before the source is opened, so that no samples wait for it.
+    """
     from holdfast.control.hands import Claim
-    from holdfast.control.loop import GripLoop
     from holdfast.control.watchdog import Watchdog
 
-    watchdog = None
-    if armed and not hand.name.startswith(TWIN):
-        stack.enter_context(Claim(hand.resource))
-        stack.enter_context(hand)
-        watchdog = stack.enter_context(Watchdog(hand.name, controller.limits.on_fault))
+    stack.enter_context(Claim(hand.resource))
+    stack.enter_context(hand)
+    watchdog = Watchdog(hand.name, limits.on_fault)
+    stack.callback(watchdog.kill)
+    watchdog.start()
+    return watchdog
+
+
+def _new_loop(
+    stack: ExitStack,
+    controller: "GripController",
+    hand: "Hand",
+    log: _Log,
+    watchdog: "Watchdog | None",
+    *,
+    armed: bool,
+) -> "GripLoop":
+    """Return the loop. At its end, the watchdog ends at once, before anything else closes."""
+    from holdfast.control.loop import GripLoop
+
+    if watchdog is not None:
+        stack.push(watchdog)
     loop = GripLoop(controller, hand, armed=armed, watchdog=watchdog, log=log.event)
     return stack.enter_context(loop)
 
@@ -241,16 +261,39 @@ def _run(
             log.command(loop.step(last, last.time + time.monotonic() - received))
 
 
-def _updates(
-    stream: "StreamDetector", seconds: float | None, stop: StopRequest, *, threaded: bool
+def _until(
+    updates: "Iterator[StreamUpdate | None]", seconds: float | None, stop: StopRequest
 ) -> "Iterator[StreamUpdate | None]":
-    """Yield what the source sends; None after `TICK` without anything."""
+    """Yield the updates until the time is over or the user stops."""
     end = math.inf if seconds is None else time.monotonic() + seconds
-    read = _threaded(stream) if threaded else _direct(stream)
-    for update in read:
+    for update in updates:
         if stop.requested or time.monotonic() >= end:
             return
         yield update
+
+
+@contextmanager
+def _reading(
+    stream: "StreamDetector", *, threaded: bool
+) -> "Iterator[Iterator[StreamUpdate | None]]":
+    """Yield what the source sends; with a thread, None after `TICK` without anything.
+
+    A read of a silent device may take longer than a heartbeat of the watchdog, so it must not
+    delay the loop: neither while it runs nor at its end.
+    """
+    if not threaded:
+        yield _direct(stream)
+        return
+    from holdfast.live.session import Session
+
+    queue: SimpleQueue[StreamUpdate] = SimpleQueue()
+    session = Session(stream)
+    session.add_listener(queue.put)
+    session.start()
+    try:
+        yield _queued(session, queue)
+    finally:
+        session.stop()
 
 
 def _direct(stream: "StreamDetector") -> "Iterator[StreamUpdate]":
@@ -259,22 +302,14 @@ def _direct(stream: "StreamDetector") -> "Iterator[StreamUpdate]":
     yield stream.finish()
 
 
-def _threaded(stream: "StreamDetector") -> "Iterator[StreamUpdate | None]":
-    """Read the source in a thread, whose reads may block for longer than `TICK`."""
-    from holdfast.live.session import Session
-
-    queue: SimpleQueue[StreamUpdate] = SimpleQueue()
-    session = Session(stream)
-    session.add_listener(queue.put)
-    session.start()
-    try:
-        while not (session.ended and queue.empty()):
-            try:
-                yield queue.get(timeout=TICK)
-            except Empty:
-                yield None
-    finally:
-        session.stop()
+def _queued(
+    session: "Session", queue: "SimpleQueue[StreamUpdate]"
+) -> "Iterator[StreamUpdate | None]":
+    while not (session.ended and queue.empty()):
+        try:
+            yield queue.get(timeout=TICK)
+        except Empty:
+            yield None
     if session.failure is not None:
         raise session.failure
 

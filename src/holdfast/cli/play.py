@@ -13,6 +13,7 @@ from holdfast.cli.terminal.stopping import handle_stop_signals
 
 if TYPE_CHECKING:
     from holdfast.live.xela_server import XelaServer
+    from holdfast.sources import Source
 
 POLL_INTERVAL = 0.2
 """Time between two checks whether the server has ended [s]."""
@@ -40,6 +41,13 @@ def play(
             show_default="whole hand if the modules have the names of an Allegro hand",
         ),
     ] = None,
+    hand: Annotated[
+        str,
+        typer.Option(
+            help="The twin takes commands as this hand does: ros2:plexus?effort=E&max_effort=M. "
+            "It plays once, for the first client.",
+        ),
+    ] = "",
     as_json: Annotated[
         bool,
         typer.Option("--json", help="Print the address, and at the end the number of packets."),
@@ -60,16 +68,17 @@ def play(
     Example:
       holdfast play twin:?object=can
       holdfast play grasp.parquet --once --separate --version 1.7
+      holdfast play twin:?object=can --hand "ros2:plexus?effort=0.1&max_effort=0.3"
       holdfast detect builtin:any xela://127.0.0.1:5000
     """
     from holdfast.live.xela_server import XelaServer
-    from holdfast.sources import open_source
     from holdfast.sources.xela.encoder import is_part_of_hand
 
     check_speed(source, speed)
     if not speed:
         raise ValueError(f"--speed: a speed above 0 expected, {speed:g} given")
-    with open_source(source, speed=speed, loop=not once) as opened:
+    once = once or bool(hand)
+    with _open(source, hand, speed, loop=not once) as opened:
         whole = is_part_of_hand(opened.sensors) if whole_hand is None else whole_hand
         server = XelaServer(
             opened, version=version, host=host, port=port, whole_hand=whole,
@@ -83,6 +92,19 @@ def play(
     if as_json:
         print_json({"packets": server.n_packets})
     print_message(f"{server.n_packets} packets sent")
+
+
+def _open(source: str, hand: str, speed: float, *, loop: bool) -> "Source":
+    """Return the source; the twin with the topics of a hand, if one is given."""
+    if hand:
+        if not source.startswith("twin:"):
+            raise ValueError(f"--hand needs the source twin:..., {source} given")
+        from holdfast.control.hands.ros.driven_twin import DrivenTwin
+
+        return DrivenTwin(source, hand, speed=speed)
+    from holdfast.sources import open_source
+
+    return open_source(source, speed=speed, loop=loop)
 
 
 def _print_address(server: "XelaServer", source: str, version: str, *, as_json: bool) -> None:

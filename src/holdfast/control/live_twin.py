@@ -51,7 +51,7 @@ class LiveTwin(Source, Hand):
         self.name, self.speed, self.paced = uri, speed, speed > 0
         self.simulation: Simulation | None = None
         self._scales = np.ones(len(FINGERS))
-        self._begun_at = 0.0
+        self._begun_at: float | None = None
 
     @property
     def sensors(self) -> Mapping[str, Sensor]:  # type: ignore[override]
@@ -76,12 +76,14 @@ class LiveTwin(Source, Hand):
         """Begin the grasp."""
         self.simulation = Simulation(self.grasp)
         self._scales = np.ones(len(FINGERS))
-        self._begun_at = time.monotonic()
+        self._begun_at = None
 
     def read(self, timeout: float) -> Arrival | None:
-        """Simulate the next sample, and return it when it is due."""
+        """Simulate the next sample, and return it when it is due. The first read is the begin."""
         if self.simulation is None or self.simulation.is_over:
             return None
+        if self._begun_at is None:
+            self._begun_at = time.monotonic()
         if self.paced:
             due = self._begun_at + self.simulation.n_samples / (RATE * self.speed)
             wait = due - time.monotonic()

@@ -86,6 +86,9 @@ class JointHand(RosHand):
         setup: description of the hand.
         shared: as of `RosHand`.
         standby: as of `RosHand`.
+
+    Attributes:
+        setup: description of the hand.
     """
 
     def __init__(
@@ -93,7 +96,7 @@ class JointHand(RosHand):
     ) -> None:
         super().__init__(name, link, setup.topics, setup.states, shared=shared, standby=standby)
         self.fingers = setup.order.fingers
-        self._setup = setup
+        self.setup = setup
         self._max_scale = 1.0
         self._grip: JointGrip | None = None
 
@@ -105,13 +108,13 @@ class JointHand(RosHand):
         """
         super().check(limits, fingers)
         self._max_scale = limits.max_scale
-        torques = self._setup.torques
+        torques = self.setup.torques
         problem = "" if torques is None else self._excess(limits.max_scale * torques)
         if problem:
             raise ValueError(f"{problem} at max_scale {limits.max_scale:g}: lower one of them")
 
     def _begin(self) -> None:
-        setup, states = self._setup, self._states
+        setup, states = self.setup, self._states
         positions = np.full(N_JOINTS, np.nan)
         torques = setup.torques
         if states is not None:
@@ -135,13 +138,13 @@ class JointHand(RosHand):
     def _press(self, command: GripCommand) -> None:
         if self._grip is None:
             return
-        torques = self._setup.order.scales(command) * self._grip.torques
+        torques = self.setup.order.scales(command) * self._grip.torques
         if problem := self._excess(torques):
             raise HandError(problem)
-        self._publish(self._setup.topic, self._message(command.time, torques, self._grip))
+        self._publish(self.setup.topic, self._message(command.time, torques, self._grip))
 
     def _release(self) -> None:
-        setup = self._setup
+        setup = self.setup
         if setup.home is None:
             message = self._values(0.0, efforts=np.zeros(N_JOINTS))
             self._publish(setup.topic, message)
@@ -150,7 +153,7 @@ class JointHand(RosHand):
             self._publish(setup.home_topic or setup.topic, message)
 
     def _message(self, time: float, torques: Array, grip: JointGrip) -> Mapping[str, Any]:
-        setup = self._setup
+        setup = self.setup
         if setup.output is Output.TORQUES:
             return self._values(time, efforts=torques)
         if setup.output is Output.LARGEST:
@@ -161,15 +164,15 @@ class JointHand(RosHand):
     def _values(
         self, time: float, *, positions: Array | None = None, efforts: Array | None = None
     ) -> Mapping[str, Any]:
-        if self._setup.message == JOINT_STATE:
-            names = self._setup.order.names
+        if self.setup.message == JOINT_STATE:
+            names = self.setup.order.names
             return joint_message(time, names, positions=positions, efforts=efforts)
         values = positions if efforts is None else efforts
         return array_message(np.empty(0) if values is None else values)
 
     def _excess(self, torques: Array) -> str:
         """Return a message about the torque that exceeds its ceiling most; empty if none does."""
-        setup = self._setup
+        setup = self.setup
         ratio = np.abs(torques) / setup.max_torques
         worst = int(np.argmax(ratio))
         if ratio[worst] <= 1.0 + SLACK:
