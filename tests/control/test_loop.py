@@ -28,7 +28,7 @@ class Tape(Hand):
     def open(self):
         pass
 
-    def send(self, command):
+    def _send(self, command):
         if self.fails:
             raise HandError("no")
         self.commands.append(command)
