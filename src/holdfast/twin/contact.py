@@ -11,7 +11,7 @@ import numpy as np
 from holdfast.compiled import compiled
 from holdfast.sensors.types import Array
 from holdfast.twin.objects import GraspObject, solid
-from holdfast.twin.shapes import AMPLITUDE, MAX_RELIEF, probe, relief
+from holdfast.twin.shapes import AMPLITUDE, MAX_RELIEF, probe, relief, unpacked
 from holdfast.twin.skin import (
     BALL,
     BX,
@@ -22,6 +22,7 @@ from holdfast.twin.skin import (
     SLIPPING,
     Skin,
     friction,
+    memory_after,
     pressure,
     tangential,
 )
@@ -275,8 +276,9 @@ def _sum_nodes(
     If a node is at distance d from the object, no later node whose path from it is shorter than
     d can touch either. So most nodes are skipped.
     """
-    nodes, solid, skin = constants
-    bristles, forces = state.bristles[tip], state.node_forces[tip]
+    nodes, bristles, forces = constants.nodes, state.bristles[tip], state.node_forces[tip]
+    solid, skin = unpacked(constants.solid), _unpacked_skin(constants.skin)
+    keep = memory_after(skin, dt)
     reach = MAX_RELIEF * solid[AMPLITUDE]
     load, slip, slipping = 0.0, 0.0, 0.0
     force, torque = (0.0, 0.0, 0.0), (0.0, 0.0, 0.0)
@@ -303,19 +305,26 @@ def _sum_nodes(
             _clear_node(bristles, forces, i)
             continue
         node = (depth, nodes[i, NODE_STIFFNESS], pressed)
-        held = friction(
-            solid, skin, bristles, i, pose[0], normal, tangential(velocity, normal), node, dt
+        bristle = (bristles[i, BX], bristles[i, BY], bristles[i, BZ], bristles[i, SLIDING])
+        held, bristle = friction(
+            solid, skin, bristle, pose[0], normal, tangential(velocity, normal), node, dt, keep
         )
+        bristles[i, BX], bristles[i, BY], bristles[i, BZ], bristles[i, SLIDING] = bristle
         total = add(scaled(normal, pressed), held)
         forces[i, 0], forces[i, 1], forces[i, 2] = apply_transposed(pose[0], total)
         force, torque = add(force, total), add(torque, cross(point, total))
         load += pressed
-        slip += pressed * bristles[i, SLIDING]
-        slipping += pressed * (bristles[i, SLIDING] > skin[SLIPPING])
+        slip += pressed * bristle[SLIDING]
+        slipping += pressed * (bristle[SLIDING] > skin[SLIPPING])
     weight = max(load, 1e-300)
     state.tips[tip, SLIP], state.tips[tip, SLIPPING_SHARE] = slip / weight, slipping / weight
     state.tips[tip, LOAD] = load
     return force, torque
+
+
+@compiled
+def _unpacked_skin(a: Array) -> tuple[float, ...]:
+    return a[0], a[1], a[2], a[3], a[4], a[5], a[6], a[7], a[8]
 
 
 @compiled

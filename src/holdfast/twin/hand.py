@@ -108,7 +108,9 @@ def hand_xml(side: str = "right", item: GraspObject | None = None) -> str:
     body = "" if item is None else object_xml(item)
     return f"""<mujoco model="allegro {side}">
   <compiler angle="radian" eulerseq="XYZ"/>
-  <option timestep="{TIMESTEP!r}" integrator="implicitfast" gravity="0 0 {-GRAVITY}"/>
+  <option timestep="{TIMESTEP!r}" integrator="implicitfast" gravity="0 0 {-GRAVITY}">
+    <flag contact="disable"/>
+  </option>
   <visual>
     <global offwidth="1280" offheight="960"/><quality shadowsize="2048"/>
     <headlight ambient=".42 .42 .42" diffuse=".35 .35 .35" specular=".1 .1 .1"/>

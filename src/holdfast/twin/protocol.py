@@ -4,6 +4,7 @@ This is a state machine without physics. Its inputs are the loads of the fingert
 of the object. Its outputs are set-points of the fingers and actions of the operator.
 """
 
+import math
 from collections.abc import Sequence
 from typing import NamedTuple
 
@@ -182,11 +183,10 @@ class Protocol:
         return self._new_command(1.0 if self.lost_at is None else 0.0, phase)
 
     def _is_lost(self, loads: Array, body: Array) -> bool:
-        self._untouched_for = (
-            self._untouched_for + self._period if (loads > CONTACT_LOAD).sum() < 2 else 0.0
-        )
-        moved = float(np.linalg.norm(body[:3] - self._locked_place))
-        return moved > LOST_DISTANCE or self._untouched_for >= LOST_CONTACT_TIME
+        n_touching = sum(load > CONTACT_LOAD for load in loads.tolist())
+        self._untouched_for = self._untouched_for + self._period if n_touching < 2 else 0.0
+        away = body[:3] - self._locked_place
+        return math.sqrt(away.dot(away)) > LOST_DISTANCE or self._untouched_for >= LOST_CONTACT_TIME
 
     def _disturbance_at(self, held_for: float) -> tuple[int, float]:
         for place, disturbance in enumerate(self.plan.disturbances):

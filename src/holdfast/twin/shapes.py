@@ -8,7 +8,7 @@ import math
 
 import numpy as np
 
-from holdfast.compiled import compiled
+from holdfast.compiled import compiled, compiled_inside
 from holdfast.sensors.types import Array
 
 REVOLVED, BOX, HEXAGON, CAPSULE = range(4)
@@ -27,6 +27,19 @@ N_OBJECT_NUMBERS = 16
 MAX_RELIEF = 2.5
 """Maximum height of a texture's three waves together, in amplitudes."""
 
+Numbers = Array | tuple[float, ...]
+"""An object or a skin, packed. A loop takes tuples: arrays are counted at every call, and read
+again after every number that is written."""
+
+
+@compiled
+def unpacked(a: Array) -> tuple[float, ...]:
+    """Return a packed object as a tuple."""
+    return (
+        a[0], a[1], a[2], a[3], a[4], a[5], a[6], a[7], a[8], a[9], a[10], a[11], a[12], a[13],
+        a[14], a[15],
+    )  # fmt: skip
+
 
 @compiled
 def distances(solid: Array, points: Array) -> Array:
@@ -38,13 +51,13 @@ def distances(solid: Array, points: Array) -> Array:
 
 
 @compiled
-def signed_distance(solid: Array, x: float, y: float, z: float) -> float:
+def signed_distance(solid: Numbers, x: float, y: float, z: float) -> float:
     """Compute the distance of a point in the object's frame from its textured surface [m]."""
     return probe(solid, x, y, z)[0] + relief(solid, x, y, z)
 
 
-@compiled
-def relief(solid: Array, x: float, y: float, z: float) -> float:
+@compiled_inside
+def relief(solid: Numbers, x: float, y: float, z: float) -> float:
     """Compute the depth of the texture at a point in the object's frame [m].
 
     The sum of three waves: A (sin a z + 0.7 sin(0.6 b z + b s + 1) + 0.8 sin(a s + 0.3)), where s
@@ -60,8 +73,8 @@ def relief(solid: Array, x: float, y: float, z: float) -> float:
     return depth
 
 
-@compiled
-def probe(solid: Array, x: float, y: float, z: float) -> tuple[float, float, float, float]:
+@compiled_inside
+def probe(solid: Numbers, x: float, y: float, z: float) -> tuple[float, float, float, float]:
     """Compute the distance of a point from the smooth object, and its gradient.
 
     Returns:
@@ -86,7 +99,7 @@ def probe(solid: Array, x: float, y: float, z: float) -> tuple[float, float, flo
     return d - solid[ROUNDING], gx, gy, gz
 
 
-@compiled
+@compiled_inside
 def _box(
     a: float, b: float, c: float, x: float, y: float, z: float
 ) -> tuple[float, float, float, float]:
@@ -108,7 +121,7 @@ def _box(
     return ez, 0.0, 0.0, math.copysign(1.0, z)
 
 
-@compiled
+@compiled_inside
 def _hexagon(
     inner: float, height: float, x: float, y: float, z: float
 ) -> tuple[float, float, float, float]:
@@ -137,8 +150,8 @@ def _hexagon(
     )
 
 
-@compiled
-def _meridian(solid: Array, q: float, z: float) -> tuple[float, float, float]:
+@compiled_inside
+def _meridian(solid: Numbers, q: float, z: float) -> tuple[float, float, float]:
     """Return distance and gradient of (radius, height) from a trapezium about the axis."""
     foot, top, height = solid[1], solid[2], solid[3]
     nq, nz, length = solid[SIDE_OUT], solid[SIDE_UP], solid[SIDE_LENGTH]

@@ -8,15 +8,15 @@ bristle is a spring, so nothing creeps, and the slip speed of each node is known
 import math
 from typing import NamedTuple
 
-from holdfast.compiled import compiled
-from holdfast.sensors.types import Array
-from holdfast.twin.shapes import MU_KINETIC, MU_STATIC
+from holdfast.compiled import compiled, compiled_inside
+from holdfast.twin.shapes import MU_KINETIC, MU_STATIC, Numbers
 from holdfast.twin.vectors import Nine, Three, add, apply, apply_transposed, dot, scaled
 
 # Columns of bristles.
 BX, BY, BZ = 0, 1, 2  # stretch of the node along the surface, fingertip frame [m]
 SLIDING = 3  # its plastic slip speed, low-pass filtered [m/s]
 N_BRISTLE = 4
+Bristle = tuple[float, float, float, float]
 
 # Columns of a packed skin: the fields of Skin in their order, and the ball around all nodes.
 STIFFNESS, HARDENING, DAMPING, SHEAR, ENGAGEMENT, SHEAR_TIME, STRIBECK, MEMORY, SLIPPING = range(9)
@@ -59,14 +59,14 @@ class Skin(NamedTuple):
 
 
 @compiled
-def elastic(skin: Array, stiffness: float, depth: float) -> float:
+def elastic(skin: Numbers, stiffness: float, depth: float) -> float:
     """Compute the normal force of a node at rest, N(d) = k d (1 + h d) [N]."""
     force: float = stiffness * depth * (1.0 + skin[HARDENING] * depth)
     return force
 
 
-@compiled
-def pressure(skin: Array, stiffness: float, depth: float, leaving: float) -> float:
+@compiled_inside
+def pressure(skin: Numbers, stiffness: float, depth: float, leaving: float) -> float:
     """Compute the normal force of a moving node, N(d) (1 - c v_n), at least 0 [N].
 
     Args:
@@ -79,18 +79,18 @@ def pressure(skin: Array, stiffness: float, depth: float, leaving: float) -> flo
     return force
 
 
-@compiled
+@compiled_inside
 def friction(
-    solid: Array,
-    skin: Array,
-    bristles: Array,
-    i: int,
+    solid: Numbers,
+    skin: Numbers,
+    bristle: Bristle,
     rotation: Nine,
     normal: Three,
     sliding: Three,
     node: Three,
     dt: float,
-) -> Three:
+    keep: float,
+) -> tuple[Three, Bristle]:
     """Compute friction on a node and advance its bristle.
 
     The bristle b follows the motion along the surface. The friction is T = -k_t (b + tau v_t)
@@ -101,49 +101,55 @@ def friction(
     Args:
         solid: the packed object.
         skin: the packed skin.
-        bristles: (n_nodes, 4) bristles of the fingertip; row i is written.
-        i: index of the node.
+        bristle: the bristle.
         rotation: rotation from the fingertip frame to the object's.
         normal: normal of the object, in its frame.
         sliding: velocity along the surface in the object's frame [m/s].
         node: its depth [m], stiffness at small depths [N/m] and normal force [N].
         dt: time since the last step [s].
+        keep: `memory_after` this time.
 
     Returns:
-        The force on the node in the object's frame [N].
+        The force on the node in the object's frame [N], and the bristle.
     """
     depth, stiffness, pressed = node
     kt = skin[SHEAR] * elastic(skin, stiffness, depth) / (depth + skin[ENGAGEMENT])
-    limit = pressed * _coefficient(solid, skin, bristles[i, SLIDING])
-    b = apply(rotation, (bristles[i, BX], bristles[i, BY], bristles[i, BZ]))
+    limit = pressed * _coefficient(solid, skin, bristle[SLIDING])
+    b = apply(rotation, (bristle[BX], bristle[BY], bristle[BZ]))
     b = tangential(add(b, scaled(sliding, dt)), normal)
     length = math.sqrt(dot(b, b))
     slip = 0.0
     if length * kt > limit:
         slip = (length - limit / kt) / dt
         b = scaled(b, limit / (kt * length))
-    bristles[i, BX], bristles[i, BY], bristles[i, BZ] = apply_transposed(rotation, b)
-    bristles[i, SLIDING] = _smoothed(skin, bristles[i, SLIDING], slip, dt)
+    x, y, z = apply_transposed(rotation, b)
+    after = x, y, z, _smoothed(bristle[SLIDING], slip, keep)
     force = scaled(add(b, scaled(sliding, skin[SHEAR_TIME])), -kt)
     square = dot(force, force)
     if square > limit * limit:
         force = scaled(force, limit / math.sqrt(square))
-    return force
+    return force, after
 
 
 @compiled
-def _coefficient(solid: Array, skin: Array, slip: float) -> float:
+def memory_after(skin: Numbers, dt: float) -> float:
+    """Return the share of a slip speed that is left after a time [s] in its low-pass filter."""
+    return math.exp(-dt / skin[MEMORY])
+
+
+@compiled_inside
+def _coefficient(solid: Numbers, skin: Numbers, slip: float) -> float:
     drop = math.exp(-slip / skin[STRIBECK]) if slip > 0.0 else 1.0
     mu: float = solid[MU_KINETIC] + (solid[MU_STATIC] - solid[MU_KINETIC]) * drop
     return mu
 
 
-@compiled
-def _smoothed(skin: Array, before: float, slip: float, dt: float) -> float:
+@compiled_inside
+def _smoothed(before: float, slip: float, keep: float) -> float:
     """Return the slip speed of a node after a first-order low-pass filter [m/s]."""
     if before == slip:
         return slip
-    after = slip + (before - slip) * math.exp(-dt / skin[MEMORY])
+    after = slip + (before - slip) * keep
     return after if after > _MIN_SLIP_SPEED else 0.0
 
 

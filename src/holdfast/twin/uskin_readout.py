@@ -31,84 +31,106 @@ class Taxels(NamedTuple):
     thermal: Array
 
 
-class Readout:
-    """Run of one fingertip, with the state of its silicone and its temperature.
+class _Constants(NamedTuple):
+    """What a fingertip does not change, for compiled code.
 
     Attributes:
-        warmth: temperature above that at the start [K].
+        taxels: properties of the taxels.
+        limits: (3,) limits of the readings [N].
+        scales: (3,) scales [count/N].
+        shares: (n_lags,) shares of a force that the silicone delays.
+        taus: (n_lags,) time constant of each [s].
+        prompt: share of a force without delay.
+        noise: standard deviation of the noise before rounding [count].
+        spread: standard deviation of the rate of warming [K/s].
+        thermal_time: its correlation time [s].
     """
+
+    taxels: Taxels
+    limits: Array
+    scales: Array
+    shares: Array
+    taus: Array
+    prompt: float
+    noise: float
+    spread: float
+    thermal_time: float
+
+
+class _State(NamedTuple):
+    """State of a fingertip.
+
+    Attributes:
+        force: (n_taxels, 3) last forces [N].
+        delayed: (n_lags, n_taxels, 3) delayed parts of the force [N].
+        numbers: (3,) time of the last sample [s], NaN before; rate of warming [K/s];
+            temperature above that at the start [K].
+    """
+
+    force: Array
+    delayed: Array
+    numbers: Array
+
+
+_TIME, _RATE, _WARMTH = range(3)
+
+
+class Readout:
+    """Run of one fingertip, with the state of its silicone and its temperature."""
 
     def __init__(
         self, parameters: UskinParameters, taxels: Taxels, generator: np.random.Generator
     ) -> None:
-        self.warmth = 0.0
-        self._parameters = parameters
-        self._taxels = taxels
+        self._constants = _constants(parameters, taxels)
         self._generator = generator
-        self._rate = 0.0
-        self._last: tuple[float, Array, Array] | None = None  # time, force and delayed parts
+        shape = taxels.baseline.shape
+        self._state = _State(
+            np.zeros(shape), np.zeros((len(parameters.lag_times), *shape)), np.array([np.nan, 0, 0])
+        )
+
+    @property
+    def warmth(self) -> float:
+        """Temperature above that at the start [K]."""
+        return float(self._state.numbers[_WARMTH])
 
     def counts(self, taxel_forces: npt.ArrayLike, times: npt.ArrayLike) -> Counts:
         """Compute the next samples; arguments, result and errors are those of `Uskin.counts`."""
         forces, clock = self._checked(taxel_forces, times)
-        if not len(clock):
-            return np.zeros(forces.shape, dtype=np.uint16)
-        parameters = self._parameters
-        drawn = self._generator.standard_normal((len(clock), 1 + self._taxels.baseline.size))
-        warmth = self._temperature(clock, drawn[:, 0])
-        passed = self._delayed(forces, clock)
-        white = np.sqrt(max(parameters.noise_counts**2 - ROUNDING_VARIANCE, 0.0))
-        limits, scales = np.array(parameters.limits), np.array(parameters.counts_per_newton)
         counts = np.empty(forces.shape, dtype=np.uint16)
-        _write_counts(passed, warmth, white * drawn[:, 1:], self._taxels, limits, scales, counts)
+        if len(clock):
+            drawn = self._generator.standard_normal((len(clock), 1 + self._state.force.size))
+            _read_out(forces, clock, drawn, self._constants, self._state, counts)
         return counts
 
     def _checked(self, taxel_forces: npt.ArrayLike, times: npt.ArrayLike) -> tuple[Array, Array]:
-        forces = np.array(taxel_forces, dtype=np.float64, order="C")
-        clock = np.array(times, dtype=np.float64)
-        n_taxels = len(self._taxels.baseline)
+        forces = np.ascontiguousarray(taxel_forces, dtype=np.float64)
+        clock = np.ascontiguousarray(times, dtype=np.float64)
+        n_taxels = len(self._state.force)
         if forces.shape != (*clock.shape, n_taxels, 3) or clock.ndim != 1:
             raise ValueError(
                 f"taxel forces of shape (n, {n_taxels}, 3) and n times expected, "
                 f"{forces.shape} and {clock.shape} given"
             )
-        if not (np.isfinite(forces).all() and np.isfinite(clock).all()):
+        if not (_is_finite(forces.ravel()) and _is_finite(clock)):
             raise ValueError("finite taxel forces and times expected, NaN or infinity given")
-        before = [] if self._last is None else [self._last[0]]
-        if not (np.diff(clock, prepend=before) > 0).all():
+        if not _is_increasing(self._state.numbers[_TIME], clock):
             raise ValueError("increasing times expected")
         return forces, clock
 
-    def _delayed(self, forces: Array, clock: Array) -> Array:
-        """Return the forces after the silicone, which delays parts of them.
 
-        The result is exact for forces that are linear between samples.
-        """
-        shares = np.array(self._parameters.lag_shares)
-        taus = np.array(self._parameters.lag_times)
-        if self._last is None:
-            state = np.repeat(forces[None, 0], len(taus), axis=0)
-            self._last = (float(clock[0]), forces[0], state)
-        last, force, state = self._last
-        passed = np.empty_like(forces)
-        _low_pass(forces, np.diff(clock, prepend=last), force, state, shares, taus, passed)
-        self._last = (float(clock[-1]), forces[-1].copy(), state)
-        return passed
-
-    def _temperature(self, clock: Array, drawn: Array) -> Array:
-        """Return the temperature above that at the start, (n,) [K]: an integrated random rate."""
-        parameters = self._parameters
-        spread = parameters.warming_rate
-        warmth = np.empty(len(clock))
-        if self._last is None:
-            start, self._rate = float(clock[0]), spread * float(drawn[0])
-        else:
-            start = self._last[0]
-        steps = np.diff(clock, prepend=start)
-        state = np.array([self._rate, self.warmth])
-        _advance_warming(steps, drawn, spread, parameters.thermal_time, state, warmth)
-        self._rate, self.warmth = state.tolist()
-        return warmth
+def _constants(parameters: UskinParameters, taxels: Taxels) -> _Constants:
+    shares = np.array(parameters.lag_shares)
+    return _Constants(
+        taxels,
+        np.array(parameters.limits),
+        np.array(parameters.counts_per_newton),
+        shares,
+        np.array(parameters.lag_times),
+        1.0 - float(shares.sum()),
+        math.sqrt(max(parameters.noise_counts**2 - ROUNDING_VARIANCE, 0.0)),
+        parameters.warming_rate,
+        parameters.thermal_time,
+    )
 
 
 @compiled
@@ -130,69 +152,110 @@ def saturated(newtons: float, limit: float) -> float:
 
 
 @compiled
-def _write_counts(
-    forces: Array,
-    warmth: Array,
-    noise: Array,
-    taxels: Taxels,
-    limits: Array,
-    scales: Array,
-    counts: Counts,
+def _is_finite(values: Array) -> bool:
+    for value in values:  # noqa: SIM110 (compiled)
+        if not math.isfinite(value):
+            return False
+    return True
+
+
+@compiled
+def _is_increasing(before: float, times: Array) -> bool:
+    """Return whether times increase, also from the one before them, if it is not NaN."""
+    for time in times:
+        if time <= before:
+            return False
+        before = time
+    return True
+
+
+@compiled
+def _read_out(
+    forces: Array, times: Array, drawn: Array, constants: _Constants, state: _State, out: Counts
 ) -> None:
-    """Write counts: cross-talk and gain, range, baseline, temperature, noise, rounding."""
-    n, n_taxels, n_axes = forces.shape
-    for k in range(n):
-        for i in range(n_taxels):
-            for axis in range(n_axes):
-                newtons = 0.0
-                for other in range(n_axes):
-                    newtons += taxels.mixing[i, axis, other] * forces[k, i, other]
-                value = saturated(newtons, limits[axis]) * scales[axis]
-                value += taxels.baseline[i, axis] + warmth[k] * taxels.thermal[i, axis]
-                value += noise[k, i * n_axes + axis]
-                counts[k, i, axis] = min(max(np.rint(value), 0.0), UINT16_MAX)
+    """Write the counts of samples, and advance the state.
+
+    Args:
+        forces: (n, n_taxels, 3) forces [N].
+        times: (n,) times [s].
+        drawn: (n, 1 + 3 n_taxels) normal random numbers: of the warming, of the readings.
+        constants: properties of the fingertip.
+        state: its state; it is written.
+        out: (n, n_taxels, 3) is written.
+    """
+    numbers = state.numbers
+    if np.isnan(numbers[_TIME]):
+        numbers[_TIME], numbers[_RATE] = times[0], constants.spread * drawn[0, 0]
+        _rest(forces[0], state)
+    passed = np.empty_like(state.force)
+    for k in range(len(times)):
+        step = times[k] - numbers[_TIME]
+        _advance_warming(constants, step, drawn[k, 0], numbers)
+        _low_pass(constants, forces[k], step, state, passed)
+        _write_counts(constants, passed, numbers[_WARMTH], drawn[k, 1:], out[k])
+        numbers[_TIME] = times[k]
+
+
+@compiled
+def _rest(forces: Array, state: _State) -> None:
+    """Set the state of a silicone at rest under forces."""
+    for i in range(forces.shape[0]):
+        for axis in range(forces.shape[1]):
+            state.force[i, axis] = forces[i, axis]
+            for lag in range(len(state.delayed)):
+                state.delayed[lag, i, axis] = forces[i, axis]
+
+
+@compiled
+def _advance_warming(constants: _Constants, step: float, drawn: float, numbers: Array) -> None:
+    """Advance rate and temperature, an integrated random rate; the first step is 0."""
+    keep = np.exp(-step / constants.thermal_time)
+    rate = keep * numbers[_RATE] + np.sqrt(1 - keep * keep) * constants.spread * drawn
+    numbers[_WARMTH] += 0.5 * (numbers[_RATE] + rate) * step
+    numbers[_RATE] = rate
 
 
 @compiled
 def _low_pass(
-    forces: Array,
-    steps: Array,
-    before: Array,
-    state: Array,
-    shares: Array,
-    taus: Array,
-    passed: Array,
+    constants: _Constants, forces: Array, step: float, state: _State, passed: Array
 ) -> None:
-    """Write the sum of a prompt part and low-pass parts; advance `state` (n_lags, n_taxels, 3).
+    """Write the force after the silicone: the sum of a prompt part and low-pass parts.
 
-    Over a step h of a force from u to v: y <- e y + (g - e) u + (1 - g) v, with
-    e = exp(-h / tau) and g = (1 - e) tau / h.
+    It is exact for forces that are linear between samples. Over a step h of a force from u to v:
+    y <- e y + (g - e) u + (1 - g) v, with e = exp(-h / tau) and g = (1 - e) tau / h.
     """
-    n, n_taxels, n_axes = forces.shape
-    prompt = 1.0 - shares.sum()
-    for k in range(n):
-        earlier = before if k == 0 else forces[k - 1]
-        passed[k] = prompt * forces[k]
-        for lag in range(len(taus)):
-            ratio = steps[k] / taus[lag]
-            keep = np.exp(-ratio)
-            mean = 1.0 if ratio == 0.0 else -np.expm1(-ratio) / ratio
-            for i in range(n_taxels):
-                for axis in range(n_axes):
-                    late = keep * state[lag, i, axis]
-                    late += (mean - keep) * earlier[i, axis] + (1 - mean) * forces[k, i, axis]
-                    state[lag, i, axis] = late
-                    passed[k, i, axis] += shares[lag] * late
+    n_taxels, n_axes = forces.shape
+    for i in range(n_taxels):
+        for axis in range(n_axes):
+            passed[i, axis] = constants.prompt * forces[i, axis]
+    for lag in range(len(constants.taus)):
+        ratio = step / constants.taus[lag]
+        keep = np.exp(-ratio)
+        mean = 1.0 if ratio == 0.0 else -np.expm1(-ratio) / ratio
+        for i in range(n_taxels):
+            for axis in range(n_axes):
+                late = keep * state.delayed[lag, i, axis]
+                late += (mean - keep) * state.force[i, axis] + (1 - mean) * forces[i, axis]
+                state.delayed[lag, i, axis] = late
+                passed[i, axis] += constants.shares[lag] * late
+    for i in range(n_taxels):
+        for axis in range(n_axes):
+            state.force[i, axis] = forces[i, axis]
 
 
 @compiled
-def _advance_warming(
-    steps: Array, drawn: Array, spread: float, tau: float, state: Array, warmth: Array
+def _write_counts(
+    constants: _Constants, forces: Array, warmth: float, drawn: Array, out: Counts
 ) -> None:
-    """Advance rate [K/s] and temperature [K] in `state`; the first step may be 0."""
-    for k in range(len(steps)):
-        keep = np.exp(-steps[k] / tau)
-        rate = keep * state[0] + np.sqrt(1 - keep * keep) * spread * drawn[k]
-        state[1] += 0.5 * (state[0] + rate) * steps[k]
-        state[0] = rate
-        warmth[k] = state[1]
+    """Write counts: cross-talk and gain, range, baseline, temperature, noise, rounding."""
+    taxels = constants.taxels
+    n_taxels, n_axes = forces.shape
+    for i in range(n_taxels):
+        for axis in range(n_axes):
+            newtons = 0.0
+            for other in range(n_axes):
+                newtons += taxels.mixing[i, axis, other] * forces[i, other]
+            value = saturated(newtons, constants.limits[axis]) * constants.scales[axis]
+            value += taxels.baseline[i, axis] + warmth * taxels.thermal[i, axis]
+            value += constants.noise * drawn[i * n_axes + axis]
+            out[i, axis] = min(max(np.rint(value), 0.0), UINT16_MAX)

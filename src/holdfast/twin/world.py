@@ -4,7 +4,7 @@ import mujoco
 import numpy as np
 
 from holdfast.sensors.types import Array
-from holdfast.twin.contact import LOAD, SLIP, constants_of, new_contact
+from holdfast.twin.contact import LOAD, constants_of, new_contact
 from holdfast.twin.control import STEPS_PER_CONTROL, Controller
 from holdfast.twin.grasp import ClosingPath, object_pose
 from holdfast.twin.hand import FINGERS, GRAVITY, N_JOINTS, SUBSTEPS, TIMESTEP, HandModel
@@ -70,7 +70,8 @@ class World:
     @property
     def slip(self) -> float:
         """Largest slip speed of a fingertip in contact [m/s]."""
-        return float(np.where(self.loads > 0, self.contact.tips[:, SLIP], 0.0).max())
+        tips = zip(self.loads.tolist(), self.contact.slip_speed.tolist(), strict=True)
+        return max(speed if load > 0 else 0.0 for load, speed in tips)
 
     def set_load(self, load: LoadState) -> None:
         """Set force, friction and acceleration of the hand until they are set again.
