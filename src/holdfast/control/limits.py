@@ -34,8 +34,8 @@ class Limits(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=Tr
     min_scale: float = 1.0
     max_scale: float = 3.0
     rise: float = 30.0
-    fall: float = 0.3
-    cooldown: float = 0.5
+    fall: float = 3.0
+    cooldown: float = 0.1
     max_force: float | None = None
     stale_after: float = 0.05
     fault_after: float = 0.03

@@ -5,7 +5,7 @@ from abc import ABC, abstractmethod
 from collections.abc import Sequence
 from typing import ClassVar
 
-from holdfast.contact import ContactEstimate, ContactState
+from holdfast.contact import Cause, ContactEstimate, ContactState
 from holdfast.control.command import GripReason
 
 Three = tuple[float, float, float]
@@ -25,6 +25,7 @@ class Touch:
         known: whether there is an estimate; False while the state is UNKNOWN.
         touching: whether the finger is in contact.
         probability: probability that the contact is stable, of this sample, not debounced.
+        cause: cause of the instability, where the model names one.
         instability: sigma, in the unit of the readings times the mean factor.
         force: (F_x, F_y, F_z) in the fingertip frame [N with a calibration, else the readings'].
         normal: force along the normal of the skin, at least 0 [as `force`].
@@ -36,6 +37,7 @@ class Touch:
     __slots__ = (
         "_factors",
         "_normal",
+        "cause",
         "finger",
         "force",
         "instability",
@@ -55,6 +57,7 @@ class Touch:
         self.finger = finger
         self.known = self.touching = False
         self.probability = self.instability = math.nan
+        self.cause: Cause | None = None
         self.force = (0.0, 0.0, 0.0)
         self.normal = self.tangential = 0.0
         self.start_normal = 0.0
@@ -72,6 +75,7 @@ class Touch:
         self.known = True
         self.touching = estimate.state is not _NO_CONTACT
         self.probability = probability = estimate.stable_probability
+        self.cause = estimate.cause
         self.instability = estimate.instability * (a + b + c) / 3
         self.force = (x, y, z)
         self.normal = along if along > 0.0 else 0.0

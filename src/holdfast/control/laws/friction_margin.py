@@ -27,13 +27,21 @@ STABLE = 0.5
 
 
 class FrictionMargin(Law):
-    """Law that keeps every finger inside its friction cone, by a margin."""
+    """Law that keeps every finger inside its friction cone, by a margin.
+
+    Args:
+        margin: factor of the least normal force.
+        first_friction: friction coefficient before anything is known.
+    """
 
     needs_newtons = True
 
+    def __init__(self, margin: float = MARGIN, first_friction: float = FIRST_FRICTION) -> None:
+        self.margin, self.first_friction = margin, first_friction
+
     def start(self, touches: Sequence[Touch], thumb: int) -> None:
         """Start with the friction that the first grip proves."""
-        self._friction = [FIRST_FRICTION] * len(touches)
+        self._friction = [self.first_friction] * len(touches)
 
     def wishes(self, touches: Sequence[Touch], time: float, dt: float) -> list[Wish]:
         """Return the scale that the tangential force of each finger needs."""
@@ -46,8 +54,8 @@ class FrictionMargin(Law):
         if touch.probability >= STABLE:
             self._friction[k] = max(self._friction[k], ratio)
         elif ratio < self._friction[k]:
-            self._friction[k] = max(FIRST_FRICTION, SLIP_SHARE * ratio)
-        target = max(MARGIN * touch.tangential / self._friction[k], LOWEST_FORCE)
+            self._friction[k] = max(self.first_friction, SLIP_SHARE * ratio)
+        target = max(self.margin * touch.tangential / self._friction[k], LOWEST_FORCE)
         scale = target / touch.start_normal
         if scale > touch.scale:
             return (scale, GripReason.MARGIN)

@@ -25,9 +25,16 @@ GAIN = 1.08
 
 
 class Pr2(Law):
-    """Law that raises the force by 8 % at every sample in which the fingertip force vibrates."""
+    """Law that raises the force by 8 % at every sample in which the fingertip force vibrates.
+
+    Args:
+        gain: factor of the force at each sample that slips.
+    """
 
     needs_newtons = True
+
+    def __init__(self, gain: float = GAIN) -> None:
+        self.gain = gain
 
     def start(self, touches: Sequence[Touch], thumb: int) -> None:
         """Start the filters at rest."""
@@ -39,7 +46,7 @@ class Pr2(Law):
         slips = [touch.known and filters.slips(touch, dt) for filters, touch in pairs]
         if not any(slips):
             return stay(touches)
-        return [(touch.scale * GAIN, GripReason.SLIP) for touch in touches]
+        return [(touch.scale * self.gain, GripReason.SLIP) for touch in touches]
 
 
 class _Filters:

@@ -19,7 +19,15 @@ GAIN = 1.1
 
 
 class WongZhu(Law):
-    """Law that raises the force of a finger whose tangential force jumps."""
+    """Law that raises the force of a finger whose tangential force jumps.
+
+    Args:
+        threshold: relative change in one sample that counts as a slip.
+        gain: factor of the force of a finger that slips.
+    """
+
+    def __init__(self, threshold: float = THRESHOLD, gain: float = GAIN) -> None:
+        self.threshold, self.gain = threshold, gain
 
     def start(self, touches: Sequence[Touch], thumb: int) -> None:
         """Remember the tangential forces."""
@@ -30,13 +38,12 @@ class WongZhu(Law):
         out = []
         for k, touch in enumerate(touches):
             if touch.known and self._slips(touch, self._last[k]):
-                out.append((touch.scale * GAIN, GripReason.SLIP))
+                out.append((touch.scale * self.gain, GripReason.SLIP))
             else:
                 out.append((touch.scale, GripReason.NONE))
             if touch.known:
                 self._last[k] = touch.tangential
         return out
 
-    @staticmethod
-    def _slips(touch: Touch, last: float) -> bool:
-        return abs(touch.tangential - last) > THRESHOLD * max(last, FLOOR * touch.start_normal)
+    def _slips(self, touch: Touch, last: float) -> bool:
+        return abs(touch.tangential - last) > self.threshold * max(last, FLOOR * touch.start_normal)

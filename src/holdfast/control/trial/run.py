@@ -29,7 +29,10 @@ tangential axes of the fingertip frame [N/count]."""
 RISE = 1.02
 """Ratio of a force scale to that at the start of the load from which it counts as a reaction."""
 REST_TIME = 0.3
-"""A new rise of force later than this after the last one is another false reaction [s]."""
+"""A new rise of force later than this after the last one is another reaction [s]."""
+SLIP_MEMORY = 0.3
+"""A reaction within this time after a fingertip slid is not false [s]: glitches of the hand's
+controller make fingertips slide before the load comes."""
 Mask = npt.NDArray[np.bool_]
 UP = np.array([0.0, 0.0, GRAVITY])
 """Acceleration that carries a weight [m/s^2]."""
@@ -47,7 +50,8 @@ class TrialResult(msgspec.Struct, frozen=True, kw_only=True):
         unseen: whether the model has not seen the object.
         kind: kind of the load.
         n_fingers: number of fingers of the grip.
-        held: whether the object was held when the load began; otherwise nothing is scored.
+        held: False if the object was lost before the load, and before the loop had begun: the
+            first grip failed, and nothing is scored.
         dropped: whether the object was lost afterwards.
         slip: largest sliding distance of a fingertip [m]; infinite if dropped.
         slipped: whether a fingertip slid faster than `SLIP_SPEED`.
@@ -55,7 +59,7 @@ class TrialResult(msgspec.Struct, frozen=True, kw_only=True):
             before [s]; infinite without a rise, NaN if nothing slipped.
         force_ratio: mean normal force over the mean of the least force, until the drop.
         peak_ratio: largest normal force over the largest least force.
-        quiet_time: time of control before the load [s].
+        quiet_time: time of control before the load in which nothing slid shortly before [s].
         n_false: number of reactions in this time.
     """
 
@@ -173,7 +177,8 @@ class _TrialLog:
         self._scales: list[Array] = []
         self._slid = np.zeros(len(FINGERS))
         self._began_at = math.nan
-        self._rising_at = -math.inf
+        self._rising_at = self._slid_at = -math.inf
+        self._quiet_time = 0.0
         self._n_false = 0
 
     def add(self, simulation: Simulation, command: GripCommand, scales: Array) -> None:
@@ -187,12 +192,21 @@ class _TrialLog:
         speeds = np.where(tips[:, LOAD] > CONTACT_FORCE, tips[:, SLIP], 0.0)
         if held_for >= self._trial.load.start:
             self._slid += np.where(speeds > SLIP_SPEED, speeds, 0.0) / RATE
-        elif command.state is LoopState.REACT:
-            self._n_false += held_for - self._rising_at > REST_TIME
-            self._rising_at = held_for
+        elif command.state is not LoopState.IDLE:
+            self._add_quiet(held_for, command, slides=bool(speeds.max() > SLIP_SPEED))
         least = least_force_at(self._trial, held_for)
         self._rows.append((held_for, float(tips[:, LOAD].sum()), least, float(speeds.max())))
         self._scales.append(scales)
+
+    def _add_quiet(self, held_for: float, command: GripCommand, *, slides: bool) -> None:
+        """Count reactions before the load, and the time in which one would be false."""
+        if slides:
+            self._slid_at = held_for
+        quiet = held_for - self._slid_at > SLIP_MEMORY
+        self._quiet_time += quiet / RATE
+        if command.state is LoopState.REACT:
+            self._n_false += quiet and held_for - self._rising_at > REST_TIME
+            self._rising_at = held_for
 
     def result(self, law: str, *, lost: bool) -> TrialResult:
         """Return the result of the trial."""
@@ -209,9 +223,10 @@ class _TrialLog:
             n_fingers=trial.n_fingers,
             held=False,
         )
-        if not (loaded.any() and controlled.any()):
+        if not (loaded.any() or controlled.any()):
             return base
-        force, least = rows[controlled, 1], rows[controlled, 2]
+        scored = loaded | controlled
+        force, least = rows[scored, 1], rows[scored, 2]
         slipping = loaded & (rows[:, 3] > SLIP_SPEED)
         return msgspec.structs.replace(
             base,
@@ -222,7 +237,7 @@ class _TrialLog:
             reaction=self._reaction(rows[:, 0], loaded, slipping),
             force_ratio=float(force.mean() / least.mean()),
             peak_ratio=float(force.max() / least.max()),
-            quiet_time=trial.load.start - self._began_at,
+            quiet_time=self._quiet_time,
             n_false=self._n_false,
         )
 
@@ -230,7 +245,7 @@ class _TrialLog:
         if not slipping.any():
             return math.nan
         scales = np.array(self._scales)
-        first = scales[np.argmax(loaded)]
+        first = scales[np.argmax(loaded)]  # slipping is loaded: there is a sample
         risen = loaded & (scales > RISE * first).any(axis=1)
         if not risen.any():
             return math.inf
