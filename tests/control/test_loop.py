@@ -124,7 +124,7 @@ class TestStop:
         controller, time = holding(on_fault=on_fault)
         texts = []
         loop = GripLoop(controller, tape, armed=True, log=lambda text, _: texts.append(text))
-        time = stepped(loop, stepped(loop, time), index=SLIPPING)
+        time = stepped(loop, stepped(loop, time), n=16, index=SLIPPING)
         held = scales(tape.commands[-1])
         assert held["index"] > 1.1
         loop.stop()
@@ -158,7 +158,7 @@ class TestStop:
         controller, time = holding()
         texts = []
         loop = GripLoop(controller, tape, armed=True, log=lambda text, _: texts.append(text))
-        time = stepped(loop, stepped(loop, time), index=SLIPPING)
+        time = stepped(loop, stepped(loop, time), n=16, index=SLIPPING)
         held = scales(tape.commands[-1])
         assert held["index"] > 1.1
         loop.stop()
@@ -201,7 +201,7 @@ class TestStop:
     def test_resuming_what_was_not_stopped_changes_nothing(self, tape):
         controller, time = holding()
         loop = GripLoop(controller, tape, armed=True)
-        time = stepped(loop, stepped(loop, time), index=SLIPPING)
+        time = stepped(loop, stepped(loop, time), n=16, index=SLIPPING)
         before = scales(loop.last)
         loop.resume()
         stepped(loop, time, n=1)
