@@ -12,8 +12,10 @@ from holdfast.ros.rospy_node import (
     check_master,
     master_uri,
     published_topics,
+    publishers_of,
     rospy_module,
     start_node,
+    subscribed_topics,
 )
 
 
@@ -29,8 +31,8 @@ def master():
     """A server that answers like a ROS master, from a dictionary."""
     answers = {}
     with SimpleXMLRPCServer(("127.0.0.1", 0), _Silent) as server:
-        for name in ("getPid", "getSystemState", "getTopicTypes"):
-            server.register_function(lambda _, name=name: answers[name], name)
+        for name in ("getPid", "getSystemState", "getTopicTypes", "lookupNode"):
+            server.register_function(lambda *_, name=name: answers[name], name)
         thread = Thread(target=server.serve_forever, kwargs={"poll_interval": 0.01})
         thread.start()
         yield f"http://127.0.0.1:{server.server_address[1]}", answers
@@ -45,6 +47,22 @@ def test_published_topics(master):
     answers["getSystemState"] = (1, "", [[["/a", ["node"]], ["/b", []]], [["/c", ["n"]]], []])
     answers["getTopicTypes"] = (1, "", [["/a", "p/A"], ["/b", "p/B"], ["/c", "p/C"]])
     assert published_topics(uri) == {"/a": "p/A"}
+
+
+def test_publishers_that_do_not_answer_are_not_listed(master):
+    uri, answers = master
+    answers["getPid"] = (1, "", 7)
+    answers["lookupNode"] = (1, "", uri)  # its own node here: it answers
+    answers["getSystemState"] = (1, "", [[["/a", ["/node"]]], [["/c", ["/n"]], ["/d", []]], []])
+    assert publishers_of(uri, "/a") == ["/node"]
+    assert publishers_of(uri, "/b") == []
+    assert subscribed_topics(uri) == ["/c"]
+    with create_server(("127.0.0.1", 0)) as free:
+        dead = f"http://127.0.0.1:{free.getsockname()[1]}"
+    answers["lookupNode"] = (1, "", dead)
+    assert publishers_of(uri, "/a") == []
+    answers["lookupNode"] = (-1, "unknown node", "")
+    assert publishers_of(uri, "/a") == []
 
 
 def test_a_master_that_refuses(master):

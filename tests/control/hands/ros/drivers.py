@@ -147,7 +147,7 @@ class Ros2Driver:
             write = self._node.writer(driver.states, definition)
             data = MessageEncoder(definition)(message)
             self._write = lambda: write(data)
-        self.silent = threading.Event()
+        self._lock = threading.Lock()
         self._ending = threading.Event()
         self._thread = threading.Thread(target=self._run)
         self._thread.start()
@@ -156,8 +156,15 @@ class Ros2Driver:
         while not self._ending.wait(0.005):
             for topic, reader, decode in self._readers:
                 self.messages += [(topic, decode(data)) for data in reader.take(0.0)]
-            if self._write is not None and not self.silent.is_set():
-                self._write()
+            with self._lock:
+                if self._write is not None:
+                    self._write()
+
+    def stop_states(self):
+        """Publish no joint states any more; none is on its way when this returns."""
+        with self._lock:
+            self._write = None
+        time.sleep(0.05)
 
     def wait(self, n):
         """The messages, as soon as there are so many."""

@@ -117,6 +117,19 @@ class TestBeginOfTheGrip:
                 {"ring": 1.0, "thumb": 1.2, "index": 1.0, "middle": 1.0}
             )
 
+    def test_the_base_is_a_mean_over_the_time_in_which_the_hand_was_stable(self, driver):
+        peer = driver(ROS2["v4"])
+        with open_hand("ros2:v4") as hand:
+            peer.stop_states()
+            hand._poll()
+            _, states = hand._states[-1]
+            hand._states.clear()
+            for factor in (0.5, 0.9):
+                changed = states._replace(efforts=factor * states.efforts)
+                hand._states.append((time.monotonic(), changed))
+            hand.send(COMMAND)
+            assert ROS2["v4"].meaning(peer.wait(1))["thumb"] == pytest.approx(1.2 * 0.7)
+
     def test_a_new_grip_takes_a_new_base(self, driver):
         peer = driver(ROS2["v4"])
         with open_hand("ros2:v4") as hand:
@@ -146,7 +159,7 @@ class TestSilence:
         peer = driver(ROS2["v4"])
         with open_hand("ros2:v4") as hand:
             hand.send(COMMAND)
-            peer.silent.set()
+            peer.stop_states()
             with pytest.raises(HandError, match=r"no joint states on /joint_states for 0.\d s"):
                 send_for_a_minute(hand)
 

@@ -114,26 +114,36 @@ class JointHand(RosHand):
             raise ValueError(f"{problem} at max_scale {limits.max_scale:g}: lower one of them")
 
     def _begin(self) -> None:
-        setup, states = self.setup, self._states
-        positions = np.full(N_JOINTS, np.nan)
-        torques = setup.torques
-        if states is not None:
-            try:
-                ordered = setup.order.sort(states)
-            except ValueError as cause:
-                raise HandError(f"{self.name}: joint states of {setup.states}: {cause}") from cause
-            positions = ordered.positions
-            torques = ordered.efforts if torques is None else torques
-        if torques is None or not torques.any():
+        given = self.setup.torques
+        positions, measured = self._measured()
+        torques = measured if given is None else given
+        if not torques.any():
             raise HandError(
-                f"{self.name}: the joint states of {setup.states} have no efforts, so the torques "
-                "at the beginning of the grip are not known: give effort="
+                f"{self.name}: the joint states of {self.setup.states} have no efforts, so the "
+                "torques at the beginning of the grip are not known: give effort="
             )
         if problem := self._excess(self._max_scale * torques):
             raise HandError(
                 f"{problem} at max_scale {self._max_scale:g}: lower it, or grip more gently"
             )
         self._grip = JointGrip(positions, torques)
+
+    def _measured(self) -> tuple[Array, Array]:
+        """Return the mean positions and torques (16,) of the last joint states.
+
+        Positions are NaN without joint states, and torques 0 where a state has none.
+        """
+        order = self.setup.order
+        if not self._states:
+            return np.full(N_JOINTS, np.nan), np.zeros(N_JOINTS)
+        try:
+            states = [order.sort(one) for _, one in self._states]
+        except ValueError as cause:
+            topic = self.setup.states
+            raise HandError(f"{self.name}: joint states of {topic}: {cause}") from cause
+        efforts = [one.efforts for one in states if len(one.efforts)]
+        torques = np.mean(efforts, axis=0) if len(efforts) == len(states) else np.zeros(N_JOINTS)
+        return np.mean([one.positions for one in states], axis=0), torques
 
     def _press(self, command: GripCommand) -> None:
         if self._grip is None:

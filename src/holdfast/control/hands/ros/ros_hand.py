@@ -2,6 +2,7 @@
 
 import time
 from abc import abstractmethod
+from collections import deque
 from collections.abc import Callable, Mapping
 from functools import partial
 from typing import Any
@@ -18,6 +19,9 @@ DISCOVERY_TIME = 0.5
 """Time in which other publishers are found [s]."""
 STATE_TIMEOUT = 0.5
 """Time without joint states after which a hand does not answer any more [s]."""
+STATE_MEMORY = 0.2
+"""Time over which joint states are averaged at the begin of a grip; the hand has been STABLE for
+as long [s]."""
 POLL_INTERVAL = 0.01
 """Time between two checks while the hand is opened [s]."""
 
@@ -55,8 +59,7 @@ class RosHand(Hand):
         self._shared, self._standby = shared or standby, standby
         self._publishers: dict[str, Publisher] = {}
         self._reader: StateReader | None = None
-        self._states: JointStates | None = None
-        self._state_at = 0.0
+        self._states: deque[tuple[float, JointStates]] = deque()
         self._begun = False
 
     @property
@@ -88,7 +91,8 @@ class RosHand(Hand):
     def close(self) -> None:
         """Disconnect. It has no effect on a hand that is closed."""
         self._publishers.clear()
-        self._reader = self._states = None
+        self._reader = None
+        self._states.clear()
         self._begun = False
         self._link.close()
 
@@ -131,8 +135,11 @@ class RosHand(Hand):
         """Read the newest joint states; return whether there are any so far."""
         found = None if self._reader is None else self._reader.take()
         if found is not None:
-            self._states, self._state_at = found, time.monotonic()
-        return self._states is not None
+            now = time.monotonic()
+            self._states.append((now, found))
+            while now - self._states[0][0] > STATE_MEMORY:
+                self._states.popleft()
+        return bool(self._states)
 
     def _check_answers(self) -> None:
         for topic, publish in self._publishers.items():
@@ -141,8 +148,10 @@ class RosHand(Hand):
                     f"{self.name}: nothing listens on {topic} any more; the hand keeps its last "
                     "command"
                 )
-        silence = time.monotonic() - self._state_at
-        if self._reader is not None and silence > STATE_TIMEOUT:
+        if self._reader is None:
+            return
+        silence = time.monotonic() - self._states[-1][0]
+        if silence > STATE_TIMEOUT:
             raise HandError(
                 f"{self.name}: no joint states on {self._states_topic} for {silence:.1f} s; the "
                 "hand keeps its last command"
