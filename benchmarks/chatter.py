@@ -30,7 +30,7 @@ SETTLED = 1.0
 """Time from the beginning of a hold after which it is quiet [s]."""
 HEADS = (
     "model", "recordings", "decisions", "quiet min", "changes/min", "changes in a recording",
-    "median delay ms", "95 % ms", "missed at 0.05, 0.1, 0.2 s %", "false alarms/min",
+    "events", "median delay ms", "95 % ms", "missed at 0.05, 0.1, 0.2 s %", "false alarms/min",
 )  # fmt: skip
 
 
@@ -88,12 +88,13 @@ def row(names: Sequence[str], hands: Sequence[FingerDecisions]) -> str:
 
 
 def delays(events: EventMetrics) -> tuple[str, ...]:
-    """Return the cells of delay, missed events and false alarms."""
+    """Return the cells of events, their delay, missed ones and false alarms."""
 
     def shown(value: float | None, scale: float, digits: int) -> str:
         return "" if value is None else f"{value * scale:.{digits}f}"
 
     return (
+        str(events.n_events),
         shown(events.delay_median, 1000, 0) or ("inf" if events.n_events else ""),
         shown(events.delay_p95, 1000, 0) or ("inf" if events.n_events else ""),
         ", ".join(shown(each, 1, 1) for each in events.missed.values()),

@@ -148,6 +148,7 @@ def _detect_recording(
 ) -> Iterator["EstimateChunk"]:
     from holdfast.cli.detect_output import chunk_from_detection
     from holdfast.detector import Detector
+    from holdfast.live.readings_monitor import ReadingsMonitor
 
     detector = None
     with ProgressBar("detecting") as bar:
@@ -155,6 +156,11 @@ def _detect_recording(
             if detector is None:
                 detector = Detector.for_recording(model, part, ignore=parse_taxels(ignore))
                 report_missing_fingers(model, part.name, part.modules)
+                readings = ReadingsMonitor(
+                    model.fingers_of({name: m.sensor for name, m in part.modules.items()})
+                )
+            for notice in readings.update_recording(part):
+                print_message(notice)
             yield chunk_from_detection(detector.run(part))
             bar.advance(max(module.n_samples for module in part.modules.values()))
 

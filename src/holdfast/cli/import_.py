@@ -82,7 +82,7 @@ def import_(
     ] = False,
     as_json: JsonOption = False,
 ) -> None:
-    """Import recordings from other formats.
+    r"""Import recordings from other formats.
 
     Formats: uskin-pick-move, xela-log, gtac, anyskin-slip, arq-crisp, rosbag, csv (see
     docs/formats.md), and recordings of holdfast itself. From an .mcap file that was cut off,
@@ -97,7 +97,8 @@ def import_(
       holdfast import data/uskin_pick_move real/
       holdfast import log.csv real/ --format xela-log --no-labels
       holdfast import press.csv real/ --sensor sensor.json
-      holdfast import press.csv real/ --sensor anyskin --columns 'time=t:ms,taxels=m{taxel}{axis}'
+      holdfast import press.csv real/ --sensor anyskin \
+        --columns 'time=t:ms,taxels=m{taxel}{axis}'
       holdfast import cut.mcap recovered/
     """
     if out.exists() and not out.is_dir():

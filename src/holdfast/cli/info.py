@@ -36,7 +36,7 @@ def info(
     force: ForcePlotOption = False,
     as_json: JsonOption = False,
 ) -> None:
-    """Show the content of a recording, of a folder of recordings, or of a model.
+    """Show the content of a recording, a folder of them, or a model.
 
     Print modules, sensors, number of samples, rates, gaps (steps in time of over three periods),
     repeats (samples equal to the one before), seconds of each label, number of samples with

@@ -70,9 +70,9 @@ def record(
     recording continues when it reconnects.
 
     Example:
-      holdfast record xela://192.168.1.10:5000 grasps/can_1.mcap --object can --case 2
+      holdfast record xela://192.168.1.10:5000 grasps/ --object can --case 2
       holdfast record twin:?object=can can.mcap --seconds 10
-      (sleep 5; echo disturbance) | holdfast record xela://auto grasps/ --set operator=Ann
+      (sleep 5; echo push) | holdfast record xela://auto grasps/ --set by=Ann
     """
     if seconds is not None and not seconds > 0:
         raise ValueError(f"--seconds: more than 0 s expected, {seconds:g} given")

@@ -20,6 +20,7 @@ from holdfast.cli.options import (
     PortOption,
     RateOption,
     RatePolicy,
+    RawOption,
     SourceArgument,
     SpeedOption,
     TokenFileOption,
@@ -59,6 +60,7 @@ def serve(
     rate: RateOption = RatePolicy.RESAMPLE,
     debounce: DebounceOption = None,
     hysteresis: HysteresisOption = None,
+    raw: RawOption = False,
     ignore: IgnoreOption = "",
     ros2: Annotated[bool, typer.Option("--ros2", help="Also publish on ROS 2 topics.")] = False,
     ros1: Annotated[bool, typer.Option("--ros1", help="Also publish on ROS 1 topics.")] = False,
@@ -66,7 +68,7 @@ def serve(
         bool, typer.Option("--json", help="Print the address of the page as JSON.")
     ] = False,
 ) -> None:
-    """Show the estimates of a source on a web page, and publish them.
+    r"""Show the estimates of a source on a web page, and publish them.
 
     The page shows the state, force, sigma, probability, taxels and faults of every finger. It
     can also take the tare and record. Other programs read the WebSocket /api/v1/estimates (every
@@ -79,7 +81,8 @@ def serve(
     Example:
       holdfast serve builtin:any twin:?object=can
       holdfast serve model.json xela://auto --ros2
-      holdfast serve model.json grasp.parquet --host 0.0.0.0 --token-file secret.txt
+      holdfast serve model.json grasp.parquet --host 0.0.0.0 \
+        --token-file secret.txt
     """
     from holdfast.live.stream_detector import compile_kernels
     from holdfast.sources import open_source
@@ -88,7 +91,7 @@ def serve(
     token = find_token(token, token_file)
     guard = Guard(host, token)
     check_speed(source, speed)
-    loaded = load_model(model, debounce, hysteresis)
+    loaded = load_model(model, debounce, hysteresis, raw=raw)
     compile_kernels()
 
     def announce(url: str) -> None:

@@ -83,7 +83,7 @@ def simulate(
       holdfast simulate twin/
       holdfast simulate hands/ --randomize --repeats 100
       holdfast simulate hands/ --randomize --repeats 12 --grasps 20
-      holdfast simulate few/ --objects can,ball --cases 2 --repeats 1 --profile vigorous
+      holdfast simulate few/ --objects can,ball --cases 2 --repeats 1
     """
     from holdfast.files import refuse_overwrite
 

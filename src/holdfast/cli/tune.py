@@ -30,7 +30,7 @@ def tune(
     force: Annotated[bool, typer.Option("--force", help="Overwrite the model.")] = False,
     as_json: JsonOption = False,
 ) -> None:
-    """Choose the threshold of a model for a wanted rate of false alarms.
+    """Choose the threshold for a wanted rate of false alarms.
 
     Write a copy of the model. Of the thresholds of the probability of stability that give at most
     so many false alarms of the hand on the recordings, it has the one that misses the fewest

@@ -14,6 +14,7 @@ from holdfast.errors import ModelError, StreamError
 from holdfast.features import Tare
 from holdfast.live.adjustable_detector import AdjustableDetector, check_thresholds
 from holdfast.live.rate import RateMonitor, measure_rate
+from holdfast.live.readings_monitor import ReadingsMonitor
 from holdfast.model import Model
 from holdfast.recordings import GAP_PERIODS
 from holdfast.resampling import Resampler
@@ -80,7 +81,8 @@ class ArrivalDetector:
         ignore: Mapping[str, tuple[int, ...]] | None = None,
         watch_rate: bool = False,
     ) -> None:
-        if Tare.parse(model.tare).kind == "interval":
+        tare = Tare.parse(model.tare)
+        if tare.kind == "interval":
             raise ModelError(
                 f"the model's tare is the interval {model.tare} s of a recording, which a live "
                 "source does not have; train with --tare 0.5, first or none"
@@ -92,6 +94,8 @@ class ArrivalDetector:
         self.notices: list[str] = []
         self._watch_rate = watch_rate
         self._monitor: RateMonitor | None = None
+        self._finds_pull = tare.kind != "seconds"
+        self._readings = ReadingsMonitor(self.fingers, finds_pull=self._finds_pull)
         self._strict = strict
         self._ignore = ignore
         self._buffer: deque[Arrival] = deque(maxlen=MAX_BUFFERED_ARRIVALS)
@@ -169,6 +173,7 @@ class ArrivalDetector:
                 f"{', '.join(touching)} in contact: open the hand, then take the tare"
             )
         self._detector.reset()
+        self._readings = ReadingsMonitor(self.fingers, finds_pull=self._finds_pull)
 
     def set_threshold(self, threshold: float | None) -> None:
         """Change the probability from which a contact is stable, for all fingers.
@@ -232,6 +237,7 @@ class ArrivalDetector:
         found = {name: arrival.samples[name] for name in self.fingers if name in arrival.samples}
         if self._monitor is not None:
             self._watch(self._monitor, found, arrival.time)
+        self.notices += self._readings.update(found, arrival.time)
         for instant, samples in self._at_model_rate(arrival.time, found):
             before, self._last = self._last, detector.update(samples, instant)
             lost = _lost_fingers(before, self._last) - samples.keys() if before else ()

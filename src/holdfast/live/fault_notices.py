@@ -35,7 +35,11 @@ FAULT_TEXTS: Mapping[Fault, FaultText] = {
     Fault.SATURATED: FaultText(
         "saturated", "readings are at the end of the sensor's range: reduce the force"
     ),
-    Fault.TARE_LOADED: FaultText("loaded at tare", f"the tare was taken in contact: {_NEW_TARE}"),
+    Fault.TARE_LOADED: FaultText(
+        "loaded at tare",
+        f"the tare was taken in contact: {_NEW_TARE}; "
+        "if it stays, z of the sensor points inwards (docs/sensors.md)",
+    ),
     Fault.DEAD: FaultText(
         "dead", "taxels have not changed since the start: leave them out by --ignore FINGER:TAXEL"
     ),

@@ -89,7 +89,7 @@ def label(
     ] = False,
     as_json: JsonOption = False,
 ) -> None:
-    """Label recordings on a page or by a rule, and check labels.
+    r"""Label recordings on a page or by a rule, and check labels.
 
     Without --auto, --compare, --audit, --export and --import, open the labelling page: draw labels
     with the mouse, set states with keys, undo changes, and accept the proposals of a rule. Every
@@ -107,7 +107,8 @@ def label(
       holdfast label recordings/
       holdfast label --auto signal recordings/ --dry-run
       holdfast label --auto tracking grasp.parquet --poses markers.csv
-      holdfast label --auto tracking grasp.mcap --poses run.bag --track object=/aruco/pose
+      holdfast label --auto tracking grasp.mcap --poses run.bag \
+        --track object=/aruco/pose
       holdfast label --compare recordings/ labels-of-ann/ --json
       holdfast label --compare recordings/ signal
       holdfast label --audit recordings/ --page

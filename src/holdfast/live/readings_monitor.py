@@ -1,0 +1,134 @@
+"""What the readings show about the sensor, as notices: dead, an axis missing, z inwards. No clock.
+
+These are no faults, because each can also be right: a sensor with a dead band is still at rest,
+and a hand may hold an object at the start. `holdfast info` finds the same in a recording.
+"""
+
+import math
+from collections.abc import Mapping
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+from holdfast.recordings import Recording
+from holdfast.sensors import Sensor
+
+CHECK_INTERVAL = 0.05
+"""Time between the samples that are looked at [s]; more would cost time and show nothing else."""
+REST_SECONDS = 0.5
+"""Time from the start in which the noise is measured [s]."""
+STILL_SECONDS = 10.0
+"""Time without any change from the start on after which a finger is reported [s]."""
+MOVED_SECONDS = 2.0
+"""Time of changed readings after which an axis without any change is reported [s]."""
+PULL_SECONDS = 0.25
+"""Minimum time for which the normal force is below its first value [s]."""
+PULL_OF_NOISE = 20.0
+"""Least fall below the first value, in standard deviations of its noise."""
+PULL_OF_LARGEST = 0.1
+"""Least fall below the first value, as a share of the largest change; elastomers creep by less."""
+
+STILL = "no reading has changed since the start: touch the sensor; if that changes none, check it"
+MISSING_AXES = "readings along {} never change: 3 axes are expected, and slip shows in the shear"
+PULLED = (
+    "the normal force fell far below its first value: the finger was in contact at the start, or "
+    "z of the sensor points inwards (docs/sensors.md)"
+)
+
+
+class ReadingsMonitor:
+    """Comparison of the readings of each finger with its first ones. Each notice comes once.
+
+    Args:
+        fingers: sensor of each finger.
+        finds_pull: report a normal force below its first value. A model whose tare takes time
+            reports it as the fault `tare_loaded`.
+
+    Example:
+        >>> from holdfast.sensors import sensor
+        >>> monitor = ReadingsMonitor({"index": sensor("uskin-4x4")})
+        >>> for time in np.arange(0, 12, 0.01):
+        ...     for notice in monitor.update({"index": np.zeros((16, 3))}, time):
+        ...         print(notice[:48])
+        index: no reading has changed since the start: t
+    """
+
+    def __init__(self, fingers: Mapping[str, Sensor], *, finds_pull: bool = True) -> None:
+        self._fingers = {
+            name: _FingerReadings(sensor, finds_pull) for name, sensor in fingers.items()
+        }
+
+    def update(self, samples: Mapping[str, npt.NDArray[Any]], time: float) -> list[str]:
+        """Look at samples, (n_taxels, 3) by finger, of a time [s]; return new notices."""
+        return [
+            f"{name}: {text}"
+            for name, readings in samples.items()
+            for text in self._fingers[name].update(readings, time)
+        ]
+
+    def update_recording(self, part: Recording) -> list[str]:
+        """Look at the next part of a recording; return new notices."""
+        notices: list[str] = []
+        for name in self._fingers.keys() & part.modules.keys():
+            module = part.modules[name]
+            stride = max(1, int(CHECK_INTERVAL * module.rate)) if module.n_samples > 1 else 1
+            for k in range(0, module.n_samples, stride):
+                notices += self.update({name: module.readings[k]}, float(module.times[k]))
+        return notices
+
+
+class _FingerReadings:
+    """Memory of the readings of one finger."""
+
+    def __init__(self, sensor: Sensor, finds_pull: bool) -> None:
+        self._weights = np.einsum("j,ijk->ik", sensor.normal, sensor.rotations)
+        self._finds_pull = finds_pull
+        self._first: npt.NDArray[Any] | None = None
+        self._start = self._last = -math.inf
+        self._moved = np.zeros(3, dtype=bool)
+        self._n_moved = 0
+        self._rest: list[float] = []
+        self._noise = 0.0
+        self._largest = 0.0
+        self._pulled_since = math.inf
+        self._reported: set[str] = set()
+
+    def update(self, readings: npt.NDArray[Any], time: float) -> list[str]:
+        """Look at the readings (n_taxels, 3) of a time [s], and return new notices."""
+        if time - self._last < CHECK_INTERVAL or not np.isfinite(readings).all():
+            return []
+        self._last = time
+        if self._first is None or time < self._start:
+            self._first, self._start = np.array(readings, dtype=np.float64), time
+            return []
+        change = readings - self._first
+        moved = (change != 0).any(axis=0)
+        self._moved |= moved
+        self._n_moved += bool(moved.any())
+        found = [*self._still(time), *self._pull(float((self._weights * change).sum()), time)]
+        new = [text for text in found if text not in self._reported]
+        self._reported.update(new)
+        return new
+
+    def _still(self, time: float) -> list[str]:
+        """Return what has not changed for too long."""
+        if not self._n_moved:
+            return [STILL] if time - self._start >= STILL_SECONDS else []
+        if self._moved.all() or self._n_moved * CHECK_INTERVAL < MOVED_SECONDS:
+            return []
+        axes = [axis for axis, moved in zip("xyz", self._moved, strict=True) if not moved]
+        return [MISSING_AXES.format(" and ".join(axes))]
+
+    def _pull(self, normal: float, time: float) -> list[str]:
+        """Return a notice if the normal force is far below its first value."""
+        self._largest = max(self._largest, abs(normal))
+        if time - self._start <= REST_SECONDS:
+            self._rest.append(normal)
+            self._noise = float(np.std(self._rest))
+        limit = max(PULL_OF_NOISE * self._noise, PULL_OF_LARGEST * self._largest)
+        if not self._finds_pull or normal >= -limit:
+            self._pulled_since = math.inf
+            return []
+        self._pulled_since = min(self._pulled_since, time)
+        return [PULLED] if time - self._pulled_since >= PULL_SECONDS else []

@@ -1,0 +1,95 @@
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from holdfast import Model
+from holdfast.live.arrival_detector import ArrivalDetector
+from holdfast.live.readings_monitor import MISSING_AXES, PULLED, STILL, ReadingsMonitor
+from holdfast.recordings import Recording, Tactile
+from holdfast.sensors import sensor
+from holdfast.sources import Arrival
+from holdfast.synthetic import synthetic_recording
+
+PATCH = sensor("uskin-4x4")
+TIMES = np.arange(0, 12, 0.01)
+
+
+def grasp(noise=2.0):
+    """Readings (n, 16, 3) that are pressed from 2 to 9 s."""
+    press = np.interp(TIMES, [2, 2.5, 9, 9.3], [0, 300, 300, 0])
+    force = np.stack([0.1 * press, 0.05 * press, press], axis=1)
+    return 1000 + force[:, None] + np.random.default_rng(0).normal(0, noise, (len(TIMES), 16, 3))
+
+
+def notices(readings, times=TIMES, **options):
+    monitor = ReadingsMonitor({"index": PATCH}, **options)
+    return [
+        (notice, time)
+        for sample, time in zip(readings, times, strict=True)
+        for notice in monitor.update({"index": sample}, time)
+    ]
+
+
+def test_a_grasp_gives_no_notice():
+    assert notices(grasp()) == []
+
+
+@pytest.mark.parametrize("noise", [0.0, 2.0])
+def test_z_that_points_inwards(noise):
+    ((text, time),) = notices(grasp(noise) * [1, -1, -1])
+    assert text == f"index: {PULLED}"
+    assert 2 < time < 3
+
+
+def test_a_grip_at_the_start_that_ends():
+    ((text, time),) = notices(grasp()[400:], TIMES[400:])
+    assert text == f"index: {PULLED}"
+    assert 9 < time < 10
+    assert notices(grasp()[400:], TIMES[400:], finds_pull=False) == []
+
+
+def test_axes_that_never_change():
+    readings = grasp()
+    readings[:, :, :2] = 1000
+    ((text, time),) = notices(readings)
+    assert text == "index: " + MISSING_AXES.format("x and y")
+    assert time < 3
+
+
+def test_readings_that_never_change():
+    ((text, time),) = notices(np.full((len(TIMES), 16, 3), 1000))
+    assert text == f"index: {STILL}"
+    assert time == pytest.approx(10, abs=0.1)
+
+
+def test_a_sensor_with_a_dead_band_may_rest_for_a_while():
+    readings = np.rint(grasp(0.0))
+    assert notices(readings) == []
+
+
+def test_samples_that_are_not_finite_show_nothing():
+    readings = grasp()
+    readings[::2] = np.nan
+    assert notices(readings) == []
+
+
+def test_a_recording_in_parts_gives_the_same():
+    module = Tactile(PATCH, TIMES, grasp() * [1, -1, -1])
+    monitor = ReadingsMonitor({"index": PATCH, "thumb": PATCH})
+    parts = [Recording("part", {"index": module.slice(k, k + 300)}) for k in range(0, 1200, 300)]
+    found = [notice for part in parts for notice in monitor.update_recording(part)]
+    assert found == [f"index: {PULLED}"]
+
+
+@pytest.mark.parametrize(
+    ("name", "expected"), [("builtin:any", 1), ("builtin:noise-floor", 0)], ids=["first", "seconds"]
+)
+def test_the_live_detector_passes_notices_on(name, expected):
+    recording = synthetic_recording("grasp", seed=0)
+    thumb = recording.modules["thumb"]
+    turned = replace(thumb, readings=-thumb.readings)
+    detector = ArrivalDetector(Model.load(name), {"thumb": thumb.sensor})
+    for time, sample in zip(turned.times.tolist(), turned.readings, strict=True):
+        detector.update(Arrival(time=time, samples={"thumb": sample}, received=time))
+    assert detector.notices == [f"thumb: {PULLED}"] * expected
