@@ -16,6 +16,8 @@ from holdfast.sensors import Sensor
 
 BLOCK_SAMPLES = 16_384
 """Samples that are converted to float64 at a time: bounds the memory of offline work."""
+SERIAL_READINGS = 100_000
+"""Readings up to which one thread is faster than several, which wait for each other."""
 
 
 def fingertip_force(
@@ -163,13 +165,25 @@ def _forces(
     for start in range(first, len(readings), BLOCK_SAMPLES):
         block = slice(start, start + BLOCK_SAMPLES)
         values = np.ascontiguousarray(readings[block], dtype=np.float64)
-        _fill_forces(values, baseline, sensor.rotations, force[block])
+        fill = _fill_forces if values.size > SERIAL_READINGS else _fill_forces_alone
+        fill(values, baseline, sensor.rotations, force[block])
     return force
 
 
 @compiled_parallel
 def _fill_forces(values: Array, baseline: Array, rotations: Array, force: Array) -> None:
     for k in numba.prange(len(values)):
-        x, y, z, _ = sum_taxels(values[k], baseline, rotations, 0, len(baseline))
-        if math.isfinite(x + y + z):
-            force[k, 0], force[k, 1], force[k, 2] = x, y, z
+        _fill_force(values[k], baseline, rotations, force[k])
+
+
+@compiled
+def _fill_forces_alone(values: Array, baseline: Array, rotations: Array, force: Array) -> None:
+    for k in range(len(values)):
+        _fill_force(values[k], baseline, rotations, force[k])
+
+
+@compiled
+def _fill_force(values: Array, baseline: Array, rotations: Array, force: Array) -> None:
+    x, y, z, _ = sum_taxels(values, baseline, rotations, 0, len(baseline))
+    if math.isfinite(x + y + z):
+        force[0], force[1], force[2] = x, y, z

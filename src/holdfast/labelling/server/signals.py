@@ -46,6 +46,12 @@ NOISE_FACTOR = 2.0
 NOISE_SHARE = 0.01
 """Movement below this share of the largest force is noise, invisible on a plot."""
 
+FIRST_DEPTH = 4
+"""Minima and maxima of blocks of 2^4 samples and more are kept; those of smaller blocks need as
+much memory as the samples, and are computed of the part that is shown."""
+PART_SAMPLES = 1 << 16
+"""Samples of which minima, sigma and movements are computed at a time; it bounds the memory."""
+
 Series = dict[str, list[float | None]]
 
 
@@ -92,11 +98,12 @@ class FingerSignals:
 
     def __init__(self, module: Tactile, tare: TareArgument | Tare = 0.5) -> None:
         self.times, self.values = _with_gaps(module, signal_values(module, tare))
-        self._levels: list[_Level] = []
-        level = _Level(np.column_stack([self.times, self.times]), self.values, self.values)
+        self._levels: dict[int, _Level] = {}  # by depth, of blocks of 2^depth samples
+        depth, level = FIRST_DEPTH, self._first_level()
+        self._levels[depth] = level
         while len(level.times) > 2:
-            level = _halved(level)
-            self._levels.append(level)
+            depth, level = depth + 1, _halved(level)
+            self._levels[depth] = level
 
     def part(self, start: float, end: float, points: int) -> tuple[bool, Series]:
         """Return whether all samples are included, and the series between two times.
@@ -114,11 +121,30 @@ class FingerSignals:
         if n <= 2 * points:
             return True, _series(self.times[first:last], self.values[first:last])
         depth = max(int(np.ceil(np.log2(n / max(points - 2, 1)))), 1)
-        depth = min(depth, len(self._levels))
-        level = self._levels[depth - 1]
+        level = self._blocks(first, last, min(depth, max(self._levels)))
+        pairs = np.stack([level.low, level.high], axis=1)
+        return False, _series(level.times.ravel(), pairs.reshape(-1, len(SERIES)))
+
+    def _blocks(self, first: int, last: int, depth: int) -> _Level:
+        """Return the blocks of 2^depth samples that contain samples `first` up to `last`."""
         blocks = slice(first >> depth, ((last - 1) >> depth) + 1)
-        pairs = np.stack([level.low[blocks], level.high[blocks]], axis=1)
-        return False, _series(level.times[blocks].ravel(), pairs.reshape(-1, len(SERIES)))
+        if depth in self._levels:
+            return _Level(*(array[blocks] for array in self._levels[depth]))
+        return self._reduced(blocks.start << depth, blocks.stop << depth, depth)
+
+    def _first_level(self) -> _Level:
+        """Return the blocks of the first depth that is kept, from parts of the samples."""
+        starts = range(0, max(len(self.times), 1), PART_SAMPLES)
+        parts = [self._reduced(start, start + PART_SAMPLES, FIRST_DEPTH) for start in starts]
+        return _Level(*(np.concatenate(arrays) for arrays in zip(*parts, strict=True)))
+
+    def _reduced(self, start: int, stop: int, depth: int) -> _Level:
+        """Return the blocks of samples `start` up to `stop`, which is a whole number of blocks."""
+        times, values = self.times[start:stop], self.values[start:stop]
+        level = _Level(np.column_stack([times, times]), values, values)
+        for _ in range(depth):
+            level = _halved(level)
+        return level
 
 
 class Signals:
@@ -178,9 +204,15 @@ def signal_values(
     Raises:
         ValueError: the tare is unknown, or no finite sample lies in its time.
     """
-    force = _force(module, tare)
-    sigma = haar_features(force, window)[:, 5:]
-    return np.concatenate([np.linalg.norm(force, axis=1, keepdims=True), force, sigma], axis=1)
+    values = np.empty((module.n_samples, len(SERIES)))
+    values[:, 1:4] = _force(module, tare)
+    for start in range(0, module.n_samples, PART_SAMPLES):
+        part = values[start : start + PART_SAMPLES]
+        history = min(start, window - 1)
+        force = values[start - history : start + len(part), 1:4]
+        part[:, 0] = np.linalg.norm(part[:, 1:4], axis=1)
+        part[:, 4] = haar_features(force, window)[history:, 5]
+    return values
 
 
 def _force(module: Tactile, tare: TareArgument | Tare) -> Array:
@@ -278,9 +310,18 @@ def _movements(force: Array, n: int) -> tuple[Array, Array]:
     steps = np.unique(np.linspace(1, n, min(n, MAX_COMPARED_STEPS)).round().astype(int))
     after, before = np.zeros(len(force)), np.zeros(len(force))
     for step in steps.tolist():
-        moved = np.linalg.norm(force[step:] - force[:-step], axis=1)
+        moved = _distances(force[step:], force[:-step])
         after[:-step] += moved
         before[step:] += moved
         after[-step:] += np.linalg.norm(force[-1] - force[-step:], axis=1)
         before[:step] += np.linalg.norm(force[0] - force[:step], axis=1)
     return after / len(steps), before / len(steps)
+
+
+def _distances(a: Array, b: Array) -> Array:
+    """Return (n,) distances of the rows of two arrays, computed in parts to bound the memory."""
+    found = np.empty(len(a))
+    for start in range(0, len(a), PART_SAMPLES):
+        part = slice(start, start + PART_SAMPLES)
+        found[part] = np.linalg.norm(a[part] - b[part], axis=1)
+    return found

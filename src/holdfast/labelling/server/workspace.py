@@ -13,12 +13,17 @@ import numpy as np
 from holdfast.errors import RecordingError
 from holdfast.features import Tare
 from holdfast.features.tare import TareArgument
-from holdfast.io import load_recording, mcap, parquet
+from holdfast.io import load_recording
 from holdfast.io.header import Header
 from holdfast.io.safe_reading import recording_errors
 from holdfast.labelling.rules import propose
 from holdfast.labelling.rules.poses import Poses, poses_of
 from holdfast.labelling.rules.start import fitting_tare
+from holdfast.labelling.server.long_recordings import (
+    load_for_labelling,
+    read_header,
+    without_forces,
+)
 from holdfast.labelling.server.signals import Signals, change_points
 from holdfast.labelling.server.store import (
     Labels,
@@ -67,18 +72,32 @@ class OpenRecording:
 
     Attributes:
         path: of the file.
-        recording: with the labels of the file itself, not of the label file.
+        recording: with the labels of the file itself, not of the label file; with forces in place
+            of readings if it is long.
+        has_readings: whether it has the readings.
         tare: how the baseline is found.
     """
 
     path: Path
     recording: Recording
+    has_readings: bool
     tare: Tare
+
+    def with_readings(self) -> Recording:
+        """Return the recording with its readings, which are read again if it is long.
+
+        Raises:
+            RecordingError: the recording cannot be read.
+        """
+        return self.recording if self.has_readings else load_recording(self.path, labels=False)
 
     @cached_property
     def signals(self) -> Signals:
         """The signals that the page plots."""
-        return Signals(self.recording, self.tare)
+        signals = Signals(self.recording, self.tare)
+        if not self.has_readings:
+            self.recording = without_forces(self.recording)
+        return signals
 
     @cached_property
     def changes(self) -> Mapping[str, list[float]]:
@@ -150,9 +169,10 @@ class Workspace:
             if key not in self._open:
                 while len(self._open) >= MAX_RECORDINGS_IN_MEMORY:
                     self._open.popitem(last=False)
-                recording = load_recording(path, labels=False)
-                tare = fitting_tare(recording, self._tare)
-                self._open[key] = OpenRecording(path, recording, tare)
+                with self._compute_lock:
+                    recording, has_readings = load_for_labelling(path)
+                    tare = fitting_tare(recording, self._tare)
+                self._open[key] = OpenRecording(path, recording, has_readings, tare)
             self._open.move_to_end(key)
             return self._open[key]
 
@@ -232,11 +252,12 @@ class Workspace:
             raise ValueError(f"parameter {refused[0]!r} given; a page may not set it")
         opened = self.open(index)
         with self._compute_lock:
-            chosen = rule or default_rule(opened.recording, self._poses)
+            recording = opened.with_readings()
+            chosen = rule or default_rule(recording, self._poses)
             given: dict[str, Any] = {"tare": opened.tare, **parameters}
             if chosen == "tracking":
                 given["tracking"] = self._poses
-            self._proposals[index] = propose(chosen, opened.recording, **given)
+            self._proposals[index] = propose(chosen, recording, **given)
         return chosen, self._proposals[index]
 
     def proposals(self, index: int) -> Proposals:
@@ -286,7 +307,7 @@ def summary_of(path: Path) -> RecordingSummary:
         RecordingError: the recording cannot be read.
     """
     with recording_errors(path):
-        header, complete = _header(path)
+        header, complete = read_header(path)
     if header is None or not (complete and header.digest):
         return _summary_of_samples(load_recording(path, labels=False))
     return RecordingSummary(
@@ -296,16 +317,6 @@ def summary_of(path: Path) -> RecordingSummary:
         header.digest,
         sum(len(module.labels) for module in header.modules.values()),
     )
-
-
-def _header(path: Path) -> tuple[Header | None, bool]:
-    """Return the header of a recording, and whether it was written at a regular end."""
-    if path.suffix not in (".parquet", ".mcap"):
-        return None, False
-    source = parquet if path.suffix == ".parquet" else mcap
-    header, samples, complete = source.read_groups(path)
-    getattr(samples, "close", lambda: None)()
-    return header, complete
 
 
 def _durations(header: Header) -> list[float]:

@@ -1,0 +1,114 @@
+"""A long recording is labelled by its forces; here every recording is long."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from holdfast.contact import ContactState
+from holdfast.errors import RecordingError
+from holdfast.features.force import tared_force
+from holdfast.io import load_recording, parquet, save_recording
+from holdfast.labelling.server import long_recordings, workspace
+from holdfast.labelling.server.long_recordings import load_for_labelling, without_forces
+from holdfast.labelling.server.signals import SERIES
+from holdfast.recordings import Label, Recording
+from holdfast.synthetic import synthetic_recording
+
+FINGERS = ("thumb", "index")
+
+
+@pytest.fixture
+def path(tmp_path, monkeypatch):
+    made = synthetic_recording("grasp", 3, FINGERS)
+    path = tmp_path / "grasp.parquet"
+    save_recording(replace(made, markers=((1.0, "closed"),)), path)
+    monkeypatch.setattr(long_recordings, "MAX_READINGS", 0)
+    return path
+
+
+def opened(path):
+    return workspace.Workspace([path], author="me", clock=lambda: "2026-01-01T00:00:00Z")
+
+
+def test_it_has_the_forces_and_all_else_of_the_recording(path):
+    whole, (long, has_readings) = load_recording(path), load_for_labelling(path)
+    assert not has_readings
+    for name, module in whole.modules.items():
+        own = long.modules[name]
+        assert own.readings.shape == (module.n_samples, 1, 3)
+        np.testing.assert_array_equal(own.times, module.times)
+        assert own.labels == module.labels
+        for tare in (0.5, "first", "none", (1.0, 1.5)):
+            ours, theirs = (tared_force(one, tare).force for one in (own, module))
+            np.testing.assert_allclose(ours, theirs, rtol=1e-9, atol=1e-6)
+    assert (long.name, long.digest, long.markers) == (whole.name, whole.digest, whole.markers)
+    assert (long.start, long.end, long.metadata) == (whole.start, whole.end, whole.metadata)
+
+
+def test_a_short_recording_has_its_readings(path, monkeypatch):
+    monkeypatch.undo()
+    recording, has_readings = load_for_labelling(path)
+    assert has_readings
+    assert recording.digest == load_recording(path).digest
+    assert recording.modules["thumb"].readings.shape[1:] == (30, 3)
+
+
+def test_a_reading_that_is_not_finite_has_no_force(path):
+    whole = load_recording(path)
+    readings = whole.modules["thumb"].readings.astype(float)
+    readings[[10, 200], 5, 1] = np.nan, np.inf
+    modules = {**whole.modules, "thumb": replace(whole.modules["thumb"], readings=readings)}
+    save_recording(Recording("grasp", modules), path, force=True)
+    force = load_for_labelling(path)[0].modules["thumb"].readings[:, 0]
+    assert np.flatnonzero(np.isnan(force).all(axis=1)).tolist() == [10, 200]
+    assert np.isfinite(np.delete(force, [10, 200], axis=0)).all()
+
+
+def test_the_page_is_that_of_all_readings(path, monkeypatch):
+    long = opened(path)
+    shown = long.signals(0).part(0.0, 5.0, 1000)
+    changes = long.changes(0)
+    proposed = long.propose(0, "signal", {})
+    monkeypatch.undo()
+    short = opened(path)
+    assert long.open(0).tare == short.open(0).tare
+    for finger, series in short.signals(0).part(0.0, 5.0, 1000).fingers.items():
+        assert shown.fingers[finger]["t"] == series["t"]
+        for name in SERIES:
+            ours, theirs = (np.array(one[name], float) for one in (shown.fingers[finger], series))
+            np.testing.assert_allclose(ours, theirs, rtol=1e-5, atol=1e-5)
+    assert changes == short.changes(0)
+    assert proposed == short.propose(0, "signal", {})
+
+
+def test_labels_are_saved_for_the_recording_of_the_file(path):
+    space = opened(path)
+    space.signals(0)  # from here on without forces
+    assert np.isnan(space.open(0).recording.modules["thumb"].readings).all()
+    label = Label(1.0, 2.0, ContactState.STABLE)
+    space.save(0, {"thumb": [label]}, revision=space.stored(0).revision, author="", note="")
+    assert [one.start for one in load_recording(path).modules["thumb"].labels] == [1.0]
+    assert space.stored(0).origin == "file"
+
+
+def test_without_forces_it_needs_no_memory_for_them(path):
+    recording, _ = load_for_labelling(path)
+    empty = without_forces(recording)
+    assert empty.digest == recording.digest
+    assert empty.modules["thumb"].readings.strides == (0, 0, 0)
+    np.testing.assert_array_equal(empty.modules["thumb"].times, recording.modules["thumb"].times)
+
+
+def test_columns_are_the_readings_by_taxel_and_axis(path):
+    header, groups = parquet.read_columns(path)
+    columns = np.concatenate([group["/tactile/index"][1] for group in groups], axis=1)
+    readings = load_recording(path).modules["index"].readings
+    assert header.digest == load_recording(path).digest
+    np.testing.assert_array_equal(columns.T.reshape(readings.shape), readings)
+
+
+def test_a_missing_file_and_another_format_are_refused_as_ever(tmp_path):
+    for name in ("none.parquet", "none.csv"):
+        with pytest.raises(RecordingError, match=f"{name} does not exist"):
+            load_for_labelling(tmp_path / name)
