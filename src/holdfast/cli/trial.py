@@ -1,7 +1,6 @@
 """`holdfast trial`: grip laws against each other on the twin."""
 
-import json
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
@@ -9,17 +8,17 @@ import typer
 
 from holdfast.cli.options import JobsOption, JsonOption, SeedOption
 from holdfast.cli.terminal.console import print_json, print_line, print_message
-from holdfast.cli.terminal.progress import ProgressBar
+from holdfast.cli.terminal.progress import progress
 
 if TYPE_CHECKING:
-    from holdfast.control.trial.run import TrialResult
+    from holdfast.parallel import Engine
 
 N_TRIALS, N_QUICK_TRIALS = 240, 60
 """Number of trials; 60 have every object with every kind of load once."""
 
 
 def trial(
-    out: Annotated[Path, typer.Option("--out", help="Folder for trial.json, created if missing.")],
+    out: Annotated[Path, typer.Option("--out", "-o", help="Folder for the results.")],
     laws: Annotated[
         str, typer.Option("--laws", help="Laws to compare, separated by commas; all by default.")
     ] = "",
@@ -33,93 +32,70 @@ def trial(
     seed: SeedOption = 0,
     jobs: JobsOption = -1,
     engine: Annotated[
-        str, typer.Option("--engine", help="Where to compute: loky, or dask:ADDRESS.")
+        str, typer.Option("--engine", help="loky: local processes; dask:ADDRESS: a Dask cluster.")
     ] = "loky",
-    force: Annotated[bool, typer.Option("--force", help="Overwrite trial.json.")] = False,
+    force: Annotated[
+        bool, typer.Option("--force", help="Overwrite a comparison; finished trials are kept.")
+    ] = False,
     as_json: JsonOption = False,
 ) -> None:
     """Compare laws of grip force on the twin, all on the same trials.
 
     In each trial the hand of the twin grips an object lightly, and then a load comes: added
     weight, a pull, friction that drops, a shake, or a fast transport. Objects, loads and grips
-    follow from the seed. docs/grip.md describes the trials and the numbers.
+    follow from the seed. Write OUT/report.html with a film of one trial, trial.json, trials.csv,
+    and each table and figure. Finished trials are kept in OUT/work, so the same command continues
+    a comparison that was stopped, and one more law runs only its own trials. docs/grip.md
+    describes the trials and the numbers.
 
     Example:
       holdfast trial --out trials --quick
       holdfast trial --out trials --laws fixed,holdfast --n 12 --json
+      holdfast trial --out trials --engine dask:tcp://10.0.0.1:8786
     """
-    from holdfast.control.laws import LAWS, law_named
-    from holdfast.files import refuse_overwrite
-    from holdfast.model import Model
-    from holdfast.parallel import Engine
+    from holdfast.control.laws import LAWS
+    from holdfast.control.trial.experiment import COMPARISON, run_trials
+    from holdfast.control.trial.plan import TrialPlan
+    from holdfast.report.folder import check_output_folder
 
-    names = [name.strip() for name in laws.split(",")] if laws else list(LAWS)
-    for name in names:
-        law_named(name)
-    if n is not None and n < 1:
-        raise ValueError(f"--n: at least 1 trial expected, {n} given")
-    Model.load(model)
-    chosen = Engine.parse(engine, jobs)
-    out.mkdir(parents=True, exist_ok=True)
-    refuse_overwrite(out / "trial.json", force=force)
-    number = n or (N_QUICK_TRIALS if quick else N_TRIALS)
-    results = _run(names, number, seed, model, chosen)
-    document = _document(names, results, seed, model)
-    _write(out / "trial.json", document, force=force)
+    names = tuple(name.strip() for name in laws.split(",")) if laws else tuple(LAWS)
+    number = n if n is not None else N_QUICK_TRIALS if quick else N_TRIALS
+    plan = TrialPlan(names, number, seed, model)
+    check_output_folder(out, COMPARISON, force=force)
+    chosen = _engine(engine, jobs)
+    try:
+        document = run_trials(
+            plan, out, chosen, progress=progress, notify=print_message, force=force
+        )
+    except KeyboardInterrupt:
+        print_message(f"the finished trials are in {out}: the same command continues them")
+        raise
     if as_json:
         print_json(document)
     else:
         _print_table(document["laws"])
-        print_message(f"{out / 'trial.json'} written")
+        print_line(f"{out / 'report.html'}: all tables and figures, and the film of one trial")
 
 
-def _run(
-    laws: Sequence[str],
-    n: int,
-    seed: int,
-    model: str,
-    engine: Any,  # noqa: ANN401 (imported late)
-) -> "list[TrialResult]":
-    from holdfast.control.trial.run import run_trial
-    from holdfast.control.trial.trials import draw_trials
+def _engine(engine: str, jobs: int) -> "Engine":
+    """Return the engine, after a test whether it works.
 
-    calls = [(one, law, model) for one in draw_trials(n, seed) for law in laws]
-    results = []
-    with ProgressBar("trials", len(calls)) as bar:
-        for result in engine.map_ordered(run_trial, calls):
-            results.append(result)
-            bar.advance()
-    return results
+    Raises:
+        ValueError: there is no such engine, or `jobs` is 0.
+        EngineError: no cluster answers at the address.
+    """
+    from holdfast.parallel import Engine
 
-
-def _document(
-    laws: Sequence[str], results: "Sequence[TrialResult]", seed: int, model: str
-) -> dict[str, Any]:
-    import msgspec
-
-    from holdfast.control.trial.summary import summarize
-    from holdfast.report.environment import versions
-
-    by_law = {law: [one for one in results if one.law == law] for law in laws}
-    unseen = {law: [one for one in each if one.unseen] for law, each in by_law.items()}
-    return {
-        "laws": {law: summarize(each) for law, each in by_law.items()},
-        "unseen_objects": {law: summarize(each) for law, each in unseen.items()},
-        "trials": msgspec.json.decode(msgspec.json.encode(results)),
-        "model": model,
-        "seed": seed,
-        "versions": versions(),
-    }
-
-
-def _write(path: Path, document: Mapping[str, Any], *, force: bool) -> None:
-    from holdfast.files import write_whole
-
-    write_whole(path, json.dumps(document, indent=1).encode(), force=force)
+    if jobs == 0:
+        raise ValueError("jobs other than 0 expected, 0 given")
+    chosen = Engine.parse(engine, jobs)
+    if chosen.scheduler is not None:
+        list(chosen.map_ordered(abs, [(0,)]))
+    return chosen
 
 
 def _print_table(laws: Mapping[str, Mapping[str, Any]]) -> None:
-    """Print a row for each law; unlimited values as `inf`."""
+    """Print a row for each law; infinite values as `inf`, unknown ones as `-`."""
     print_line(
         f"{'law':16}{'n':>5}{'dropped':>9}{'slip':>9}{'reaction':>10}{'force':>7}{'false':>8}"
     )
@@ -127,14 +103,18 @@ def _print_table(laws: Mapping[str, Mapping[str, Any]]) -> None:
     for law, row in laws.items():
         numbers = [
             _text(row["dropped"], 1.0, 9, 1),
-            _text(row["slip_median"], 1e3, 9, 2),
-            _text(row["reaction_median"], 1e3, 10, 0),
+            _text(row["slip_median"], 1e3, 9, 2, infinite=row["n"] > 0),
+            _text(row["reaction_median"], 1e3, 10, 0, infinite=row["n_slipped"] > 0),
             _text(row["force_ratio_mean"], 1.0, 7, 2),
             _text(row["false_reactions_per_minute"], 1.0, 8, 1),
         ]
         print_line(f"{law:16}{row['n']:5}{''.join(numbers)}")
 
 
-def _text(number: Mapping[str, Any], factor: float, width: int, digits: int) -> str:
+def _text(
+    number: Mapping[str, Any], factor: float, width: int, digits: int, *, infinite: bool = False
+) -> str:
     value = number["value"]
-    return f"{'inf':>{width}}" if value is None else f"{factor * value:{width}.{digits}f}"
+    if value is None:
+        return f"{'inf' if infinite else '-':>{width}}"
+    return f"{factor * value:{width}.{digits}f}"

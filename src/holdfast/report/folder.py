@@ -9,7 +9,6 @@ import msgspec
 
 from holdfast.errors import OutputError
 from holdfast.report.html_report import Section, html_report
-from holdfast.report.images import png_of, svg_of
 from holdfast.report.result_tables import ResultTable, to_csv, to_json
 from holdfast.report.table_layouts import to_latex, to_markdown
 
@@ -135,9 +134,9 @@ def _write_tables_and_figures(folder: Path, sections: Sequence[Section]) -> None
     for section in sections:
         for table in section.tables:
             _write_table(folder / "tables", table)
-        for name, _, figure in section.figures:
-            (folder / "figures" / f"{name}.svg").write_text(svg_of(figure, name), encoding="utf-8")
-            (folder / "figures" / f"{name}.png").write_bytes(png_of(figure))
+        for figure in section.figures:
+            for suffix, data in figure.files().items():
+                (folder / "figures" / f"{figure.name}.{suffix}").write_bytes(data)
 
 
 def _write_table(folder: Path, table: ResultTable) -> None:

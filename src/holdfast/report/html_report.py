@@ -6,7 +6,7 @@ from typing import NamedTuple
 
 from matplotlib.figure import Figure
 
-from holdfast.report.images import InlineImage, inline_image
+from holdfast.report.images import InlineImage, inline_image, png_of, svg_of
 from holdfast.report.rendering import render
 from holdfast.report.result_tables import FILE_NAME, ResultTable
 from holdfast.report.table_layouts import TableText, table_text
@@ -31,11 +31,42 @@ class ReportFigure(NamedTuple):
     @property
     def title(self) -> str:
         """First sentence of the caption."""
-        return self.caption.split(". ", maxsplit=1)[0].rstrip(".")
+        return _first_sentence(self.caption)
 
     def image(self) -> InlineImage:
         """Draw the figure for an HTML document."""
         return inline_image(self.figure, self.name)
+
+    def files(self) -> dict[str, bytes]:
+        """Return the content of each file of the figure, by suffix."""
+        return {"svg": svg_of(self.figure, self.name).encode(), "png": png_of(self.figure)}
+
+
+class ReportFilm(NamedTuple):
+    """A film of the report, which plays again and again.
+
+    Attributes:
+        name: of its file: letters, digits, "-" and "_".
+        caption: what it shows; the first sentence is its title in the contents.
+        film: content of an animated WebP file.
+    """
+
+    name: str
+    caption: str
+    film: bytes
+
+    @property
+    def title(self) -> str:
+        """First sentence of the caption."""
+        return _first_sentence(self.caption)
+
+    def image(self) -> InlineImage:
+        """Return the film for an HTML document."""
+        return InlineImage.of(self.film, "webp")
+
+    def files(self) -> dict[str, bytes]:
+        """Return the content of its file, by suffix."""
+        return {"webp": self.film}
 
 
 class Section(NamedTuple):
@@ -52,7 +83,7 @@ class Section(NamedTuple):
     title: str
     text: str
     tables: Sequence[ResultTable] = ()
-    figures: Sequence[ReportFigure] = ()
+    figures: Sequence[ReportFigure | ReportFilm] = ()
 
 
 class Paragraph(NamedTuple):
@@ -68,7 +99,7 @@ class NumberedSection(NamedTuple):
     title: str
     paragraphs: list[Paragraph]
     tables: list[tuple[int, TableText]]
-    figures: list[tuple[int, ReportFigure]]
+    figures: list[tuple[int, ReportFigure | ReportFilm]]
 
 
 def html_report(title: str, facts: Mapping[str, object], sections: Sequence[Section]) -> str:
@@ -109,6 +140,10 @@ def check_names(sections: Sequence[Section]) -> None:
     for name in figures:
         if not FILE_NAME.fullmatch(name):
             raise ValueError(f"a figure's name is letters, digits, - and _; {name!r} given")
+
+
+def _first_sentence(text: str) -> str:
+    return text.split(". ", maxsplit=1)[0].rstrip(".")
 
 
 def _numbered(sections: Sequence[Section]) -> list[NumberedSection]:

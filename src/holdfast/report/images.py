@@ -3,7 +3,7 @@
 import base64
 import io
 import re
-from typing import NamedTuple
+from typing import NamedTuple, Self
 
 import matplotlib as mpl
 from matplotlib.figure import Figure
@@ -47,13 +47,20 @@ class InlineImage(NamedTuple):
 
     Attributes:
         view_box: of the `svg` element.
-        svg: contents of the `svg` element and its end; empty if the image is a PNG.
-        png: of an `img` element, in base64; empty if the image is an SVG.
+        svg: contents of the `svg` element and its end; empty if the image is of another kind.
+        data: of an `img` element, in base64; empty if the image is an SVG.
+        kind: of the data: "png" or "webp".
     """
 
     view_box: str
     svg: str
-    png: str
+    data: str
+    kind: str = "png"
+
+    @classmethod
+    def of(cls, data: bytes, kind: str) -> Self:
+        """Return the image for the content of a file."""
+        return cls("", "", base64.b64encode(data).decode(), kind)
 
 
 def inline_image(figure: Figure, name: str) -> InlineImage:
@@ -66,7 +73,7 @@ def inline_image(figure: Figure, name: str) -> InlineImage:
     view_box, svg = _svg_contents(svg_of(figure, name), name)
     if len(svg) <= MAX_INLINE_SVG:
         return InlineImage(view_box, svg, "")
-    return InlineImage("", "", base64.b64encode(png_of(figure)).decode())
+    return InlineImage.of(png_of(figure), "png")
 
 
 def _svg_contents(document: str, name: str) -> tuple[str, str]:

@@ -85,3 +85,13 @@ class TestCompare:
         quiet = [result(number=k, slipped=False, reaction=math.nan) for k in range(2)]
         found = compare(quiet, [result(number=0), result(number=1)])
         assert found["reacted_sooner"] == {"value": None, "interval": None}
+
+
+def test_rates_of_false_reactions_may_have_other_quiet_times():
+    ours = [result(number=k, n_false=1, quiet_time=3.0) for k in range(3)]
+    theirs = [result(number=k, n_false=1, quiet_time=1.5) for k in range(3)]
+    found = compare(ours, theirs)["false_reactions_per_minute"]
+    assert found["value"] == pytest.approx(-20.0)
+    assert found["interval"] == pytest.approx([-20.0, -20.0])
+    nothing = compare([], [])["false_reactions_per_minute"]
+    assert nothing == {"value": None, "interval": None}

@@ -22,8 +22,8 @@ Summary = dict[str, Any]
 def summarize(results: Sequence[TrialResult]) -> Summary:
     """Return the numbers of one law, as `trial.json` has them.
 
-    Trials whose object was lost before the load, or in which the loop had not begun by then,
-    are counted in `n_not_held`, and in nothing else.
+    Trials whose object was lost before the load and before the loop had begun are counted in
+    `n_not_held`, and in nothing else.
 
     Returns:
         `n`, `n_not_held`, `n_slipped`, `dropped` [%], `slip_median` [m], `reaction_median` [s],
@@ -98,11 +98,25 @@ def compare(results: Sequence[TrialResult], others: Sequence[TrialResult]) -> Su
         "peak_ratio_mean": _ratio(
             [one.peak_ratio - other.peak_ratio for one, other in pairs], ones
         ),
-        "false_reactions_per_minute": _ratio(
-            [60.0 * (one.n_false - other.n_false) for one, other in pairs],
-            [one.quiet_time for one, _ in pairs],
-        ),
+        "false_reactions_per_minute": _false_reactions(pairs),
     }
+
+
+def _false_reactions(pairs: Sequence[tuple[TrialResult, TrialResult]]) -> Summary:
+    """Return the difference of the rates of false reactions [1/min]; quiet times may differ."""
+    counts = np.array([[60.0 * one.n_false, one.quiet_time, 60.0 * other.n_false, other.quiet_time]
+                       for one, other in pairs]).reshape(-1, 4)  # fmt: skip
+
+    def statistic(draws: Array) -> Array:
+        sums = draws @ counts
+        known = (sums[:, 1] > 0) & (sums[:, 3] > 0)
+        rates = sums[known]
+        difference = np.full(len(sums), np.nan)
+        difference[known] = rates[:, 0] / rates[:, 1] - rates[:, 2] / rates[:, 3]
+        return difference
+
+    value = float(statistic(np.ones((1, len(counts))))[0])
+    return _number(value, bootstrap_interval(statistic, len(counts)))
 
 
 def _share(hits: Sequence[bool]) -> Summary:
