@@ -4,7 +4,12 @@ There is no fast-math, so a result does not depend on how many samples are compu
 The cache does not follow imports: after a change of a kernel, delete it (see CONTRIBUTING).
 """
 
+from collections.abc import Callable
+from typing import Any, TypeVar, cast
+
 import numba
+
+Function = TypeVar("Function", bound=Callable[..., Any])
 
 compiled = numba.njit(cache=True, error_model="numpy")
 compiled_parallel = numba.njit(cache=True, error_model="numpy", parallel=True)
@@ -12,3 +17,23 @@ compiled_inside = numba.njit(cache=True, error_model="numpy", forceinline=True)
 """Compile a step into the loops that call it: a call costs as much as the step."""
 inlined = numba.njit(error_model="numpy", inline="always")
 """Inline a step that receives all arrays: passing them costs as much as the step."""
+
+
+def compiled_step(function: Function) -> Function:
+    """Compile a step that allocates no array and returns none, without reference counts.
+
+    Otherwise numba counts each use of each array, which takes longer than the arithmetic. Copy
+    arrays element by element in such a step: a slice assigned to a slice allocates.
+    """
+    return _compile(function, counts=False)
+
+
+def compiled_view(function: Function) -> Function:
+    """Compile a function that returns an array, for use in a step without reference counts."""
+    return _compile(function, counts=True)
+
+
+def _compile(function: Function, *, counts: bool) -> Function:
+    options: dict[str, Any] = {"_nrt": counts}  # numba's annotations lack it
+    compile_it: Any = numba.njit(cache=True, error_model="numpy", **options)
+    return cast("Function", compile_it(function))

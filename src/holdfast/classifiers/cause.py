@@ -6,7 +6,7 @@ import msgspec
 import numpy as np
 
 from holdfast.classifiers.linear import Array
-from holdfast.compiled import compiled
+from holdfast.compiled import compiled_step
 from holdfast.contact import Cause
 from holdfast.errors import ModelError
 
@@ -75,7 +75,7 @@ class CauseClassifier(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
         return found
 
 
-@compiled
+@compiled_step
 def add_scores(features: Array, weights: Array, scores: Array) -> int:
     """Add the scores of a sample to the sums. Return the code of the cause with the largest.
 

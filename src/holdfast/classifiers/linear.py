@@ -6,7 +6,7 @@ import msgspec
 import numpy as np
 import numpy.typing as npt
 
-from holdfast.compiled import compiled
+from holdfast.compiled import compiled_step
 from holdfast.errors import ModelError
 
 Array = npt.NDArray[np.float64]
@@ -107,7 +107,7 @@ def feature_rows(features: npt.ArrayLike, n_features: int) -> Array:
     return rows
 
 
-@compiled
+@compiled_step
 def linear_probability(features: Array, weights: Array) -> float:
     """Return the logistic function of the weighted sum, for offline and live detection."""
     value = weights[0]
@@ -116,7 +116,7 @@ def linear_probability(features: Array, weights: Array) -> float:
     return 1.0 / (1.0 + math.exp(-value))
 
 
-@compiled
+@compiled_step
 def _probabilities(features: Array, weights: Array, out: Array) -> None:
     for k in range(len(features)):
         out[k] = linear_probability(features[k], weights)

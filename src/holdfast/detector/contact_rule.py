@@ -7,7 +7,7 @@ that is released and relaxes.
 import math
 
 from holdfast import contact
-from holdfast.compiled import compiled, inlined
+from holdfast.compiled import compiled_step, inlined
 from holdfast.features.arrays import (
     AMPLITUDE,
     MEAN,
@@ -54,7 +54,7 @@ CALM_RATIO = 3.0
 """A finger is calm while sigma is at most this many times the sigma of noise alone."""
 
 
-@compiled
+@compiled_step
 def contact_threshold(noise: float, limits: Array) -> float:
     """Return the threshold of contact of F_a; NaN, which no value is under, if there is none."""
     if math.isnan(limits[CONTACT]):
@@ -62,7 +62,7 @@ def contact_threshold(noise: float, limits: Array) -> float:
     return float(limits[CONTACT])
 
 
-@compiled
+@compiled_step
 def is_at_rest(motion: Array, limit: float, latest: int, time: float) -> bool:
     """Return whether a finger is without contact: its load is small, and its force is at rest.
 
@@ -97,7 +97,7 @@ def is_empty(load: float, decided: Array, threshold: float, latest: int, time: f
     return bool(_is_unloaded(load, peak, threshold, latest))
 
 
-@compiled
+@compiled_step
 def _is_unloaded(load: float, peak: float, threshold: float, latest: int) -> bool:
     """Return whether a load is below the threshold of contact, which is lower while in contact.
 
@@ -135,7 +135,7 @@ def update_load(values: Array, decided: Array, quiet: float, time: float, period
     return load
 
 
-@compiled
+@compiled_step
 def follow(values: Array, decided: Array, period: float) -> None:
     """Let the force without contact follow slowly."""
     share = min(1.0, period / FOLLOW_SECONDS)
@@ -143,7 +143,7 @@ def follow(values: Array, decided: Array, period: float) -> None:
         decided[REST + axis] += share * (values[axis] - decided[REST + axis])
 
 
-@compiled
+@compiled_step
 def has_drifted(
     load: float,
     values: Array,

@@ -10,7 +10,7 @@ import numpy.typing as npt
 from holdfast import contact
 from holdfast.classifiers.cause import CAUSES, add_scores
 from holdfast.classifiers.linear import linear_probability
-from holdfast.compiled import compiled, inlined
+from holdfast.compiled import compiled_step, inlined
 from holdfast.detector.contact_rule import (
     CONTACT_LOAD,
     PEAK,
@@ -52,8 +52,8 @@ UNKNOWN, NO_CONTACT, UNSTABLE, STABLE = (
     contact.UNSTABLE,
     contact.STABLE,
 )
-_hand_state = compiled(contact.hand_state)
-_is_held = compiled(contact.is_held)
+_hand_state = compiled_step(contact.hand_state)
+_is_held = compiled_step(contact.is_held)
 
 # Columns of DecisionMemory.codes; LOAD is one of holdfast.detector.contact_rule.
 STATE = 0  # the state that is reported, as a code of holdfast.contact
@@ -169,7 +169,7 @@ def new_decision_memory(n_fingers: int, n_causes: int = 0) -> DecisionMemory:
     )
 
 
-@compiled
+@compiled_step
 def step(
     layout: Layout,
     memory: Memory,
@@ -286,7 +286,7 @@ def _decide(
     debounce(codes, decided, state, rule.min_duration, time, period)
 
 
-@compiled
+@compiled_step
 def _forget_cause(codes: Integers, scores: Array, finger: int) -> None:
     """Reset the cause of a finger that is not unstable."""
     codes[CAUSE] = 0
@@ -294,7 +294,7 @@ def _forget_cause(codes: Integers, scores: Array, finger: int) -> None:
         scores[finger, place] = 0.0
 
 
-@compiled
+@compiled_step
 def run(
     layout: Layout,
     memory: Memory,
@@ -323,18 +323,19 @@ def run(
         rows.hand[k] = step(
             layout, memory, output, rule, decision, readings[k], present[k], times[k]
         )
-        rows.state[k] = decision.codes[:, STATE]
-        rows.reason[k] = output.status[:, REASON]
-        rows.faults[k] = output.status[:, FAULTS]
-        rows.taxels[k] = output.status[:, TAXELS]
-        rows.probability[k] = decision.values[:, PROBABILITY]
-        for finger in range(len(decision.codes)):
-            if decision.codes[finger, STATE] == UNSTABLE:
-                rows.cause[k, finger] = decision.codes[finger, CAUSE]
-        rows.values[k] = output.values
+        for f in range(len(decision.codes)):
+            state = decision.codes[f, STATE]
+            rows.state[k, f] = state
+            rows.reason[k, f] = output.status[f, REASON]
+            rows.faults[k, f] = output.status[f, FAULTS]
+            rows.taxels[k, f] = output.status[f, TAXELS]
+            rows.probability[k, f] = decision.values[f, PROBABILITY]
+            rows.cause[k, f] = decision.codes[f, CAUSE] if state == UNSTABLE else 0
+            for column in range(VALUES_WIDTH):
+                rows.values[k, f, column] = output.values[f, column]
 
 
-@compiled
+@compiled_step
 def classify_contact(probability: float, threshold: float, hysteresis: float, reported: int) -> int:
     """Return STABLE from the threshold on. Hysteresis moves it away from the reported state."""
     if reported == STABLE:
@@ -344,7 +345,7 @@ def classify_contact(probability: float, threshold: float, hysteresis: float, re
     return STABLE if probability >= threshold else UNSTABLE
 
 
-@compiled
+@compiled_step
 def hold_unstable(state: int, decided: Array, hold: float, time: float, period: float) -> int:
     """Return UNSTABLE while it is held, else the state."""
     if state == UNSTABLE:
@@ -354,7 +355,7 @@ def hold_unstable(state: int, decided: Array, hold: float, time: float, period: 
     return state
 
 
-@compiled
+@compiled_step
 def debounce(
     codes: Integers, decided: Array, state: int, min_duration: float, time: float, period: float
 ) -> None:

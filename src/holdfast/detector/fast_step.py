@@ -14,7 +14,7 @@ from numba import types
 from numba.extending import intrinsic
 from numba.np.numpy_support import carray
 
-from holdfast.compiled import compiled
+from holdfast.compiled import compiled_step, compiled_view
 from holdfast.detector.decision_rule import (
     CAUSE,
     PROBABILITY,
@@ -46,7 +46,7 @@ def estimate_code(state: int, reason: int, faults: int) -> int:
     return state + 4 * reason + 32 * faults
 
 
-_estimate_code = compiled(estimate_code)
+_estimate_code = compiled_step(estimate_code)
 
 
 class StepArrays(NamedTuple):
@@ -102,51 +102,51 @@ def _cast(_typing: Any, address: Any) -> Any:  # noqa: ANN401 (numba's own objec
 _pointer: Any = intrinsic(_cast)
 
 
-@compiled
+@compiled_view
 def floats1(table: npt.NDArray[np.int64], i: int) -> npt.NDArray[np.float64]:
     """Return array i of the table: float64, one axis."""
     return carray(_pointer(table[i, 0]), (table[i, 1],), np.float64)
 
 
-@compiled
+@compiled_view
 def floats2(table: npt.NDArray[np.int64], i: int) -> npt.NDArray[np.float64]:
     """Return array i of the table: float64, two axes."""
     return carray(_pointer(table[i, 0]), (table[i, 1], table[i, 2]), np.float64)
 
 
-@compiled
+@compiled_view
 def floats3(table: npt.NDArray[np.int64], i: int) -> npt.NDArray[np.float64]:
     """Return array i of the table: float64, three axes."""
     shape = (table[i, 1], table[i, 2], table[i, 3])
     return carray(_pointer(table[i, 0]), shape, np.float64)
 
 
-@compiled
+@compiled_view
 def integers1(table: npt.NDArray[np.int64], i: int) -> npt.NDArray[np.int64]:
     """Return array i of the table: int64, one axis."""
     return carray(_pointer(table[i, 0]), (table[i, 1],), np.int64)
 
 
-@compiled
+@compiled_view
 def integers2(table: npt.NDArray[np.int64], i: int) -> npt.NDArray[np.int64]:
     """Return array i of the table: int64, two axes."""
     return carray(_pointer(table[i, 0]), (table[i, 1], table[i, 2]), np.int64)
 
 
-@compiled
+@compiled_view
 def integers3(table: npt.NDArray[np.int64], i: int) -> npt.NDArray[np.int64]:
     """Return array i of the table: int64, three axes."""
     shape = (table[i, 1], table[i, 2], table[i, 3])
     return carray(_pointer(table[i, 0]), shape, np.int64)
 
 
-@compiled
+@compiled_view
 def flags1(table: npt.NDArray[np.int64], i: int) -> npt.NDArray[np.bool_]:
     """Return array i of the table: bool, one axis."""
     return carray(_pointer(table[i, 0]), (table[i, 1],), np.bool_)
 
 
-@compiled
+@compiled_step
 def fast_step(table: Integers, time: float) -> int:
     """Process one sample as `step` does, and fill the report.
 

@@ -11,7 +11,7 @@ import math
 
 import numpy as np
 
-from holdfast.compiled import compiled, inlined
+from holdfast.compiled import compiled_step, inlined
 from holdfast.features.arrays import (
     CHANGED_AT,
     FAULTY_TAXELS,
@@ -74,7 +74,7 @@ LOADED_SECONDS = 0.25
 """A pull for this long means that the tare was taken under load: nothing pulls a skin [s]."""
 
 
-@compiled
+@compiled_step
 def scan_readings(
     readings: Array, ignored: Flags, first: int, last: int
 ) -> tuple[float, float, float]:
@@ -100,7 +100,7 @@ def scan_readings(
     return sum_x + sum_y + sum_z, least, most
 
 
-@compiled
+@compiled_step
 def copy_readings(readings: Array, previous: Array, first: int, last: int) -> None:
     """Copy the readings of a finger. A copy by slices takes three times as long."""
     for i in range(np.uint64(first), np.uint64(last)):
@@ -111,7 +111,7 @@ def copy_readings(readings: Array, previous: Array, first: int, last: int) -> No
         )
 
 
-@compiled
+@compiled_step
 def taxels_outside(
     readings: Array, ignored: Flags, first: int, last: int, low: float, high: float
 ) -> int:
@@ -142,7 +142,7 @@ def track_changes(
     counts[f, N_SEEN] += 1
 
 
-@compiled
+@compiled_step
 def is_stuck(counts: Integers, f: int, period: float) -> bool:
     """Return whether the readings of a finger stopped changing after they had changed."""
     n_steps = counts[f, N_SEEN] - 1 - counts[f, N_UNCHANGED]
@@ -151,7 +151,7 @@ def is_stuck(counts: Integers, f: int, period: float) -> bool:
     return bool(changed_often and counts[f, N_UNCHANGED] >= long and counts[f, N_CHANGES] >= long)
 
 
-@compiled
+@compiled_step
 def is_pulled(counts: Integers, levels: Array, f: int, normal: float, period: float) -> bool:
     """Return whether the normal readings show a pull, well above noise, for a long time.
 
@@ -167,7 +167,7 @@ def is_pulled(counts: Integers, levels: Array, f: int, normal: float, period: fl
     return bool(counts[f, N_PULLED] * period >= LOADED_SECONDS)
 
 
-@compiled
+@compiled_step
 def _differ(readings: Array, previous: Array, first: int, last: int) -> bool:
     for i in range(first, last):
         for axis in range(3):
@@ -206,7 +206,7 @@ def _find_taxel_faults(
             counts[f, FAULTY_TAXELS] |= bit_of(loudest - first)
 
 
-@compiled
+@compiled_step
 def _update_taxels(
     readings: Array,
     previous: Array,
@@ -270,18 +270,18 @@ def _update_taxels(
     return any_still, largest >= LONE_SHARE * total, loudest
 
 
-@compiled
+@compiled_step
 def _has_reading(readings: Array, i: int) -> bool:
     """Return False for zeros: a sensor with a dead band jumps to and from zero without noise."""
     return bool(readings[i, 0] != 0.0 or readings[i, 1] != 0.0 or readings[i, 2] != 0.0)
 
 
-@compiled
+@compiled_step
 def _reset_change(taxels: Array, i: int) -> None:
     taxels[i, LAST_CHANGE] = taxels[i, LAST_CHANGE + 1] = taxels[i, LAST_CHANGE + 2] = 0.0
 
 
-@compiled
+@compiled_step
 def _reset_noise(taxels: Array, first: int, last: int) -> None:
     """Reset the noise of the taxels after a gap, over which a change is no noise."""
     for i in range(first, last):
@@ -289,7 +289,7 @@ def _reset_noise(taxels: Array, first: int, last: int) -> None:
         taxels[i, FIRST_POWER] = taxels[i, SECOND_POWER] = 0.0
 
 
-@compiled
+@compiled_step
 def _is_noisy(taxels: Array, i: int, quiet: float) -> bool:
     """Return whether a taxel that has most of the second differences is noisy.
 
@@ -302,7 +302,7 @@ def _is_noisy(taxels: Array, i: int, quiet: float) -> bool:
     return bool(white and taxels[i, SECOND_POWER] > 6.0 * (LOUD_RATIO * quiet) ** 2)
 
 
-@compiled
+@compiled_step
 def _still_taxels(
     taxels: Array,
     ignored: Flags,
@@ -343,12 +343,12 @@ def _still_taxels(
     return (faults, bits) if n_moving >= MOVING_SHARE * n_used else (0, 0)
 
 
-@compiled
+@compiled_step
 def _was_busy(changed: float, changed_at: float, long: float) -> bool:
     return bool(changed >= long and changed > BUSY_SHARE * changed_at)
 
 
-@compiled
+@compiled_step
 def bit_of(taxel: int) -> int:
     """Return the bit of a taxel in a mask; 0 for a taxel that the mask cannot hold."""
     return 1 << taxel if taxel < N_MASK_BITS else 0

@@ -7,7 +7,7 @@ import numba
 import numpy as np
 import numpy.typing as npt
 
-from holdfast.compiled import compiled, compiled_parallel
+from holdfast.compiled import compiled_parallel, compiled_step
 from holdfast.errors import RecordingError
 from holdfast.features.arrays import Array
 from holdfast.features.tare import Tare, TareArgument, baseline_of, offline_tare
@@ -140,7 +140,7 @@ def rest_amplitude(module: Tactile, tare: Tare, rate: float) -> Array:
     return amplitude[np.isfinite(amplitude)]
 
 
-@compiled
+@compiled_step
 def sum_taxels(
     readings: Array, baseline: Array, rotations: Array, first: int, last: int
 ) -> tuple[float, float, float, float]:

@@ -6,7 +6,7 @@ import numba
 import numpy as np
 import numpy.typing as npt
 
-from holdfast.compiled import compiled, compiled_parallel
+from holdfast.compiled import compiled_parallel, compiled_step
 
 Array = npt.NDArray[np.float64]
 
@@ -66,7 +66,7 @@ def check_window(window: int) -> int:
     return int(window)
 
 
-@compiled
+@compiled_step
 def haar_windows(x: Array, window: int, m: Array, sigma: Array, scratch: Array) -> None:
     """Compute m and sigma of every window in x (equations 1 and 2).
 
@@ -103,7 +103,7 @@ def haar_windows(x: Array, window: int, m: Array, sigma: Array, scratch: Array) 
         sigma[k] = math.sqrt(sigma[k] / (2.0 * window))
 
 
-@compiled
+@compiled_step
 def haar_window(x: Array, window: int) -> tuple[float, float]:
     """Return m and sigma of one window, by the same sums in the same order as `haar_windows`.
 

@@ -9,7 +9,7 @@ import math
 
 import numpy as np
 
-from holdfast.compiled import compiled, inlined
+from holdfast.compiled import compiled_step, inlined
 from holdfast.features.arrays import (
     AFTER_GAP,
     AMPLITUDE,
@@ -86,7 +86,7 @@ NOISE_SECONDS = 0.5
 """Time over which the noise of a sensor is measured, where the tare takes no time [s]."""
 
 
-@compiled
+@compiled_step
 def advance(
     layout: Layout, memory: Memory, output: Output, readings: Array, present: Flags, time: float
 ) -> None:
@@ -180,7 +180,7 @@ def _update_tare(layout: Layout, memory: Memory, readings: Array, f: int, elapse
     return bool(update_baseline(readings, memory.baseline, counts, f, first, last, kind, running))
 
 
-@compiled
+@compiled_step
 def _measure_noise(layout: Layout, memory: Memory, readings: Array, f: int, complete: bool) -> None:
     """Measure the noise of a force component by the steps from sample to sample.
 
@@ -227,7 +227,7 @@ def _process_force(
     return READY, 0, 0
 
 
-@compiled
+@compiled_step
 def _append(
     history: Array, counts: Integers, values: Array, f: int, x: float, y: float, z: float
 ) -> None:
@@ -288,7 +288,7 @@ def _fill_features(layout: Layout, memory: Memory, output: Output, f: int) -> fl
     return total
 
 
-@compiled
+@compiled_step
 def _feature_of_other(layout: Layout, memory: Memory, f: int, place: int, other: int) -> float:
     """Return a feature of finger f for another finger; NaN where its stretch is too short."""
     kind, window = layout.specs[f, place, KIND], layout.specs[f, place, WINDOW]
@@ -301,7 +301,7 @@ def _feature_of_other(layout: Layout, memory: Memory, f: int, place: int, other:
     return float(_transform(value, transform, window, memory.levels[other, NOISE], floor))
 
 
-@compiled
+@compiled_step
 def _feature(kind: int, window: int, history: Array, counts: Integers, f: int) -> float:
     if kind < FIRST_WINDOWED:
         return float(history[f, kind, counts[f, HISTORY_END] - 1])
@@ -317,7 +317,7 @@ def _feature(kind: int, window: int, history: Array, counts: Integers, f: int) -
     return math.sqrt(total)
 
 
-@compiled
+@compiled_step
 def _moments(
     history: Array, counts: Integers, f: int, channel: int, window: int
 ) -> tuple[float, float]:
@@ -326,7 +326,7 @@ def _moments(
     return haar_window(history[f, channel, end - window : end], window)
 
 
-@compiled
+@compiled_step
 def _transform(value: float, transform: int, window: int, noise: float, floor: float) -> float:
     if transform == 0:
         return float(value)
@@ -336,13 +336,13 @@ def _transform(value: float, transform: int, window: int, noise: float, floor: f
     return math.log(max(value, 1e-3 * expected) / expected)
 
 
-@compiled
+@compiled_step
 def noise_sigma(noise: float, window: int) -> float:
     """Return the sigma that noise of a standard deviation gives."""
     return noise * math.sqrt((window - 2.0) / (2.0 * window))
 
 
-@compiled
+@compiled_step
 def _clear(values: Array, f: int) -> None:
     """Set the values of a finger to NaN."""
     for place in range(values.shape[1]):

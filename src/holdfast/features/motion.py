@@ -6,7 +6,7 @@ that they carry over from one hand to another. `docs/training.md` has the equati
 
 import math
 
-from holdfast.compiled import compiled, inlined
+from holdfast.compiled import compiled_step, inlined
 from holdfast.features.arrays import (
     BLOCK_SQUARES,
     BLOCK_START,
@@ -261,7 +261,7 @@ def _residual(
     return moved, pressed
 
 
-@compiled
+@compiled_step
 def _relative(square: float, noise_square: float, load: float) -> float:
     """Return log(v / load) of a change v, given v^2 with noise; at least log(LEAST_CHANGE)."""
     square = max(square - NOISE_SQUARES * noise_square, 0.0)

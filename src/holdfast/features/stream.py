@@ -8,7 +8,7 @@ from typing import NamedTuple, Self
 
 import numpy as np
 
-from holdfast.compiled import compiled
+from holdfast.compiled import compiled_step
 from holdfast.features import kernel
 from holdfast.features.arrays import (
     AMPLITUDE,
@@ -241,7 +241,7 @@ def extract(plan: StreamPlan, recording: Recording) -> dict[str, FingerFeatures]
     }
 
 
-@compiled
+@compiled_step
 def _extract(
     layout: Layout,
     memory: Memory,
@@ -254,8 +254,10 @@ def _extract(
 ) -> None:
     for k in range(len(times)):
         kernel.advance(layout, memory, output, readings[k], present[k], times[k])
-        features[k] = output.features
-        amplitude[k] = output.values[:, AMPLITUDE]
+        for f in range(features.shape[1]):
+            amplitude[k, f] = output.values[f, AMPLITUDE]
+            for place in range(features.shape[2]):
+                features[k, f, place] = output.features[f, place]
 
 
 def _layout(plan: StreamPlan) -> Layout:

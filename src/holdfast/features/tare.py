@@ -11,7 +11,7 @@ from typing import Any, Literal, Self
 import numpy as np
 import numpy.typing as npt
 
-from holdfast.compiled import compiled
+from holdfast.compiled import compiled_step
 from holdfast.features.arrays import N_TARED, TARE_FIRST, TARE_SECONDS, Array, Integers
 from holdfast.recordings import Tactile
 
@@ -155,7 +155,7 @@ def _mean(readings: npt.NDArray[Any], tare: Tare) -> Array:
     return np.asarray(np.add.accumulate(values, axis=0)[-1] / len(values))
 
 
-@compiled
+@compiled_step
 def update_baseline(
     readings: Array,
     baseline: Array,
@@ -178,14 +178,19 @@ def update_baseline(
         kind: code of the tare.
         running: whether the sample lies in the time of the tare.
     """
-    if kind == TARE_FIRST:
-        baseline[first:last] = readings[first:last]
-    elif kind == TARE_SECONDS:
-        if running:
-            baseline[first:last] += readings[first:last]
-            counts[f, N_TARED] += 1
-            return False
-        baseline[first:last] /= max(counts[f, N_TARED], 1)
+    taking = running and kind == TARE_SECONDS
+    n_taken = max(counts[f, N_TARED], 1)
+    for i in range(first, last):
+        for axis in range(3):
+            if kind == TARE_FIRST:
+                baseline[i, axis] = readings[i, axis]
+            elif taking:
+                baseline[i, axis] += readings[i, axis]
+            elif kind == TARE_SECONDS:
+                baseline[i, axis] /= n_taken
+    if taking:
+        counts[f, N_TARED] += 1
+        return False
     counts[f, N_TARED] = -1
     return True
 
