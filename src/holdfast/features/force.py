@@ -176,13 +176,13 @@ def _fill_forces(values: Array, baseline: Array, rotations: Array, force: Array)
         _fill_force(values[k], baseline, rotations, force[k])
 
 
-@compiled
+@compiled_step
 def _fill_forces_alone(values: Array, baseline: Array, rotations: Array, force: Array) -> None:
     for k in range(len(values)):
         _fill_force(values[k], baseline, rotations, force[k])
 
 
-@compiled
+@compiled_step
 def _fill_force(values: Array, baseline: Array, rotations: Array, force: Array) -> None:
     x, y, z, _ = sum_taxels(values, baseline, rotations, 0, len(baseline))
     if math.isfinite(x + y + z):
