@@ -2,7 +2,7 @@ import numba
 import numpy as np
 import pytest
 
-from holdfast.detector.fast_step import floats3, integers2, table_of
+from holdfast.detector.fast_step import estimate_code, floats3, integers2, split_code, table_of
 
 
 @numba.njit  # not kept: its cache would not follow the module that it tests
@@ -23,3 +23,8 @@ def test_refuses_arrays_with_holes():
     with pytest.raises(ValueError) as raised:
         table_of([np.zeros((4, 4))[:, ::2]])
     assert str(raised.value) == "contiguous arrays expected"
+
+
+@pytest.mark.parametrize("decision", [(0, 1, 0, 0), (2, 0, 8191, 6), (3, 4, 255, 0)])
+def test_a_code_is_split_as_it_was_made(decision):
+    assert split_code(estimate_code(*decision)) == decision

@@ -201,7 +201,13 @@ def step(
             _decide_unready(output, rule, decision, f, present[f], time, layout.period)
         elif present[f]:
             _decide(output, rule, decision, f, unloaded, time, layout.period)
-    return _hand_state(decision.codes[:, STATE], rule.n_model_fingers)
+    return hand_code(decision, rule)
+
+
+@compiled_step
+def hand_code(decision: DecisionMemory, rule: DecisionRule) -> int:
+    """Return the code of the hand's state."""
+    return int(_hand_state(decision.codes[:, STATE], rule.n_model_fingers))
 
 
 @inlined

@@ -9,7 +9,6 @@ import numpy.typing as npt
 
 from holdfast.classifiers.cause import CAUSES
 from holdfast.contact import (
-    SIGNAL_FAULTS,
     Cause,
     ContactEstimate,
     ContactState,
@@ -19,19 +18,21 @@ from holdfast.contact import (
     taxels_of,
 )
 from holdfast.detector.decision_rule import TraceRows
-from holdfast.detector.fast_step import estimate_code
+from holdfast.detector.fast_step import split_code
 from holdfast.features.arrays import SIGMA, Array
 
 STATES = tuple(ContactState)
 REASONS = tuple(Reason)
 CAUSES_BY_CODE: tuple[Cause | None, ...] = (None, *CAUSES)
-ESTIMATES: dict[float, tuple[ContactState, Reason, tuple[Fault, ...]]] = {
-    estimate_code(state.code, reason, mask): (state, REASONS[reason], faults_of(mask))
-    for state in STATES
-    for reason in range(len(REASONS))
-    for mask in range(1 << len(SIGNAL_FAULTS))
-}
-"""State, reason and faults by their common code."""
+
+
+Decision = tuple[ContactState, Reason, tuple[Fault, ...], Cause | None]
+
+
+def decision_of(code: float) -> Decision:
+    """Return state, reason, faults and cause of a code that the kernel reports."""
+    state, reason, faults, cause = split_code(int(code))
+    return STATES[state], REASONS[reason], faults_of(faults), CAUSES_BY_CODE[cause]
 
 
 class FingerTrace(NamedTuple):

@@ -5,10 +5,11 @@ and the probability, and one rule turns them into a state.
 """
 
 from collections import deque
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
 from math import inf
-from typing import Self
+from operator import itemgetter
+from typing import Any, Self
 
 import numpy as np
 import numpy.typing as npt
@@ -17,13 +18,26 @@ from numpy import ndarray
 from holdfast.contact import (
     ContactEstimate,
     ContactEvent,
+    ContactState,
     HandEstimate,
     StateChanges,
     taxels_of,
 )
 from holdfast.detector.decision_rule import TraceRows, new_decision_memory, rule_of, run
-from holdfast.detector.detection import CAUSES_BY_CODE, ESTIMATES, STATES, Detection, detection_of
-from holdfast.detector.fast_step import REPORT_WIDTH, StepArrays, fast_step
+from holdfast.detector.detection import (
+    STATES,
+    Decision,
+    Detection,
+    decision_of,
+    detection_of,
+)
+from holdfast.detector.fast_step import (
+    CHANGED,
+    REPORT_WIDTH,
+    UNREADABLE,
+    StepArrays,
+    compiled_fast_step,
+)
 from holdfast.errors import ModelError, StreamError
 from holdfast.features.arrays import TAXELS, Array
 from holdfast.features.stream import FeatureStream, StreamPlan
@@ -33,6 +47,7 @@ from holdfast.resampling import resample
 from holdfast.sensors import Sensor
 
 IgnoredTaxels = Mapping[str, Sequence[int]]
+States = tuple[ContactState, ...]
 HAND = "hand"
 """Name of the hand as a whole, beside the fingers of events and metrics."""
 MAX_EVENTS = 1000
@@ -116,9 +131,10 @@ class Detector:
             finger: (place, self._readings[taxels], (taxels.stop - taxels.start, 3))
             for place, (finger, taxels) in enumerate(stream.slices.items())
         }
+        self._arrays_of = _arrays_getter(stream.plan.fingers)
+        self._step = compiled_fast_step()
+        self._decisions: dict[float, Decision] = {}  # of the codes so far
         self._use(stream)
-        # Compile, and change nothing: no finger is present.
-        fast_step(self._table, 0.0)
 
     def _use(self, stream: FeatureStream) -> None:
         """Set a new feature stream, and an empty decision memory."""
@@ -131,6 +147,8 @@ class Detector:
         self._table, self._arrays = arrays.table()
         self._status = stream.output.status
         self._changes = StateChanges(self._names)
+        self._states: States = tuple(self._changes.states)
+        self._transitions: deque[tuple[float, States, States]] = deque(maxlen=MAX_EVENTS)
         self._last_time = -inf
         self._events: deque[ContactEvent] = deque(maxlen=MAX_EVENTS)
 
@@ -169,12 +187,19 @@ class Detector:
         time = float(time)
         if not self._last_time < time < inf:
             self._refuse_time(time)
-        self._store(samples)
+        code = UNREADABLE
+        if len(samples) == len(self._slots):
+            arrays = self._arrays_of(samples)
+            code = self._step(self._table, time, id(arrays))
+        if code == UNREADABLE:
+            self._store(samples)
+            code = self._step(self._table, time, 0)
         self._last_time = time
-        return self._estimate(time, fast_step(self._table, time))
+        return self._estimate(time, code)
 
     def events(self) -> list[ContactEvent]:
         """Return the changes of state since the last call, at most `MAX_EVENTS`, oldest first."""
+        self._settle_transitions()
         events = list(self._events)
         self._events.clear()
         return events
@@ -194,6 +219,7 @@ class Detector:
                 or begins before the last sample.
         """
         self._check_recording(recording)
+        self._settle_transitions()
         stream, chunks = self._stream, []
         for times, present, readings in stream.samples_of(recording):
             rows = TraceRows.empty(len(times), present.shape[1])
@@ -205,6 +231,7 @@ class Detector:
             self._events += self._changes.update_chunk(times, codes)
             self._last_time = float(times[-1])
             chunks.append((times, present, rows))
+        self._states = tuple(self._changes.states)
         return detection_of(recording.name, stream.plan.fingers, chunks)
 
     def _refuse_time(self, time: float) -> None:
@@ -233,10 +260,9 @@ class Detector:
             )
 
     def _store(self, samples: Mapping[str, npt.ArrayLike]) -> None:
-        """Copy the samples into the array that the kernel reads."""
+        """Copy the samples of some fingers, or of any type, into the kernel's array."""
         slots, flags = self._slots, self._flags
-        if len(samples) != len(slots):
-            flags[:] = bytes(len(flags))
+        flags[:] = bytes(len(flags))
         for finger, sample in samples.items():
             if finger not in slots:
                 raise StreamError(f"finger {finger!r} given; the model is for {', '.join(slots)}")
@@ -247,25 +273,37 @@ class Detector:
             slot[...] = values
             flags[place] = 1
 
-    def _estimate(self, time: float, hand_code: int) -> HandEstimate:
-        """Return the estimate that the kernel reported, and keep its changes as events."""
-        fingers = {}
-        changes, events = self._changes, self._events
-        previous = changes.states
-        for place, row in enumerate(self._report.tolist()):
-            sample_time, code, probability, sigma, x, y, z, cause = row
-            state, reason, faults = ESTIMATES[code]
-            taxels = taxels_of(int(self._status[place, TAXELS])) if faults else ()
-            if state is not previous[place]:
-                events.append(changes.change(place, state, time))
-            fingers[self._names[place]] = ContactEstimate(
-                sample_time, state, reason, probability, sigma, (x, y, z), faults, taxels,
-                CAUSES_BY_CODE[int(cause)],
-            )  # fmt: skip
-        hand = STATES[hand_code]
-        if hand is not previous[-1]:
-            events.append(changes.change(len(previous) - 1, hand, time))
+    def _estimate(self, time: float, code: int) -> HandEstimate:
+        """Return the estimate that the kernel reported, and note its changes of state."""
+        fingers, known = {}, self._decisions
+        for name, (at, number, probability, sigma, x, y, z) in zip(
+            self._slots, self._report.tolist(), strict=False
+        ):
+            state, reason, faults, cause = known.get(number) or self._decode(number)
+            taxels = self._faulty_taxels(name) if faults else ()
+            fingers[name] = ContactEstimate(
+                at, state, reason, probability, sigma, (x, y, z), faults, taxels, cause
+            )
+        hand = STATES[code % CHANGED]
+        if code >= CHANGED:
+            states = (*[finger.state for finger in fingers.values()], hand)
+            self._transitions.append((time, self._states, states))
+            self._states = states
         return HandEstimate(time, hand, fingers)
+
+    def _settle_transitions(self) -> None:
+        """Turn the changes of state of the last updates into events."""
+        for time, before, after in self._transitions:
+            self._changes.states = list(before)
+            self._events += self._changes.update(after, time)
+        self._transitions.clear()
+
+    def _decode(self, number: float) -> Decision:
+        self._decisions[number] = decision_of(number)
+        return self._decisions[number]
+
+    def _faulty_taxels(self, finger: str) -> tuple[int, ...]:
+        return taxels_of(int(self._status[self._slots[finger][0], TAXELS]))
 
 
 def detect(model: Model, recording: Recording) -> Detection:
@@ -293,6 +331,22 @@ def detect(model: Model, recording: Recording) -> Detection:
     if model.rate is not None and not model.rate_fits(recording.rate):
         recording = resample(recording, model.rate)
     return Detector.for_recording(model, recording).run(recording)
+
+
+def _arrays_getter(fingers: Sequence[str]) -> Callable[[Mapping[str, Any]], object]:
+    """Return a function that returns a tuple with the samples of all fingers, in their order.
+
+    It returns something else for a single finger, or if a finger is missing.
+    """
+    take = itemgetter(*fingers)
+
+    def arrays_of(samples: Mapping[str, Any]) -> object:
+        try:
+            return take(samples)
+        except KeyError:
+            return None
+
+    return arrays_of
 
 
 def _sensors_of(model: Model) -> dict[str, Sensor]:

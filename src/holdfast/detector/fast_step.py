@@ -5,13 +5,11 @@ a detector that is a fifth of an update. So `fast_step` receives one table of ad
 caller must keep the arrays, and must not resize or replace them while the table is in use.
 """
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from typing import Any, NamedTuple
 
 import numpy as np
 import numpy.typing as npt
-from numba import types
-from numba.extending import intrinsic
 from numba.np.numpy_support import carray
 
 from holdfast.compiled import compiled_step, compiled_view
@@ -22,8 +20,10 @@ from holdfast.detector.decision_rule import (
     UNSTABLE,
     DecisionMemory,
     DecisionRule,
+    hand_code,
     step,
 )
+from holdfast.detector.sample_arrays import KNOWN_TYPES, copy_samples, pointer
 from holdfast.features.arrays import (
     FAULTS,
     LAST_TIME,
@@ -38,15 +38,27 @@ from holdfast.features.arrays import (
 )
 
 MAX_AXES = 3
-REPORT_WIDTH = 8
+REPORT_WIDTH = 7
+CHANGED = 4
+"""Is added to the state of the hand if any state has changed."""
+UNREADABLE = -1
+"""Is returned instead of a state if a sample is in a form that `fast_step` cannot read."""
 
 
-def estimate_code(state: int, reason: int, faults: int) -> int:
-    """Return state, reason and faults as one number."""
-    return state + 4 * reason + 32 * faults
+@compiled_step
+def estimate_code(state: int, reason: int, faults: int, cause: int) -> int:
+    """Return state, reason, faults and cause as one number; `split_code` is the inverse."""
+    return state + 4 * (reason + 8 * (faults + 2**16 * cause))
 
 
-_estimate_code = compiled_step(estimate_code)
+def split_code(code: int) -> tuple[int, int, int, int]:
+    """Return state, reason, faults and cause.
+
+    Example:
+        >>> split_code(estimate_code(2, 0, 5, 3))
+        (2, 0, 5, 3)
+    """
+    return code % 4, code // 4 % 8, code // 32 % 2**16, code // 2**21
 
 
 class StepArrays(NamedTuple):
@@ -59,7 +71,7 @@ class StepArrays(NamedTuple):
     decision: DecisionMemory
     readings: Array  # (n_taxels, 3) of all fingers
     present: Flags  # (n_fingers,)
-    report: Array  # (n_fingers, REPORT_WIDTH) time, estimate code, probability, sigma, force, cause
+    report: Array  # (n_fingers, REPORT_WIDTH) time, estimate code, probability, sigma, force
 
     def table(self) -> tuple[Integers, list[npt.NDArray[Any]]]:
         """Return the table for `fast_step`, and the arrays that must live as long."""
@@ -72,7 +84,7 @@ class StepArrays(NamedTuple):
             integers, floats, *layout[:7], *self.memory[:7], *self.output,
             rule.weights, rule.n_weights, rule.limits, *self.decision[:2],
             self.readings, self.present, self.report,
-            *layout[11:], *self.memory[7:], rule.causes, self.decision.scores,
+            *layout[11:], *self.memory[7:], rule.causes, self.decision.scores, KNOWN_TYPES,
         ]  # fmt: skip
         return table_of(arrays), arrays
 
@@ -92,70 +104,63 @@ def table_of(arrays: Sequence[npt.NDArray[Any]]) -> npt.NDArray[np.int64]:
     return table
 
 
-def _cast(_typing: Any, address: Any) -> Any:  # noqa: ANN401 (numba's own objects)
-    def generate(context: Any, builder: Any, signature: Any, args: Any) -> Any:  # noqa: ANN401
-        return builder.inttoptr(args[0], context.get_value_type(signature.return_type))
-
-    return types.voidptr(address), generate
-
-
-_pointer: Any = intrinsic(_cast)
-
-
 @compiled_view
 def floats1(table: npt.NDArray[np.int64], i: int) -> npt.NDArray[np.float64]:
     """Return array i of the table: float64, one axis."""
-    return carray(_pointer(table[i, 0]), (table[i, 1],), np.float64)
+    return carray(pointer(table[i, 0]), (table[i, 1],), np.float64)
 
 
 @compiled_view
 def floats2(table: npt.NDArray[np.int64], i: int) -> npt.NDArray[np.float64]:
     """Return array i of the table: float64, two axes."""
-    return carray(_pointer(table[i, 0]), (table[i, 1], table[i, 2]), np.float64)
+    return carray(pointer(table[i, 0]), (table[i, 1], table[i, 2]), np.float64)
 
 
 @compiled_view
 def floats3(table: npt.NDArray[np.int64], i: int) -> npt.NDArray[np.float64]:
     """Return array i of the table: float64, three axes."""
     shape = (table[i, 1], table[i, 2], table[i, 3])
-    return carray(_pointer(table[i, 0]), shape, np.float64)
+    return carray(pointer(table[i, 0]), shape, np.float64)
 
 
 @compiled_view
 def integers1(table: npt.NDArray[np.int64], i: int) -> npt.NDArray[np.int64]:
     """Return array i of the table: int64, one axis."""
-    return carray(_pointer(table[i, 0]), (table[i, 1],), np.int64)
+    return carray(pointer(table[i, 0]), (table[i, 1],), np.int64)
 
 
 @compiled_view
 def integers2(table: npt.NDArray[np.int64], i: int) -> npt.NDArray[np.int64]:
     """Return array i of the table: int64, two axes."""
-    return carray(_pointer(table[i, 0]), (table[i, 1], table[i, 2]), np.int64)
+    return carray(pointer(table[i, 0]), (table[i, 1], table[i, 2]), np.int64)
 
 
 @compiled_view
 def integers3(table: npt.NDArray[np.int64], i: int) -> npt.NDArray[np.int64]:
     """Return array i of the table: int64, three axes."""
     shape = (table[i, 1], table[i, 2], table[i, 3])
-    return carray(_pointer(table[i, 0]), shape, np.int64)
+    return carray(pointer(table[i, 0]), shape, np.int64)
 
 
 @compiled_view
 def flags1(table: npt.NDArray[np.int64], i: int) -> npt.NDArray[np.bool_]:
     """Return array i of the table: bool, one axis."""
-    return carray(_pointer(table[i, 0]), (table[i, 1],), np.bool_)
+    return carray(pointer(table[i, 0]), (table[i, 1],), np.bool_)
 
 
 @compiled_step
-def fast_step(table: Integers, time: float) -> int:
+def fast_step(table: Integers, time: float, samples: int) -> int:
     """Process one sample as `step` does, and fill the report.
 
     Args:
         table: of `StepArrays.table`.
         time: of the sample [s].
+        samples: address of a tuple with the readings of every finger, which are copied first;
+            0 if the readings of some fingers are in the table already.
 
     Returns:
-        The code of the hand's state.
+        The code of the hand's state, plus `CHANGED` if any state has changed; or `UNREADABLE`,
+        and nothing has changed.
     """
     kind, numbers = integers1(table, 0), floats1(table, 1)
     layout = Layout(
@@ -163,6 +168,11 @@ def fast_step(table: Integers, time: float) -> int:
         floats2(table, 6), integers2(table, 7), flags1(table, 8), kind[2] != 0, kind[0],
         numbers[0], numbers[1], integers1(table, 27), floats2(table, 28), floats2(table, 29),
     )  # fmt: skip
+    readings, present, report = floats2(table, 24), flags1(table, 25), floats2(table, 26)
+    if samples != 0:
+        if not copy_samples(samples, layout.offsets, integers1(table, 37), readings):
+            return UNREADABLE
+        present[:] = True
     memory = Memory(
         floats2(table, 9), floats2(table, 10), floats2(table, 11), floats3(table, 12),
         integers2(table, 13), floats2(table, 14), floats2(table, 15), floats3(table, 30),
@@ -174,15 +184,28 @@ def fast_step(table: Integers, time: float) -> int:
         numbers[2], numbers[3], numbers[4], kind[1],
     )  # fmt: skip
     decision = DecisionMemory(integers2(table, 22), floats2(table, 23), floats2(table, 36))
-    readings, present, report = floats2(table, 24), flags1(table, 25), floats2(table, 26)
+    before = hand_code(decision, rule)
+    for f in range(len(present)):
+        report[f, 1] = decision.codes[f, STATE]
     hand = step(layout, memory, output, rule, decision, readings, present, time)
+    changed = hand != before
     for f in range(len(present)):
         state, status = decision.codes[f, STATE], output.status[f]
+        changed |= report[f, 1] != state
+        cause = decision.codes[f, CAUSE] if state == UNSTABLE else 0
         report[f, 0] = memory.levels[f, LAST_TIME]
-        report[f, 1] = _estimate_code(state, status[REASON], status[FAULTS])
+        report[f, 1] = estimate_code(state, status[REASON], status[FAULTS], cause)
         report[f, 2] = decision.values[f, PROBABILITY]
         report[f, 3] = output.values[f, SIGMA]
         for axis in range(3):
             report[f, 4 + axis] = output.values[f, axis]
-        report[f, 7] = decision.codes[f, CAUSE] if state == UNSTABLE else 0
-    return hand
+    return hand + CHANGED * changed
+
+
+STEP_SIGNATURE = "int64(int64[:, ::1], float64, int64)"
+
+
+def compiled_fast_step() -> Callable[[Integers, float, int], int]:
+    """Return `fast_step` for its argument types: a call need not find them out."""
+    entry: Callable[[Integers, float, int], int] = fast_step.compile(STEP_SIGNATURE)
+    return entry

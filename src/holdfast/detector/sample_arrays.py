@@ -1,0 +1,116 @@
+"""Readings of Python's arrays, copied by a compiled step from the memory of the arrays.
+
+To unpack an array, NumPy and numba need 50 to 250 ns, more than the copy itself. So a compiled
+step receives the address of a tuple of arrays, and reads the fields of these objects where
+CPython and NumPy's C interface have them. It accepts exactly what it can read: a tuple, arrays
+of NumPy's own class, two axes of the right length, uint16 or float64, contiguous. For anything
+else it returns False before it has copied anything, also where an interpreter lays out its
+objects in another way, because their types are then not where they are expected.
+"""
+
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+from numba import types
+from numba.extending import intrinsic
+from numba.np.numpy_support import carray
+
+from holdfast.compiled import compiled_step, compiled_view
+from holdfast.features.arrays import Array, Integers
+
+WORD = 8
+"""Length of a field [bytes]."""
+# Fields of an object, in words.
+TYPE = 1
+FIRST_ITEM = 3  # of a tuple
+DATA, N_AXES, SHAPE, STRIDES, DTYPE = 2, 3, 4, 5, 7  # of an array
+OBJECT_WORDS = 8
+
+KNOWN_TYPES = np.array(
+    [id(tuple), id(np.ndarray), id(np.dtype(np.uint16)), id(np.dtype(np.float64))]
+)
+"""Addresses of the types that can be read; they live as long as the interpreter."""
+TUPLE, ARRAY, COUNTS, FLOATS = range(4)
+
+
+def _cast(_typing: Any, address: Any) -> Any:  # noqa: ANN401 (numba's own objects)
+    def generate(context: Any, builder: Any, signature: Any, args: Any) -> Any:  # noqa: ANN401
+        return builder.inttoptr(args[0], context.get_value_type(signature.return_type))
+
+    return types.voidptr(address), generate
+
+
+pointer: Any = intrinsic(_cast)
+"""Pointer to an address."""
+
+
+@compiled_view
+def _words(address: int, n: int) -> npt.NDArray[np.int64]:
+    return carray(pointer(address), (n,), np.int64)
+
+
+@compiled_view
+def _counts(address: int, n: int) -> npt.NDArray[np.uint16]:
+    return carray(pointer(address), (n, 3), np.uint16)
+
+
+@compiled_view
+def _floats(address: int, n: int) -> npt.NDArray[np.float64]:
+    return carray(pointer(address), (n, 3), np.float64)
+
+
+@compiled_step
+def copy_samples(samples: int, offsets: Integers, known: Integers, readings: Array) -> bool:
+    """Copy the readings of all fingers, if all of them are in a form that can be read.
+
+    Args:
+        samples: address of a tuple with one array for each finger.
+        offsets: (n_fingers + 1,) first taxel of each finger.
+        known: `KNOWN_TYPES`.
+        readings: (n_taxels, 3) of all fingers; are filled.
+
+    Returns:
+        Whether they were copied.
+    """
+    n_fingers = len(offsets) - 1
+    if _words(samples, OBJECT_WORDS)[TYPE] != known[TUPLE]:
+        return False
+    arrays = _words(samples + WORD * FIRST_ITEM, n_fingers)
+    for f in range(n_fingers):
+        if not _is_readable(arrays[f], offsets[f + 1] - offsets[f], known):
+            return False
+    for f in range(n_fingers):
+        _copy(_words(arrays[f], OBJECT_WORDS), offsets[f], offsets[f + 1], known, readings)
+    return True
+
+
+@compiled_step
+def _is_readable(address: int, n_taxels: int, known: Integers) -> bool:
+    """Return whether an object is an array of (n_taxels, 3) in a form that can be read."""
+    fields = _words(address, OBJECT_WORDS)
+    if fields[TYPE] != known[ARRAY]:
+        return False
+    size = 2 if fields[DTYPE] == known[COUNTS] else WORD
+    if size == WORD and fields[DTYPE] != known[FLOATS]:
+        return False
+    if fields[N_AXES] & 0xFFFFFFFF != 2 or fields[DATA] % size != 0:
+        return False
+    shape, strides = _words(fields[SHAPE], 2), _words(fields[STRIDES], 2)
+    fits = shape[0] == n_taxels and shape[1] == 3
+    return bool(fits and strides[0] == 3 * size and strides[1] == size)
+
+
+@compiled_step
+def _copy(fields: Integers, first: int, last: int, known: Integers, readings: Array) -> None:
+    n_taxels = last - first
+    if fields[DTYPE] == known[COUNTS]:
+        counts = _counts(fields[DATA], n_taxels)
+        for i in range(n_taxels):
+            for axis in range(3):
+                readings[first + i, axis] = counts[i, axis]
+    else:
+        values = _floats(fields[DATA], n_taxels)
+        for i in range(n_taxels):
+            for axis in range(3):
+                readings[first + i, axis] = values[i, axis]
