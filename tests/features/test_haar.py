@@ -1,3 +1,4 @@
+import math
 from itertools import pairwise
 
 import numpy as np
@@ -7,6 +8,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from holdfast.features import FEATURE_NAMES, haar_features
+from holdfast.features.haar import N_SUMS, append_pair, n_levels, newest_moments
 
 from . import naive
 
@@ -139,6 +141,20 @@ def test_any_chunking_gives_the_same_bits(n, half, cuts, seed):
         origin = max(start - window + 1, 0)
         pieces.append(haar_features(force[origin:stop], window)[start - origin :])
     assert np.array_equal(np.concatenate(pieces), haar_features(force, window), equal_nan=True)
+
+
+@pytest.mark.parametrize("longest", [2, 14, 34, 64])
+def test_a_stream_gives_the_same_bits_in_every_window(longest):
+    """Also where the memory is longer than the window."""
+    force, levels = walk(3 * longest), n_levels(longest)
+    amplitude = [math.sqrt(x * x + y * y + z * z) for x, y, z in force.tolist()]
+    expected = {w: haar_features(force, w)[:, 4:].tolist() for w in range(2, longest + 1, 2)}
+    blocks = np.full((longest, 1 + N_SUMS * levels), np.nan)
+    for k, pair in enumerate(pairwise(amplitude), start=1):
+        append_pair(*pair, blocks, k % longest, 1, levels)
+        for window, rows in expected.items():
+            if k >= window - 1:
+                assert newest_moments(blocks, k % longest, 1, window) == tuple(rows[k])
 
 
 forces = st.builds(walk, st.integers(30, 80), st.integers(0, 99), st.sampled_from([0.01, 1, 1e4]))

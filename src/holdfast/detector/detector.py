@@ -5,11 +5,11 @@ and the probability, and one rule turns them into a state.
 """
 
 from collections import deque
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from math import inf
 from operator import itemgetter
-from typing import Any, Self
+from typing import Self
 
 import numpy as np
 import numpy.typing as npt
@@ -127,11 +127,12 @@ class Detector:
         self._flags = bytearray(n_fingers)  # present fingers: an array is slower to write to
         self._present = np.frombuffer(self._flags, dtype=np.bool_)
         self._report = np.zeros((n_fingers, REPORT_WIDTH))
+        self._read_report = self._report.tolist
         self._slots = {
             finger: (place, self._readings[taxels], (taxels.stop - taxels.start, 3))
             for place, (finger, taxels) in enumerate(stream.slices.items())
         }
-        self._arrays_of = _arrays_getter(stream.plan.fingers)
+        self._take = itemgetter(*stream.plan.fingers)  # a tuple, unless the finger is single
         self._step = compiled_fast_step()
         self._decisions: dict[float, Decision] = {}  # of the codes so far
         self._use(stream)
@@ -189,8 +190,11 @@ class Detector:
             self._refuse_time(time)
         code = UNREADABLE
         if len(samples) == len(self._slots):
-            arrays = self._arrays_of(samples)
-            code = self._step(self._table, time, id(arrays))
+            try:
+                arrays = self._take(samples)
+                code = self._step(self._table, time, id(arrays))
+            except KeyError:
+                pass  # another finger, which is refused below
         if code == UNREADABLE:
             self._store(samples)
             code = self._step(self._table, time, 0)
@@ -277,7 +281,7 @@ class Detector:
         """Return the estimate that the kernel reported, and note its changes of state."""
         fingers, known = {}, self._decisions
         for name, (at, number, probability, sigma, x, y, z) in zip(
-            self._slots, self._report.tolist(), strict=False
+            self._slots, self._read_report(), strict=False
         ):
             state, reason, faults, cause = known.get(number) or self._decode(number)
             taxels = self._faulty_taxels(name) if faults else ()
@@ -331,22 +335,6 @@ def detect(model: Model, recording: Recording) -> Detection:
     if model.rate is not None and not model.rate_fits(recording.rate):
         recording = resample(recording, model.rate)
     return Detector.for_recording(model, recording).run(recording)
-
-
-def _arrays_getter(fingers: Sequence[str]) -> Callable[[Mapping[str, Any]], object]:
-    """Return a function that returns a tuple with the samples of all fingers, in their order.
-
-    It returns something else for a single finger, or if a finger is missing.
-    """
-    take = itemgetter(*fingers)
-
-    def arrays_of(samples: Mapping[str, Any]) -> object:
-        try:
-            return take(samples)
-        except KeyError:
-            return None
-
-    return arrays_of
 
 
 def _sensors_of(model: Model) -> dict[str, Sensor]:

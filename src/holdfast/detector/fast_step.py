@@ -76,7 +76,9 @@ class StepArrays(NamedTuple):
     def table(self) -> tuple[Integers, list[npt.NDArray[Any]]]:
         """Return the table for `fast_step`, and the arrays that must live as long."""
         layout, rule = self.layout, self.rule
-        integers = np.array([layout.tare_kind, rule.n_model_fingers, layout.alike], dtype=np.int64)
+        integers = np.array(
+            [layout.tare_kind, rule.n_model_fingers, layout.alike, layout.n_levels], dtype=np.int64
+        )
         floats = np.array(
             [layout.tare_seconds, layout.period, rule.hysteresis, rule.min_duration, rule.hold]
         )
@@ -84,7 +86,8 @@ class StepArrays(NamedTuple):
             integers, floats, *layout[:7], *self.memory[:7], *self.output,
             rule.weights, rule.n_weights, rule.limits, *self.decision[:2],
             self.readings, self.present, self.report,
-            *layout[11:], *self.memory[7:], rule.causes, self.decision.scores, KNOWN_TYPES,
+            *layout[11:14], *self.memory[7:12], rule.causes, self.decision.scores, KNOWN_TYPES,
+            self.memory.blocks,
         ]  # fmt: skip
         return table_of(arrays), arrays
 
@@ -167,6 +170,7 @@ def fast_step(table: Integers, time: float, samples: int) -> int:
         integers1(table, 2), floats3(table, 3), floats2(table, 4), integers3(table, 5),
         floats2(table, 6), integers2(table, 7), flags1(table, 8), kind[2] != 0, kind[0],
         numbers[0], numbers[1], integers1(table, 27), floats2(table, 28), floats2(table, 29),
+        kind[3],
     )  # fmt: skip
     readings, present, report = floats2(table, 24), flags1(table, 25), floats2(table, 26)
     if samples != 0:
@@ -177,6 +181,7 @@ def fast_step(table: Integers, time: float, samples: int) -> int:
         floats2(table, 9), floats2(table, 10), floats2(table, 11), floats3(table, 12),
         integers2(table, 13), floats2(table, 14), floats2(table, 15), floats3(table, 30),
         floats2(table, 31), floats3(table, 32), floats2(table, 33), floats3(table, 34),
+        floats3(table, 38),
     )  # fmt: skip
     output = Output(floats2(table, 16), floats2(table, 17), integers2(table, 18))
     rule = DecisionRule(
@@ -207,5 +212,6 @@ STEP_SIGNATURE = "int64(int64[:, ::1], float64, int64)"
 
 def compiled_fast_step() -> Callable[[Integers, float, int], int]:
     """Return `fast_step` for its argument types: a call need not find them out."""
-    entry: Callable[[Integers, float, int], int] = fast_step.compile(STEP_SIGNATURE)
+    dispatcher: Any = fast_step
+    entry: Callable[[Integers, float, int], int] = dispatcher.compile(STEP_SIGNATURE)
     return entry

@@ -62,6 +62,8 @@ KIND, WINDOW, TRANSFORM, SCOPE, SAME_AS = range(5)
 SIGMA_WINDOW, LONGEST_WINDOW = 0, 1
 READY_WINDOW = 2  # samples of a stretch from which on all features are known
 
+N_CHANNELS = 4  # of the history: F_a, F_x, F_y, F_z
+
 # Columns of Output.values: F_tip, then
 AMPLITUDE, MEAN, SIGMA = 3, 4, 5  # F_a, and m and sigma over the reported window
 VALUES_WIDTH = 6
@@ -117,6 +119,7 @@ class Layout(NamedTuple):
     lags: Integers  # (n_lags,) of relative features [samples], ascending; empty without any
     places: Array  # (n_taxels, 3) from the centroid of the used taxels, in radii of the patch
     normals: Array  # (n_fingers, 3)
+    n_levels: int  # sizes of blocks of pairs, see holdfast.features.haar
 
 
 class Memory(NamedTuple):
@@ -134,6 +137,7 @@ class Memory(NamedTuple):
     track: Array  # (n_fingers, TRACK_WIDTH, longest lag + 1), a ring
     motion: Array  # (n_fingers, MOTION_WIDTH)
     relative: Array  # (n_fingers, N_RELATIVE, n_lags) relative features of the last sample
+    blocks: Array  # (n_fingers, longest, n_channels * n_levels * 3) sums of blocks of pairs, a ring
 
 
 class Output(NamedTuple):

@@ -1,4 +1,15 @@
-"""The Haar window: one definition of m and sigma for whole arrays and for streams."""
+"""The Haar window: one definition of m and sigma for whole arrays and for streams.
+
+A window is cut into blocks of 1, 2, 4, ... pairs. The sums of a block come from its two halves,
+so that overlapping windows share them; each belongs to its own samples only, and no value is
+carried on. A window of 7 pairs consists of blocks of 4, 2 and 1 pairs, the newest being last.
+The sums of a block are P = sum (x_0 + x_1), D = sum (x_0 - x_1), and the sum of squares
+S = sum (x_0 - x_1 - D / n)^2 over its n pairs. Two blocks, of a and b pairs, give
+
+    P = P_a + P_b,    D = D_a + D_b,    S = S_a + S_b + (b D_a - a D_b)^2 / (a b (a + b))
+
+(Chan, Golub and LeVeque 1983), in which nothing cancels.
+"""
 
 import math
 
@@ -66,60 +77,177 @@ def check_window(window: int) -> int:
     return int(window)
 
 
+N_SUMS = 3
+"""Sums of a block: P, D and S."""
+_SCRATCH_ROWS = 2 * N_SUMS + 1
+
+
+def n_levels(window: int) -> int:
+    """Return the number of sizes of blocks in windows up to this one."""
+    return (window // 2).bit_length()
+
+
 @compiled_step
 def haar_windows(x: Array, window: int, m: Array, sigma: Array, scratch: Array) -> None:
     """Compute m and sigma of every window in x (equations 1 and 2).
 
-    The first window ends at x[window - 1]. Each window takes two passes. No value is carried
-    from one sample to the next: so there is no drift, any chunking gives the same bits, and a
-    value that is not finite makes exactly the windows with it NaN. The inner loops run over
-    windows, so that the compiler can vectorise them.
+    The first window ends at x[window - 1]. Any chunking gives the same bits, and a value that
+    is not finite makes exactly the windows with it so. The inner loops run over windows and
+    fill one array each, so that the compiler can vectorise them.
 
     Args:
         x: (n + window - 1,) values, contiguous.
         window: N_w.
         m: (n,) is filled.
         sigma: (n,) is filled.
-        scratch: (n,) is overwritten.
+        scratch: (_SCRATCH_ROWS, n + window - 1) is overwritten.
     """
-    n = len(m)
-    m[:] = 0.0
-    sigma[:] = 0.0
-    scratch[:] = 0.0
-    for j in range(0, window, 2):
-        older, newer = x[j : j + n], x[j + 1 : j + 1 + n]
-        for k in range(n):
-            m[k] += older[k] + newer[k]
-            scratch[k] += older[k] - newer[k]
+    n, n_pairs, length = len(m), window // 2, len(x) - 1
+    # P, D and S of the blocks that begin at each sample, of one size and of the next.
+    p, d, s = scratch[0], scratch[1], scratch[2]
+    next_p, next_d, next_s = scratch[3], scratch[4], scratch[5]
+    own_d = scratch[6, :n]
+    _add(x, x[1:], p[:length])
+    _subtract(x, x[1:], d[:length])
+    s[:] = 0.0
+    taken, size = 0, 1
+    while True:
+        if n_pairs & size:
+            start = 2 * (n_pairs - taken - size)
+            if taken == 0:
+                _copy(s[start:], sigma)
+                _copy(d[start:], own_d)
+                _copy(p[start:], m)
+            else:
+                _join(d[start:], s[start:], size, own_d, sigma, taken)
+                _add(p[start:], m, m)
+            taken += size
+        if taken == n_pairs:
+            break
+        step = 2 * size
+        length -= step
+        _join_equal(d, d[step:], s, s[step:], size, next_s[:length])
+        _add(d, d[step:], next_d[:length])
+        _add(p, p[step:], next_p[:length])
+        p, d, s, next_p, next_d, next_s = next_p, next_d, next_s, p, d, s
+        size = step
     for k in range(n):
-        m[k] /= math.sqrt(2.0) * window
-        scratch[k] /= window // 2
-    for j in range(0, window, 2):
-        older, newer = x[j : j + n], x[j + 1 : j + 1 + n]
-        for k in range(n):
-            deviation = older[k] - newer[k] - scratch[k]
-            sigma[k] += deviation * deviation
+        m[k] *= _m_factor(window)
     for k in range(n):
-        sigma[k] = math.sqrt(sigma[k] / (2.0 * window))
+        sigma[k] = math.sqrt(sigma[k] * _sigma_factor(window))
 
 
 @compiled_step
-def haar_window(x: Array, window: int) -> tuple[float, float]:
-    """Return m and sigma of one window, by the same sums in the same order as `haar_windows`.
+def _copy(values: Array, copied: Array) -> None:
+    for k in range(len(copied)):
+        copied[k] = values[k]
+
+
+@compiled_step
+def _add(older: Array, newer: Array, total: Array) -> None:
+    for k in range(len(total)):
+        total[k] = older[k] + newer[k]
+
+
+@compiled_step
+def _subtract(older: Array, newer: Array, difference: Array) -> None:
+    for k in range(len(difference)):
+        difference[k] = older[k] - newer[k]
+
+
+@compiled_step
+def _join(
+    older_d: Array, older_s: Array, n_older: int, newer_d: Array, newer_s: Array, n_newer: int
+) -> None:
+    """Add D and S of older blocks to those of the newer pairs of each window."""
+    factor = _join_factor(n_older, n_newer)
+    for k in range(len(newer_s)):
+        apart = n_newer * older_d[k] - n_older * newer_d[k]
+        newer_s[k] = older_s[k] + newer_s[k] + apart * apart * factor
+        newer_d[k] = older_d[k] + newer_d[k]
+
+
+@compiled_step
+def _join_equal(
+    older_d: Array, newer_d: Array, older_s: Array, newer_s: Array, size: int, joined: Array
+) -> None:
+    """Compute S of blocks of two equal halves."""
+    factor = 0.5 / size
+    for k in range(len(joined)):
+        apart = older_d[k] - newer_d[k]
+        joined[k] = older_s[k] + newer_s[k] + apart * apart * factor
+
+
+@compiled_step
+def _join_factor(n_older: int, n_newer: int) -> float:
+    return 1.0 / (n_older * n_newer * (n_older + n_newer)) if n_newer else 0.0
+
+
+@compiled_step
+def _m_factor(window: int) -> float:
+    return 1.0 / (math.sqrt(2.0) * window)
+
+
+@compiled_step
+def _sigma_factor(window: int) -> float:
+    return 0.5 / window
+
+
+@compiled_step
+def _row_before(row: int, n: int, length: int) -> int:
+    """Return the row of a ring n rows before another; faster than a remainder."""
+    return row - n if row >= n else row - n + length
+
+
+@compiled_step
+def append_pair(older: float, newer: float, blocks: Array, row: int, first: int, n: int) -> None:
+    """Append the blocks that end with a pair of a stream, by the sums of `haar_windows`.
 
     Args:
-        x: (window,) values.
+        older: the value before the newest.
+        newer: the newest value.
+        blocks: (longest window, columns) a ring; `N_SUMS` columns for each size of blocks.
+        row: of the newest value.
+        first: first column of the value.
+        n: number of sizes.
+    """
+    blocks[row, first], blocks[row, first + 1] = older + newer, older - newer
+    blocks[row, first + 2] = 0.0
+    size = 1
+    for column in range(first, first + N_SUMS * (n - 1), N_SUMS):
+        then = _row_before(row, 2 * size, len(blocks))
+        apart = blocks[then, column + 1] - blocks[row, column + 1]
+        both = blocks[then, column + 2] + blocks[row, column + 2]
+        for place in range(column, column + 2):
+            blocks[row, place + N_SUMS] = blocks[then, place] + blocks[row, place]
+        blocks[row, column + 2 + N_SUMS] = both + apart * apart * (0.5 / size)
+        size *= 2
+
+
+@compiled_step
+def newest_moments(blocks: Array, row: int, first: int, window: int) -> tuple[float, float]:
+    """Return m and sigma of the newest window of a stream, the same bits as `haar_windows`.
+
+    Args:
+        blocks: that `append_pair` filled.
+        row: of the newest value.
+        first: first column of the value.
         window: N_w.
     """
+    n_pairs = window // 2
     total = drift = spread = 0.0
-    for j in range(0, window, 2):
-        total += x[j] + x[j + 1]
-        drift += x[j] - x[j + 1]
-    drift /= window // 2
-    for j in range(0, window, 2):
-        deviation = x[j] - x[j + 1] - drift
-        spread += deviation * deviation
-    return total / (math.sqrt(2.0) * window), math.sqrt(spread / (2.0 * window))
+    taken, size, column = 0, 1, first
+    while taken < n_pairs:
+        if n_pairs & size:
+            then = _row_before(row, 2 * taken, len(blocks))
+            older = blocks[then, column + 1]
+            apart = taken * older - size * drift
+            both = blocks[then, column + 2] + spread
+            spread = both + apart * apart * _join_factor(size, taken)
+            total, drift = blocks[then, column] + total, older + drift
+            taken += size
+        size, column = 2 * size, column + N_SUMS
+    return total * _m_factor(window), math.sqrt(spread * _sigma_factor(window))
 
 
 @compiled_parallel
@@ -130,20 +258,30 @@ def fill_features(force: Array, window: int, out: Array) -> None:
     for block in numba.prange(max(n - window + _BLOCK_SAMPLES, 0) // _BLOCK_SAMPLES):
         start = window - 1 + block * _BLOCK_SAMPLES
         stop = min(start + _BLOCK_SAMPLES, n)
-        origin = start - window + 1
-        amplitude = np.empty(stop - origin)
-        for k in range(origin, stop):
-            x, y, z = force[k, 0], force[k, 1], force[k, 2]
-            amplitude[k - origin] = math.sqrt(x * x + y * y + z * z)
-        m = np.empty(stop - start)
-        sigma = np.empty(stop - start)
-        scratch = np.empty(stop - start)
+        amplitude = np.empty(stop - start + window - 1)
+        m, sigma = np.empty(stop - start), np.empty(stop - start)
+        scratch = np.empty((_SCRATCH_ROWS, len(amplitude)))
+        _fill_amplitude(force[start - window + 1 : stop], amplitude)
         haar_windows(amplitude, window, m, sigma, scratch)
-        for k in range(start, stop):
-            row = out[k]
-            if math.isfinite(sigma[k - start]):
-                row[0] = amplitude[k - origin]
-                row[1], row[2], row[3] = force[k, 0], force[k, 1], force[k, 2]
-                row[4], row[5] = m[k - start], sigma[k - start]
-            else:
-                row[:] = math.nan
+        _fill_rows(force[start:stop], amplitude[window - 1 :], m, sigma, out[start:stop])
+
+
+@compiled_step
+def _fill_amplitude(force: Array, amplitude: Array) -> None:
+    for k in range(len(amplitude)):
+        x, y, z = force[k, 0], force[k, 1], force[k, 2]
+        amplitude[k] = math.sqrt(x * x + y * y + z * z)
+
+
+@compiled_step
+def _fill_rows(force: Array, amplitude: Array, m: Array, sigma: Array, out: Array) -> None:
+    """Fill the rows of a block; NaN where a window is not finite."""
+    all_finite = True
+    for k in range(len(out)):
+        out[k, 0], out[k, 4], out[k, 5] = amplitude[k], m[k], sigma[k]
+        out[k, 1], out[k, 2], out[k, 3] = force[k, 0], force[k, 1], force[k, 2]
+        all_finite &= math.isfinite(m[k] + sigma[k])
+    if not all_finite:
+        for k in range(len(out)):
+            if not math.isfinite(m[k] + sigma[k]):
+                out[k, :] = math.nan

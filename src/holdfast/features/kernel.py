@@ -75,7 +75,7 @@ from holdfast.features.faults import (
     track_changes,
 )
 from holdfast.features.force import sum_taxels
-from holdfast.features.haar import haar_window
+from holdfast.features.haar import N_SUMS, append_pair, newest_moments
 from holdfast.features.motion import update_motion
 from holdfast.features.tare import update_baseline
 
@@ -206,6 +206,7 @@ def _process_force(
     first, last = layout.offsets[f], layout.offsets[f + 1]
     x, y, z, normal = sum_taxels(readings, memory.baseline, layout.rotations, first, last)
     _append(memory.history, counts, values, f, x, y, z)
+    _append_blocks(memory.history, memory.blocks, counts, f, layout.n_levels)
     if len(layout.lags):
         update_motion(layout, memory, readings, f, levels[f, LAST_TIME])
     if is_stuck(counts, f, layout.period):
@@ -215,7 +216,7 @@ def _process_force(
         return FAULT, faults, bits
     levels[f, MAX_AMPLITUDE] = max(levels[f, MAX_AMPLITUDE], values[f, AMPLITUDE])
     if counts[f, N_STRETCH] >= windows[f, SIGMA_WINDOW]:
-        found = _moments(memory.history, counts, f, 0, windows[f, SIGMA_WINDOW])
+        found = _moments(memory.blocks, counts, f, 0, windows[f, SIGMA_WINDOW])
         values[f, MEAN], values[f, SIGMA] = found
     if layout.tare_kind == TARE_SECONDS and is_pulled(counts, levels, f, normal, layout.period):
         faults |= TARE_LOADED
@@ -245,6 +246,15 @@ def _append(
     values[f, AMPLITUDE] = amplitude
 
 
+@compiled_step
+def _append_blocks(history: Array, blocks: Array, counts: Integers, f: int, n_levels: int) -> None:
+    """Append the blocks of pairs that end with the newest value, of each channel that needs it."""
+    end, width = counts[f, HISTORY_END], N_SUMS * n_levels
+    for channel in range(blocks.shape[2] // width):
+        older, newer = history[f, channel, end - 2], history[f, channel, end - 1]
+        append_pair(older, newer, blocks[f], end - 1 - blocks.shape[1], width * channel, n_levels)
+
+
 @inlined
 def _compute_own(layout: Layout, memory: Memory, output: Output, f: int) -> None:
     """Compute the features of a finger by itself; NaN where its stretch is too short."""
@@ -264,7 +274,7 @@ def _compute_own(layout: Layout, memory: Memory, output: Output, f: int) -> None
             if window == reported and kind < SIGMA_XYZ:
                 value = output.values[f, MEAN + kind - FIRST_WINDOWED]
             else:
-                value = _feature(kind, window, history, counts, f)
+                value = _feature(kind, window, history, memory.blocks, counts, layout.n_levels, f)
             noise, floor = levels[f, NOISE], floors[f, place]
             own[f, place] = _transform(value, specs[f, place, TRANSFORM], window, noise, floor)
 
@@ -296,34 +306,37 @@ def _feature_of_other(layout: Layout, memory: Memory, f: int, place: int, other:
         return float(memory.relative[other, kind - FIRST_RELATIVE, window])
     if memory.counts[other, N_STRETCH] < max(window, 1):
         return math.nan
-    value = _feature(kind, window, memory.history, memory.counts, other)
+    value = _feature(
+        kind, window, memory.history, memory.blocks, memory.counts, layout.n_levels, other
+    )
     transform, floor = layout.specs[f, place, TRANSFORM], layout.floors[f, place]
     return float(_transform(value, transform, window, memory.levels[other, NOISE], floor))
 
 
 @compiled_step
-def _feature(kind: int, window: int, history: Array, counts: Integers, f: int) -> float:
+def _feature(
+    kind: int, window: int, history: Array, blocks: Array, counts: Integers, n_levels: int, f: int
+) -> float:
     if kind < FIRST_WINDOWED:
         return float(history[f, kind, counts[f, HISTORY_END] - 1])
     if kind < SIGMA_XYZ:
-        return _moments(history, counts, f, 0, window)[kind - FIRST_WINDOWED]
+        return _moments(blocks, counts, f, 0, window)[kind - FIRST_WINDOWED]
     total, newest = 0.0, counts[f, HISTORY_END] - 1
     for axis in range(1, 4):
         if kind == CHANGE:
             value = history[f, axis, newest] - history[f, axis, newest + 1 - window]
         else:
-            value = _moments(history, counts, f, axis, window)[1]
+            value = _moments(blocks, counts, f, N_SUMS * n_levels * axis, window)[1]
         total += value * value
     return math.sqrt(total)
 
 
 @compiled_step
 def _moments(
-    history: Array, counts: Integers, f: int, channel: int, window: int
+    blocks: Array, counts: Integers, f: int, first: int, window: int
 ) -> tuple[float, float]:
     """Return m and sigma of the last `window` values; the stretch must have as many."""
-    end = counts[f, HISTORY_END]
-    return haar_window(history[f, channel, end - window : end], window)
+    return newest_moments(blocks[f], counts[f, HISTORY_END] - 1 - blocks.shape[1], first, window)
 
 
 @compiled_step

@@ -6,6 +6,8 @@ that they carry over from one hand to another. `docs/training.md` has the equati
 
 import math
 
+import numpy as np
+
 from holdfast.compiled import compiled_step, inlined
 from holdfast.features.arrays import (
     BLOCK_SQUARES,
@@ -104,7 +106,7 @@ def _append_sample(
     before = (now - 1) % length
     fx, fy, fz, weight, squares, moved = 0.0, 0.0, 0.0, 0.0, 0.0, 0.0
     cx, cy, cz, moment = 0.0, 0.0, 0.0, 0.0
-    for i in range(first, last):
+    for i in range(np.uint64(first), np.uint64(last)):
         x = readings[i, 0] - memory.baseline[i, 0]
         y = readings[i, 1] - memory.baseline[i, 1]
         z = readings[i, 2] - memory.baseline[i, 2]
@@ -159,7 +161,7 @@ def _update_load(layout: Layout, memory: Memory, f: int, now: int) -> None:
     if normal < motion[f, LEAST_NORMAL]:
         motion[f, LEAST_NORMAL] = normal
         motion[f, REFERENCE], motion[f, REFERENCE + 1], motion[f, REFERENCE + 2] = x, y, z
-        for i in range(layout.offsets[f], layout.offsets[f + 1]):
+        for i in range(np.uint64(layout.offsets[f]), np.uint64(layout.offsets[f + 1])):
             for axis in range(3):
                 memory.reference[i, axis] = memory.taxel_forces[now, i, axis]
         motion[f, TAXEL_LOAD] = 0.0
@@ -250,7 +252,7 @@ def _residual(
     forces = memory.taxel_forces
     nx, ny, nz = layout.normals[f, 0], layout.normals[f, 1], layout.normals[f, 2]
     moved, pressed = 0.0, 0.0
-    for i in range(layout.offsets[f], layout.offsets[f + 1]):
+    for i in range(np.uint64(layout.offsets[f]), np.uint64(layout.offsets[f + 1])):
         if not layout.ignored[i]:
             x = forces[now, i, 0] - forces[then, i, 0] - mx
             y = forces[now, i, 1] - forces[then, i, 1] - my

@@ -16,6 +16,7 @@ from holdfast.features.arrays import (
     CHANGED_AT,
     COUNTS_WIDTH,
     FIRST_TIME,
+    KIND,
     LAST_TIME,
     LEAST_NOISE,
     LEAST_TAXEL_NOISE,
@@ -23,10 +24,12 @@ from holdfast.features.arrays import (
     LONGEST_WINDOW,
     MOTION_WIDTH,
     MOVED_AT,
+    N_CHANNELS,
     N_RELATIVE,
     N_TARED,
     NOISE,
     REASON,
+    SIGMA_XYZ,
     STATUS_WIDTH,
     TARE,
     TARE_FIRST,
@@ -43,6 +46,7 @@ from holdfast.features.arrays import (
     Memory,
     Output,
 )
+from holdfast.features.haar import N_SUMS, n_levels
 from holdfast.features.specs import FeatureSpec, spec_codes
 from holdfast.features.tare import Tare, baseline_of
 from holdfast.recordings import Recording
@@ -295,6 +299,7 @@ def _layout(plan: StreamPlan) -> Layout:
         lags=np.array([max(1, round(lag * plan.rate)) for lag in lags], dtype=np.int64),
         places=np.concatenate([_places(s, i) for s, i in zip(sensors, ignored, strict=True)]),
         normals=np.array([sensor.normal for sensor in sensors], dtype=np.float64),
+        n_levels=n_levels(max(longest)),
     )
 
 
@@ -332,13 +337,14 @@ def _memory(layout: Layout) -> Memory:
     motion[:, [LEAST_NOISE, LEAST_TAXEL_NOISE]] = np.inf
     motion[:, BLOCK_START] = np.nan
     motion[:, MOVED_AT] = -np.inf
+    n_channels = N_CHANNELS if (layout.specs[:, :, KIND] == SIGMA_XYZ).any() else 1
     taxels = np.zeros((n_taxels, TAXELS_WIDTH))
     taxels[layout.ignored, CHANGED_AT] = np.inf  # never long ago
     return Memory(
         baseline=np.zeros((n_taxels, 3)),
         previous=np.zeros((n_taxels, 3)),
         taxels=taxels,
-        history=np.zeros((n_fingers, 4, 2 * longest)),
+        history=np.zeros((n_fingers, N_CHANNELS, 2 * longest)),
         counts=np.zeros((n_fingers, COUNTS_WIDTH), dtype=np.int64),
         levels=levels,
         own=np.full((n_fingers, layout.specs.shape[1]), np.nan),
@@ -347,6 +353,7 @@ def _memory(layout: Layout) -> Memory:
         track=np.zeros((n_fingers, TRACK_WIDTH, length)),
         motion=motion,
         relative=np.full((n_fingers, N_RELATIVE, len(layout.lags)), np.nan),
+        blocks=np.zeros((n_fingers, longest, n_channels * layout.n_levels * N_SUMS)),
     )
 
 
