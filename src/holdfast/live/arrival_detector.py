@@ -230,9 +230,10 @@ class ArrivalDetector:
         return [one for arrival in buffered for one in self._detect(detector, arrival)]
 
     def _detect(self, detector: Detector, arrival: Arrival) -> Iterator[StreamEstimate]:
-        for name in arrival.samples:
-            self._faults.pop(name, None)
-            self._silent_fingers.discard(name)
+        if self._faults or self._silent_fingers:
+            for name in arrival.samples:
+                self._faults.pop(name, None)
+                self._silent_fingers.discard(name)
         self._faults.update(arrival.faults)
         found = {name: arrival.samples[name] for name in self.fingers if name in arrival.samples}
         if self._monitor is not None:

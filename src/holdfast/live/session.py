@@ -148,7 +148,7 @@ class Session:
             self._n_latencies += 1
         for module in arrival.samples:
             self._n_samples[module] += 1
-            self.n_packets = max(self.n_packets, self._n_samples[module])
+        self.n_packets = max(self._n_samples.values(), default=0)
         self.n_lost += arrival.n_lost
         self.n_refused += arrival.n_refused
 

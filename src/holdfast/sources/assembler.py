@@ -3,6 +3,7 @@
 import math
 from collections.abc import Hashable, Mapping
 from dataclasses import dataclass, field
+from itertools import accumulate
 from typing import Any, NamedTuple
 
 import numpy.typing as npt
@@ -46,20 +47,19 @@ class Device:
     order: npt.NDArray[Any] | None = None
     notices: tuple[str, ...] = ()
     n_taxels: int = field(init=False)
+    _parts: tuple[tuple[str, slice], ...] = field(init=False)
 
     def __post_init__(self) -> None:
-        object.__setattr__(self, "n_taxels", sum(s.n_taxels for s in self.modules.values()))
+        ends = list(accumulate(sensor.n_taxels for sensor in self.modules.values()))
+        object.__setattr__(self, "n_taxels", ends[-1] if ends else 0)
+        object.__setattr__(
+            self, "_parts", tuple(zip(self.modules, map(slice, [0, *ends], ends), strict=False))
+        )
 
     def split(self, readings: npt.NDArray[Any]) -> Samples:
         """Return the readings of each module, given (n_taxels, 3) in the order of the packet."""
-        ordered = readings if self.order is None else readings[self.order]
-        if len(self.modules) == 1:
-            return dict.fromkeys(self.modules, ordered)
-        samples, first = {}, 0
-        for name, module in self.modules.items():
-            samples[name] = ordered[first : first + module.n_taxels]
-            first += module.n_taxels
-        return samples
+        ordered = readings if self.order is None else readings.take(self.order, axis=0)
+        return {name: ordered[taxels] for name, taxels in self._parts}
 
 
 class Assembler:
