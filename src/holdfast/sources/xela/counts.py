@@ -5,7 +5,6 @@ The step accepts the forms that XELA's server writes. It returns nothing for any
 """
 
 from collections.abc import Callable
-from functools import cache
 from typing import Any
 
 import msgspec
@@ -43,17 +42,7 @@ def counts_of(data: msgspec.Raw, integers: msgspec.Raw) -> Counts | None:
     """
     text, numbers = np.frombuffer(data, np.uint8), np.frombuffer(integers, np.uint8)
     counts = np.empty(len(text) // 5, dtype=np.uint16)
-    return counts if _parser()(text, numbers, counts) else None
-
-
-@cache
-def _parser() -> Callable[[Bytes, Bytes, Counts], bool]:
-    """Return `_parse` for its argument types: a call need not find them out."""
-    dispatcher: Any = _parse
-    entry: Callable[[Bytes, Bytes, Counts], bool] = dispatcher.compile(
-        "boolean(uint8[::1], uint8[::1], uint16[::1])"
-    )
-    return entry
+    return counts if _PARSER(text, numbers, counts) else None
 
 
 @compiled_step
@@ -101,3 +90,16 @@ def _has_integers(numbers: Bytes, counts: Counts) -> bool:
             return False
         place += 1
     return place == len(numbers)
+
+
+def _compiled() -> Callable[[Bytes, Bytes, Counts], bool]:
+    """Return `_parse` for its argument types: a call need not find them out."""
+    dispatcher: Any = _parse
+    entry: Callable[[Bytes, Bytes, Counts], bool] = dispatcher.compile(
+        "boolean(uint8[::1], uint8[::1], uint16[::1])"
+    )
+    return entry
+
+
+_PARSER = _compiled()
+"""Compiled when this module is imported: before a source is opened."""
