@@ -18,7 +18,7 @@ def hand(kind=np.uint16):
 
 def copied(arrays):
     readings = np.full((9, 3), -1.0)
-    done = copy_samples(id(arrays), OFFSETS, KNOWN_TYPES, readings)
+    done = copy_samples(id(arrays), OFFSETS, KNOWN_TYPES, readings.ctypes.data)
     assert done or (readings == -1).all()
     return readings if done else None
 

@@ -174,7 +174,7 @@ def fast_step(table: Integers, time: float, samples: int) -> int:
     )  # fmt: skip
     readings, present, report = floats2(table, 24), flags1(table, 25), floats2(table, 26)
     if samples != 0:
-        if not copy_samples(samples, layout.offsets, integers1(table, 37), readings):
+        if not copy_samples(samples, layout.offsets, integers1(table, 37), table[24, 0]):
             return UNREADABLE
         present[:] = True
     memory = Memory(

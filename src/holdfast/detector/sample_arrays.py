@@ -52,23 +52,23 @@ def _words(address: int, n: int) -> npt.NDArray[np.int64]:
 
 @compiled_view
 def _counts(address: int, n: int) -> npt.NDArray[np.uint16]:
-    return carray(pointer(address), (n, 3), np.uint16)
+    return carray(pointer(address), (n,), np.uint16)
 
 
 @compiled_view
 def _floats(address: int, n: int) -> npt.NDArray[np.float64]:
-    return carray(pointer(address), (n, 3), np.float64)
+    return carray(pointer(address), (n,), np.float64)
 
 
 @compiled_step
-def copy_samples(samples: int, offsets: Integers, known: Integers, readings: Array) -> bool:
+def copy_samples(samples: int, offsets: Integers, known: Integers, readings: int) -> bool:
     """Copy the readings of all fingers, if all of them are in a form that can be read.
 
     Args:
         samples: address of a tuple with one array for each finger.
         offsets: (n_fingers + 1,) first taxel of each finger.
         known: `KNOWN_TYPES`.
-        readings: (n_taxels, 3) of all fingers; are filled.
+        readings: address of an array (n_taxels, 3) of all fingers, float64; it is filled.
 
     Returns:
         Whether they were copied.
@@ -81,7 +81,8 @@ def copy_samples(samples: int, offsets: Integers, known: Integers, readings: Arr
         if not _is_readable(arrays[f], offsets[f + 1] - offsets[f], known):
             return False
     for f in range(n_fingers):
-        _copy(_words(arrays[f], OBJECT_WORDS), offsets[f], offsets[f + 1], known, readings)
+        first, n = 3 * offsets[f], 3 * (offsets[f + 1] - offsets[f])
+        _copy(_words(arrays[f], OBJECT_WORDS), known, _floats(readings + WORD * first, n))
     return True
 
 
@@ -102,15 +103,14 @@ def _is_readable(address: int, n_taxels: int, known: Integers) -> bool:
 
 
 @compiled_step
-def _copy(fields: Integers, first: int, last: int, known: Integers, readings: Array) -> None:
-    n_taxels = last - first
+def _copy(fields: Integers, known: Integers, readings: Array) -> None:
+    """Copy the values of an array, in the order of its memory."""
+    n = np.uint64(len(readings))
     if fields[DTYPE] == known[COUNTS]:
-        counts = _counts(fields[DATA], n_taxels)
-        for i in range(n_taxels):
-            for axis in range(3):
-                readings[first + i, axis] = counts[i, axis]
+        counts = _counts(fields[DATA], len(readings))
+        for place in range(n):
+            readings[place] = counts[place]
     else:
-        values = _floats(fields[DATA], n_taxels)
-        for i in range(n_taxels):
-            for axis in range(3):
-                readings[first + i, axis] = values[i, axis]
+        values = _floats(fields[DATA], len(readings))
+        for place in range(n):
+            readings[place] = values[place]

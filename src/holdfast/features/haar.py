@@ -234,6 +234,13 @@ def newest_moments(blocks: Array, row: int, first: int, window: int) -> tuple[fl
         first: first column of the value.
         window: N_w.
     """
+    total, variance = newest_variance(blocks, row, first, window)
+    return total * _m_factor(window), math.sqrt(variance)
+
+
+@compiled_step
+def newest_variance(blocks: Array, row: int, first: int, window: int) -> tuple[float, float]:
+    """Return P and sigma squared of the newest window; see `newest_moments`."""
     n_pairs = window // 2
     total = drift = spread = 0.0
     taken, size, column = 0, 1, first
@@ -247,7 +254,7 @@ def newest_moments(blocks: Array, row: int, first: int, window: int) -> tuple[fl
             total, drift = blocks[then, column] + total, older + drift
             taken += size
         size, column = 2 * size, column + N_SUMS
-    return total * _m_factor(window), math.sqrt(spread * _sigma_factor(window))
+    return total, spread * _sigma_factor(window)
 
 
 @compiled_parallel

@@ -75,7 +75,7 @@ from holdfast.features.faults import (
     track_changes,
 )
 from holdfast.features.force import sum_taxels
-from holdfast.features.haar import N_SUMS, append_pair, newest_moments
+from holdfast.features.haar import N_SUMS, append_pair, newest_moments, newest_variance
 from holdfast.features.motion import update_motion
 from holdfast.features.tare import update_baseline
 
@@ -325,9 +325,10 @@ def _feature(
     for axis in range(1, 4):
         if kind == CHANGE:
             value = history[f, axis, newest] - history[f, axis, newest + 1 - window]
+            total += value * value
         else:
-            value = _moments(blocks, counts, f, N_SUMS * n_levels * axis, window)[1]
-        total += value * value
+            row, first = newest - blocks.shape[1], N_SUMS * n_levels * axis
+            total += newest_variance(blocks[f], row, first, window)[1]
     return math.sqrt(total)
 
 

@@ -59,6 +59,8 @@ class Device:
     def split(self, readings: npt.NDArray[Any]) -> Samples:
         """Return the readings of each module, given (n_taxels, 3) in the order of the packet."""
         ordered = readings if self.order is None else readings.take(self.order, axis=0)
+        if len(self.modules) == 1:
+            return dict.fromkeys(self.modules, ordered)
         return {name: ordered[taxels] for name, taxels in self._parts}
 
 
