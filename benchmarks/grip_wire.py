@@ -6,7 +6,7 @@ trials of `holdfast trial`, the twin takes the commands, so that the loop is clo
 slip is that of the twin's truth: the instant at which the first sample with a sliding fingertip
 is due. The time of a command is that of its arrival here. All clocks are that of this machine.
 
-    python benchmarks/grip_wire.py [TRIALS] [--seed S]
+    python benchmarks/grip_wire.py [TRIALS] [--seed S] [--kind KIND]
 """
 
 import argparse
@@ -25,13 +25,14 @@ import numpy as np
 from holdfast.contact import CONTACT_FORCE, SLIP_SPEED
 from holdfast.control.hands.ros.driven_twin import DrivenTwin
 from holdfast.control.trial.run import RISE
-from holdfast.control.trial.trials import Trial, draw_trials
+from holdfast.control.trial.trials import KINDS, Trial, draw_trials
 from holdfast.live.xela_server import XelaServer
 from holdfast.ros import dds
 from holdfast.ros.cdr import MessageDecoder, MessageEncoder
 from holdfast.ros.hand_messages import FLOATS, JOINT_STATE, hand_definition, joint_message
 from holdfast.twin.contact import LOAD, SLIP
 from holdfast.twin.hand import RATE
+from holdfast.twin.loads import LoadKind
 from holdfast.twin.simulation import Simulation
 
 EFFORT = 0.1
@@ -42,6 +43,10 @@ V5_TOPIC, V5_STATES = "/allegroHand/joint_cmd", "/allegroHand/joint_states"
 DOMAIN = 151
 HOLDFAST = Path(sys.executable).with_name("holdfast")
 START_TIMEOUT = 120.0
+N_STAMPED = 4
+"""Number of trials in which the time from sample to command is measured."""
+IDLE_TIME = 6.0
+"""Time before the hand closes, in which the loop gets ready [s]."""
 
 
 class TrialTwin(DrivenTwin):
@@ -56,7 +61,8 @@ class TrialTwin(DrivenTwin):
     def open(self) -> None:
         super().open()
         trial = self._trial
-        self.simulation = Simulation(trial.grasp, plan=trial.plan(), loads=[trial.load])
+        plan = trial.plan()._replace(before=IDLE_TIME)
+        self.simulation = Simulation(trial.grasp, plan=plan, loads=[trial.load])
 
     @property
     def ended(self) -> bool:
@@ -91,7 +97,7 @@ class Listener:
         self._reader = self._node.reader(topic, definition)
         self._decode = MessageDecoder(definition, ros2=True)
         self._ending = Event()
-        self._thread = Thread(target=self._run)
+        self._thread = Thread(target=self._run, daemon=True)
         self._thread.start()
 
     def _run(self) -> None:
@@ -149,7 +155,7 @@ def sample_to_command(trial: Trial, output) -> np.ndarray:
         while not stop.wait(0.02):
             write(state)
 
-    driver, listener = Thread(target=publish), Listener(V5_TOPIC, JOINT_STATE)
+    driver, listener = Thread(target=publish, daemon=True), Listener(V5_TOPIC, JOINT_STATE)
     driver.start()
     twin = TrialTwin(trial)
     server = serve(twin, V5, output)
@@ -200,18 +206,21 @@ def show(name: str, seconds: np.ndarray) -> None:
           f"n {len(seconds)}")  # fmt: skip
 
 
-def main(n_trials: int, seed: int, output) -> None:
+def main(n_trials: int, seed: int, kind: str, output) -> None:
     os.environ["ROS_LOCALHOST_ONLY"], os.environ["ROS_DOMAIN_ID"] = "1", str(DOMAIN)
     sys.setswitchinterval(5e-4)  # the threads of this process shall not delay each other
-    trials = draw_trials(n_trials, seed)
-    show("sample to command", sample_to_command(trials[0], output))
+    kinds = [LoadKind(kind)] if kind else KINDS
+    drawn = draw_trials(n_trials * len(KINDS) // len(kinds), seed)
+    trials = [trial for trial in drawn if trial.load.kind in kinds]
+    delays = [sample_to_command(trial, output) for trial in trials[:N_STAMPED]]
+    show("sample to command", np.concatenate(delays))
     found = [reaction(trial, output) for trial in trials]
     slips = np.array([one for one in found if one is not None])
     print(f"{len(slips)} of {len(found)} trials slipped while the loop held the object")
     print(f"the command rose before the slip in {int((slips == 0).sum())} of them, "
           f"never in {int(np.isinf(slips).sum())}")  # fmt: skip
     show("slip onset to command, all slips (0 if it rose before)", slips)
-    show("slip onset to command, where it rose after", slips[slips > 0])
+    show("slip onset to command, where it rose after", slips[(slips > 0) & np.isfinite(slips)])
 
 
 if __name__ == "__main__":
@@ -220,7 +229,8 @@ if __name__ == "__main__":
     )
     parser.add_argument("trials", type=int, nargs="?", default=48)
     parser.add_argument("--seed", type=int, default=0)
+    parser.add_argument("--kind", default="", help="of the load: friction drops without notice")
     parser.add_argument("--log", type=Path, default=None, help="output of holdfast hold")
     given = parser.parse_args()
     with open(given.log or os.devnull, "w") as file:  # noqa: PTH123
-        main(given.trials, given.seed, file)
+        main(given.trials, given.seed, given.kind, file)
