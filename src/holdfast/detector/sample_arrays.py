@@ -21,11 +21,12 @@ from holdfast.features.arrays import Array, Integers
 
 WORD = 8
 """Length of a field [bytes]."""
-# Fields of an object, in words.
-TYPE = 1
-FIRST_ITEM = 3  # of a tuple
-DATA, N_AXES, SHAPE, STRIDES, DTYPE = 2, 3, 4, 5, 7  # of an array
-OBJECT_WORDS = 8
+# Fields of an object, in words. Interpreters differ in the length of their headers.
+HEADER = object.__basicsize__ // WORD
+TYPE = HEADER - 1
+FIRST_ITEM = tuple.__basicsize__ // WORD
+DATA, N_AXES, SHAPE, STRIDES, DTYPE = (HEADER + place for place in (0, 1, 2, 3, 5))  # of an array
+OBJECT_WORDS = HEADER + 6
 
 KNOWN_TYPES = np.array(
     [id(tuple), id(np.ndarray), id(np.dtype(np.uint16)), id(np.dtype(np.float64))]
