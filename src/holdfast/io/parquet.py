@@ -8,9 +8,9 @@ A checksum over all bytes is stored in the footer of the file, so that any flipp
 """
 
 import hashlib
-from collections import Counter
+from collections import Counter, deque
 from collections.abc import Callable, Iterator, Mapping
-from concurrent.futures import Future, ThreadPoolExecutor
+from concurrent.futures import ThreadPoolExecutor
 from functools import partial
 from itertools import product
 from pathlib import Path
@@ -123,7 +123,7 @@ def read_columns(path: Path) -> tuple[Header, Iterator[TimedArrays]]:
         RecordingError: as in `load`.
     """
     header, file = _open(path)
-    return header, _groups(header, file, path, by_column=True)
+    return header, _groups_ahead(header, file, path)
 
 
 def is_foreign(path: Path) -> bool:
@@ -285,23 +285,31 @@ def _padded(values: npt.NDArray[Any], n_rows: int) -> pa.Array:
     return pa.concat_arrays([array, pa.nulls(missing, array.type)]) if missing else array
 
 
-def _groups(
-    header: Header, file: pq.ParquetFile, path: Path, by_column: bool = False
-) -> Iterator[TimedArrays]:
-    """Yield the arrays of each row group; the next one is read while the caller uses it."""
+def _groups(header: Header, file: pq.ParquetFile, path: Path) -> Iterator[TimedArrays]:
+    convert = partial(_arrays, _specs(header, file, path))
+    return (_group(file, group, path, convert) for group in range(file.num_row_groups))
+
+
+def _groups_ahead(header: Header, file: pq.ParquetFile, path: Path) -> Iterator[TimedArrays]:
+    """Yield the columns of each row group; a thread reads the next while the caller uses it.
+
+    Where memory is short, a new thread can end the process; so `load` has none.
+    """
+    convert = partial(_columns, _specs(header, file, path))
+    groups = range(file.num_row_groups)
+    with ThreadPoolExecutor(1) as reader:
+        waiting = deque(reader.submit(_group, file, k, path, convert) for k in groups[:1])
+        for group in groups:
+            if group + 1 < len(groups):
+                waiting.append(reader.submit(_group, file, group + 1, path, convert))
+            yield waiting.popleft().result()
+
+
+def _specs(header: Header, file: pq.ParquetFile, path: Path) -> list[ArraySpec]:
     specs = array_specs(header)
     if file.schema_arrow.names != _schema(specs).names:
         raise RecordingError(f"{path}: its columns are not those that its header names")
-    convert = partial(_columns if by_column else _arrays, specs)
-    n = file.num_row_groups
-    with ThreadPoolExecutor(1) as reader:
-        waiting: Future[TimedArrays] | None = None
-        for group in range(n):
-            read = waiting.result if waiting else partial(_group, file, group, path, convert)
-            arrays = read()
-            if group + 1 < n:
-                waiting = reader.submit(_group, file, group + 1, path, convert)
-            yield arrays
+    return specs
 
 
 def _group(
