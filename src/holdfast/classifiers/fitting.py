@@ -1,5 +1,6 @@
 """Interfaces and functions that all recipes share: samples, classifiers, calibration."""
 
+import math
 from collections.abc import Mapping
 from typing import TYPE_CHECKING, Any, NamedTuple, Protocol
 
@@ -7,6 +8,7 @@ import numpy as np
 import numpy.typing as npt
 
 from holdfast.classifiers.linear import LinearClassifier
+from holdfast.compiled import compiled
 from holdfast.errors import TrainingError
 
 if TYPE_CHECKING:
@@ -91,12 +93,34 @@ class LinearRecipe(Recipe, Protocol):
 
 def standardise(features: npt.NDArray[np.float64]) -> tuple[npt.NDArray[np.float64], ...]:
     """Return mean and scale of each feature, and the features standardised by them."""
-    mean = features.mean(axis=0)
-    scale = features.std(axis=0)
-    scale[np.ptp(features, axis=0) == 0] = (
-        1.0  # rounding can give a constant feature a spread of 1e-17
-    )
-    return mean, scale, (features - mean) / scale
+    standard = np.empty(features.shape)
+    return *_standardise(np.ascontiguousarray(features, dtype=np.float64), standard), standard
+
+
+@compiled
+def _standardise(
+    features: npt.NDArray[np.float64], out: npt.NDArray[np.float64]
+) -> tuple[npt.NDArray[np.float64], npt.NDArray[np.float64]]:
+    """Return mean and scale, and write the standardised features; the order is NumPy's."""
+    n, d = features.shape
+    mean, scale = np.zeros(d), np.zeros(d)
+    varies = np.zeros(d, dtype=np.bool_)
+    for i in range(n):
+        for a in range(d):
+            mean[a] += features[i, a]
+            varies[a] |= features[i, a] != features[0, a]
+    for a in range(d):
+        mean[a] /= n
+    for i in range(n):
+        for a in range(d):
+            deviation = features[i, a] - mean[a]
+            scale[a] += deviation * deviation
+    for a in range(d):  # rounding can give a constant feature a spread of 1e-17
+        scale[a] = math.sqrt(scale[a] / n) if varies[a] else 1.0
+    for i in range(n):
+        for a in range(d):
+            out[i, a] = (features[i, a] - mean[a]) / scale[a]
+    return mean, scale
 
 
 def check_classes(samples: Samples) -> None:

@@ -4,6 +4,7 @@ from dataclasses import dataclass, field
 from typing import TYPE_CHECKING
 
 import numpy as np
+import numpy.typing as npt
 
 from holdfast.classifiers.fitting import (
     Parameters,
@@ -13,6 +14,7 @@ from holdfast.classifiers.fitting import (
     standardise,
 )
 from holdfast.classifiers.linear import LinearClassifier
+from holdfast.classifiers.newton import fit_weights
 
 if TYPE_CHECKING:
     from optuna import Trial
@@ -37,29 +39,33 @@ class LogisticRegression:
         }
 
     def fit(self, samples: Samples, parameters: Parameters, seed: int) -> LinearClassifier:
-        """Fit the classifier to the samples. The fit is deterministic; the seed is not used.
+        """Fit the classifier to the samples by Newton's method; the seed is not used.
 
         Raises:
             TrainingError: the samples have only one class.
         """
-        from sklearn.linear_model import LogisticRegression as Estimator
-
         del seed
         check_classes(samples)
         mean, scale, features = standardise(samples.features)
         balanced = parameters["class_weight"] == "balanced"
-        estimator = Estimator(
-            C=parameters["C"],
-            class_weight=parameters["class_weight"],
-            solver="newton-cholesky",
-            max_iter=1000,
-        ).fit(features, samples.stable)
+        solution = fit_weights(
+            features,
+            samples.stable,
+            _balanced_weights(samples.stable) if balanced else (1.0, 1.0),
+            parameters["C"],
+        )
         odds = class_ratio(samples.stable) if balanced else 1.0
         return LinearClassifier(
             mean=tuple(mean.tolist()),
             scale=tuple(scale.tolist()),
-            coefficients=tuple(estimator.coef_[0].tolist()),
-            intercept=float(estimator.intercept_[0]),
+            coefficients=tuple(solution.weights.tolist()),
+            intercept=solution.intercept,
             offset=-float(np.log(odds)),
             threshold=1.0 / (1.0 + odds),
         )
+
+
+def _balanced_weights(stable: npt.NDArray[np.bool_]) -> tuple[float, float]:
+    """Return the weights n / (2 n_0) and n / (2 n_1) of the classes."""
+    n, n_stable = len(stable), int(stable.sum())
+    return n / (2 * (n - n_stable)), n / (2 * n_stable)

@@ -54,11 +54,13 @@ def search(
     if journal is not None:
         known = Journal(journal, search_key(*samples, *folds, recipe.name, seed, objective))
 
+    pairs = [(samples.take(~held_out), samples.take(held_out)) for held_out in folds]
+
     def loss(trial: "Trial") -> float:
         parameters = recipe.suggest(trial)
         found = None if known is None else known.find(parameters)
         if found is None:
-            found = _loss(samples, folds, recipe, parameters, seed, objective)
+            found = _loss(pairs, recipe, parameters, seed, objective)
             if known is not None:
                 known.add(parameters, found)
         return found
@@ -78,19 +80,17 @@ def log_losses(
 
 
 def _loss(
-    samples: Samples,
-    folds: Sequence[npt.NDArray[np.bool_]],
+    pairs: Sequence[tuple[Samples, Samples]],
     recipe: Recipe,
     parameters: Parameters,
     seed: int,
     objective: Objective,
 ) -> float:
-    """Compute the mean loss over held-out samples."""
+    """Compute the mean loss over the held-out samples; a pair is (to fit, held out)."""
     total = 0.0
     n = 0
-    for held_out in folds:
-        classifier = recipe.fit(samples.take(~held_out), parameters, seed)
-        tested = samples.take(held_out)
+    for fitted, tested in pairs:
+        classifier = recipe.fit(fitted, parameters, seed)
         probability = classifier.probability(tested.features)
         if objective == "error":
             total += float(((probability >= classifier.threshold) != tested.stable).sum())
