@@ -215,3 +215,27 @@ def test_an_orderly_end_leaves_an_open_hand_open(tape):
         loop.stop()
         stepped(loop, time)
     assert tape.commands[-1].release
+
+
+def test_a_sample_that_is_late_by_more_than_an_update_is_no_fault(tape):
+    controller, time = holding()
+    loop = GripLoop(controller, tape)
+    loop.step(hand(time), time + 0.012)  # an update while nothing arrived
+    assert loop.step(hand(time + 1 / RATE), time + 1 / RATE).state is LoopState.HOLD
+
+
+def test_a_clock_that_jumps_back_is_a_fault(tape):
+    controller, time = holding()
+    loop = GripLoop(controller, tape)
+    loop.step(hand(time), time)
+    command = loop.step(hand(time - 1.0), time - 1.0)
+    assert (command.state, command.reason) == (LoopState.FAULT, GripReason.STALE)
+
+
+@pytest.mark.parametrize("given", [float("nan"), float("inf")])
+def test_a_time_that_is_no_time_is_a_fault_and_is_forgotten(tape, given):
+    controller, time = holding(recovery=0.0)
+    loop = GripLoop(controller, tape)
+    loop.step(hand(time), time)
+    assert loop.step(hand(time), given).reason is GripReason.CLOCK
+    assert loop.step(hand(time + 1 / RATE), time + 1 / RATE).state is LoopState.HOLD

@@ -1,5 +1,6 @@
 """The loop: from estimates to a hand, with guard, watchdog and log."""
 
+import math
 from collections.abc import Callable
 from contextlib import nullcontext, suppress
 from types import TracebackType
@@ -34,6 +35,8 @@ class GripLoop:
         last: the last command; None before the first.
         n_sent: number of commands that were sent.
     """
+
+    _now = -math.inf
 
     def __init__(
         self,
@@ -80,13 +83,17 @@ class GripLoop:
 
         Args:
             estimate: the newest estimate, or the last one again.
-            time: time now, on the clock of the source [s].
+            time: time now, on the clock of the source [s]. One before that of an earlier step
+                counts as the same: a sample may be late by more than the time between two
+                steps. If the clock of the source jumps back, its samples become stale.
 
         Raises:
             HandError: the hand refuses the command, or the watchdog has taken over.
         """
         if self.stopped:
             self.controller.stop()
+        if math.isfinite(time):
+            self._now = time = max(self._now, time)
         command = self.controller.update(estimate, time)
         for event in self.controller.events():
             self._log(str(event), event.time)
