@@ -127,6 +127,13 @@ def test_lines_equal_the_result_of_detect(name, request, capsys, grasp):
     assert {"STABLE", "UNSTABLE", "NO_CONTACT", "UNKNOWN"} == {line["state"] for line in got}
 
 
+@pytest.mark.parametrize("source", ["grasp.parquet", "twin:?object=can"])
+def test_a_source_in_the_place_of_the_model(capsys, source):
+    assert refusal(capsys, source, "other.parquet") == (
+        f"{source} is a source; MODEL SOURCE expected, such as builtin:any {source}"
+    )
+
+
 def test_at_one_instant_fingers_keep_their_order(capsys, save):
     got, _ = lines(capsys, NOISE_FLOOR, save(synthetic_recording("a", 1, ("thumb", "index"))))
     assert [line["finger"] for line in got[:4]] == ["thumb", "index", "thumb", "index"]

@@ -67,6 +67,7 @@ def demo(
     refuse_overwrite(model, force=force)
     recordings = _simulate(folder, seed, force)
     print_message(f"2/4  evaluating {DEMO_MODEL}, which was not trained on these objects")
+    print_message("     (the first run on a machine compiles the detector here)")
     ours = Model.load(DEMO_MODEL)
     metrics = evaluate(ours, recordings)
     trained = _train(recordings, model, seed, force)

@@ -171,12 +171,17 @@ def load_model(
         raw: leave the debouncing out.
 
     Raises:
-        ValueError: `raw` and another value are given.
+        ValueError: a source is given instead of a model; or `raw` and another value.
         ModelError: the model cannot be read.
     """
     from msgspec.structs import replace
 
     from holdfast.model import Debounce, Model
+    from holdfast.sources.uri import is_uri
+
+    is_source = is_uri(name) and not name.startswith("builtin:")
+    if is_source or name.endswith((".parquet", ".mcap")):
+        raise ValueError(f"{name} is a source; MODEL SOURCE expected, such as builtin:any {name}")
 
     if raw and (debounce, hysteresis) != (None, None):
         raise ValueError("--raw decides without debouncing; leave out --debounce and --hysteresis")
