@@ -14,7 +14,7 @@ from concurrent.futures import ThreadPoolExecutor
 from functools import partial
 from itertools import product
 from pathlib import Path
-from typing import Any
+from typing import Any, Literal
 
 import numpy as np
 import numpy.typing as npt
@@ -344,15 +344,17 @@ def _size(spec: ArraySpec) -> int:
 def _arrays(specs: list[ArraySpec], table: pa.Table) -> TimedArrays:
     shapes = {spec.topic: spec.shape for spec in specs}
     return {
-        topic: (times, values.T.copy().reshape(len(times), *shapes[topic]))
+        topic: (times, values.T.reshape(len(times), *shapes[topic]))
         if topic != TRUTH_TIME
         else (times, times)
-        for topic, (times, values) in _columns(specs, table).items()
+        for topic, (times, values) in _columns(specs, table, "F").items()
     }
 
 
-def _columns(specs: list[ArraySpec], table: pa.Table) -> TimedArrays:
-    """Return times and values of each array, a row for each component."""
+def _columns(
+    specs: list[ArraySpec], table: pa.Table, order: Literal["C", "F"] = "C"
+) -> TimedArrays:
+    """Return times and values of each array, a row for each component, in this order in memory."""
     columns = iter(table.columns)
     arrays: dict[str, TimedArray] = {}
     times: Array = np.empty(0)
@@ -363,7 +365,7 @@ def _columns(specs: list[ArraySpec], table: pa.Table) -> TimedArrays:
             times = _values(next(columns), None)
             arrays[spec.topic] = (times, times)
             continue
-        values = np.empty((spec.n_components, len(times)), _memory_type(spec))
+        values = np.empty((spec.n_components, len(times)), _memory_type(spec), order=order)
         for row in values:
             row[:] = _values(next(columns), len(times))
         arrays[spec.topic] = (times, values)
