@@ -140,7 +140,7 @@ def draw_courses(courses: Mapping[str, ForceCourse]) -> Figure:
     if courses:
         add_labels(upper[0], y="normal force, sum [N]")
         add_labels(lower[0], y="slip speed [mm/s]")
-        upper[-1].legend(loc="lower right", fontsize=FONT_SIZE, frameon=False)
+        add_legend(figure, upper[0].get_legend_handles_labels()[0])
     return figure
 
 
@@ -182,8 +182,12 @@ def _draw_cross(axes: Axes, values: TradeOff, style: SeriesStyle) -> None:
 def _draw_force(axes: Axes, course: ForceCourse) -> None:
     axes.grid(color=FAINT, linewidth=0.5)
     axes.axvline(0, color=GREY, linewidth=0.9, linestyle=":")
-    axes.plot(course.times, course.force, color=COLOURS[0], linewidth=1.1, label="of the hand")
-    axes.plot(course.times, course.least, color=INK, linewidth=0.9, linestyle="--", label="least")
+    axes.plot(
+        course.times, course.force, color=COLOURS[0], linewidth=1.1, label="force of the hand"
+    )
+    axes.plot(
+        course.times, course.least, color=INK, linewidth=0.9, linestyle="--", label="least force"
+    )
     _mark_loss(axes, course)
 
 

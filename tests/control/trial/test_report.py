@@ -59,6 +59,23 @@ def test_every_part_of_the_issue_is_in_the_report(page):
         assert words in page
 
 
+def test_a_browser_shows_all_of_it(browser, tmp_path):
+    from PIL import Image
+
+    pictures = [Image.new("RGB", (16, 8), colour) for colour in ("red", "blue")]
+    pictures[0].save(tmp_path / "film.webp", save_all=True, append_images=pictures[1:])
+    film = (tmp_path / "film.webp").read_bytes()
+    (tmp_path / "report.html").write_text(report(results_of(n=6), EXAMPLE._replace(film=film))[0])
+    page = browser.new_page()
+    page.goto((tmp_path / "report.html").as_uri())
+    for width in (390, 768, 1440):
+        page.set_viewport_size({"width": width, "height": 900})
+        assert page.evaluate("document.documentElement.scrollWidth") <= width
+    assert page.evaluate("document.querySelector('#figure-film img').naturalWidth") == 16
+    assert page.locator("main svg").count() == 4
+    page.close()
+
+
 def test_the_rule_of_the_film_is_stated(page):
     assert "the first of the set that fixed loses and holdfast holds" in page
 

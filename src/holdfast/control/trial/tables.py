@@ -83,7 +83,7 @@ def objects_table(document: Mapping[str, Any]) -> ResultTable:
     return _table(
         "objects",
         "By set of objects",
-        "The six others are those that no model was trained on which was trained on the six.",
+        "The model builtin:twin was trained on the six, and on none of the six others.",
         _rows_of_parts(parts, "objects", NUMBERS),
         "objects",
     )
