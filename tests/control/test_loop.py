@@ -192,7 +192,8 @@ class TestStop:
             n = len(tape.commands)
             time = stepped(loop, time, n=20)
             assert loop.last.state is LoopState.IDLE
-            assert len(tape.commands) == n
+            (last,) = tape.commands[n:]  # ends the grip of the hand
+            assert (last.state, last.release) == (LoopState.IDLE, True)
         assert tape.commands[-1].release
         stepped(loop, time, n=40)
         assert tape.commands[-1].state is LoopState.HOLD

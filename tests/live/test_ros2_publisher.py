@@ -15,7 +15,7 @@ from rosbags.typesys import Stores, get_typestore
 from holdfast.live.ros2_publisher import DEFINITIONS, Ros2Publisher
 from holdfast.ros.definitions import parse_definition
 
-from .estimates import UNITS, check_received, estimate
+from .estimates import UNITS, FakeGrip, check_received, estimate
 
 PEER = Path(__file__).parents[1] / "sources" / "ros2_peer.py"
 
@@ -46,7 +46,7 @@ def test_another_program_reads_what_is_published(domain):
         [sys.executable, PEER, "read", str(domain)], stdout=subprocess.PIPE, text=True
     )
     try:
-        with Ros2Publisher(UNITS) as publisher:
+        with Ros2Publisher(UNITS, grip=FakeGrip()) as publisher:
             end = time.monotonic() + 60
             while reader.poll() is None:
                 assert time.monotonic() < end, "not all topics were received"
@@ -60,7 +60,8 @@ def test_another_program_reads_what_is_published(domain):
     assert publisher.n_failed == 0
     force = found["/holdfast/thumb/force"]
     stamp = force["header"]["stamp"]
-    thumb = {one["name"]: one for one in found["/diagnostics"]["status"]}["holdfast: thumb"]
+    status = {one["name"]: one for one in found["/diagnostics"]["status"]}
+    thumb = status["holdfast: thumb"]
     check_received(
         {
             "state": found["/holdfast/thumb/state"]["data"],
@@ -73,6 +74,9 @@ def test_another_program_reads_what_is_published(domain):
             "vector": list(found["/holdfast/index_1/force"]["vector"].values()),
             "level": thumb["level"],
             "values": {pair["key"]: pair["value"] for pair in thumb["values"]},
+            "grip": found["/holdfast/grip/state"]["data"],
+            "scale": found["/holdfast/thumb/force_scale"]["data"],
+            "grip_message": status["holdfast: grip"]["message"],
         }
     )
 

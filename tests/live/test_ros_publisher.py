@@ -9,7 +9,7 @@ from holdfast.live.arrival_detector import StreamEstimate
 from holdfast.live.ros_publisher import ERROR, OK, WARN, RosPublisher, diagnostics_of, topic_names
 from holdfast.live.stream_detector import StreamUpdate
 
-from .estimates import UNITS, estimate, finger
+from .estimates import UNITS, FakeGrip, estimate, finger
 
 
 class FakePublisher(RosPublisher):
@@ -179,6 +179,45 @@ class TestDiagnostics:
         (after,) = diagnostics_of((estimate(), 100.0), 103.2)
         assert after[:3] == ("hand", ERROR, "no estimates any more")
         assert after.values == (("seconds_since_estimate", "3"),)
+
+
+class TestGrip:
+    def test_state_and_commands_are_published_with_every_estimate(self):
+        with FakePublisher(grip=FakeGrip()) as publisher:
+            publisher.publish(estimate(), ("thumb",))
+        assert publisher.kinds["/holdfast/grip/state"] == "std_msgs/String"
+        assert publisher.kinds["/holdfast/index_1/force_scale"] == "std_msgs/Float64"
+        assert publisher.of("/holdfast/grip/state")[-1] == "HOLD"
+        assert publisher.of("/holdfast/grip/reason")[-1] == ""
+        assert publisher.of("/holdfast/thumb/force_scale")[-1] == 1.25
+        assert publisher.of("/holdfast/index_1/force_scale") == []
+
+    def test_a_stop_is_published_while_nothing_arrives(self, monkeypatch):
+        monkeypatch.setattr(ros_publisher, "DIAGNOSTICS_PERIOD", 1000.0)
+        grip = FakeGrip()
+        with FakePublisher(grip=grip) as publisher:
+            while not publisher.of("/diagnostics"):
+                time.sleep(0.005)
+            grip.stop()
+            grip.happen("grip FAULT (stopped)", 7.0)
+            while ("grip", ERROR) not in publisher.of("/diagnostics")[-1]:
+                time.sleep(0.005)
+        assert publisher.of("/holdfast/grip/reason")[-1] == "stopped"
+
+    def test_diagnostics(self):
+        well = ros_publisher.diagnostic_of_grip(FakeGrip().document())
+        assert (well.name, well.level, well.message) == ("grip", OK, "HOLD")
+        values = dict(well.values)
+        assert (values["armed"], values["law"], values["scale thumb"]) == (
+            "true", "holdfast", "1.250",
+        )  # fmt: skip
+        ended = FakeGrip(state="FAULT", reason="stale", failure="the hand does not answer")
+        found = ros_publisher.diagnostic_of_grip(ended.document())
+        assert (found.level, found.message) == (ERROR, "FAULT (the hand does not answer)")
+
+    def test_a_finger_cannot_have_its_name(self):
+        with pytest.raises(ValueError, match="fingers grip would share topics"):
+            topic_names(["grip"], "/holdfast")
 
 
 def test_topic_names_are_valid_in_ros():

@@ -104,6 +104,8 @@ def read():
         "/holdfast/thumb/force": WrenchStamped,
         "/holdfast/index_1/force": Vector3Stamped,
         "/holdfast/hand/state": String,
+        "/holdfast/grip/state": String,
+        "/holdfast/thumb/force_scale": Float64,
         "/diagnostics": DiagnosticArray,
     }
     rospy.init_node("reader", anonymous=True, disable_signals=True)
@@ -132,6 +134,9 @@ def read():
             "vector": [vector.vector.x, vector.vector.y, vector.vector.z],
             "level": thumb.level,
             "values": {pair.key: pair.value for pair in thumb.values},
+            "grip": found["/holdfast/grip/state"].data,
+            "scale": found["/holdfast/thumb/force_scale"].data,
+            "grip_message": status["holdfast: grip"].message,
         }
     )
     rospy.signal_shutdown("all is published")
@@ -139,9 +144,9 @@ def read():
 
 def estimates():
     from holdfast.live.ros1_publisher import Ros1Publisher
-    from live.estimates import UNITS, estimate
+    from live.estimates import UNITS, FakeGrip, estimate
 
-    with Ros1Publisher(UNITS) as publisher:
+    with Ros1Publisher(UNITS, grip=FakeGrip()) as publisher:
         emit("open")
         while True:
             publisher.publish(estimate())

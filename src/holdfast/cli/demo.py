@@ -145,10 +145,15 @@ def _replay(model: "Model", recording: "Recording", out: Path, speed: float, *, 
 def _replay_on_page(model: "Model", path: Path, out: Path, speed: float) -> None:
     """Replay on a web page; at a terminal the page stays open until Ctrl-C."""
     from holdfast.cli.serve import open_browser, run_page
+    from holdfast.live.session import Session
+    from holdfast.live.stream_detector import StreamDetector
     from holdfast.sources import open_source
 
     stay = sys.stdin.isatty()
-    with open_source(str(path), speed=speed, loop=stay) as source:
+    with (
+        open_source(str(path), speed=speed, loop=stay) as source,
+        Session(StreamDetector(model, source)) as session,
+    ):
 
         def announce(url: str) -> None:
             opened = open_browser(url)
@@ -157,7 +162,7 @@ def _replay_on_page(model: "Model", path: Path, out: Path, speed: float) -> None
                 "     Ctrl-C stops it" if stay else "     it stops at the end of the recording"
             )
 
-        run_page(model, source, announce, port=0, folder=out / "recorded", stay=stay)
+        run_page(model, session, announce, port=0, folder=out / "recorded", stay=stay)
 
 
 def _print_results(metrics: "Metrics", trained: "Trained", n: int) -> None:

@@ -1,17 +1,31 @@
 """`holdfast hold`: control the grip force of a hand by the estimates of a source."""
 
 import math
-import sys
 import time
-from collections.abc import Iterator
-from contextlib import ExitStack, contextmanager
-from enum import StrEnum
+from collections.abc import Callable
+from contextlib import ExitStack
 from pathlib import Path
-from queue import Empty, SimpleQueue
 from typing import TYPE_CHECKING, Annotated
 
 import typer
 
+from holdfast.cli.grip_options import (
+    ArmedOption,
+    ConfirmOption,
+    FaultAction,
+    FaultOption,
+    GripSettings,
+    HandOption,
+    LawOption,
+    MaxForceOption,
+    MaxScaleOption,
+    MinScaleOption,
+    NewtonsOption,
+    check_armed,
+    connect_hand,
+    find_source_and_hand,
+    open_loop,
+)
 from holdfast.cli.options import (
     IgnoreOption,
     ModelArgument,
@@ -25,68 +39,27 @@ from holdfast.cli.terminal.console import print_line, print_message
 from holdfast.cli.terminal.stopping import StopRequest, handle_stop_signals
 
 if TYPE_CHECKING:
-    from holdfast.contact import HandEstimate
-    from holdfast.control import GripCommand, GripController, Limits
-    from holdfast.control.hands import Hand
+    from holdfast.control import GripCommand
     from holdfast.control.loop import GripLoop
-    from holdfast.control.watchdog import Watchdog
+    from holdfast.control.runner import LoopRunner
     from holdfast.live.recorder import Recorder
     from holdfast.live.session import Session
     from holdfast.live.stream_detector import StreamDetector, StreamUpdate
     from holdfast.sources import Source
 
 
-class FaultAction(StrEnum):
-    """What the hand does in a fault."""
-
-    HOLD = "hold"
-    OPEN = "open"
-
-
-TICK = 0.01
-"""Time without samples after which the loop is updated, so that it notices silence [s]."""
-TWIN = "twin:"
-
-
 def hold(
     model: ModelArgument,
     source: SourceArgument,
-    hand: Annotated[
-        str,
-        typer.Option(
-            "--hand",
-            help="URI of the hand: twin:, ros2:KIND?..., ros1:KIND?..., log:PATH or "
-            "call:MODULE:FUNCTION.",
-        ),
-    ],
-    law: Annotated[str, typer.Option("--law", help="Law of grip force.")] = "holdfast",
-    armed: Annotated[
-        bool, typer.Option("--armed", help="Send commands; without it, this is a dry run.")
-    ] = False,
-    confirm: Annotated[
-        str, typer.Option("--confirm", help="URI of the hand again, with --armed.")
-    ] = "",
-    max_scale: Annotated[
-        float, typer.Option("--max-scale", help="Largest multiple of the first force.")
-    ] = 2.0,
-    min_scale: Annotated[
-        float, typer.Option("--min-scale", help="Smallest multiple of the first force.")
-    ] = 1.0,
-    max_force: Annotated[
-        float | None,
-        typer.Option(
-            "--max-force",
-            help="Largest normal force of a finger [unit of the readings, or N with --newtons].",
-            show_default="no limit",
-        ),
-    ] = None,
-    on_fault: Annotated[
-        FaultAction, typer.Option("--on-fault", help="What the hand does in a fault.")
-    ] = FaultAction.HOLD,
-    newtons: Annotated[
-        float | None,
-        typer.Option("--newtons", help="Calibration: newtons for each unit of the readings."),
-    ] = None,
+    hand: HandOption,
+    law: LawOption = "holdfast",
+    armed: ArmedOption = False,
+    confirm: ConfirmOption = "",
+    max_scale: MaxScaleOption = 2.0,
+    min_scale: MinScaleOption = 1.0,
+    max_force: MaxForceOption = None,
+    on_fault: FaultOption = FaultAction.HOLD,
+    newtons: NewtonsOption = None,
     record: Annotated[
         Path | None, typer.Option("--record", help="Record samples and the log to NAME.mcap.")
     ] = None,
@@ -117,52 +90,28 @@ def hold(
         --confirm call:my_gripper:set_force --max-scale 1.2 --on-fault open
       holdfast hold builtin:any xela://auto --hand "ros2:plexus?effort=0.1&max_effort=0.2"
     """
-    from holdfast.control import GripController, Limits
+    from holdfast.live.session import Session
 
-    limits = Limits(min_scale=min_scale, max_scale=max_scale, max_force=max_force,
-                    on_fault=on_fault.value)  # fmt: skip
+    settings = GripSettings(
+        hand, law, armed, confirm, max_scale, min_scale, max_force, on_fault, newtons
+    )
+    settings.check()
     if seconds is not None and not seconds > 0:
         raise ValueError(f"--seconds: more than 0 s expected, {seconds:g} given")
     loaded = load_model(model, None, None)
-    opened, commanded = _open(source, hand, speed)
-    _check_armed(hand, armed, confirm)
+    opened, commanded = find_source_and_hand(source, hand, speed=speed)
+    check_armed(settings)
     with ExitStack() as stack:
         stop = stack.enter_context(handle_stop_signals())
-        watchdog = _connect(stack, commanded, limits) if armed and hand != TWIN else None
+        watchdog = connect_hand(stack, settings, commanded)
         stack.enter_context(opened)
         stream = create_stream_detector(loaded, opened, RatePolicy.RESAMPLE, ignore)
-        controller = GripController(limits, law, sensors=stream.fingers, newtons_per_unit=newtons)
-        commanded.check(limits, stream.fingers)
         log = _new_log(stack, record, opened, as_json=as_json)
-        updates = stack.enter_context(_reading(stream, threaded=opened.paced))
-        loop = _new_loop(stack, controller, commanded, log, watchdog, armed=armed)
+        session = stack.enter_context(Session(stream))  # ends after the loop, which reads it
+        loop = stack.enter_context(open_loop(settings, commanded, stream, watchdog, log.event))
         stop.graceful = True
-        _run(loop, _until(updates, seconds, stop), log, paced=opened.paced)
+        _run(loop, session, log, seconds, stop)
     _report(loop, hand, armed=armed)
-
-
-def _open(source: str, hand: str, speed: float) -> "tuple[Source, Hand]":
-    """Return source and hand, the same object if both are the twin."""
-    from holdfast.control.hands import open_hand
-    from holdfast.control.live_twin import LiveTwin
-    from holdfast.sources import open_source
-
-    if hand == TWIN:
-        if not source.startswith(TWIN):
-            raise ValueError(f"--hand twin: needs the source twin:..., {source} given")
-        twin = LiveTwin(source, speed=speed)
-        return twin, twin
-    return open_source(source, speed=speed), open_hand(hand)
-
-
-def _check_armed(hand: str, armed: bool, confirm: str) -> None:
-    """Check that a hand that moves was named twice."""
-    if not armed or hand in (TWIN, confirm):
-        return
-    if not confirm and sys.stdin.isatty():
-        confirm = typer.prompt(f"This moves a hand. Type its URI ({hand})", err=True)
-    if confirm != hand:
-        raise ValueError(f"--armed moves the hand: confirm it with --confirm {hand}")
 
 
 class _Log:
@@ -180,14 +129,14 @@ class _Log:
         if not self._as_json:
             print_line(f"{at:10.3f} s  {text}")
 
-    def update(self, update: "StreamUpdate", *, paced: bool) -> None:
-        """Record the samples, and print the notices of the source."""
+    def update(self, update: "StreamUpdate", *, wait: bool = False) -> None:
+        """Record the samples, and print the notices of the source; a listener of a session."""
         if update.arrival is None:
             return
         for notice in update.arrival.notices:
             print_message(notice)
         if self._recorder is not None:
-            self._recorder.put(update.arrival, wait=not paced)
+            self._recorder.put(update.arrival, wait=wait)
 
     def command(self, command: "GripCommand") -> None:
         """Print a command that differs from the last one."""
@@ -210,108 +159,40 @@ def _new_log(stack: ExitStack, record: Path | None, source: "Source", *, as_json
     return _Log(stack.enter_context(recorder), as_json=as_json)
 
 
-def _connect(stack: ExitStack, hand: "Hand", limits: "Limits") -> "Watchdog":
-    """Connect to the hand, and start its watchdog, which takes the longest time.
-
-    It is done before the source is opened, so that no samples wait for it.
-    """
-    from holdfast.control.hands import Claim
-    from holdfast.control.watchdog import Watchdog
-
-    stack.enter_context(Claim(hand.resource))
-    stack.enter_context(hand)
-    watchdog = Watchdog(hand.name, limits.on_fault)
-    stack.callback(watchdog.kill)
-    watchdog.start()
-    return watchdog
-
-
-def _new_loop(
-    stack: ExitStack,
-    controller: "GripController",
-    hand: "Hand",
-    log: _Log,
-    watchdog: "Watchdog | None",
-    *,
-    armed: bool,
-) -> "GripLoop":
-    """Return the loop. At its end, the watchdog ends at once, before anything else closes."""
-    from holdfast.control.loop import GripLoop
-
-    if watchdog is not None:
-        stack.push(watchdog)
-    loop = GripLoop(controller, hand, armed=armed, watchdog=watchdog, log=log.event)
-    return stack.enter_context(loop)
-
-
 def _run(
-    loop: "GripLoop", updates: "Iterator[StreamUpdate | None]", log: _Log, *, paced: bool
+    loop: "GripLoop", session: "Session", log: _Log, seconds: float | None, stop: StopRequest
 ) -> None:
-    """Step the loop with every estimate, and with the last one while nothing arrives."""
-    last: HandEstimate | None = None
-    received = time.monotonic()
-    for update in updates:
-        if update is not None:
-            log.update(update, paced=paced)
-        estimates = update.estimates if update is not None else []
-        for one in estimates:
-            last, received = one.estimate, time.monotonic()
-            log.command(loop.step(last, last.time))
-        if last is not None and not estimates and paced:
-            log.command(loop.step(last, last.time + time.monotonic() - received))
+    """Step the loop until the source ends, the time is over, or Ctrl-C."""
+    from holdfast.control.runner import LoopRunner
 
-
-def _until(
-    updates: "Iterator[StreamUpdate | None]", seconds: float | None, stop: StopRequest
-) -> "Iterator[StreamUpdate | None]":
-    """Yield the updates until the time is over or the user stops."""
+    source = session.source
+    runner = LoopRunner(loop, source.speed if source.paced else 0.0, log.command)
     end = math.inf if seconds is None else time.monotonic() + seconds
-    for update in updates:
-        if stop.requested or time.monotonic() >= end:
-            return
-        yield update
 
+    def is_over() -> bool:
+        return stop.requested or time.monotonic() >= end
 
-@contextmanager
-def _reading(
-    stream: "StreamDetector", *, threaded: bool
-) -> "Iterator[Iterator[StreamUpdate | None]]":
-    """Yield what the source sends; with a thread, None after `TICK` without anything.
-
-    A read of a silent device may take longer than a heartbeat of the watchdog, so it must not
-    delay the loop: neither while it runs nor at its end.
-    """
-    if not threaded:
-        yield _direct(stream)
+    if not source.paced:
+        _run_directly(runner, session.stream, log, is_over)
         return
-    from holdfast.live.session import Session
-
-    queue: SimpleQueue[StreamUpdate] = SimpleQueue()
-    session = Session(stream)
-    session.add_listener(queue.put)
+    # Reads of the source may block for longer than the loop may wait.
+    session.add_listener(log.update)
+    session.add_listener(runner.put)
     session.start()
-    try:
-        yield _queued(session, queue)
-    finally:
-        session.stop()
-
-
-def _direct(stream: "StreamDetector") -> "Iterator[StreamUpdate]":
-    while not stream.source.ended:
-        yield stream.read()
-    yield stream.finish()
-
-
-def _queued(
-    session: "Session", queue: "SimpleQueue[StreamUpdate]"
-) -> "Iterator[StreamUpdate | None]":
-    while not (session.ended and queue.empty()):
-        try:
-            yield queue.get(timeout=TICK)
-        except Empty:
-            yield None
+    runner.run(lambda: session.ended or is_over())
     if session.failure is not None:
         raise session.failure
+
+
+def _run_directly(
+    runner: "LoopRunner", stream: "StreamDetector", log: _Log, is_over: Callable[[], bool]
+) -> None:
+    """Read the source and step the loop in turn, so that the same seed gives the same commands."""
+    while not (is_over() or stream.source.ended):
+        update = stream.read()
+        log.update(update, wait=True)
+        runner.process(update)
+    runner.process(stream.finish())
 
 
 def _report(loop: "GripLoop", hand: str, *, armed: bool) -> None:

@@ -4,13 +4,30 @@ import os
 import sys
 import webbrowser
 from collections.abc import Callable, Iterator, Sequence
-from contextlib import ExitStack
+from contextlib import ExitStack, contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 from urllib.parse import quote
 
 import typer
 
+from holdfast.cli.grip_options import (
+    ArmedOption,
+    ConfirmOption,
+    FaultAction,
+    FaultOption,
+    GripSettings,
+    HandOption,
+    LawOption,
+    MaxForceOption,
+    MaxScaleOption,
+    MinScaleOption,
+    NewtonsOption,
+    check_armed,
+    connect_hand,
+    find_source_and_hand,
+    open_loop,
+)
 from holdfast.cli.options import (
     DebounceOption,
     HostOption,
@@ -33,8 +50,12 @@ from holdfast.cli.options import (
 from holdfast.cli.terminal.console import print_json, print_message
 
 if TYPE_CHECKING:
+    from holdfast.control.hands import Hand
+    from holdfast.control.live_grip import LiveGrip
+    from holdfast.control.watchdog import Watchdog
+    from holdfast.live.grip import Grip
     from holdfast.live.ros_publisher import RosPublisher
-    from holdfast.live.session import Listener
+    from holdfast.live.session import Session
     from holdfast.live.stream_detector import StreamDetector
     from holdfast.model import Model
     from holdfast.sources import Source
@@ -62,6 +83,15 @@ def serve(
     hysteresis: HysteresisOption = None,
     raw: RawOption = False,
     ignore: IgnoreOption = "",
+    hand: HandOption = "",
+    law: LawOption = "holdfast",
+    armed: ArmedOption = False,
+    confirm: ConfirmOption = "",
+    max_scale: MaxScaleOption = 2.0,
+    min_scale: MinScaleOption = 1.0,
+    max_force: MaxForceOption = None,
+    on_fault: FaultOption = FaultAction.HOLD,
+    newtons: NewtonsOption = None,
     ros2: Annotated[bool, typer.Option("--ros2", help="Also publish on ROS 2 topics.")] = False,
     ros1: Annotated[bool, typer.Option("--ros1", help="Also publish on ROS 1 topics.")] = False,
     as_json: Annotated[
@@ -75,19 +105,27 @@ def serve(
     sample) or /api/v1/live (twenty times per second), see docs/live.md. Without --host, only
     this machine can connect. Stop it with Ctrl-C.
 
+    With --hand, it also controls the grip force of a hand, as holdfast hold does, and the page
+    has an emergency stop. Without --armed nothing is sent. Read docs/grip.md first.
+
     SOURCE is the path of a recording, xela://HOST:PORT (or xela://auto), twin:?object=can,
     ros2:///xServTopic, ros1:///xServTopic or serial:///dev/ttyACM0?sensor=anyskin.
 
     Example:
       holdfast serve builtin:any twin:?object=can
       holdfast serve model.json xela://auto --ros2
+      holdfast serve builtin:any twin:?object=can --hand twin: --armed
       holdfast serve model.json grasp.parquet --host 0.0.0.0 \
         --token-file secret.txt
     """
+    from holdfast.live.session import Session
     from holdfast.live.stream_detector import compile_kernels
-    from holdfast.sources import open_source
     from holdfast.web.guard import Guard
 
+    settings = GripSettings(
+        hand, law, armed, confirm, max_scale, min_scale, max_force, on_fault, newtons
+    )
+    settings.check()
     token = find_token(token, token_file)
     guard = Guard(host, token)
     check_speed(source, speed)
@@ -101,17 +139,49 @@ def serve(
             sys.stdout.flush()
         print_message(f"{page} shows the estimates of {loaded.name} for {source}; Ctrl-C stops it")
 
+    opened, commanded = _find(source, hand, speed=speed, loop=not once)
+    check_armed(settings)
     with ExitStack() as stack:
-        opened = stack.enter_context(open_source(source, speed=speed, loop=not once))
+        watchdog = None if commanded is None else connect_hand(stack, settings, commanded)
+        stack.enter_context(opened)
         stream = create_stream_detector(loaded, opened, rate, ignore)
-        created = _create_publishers(stream, ros2=ros2, ros1=ros1)
+        session = stack.enter_context(Session(stream))
+        grip = None
+        if commanded is not None:
+            grip = stack.enter_context(_live_grip(settings, commanded, session, watchdog))
+        created = _create_publishers(stream, grip=grip, ros2=ros2, ros1=ros1)
         publishers = [stack.enter_context(publisher) for publisher in created]
+        for publisher in publishers:
+            session.add_listener(publisher.put)
         run_page(
-            loaded, opened, announce,
-            stream=stream, host=host, port=port, guard=guard, folder=record_to,
-            listeners=[publisher.put for publisher in publishers], stay=not once,
+            loaded, session, announce,
+            host=host, port=port, guard=guard, folder=record_to, grip=grip, stay=not once,
         )  # fmt: skip
         _report_unpublished(publishers)
+
+
+def _find(source: str, hand: str, *, speed: float, loop: bool) -> "tuple[Source, Hand | None]":
+    """Return the source, and the hand if one is given; neither is open yet."""
+    from holdfast.sources import open_source
+
+    if hand:
+        return find_source_and_hand(source, hand, speed=speed, loop=loop)
+    return open_source(source, speed=speed, loop=loop), None
+
+
+@contextmanager
+def _live_grip(
+    settings: GripSettings, hand: "Hand", session: "Session", watchdog: "Watchdog | None"
+) -> "Iterator[LiveGrip]":
+    """Yield the loop of a hand, which runs in a thread. Without `--armed` nothing is sent."""
+    from holdfast.control.live_grip import EventLog, LiveGrip
+
+    log = EventLog()
+    with (
+        open_loop(settings, hand, session.stream, watchdog, log) as loop,
+        LiveGrip(settings.law, loop, session, log) as grip,
+    ):
+        yield grip
 
 
 def _report_unpublished(publishers: "Sequence[RosPublisher]") -> None:
@@ -125,68 +195,58 @@ def _report_unpublished(publishers: "Sequence[RosPublisher]") -> None:
 
 
 def _create_publishers(
-    stream: "StreamDetector", *, ros2: bool, ros1: bool
+    stream: "StreamDetector", *, grip: "Grip | None", ros2: bool, ros1: bool
 ) -> "Iterator[RosPublisher]":
     units = {name: sensor.unit for name, sensor in stream.fingers.items()}
     if ros2:
         from holdfast.live.ros2_publisher import Ros2Publisher
 
-        yield Ros2Publisher(units)
+        yield Ros2Publisher(units, grip=grip)
     if ros1:
         from holdfast.live.ros1_publisher import Ros1Publisher
 
-        yield Ros1Publisher(units)
+        yield Ros1Publisher(units, grip=grip)
 
 
 def run_page(
     model: "Model",
-    source: "Source",
+    session: "Session",
     announce: Callable[[str], None],
     *,
-    stream: "StreamDetector | None" = None,
     host: str = DEFAULT_HOST,
     port: int = DEFAULT_PORT,
     guard: "Guard | None" = None,
     folder: Path | None = None,
-    listeners: Sequence["Listener"] = (),
+    grip: "Grip | None" = None,
     stay: bool = True,
 ) -> None:
-    """Run the live page of a source until Ctrl-C, or until the source ends if not `stay`.
+    """Run the live page of a session until Ctrl-C, or until the source ends if not `stay`.
 
     Args:
-        model: the model to use.
-        source: an open source.
+        model: the model of the session.
+        session: it is started here; the caller stops it.
         announce: function that is called with the URL when the page can be opened.
-        stream: detector of the source; by default one without options.
         host: address to listen on.
         port: port to listen on; 0 selects a free one.
         guard: access control; by default only this machine can connect.
         folder: folder for recordings.
-        listeners: functions that are called with every update.
+        grip: the loop that controls the hand.
         stay: continue when the source has ended.
 
     Raises:
         OutputError: the address is not available.
         Exception: the failure of the session.
     """
-    from holdfast.live.session import Session
-    from holdfast.live.stream_detector import StreamDetector
     from holdfast.live.web.service import LiveService
     from holdfast.web.guard import Guard
     from holdfast.web.server import run_server
 
-    session = Session(stream or StreamDetector(model, source))
-    service = LiveService(session, model, guard or Guard(host), folder, print_message)
-    for listener in listeners:
-        session.add_listener(listener)
+    service = LiveService(session, model, guard or Guard(host), folder, print_message, grip)
     session.start()
-    try:
-        run_server(
-            service.app, host, port, announce,
-            lambda: session.ended and not (stay and session.failure is None),
-        )  # fmt: skip
-    finally:
-        session.stop()
+    run_server(
+        service.app, host, port, announce,
+        lambda: session.ended and not (stay and session.failure is None),
+    )  # fmt: skip
     if session.failure is not None:
         raise session.failure
 

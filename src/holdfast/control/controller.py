@@ -123,6 +123,11 @@ class GripController:
         """Fingers of the grip; none while IDLE."""
         return tuple(touch.finger for touch in self._touches)
 
+    @property
+    def highest_scales(self) -> dict[str, float]:
+        """Highest scale that each finger of the grip may get; none while IDLE."""
+        return dict(zip(self.loaded_fingers, self._highest, strict=False))
+
     def events(self) -> list[GripEvent]:
         """Return states and rises since the last call, at most `MAX_EVENTS`, oldest first."""
         events = list(self._events)

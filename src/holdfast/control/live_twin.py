@@ -11,6 +11,7 @@ from holdfast.control.hands import Hand
 from holdfast.errors import HandError
 from holdfast.sensors import Sensor
 from holdfast.sources import Arrival, Source
+from holdfast.sources.replay import PAUSE
 from holdfast.sources.twin import grasp_of
 from holdfast.sources.uri import parse
 from holdfast.twin.hand import FINGERS, RATE
@@ -26,6 +27,7 @@ class LiveTwin(Source, Hand):
     Args:
         uri: as of the source: `twin:?object=can&seed=0&case=2&repeat=1&profile=reference`.
         speed: 1 is real time, 0 is as fast as samples are read.
+        loop: begin the grasp again at its end; the times continue after a pause.
 
     Attributes:
         simulation: the simulation; None while the twin is closed.
@@ -44,13 +46,15 @@ class LiveTwin(Source, Hand):
 
     fingers = FINGERS
 
-    def __init__(self, uri: str = "twin:", *, speed: float = 1.0) -> None:
+    def __init__(self, uri: str = "twin:", *, speed: float = 1.0, loop: bool = False) -> None:
         self.grasp = grasp_of(parse(uri)[1])
         if self.grasp.server:
             raise ValueError(f"{uri}: server=false expected while the twin takes commands")
         self.name, self.speed, self.paced = uri, speed, speed > 0
         self.simulation: Simulation | None = None
         self._scales = np.ones(len(FINGERS))
+        self._loops = loop
+        self._shift = 0.0  # of the times of this grasp
         self._begun_at: float | None = None
 
     @property
@@ -70,18 +74,21 @@ class LiveTwin(Source, Hand):
     @property
     def ended(self) -> bool:
         """Whether the grasp is complete."""
-        return self.simulation is None or self.simulation.is_over
+        return self.simulation is None or (self.simulation.is_over and not self._loops)
 
     def open(self) -> None:
         """Begin the grasp."""
+        self._shift = 0.0
         self.simulation = Simulation(self.grasp)
         self._scales = np.ones(len(FINGERS))
         self._begun_at = None
 
     def read(self, timeout: float) -> Arrival | None:
         """Simulate the next sample, and return it when it is due. The first read is the begin."""
-        if self.simulation is None or self.simulation.is_over:
+        if self.simulation is None or self.ended:
             return None
+        if self.simulation.is_over:
+            self._begin_again(self.simulation.time)
         if self._begun_at is None:
             self._begun_at = time.monotonic()
         if self.paced:
@@ -90,9 +97,16 @@ class LiveTwin(Source, Hand):
             time.sleep(max(min(wait, timeout), 0.0))
             if wait > timeout:
                 return None
-        at = self.simulation.time
+        at = self._shift + self.simulation.time
         self.simulation.step(self._scales)
         return Arrival(at, self.simulation.read(), time.monotonic())
+
+    def _begin_again(self, ended_at: float) -> None:
+        """Begin the grasp once more, after a pause."""
+        self.simulation = Simulation(self.grasp)
+        self._scales = np.ones(len(FINGERS))
+        self._shift += ended_at + PAUSE
+        self._begun_at = time.monotonic() + PAUSE / self.speed if self.paced else None
 
     def _send(self, command: GripCommand) -> None:
         """Set the force scales from the next sample on, or release the object."""

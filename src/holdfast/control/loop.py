@@ -6,6 +6,8 @@ from contextlib import nullcontext, suppress
 from types import TracebackType
 from typing import Self
 
+from msgspec import structs
+
 from holdfast.contact import HandEstimate
 from holdfast.control.command import GripCommand, GripReason, LoopState
 from holdfast.control.controller import GripController
@@ -51,7 +53,7 @@ class GripLoop:
         self.guard = CommandGuard(controller.limits)
         self.last: GripCommand | None = None
         self.n_sent = 0
-        self._released = False  # by a stop or fault that a person has ended
+        self._stays_open = False  # after a stop or fault that opened the hand and was ended
         self._watchdog = watchdog
         self._log = log or (lambda text, time: None)
 
@@ -71,10 +73,10 @@ class GripLoop:
     def resume(self) -> None:
         """End a stop or a fault, by the decision of a person.
 
-        A hand that was opened gets no command until it holds something again: a reset must not
-        close it.
+        A hand that was opened is released once more, which ends its grip, and gets no command
+        until it holds something again: a reset must not close it.
         """
-        self._released = self.last is not None and self.last.release
+        self._stays_open = self.last is not None and self.last.release
         self.controller.resume()
         self.guard.resume()
 
@@ -101,10 +103,13 @@ class GripLoop:
         admitted = self.guard.admit(command)
         if self.guard.violation != violated:
             self._log(f"grip FAULT (limit): {self.guard.violation}", time)
-        self.last = admitted or self.last or command
-        self._released = self._released and self.last.state is LoopState.IDLE
+        before, self.last = self.last, admitted or self.last or command
+        self._stays_open = self._stays_open and self.last.state is LoopState.IDLE
+        if self._stays_open:
+            self.last = structs.replace(self.last, release=True)
+        repeats = self._stays_open and before is not None and before.state is LoopState.IDLE
         if self.armed:
-            self._send(self.last, is_new=admitted is not None and not self._released)
+            self._send(self.last, is_new=admitted is not None and not repeats)
         return self.last
 
     def _send(self, command: GripCommand, *, is_new: bool) -> None:
@@ -128,6 +133,6 @@ class GripLoop:
         if not self.armed or self.last is None:
             return
         failed = kind is not None and self.controller.limits.on_fault == "open"
-        release = failed or self.last.release or self._released
+        release = failed or self.last.release
         with suppress(HandError) if kind else nullcontext():
             self.hand.send(safe_command(self.last, GripReason.NONE, release=release))

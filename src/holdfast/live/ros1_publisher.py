@@ -3,6 +3,7 @@
 from collections.abc import Iterable, Mapping
 from typing import Any
 
+from holdfast.live.grip import Grip
 from holdfast.live.ros_publisher import DIAGNOSTICS, VECTOR, WRENCH, DiagnosticStatus, RosPublisher
 from holdfast.ros import rospy_node
 from holdfast.sensors.types import Unit
@@ -18,6 +19,7 @@ class Ros1Publisher(RosPublisher):
         units: of the readings, by finger.
         namespace: prefix of the topics.
         master: URI of the ROS master; by default `ROS_MASTER_URI`.
+        grip: the loop that controls the hand; None if there is none.
 
     Raises:
         ValueError: as `RosPublisher`, or `master` is not a URI.
@@ -28,8 +30,9 @@ class Ros1Publisher(RosPublisher):
         units: Mapping[str, Unit],
         namespace: str = "/holdfast",
         master: str | None = None,
+        grip: Grip | None = None,
     ) -> None:
-        super().__init__(units, namespace)
+        super().__init__(units, namespace, grip)
         self._master = rospy_node.master_uri(master)
         self._publishers: dict[str, Any] = {}
         self._message_types: dict[str, type[Any]] = {}

@@ -3,6 +3,7 @@
 from collections.abc import Callable, Iterable, Mapping
 from typing import Any
 
+from holdfast.live.grip import Grip
 from holdfast.live.ros_publisher import (
     DIAGNOSTICS,
     FLOAT,
@@ -59,6 +60,7 @@ class Ros2Publisher(RosPublisher):
         units: of the readings, by finger.
         namespace: prefix of the topics.
         domain: ROS domain; by default `ROS_DOMAIN_ID`.
+        grip: the loop that controls the hand; None if there is none.
 
     Raises:
         ValueError: as `RosPublisher`, or the domain does not exist.
@@ -69,8 +71,9 @@ class Ros2Publisher(RosPublisher):
         units: Mapping[str, Unit],
         namespace: str = "/holdfast",
         domain: int | None = None,
+        grip: Grip | None = None,
     ) -> None:
-        super().__init__(units, namespace)
+        super().__init__(units, namespace, grip)
         self._domain = dds.domain_number(None if domain is None else str(domain))
         self._node: dds.Node | None = None
         self._writers: dict[str, Callable[[Mapping[str, Any]], None]] = {}

@@ -9,6 +9,7 @@ from threading import Condition, Thread
 from typing import TYPE_CHECKING, NamedTuple
 
 from holdfast.contact import ContactEstimate, ContactState, HandEstimate, Reason
+from holdfast.live.grip import Grip, GripDocument
 from holdfast.openable import Openable
 from holdfast.sensors.types import Unit
 
@@ -25,6 +26,8 @@ STRING, FLOAT = "std_msgs/String", "std_msgs/Float64"
 VECTOR, WRENCH = "geometry_msgs/Vector3Stamped", "geometry_msgs/WrenchStamped"
 DIAGNOSTICS = "diagnostic_msgs/DiagnosticArray"
 """Message types of the topics."""
+GRIP_TEXTS = ("state", "reason")
+"""Topics of the grip loop that are texts."""
 OK, WARN, ERROR = 0, 1, 2
 """Levels of diagnostics in ROS."""
 
@@ -55,9 +58,13 @@ class RosPublisher(Openable):
     of the hand is `NAMESPACE/hand/state`. `/diagnostics` is published once a second, and when
     faults change. Time stamps are the host's time when `publish` was called.
 
+    With a grip loop there are also `NAMESPACE/grip/state` and `reason` (texts), and
+    `NAMESPACE/FINGER/force_scale` (numbers), published with every estimate and at every event.
+
     Args:
         units: of the readings, by finger.
         namespace: prefix of the topics.
+        grip: the loop that controls the hand; None if there is none.
 
     Attributes:
         n_dropped: estimates that were dropped because ROS was too slow.
@@ -68,7 +75,14 @@ class RosPublisher(Openable):
             ROS name.
     """
 
-    def __init__(self, units: Mapping[str, Unit], namespace: str = "/holdfast") -> None:
+    def __init__(
+        self,
+        units: Mapping[str, Unit],
+        namespace: str = "/holdfast",
+        grip: Grip | None = None,
+    ) -> None:
+        self._grip = grip
+        self._grip_changed = False
         self._units = dict(units)
         self._names = topic_names(units, namespace)
         self._namespace = namespace.rstrip("/")
@@ -80,6 +94,8 @@ class RosPublisher(Openable):
         self._diagnostics_due = 0.0
         self._closing = False
         self.n_dropped = self.n_failed = 0
+        if grip is not None:
+            grip.add_listener(self._wake)
 
     def open(self) -> None:
         """Connect to ROS, and start the thread.
@@ -99,6 +115,9 @@ class RosPublisher(Openable):
             topics[f"{name}/state"] = STRING
             topics[f"{name}/stable_probability"] = topics[f"{name}/instability"] = FLOAT
             topics[f"{name}/force"] = WRENCH if self._units[finger] == "N" else VECTOR
+        if self._grip is not None:
+            topics |= dict.fromkeys((f"{self._namespace}/grip/{n}" for n in GRIP_TEXTS), STRING)
+            topics |= {f"{name}/force_scale": FLOAT for name in self._names.values()}
         return topics
 
     def close(self) -> None:
@@ -153,11 +172,21 @@ class RosPublisher(Openable):
     @abstractmethod
     def _publish_diagnostics(self, stamp: float, statuses: Iterable[DiagnosticStatus]) -> None: ...
 
+    def _wake(self, text: str, time: float) -> None:
+        """Publish the grip loop at once; a listener of its events."""
+        with self._queue_changed:
+            self._grip_changed = True
+            self._queue_changed.notify()
+
+    def _has_work(self) -> bool:
+        return bool(self._queue) or self._grip_changed or self._closing
+
     def _run(self) -> None:
         while True:
             with self._queue_changed:
                 until = max(self._diagnostics_due - time.monotonic(), 0.0)
-                self._queue_changed.wait_for(lambda: self._queue or self._closing, until)
+                self._queue_changed.wait_for(self._has_work, until)
+                self._grip_changed = False
                 if self._closing and not self._queue:
                     return
                 item = self._queue.popleft() if self._queue else None
@@ -171,7 +200,10 @@ class RosPublisher(Openable):
             estimate, fingers, stamp = item
             self._newest = estimate, stamp
             self._publish_estimate(estimate, fingers, stamp)
-        self._update_diagnostics()
+        grip = None if self._grip is None else self._grip.document()
+        if grip is not None:
+            self._publish_grip(grip)
+        self._update_diagnostics(grip)
 
     def _publish_estimate(
         self, estimate: HandEstimate, fingers: Iterable[str], stamp: float
@@ -185,10 +217,19 @@ class RosPublisher(Openable):
             self._publish_force(f"{name}/force", stamp, finger, one.force, newtons=newtons)
         self._publish_text(f"{self._namespace}/hand/state", estimate.state)
 
-    def _update_diagnostics(self) -> None:
+    def _publish_grip(self, grip: GripDocument) -> None:
+        self._publish_text(f"{self._namespace}/grip/state", grip.state)
+        self._publish_text(f"{self._namespace}/grip/reason", grip.reason)
+        for finger, command in grip.fingers.items():
+            if finger in self._names:
+                self._publish_number(f"{self._names[finger]}/force_scale", command.scale)
+
+    def _update_diagnostics(self, grip: GripDocument | None) -> None:
         """Publish the diagnostics if they are due or have changed."""
         now = time.time()
         statuses = diagnostics_of(self._newest, now)
+        if grip is not None:
+            statuses.append(diagnostic_of_grip(grip))
         levels = tuple(hash((one.level, one.message)) for one in statuses)
         if levels == self._levels and time.monotonic() < self._diagnostics_due:
             return
@@ -215,7 +256,7 @@ def topic_names(fingers: Iterable[str], namespace: str) -> dict[str, str]:
     if not re.fullmatch(r"(/[A-Za-z][A-Za-z0-9_]*)*", base):
         raise ValueError(f"a namespace as /holdfast expected, {namespace!r} given")
     names = {finger: f"{base}/{_ros_name(finger)}" for finger in fingers}
-    if len({*names.values(), f"{base}/hand"}) <= len(names):
+    if len({*names.values(), f"{base}/hand", f"{base}/grip"}) <= len(names) + 1:
         raise ValueError(f"fingers {', '.join(names)} would share topics: rename one")
     return names
 
@@ -245,6 +286,25 @@ def diagnostics_of(newest: tuple[HandEstimate, float] | None, now: float) -> lis
     text = f"problem of {', '.join(faulty)}" if faulty else "no problems"
     hand = DiagnosticStatus("hand", worst, text, (("state", str(estimate.state)),))
     return [hand, *fingers]
+
+
+def diagnostic_of_grip(grip: GripDocument) -> DiagnosticStatus:
+    """Return the health of the grip loop, with its newest command."""
+    reason = grip.failure or grip.reason
+    values = (
+        ("state", grip.state),
+        ("reason", grip.reason),
+        ("hand", grip.hand),
+        ("law", grip.law),
+        ("armed", str(grip.armed).lower()),
+        ("stopped", str(grip.stopped).lower()),
+        ("released", str(grip.released).lower()),
+        ("commands_sent", str(grip.n_sent)),
+        *((f"scale {name}", f"{one.scale:.3f}") for name, one in grip.fingers.items()),
+    )
+    level = ERROR if grip.state == "FAULT" else OK
+    message = f"{grip.state} ({reason})" if reason else grip.state
+    return DiagnosticStatus("grip", level, message, values)
 
 
 def _diagnostic(name: str, finger: ContactEstimate) -> DiagnosticStatus:

@@ -7,7 +7,8 @@ from collections import deque
 from collections.abc import Callable
 from concurrent.futures import Future
 from threading import Event, Thread
-from typing import NamedTuple
+from types import TracebackType
+from typing import NamedTuple, Self
 
 import numpy as np
 
@@ -36,7 +37,7 @@ Listener = Callable[[StreamUpdate], None]
 
 
 class Session:
-    """Run a stream detector in its own thread.
+    """Run a stream detector in its own thread. Leaving it as a context manager stops it.
 
     Listeners are called in that thread, one after the other. They must return at once: they
     put the update into a queue, and other threads process it.
@@ -89,6 +90,17 @@ class Session:
         if self._thread.is_alive():
             self._thread.join()
         self.source.close()
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(
+        self,
+        kind: type[BaseException] | None,
+        error: BaseException | None,
+        trace: TracebackType | None,
+    ) -> None:
+        self.stop()
 
     def restart_tare(self) -> None:
         """Discard the tare, and take a new one from the next samples.

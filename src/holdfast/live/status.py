@@ -9,6 +9,7 @@ import numpy as np
 from holdfast.contact import ContactEstimate, ContactState, HandEstimate
 from holdfast.live.arrival_detector import StreamEstimate
 from holdfast.live.fault_notices import FAULT_TEXTS, FaultWatch
+from holdfast.live.grip import Grip
 from holdfast.live.recorder import Recorder
 from holdfast.live.session import Session
 from holdfast.live.stream_detector import StreamUpdate
@@ -33,10 +34,17 @@ class StatusPublisher:
     Args:
         session: to publish.
         report: called with the text of each notice about a fault or by the service.
+        grip: the grip loop; None if no hand is controlled.
     """
 
-    def __init__(self, session: Session, report: Callable[[str], None] = lambda _: None) -> None:
+    def __init__(
+        self,
+        session: Session,
+        report: Callable[[str], None] = lambda _: None,
+        grip: Grip | None = None,
+    ) -> None:
         self._session = session
+        self._grip = grip
         self._report = report
         self._faults = FaultWatch()
         self._updates: deque[tuple[float, StreamUpdate]] = deque(maxlen=MAX_BUFFERED_UPDATES)
@@ -83,6 +91,7 @@ class StatusPublisher:
                 for problem in self._faults.current
             ],
             thresholds=dict(self._session.stream.thresholds),
+            grip=None if self._grip is None else self._grip.document(),
         )
 
     def _watch_faults(self, estimates: list[StreamEstimate]) -> None:

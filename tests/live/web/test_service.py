@@ -30,11 +30,13 @@ def kernels():
 
 
 @asynccontextmanager
-async def served(source, token=None, host="127.0.0.1", folder=None, start=True, reports=None):
+async def served(
+    source, token=None, host="127.0.0.1", folder=None, start=True, reports=None, grip=None
+):
     """Yield a client of the service of a source, and the session."""
     session = Session(StreamDetector(build.model(), source))
     report = [].append if reports is None else reports.append
-    service = LiveService(session, build.model(), Guard(host, token), folder, report)
+    service = LiveService(session, build.model(), Guard(host, token), folder, report, grip)
     runner = web.AppRunner(service.app, shutdown_timeout=0.5)
     await runner.setup()
     await web.TCPSite(runner, "127.0.0.1", 0).start()

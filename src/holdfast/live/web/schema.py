@@ -5,6 +5,7 @@ from typing import Literal
 from msgspec import Struct
 
 from holdfast.contact import Cause, ContactState, Fault, Reason
+from holdfast.live.grip import GripDocument
 
 SCHEMA = "holdfast.live/1"
 """Name of the schema. New fields may be added under this name; existing ones do not change."""
@@ -218,6 +219,7 @@ class LiveDocument(Struct, frozen=True, kw_only=True, tag_field="type", tag="liv
         ended: whether the source has ended.
         problems: faults that last.
         thresholds: probability from which each finger is stable now.
+        grip: the grip loop; null if no hand is controlled.
     """
 
     time: Number
@@ -231,6 +233,7 @@ class LiveDocument(Struct, frozen=True, kw_only=True, tag_field="type", tag="liv
     ended: bool
     problems: list[ProblemDocument] = []
     thresholds: dict[str, float] = {}
+    grip: GripDocument | None = None
 
 
 class EstimateDocument(

@@ -13,6 +13,7 @@ import msgspec
 from aiohttp import WSMsgType, web
 
 from holdfast.errors import HoldfastError
+from holdfast.live.grip import Grip
 from holdfast.live.recorder import SessionRecorder
 from holdfast.live.session import Session
 from holdfast.live.status import (
@@ -23,6 +24,7 @@ from holdfast.live.status import (
 )
 from holdfast.live.stream_detector import StreamUpdate
 from holdfast.live.web import schema
+from holdfast.live.web.grip_routes import GripRoutes
 from holdfast.model import Model
 from holdfast.web.body import BodyReader, json_error
 from holdfast.web.guard import Guard
@@ -91,6 +93,7 @@ class LiveService:
         guard: check of every request.
         folder: for recordings; None if the service may not record.
         report: called with the text of each notice about a fault or by the service.
+        grip: the loop that controls the hand; None if there is none.
 
     Attributes:
         app: the web application.
@@ -103,11 +106,15 @@ class LiveService:
         guard: Guard,
         folder: Path | None = None,
         report: Callable[[str], None] = lambda _: None,
+        grip: Grip | None = None,
     ) -> None:
         self._session = session
         self._model = model
         self._recorder = SessionRecorder(session, folder)
-        self._status = StatusPublisher(session, report)
+        self._status = StatusPublisher(session, report, grip)
+        self._grip = grip
+        if grip is not None:
+            grip.add_listener(self._mark)
         self._started = time.time()
         self._clients: dict[str, set[WebSocketClient]] = {"live": set(), "estimates": set()}
         self._newest_document = b"{}"
@@ -132,7 +139,14 @@ class LiveService:
             web.post("/api/v1/recording", self._post_recording),
             web.delete("/api/v1/recording", self._delete_recording),
             web.post("/api/v1/markers", self._post_marker),
+            *GripRoutes(self._grip, self._status.add_notice).routes(),
         ]
+
+    def _mark(self, text: str, time: float) -> None:
+        """Add an event of the grip loop to the recording, if one is running."""
+        recorder = self._recorder.current
+        if recorder is not None:
+            recorder.add_marker(text, time)
 
     async def _publish(self, _: web.Application) -> AsyncIterator[None]:
         """Publish the session while the application runs."""
@@ -234,7 +248,15 @@ class LiveService:
 
     async def _post_recording(self, request: web.Request) -> web.Response:
         name = (await self._bodies.read(request, _RecordingRequest)).name
-        return await _answer(lambda: {"path": str(self._recorder.start(name))})
+        return await _answer(lambda: self._start_recording(name))
+
+    def _start_recording(self, name: str) -> dict[str, str]:
+        path = self._recorder.start(name)
+        if self._grip is not None:
+            grip = self._grip.document()
+            armed = "armed" if grip.armed else "dry run"
+            self._recorder.add_marker(f"grip {grip.state} ({grip.law}, {grip.hand}, {armed})")
+        return {"path": str(path)}
 
     async def _delete_recording(self, _: web.Request) -> web.Response:
         return await _answer(lambda: recording_info(self._recorder.stop()))

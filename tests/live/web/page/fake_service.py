@@ -195,6 +195,29 @@ class Tape:
         }
 
 
+def gripping(names=("thumb", "index", "middle", "ring"), **fields):
+    """Document of a grip loop that reacts."""
+    scales = [1.24, 1.5, 1.0, 2.0, 1.75, 1.9]
+    return {
+        "hand": "ros2:plexus?namespace=/allegro_hand", "law": "friction-margin", "armed": True,
+        "limits": {
+            "min_scale": 1.0, "max_scale": 2.0, "rise": 30.0, "fall": 0.3, "cooldown": 0.5,
+            "max_force": 12.5, "stale_after": 0.05, "fault_after": 0.03, "recovery": None,
+            "on_fault": "open", "max_rate": 400.0,
+        },
+        "state": "REACT", "reason": "", "stopped": False, "released": False, "time": 4.2,
+        "fingers": {
+            name: {"scale": scales[k], "highest": 1.75 if k else 2.0, "reason": "unstable"}
+            for k, name in enumerate(names)
+        },
+        "n_sent": 1234, "failure": "",
+        "events": [
+            {"time": 3.9, "text": "grip HOLD"},
+            {"time": 4.1, "text": "grip REACT: index rises from 1.000 (unstable)"},
+        ],
+    } | fields  # fmt: skip
+
+
 class Service:
     """Fake service with its own port and thread."""
 
@@ -204,6 +227,8 @@ class Service:
         self.calls = []
         self.recording = None
         self.threshold = 0.5
+        self.grip = None  # document of the grip loop
+        self.stop_fails = False  # drop the connection of a stop without an answer
         self.patch = {}  # fields that replace those of every message
         self.notices = []
         self.muted = False
@@ -254,6 +279,9 @@ class Service:
         app.router.add_post("/api/v1/recording", self.start_recording)
         app.router.add_delete("/api/v1/recording", self.stop_recording)
         app.router.add_post("/api/v1/markers", self.marker)
+        app.router.add_get("/api/v1/grip", self.get_grip)
+        app.router.add_post("/api/v1/grip/stop", self.stop_grip)
+        app.router.add_post("/api/v1/grip/reset", self.reset_grip)
         return app
 
     @web.middleware
@@ -310,6 +338,20 @@ class Service:
     async def marker(self, _):
         return web.json_response({})
 
+    async def get_grip(self, _):
+        return web.json_response(self.grip)
+
+    async def stop_grip(self, request):
+        if self.stop_fails:
+            request.transport.abort()
+            return web.Response()
+        self.grip |= {"state": "FAULT", "reason": "stopped", "stopped": True}
+        return web.json_response(self.grip)
+
+    async def reset_grip(self, _):
+        self.grip |= {"state": "HOLD", "reason": "", "stopped": False}
+        return web.json_response(self.grip)
+
     async def live(self, request):
         socket = web.WebSocketResponse()
         await socket.prepare(request)
@@ -331,6 +373,7 @@ class Service:
             message = self.tape.message(start, self.at) | self.patch
             message["thresholds"] = dict.fromkeys(self.tape.tracks, self.threshold)
             message["notices"], self.notices = self.notices, []
+            message["grip"] = self.grip
             if self.recording:
                 self.recording["seconds"] += PERIOD
                 self.recording["n_bytes"] += 14_000

@@ -29,10 +29,10 @@ export class EventLog {
     this.addItem(event.time, name, make("span", "change", chip(event.previous), "→", chip(event.state)));
   }
 
-  addMarker(time, text) {
+  addMarker(time, text, kind = "marker") {
     const label = make("span", "change", text);
     label.title = text;
-    this.addItem(time, make("b", "finger marked", "marker"), label);
+    this.addItem(time, make("b", "finger marked", kind), label);
   }
 
   addItem(time, ...parts) {

@@ -9,6 +9,7 @@ import { Connection } from "./connection.js";
 import { Controls } from "./controls.js";
 import { STATES, duration } from "./format.js";
 import { FrameLimiter } from "./frame_rate.js";
+import { GripPanel } from "./grip.js";
 import { listenToKeys } from "./keys.js";
 import { EventLog, NoticeLog } from "./logs.js";
 import { Plots } from "./plots.js";
@@ -28,6 +29,7 @@ class Page {
     this.cards = new Cards(byId("cards"), (name) => this.chooseFinger(this.plots.chosen === name ? null : name));
     this.controls = new Controls((text) => this.addMarker(text));
     this.threshold = new ThresholdPanel();
+    this.grip = new GripPanel((time, text) => this.events.addMarker(time, text, "grip"));
     this.status = { link: "connecting", reason: "", ended: false, silent: false, problem: "" };
     this.store = null;
     this.frozen = null; // a copy of the store while the plots are paused
@@ -40,7 +42,7 @@ class Page {
     listenToKeys({
       " ": () => this.togglePause(), t: () => this.controls.tare(), r: () => this.controls.record(),
       m: () => this.controls.mark(), f: () => this.controls.toggleFullScreen(), "?": () => byId("help").click(),
-      p: () => this.threshold.toggle(),
+      p: () => this.threshold.toggle(), k: () => this.togglePause(),
       digit: (n) => this.chooseFinger(n ? this.plots.names?.[n - 1] ?? this.plots.chosen : null),
     });
     onTheme(() => this.updateColours());
@@ -58,7 +60,7 @@ class Page {
     this.store = new SampleStore(names, capacityFor(hello.rate));
     this.maxGap = hello.rate ? Math.max(0.1, 4 / hello.rate) : 0.5;
     this.events.clear();
-    for (const part of [this.banner, this.cards, this.controls, this.threshold]) part.start(hello);
+    for (const part of [this.banner, this.cards, this.controls, this.threshold, this.grip]) part.start(hello);
     this.plots.start(hello, this.store);
     this.fillFingers();
     this.showStream(hello);
@@ -83,6 +85,7 @@ class Page {
     for (const notice of message.notices ?? []) this.notices.add(notice);
     if (message.health) this.health.update(message.health);
     this.controls.update(message.recording);
+    this.grip.update(message.grip);
     this.showLink();
     this.dirty = true;
   }
@@ -93,6 +96,7 @@ class Page {
     Object.assign(this.status, { link, reason });
     this.controls.setConnected(link === "open");
     this.threshold.setConnected(link === "open");
+    this.grip.setLink(link);
     this.showLink();
     if (link === "open") return;
     this.banner.showState("UNKNOWN", "NO CONNECTION");
