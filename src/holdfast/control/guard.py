@@ -47,8 +47,12 @@ class CommandGuard:
         self.stopped = True
 
     def resume(self) -> None:
-        """End a stop or a violation; the last scales stay those from which a rise is measured."""
+        """End a stop or a violation; the last scales stay those from which a rise is measured.
+
+        The next command is not held back.
+        """
         self.violation, self.stopped = "", False
+        self._sent_at = -math.inf
 
     def admit(self, command: GripCommand) -> GripCommand | None:
         """Return the command to send.
