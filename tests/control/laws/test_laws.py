@@ -6,7 +6,7 @@ import pytest
 from holdfast.contact import Cause
 from holdfast.control import LAWS, GripReason
 from holdfast.control.laws import Touch, law_named
-from holdfast.control.laws.friction_margin import FIRST_FRICTION, MARGIN
+from holdfast.control.laws.friction_margin import MARGIN
 
 DT = 1 / 150
 
@@ -57,9 +57,9 @@ class TestPr2:
             wishes.append(wanted(law, touches, k * DT, DT))
         return wishes
 
-    def test_a_vibration_raises_all_fingers_by_8_percent(self):
+    def test_a_vibration_raises_all_fingers(self):
         last = self.shaken(0.1)[-1]
-        assert [tuple(wish) for wish in last] == [(1.08, GripReason.SLIP)] * 2
+        assert [tuple(wish) for wish in last] == [(1.3, GripReason.SLIP)] * 2
 
     def test_a_vibration_below_the_threshold_does_not(self):
         assert all(one.scale == 1.0 for wishes in self.shaken(0.01) for one in wishes)
@@ -74,36 +74,35 @@ class TestWongZhu:
         law = started("wong-zhu", touches)
         touches[0].tangential = 0.67
         one, other = wanted(law, touches, DT, DT)
-        assert one == (1.1, GripReason.SLIP)
+        assert one == (1.3, GripReason.SLIP)
         assert other == (1.0, GripReason.NONE)
 
     def test_a_small_change_does_not(self):
         touches = [touch()]
         law = started("wong-zhu", touches)
-        touches[0].tangential = 0.65
+        touches[0].tangential = 0.62
         assert wanted(law, touches, DT, DT)[0].reason is GripReason.NONE
 
 
 class TestFrictionMargin:
     def test_the_target_is_the_margin_times_the_least_force(self):
-        touches = [touch(normal=2.0, tangential=0.9)]
+        touches = [touch(normal=2.0, tangential=1.2)]
         (wish,) = wanted(started("friction-margin", touches), touches, DT, DT)
-        assert wish.scale == pytest.approx(MARGIN * 0.9 / 0.45 / 2.0)  # 0.45 holds: it is known
+        assert wish.scale == pytest.approx(MARGIN * 1.2 / 0.6 / 2.0)  # 0.6 holds: it is known
         assert wish.reason is GripReason.MARGIN
 
     def test_a_slip_lowers_the_friction(self):
-        touches = [touch(normal=2.0, tangential=1.0)]
+        touches = [touch(normal=2.0, tangential=1.4)]
         law = started("friction-margin", touches)
         wanted(law, touches, DT, DT)
-        touches[0].probability, touches[0].tangential = 0.1, 0.8
+        touches[0].probability, touches[0].tangential = 0.1, 1.2
         (wish,) = wanted(law, touches, 2 * DT, DT)
-        assert wish.scale == pytest.approx(MARGIN * 0.8 / (0.9 * 0.4) / 2.0)
+        assert wish.scale == pytest.approx(MARGIN * 1.2 / (0.9 * 0.6) / 2.0)
 
     def test_it_falls_by_5_percent_at_most(self):
         touches = [touch(tangential=0.01)]
         (wish,) = wanted(started("friction-margin", touches), touches, DT, DT)
         assert wish == (0.95, GripReason.RELAX)
-        assert FIRST_FRICTION < 0.5
 
 
 class TestStability:
