@@ -109,7 +109,7 @@ class Stability(Law):
         settle_time: float = 0.15,
         fall: float = 1.0,
         margin: float = 1.15,
-        memory: float = 5.0,
+        memory: float = 20.0,
     ) -> None:
         self.threshold, self.again_time = threshold, again_time
         self.threshold_again = threshold_again
