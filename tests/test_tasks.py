@@ -12,7 +12,6 @@ import numpy as np
 import pytest
 from threadpoolctl import threadpool_info
 
-from holdfast import cluster
 from holdfast import tasks as work
 from holdfast.cli.terminal.progress import progress
 from holdfast.errors import EngineError, OutputError
@@ -231,9 +230,9 @@ def digest(tmp_path, monkeypatch):
 
     def clear():
         work.source_digest.cache_clear()
-        cluster.file_digests.cache_clear()
+        work._file_digests.cache_clear()
 
-    monkeypatch.setattr(cluster, "__file__", str(tmp_path / "package" / "cluster.py"))
+    monkeypatch.setattr(work, "__file__", str(tmp_path / "package" / "tasks.py"))
     yield written
     monkeypatch.undo()
     clear()

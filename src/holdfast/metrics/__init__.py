@@ -19,10 +19,7 @@ from holdfast.metrics.summary import (
     Intervals,
     Metrics,
     RecordingMetrics,
-    RecordingResults,
-    score_recording,
     summarise,
-    summarise_results,
 )
 
 __all__ = [
@@ -38,7 +35,6 @@ __all__ = [
     "Intervals",
     "Metrics",
     "RecordingMetrics",
-    "RecordingResults",
     "SampleMetrics",
     "bootstrap_interval",
     "calibration_sums",
@@ -49,7 +45,5 @@ __all__ = [
     "pool_events",
     "ratio_of_sums",
     "sample_metrics",
-    "score_recording",
     "summarise",
-    "summarise_results",
 ]

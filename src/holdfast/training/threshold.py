@@ -107,7 +107,7 @@ def tune(
     points = _usable([_point(replays, t) for t in _probabilities(LOG_ODDS)])
     first = _best(points, false_alarms)
     fine = [_point(replays, t) for t in _probabilities(_log_odds(first.threshold) + FINE_STEPS)]
-    every = _in_order([*points, *fine])
+    every = _in_order(_usable([*points, *fine]))
     chosen = _confirm(model, recordings, _ranked(every, false_alarms), false_alarms)
     tuned = with_threshold(model, chosen.threshold)
     own = max(part.classifier.threshold for part in model.fingers.values())
@@ -152,14 +152,18 @@ def _measure(hands: Sequence[FingerDecisions], threshold: float) -> OperatingPoi
 
 
 def _usable(points: list[OperatingPoint]) -> list[OperatingPoint]:
-    """Return the thresholds at which the hand is STABLE often enough."""
+    """Return the thresholds at which the hand is STABLE often enough, and not for ever.
+
+    Below the hysteresis of the model a stable contact stays stable, so that every event is missed.
+    """
     most = max(point.stable for point in points)
     if most == 0:
         raise ModelError(
             "the model cannot be tuned: the hand is never STABLE at any threshold while it is "
             "labelled stable (see holdfast detect --summary)"
         )
-    return [point for point in points if point.stable >= USABLE_SHARE * most]
+    usable = [point for point in points if point.stable >= USABLE_SHARE * most]
+    return [point for point in usable if (point.events.missed["0.2"] or 0.0) < 100] or usable
 
 
 def _ranked(points: Sequence[OperatingPoint], false_alarms: float) -> list[OperatingPoint]:
