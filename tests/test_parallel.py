@@ -10,7 +10,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from holdfast import parallel
+from holdfast import cluster as cluster_module
 from holdfast.errors import EngineError, MissingExtra
 from holdfast.parallel import Engine, map_ordered
 
@@ -50,6 +50,10 @@ def die_at(place, deadly):
     if place == deadly:
         os.kill(os.getpid(), signal.SIGKILL)
     return place
+
+
+def joined(*parts):
+    return parts
 
 
 ENDLESS = """
@@ -179,6 +183,17 @@ class TestEngine:
         calls = [("slow", (1.0,)), ("quick", (0.0,))]
         assert [name for name, _ in PROCESSES.map_unordered(time.sleep, calls)] == ["quick", "slow"]
 
+    @pytest.mark.parametrize("engine", [HERE, PROCESSES])
+    def test_shared_arguments_come_first(self, engine):
+        assert list(engine.map_ordered(joined, [("c",), ("d",)], shared=("a", ["b"]))) == [
+            ("a", ["b"], "c"),
+            ("a", ["b"], "d"),
+        ]
+
+    def test_only_a_cluster_needs_absolute_paths(self):
+        assert HERE.path(Path("data")) == Path("data")
+        assert Engine.parse("dask:hub:8786").path(Path("data")) == Path.cwd() / "data"
+
 
 class TestProcesses:
     def test_calls_of_a_process_that_died_are_made_again(self, tmp_path):
@@ -215,9 +230,48 @@ class TestCluster:
         ):
             list(engine_of(cluster).map_ordered(die_at, calls))
 
+    def test_shared_arguments_come_first(self, cluster):
+        shared = (np.arange(100_000), {"of": "all"})
+        found = list(engine_of(cluster).map_ordered(joined, [(1,), (2,)], shared=shared))
+        assert [each[1:] for each in found] == [({"of": "all"}, 1), ({"of": "all"}, 2)]
+        assert all((each[0] == shared[0]).all() for each in found)
+
+    def test_calls_are_read_as_the_workers_need_them(self, cluster):
+        n_read = 0
+
+        def arguments():
+            nonlocal n_read
+            for n_read in range(1, 201):
+                yield n_read, 1
+
+        results = engine_of(cluster).map_ordered(power, arguments())
+        next(results)
+        assert n_read < 100
+        assert len(list(results)) == 199
+
+    @pytest.mark.parametrize(
+        ("preload", "message"),
+        [
+            ("import sys; sys.modules['holdfast'] = None", "cannot import this holdfast: install"),
+            (
+                "from holdfast import cluster; cluster.package_digest = lambda: 'other'",
+                "has another version of holdfast: install",
+            ),
+        ],
+    )
+    def test_a_worker_with_another_installation(self, tmp_path, preload, message):
+        distributed = pytest.importorskip("distributed")
+        file = tmp_path / "before.py"
+        file.write_text(preload)
+        with (
+            distributed.LocalCluster(n_workers=1, preload=[str(file)], **PRIVATE) as other,
+            pytest.raises(EngineError, match=rf"^the worker at tcp://127\.0\.0\.1:\d+ {message}"),
+        ):
+            list(engine_of(other).map_ordered(power, [(1, 1)]))
+
     def test_without_workers(self, monkeypatch):
         distributed = pytest.importorskip("distributed")
-        monkeypatch.setattr(parallel, "NO_WORKER_TIMEOUT", 0.5)
+        monkeypatch.setattr(cluster_module, "NO_WORKER_TIMEOUT", 0.5)
         with distributed.LocalCluster(n_workers=0, **PRIVATE) as empty:
             address = empty.scheduler_address
             with pytest.raises(EngineError, match=f"^the Dask scheduler at {address} has no work"):
@@ -226,13 +280,13 @@ class TestCluster:
     @pytest.mark.parametrize("address", ["missing", "127.0.0.1:1", "spark://127.0.0.1:1"])
     def test_no_scheduler_at_the_address(self, monkeypatch, address):
         pytest.importorskip("distributed")
-        monkeypatch.setattr(parallel, "CONNECT_TIMEOUT", 0.5)
+        monkeypatch.setattr(cluster_module, "CONNECT_TIMEOUT", 0.5)
         with pytest.raises(EngineError, match=rf"^no Dask scheduler answers at {address}: start"):
             list(Engine.parse(f"dask:{address}").map_ordered(power, [(1, 1)]))
 
     def test_another_server_at_the_address(self, monkeypatch):
         pytest.importorskip("distributed")
-        monkeypatch.setattr(parallel, "CONNECT_TIMEOUT", 0.5)
+        monkeypatch.setattr(cluster_module, "CONNECT_TIMEOUT", 0.5)
         with socket.create_server(("127.0.0.1", 0)) as silent:
             engine = Engine.parse("dask:{}:{}".format(*silent.getsockname()))
             with pytest.raises(EngineError, match=r"^no Dask scheduler answers at 127\.0\.0\.1:"):

@@ -12,6 +12,7 @@ import numpy as np
 import pytest
 from threadpoolctl import threadpool_info
 
+from holdfast import cluster
 from holdfast import tasks as work
 from holdfast.cli.terminal.progress import progress
 from holdfast.errors import EngineError, OutputError
@@ -230,9 +231,9 @@ def digest(tmp_path, monkeypatch):
 
     def clear():
         work.source_digest.cache_clear()
-        work._file_digests.cache_clear()
+        cluster.file_digests.cache_clear()
 
-    monkeypatch.setattr(work, "__file__", str(tmp_path / "package" / "tasks.py"))
+    monkeypatch.setattr(cluster, "__file__", str(tmp_path / "package" / "cluster.py"))
     yield written
     monkeypatch.undo()
     clear()

@@ -124,6 +124,8 @@ class Training(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
         figures: pooled metrics out of fold.
         seed: seed of all random numbers.
         versions: versions of the packages that fitted it.
+        samples: number of used and of all labelled samples of each finger of which only every
+            n-th was used.
     """
 
     recordings: dict[str, str]
@@ -132,6 +134,7 @@ class Training(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     figures: dict[str, float | None] = {}
     seed: int = 0
     versions: dict[str, str] = {}
+    samples: dict[str, tuple[int, int]] | msgspec.UnsetType = msgspec.UNSET
 
 
 class ThresholdPoint(msgspec.Struct, frozen=True, forbid_unknown_fields=True):

@@ -8,33 +8,23 @@ import os
 import time
 import warnings
 from collections.abc import Callable, Hashable, Iterable, Iterator
-from contextlib import contextmanager, suppress
+from contextlib import suppress
 from functools import cache, partial
-from queue import Empty, SimpleQueue
+from pathlib import Path
 from threading import Thread
-from typing import TYPE_CHECKING, Any, NamedTuple, Self, TypeVar
+from typing import NamedTuple, Self, TypeVar
 
-from holdfast.errors import EngineError, MissingExtra
-
-if TYPE_CHECKING:
-    from distributed import Client, Future
+from holdfast.cluster import Arguments, Call, call_on_cluster
+from holdfast.errors import EngineError
 
 T = TypeVar("T")
 K = TypeVar("K", bound=Hashable)
-Arguments = tuple[object, ...]
-Call = tuple[K, Arguments]
 
 MAX_RETRIES = 2
 """Number of times that a call whose process died is made again, alone."""
 
-CONNECT_TIMEOUT = 10.0
-"""Time within which a scheduler must answer [s]."""
-
 PARENT_CHECK_INTERVAL = 1.0
 """Time between two checks of a process whether the process that started it still runs [s]."""
-
-NO_WORKER_TIMEOUT = 30.0
-"""Time for which a cluster may have neither a worker nor a new result [s]."""
 
 
 class Engine(NamedTuple):
@@ -71,14 +61,39 @@ class Engine(NamedTuple):
             return cls(n_jobs, address)
         raise ValueError(f"unknown engine {text!r}; there are loky and dask:ADDRESS")
 
+    @property
+    def in_this_process(self) -> bool:
+        """Whether a call is made in this process, when its result is needed."""
+        return self.scheduler is None and self.n_jobs == 1
+
+    def path(self, path: Path) -> Path:
+        """Return a path as all processes can use it: absolute on a cluster.
+
+        A worker has another working folder. Its machine must have the file at the same path.
+        """
+        return path if self.scheduler is None else path.absolute()
+
+    def check(self) -> None:
+        """Make one call, so that an engine that cannot be reached is found before the work.
+
+        Raises:
+            EngineError, MissingExtra: as `map_unordered`.
+        """
+        if self.scheduler is not None:
+            list(self.map_ordered(abs, [(0,)]))
+
     def map_ordered(
-        self, function: Callable[..., T], arguments: Iterable[Arguments]
+        self,
+        function: Callable[..., T],
+        arguments: Iterable[Arguments],
+        shared: Arguments = (),
     ) -> Iterator[T]:
         """Call a function with many arguments; yield the results in the order of the arguments.
 
         Args:
             function: any function that can be sent to another process.
             arguments: the arguments of each call.
+            shared: as in `map_unordered`.
 
         Yields:
             The result of each call, as soon as all earlier results have been yielded.
@@ -88,31 +103,35 @@ class Engine(NamedTuple):
         """
         waiting: dict[int, T] = {}
         next_index = 0
-        for index, result in self.map_unordered(function, enumerate(arguments)):
+        for index, result in self.map_unordered(function, enumerate(arguments), shared):
             waiting[index] = result
             while next_index in waiting:
                 yield waiting.pop(next_index)
                 next_index += 1
 
     def map_unordered(
-        self, function: Callable[..., T], calls: Iterable[Call[K]]
+        self, function: Callable[..., T], calls: Iterable[Call[K]], shared: Arguments = ()
     ) -> Iterator[tuple[K, T]]:
         """Call a function with many arguments; yield each result as soon as it exists.
 
         Args:
             function: any function that can be sent to another process.
             calls: the name of each call and its arguments. All names differ.
+            shared: first arguments of every call. A cluster copies them to each worker once.
 
         Yields:
             The name of a call and its result.
 
         Raises:
-            EngineError: the cluster cannot be reached or has no workers, or the process died
-                every time that one call was made. The text names that call.
+            EngineError: the cluster cannot be reached, has no workers or a worker without this
+                version of holdfast, or the process died every time that one call was made.
+                The text names that call.
             MissingExtra: dask is not installed.
         """
         if self.scheduler is not None:
-            return _on_cluster(function, calls, self.scheduler)
+            return call_on_cluster(function, calls, self.scheduler, shared)
+        if shared:
+            function = partial(function, *shared)
         if self.n_jobs != 1:
             return _in_processes(function, calls, self.n_jobs)
         return ((name, function(*arguments)) for name, arguments in calls)
@@ -206,112 +225,3 @@ def _call_alone(function: Callable[..., T], name: object, arguments: Arguments) 
         f"{name}: its process died {1 + MAX_RETRIES} times, killed or out of memory; "
         "try with fewer jobs"
     )
-
-
-def _on_cluster(
-    function: Callable[..., T], calls: Iterable[Call[K]], scheduler: str
-) -> Iterator[tuple[K, T]]:
-    """Make calls on a Dask cluster, which repeats the calls of a worker that died.
-
-    If a worker dies, Dask counts a failure of every call that the worker held (decision 0006).
-    So a call that Dask cancels is repeated alone.
-    """
-    with _client(scheduler) as client:
-        suspects: list[Call[K]] = []
-        yield from _submit(client, function, calls, suspects)
-        for call in suspects:
-            failed: list[Call[K]] = []
-            yield from _submit(client, function, [call], failed)
-            if failed:
-                raise EngineError(f"{call[0]}: its worker died each time, killed or out of memory")
-
-
-def _submit(
-    client: "Client", function: Callable[..., T], calls: Iterable[Call[K]], suspects: list[Call[K]]
-) -> Iterator[tuple[K, T]]:
-    """Make calls on a cluster; append to `suspects` those whose workers died."""
-    from distributed import KilledWorker
-
-    done: SimpleQueue[Future] = SimpleQueue()
-    waiting: dict[str, tuple[Call[K], Future]] = {}
-    for call in calls:
-        future = client.submit(partial(function, *call[1]), pure=False)
-        waiting[future.key] = call, future
-        future.add_done_callback(done.put)
-    while waiting:
-        call, future = waiting.pop(_next_done(done, client).key)
-        try:
-            result = _result(future)
-        except KilledWorker:
-            suspects.append(call)
-        else:
-            yield call[0], result
-
-
-@contextmanager
-def _client(scheduler: str) -> Iterator["Client"]:
-    """Connect to a scheduler; at the end, drop the calls that are not done."""
-    try:
-        import distributed  # noqa: F401 (fills dask's configuration, so it must be first)
-        from dask import config
-    except ImportError as missing:
-        raise MissingExtra("distributed", "cluster") from missing
-    large = {"distributed.admin.large-graph-warning-threshold": "1GB"}
-    with config.set(large), _connect(scheduler) as client:
-        yield client
-
-
-def _connect(scheduler: str) -> "Client":
-    from asyncio import run, wait_for
-    from concurrent.futures import ThreadPoolExecutor
-    from logging import CRITICAL, getLogger
-
-    from distributed import Client
-
-    getLogger("distributed.client").setLevel(CRITICAL)  # our errors say the same in one line
-    try:
-        with ThreadPoolExecutor(1) as thread:  # the calling thread may have an event loop
-            thread.submit(run, wait_for(_connect_once(scheduler), CONNECT_TIMEOUT)).result()
-        return Client(scheduler, timeout=CONNECT_TIMEOUT, set_as_default=False)
-    except Exception as cause:  # a server of any other kind may answer there
-        raise EngineError(
-            f"no Dask scheduler answers at {scheduler}: start one with `dask scheduler` "
-            "and give the address that it shows, tcp://HOST:8786"
-        ) from cause
-
-
-async def _connect_once(scheduler: str) -> None:
-    """Test the connection: a `Client` that cannot connect leaves threads and delays the exit."""
-    from distributed.comm import connect
-
-    comm = await connect(scheduler)
-    await comm.close()
-
-
-def _next_done(done: "SimpleQueue[Future]", client: "Client") -> "Future":
-    """Wait for the next future that is done."""
-    while True:
-        with suppress(Empty):
-            return done.get(timeout=NO_WORKER_TIMEOUT)
-        if not client.scheduler_info()["workers"]:
-            scheduler = client.scheduler.address
-            raise EngineError(
-                f"the Dask scheduler at {scheduler} has no workers: "
-                f"start some with `dask worker {scheduler} --nthreads 1`"
-            )
-
-
-def _result(future: "Future") -> Any:  # noqa: ANN401 (any function's)
-    from distributed.client import FutureCancelledError
-
-    try:
-        return future.result()
-    except FutureCancelledError as cause:
-        raise EngineError("the Dask scheduler is gone") from cause
-    except RuntimeError as cause:
-        if "deserialization of the task graph" not in str(cause):
-            raise
-        raise EngineError(
-            "the Dask scheduler cannot import holdfast: install the same version for it and for "
-            "its workers"
-        ) from cause

@@ -1,17 +1,15 @@
 """Tasks whose results are stored, so that a stopped command continues where it stopped."""
 
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
-from contextlib import contextmanager
 from dataclasses import dataclass
 from functools import lru_cache
 from hashlib import sha256
 from pathlib import Path
 from typing import Any, NamedTuple, Protocol, TypeVar
 
-import numba
 from msgspec import UNSET, MsgspecError, Raw, Struct, UnsetType, msgpack
-from threadpoolctl import threadpool_limits
 
+from holdfast.cluster import file_digests, one_thread
 from holdfast.errors import EngineError, OutputError
 from holdfast.files import write_whole
 from holdfast.parallel import Engine
@@ -145,21 +143,10 @@ def source_digest(unused: tuple[str, ...] = ()) -> str:
     """
     left_out = (*NEVER_USED, *unused)
     digest = sha256()
-    for name, content in _file_digests().items():
+    for name, content in file_digests().items():
         if not any(name.is_relative_to(each) for each in left_out):
             digest.update(f"{name.as_posix()} {content}\n".encode())
     return digest.hexdigest()
-
-
-@lru_cache
-def _file_digests() -> dict[Path, str]:
-    """Return a digest of each file of the package, by its path in the package."""
-    package = Path(__file__).parent
-    return {
-        path.relative_to(package): sha256(path.read_bytes()).hexdigest()
-        for path in sorted(package.rglob("*"))
-        if path.is_file() and "__pycache__" not in path.parts
-    }
 
 
 class StoredResult(Struct, frozen=True):
@@ -197,27 +184,11 @@ def _call(
     try:
         if source != source_digest():
             raise EngineError("the version of holdfast of its worker differs from this one")
-        with _one_thread():
+        with one_thread():
             return msgpack.encode(function(*arguments), enc_hook=_to_builtin)
     except Exception as failure:
         _add_name(name, failure)
         raise
-
-
-@contextmanager
-def _one_thread() -> Iterator[None]:
-    """Make NumPy and compiled kernels use one thread.
-
-    Workers would compete for processors otherwise, and a sum over several threads is rounded
-    differently.
-    """
-    before = numba.get_num_threads()
-    numba.set_num_threads(1)
-    try:
-        with threadpool_limits(1):
-            yield
-    finally:
-        numba.set_num_threads(before)
 
 
 def _add_name(name: str, failure: Exception) -> None:

@@ -4,7 +4,7 @@ from dataclasses import replace
 import msgspec
 import pytest
 
-from holdfast import parallel
+from holdfast import cluster
 from holdfast.cli import main
 from holdfast.cli import study as verb
 from holdfast.contact import ContactState
@@ -177,7 +177,7 @@ class TestBadInput:
             "unknown engine 'spark'; there are loky and dask:ADDRESS"
         )
         pytest.importorskip("distributed")
-        monkeypatch.setattr(parallel, "CONNECT_TIMEOUT", 0.3)
+        monkeypatch.setattr(cluster, "CONNECT_TIMEOUT", 0.3)
         err = refusal(capsys, data, *out, "--engine", "dask:tcp://127.0.0.1:9")
         assert err.startswith("no Dask scheduler answers at tcp://127.0.0.1:9: start one with")
         assert not (tmp_path / "out").exists()

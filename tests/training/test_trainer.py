@@ -134,9 +134,8 @@ def test_a_random_sample_is_evaluated_by_the_model_without_it(grasps, monkeypatc
 
     monkeypatch.setattr(Setting, "recipe_of", lambda self, finger: Marked())
     given_decisions = []
-    monkeypatch.setattr(
-        trainer, "summarise", lambda each, seed: given_decisions.extend(each) or _some()
-    )
+    monkeypatch.setattr(trainer, "score_recording", given_decisions.append)
+    monkeypatch.setattr(trainer, "summarise_results", lambda each, seed: list(each) and _some())
     train(grasps, replace(SETTING, split="random"))
     for place, decisions in enumerate(given_decisions):
         units = split_data(scan_dataset(grasps).recordings, "random", 0).units_of(place, 400)

@@ -8,22 +8,21 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from holdfast.cli.options import (
+    EngineOption,
     ForcePlotOption,
+    JobsOption,
     JsonOption,
     ModelArgument,
     PlotOption,
     check_plot,
     save_plot,
+    start_engine,
 )
 from holdfast.cli.terminal.console import print_json, print_line, print_message, print_table
 from holdfast.cli.terminal.progress import progress
 
 if TYPE_CHECKING:
-    from collections.abc import Iterator
-
-    from holdfast.metrics import Decisions, EventMetrics, Intervals, Metrics, SampleMetrics
-    from holdfast.model import Model
-    from holdfast.recordings import Recording
+    from holdfast.metrics import EventMetrics, Intervals, Metrics, SampleMetrics
 
 PERCENT_FIELDS = ("accuracy", "fdr", "fpr", "fnr")
 
@@ -32,6 +31,8 @@ def evaluate(
     model: ModelArgument,
     data: Annotated[Path, typer.Argument(help="A labelled recording, or a folder of them.")],
     seed: Annotated[int, typer.Option(help="Seed of the bootstrap.")] = 0,
+    engine: EngineOption = "loky",
+    jobs: JobsOption = 1,
     plot: PlotOption = None,
     force: ForcePlotOption = False,
     as_json: JsonOption = False,
@@ -47,54 +48,40 @@ def evaluate(
     Example:
       holdfast evaluate model.json recordings/
       holdfast evaluate builtin:twin recordings/ --json
+      holdfast evaluate model.json recordings/ --engine dask:tcp://hub:8786
     """
     import msgspec
 
     from holdfast.errors import TrainingError
     from holdfast.io import load_dataset
-    from holdfast.metrics import summarise
     from holdfast.model import Model
-    from holdfast.training.evaluation import judge
-    from holdfast.training.verdict import LoadedTares, verdict
+    from holdfast.training.evaluation import evaluate_recordings
+    from holdfast.training.verdict import verdict
 
     if plot is not None:
         check_plot(plot, force)
     loaded = Model.load(model)
-    trained_on: list[str] = []
-    tares: list[bool] = []
-    plotted = []
-    recordings = load_dataset(data)
-
-    def decisions_of_all() -> "Iterator[Decisions]":
-        for recording in progress(recordings, "evaluating"):
-            if was_trained_on(loaded, recording):
-                trained_on.append(recording.name)
-            decisions, tare_loaded = judge(loaded, recording)
-            tares.append(tare_loaded)
-            if plot is not None:
-                plotted.append(decisions)
-            yield decisions
-
-    metrics = summarise(decisions_of_all(), seed=seed)
+    used = start_engine(engine, jobs)
+    recordings = load_dataset(used.path(data))
+    found = evaluate_recordings(
+        loaded, recordings, seed, used, progress=progress, keep=plot is not None
+    )
+    metrics = found.metrics
     if metrics.pooled.n + metrics.pooled.n_undecided == 0:
         raise TrainingError(f"{data}: {len(recordings)} recordings without labels; labels expected")
-    warn_about_training(trained_on, len(recordings))
+    warn_about_training(found.trained_on, len(recordings))
     if plot is not None:
         from holdfast.plots.evaluation import draw_evaluation
 
-        save_plot(draw_evaluation(metrics, plotted), plot, force)
-    sentence = verdict(metrics, LoadedTares(sum(tares), len(tares)))
+        save_plot(draw_evaluation(metrics, found.decisions), plot, force)
+    sentence = verdict(metrics, found.tares)
     if as_json:
-        print_json({**msgspec.to_builtins(metrics), "trained_on": trained_on, "verdict": sentence})
+        document = {"trained_on": found.trained_on, "verdict": sentence}
+        print_json({**msgspec.to_builtins(metrics), **document})
         return
     print_verdict(sentence)
     print_metrics(metrics)
     print_line(f"\n{model} on {len(recordings)} recordings")
-
-
-def was_trained_on(model: "Model", recording: "Recording") -> bool:
-    """Return whether a model was trained on a recording, by the digest of its samples."""
-    return model.training is not None and recording.digest in model.training.recordings.values()
 
 
 def warn_about_training(trained_on: list[str], n_recordings: int) -> None:
@@ -129,6 +116,8 @@ def print_metrics(metrics: "Metrics") -> None:
     )  # fmt: skip
     if metrics.intervals is not None:
         _print_intervals(metrics.intervals)
+    if metrics.score_bins is not None:
+        print_line(f"AUC from {metrics.score_bins} bins of probability, because of many samples")
 
 
 def _onsets(metrics: "Metrics") -> str:
@@ -160,10 +149,9 @@ def _print_intervals(intervals: "Intervals") -> None:
         if (interval := getattr(intervals, name)) is not None
         for low, high in [interval]
     ]
-    print_line(
-        f"\n{100 * intervals.level:g} % intervals over {intervals.n_recordings} recordings: "
-        + ", ".join(parts)
-    )
+    groups = "" if intervals.n_groups is None else f" in {intervals.n_groups} groups"
+    of = f"{intervals.n_recordings} recordings{groups}"
+    print_line(f"\n{100 * intervals.level:g} % intervals over {of}: " + ", ".join(parts))
 
 
 def _format(value: float | None, digits: int) -> str:

@@ -1,22 +1,29 @@
 """`holdfast import`: recordings from other formats, and from files that were cut off."""
 
 import tempfile
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager, suppress
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from enum import StrEnum
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from holdfast.cli.options import JsonOption
+from holdfast.cli.options import (
+    EngineOption,
+    JobsOption,
+    JsonOption,
+    check_shared,
+    start_engine,
+)
 from holdfast.cli.sensors import find_sensor
 from holdfast.cli.terminal.console import print_json, print_line, print_message, print_table
 from holdfast.cli.terminal.progress import progress
 
 if TYPE_CHECKING:
     from holdfast.labelling.review.findings import Finding
+    from holdfast.parallel import Engine
     from holdfast.recordings import Recording
     from holdfast.sensors import Sensor
 
@@ -74,6 +81,8 @@ def import_(
     no_labels: Annotated[
         bool, typer.Option("--no-labels", help="Do not import the labels of the input.")
     ] = False,
+    engine: EngineOption = "loky",
+    jobs: JobsOption = 1,
     suffix: Annotated[
         RecordingFormat, typer.Option(help="Format of the recordings to write.")
     ] = RecordingFormat.PARQUET,
@@ -100,37 +109,109 @@ def import_(
       holdfast import press.csv real/ --sensor anyskin \
         --columns 'time=t:ms,taxels=m{taxel}{axis}'
       holdfast import cut.mcap recovered/
+      holdfast import /shared/logs /shared/out --engine dask:tcp://hub:8786
     """
     if out.exists() and not out.is_dir():
         raise NotADirectoryError(20, "is a file; a folder expected", str(out))
-    known = _sensors(sensor or ())
-    recordings = _recordings(path, data_format, known, columns, labels=not no_labels)
-    with _staging_folder(out) as folder:
-        imported = [
-            _write(recording, folder, out, suffix, force)
-            for recording in progress(recordings, "importing")
-        ]
+    used = start_engine(engine, jobs)
+    task = _ImportTask(
+        data_format, _sensors(sensor or ()), columns, not no_labels, suffix, force, used.path(out)
+    )
+    parts, task = _parts(used.path(path), task)
+    with _staging_folder(task.out) as folder:
+        found = used.map_ordered(_import_part, ((part,) for part in parts), shared=(task, folder))
+        imported = list(_collect(progress(found, "importing", len(parts)), folder, used))
         for one in imported:
             (folder / one.path.name).replace(one.path)
+    imported = [replace(one, path=out / one.path.name) for one in imported]
     _print(imported, out, as_json)
     _report_findings(imported)
 
 
+@dataclass(frozen=True)
+class _ImportTask:
+    """How to import each part of the input; `data_format` is None for recordings of holdfast."""
+
+    data_format: str | None
+    sensors: "Mapping[str, Sensor]"
+    columns: str | None
+    labels: bool
+    suffix: RecordingFormat
+    force: bool
+    out: Path
+
+
+def _parts(path: Path, task: _ImportTask) -> tuple[list[Path], _ImportTask]:
+    """Return the parts of the input that are imported one by one, and the task with the format."""
+    from holdfast.io.importers import import_parts
+
+    foreign = task.data_format is not None or task.sensors or task.columns is not None
+    if not foreign and (files := _own_files(path)):
+        return files, task
+    name, parts = import_parts(path, task.data_format, sensors=task.sensors, columns=task.columns)
+    return parts, replace(task, data_format=name)
+
+
+def _import_part(
+    task: _ImportTask, folder: Path, part: Path
+) -> tuple[list[_Imported], dict[str, str]]:
+    """Import a part into the staging folder; return its recordings and messages.
+
+    Each message is a text, by the same text without the name of the part.
+    """
+    messages: dict[str, str] = {}
+
+    def report(text: str) -> None:
+        messages[text.replace(part.name, "")] = text
+
+    recordings = _recordings(part, task, report)
+    return [_write(recording, folder, task) for recording in recordings], messages
+
+
+def _collect(
+    found: "Iterable[tuple[list[_Imported], dict[str, str]]]", folder: Path, engine: "Engine"
+) -> Iterator[_Imported]:
+    """Yield the imported recordings; print each message once.
+
+    Raises:
+        RecordingError: two recordings have the same name.
+        OutputError: a worker does not share the folder.
+    """
+    names: set[str] = set()
+    printed: set[str] = set()
+    for recordings, messages in found:
+        for key, text in messages.items():
+            if key not in printed:
+                print_message(text)
+        printed |= messages.keys()
+        for one in recordings:
+            check_shared(folder / one.path.name, engine)
+            _check_new(one.name, one.path.name in names)
+            names.add(one.path.name)
+            yield one
+
+
+def _check_new(name: str, known: bool) -> None:
+    from holdfast.errors import RecordingError
+
+    if known:
+        raise RecordingError(f"two recordings have the name {name!r}: import them one by one")
+
+
 def _recordings(
-    path: Path,
-    data_format: str | None,
-    sensors: "Mapping[str, Sensor]",
-    columns: str | None,
-    *,
-    labels: bool,
+    part: Path, task: _ImportTask, report: Callable[[str], None]
 ) -> Iterator["Recording"]:
     from holdfast.io import import_recordings
 
-    foreign = data_format is not None or sensors or columns is not None
-    if not foreign and (files := _own_files(path)):
-        return (_load(file, labels=labels) for file in files)
+    if task.data_format is None:
+        return iter([_load(part, report, labels=task.labels)])
     return import_recordings(
-        path, data_format, labels=labels, sensors=sensors, columns=columns, report=print_message
+        part,
+        task.data_format,
+        labels=task.labels,
+        sensors=task.sensors,
+        columns=task.columns,
+        report=report,
     )
 
 
@@ -162,12 +243,12 @@ def _own_files(path: Path) -> list[Path]:
     return [path] if is_recording(path) else []
 
 
-def _load(file: Path, *, labels: bool) -> "Recording":
+def _load(file: Path, report: Callable[[str], None], *, labels: bool) -> "Recording":
     from holdfast.io import load_recording
 
     recording = load_recording(file, labels=labels)
     if not recording.complete:
-        print_message(f"{file} is cut off: {recording.duration:.2f} s recovered")
+        report(f"{file} is cut off: {recording.duration:.2f} s recovered")
     return recording if labels else recording.with_labels({})
 
 
@@ -193,24 +274,18 @@ def _staging_folder(out: Path) -> Iterator[Path]:
                 folder.rmdir()
 
 
-def _write(
-    recording: "Recording", folder: Path, out: Path, suffix: RecordingFormat, force: bool
-) -> _Imported:
-    from holdfast.errors import RecordingError
+def _write(recording: "Recording", folder: Path, task: _ImportTask) -> _Imported:
     from holdfast.files import file_stem, refuse_overwrite
     from holdfast.io import save_recording
     from holdfast.labelling.review.findings import findings_of
 
-    file_name = f"{file_stem(recording.name)}.{suffix}"
-    refuse_overwrite(out / file_name, force=force)
-    if (folder / file_name).exists():
-        raise RecordingError(
-            f"two recordings have the name {recording.name!r}: import them one by one"
-        )
+    file_name = f"{file_stem(recording.name)}.{task.suffix}"
+    refuse_overwrite(task.out / file_name, force=task.force)
+    _check_new(recording.name, (folder / file_name).exists())
     save_recording(recording, folder / file_name)
     return _Imported(
         recording.name,
-        out / file_name,
+        task.out / file_name,
         {name: module.n_samples for name, module in recording.modules.items()},
         recording.duration,
         sum(len(module.labels) for module in recording.modules.values()),

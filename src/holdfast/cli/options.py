@@ -16,6 +16,7 @@ if TYPE_CHECKING:
 
     from holdfast.live.stream_detector import StreamDetector
     from holdfast.model import Model
+    from holdfast.parallel import Engine
     from holdfast.sources import Source
 
 TOKEN_VARIABLE = "HOLDFAST_TOKEN"
@@ -65,6 +66,10 @@ JsonOption = Annotated[bool, typer.Option("--json", help="Print JSON on stdout."
 SeedOption = Annotated[int, typer.Option("--seed", help="Seed of all random numbers.")]
 JobsOption = Annotated[
     int, typer.Option("--jobs", help="Number of parallel processes; -1: one per processor.")
+]
+EngineOption = Annotated[
+    str,
+    typer.Option("--engine", help="loky: processes of this machine; dask:ADDRESS: a Dask cluster."),
 ]
 TareOption = Annotated[
     str,
@@ -136,6 +141,38 @@ PlotOption = Annotated[
 ForcePlotOption = Annotated[
     bool, typer.Option("--force", help="Overwrite the figure if it exists.")
 ]
+
+
+def start_engine(engine: str, jobs: int) -> "Engine":
+    """Return the engine of `--engine` and `--jobs`, after a connection to it.
+
+    Raises:
+        ValueError: there is no such engine, or no jobs.
+        EngineError: no cluster answers at the address, or a worker has another version.
+        MissingExtra: dask is not installed.
+    """
+    from holdfast.parallel import Engine
+
+    if jobs == 0:
+        raise ValueError("jobs other than 0 expected, 0 given")
+    chosen = Engine.parse(engine, jobs)
+    chosen.check()
+    return chosen
+
+
+def check_shared(path: Path, engine: "Engine") -> None:
+    """Check that a file that an engine has written is there.
+
+    Raises:
+        OutputError: a worker of a cluster wrote it to a disk of its own.
+    """
+    from holdfast.errors import OutputError
+
+    if engine.scheduler is not None and not path.exists():
+        raise OutputError(
+            f"a worker wrote {path.absolute()}, but it is not on this machine: choose a folder "
+            "that all machines have at the same path"
+        )
 
 
 def find_token(token: str | None, file: Path | None) -> str | None:

@@ -7,12 +7,13 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from holdfast.cli.options import JobsOption, JsonOption
+from holdfast.cli.options import EngineOption, JobsOption, JsonOption, check_shared, start_engine
 from holdfast.cli.terminal.console import print_json, print_line, print_message
 from holdfast.cli.terminal.progress import ProgressBar
 from holdfast.twin.profile import ATTEMPTS
 
 if TYPE_CHECKING:
+    from holdfast.parallel import Engine
     from holdfast.twin.randomized.simulation import RandomHold
     from holdfast.twin.simulation import Grasp
 
@@ -54,6 +55,7 @@ def simulate(
             "--server", help="Add irregular times and repeated packets, as a XELA server has."
         ),
     ] = False,
+    engine: EngineOption = "loky",
     jobs: JobsOption = -1,
     video: Annotated[
         Path | None,
@@ -77,18 +79,21 @@ def simulate(
     With --randomize, every recording has another hand: two to four fingers or a parallel
     gripper, six kinds of sensors in counts or newtons at 30 to 500 Hz, another object, and an arm
     that carries, swings, brakes and turns; with --grasps, several recordings of each. Only
-    --repeats, --grasps, --seed, --jobs and --force apply then.
+    --repeats, --grasps, --seed, --engine, --jobs and --force apply then. With --engine
+    dask:ADDRESS, the workers write into OUT, which all machines need at the same path.
 
     Example:
       holdfast simulate twin/
       holdfast simulate hands/ --randomize --repeats 100
       holdfast simulate hands/ --randomize --repeats 12 --grasps 20
       holdfast simulate few/ --objects can,ball --cases 2 --repeats 1
+      holdfast simulate /shared/twin --engine dask:tcp://hub:8786
     """
     from holdfast.files import refuse_overwrite
 
+    used = start_engine(engine, jobs)
     if randomize:
-        names = simulate_hands(out, repeats, seed, n_grasps=grasps, jobs=jobs, force=force)
+        names = simulate_hands(out, repeats, seed, n_grasps=grasps, engine=used, force=force)
         if as_json:
             print_json({"out": out, "recordings": names, "failed": [], "profile": "randomized"})
         else:
@@ -103,9 +108,10 @@ def simulate(
 
         check_film(video)
         refuse_overwrite(video, force=force)
-    planned = plan_grasps(objects, cases, repeats, profile, seed, server=server, table=table)
+    own = None if table is None else used.path(table)
+    planned = plan_grasps(objects, cases, repeats, profile, seed, server=server, table=own)
     out.mkdir(parents=True, exist_ok=True)
-    names = simulate_grasps(planned, out, jobs=jobs, force=force)
+    names = simulate_grasps(planned, out, engine=used, force=force)
     if video is not None:
         _write_video(planned[0], video, force)
     failed = [name for name in names if "-failed" in name]
@@ -116,7 +122,7 @@ def simulate(
 
 
 def simulate_hands(
-    out: Path, n_hands: int, seed: int, *, n_grasps: int = 1, jobs: int, force: bool
+    out: Path, n_hands: int, seed: int, *, n_grasps: int = 1, engine: "Engine", force: bool
 ) -> list[str]:
     """Simulate randomized hands whose recordings do not exist; return the names of new ones.
 
@@ -124,7 +130,6 @@ def simulate_hands(
         ValueError: a number is out of range.
         OutputError: an existing recording has another seed or profile.
     """
-    from holdfast.parallel import map_ordered
     from holdfast.twin.randomized.simulation import RandomHold
 
     _check_numbers(n_hands, seed)
@@ -135,7 +140,7 @@ def simulate_hands(
     holds = [RandomHold(number, seed, grasp=grasp) for number in range(n_hands) for grasp in places]
     wanted: dict[str, object] = {"profile": "randomized", "seed": seed}
     tasks = [
-        (hold, out, force)
+        (hold, engine.path(out), force)
         for hold in holds
         if force or not _is_recorded(_path_of(hold.name, out), wanted)
     ]
@@ -143,7 +148,8 @@ def simulate_hands(
         print_message(f"{len(holds) - len(tasks)} of {len(holds)} recordings exist already")
     names = []
     with ProgressBar("simulating", len(tasks)) as bar:
-        for name in map_ordered(simulate_hand, tasks, 1 if len(tasks) == 1 else jobs):
+        for name in _engine_for(len(tasks), engine).map_ordered(simulate_hand, tasks):
+            check_shared(_path_of(name, out), engine)
             names.append(name)
             bar.advance()
     return names
@@ -162,29 +168,43 @@ def simulate_grasps(
     grasps: "Sequence[Grasp]",
     out: Path,
     *,
-    jobs: int,
+    jobs: int = -1,
+    engine: "Engine | None" = None,
     force: bool,
     report: Callable[[list[str]], None] = lambda _: None,
 ) -> list[str]:
     """Simulate the grasps whose recordings do not exist; return the names of new recordings.
 
-    `report` is called with the names of the recordings of each finished grasp.
+    They are simulated in `jobs` processes of this machine, or by `engine`. `report` is called
+    with the names of the recordings of each finished grasp.
 
     Raises:
         OutputError: an existing recording has another seed or profile.
     """
-    from holdfast.parallel import map_ordered
+    from holdfast.parallel import Engine
 
-    tasks = [(grasp, out, force) for grasp in grasps if force or not _is_finished(grasp, out)]
+    engine = engine or Engine(jobs)
+    tasks = [
+        (grasp, engine.path(out), force)
+        for grasp in grasps
+        if force or not _is_finished(grasp, out)
+    ]
     if len(tasks) < len(grasps):
         print_message(f"{len(grasps) - len(tasks)} of {len(grasps)} recordings exist already")
     written = []
     with ProgressBar("simulating", len(tasks)) as bar:
-        for names in map_ordered(simulate_grasp, tasks, 1 if len(tasks) == 1 else jobs):
+        for names in _engine_for(len(tasks), engine).map_ordered(simulate_grasp, tasks):
+            check_shared(_path_of(names[-1], out), engine)
             written += names
             report(names)
             bar.advance()
     return written
+
+
+def _engine_for(n_tasks: int, engine: "Engine") -> "Engine":
+    """Return the engine; one task on this machine needs no other process."""
+    alone = n_tasks == 1 and engine.scheduler is None
+    return engine._replace(n_jobs=1) if alone else engine
 
 
 def simulate_grasp(grasp: "Grasp", out: Path, force: bool) -> list[str]:

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Annotated, NamedTuple
 
 import typer
 
-from holdfast.cli.options import JobsOption, JsonOption, SeedOption, TareOption
+from holdfast.cli.options import EngineOption, JobsOption, JsonOption, SeedOption, TareOption
 from holdfast.cli.simulate import plan_grasps, simulate_grasps
 from holdfast.cli.terminal.console import print_json, print_line, print_message, print_table
 from holdfast.cli.terminal.progress import progress
@@ -87,9 +87,7 @@ def study(
     quick: Annotated[
         bool, typer.Option("--quick", help="Run a smaller study that takes a few minutes.")
     ] = False,
-    engine: Annotated[
-        str, typer.Option(help="loky: local processes; dask:ADDRESS: a Dask cluster.")
-    ] = "loky",
+    engine: EngineOption = "loky",
     jobs: JobsOption = -1,
     seed: SeedOption = 0,
     tare: TareOption = "0.5",
@@ -178,8 +176,7 @@ def _check_arguments(
     Tare.parse(tare)
     chosen = Engine.parse(engine, jobs)
     check_output_folder(out, STUDY, force=force)
-    if chosen.scheduler is not None:
-        list(chosen.map_ordered(abs, [(0,)]))
+    chosen.check()
     return chosen
 
 

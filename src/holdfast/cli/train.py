@@ -5,7 +5,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from holdfast.cli.options import JsonOption, SeedOption
+from holdfast.cli.options import EngineOption, JobsOption, JsonOption, SeedOption, start_engine
 from holdfast.cli.terminal.console import print_json, print_line, print_message
 from holdfast.cli.terminal.progress import progress
 
@@ -110,9 +110,8 @@ def train(
             help="Maximum number of samples per finger; of more, every n-th sample is used."
         ),
     ] = 200_000,
-    jobs: Annotated[
-        int, typer.Option(help="Number of parallel searches or fits; -1: one per processor.")
-    ] = 1,
+    engine: EngineOption = "loky",
+    jobs: JobsOption = 1,
     force: Annotated[bool, typer.Option("--force", help="Overwrite the model.")] = False,
     as_json: JsonOption = False,
 ) -> None:
@@ -127,6 +126,7 @@ def train(
       holdfast train recordings/ -o model.json --split object --classifier svm
       holdfast train recordings/ -o model.json --features holdfast --hold 0.1
       holdfast train recordings/ -o model.json --init builtin:any
+      holdfast train recordings/ -o model.json --engine dask:tcp://hub:8786
     """
     from holdfast.cli.evaluate import print_metrics, print_verdict
     from holdfast.files import refuse_overwrite
@@ -149,12 +149,15 @@ def train(
         max_samples=max_samples,
     )
     refuse_overwrite(model, force=force)
-    recordings = load_dataset(data)
+    used = start_engine(engine, jobs)
+    if resume and used.scheduler is not None:
+        raise ValueError("--resume is for --engine loky; a search on a cluster keeps no trials")
+    recordings = load_dataset(used.path(data))
     report_hidden_labels(recordings.paths, print_message)
     journal = _search_journal(model, resume=resume, force=force)
     try:
         trained = fit(
-            recordings, setting, journal=journal, warn=print_message, progress=progress, n_jobs=jobs
+            recordings, setting, journal=journal, warn=print_message, progress=progress, engine=used
         )
     except KeyboardInterrupt:
         if journal.exists():

@@ -2,16 +2,13 @@
 
 from collections.abc import Mapping
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import Annotated, Any
 
 import typer
 
-from holdfast.cli.options import JobsOption, JsonOption, SeedOption
+from holdfast.cli.options import EngineOption, JobsOption, JsonOption, SeedOption, start_engine
 from holdfast.cli.terminal.console import print_json, print_line, print_message
 from holdfast.cli.terminal.progress import progress
-
-if TYPE_CHECKING:
-    from holdfast.parallel import Engine
 
 N_TRIALS, N_QUICK_TRIALS = 240, 60
 """Number of trials; 60 have every object with every kind of load once."""
@@ -31,9 +28,7 @@ def trial(
     ] = None,
     seed: SeedOption = 0,
     jobs: JobsOption = -1,
-    engine: Annotated[
-        str, typer.Option("--engine", help="loky: local processes; dask:ADDRESS: a Dask cluster.")
-    ] = "loky",
+    engine: EngineOption = "loky",
     force: Annotated[
         bool, typer.Option("--force", help="Overwrite a comparison; finished trials are kept.")
     ] = False,
@@ -62,7 +57,7 @@ def trial(
     number = n if n is not None else N_QUICK_TRIALS if quick else N_TRIALS
     plan = TrialPlan(names, number, seed, model)
     check_output_folder(out, COMPARISON, force=force)
-    chosen = _engine(engine, jobs)
+    chosen = start_engine(engine, jobs)
     try:
         document = run_trials(
             plan, out, chosen, progress=progress, notify=print_message, force=force
@@ -75,23 +70,6 @@ def trial(
     else:
         _print_table(document["laws"])
         print_line(f"{out / 'report.html'}: all tables and figures, and the film of one trial")
-
-
-def _engine(engine: str, jobs: int) -> "Engine":
-    """Return the engine, after a test whether it works.
-
-    Raises:
-        ValueError: there is no such engine, or `jobs` is 0.
-        EngineError: no cluster answers at the address.
-    """
-    from holdfast.parallel import Engine
-
-    if jobs == 0:
-        raise ValueError("jobs other than 0 expected, 0 given")
-    chosen = Engine.parse(engine, jobs)
-    if chosen.scheduler is not None:
-        list(chosen.map_ordered(abs, [(0,)]))
-    return chosen
 
 
 def _print_table(laws: Mapping[str, Mapping[str, Any]]) -> None:

@@ -5,7 +5,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from holdfast.cli.evaluate import print_verdict, warn_about_training, was_trained_on
+from holdfast.cli.evaluate import print_verdict, warn_about_training
 from holdfast.cli.options import JsonOption, ModelArgument
 from holdfast.cli.terminal.console import print_json, print_line, print_table
 from holdfast.cli.terminal.progress import progress
@@ -45,6 +45,7 @@ def tune(
     from holdfast.io import load_dataset
     from holdfast.model import Model
     from holdfast.training import tune as choose
+    from holdfast.training.evaluation import was_trained_on
     from holdfast.training.verdict import verdict_of_events
 
     refuse_overwrite(out, force=force)

@@ -19,7 +19,10 @@ from holdfast.metrics.summary import (
     Intervals,
     Metrics,
     RecordingMetrics,
+    RecordingResults,
+    score_recording,
     summarise,
+    summarise_results,
 )
 
 __all__ = [
@@ -35,6 +38,7 @@ __all__ = [
     "Intervals",
     "Metrics",
     "RecordingMetrics",
+    "RecordingResults",
     "SampleMetrics",
     "bootstrap_interval",
     "calibration_sums",
@@ -45,5 +49,7 @@ __all__ = [
     "pool_events",
     "ratio_of_sums",
     "sample_metrics",
+    "score_recording",
     "summarise",
+    "summarise_results",
 ]

@@ -5,9 +5,10 @@ last for the median interval between samples.
 """
 
 import math
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
+from collections.abc import Set as AbstractSet
 from dataclasses import dataclass, replace
-from typing import Literal, NamedTuple
+from typing import Literal, NamedTuple, Self
 
 import msgspec
 import numpy as np
@@ -94,6 +95,53 @@ class AlarmMatch:
     def n_missed(self, post: float) -> int:
         """Return the number of events without an alarm until onset + post [s]."""
         return sum(event.delay > post + TIME_TOLERANCE for event in self.events)
+
+
+@dataclass(frozen=True, eq=False)
+class EventCounts:
+    """Counts of the events and alarms of one finger, or hand, in one or more recordings.
+
+    Attributes:
+        delays: (n_events,) in ascending order [s]; infinite for a missed event.
+        false_alarms: number of false alarms by labelled state.
+        stable_seconds: duration of stable labels [s].
+        onsets: where the onsets come from; empty without recordings.
+    """
+
+    delays: Array
+    false_alarms: Mapping[ContactState, int]
+    stable_seconds: float
+    onsets: frozenset[Onsets]
+
+    @classmethod
+    def of(cls, match: AlarmMatch) -> Self:
+        """Return the counts of one recording."""
+        labels = [alarm.label for alarm in match.false_alarms]
+        return cls(
+            event_delays([match]),
+            {state: labels.count(state) for state in ContactState},
+            match.stable_seconds,
+            frozenset({match.onsets}),
+        )
+
+    @classmethod
+    def total(cls, parts: Sequence[Self]) -> Self:
+        """Return the counts of all parts together."""
+        return cls(
+            np.sort(np.concatenate([np.empty(0), *(each.delays for each in parts)])),
+            {state: sum(each.false_alarms[state] for each in parts) for state in ContactState},
+            sum(each.stable_seconds for each in parts),
+            frozenset[Onsets]().union(*(each.onsets for each in parts)),
+        )
+
+    @property
+    def n_false(self) -> int:
+        """Number of false alarms."""
+        return sum(self.false_alarms.values())
+
+    def n_missed(self, post: float) -> int:
+        """Return the number of events without an alarm until onset + post [s]."""
+        return int((self.delays > post + TIME_TOLERANCE).sum())
 
 
 class EventMetrics(msgspec.Struct, frozen=True):
@@ -223,21 +271,23 @@ def pool_events(matches: Sequence[AlarmMatch]) -> EventMetrics:
         >>> metrics.missed["0.2"], metrics.delay_median, metrics.stable_minutes
         (50.0, None, 2.0)
     """
-    delays = event_delays(matches)
-    minutes = sum(match.stable_seconds for match in matches) / 60
-    false_labels = [alarm.label for match in matches for alarm in match.false_alarms]
+    return event_metrics_of(EventCounts.total([EventCounts.of(match) for match in matches]))
+
+
+def event_metrics_of(counts: EventCounts) -> EventMetrics:
+    """Compute the event metrics from the counts of one or more recordings."""
+    minutes = counts.stable_seconds / 60
     return EventMetrics(
-        n_events=len(delays),
+        n_events=len(counts.delays),
         stable_minutes=minutes,
         missed={
-            str(post): percent(sum(match.n_missed(post) for match in matches), len(delays))
-            for post in POST_DURATIONS
+            str(post): percent(counts.n_missed(post), len(counts.delays)) for post in POST_DURATIONS
         },
-        delay_median=finite_or_none(quantile(delays, 0.5)),
-        delay_p95=finite_or_none(quantile(delays, 0.95)),
-        false_alarms_per_minute=len(false_labels) / minutes if minutes else None,
-        false_alarms={str(state): false_labels.count(state) for state in ContactState},
-        onsets=_common_onsets(matches),
+        delay_median=finite_or_none(quantile(counts.delays, 0.5)),
+        delay_p95=finite_or_none(quantile(counts.delays, 0.95)),
+        false_alarms_per_minute=counts.n_false / minutes if minutes else None,
+        false_alarms={str(state): n for state, n in counts.false_alarms.items()},
+        onsets=_common_onsets(counts.onsets),
     )
 
 
@@ -246,9 +296,8 @@ def event_delays(matches: Sequence[AlarmMatch]) -> Array:
     return np.sort(np.array([event.delay for match in matches for event in match.events]))
 
 
-def _common_onsets(matches: Sequence[AlarmMatch]) -> Onsets:
-    found = {match.onsets for match in matches} or {"labels"}
-    return found.pop() if len(found) == 1 else "mixed"
+def _common_onsets(found: AbstractSet[Onsets]) -> Onsets:
+    return next(iter(found), "labels") if len(found) < 2 else "mixed"
 
 
 _STATES = tuple(ContactState)

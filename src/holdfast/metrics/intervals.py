@@ -89,7 +89,16 @@ def auc_of(positives: Sequence[Array], negatives: Sequence[Array]) -> Statistic:
     """
     ordered = np.sort(np.concatenate([*positives, *negatives]))
     edges = np.unique(ordered[:: max(1, -(-len(ordered) // MAX_SCORE_BINS))])
-    positive, negative = _histograms(positives, edges), _histograms(negatives, edges)
+    return auc_of_counts(_histograms(positives, edges), _histograms(negatives, edges))
+
+
+def auc_of_counts(positive: Array, negative: Array) -> Statistic:
+    """Return the statistic AUC of `auc_of` from histograms of the scores.
+
+    Args:
+        positive: (n_recordings, n_bins) number of scores of class 1 in each bin, in order.
+        negative: the same of class 0.
+    """
     ordered_pairs = positive @ (np.cumsum(negative, axis=1) - negative / 2).T
     p, q = positive.sum(axis=1), negative.sum(axis=1)
     return lambda w: _divide(((w @ ordered_pairs) * w).sum(axis=1), (w @ p) * (w @ q))
@@ -108,8 +117,8 @@ def quantile_of(values: Sequence[Array], q: float) -> Statistic:
     ordered, recordings = pooled[order], recordings[order]
 
     def statistic(draws: Array) -> Array:
-        times = draws.astype(np.intp)[:, recordings]
-        each = (quantile(np.repeat(ordered, row), q) for row in times)
+        counts = draws.astype(np.intp)
+        each = (quantile(np.repeat(ordered, row[recordings]), q) for row in counts)
         return np.array([np.nan if value is None else value for value in each])
 
     return statistic

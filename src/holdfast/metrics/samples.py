@@ -3,6 +3,7 @@
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import Protocol
 
 import msgspec
 import numpy as np
@@ -73,6 +74,44 @@ class ScoredSamples:
         """Scores of the samples of class 0 (not stable)."""
         return np.concatenate([self.unstable, self.no_contact])
 
+    @property
+    def n_scores(self) -> tuple[int, int, int]:
+        """Number of samples labelled STABLE, UNSTABLE and NO_CONTACT."""
+        return len(self.stable), len(self.unstable), len(self.no_contact)
+
+    def ordered_pairs(self) -> tuple[float, float]:
+        """Return the Mann-Whitney statistics of STABLE against UNSTABLE and NO_CONTACT."""
+        u_unstable = mann_whitney_u(self.stable, self.unstable)
+        return u_unstable, mann_whitney_u(self.stable, self.no_contact)
+
+
+class CountedSamples(Protocol):
+    """What the metrics need of samples: counts, and pairs in the right order."""
+
+    @property
+    def confusion(self) -> npt.NDArray[np.int64]:
+        """(2, 2) counts [[TN, FP], [FN, TP]]."""
+        ...
+
+    @property
+    def squared_error(self) -> float:
+        """Sum of (score - class)^2; NaN where a score lies outside [0, 1]."""
+        ...
+
+    @property
+    def n_undecided(self) -> int:
+        """Number of samples with a label whose decided state is UNKNOWN."""
+        ...
+
+    @property
+    def n_scores(self) -> tuple[int, int, int]:
+        """Number of samples labelled STABLE, UNSTABLE and NO_CONTACT."""
+        ...
+
+    def ordered_pairs(self) -> tuple[float, float]:
+        """Return the Mann-Whitney statistics of STABLE against UNSTABLE and NO_CONTACT."""
+        ...
+
 
 def sample_metrics(
     labels: npt.ArrayLike, states: npt.ArrayLike, stable_probability: npt.ArrayLike
@@ -139,14 +178,15 @@ def pool_samples(parts: Sequence[ScoredSamples]) -> ScoredSamples:
     )
 
 
-def metrics_of_samples(samples: ScoredSamples) -> SampleMetrics:
+def metrics_of_samples(samples: CountedSamples) -> SampleMetrics:
     """Compute the metrics of scored samples."""
     (tn, fp), (fn, tp) = samples.confusion.tolist()
     n = tn + fp + fn + tp
-    u_unstable = mann_whitney_u(samples.stable, samples.unstable)
-    u = u_unstable + mann_whitney_u(samples.stable, samples.no_contact)
-    contact_pairs = len(samples.stable) * len(samples.unstable)
-    pairs = contact_pairs + len(samples.stable) * len(samples.no_contact)
+    u_unstable, u_no_contact = samples.ordered_pairs()
+    u = u_unstable + u_no_contact
+    n_stable, n_unstable, n_no_contact = samples.n_scores
+    contact_pairs = n_stable * n_unstable
+    pairs = contact_pairs + n_stable * n_no_contact
     return SampleMetrics(
         n=n,
         accuracy=percent(tp + tn, n),

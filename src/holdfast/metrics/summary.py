@@ -7,19 +7,20 @@ from functools import partial
 import msgspec
 import numpy as np
 
+from holdfast.metrics.binned import N_BINS, BinnedSamples, SampleTotal
 from holdfast.metrics.decisions import Decisions
 from holdfast.metrics.events import (
     POST_DURATIONS,
-    AlarmMatch,
+    EventCounts,
     EventMetrics,
-    event_delays,
+    event_metrics_of,
     match_decisions,
-    pool_events,
 )
 from holdfast.metrics.intervals import (
     Interval,
     Statistic,
     auc_of,
+    auc_of_counts,
     bootstrap_interval,
     quantile_of,
     ratio_of_sums,
@@ -28,9 +29,17 @@ from holdfast.metrics.samples import (
     SampleMetrics,
     ScoredSamples,
     metrics_of_samples,
-    pool_samples,
     score_samples,
 )
+
+MAX_EXACT_SCORES = 10_000_000
+"""Number of labelled samples above which the AUC comes from a histogram of the scores.
+
+The scores of all recordings would not fit into memory (80 bytes for each, with copies)."""
+MAX_GROUPS = 1000
+"""Number of recordings above which the bootstrap draws groups of recordings.
+
+The variance of the mean of 1000 random groups is that of the recordings, to about 5 %."""
 
 
 class HandEventMetrics(msgspec.Struct, frozen=True):
@@ -61,7 +70,7 @@ class EventIntervals(msgspec.Struct, frozen=True):
     false_alarms_per_minute: Interval | None
 
 
-class Intervals(msgspec.Struct, frozen=True):
+class Intervals(msgspec.Struct, frozen=True, omit_defaults=True):
     """Intervals of the pooled sample metrics and of the event metrics of the hand.
 
     Attributes:
@@ -75,6 +84,8 @@ class Intervals(msgspec.Struct, frozen=True):
         auc_contact: stable against unstable.
         brier: of the probabilities.
         hand: of the event metrics.
+        n_groups: number of groups of recordings that the bootstrap draws; None if it draws
+            recordings, as up to 1000 recordings.
     """
 
     n_recordings: int
@@ -87,9 +98,10 @@ class Intervals(msgspec.Struct, frozen=True):
     auc_contact: Interval | None
     brier: Interval | None
     hand: EventIntervals
+    n_groups: int | None = None
 
 
-class Metrics(msgspec.Struct, frozen=True):
+class Metrics(msgspec.Struct, frozen=True, omit_defaults=True):
     """Metrics of decisions about recordings; `msgspec.json.encode` returns their JSON.
 
     Attributes:
@@ -98,6 +110,8 @@ class Metrics(msgspec.Struct, frozen=True):
         recordings: of each recording.
         events: by event, over all recordings.
         intervals: by bootstrap over recordings; None with fewer than two labelled recordings.
+        score_bins: number of bins of the histogram of scores from which the AUC of all recordings
+            is computed; None if it is exact, as up to 10 million samples.
     """
 
     fingers: dict[str, SampleMetrics]
@@ -105,19 +119,26 @@ class Metrics(msgspec.Struct, frozen=True):
     recordings: list[RecordingMetrics]
     events: HandEventMetrics
     intervals: Intervals | None
+    score_bins: int | None = None
 
 
 @dataclass(frozen=True, eq=False)
-class _RecordingResults:
+class RecordingResults:
     """Scores, events and alarms of a recording, without its samples.
 
     A finger, or the hand, without labels has no events and no false alarms.
+
+    Attributes:
+        metrics: of the recording.
+        samples: by finger.
+        events: by finger with labels.
+        hand: events of the hand; None without labels.
     """
 
-    name: str
+    metrics: RecordingMetrics
     samples: Mapping[str, ScoredSamples]
-    matches: Mapping[str, AlarmMatch]
-    hand: Sequence[AlarmMatch]
+    events: Mapping[str, EventCounts]
+    hand: EventCounts | None
 
 
 def summarise(
@@ -126,7 +147,7 @@ def summarise(
     """Compute the metrics of several recordings.
 
     The recordings are read one at a time. Only the scores of labelled samples, counts, events
-    and alarms stay in memory.
+    and alarms stay in memory; of many recordings only histograms of the scores.
 
     Args:
         decisions: of each recording.
@@ -144,92 +165,193 @@ def summarise(
         >>> metrics.pooled.accuracy, metrics.events.hand.n_events, metrics.intervals
         (100.0, 0, None)
     """
-    results = [_evaluate(each) for each in decisions]
-    names = list(dict.fromkeys(name for each in results for name in each.samples))
-    every = [own for each in results for own in each.samples.values()]
-    return Metrics(
-        fingers={
-            name: metrics_of_samples(
-                pool_samples([each.samples[name] for each in results if name in each.samples])
-            )
-            for name in names
-        },
-        pooled=metrics_of_samples(pool_samples(every)),
-        recordings=[_recording_metrics(each) for each in results],
-        events=_event_metrics(results, names),
-        intervals=_intervals([each for each in results if each.matches], n_resamples, seed, level),
-    )
+    results = (score_recording(each) for each in decisions)
+    return summarise_results(results, n_resamples=n_resamples, seed=seed, level=level)
 
 
-def _evaluate(decisions: Decisions) -> _RecordingResults:
+def score_recording(decisions: Decisions) -> RecordingResults:
+    """Return what `summarise_results` needs of the decisions about a recording.
+
+    Raises:
+        ValueError: the probability of a decided sample is NaN.
+    """
     samples = {
         name: score_samples(finger.labels, finger.states, finger.stable_probability)
         for name, finger in decisions.fingers.items()
     }
-    matches = {
-        name: match_decisions(finger)
+    events = {
+        name: EventCounts.of(match_decisions(finger))
         for name, finger in decisions.fingers.items()
         if finger.labels.any()
     }
-    hand = decisions.hand
-    hand_matches = [] if hand is None or not hand.labels.any() else [match_decisions(hand)]
-    return _RecordingResults(decisions.name, samples, matches, hand_matches)
+    found = decisions.hand
+    hand = None
+    if found is not None and found.labels.any():
+        hand = EventCounts.of(match_decisions(found))
+    metrics = RecordingMetrics(
+        decisions.name,
+        {name: metrics_of_samples(own) for name, own in samples.items()},
+        _event_metrics([events], [hand], list(samples)),
+    )
+    return RecordingResults(metrics, samples, events, hand)
 
 
-def _recording_metrics(results: _RecordingResults) -> RecordingMetrics:
-    fingers = {name: metrics_of_samples(own) for name, own in results.samples.items()}
-    return RecordingMetrics(results.name, fingers, _event_metrics([results], list(fingers)))
+def summarise_results(
+    results: Iterable[RecordingResults],
+    *,
+    n_resamples: int = 1000,
+    seed: int = 0,
+    level: float = 0.95,
+) -> Metrics:
+    """Compute the metrics of several recordings from the results of each.
+
+    Args:
+        results: of each recording, in a fixed order.
+        n_resamples: as in `summarise`.
+        seed: as in `summarise`.
+        level: as in `summarise`.
+    """
+    total = _Total()
+    for each in results:
+        total.add(each)
+    return total.metrics(n_resamples, seed, level)
 
 
-def _event_metrics(results: Sequence[_RecordingResults], names: Sequence[str]) -> HandEventMetrics:
-    fingers = {
-        name: pool_events([each.matches[name] for each in results if name in each.matches])
-        for name in names
-    }
+class _Group:
+    """Recordings that the bootstrap draws together: one, or every 1000th of more."""
+
+    def __init__(self) -> None:
+        self.samples, self.hand = SampleTotal(), list[EventCounts]()
+
+
+class _Total:
+    """Results of the recordings so far."""
+
+    def __init__(self) -> None:
+        self.recordings: list[RecordingMetrics] = []
+        self.fingers: dict[str, SampleTotal] = {}
+        self.pooled = SampleTotal()
+        self.events: list[Mapping[str, EventCounts]] = []
+        self.hands: list[EventCounts | None] = []
+        self.groups: list[_Group] = []
+        self.n_labelled = self.n_scores = 0
+        self.binned = False
+
+    def add(self, results: RecordingResults) -> None:
+        """Add the results of a recording."""
+        self.recordings.append(results.metrics)
+        self.events.append(results.events)
+        self.hands.append(results.hand)
+        group = self._group() if results.events else _Group()
+        if results.hand is not None:
+            group.hand.append(results.hand)
+        for name, samples in results.samples.items():
+            part = BinnedSamples.of(samples) if self.binned else samples
+            for total in (self._finger(name), self.pooled, group.samples):
+                total.add(part)
+            self.n_scores += sum(samples.n_scores)
+        if self.n_scores > MAX_EXACT_SCORES and not self.binned:
+            self._bin()
+
+    def metrics(self, n_resamples: int, seed: int, level: float) -> Metrics:
+        """Compute the metrics."""
+        return Metrics(
+            fingers={name: metrics_of_samples(own.samples) for name, own in self.fingers.items()},
+            pooled=metrics_of_samples(self.pooled.samples),
+            recordings=self.recordings,
+            events=_event_metrics(self.events, self.hands, list(self.fingers)),
+            intervals=self._intervals(n_resamples, seed, level),
+            score_bins=N_BINS if self.binned else None,
+        )
+
+    def _finger(self, name: str) -> SampleTotal:
+        if name not in self.fingers:
+            self.fingers[name] = SampleTotal()
+        return self.fingers[name]
+
+    def _group(self) -> _Group:
+        """Return the group of the next recording with labels."""
+        place = self.n_labelled % MAX_GROUPS
+        self.n_labelled += 1
+        if place == len(self.groups):
+            self.groups.append(_Group())
+        return self.groups[place]
+
+    def _bin(self) -> None:
+        self.binned = True
+        for total in (*self.fingers.values(), self.pooled, *(g.samples for g in self.groups)):
+            total.bin()
+
+    def _intervals(self, n: int, seed: int, level: float) -> Intervals | None:
+        n_groups = len(self.groups)
+        if n_groups < 2:
+            return None
+        interval = partial(bootstrap_interval, n_recordings=n_groups, n=n, seed=seed, level=level)
+        by_sample = {name: interval(each) for name, each in _sample_statistics(self.groups).items()}
+        events = {name: interval(each) for name, each in _event_statistics(self.groups).items()}
+        missed = {str(post): events.pop(str(post)) for post in POST_DURATIONS}
+        return Intervals(
+            n_recordings=self.n_labelled,
+            level=level,
+            hand=EventIntervals(missed=missed, **events),
+            n_groups=n_groups if self.n_labelled > n_groups else None,
+            **by_sample,
+        )
+
+
+def _event_metrics(
+    fingers: Sequence[Mapping[str, EventCounts]],
+    hands: Sequence[EventCounts | None],
+    names: Sequence[str],
+) -> HandEventMetrics:
+    by_name = {name: [each[name] for each in fingers if name in each] for name in names}
     return HandEventMetrics(
-        fingers, pool_events([match for each in results for match in each.hand])
+        {name: event_metrics_of(EventCounts.total(own)) for name, own in by_name.items()},
+        event_metrics_of(EventCounts.total([hand for hand in hands if hand is not None])),
     )
 
 
-def _intervals(
-    results: Sequence[_RecordingResults], n: int, seed: int, level: float
-) -> Intervals | None:
-    if len(results) < 2:
-        return None
-    interval = partial(bootstrap_interval, n_recordings=len(results), n=n, seed=seed, level=level)
-    samples = [pool_samples(list(each.samples.values())) for each in results]
-    by_sample = {name: interval(each) for name, each in _sample_statistics(samples).items()}
-    events = {name: interval(each) for name, each in _event_statistics(results).items()}
-    missed = {str(post): events.pop(str(post)) for post in POST_DURATIONS}
-    hand = EventIntervals(missed=missed, **events)
-    return Intervals(n_recordings=len(results), level=level, hand=hand, **by_sample)
-
-
-def _sample_statistics(samples: Sequence[ScoredSamples]) -> dict[str, Statistic]:
-    """Return the statistics of the sample metrics, given the samples of each recording."""
+def _sample_statistics(groups: Sequence[_Group]) -> dict[str, Statistic]:
+    """Return the statistics of the sample metrics, given the samples of each group."""
+    samples = [group.samples.samples for group in groups]
     tn, fp, fn, tp = np.array([each.confusion.ravel() for each in samples]).T
     n = tn + fp + fn + tp
-    stable = [each.stable for each in samples]
     return {
         "accuracy": ratio_of_sums(100 * (tp + tn), n),
         "fdr": ratio_of_sums(100 * fp, tp + fp),
         "fpr": ratio_of_sums(100 * fp, fp + tn),
         "fnr": ratio_of_sums(100 * fn, fn + tp),
-        "auc": auc_of(stable, [each.not_stable for each in samples]),
-        "auc_contact": auc_of(stable, [each.unstable for each in samples]),
+        **_auc_statistics(samples),
         "brier": ratio_of_sums([each.squared_error for each in samples], n),
     }
 
 
-def _event_statistics(results: Sequence[_RecordingResults]) -> dict[str, Statistic]:
+def _auc_statistics(samples: Sequence[ScoredSamples | BinnedSamples]) -> dict[str, Statistic]:
+    exact = [each for each in samples if isinstance(each, ScoredSamples)]
+    if exact:
+        stable = [each.stable for each in exact]
+        return {
+            "auc": auc_of(stable, [each.not_stable for each in exact]),
+            "auc_contact": auc_of(stable, [each.unstable for each in exact]),
+        }
+    counts = np.array([each.counts for each in samples if isinstance(each, BinnedSamples)])
+    used = counts.any(axis=(0, 1))
+    positive, unstable, no_contact = counts[:, :, used].transpose(1, 0, 2).astype(np.float64)
+    return {
+        "auc": auc_of_counts(positive, unstable + no_contact),
+        "auc_contact": auc_of_counts(positive, unstable),
+    }
+
+
+def _event_statistics(groups: Sequence[_Group]) -> dict[str, Statistic]:
     """Return the statistics of the hand's event metrics; missed events under their `post`."""
-    matches = [match for each in results for match in each.hand or [_NO_EVENTS]]
-    n_events = [len(match.events) for match in matches]
-    n_false = [len(match.false_alarms) for match in matches]
-    minutes = [match.stable_seconds / 60 for match in matches]
-    delays = [event_delays([match]) for match in matches]
+    counts = [EventCounts.total(group.hand) for group in groups]
+    n_events = [len(each.delays) for each in counts]
+    n_false = [each.n_false for each in counts]
+    minutes = [each.stable_seconds / 60 for each in counts]
+    delays = [each.delays for each in counts]
     missed = {
-        str(post): ratio_of_sums([100 * match.n_missed(post) for match in matches], n_events)
+        str(post): ratio_of_sums([100 * each.n_missed(post) for each in counts], n_events)
         for post in POST_DURATIONS
     }
     return missed | {
@@ -237,7 +359,3 @@ def _event_statistics(results: Sequence[_RecordingResults]) -> dict[str, Statist
         "delay_p95": quantile_of(delays, 0.95),
         "false_alarms_per_minute": ratio_of_sums(n_false, minutes),
     }
-
-
-_NO_EVENTS = AlarmMatch((), (), 0.0)
-"""Events of a recording whose hand has no labels, so that every recording counts once."""

@@ -2,6 +2,7 @@
 
 from collections.abc import Iterable
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 
@@ -35,6 +36,13 @@ class ScannedRecording:
     rate: float
     n_labelled: dict[str, int]
     step: int = 1
+
+
+class RecordingScan(NamedTuple):
+    """Facts about a recording, and the sensor of each finger that has labels."""
+
+    recording: ScannedRecording
+    sensors: dict[str, Sensor]
 
 
 @dataclass(frozen=True)
@@ -89,15 +97,32 @@ def scan_dataset(
             samples or name, a finger has different sensors, or relative features are not
             made for the rate of a recording.
     """
+    scans = (scan_recording(recording, relative=relative) for recording in recordings)
+    return combine_scans(scans, rate, relative=relative)
+
+
+def scan_recording(recording: Recording, *, relative: bool = False) -> RecordingScan:
+    """Return the facts about a recording, and the sensors of its labelled fingers.
+
+    Raises:
+        TrainingError: relative features are not made for its rate.
+    """
+    found = _scan(recording, relative)
+    return RecordingScan(found, {f: recording.modules[f].sensor for f in found.n_labelled})
+
+
+def combine_scans(
+    scans: Iterable[RecordingScan], rate: float | None = None, *, relative: bool = False
+) -> DatasetScan:
+    """Return the scan of a dataset from those of its recordings; see `scan_dataset`."""
     scanned: list[ScannedRecording] = []
     sensors: dict[str, Sensor] = {}
-    for recording in recordings:
-        scanned.append(_scan(recording, relative))
-        for finger in scanned[-1].n_labelled:
-            found = recording.modules[finger].sensor
-            known = sensors.setdefault(finger, found)
+    for found, own in scans:
+        scanned.append(found)
+        for finger, given in own.items():
+            known = sensors.setdefault(finger, given)
             if not relative:
-                _check_same_sensor(f"{finger} of {recording.name!r}", found, known)
+                _check_same_sensor(f"{finger} of {found.name!r}", given, known)
     if not scanned:
         raise TrainingError("no recordings given; at least one expected")
     if not sensors:

@@ -1,18 +1,28 @@
 """Evaluation of models: the decisions of a model beside the labels, and their metrics."""
 
-from collections.abc import Callable, Iterable, Sequence
-from dataclasses import replace
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from holdfast.contact import SIGNAL_FAULTS, UNKNOWN, Fault
 from holdfast.detector import detect
-from holdfast.metrics import Decisions, FingerDecisions, Metrics, summarise
+from holdfast.metrics import (
+    Decisions,
+    FingerDecisions,
+    Metrics,
+    RecordingResults,
+    score_recording,
+    summarise_results,
+)
 from holdfast.metrics.decisions import hand_decisions
 from holdfast.metrics.truth_labels import LabelRule, labels_by_truth
 from holdfast.model import Model
+from holdfast.parallel import Engine
 from holdfast.recordings import Recording, label_states
+from holdfast.training.progress import Progress, show_nothing
 from holdfast.training.splits import Integers
+from holdfast.training.verdict import LoadedTares
 
 TARE_LOADED = 1 << SIGNAL_FAULTS.index(Fault.TARE_LOADED)
 """Bit of the fault of a tare that was taken under load."""
@@ -52,18 +62,98 @@ def judge(model: Model, recording: Recording) -> tuple[Decisions, bool]:
     return Decisions(recording.name, fingers, hand), loaded
 
 
-def evaluate(model: Model, recordings: Iterable[Recording], seed: int = 0) -> Metrics:
+def was_trained_on(model: Model, recording: Recording) -> bool:
+    """Return whether a model was trained on a recording, by the digest of its samples."""
+    return model.training is not None and recording.digest in model.training.recordings.values()
+
+
+@dataclass(frozen=True)
+class Evaluation:
+    """Metrics of a model, and what they depend on.
+
+    Attributes:
+        metrics: of all recordings.
+        trained_on: names of the recordings that the model was trained on.
+        tares: recordings whose tare was taken under load, of all.
+        decisions: about each recording, if they are kept.
+    """
+
+    metrics: Metrics
+    trained_on: list[str]
+    tares: LoadedTares
+    decisions: list[Decisions]
+
+
+def evaluate(
+    model: Model,
+    recordings: Sequence[Recording],
+    seed: int = 0,
+    engine: Engine = Engine(),  # noqa: B008 (a tuple: it cannot change)
+) -> Metrics:
     """Compute the metrics of a model on recordings, which are read one at a time.
 
     Args:
         model: to evaluate.
         recordings: labelled.
         seed: of the bootstrap.
+        engine: that reads the recordings. On a cluster, all machines need the recordings at the
+            same paths.
 
     Raises:
         ModelError: a recording has other fingers or sensors.
+        EngineError: the engine cannot be used.
     """
-    return summarise((compute_decisions(model, recording) for recording in recordings), seed=seed)
+    return evaluate_recordings(model, recordings, seed, engine).metrics
+
+
+def evaluate_recordings(
+    model: Model,
+    recordings: Sequence[Recording],
+    seed: int = 0,
+    engine: Engine = Engine(),  # noqa: B008 (a tuple: it cannot change)
+    *,
+    progress: Progress = show_nothing,
+    keep: bool = False,
+) -> Evaluation:
+    """Evaluate a model as `evaluate`, and return what the metrics depend on.
+
+    Args:
+        model: as in `evaluate`.
+        recordings: as in `evaluate`.
+        seed: as in `evaluate`.
+        engine: as in `evaluate`.
+        progress: iterates over the recordings.
+        keep: keep the decisions about every sample, for a figure.
+
+    Raises:
+        ModelError: a recording has other fingers or sensors.
+        EngineError: the engine cannot be used.
+    """
+    parts = ((recordings[place : place + 1],) for place in range(len(recordings)))
+    trained_on: list[str] = []
+    tares: list[bool] = []
+    kept: list[Decisions] = []
+
+    def results() -> Iterator[RecordingResults]:
+        found = engine.map_ordered(_evaluate_part, parts, shared=(model, keep))
+        for own, loaded, known, decisions in progress(found, "evaluating", len(recordings)):
+            trained_on.extend([own.metrics.name] if known else [])
+            tares.append(loaded)
+            kept.extend(decisions)
+            yield own
+
+    metrics = summarise_results(results(), seed=seed)
+    return Evaluation(metrics, trained_on, LoadedTares(sum(tares), len(tares)), kept)
+
+
+def _evaluate_part(
+    model: Model, keep: bool, part: Sequence[Recording]
+) -> tuple[RecordingResults, bool, bool, list[Decisions]]:
+    """Return results, loaded tare, whether it was trained on, and the decisions if kept."""
+    (recording,) = part
+    decisions, loaded = judge(model, recording)
+    known = was_trained_on(model, recording)
+    return score_recording(decisions), loaded, known, [decisions] if keep else []
 
 
 def combine_decisions(

@@ -29,6 +29,12 @@ class TrainingData:
     data_split: DataSplit
     fingers: Mapping[str, FingerSamples]
 
+    @property
+    def thinned(self) -> dict[str, tuple[int, int]]:
+        """Number of used and of all labelled samples of each finger of which not all are used."""
+        counts = {f: (len(own.units), own.n_usable) for f, own in self.fingers.items()}
+        return {finger: (used, n) for finger, (used, n) in counts.items() if used < n}
+
     def check_classes(self) -> None:
         """Check that the samples of every finger have both classes.
 

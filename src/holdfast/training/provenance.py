@@ -3,6 +3,8 @@
 from collections.abc import Collection, Iterator, Mapping
 from importlib.metadata import version
 
+from msgspec import UNSET
+
 from holdfast.classifiers import Parameters
 from holdfast.metrics import SampleMetrics
 from holdfast.model import Model, Training
@@ -15,6 +17,7 @@ def training_record(
     scan: DatasetScan,
     parameters: Mapping[str, Parameters],
     pooled: SampleMetrics,
+    thinned: Mapping[str, tuple[int, int]],
 ) -> Training:
     """Return the provenance of a model, which its file contains.
 
@@ -23,6 +26,7 @@ def training_record(
         scan: of the training recordings.
         parameters: hyper-parameters of each finger's classifier.
         pooled: metrics out of fold, of all fingers and recordings.
+        thinned: number of used and of all samples of each finger of which not all are used.
     """
     return Training(
         recordings=_digests(setting.init, scan),
@@ -30,6 +34,7 @@ def training_record(
         parameters={finger: dict(found) for finger, found in parameters.items()},
         figures={name: getattr(pooled, name) for name in ("accuracy", "fdr", "fnr", "auc")},
         seed=setting.seed,
+        samples=dict(thinned) or UNSET,
         versions={name: version(name) for name in ("holdfast", "numpy", "scikit-learn")},
     )
 

@@ -91,7 +91,8 @@ def split_data(recordings: Sequence[ScannedRecording], split: Split, seed: int) 
             "the split by object needs the object of every recording"
         )
     groups = list(dict.fromkeys(str(name) for name in names))
-    group_of = np.array([groups.index(str(name)) for name in names])
+    places = {name: place for place, name in enumerate(groups)}
+    group_of = np.array([places[str(name)] for name in names])
     rates = np.array([each.rate for each in recordings])
     if split in ("time", "random"):
         n_folds = TIME_FOLDS if split == "time" else RANDOM_FOLDS

@@ -1,25 +1,31 @@
 """Training: fit a model to all recordings, and cross-validate it with the detector itself."""
 
-from collections.abc import Callable, Collection, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Protocol, TypeVar
 
 import msgspec
 
 from holdfast.classifiers import Parameters, Samples
-from holdfast.metrics import Decisions, Metrics, summarise
+from holdfast.metrics import (
+    Decisions,
+    Metrics,
+    RecordingResults,
+    score_recording,
+    summarise_results,
+)
 from holdfast.model import ANY_FINGER, Model
-from holdfast.parallel import map_ordered
+from holdfast.parallel import Engine
 from holdfast.recordings import Recording
 from holdfast.training.adaptation import choose_adaptation
-from holdfast.training.dataset_scan import scan_dataset
+from holdfast.training.dataset_scan import RecordingScan, combine_scans, scan_recording
 from holdfast.training.evaluation import combine_decisions, judge
 from holdfast.training.model_fit import TrainingData, fit_full_model, fit_model
+from holdfast.training.progress import Progress, show_nothing
 from holdfast.training.provenance import adaptation_warnings, training_record
 from holdfast.training.setting import SEARCH_SAMPLES, Setting, Split
-from holdfast.training.splits import inner_folds, split_data
-from holdfast.training.training_samples import gather_samples, thin
+from holdfast.training.splits import DataSplit, inner_folds, split_data
+from holdfast.training.training_samples import gather_samples, thin, thinning_step
 from holdfast.training.tuning import INNER_FOLDS, search
 from holdfast.training.verdict import LoadedTares, verdict
 
@@ -28,25 +34,16 @@ MAX_SEARCHES = 5
 
 The parameters with which a unit is evaluated come from a search that leaves the unit out."""
 
+MAX_FITS = 500
+"""Maximum number of models that the cross-validation fits.
+
+Of more recordings (or objects), every 500th is held out together. It is a multiple of
+`MAX_SEARCHES`, so that the search for each of these groups leaves it out."""
+
 MAX_UNDECIDED_FRACTION = 0.2
 """Warn when more than this fraction of the labelled samples has no decision."""
 
-T = TypeVar("T")
 Warn = Callable[[str], None]
-
-
-class Progress(Protocol):
-    """Iteration over items that may show a progress bar."""
-
-    def __call__(self, items: Iterable[T], what: str, total: int) -> Iterator[T]:
-        """Yield the items.
-
-        Args:
-            items: to yield.
-            what: is done with them, in one word.
-            total: number of items.
-        """
-        ...
 
 
 @dataclass(frozen=True)
@@ -77,12 +74,14 @@ def train(
     *,
     journal: Path | None = None,
     warn: Warn = lambda _: None,
-    progress: Progress = lambda items, _, __: iter(items),
+    progress: Progress = show_nothing,
     n_jobs: int = 1,
+    engine: Engine | None = None,
 ) -> Trained:
     """Train a model, and evaluate it on recordings that it was not trained on.
 
-    Recordings are read one at a time, and more than once. Only their features stay in memory.
+    Recordings are read one at a time, and more than once. Of their features, at most
+    `setting.max_samples` for each finger stay in memory.
 
     Args:
         recordings: labelled; may be a lazy dataset.
@@ -90,7 +89,10 @@ def train(
         journal: file that keeps the trials of the search, so that it can be resumed.
         warn: is called with the text of every warning.
         progress: iterates over recordings, searches and fits.
-        n_jobs: number of parallel searches or fits; -1 for one per processor.
+        n_jobs: number of processes on this machine; -1 for one per processor.
+        engine: that reads the recordings, searches and fits, instead of `n_jobs` processes. The
+            result is the same. On a cluster, all machines need the recordings at the same
+            paths, and the journal is not used.
 
     Raises:
         TrainingError: there are no labels, only one class, or too few recordings or objects
@@ -98,15 +100,18 @@ def train(
         ModelError: the model to adapt lacks a finger of the recordings.
         RecordingError: a recording cannot be read.
         OutputError: the journal cannot be written.
+        EngineError: the engine cannot be used.
     """
-    setting = setting or Setting()
-    trainer = _Trainer(recordings, setting, journal, warn, progress, n_jobs)
+    setting, engine = setting or Setting(), engine or Engine(n_jobs)
+    trainer = _Trainer(recordings, setting, journal, warn, progress, engine)
     trainer.check()
     final, *held_out = trainer.search([set(), *trainer.search_units()])
     model = fit_full_model(trainer.data, trainer.setting, final)
     metrics = trainer.cross_validate(held_out or [final])
     _warn_of_undecided(metrics, warn)
-    provenance = training_record(trainer.setting, trainer.scan, final, metrics.pooled)
+    provenance = training_record(
+        trainer.setting, trainer.scan, final, metrics.pooled, trainer.data.thinned
+    )
     model = msgspec.structs.replace(model, training=provenance)
     return Trained(model, metrics, trainer.setting.split, trainer.tares)
 
@@ -119,15 +124,21 @@ class _Trainer:
         journal: Path | None,
         warn: Warn,
         progress: Progress,
-        n_jobs: int,
+        engine: Engine,
     ) -> None:
-        self.recordings, self.journal = recordings, journal
+        self.recordings = recordings
+        self.journal = journal if engine.scheduler is None else None
         self.n_loaded = 0
-        self.warn, self.progress, self.n_jobs = warn, progress, n_jobs
-        self.scan = scan_dataset(self._read("reading"), setting.rate, relative=setting.relative)
+        self.warn, self.progress, self.engine = warn, progress, engine
+        parts = ((recordings[place : place + 1],) for place in range(len(recordings)))
+        scans = engine.map_ordered(_scan_part, parts, shared=(setting.relative,))
+        read = progress(scans, "reading", len(recordings))
+        self.scan = combine_scans(read, setting.rate, relative=setting.relative)
         self.setting = setting = self._with_split(setting)
         self.data_split = split_data(self.scan.recordings, setting.split, setting.seed)
-        self.fingers = gather_samples(self._read("features"), self.scan, setting, self.data_split)
+        self.fingers = gather_samples(
+            recordings, self.scan, setting, self.data_split, engine, progress
+        )
         self.data = TrainingData(self.scan, self.data_split, self.fingers)
 
     def _with_split(self, setting: Setting) -> Setting:
@@ -154,6 +165,12 @@ class _Trainer:
             ModelError: the model to adapt lacks a finger.
         """
         self.data.check_classes()
+        for finger, (n_used, n) in self.data.thinned.items():
+            step = thinning_step(self.scan.n_labelled, self.setting.max_samples)
+            self.warn(
+                f"{finger}: fitted to {n_used} of {n} labelled samples, one of {step} "
+                "(--max-samples); the metrics are on all of them"
+            )
         if self.setting.init is not None:
             for warning in adaptation_warnings(self.setting.init, self.scan, self.fingers):
                 self.warn(warning)
@@ -179,13 +196,14 @@ class _Trainer:
             return [reference for _ in held_units]
         if setting.init is not None:
             return [self._adapt(held, setting.init) for held in held_units]
-        tasks = [
+        tasks = (
             (thin(own.without(held), SEARCH_SAMPLES), setting, finger, self.journal)
             for held in held_units
             for finger, own in self.fingers.items()
-        ]
-        results = map_ordered(_search, tasks, self.n_jobs)
-        found = list(self.progress(results, "searching", len(tasks)))
+        )
+        results = self.engine.map_ordered(_search, tasks)
+        n_tasks = len(held_units) * len(self.fingers)
+        found = list(self.progress(results, "searching", n_tasks))
         for warning in dict.fromkeys(warning for _, warning in found if warning):
             self.warn(warning)
         parameters = iter(parameters for parameters, _ in found)
@@ -209,47 +227,78 @@ class _Trainer:
                 modulo the number of searches.
         """
         n_units = len(self.data_split.units)
-        tasks = [
-            (self.data, self.setting, found[unit % len(found)], {unit}) for unit in range(n_units)
-        ]
-        models = list(self.progress(map_ordered(fit_model, tasks, self.n_jobs), "fitting", n_units))
-        decisions = (
-            self._decisions_out_of_fold(models, place, recording)
-            for place, recording in enumerate(self._read("evaluating"))
-        )
-        return summarise(decisions, seed=self.setting.seed)
+        n_fits = min(n_units, MAX_FITS)
+        tasks = ((found[k % len(found)], set(range(k, n_units, n_fits))) for k in range(n_fits))
+        fits = self.engine.map_ordered(fit_model, tasks, shared=(self.data, self.setting))
+        models = list(self.progress(fits, "fitting", n_fits))
+        if n_fits < n_units:
+            self.warn(
+                f"{n_units} {self.data_split.split}s are held out in {n_fits} groups, not alone"
+            )
+        context = (self.data_split, len(self.fingers))
+        calls = (self._call(place, models) for place in range(len(self.recordings)))
+        evaluated = self.engine.map_ordered(_score_out_of_fold, calls, shared=context)
+        return summarise_results(self._results(evaluated), seed=self.setting.seed)
 
-    def _read(self, what: str) -> Iterator[Recording]:
-        return self.progress(self.recordings, what, len(self.recordings))
+    def _call(
+        self, place: int, models: Sequence[Model | None]
+    ) -> tuple[int, str, Sequence[Recording], list[Model | None]]:
+        """Return the arguments of `_score_out_of_fold`, without models if there are no labels."""
+        scanned = self.scan.recordings[place]
+        used = list(models) if scanned.n_labelled else []
+        if used and self.data_split.split not in ("time", "random"):
+            used = [models[self.data_split.group_of[place] % len(models)]]
+        return place, scanned.name, self.recordings[place : place + 1], used
 
-    def _decisions_out_of_fold(
-        self, models: Sequence[Model | None], place: int, recording: Recording
-    ) -> Decisions:
-        """Return the decisions about a recording of the models that are fitted without it.
+    def _results(
+        self, evaluated: Iterator[tuple[RecordingResults, bool]]
+    ) -> Iterator[RecordingResults]:
+        for results, loaded in self.progress(evaluated, "evaluating", len(self.recordings)):
+            self.n_loaded += loaded
+            yield results
 
-        They are empty if there are no labels or no models.
 
-        Args:
-            models: the model that is fitted without each unit.
-            place: index of the recording in the dataset.
-            recording: to decide about.
-        """
-        empty = Decisions(recording.name, {})
-        if not self.scan.recordings[place].n_labelled:
-            return empty
-        if self.data_split.split not in ("time", "random"):
-            model = models[self.data_split.group_of[place]]
-            models = [model]
-        judged = [_judge(model, recording) for model in models if model is not None]
-        each = [decisions for decisions, _ in judged]
-        self.n_loaded += any(loaded for _, loaded in judged)
-        if self.data_split.split not in ("time", "random"):
-            return each[0] if each else empty
-        if len(each) < len(models) or len({tuple(one.fingers) for one in each}) > 1:
-            return empty
-        return combine_decisions(
-            each, lambda n: self.data_split.units_of(place, n), len(self.fingers)
-        )
+def _scan_part(relative: bool, part: Sequence[Recording]) -> RecordingScan:
+    (recording,) = part
+    return scan_recording(recording, relative=relative)
+
+
+def _score_out_of_fold(
+    data_split: DataSplit,
+    n_fingers: int,
+    place: int,
+    name: str,
+    part: Sequence[Recording],
+    models: Sequence[Model | None],
+) -> tuple[RecordingResults, bool]:
+    """Return the results of models that are fitted without a recording, or parts of it.
+
+    They are empty if there are no labels or no models.
+
+    Args:
+        data_split: of the dataset.
+        n_fingers: number of fingers of the models.
+        place: index of the recording in the dataset.
+        name: of the recording.
+        part: only this recording.
+        models: that are fitted without it, or without each unit of a split by samples.
+
+    Returns:
+        The results, and whether the tare of the recording was taken under load.
+    """
+    used = [model for model in models if model is not None]
+    if not used:
+        return score_recording(Decisions(name, {})), False
+    (recording,) = part
+    judged = [_judge(model, recording) for model in used]
+    each = [decisions for decisions, _ in judged]
+    loaded = any(loaded for _, loaded in judged)
+    decisions = Decisions(name, {})
+    if data_split.split not in ("time", "random"):
+        decisions = each[0]
+    elif len(each) == len(models) and len({tuple(one.fingers) for one in each}) == 1:
+        decisions = combine_decisions(each, lambda n: data_split.units_of(place, n), n_fingers)
+    return score_recording(decisions), loaded
 
 
 def _judge(model: Model, recording: Recording) -> tuple[Decisions, bool]:

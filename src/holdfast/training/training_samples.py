@@ -1,8 +1,9 @@
 """Training samples: labelled samples with features, from recordings that are read one by one."""
 
-from collections.abc import Collection, Iterable, Mapping, Sequence
+from collections import Counter
+from collections.abc import Collection, Iterator, Mapping, Sequence
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 import numpy.typing as npt
@@ -14,10 +15,12 @@ from holdfast.features import FeatureSpec, Tare
 from holdfast.features.force import rest_amplitude
 from holdfast.features.stream import StreamPlan, extract
 from holdfast.model import ANY_FINGER, RATE_TOLERANCE
+from holdfast.parallel import Engine
 from holdfast.recordings import Recording, Tactile, label_states
 from holdfast.resampling import resample
 from holdfast.sensors import Sensor
 from holdfast.training.dataset_scan import DatasetScan
+from holdfast.training.progress import Progress, show_nothing
 from holdfast.training.setting import Setting
 from holdfast.training.splits import DataSplit, Integers
 
@@ -37,6 +40,7 @@ class FingerSamples:
         recordings: (n,) index of the recording of each sample.
         times: (n,) time of each sample since the start of its recording [s].
         at_rest: (n_recordings, 3) number, sum and sum of squares of F_a in each tare interval.
+        n_usable: number of samples from which these were taken.
     """
 
     sensor: Sensor | None
@@ -45,6 +49,7 @@ class FingerSamples:
     recordings: Integers
     times: npt.NDArray[np.float64]
     at_rest: npt.NDArray[np.float64]
+    n_usable: int = 0
 
     def without(self, held: Collection[int]) -> Samples:
         """Return the samples that are not in held units."""
@@ -77,8 +82,58 @@ class FingerSamples:
         return contact_threshold(self.at_rest[list(recordings)])
 
 
+class RecordingSamples(NamedTuple):
+    """Training samples of one finger in one recording.
+
+    Attributes:
+        sensor: of the finger; None for any sensor.
+        samples: labelled, with features; the groups are those of the split.
+        units: (n,) as in `FingerSamples`.
+        times: (n,) since the start of the recording [s].
+        at_rest: number, sum and sum of squares of F_a in the tare interval.
+        n_usable: number of samples before thinning.
+    """
+
+    sensor: Sensor | None
+    samples: Samples
+    units: Integers
+    times: npt.NDArray[np.float64]
+    at_rest: tuple[float, float, float]
+    n_usable: int
+
+
+@dataclass(frozen=True)
+class SamplesPlan:
+    """What the training samples of any recording of a dataset depend on.
+
+    Attributes:
+        scan: of the dataset.
+        setting: of the training: features, tare and so on.
+        data_split: of the dataset.
+    """
+
+    scan: DatasetScan
+    setting: Setting
+    data_split: DataSplit
+
+    @property
+    def step(self) -> int:
+        """Every step-th usable sample of a finger is kept."""
+        return thinning_step(self.scan.n_labelled, self.setting.max_samples)
+
+    @property
+    def places(self) -> list[int]:
+        """Indices of the recordings with labels."""
+        return [place for place, each in enumerate(self.scan.recordings) if each.n_labelled]
+
+
 def gather_samples(
-    recordings: Iterable[Recording], scan: DatasetScan, setting: Setting, data_split: DataSplit
+    recordings: Sequence[Recording],
+    scan: DatasetScan,
+    setting: Setting,
+    data_split: DataSplit,
+    engine: Engine = Engine(),  # noqa: B008 (a tuple: it cannot change)
+    progress: Progress = show_nothing,
 ) -> dict[str, FingerSamples]:
     """Return the training samples of every finger, or of all fingers together under `"*"`.
 
@@ -87,46 +142,117 @@ def gather_samples(
         scan: of the recordings.
         setting: of the training: features, tare and so on.
         data_split: of the recordings.
+        engine: that reads the recordings.
+        progress: iterates over the recordings.
 
     Returns:
-        By finger. Each has at most `setting.max_samples`; of larger data every n-th sample.
+        By finger. Each has at most `setting.max_samples`; of larger data every n-th sample, so
+        that each recording has its share.
 
     Raises:
         RecordingError: a recording cannot be read.
         TrainingError: one classifier of all fingers is required, but their sensors differ.
     """
-    step = thinning_step(scan.n_labelled, setting.max_samples)
-    parts: dict[str, list[FingerSamples]] = {finger: [] for finger in scan.sensors}
-    n_seen = dict.fromkeys(scan.sensors, 0)
-    for place, given in enumerate(recordings):
-        scanned = scan.recordings[place]
-        if not scanned.n_labelled:
-            continue
-        recording = given if scan.relative else resample_if_needed(given, scan.rate)
-        rate = scan.model_rate or recording.rate
-        plan = stream_plan(_sensors_of(recording, scan), setting.features, setting, rate)
-        for finger, rows in extract(plan, recording).items():
-            module = recording.modules[finger]
-            states = _states_to_learn(module, scan.relative)
-            usable = usable_rows(rows.features, states)[:: scanned.step]
-            kept = usable[-n_seen[finger] % step :: step]
-            n_seen[finger] += len(usable)
-            at_rest = np.zeros((len(scan.recordings), 3))
-            if plan.tare.without_contact and not scan.relative:
-                at_rest[place] = rest_moments(module, plan.tare, rate)
-            group = int(data_split.group_of[place])
-            parts[finger].append(
-                FingerSamples(
-                    None if scan.relative else module.sensor,
-                    labelled_samples(rows.features, states, kept, group),
-                    data_split.units_of(place, module.n_samples)[kept],
-                    np.full(len(kept), place),
-                    module.times[kept] - recording.start,
-                    at_rest,
-                )
-            )
-    fingers = {finger: _join(own) for finger, own in parts.items()}
+    plan = SamplesPlan(scan, setting, data_split)
+    parts: dict[str, dict[int, RecordingSamples]] = {finger: {} for finger in scan.sensors}
+    for place, found in zip(
+        plan.places, progress(_read(recordings, plan, engine), "features", len(plan.places)),
+        strict=True,
+    ):  # fmt: skip
+        for finger, samples in found.items():
+            parts[finger][place] = samples
+    n = len(scan.recordings)
+    fingers = {finger: _concatenate(own, n) for finger, own in parts.items() if own}
     return {ANY_FINGER: _pool(fingers)} if setting.is_shared else fingers
+
+
+def _read(
+    recordings: Sequence[Recording], plan: SamplesPlan, engine: Engine
+) -> Iterator[dict[str, RecordingSamples]]:
+    """Yield the samples of each recording with labels, by finger.
+
+    Which samples are kept depends on the number of usable samples in all recordings before.
+    Other processes read a recording twice if samples are left out: first these numbers.
+    """
+    n_seen = Counter[str]()
+    parts = [(place, recordings[place : place + 1]) for place in plan.places]
+    counts: Iterator[Mapping[str, int]] | None = None
+    if plan.step > 1 and not engine.in_this_process:
+        counts = iter(list(engine.map_ordered(_count_usable, parts, shared=(plan,))))
+
+    def calls() -> Iterator[tuple[object, ...]]:
+        for place, part in parts:
+            yield place, part, dict(n_seen)
+            if counts is not None:
+                n_seen.update(next(counts))
+
+    for found in engine.map_ordered(_samples_of_part, calls(), shared=(plan,)):
+        if counts is None:
+            n_seen.update({finger: samples.n_usable for finger, samples in found.items()})
+        yield found
+
+
+def _count_usable(plan: SamplesPlan, place: int, part: Sequence[Recording]) -> dict[str, int]:
+    found = _samples_of_part(plan, place, part, {})
+    return {finger: samples.n_usable for finger, samples in found.items()}
+
+
+def _samples_of_part(
+    plan: SamplesPlan, place: int, part: Sequence[Recording], n_seen: Mapping[str, int]
+) -> dict[str, RecordingSamples]:
+    """Return the samples of one recording by finger.
+
+    Args:
+        plan: of the dataset.
+        place: index of the recording.
+        part: only this recording.
+        n_seen: usable samples of each finger in all recordings before.
+    """
+    scan, setting, step = plan.scan, plan.setting, plan.step
+    (given,) = part
+    recording = given if scan.relative else resample_if_needed(given, scan.rate)
+    rate = scan.model_rate or recording.rate
+    stream = stream_plan(_sensors_of(recording, scan), setting.features, setting, rate)
+    found = {}
+    for finger, rows in extract(stream, recording).items():
+        module = recording.modules[finger]
+        states = _states_to_learn(module, scan.relative)
+        usable = usable_rows(rows.features, states)[:: scan.recordings[place].step]
+        kept = usable[-n_seen.get(finger, 0) % step :: step]
+        at_rest = (0.0, 0.0, 0.0)
+        if stream.tare.without_contact and not scan.relative:
+            at_rest = rest_moments(module, stream.tare, rate)
+        found[finger] = RecordingSamples(
+            None if scan.relative else module.sensor,
+            labelled_samples(rows.features, states, kept, int(plan.data_split.group_of[place])),
+            plan.data_split.units_of(place, module.n_samples)[kept],
+            module.times[kept] - recording.start,
+            at_rest,
+            len(usable),
+        )
+    return found
+
+
+def _concatenate(parts: Mapping[int, RecordingSamples], n_recordings: int) -> FingerSamples:
+    """Return the samples of a finger in all recordings, in order.
+
+    Args:
+        parts: by index of the recording; at least one.
+        n_recordings: in the dataset.
+    """
+    own = list(parts.values())
+    at_rest = np.zeros((n_recordings, 3))
+    at_rest[list(parts)] = [each.at_rest for each in own]
+    n_kept = [len(each.units) for each in own]
+    return FingerSamples(
+        own[0].sensor,
+        concatenate([each.samples for each in own]),
+        np.concatenate([each.units for each in own]),
+        np.repeat(list(parts), n_kept),
+        np.concatenate([each.times for each in own]),
+        at_rest,
+        n_usable=sum(each.n_usable for each in own),
+    )
 
 
 def _sensors_of(recording: Recording, scan: DatasetScan) -> dict[str, Sensor]:
@@ -250,4 +376,5 @@ def _join(parts: Sequence[FingerSamples]) -> FingerSamples:
         np.concatenate([own.recordings for own in parts]),
         np.concatenate([own.times for own in parts]),
         np.sum([own.at_rest for own in parts], axis=0),
+        sum(own.n_usable for own in parts),
     )

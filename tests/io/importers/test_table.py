@@ -1,9 +1,11 @@
+import csv
 from pathlib import Path
 
 import numpy as np
 import pytest
 
 from holdfast.errors import RecordingError
+from holdfast.io.importers import table as table_module
 from holdfast.io.importers.table import Table, natural_order, read_table, with_integer_type
 
 
@@ -70,11 +72,56 @@ def test_the_first_of_two_columns_with_one_name_is_used():
     assert table.columns(["a"]).tolist() == [[1.0]]
 
 
-def test_a_cell_without_end(tmp_path):
+def test_a_long_cell_with_one_wrong_character(tmp_path):
     path = tmp_path / "a.csv"
     path.write_text("time,x\n0,1\n1," + "9" * 140_000 + "a\n")
-    with pytest.raises(RecordingError, match="is not a table of numbers: field larger than field"):
+    with pytest.raises(RecordingError, match=r"row 3, column 'x': '9{40}'\.\.\. \(140001 char"):
         read_table(path)
-    path.write_text("time," + "x" * 140_000 + "\n0,1\n")
-    with pytest.raises(RecordingError, match="is not CSV text: field larger than field limit"):
+    path.write_text("time," + "x" * 1_100_000 + "\n0,1\n")
+    with pytest.raises(RecordingError, match="is not CSV text: a cell of more than 1048576 char"):
         read_table(path)
+
+
+class TestLongCells:
+    """Cells that the csv module alone refuses, or that need larger blocks of pyarrow."""
+
+    @pytest.mark.parametrize("n", [131_073, 600_000, 1 << 20])
+    def test_text(self, tmp_path, n):
+        path = tmp_path / "a.csv"
+        path.write_text(f"a,note\n1,{'x' * n}\n2,y\n3,{'z' * n}\n")
+        table, cells = read_table(path, ["note"])
+        assert table.values[:, 0].tolist() == [1, 2, 3]
+        assert [len(cell) for cell in cells["note"]] == [n, 1, n]
+
+    def test_a_long_name_of_a_column(self, tmp_path):
+        path = tmp_path / "a.csv"
+        path.write_text(f"a,{'b' * 200_000}\n1,2\n")
+        assert read_table(path)[0].values.tolist() == [[1, 2]]
+
+    def test_a_long_cell_that_is_no_number(self, tmp_path):
+        path = tmp_path / "a.csv"
+        path.write_text(f"a,b\n1,2\n3,{'x' * 200_000}\n")
+        with pytest.raises(RecordingError, match=r"row 3, column 'b': 'x{40}'\.\.\. \(200000 ch"):
+            read_table(path)
+
+    @pytest.mark.parametrize("text", [["note"], []])
+    def test_too_long(self, tmp_path, text):
+        path = tmp_path / "a.csv"
+        path.write_text(f"a,note\n1,{'x' * ((1 << 20) + 1)}\n")
+        with pytest.raises(RecordingError, match=r"a\.csv.* a cell of (more than )?10485\d\d char"):
+            read_table(path, text)
+
+    def test_a_row_that_is_too_long(self, tmp_path, monkeypatch):
+        monkeypatch.setattr(table_module, "MAX_ROW_SIZE", 1 << 20)
+        row = "1" + f",{'x' * (1 << 20)}" * 4
+        path = tmp_path / "a.csv"
+        path.write_text(f"a,b,c,d,e\n{row}\n{row}\n")
+        with pytest.raises(RecordingError, match=r"table of numbers: a row of more than 1048576 b"):
+            read_table(path, list("bcde"))
+
+    def test_the_limit_of_other_programs_stays(self, tmp_path):
+        before = csv.field_size_limit()
+        path = tmp_path / "a.csv"
+        path.write_text("a\n1\n")
+        read_table(path)
+        assert csv.field_size_limit() == before

@@ -5,6 +5,7 @@ import pytest
 
 from holdfast.ros.rospy_node import published_topics
 from holdfast.sources import open_source
+from holdfast.sources.ros import ros1
 from sources.ros1_master import lines, running_master
 
 N = 300
@@ -81,3 +82,13 @@ def test_unknown_parameters():
         ValueError, match=r"a ROS master like http://localhost:11311 expected, 'x' given"
     ):
         open_source("ros1:///a?master=x")
+
+
+def test_old_definitions_are_dropped(monkeypatch):
+    monkeypatch.setattr(ros1, "MAX_DECODERS", 3)
+    subscription = ros1.Ros1Subscription("/xServTopic", "http://127.0.0.1:1")
+    headers = [{"type": "a/B", "message_definition": f"float32 x{k}"} for k in range(5)]
+    decoders = [subscription._decoder(header) for header in headers]
+    assert len(subscription._decoders) == 3
+    assert subscription._decoder(headers[4]) is decoders[4]
+    assert subscription._decoder(headers[0]) is not decoders[0]

@@ -55,25 +55,72 @@ def import_recordings(
         ValueError: there is no format of this name, `columns` is not valid, or `sensors` or
             `columns` are given for another format than `csv`.
     """
-    place = Path(path)
-    given = Columns.parse(columns) if isinstance(columns, str) else columns
-    if format is None and (sensors or given):
-        format = "csv"  # noqa: A001 (as on the command line)
-    if format is not None and format not in FORMATS:
-        raise ValueError(f"unknown format {format!r}; there are {', '.join(FORMATS)}")
-    if format not in (None, "csv") and (sensors or given):
-        raise ValueError(f"--sensor and --columns belong to the format csv; {format!r} given")
-    if not place.exists():
-        raise RecordingError(f"{place} does not exist; a file or folder to import expected")
+    place, given = Path(path), _columns(columns)
+    name = _format_of(place, format, sensors, given)
     with recording_errors(place):
-        if not place.is_dir():
-            check_regular(place)
-        name = format or _detected_format(place)
         source = _importer(name)
         recordings: Iterator[Recording] = (
             source.read(place, sensors, given, report) if name == "csv" else source.read(place)
         )
     return _guarded(place, recordings, labels=labels)
+
+
+def import_parts(
+    path: str | Path,
+    format: str | None = None,  # noqa: A002 (as on the command line)
+    *,
+    sensors: Mapping[str, Sensor] | None = None,
+    columns: Columns | str | None = None,
+) -> tuple[str, list[Path]]:
+    """Return the format of a file or folder, and its parts, which can be imported one by one.
+
+    Args:
+        path: as in `import_recordings`.
+        format: as in `import_recordings`.
+        sensors: as in `import_recordings`.
+        columns: as in `import_recordings`.
+
+    Returns:
+        The format, and the files (or folders, or bags) of the recordings, in order.
+
+    Raises:
+        RecordingError: `path` does not exist, no format fits, or the folder has no such file.
+        ValueError: as `import_recordings`.
+    """
+    place, given = Path(path), _columns(columns)
+    name = _format_of(place, format, sensors, given)
+    with recording_errors(place):
+        source = _importer(name)
+        parts: list[Path] = source.parts(place, given) if name == "csv" else source.parts(place)
+    return name, parts
+
+
+def _columns(columns: Columns | str | None) -> Columns | None:
+    return Columns.parse(columns) if isinstance(columns, str) else columns
+
+
+def _format_of(
+    path: Path, name: str | None, sensors: Mapping[str, Sensor] | None, columns: Columns | None
+) -> str:
+    """Return the format of a path, and check that the arguments fit together.
+
+    Raises:
+        RecordingError: the path does not exist, or no format fits.
+        ValueError: there is no format of this name, or sensors or columns are given for another
+            format than `csv`.
+    """
+    if name is None and (sensors or columns):
+        name = "csv"
+    if name is not None and name not in FORMATS:
+        raise ValueError(f"unknown format {name!r}; there are {', '.join(FORMATS)}")
+    if name not in (None, "csv") and (sensors or columns):
+        raise ValueError(f"--sensor and --columns belong to the format csv; {name!r} given")
+    if not path.exists():
+        raise RecordingError(f"{path} does not exist; a file or folder to import expected")
+    with recording_errors(path):
+        if not path.is_dir():
+            check_regular(path)
+        return name or _detected_format(path)
 
 
 def _guarded(path: Path, recordings: Iterator[Recording], *, labels: bool) -> Iterator[Recording]:

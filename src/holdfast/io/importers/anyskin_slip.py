@@ -40,18 +40,27 @@ def can_read(path: Path) -> bool:
     return any(_is_header(header_line(file)) for file in csv_files(path))
 
 
-def read(path: Path) -> Iterator[Recording]:
-    """Read the recording in a CSV file, or those in the CSV files of a folder.
+def parts(path: Path) -> list[Path]:
+    """Return the file, or the files of this format in a folder.
 
     Raises:
-        RecordingError: there is no CSV file, or one has another form.
+        RecordingError: there is none.
     """
     files = [file for file in csv_files(path) if path.is_file() or _is_header(header_line(file))]
     if not files:
         raise RecordingError(
             f"no anyskin-slip file in {path}; CSV files with columns mag1_x.. and slip expected"
         )
-    return (_recording(file) for file in files)
+    return files
+
+
+def read(path: Path) -> Iterator[Recording]:
+    """Read the recording in a CSV file, or those in the CSV files of a folder.
+
+    Raises:
+        RecordingError: there is no CSV file, or one has another form.
+    """
+    return (_recording(file) for file in parts(path))
 
 
 def _is_header(names: tuple[str, ...]) -> bool:

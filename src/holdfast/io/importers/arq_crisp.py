@@ -51,6 +51,18 @@ def can_read(path: Path) -> bool:
     return any(file.suffix in SUFFIXES or _is_hdf5(file) for file in _files(path))
 
 
+def parts(path: Path) -> list[Path]:
+    """Return the file, or the HDF5 files of a folder.
+
+    Raises:
+        RecordingError: there is none.
+    """
+    files = _files(path)
+    if not files:
+        raise RecordingError(f"no HDF5 file in {path}; {' or '.join(SUFFIXES)} expected")
+    return files
+
+
 def read(path: Path) -> Iterator[Recording]:
     """Read the recordings in an HDF5 file, or in the HDF5 files of a folder.
 
@@ -59,10 +71,7 @@ def read(path: Path) -> Iterator[Recording]:
         MissingExtra: h5py is not installed.
     """
     h5py = _import_h5py()
-    files = _files(path)
-    if not files:
-        raise RecordingError(f"no HDF5 file in {path}; {' or '.join(SUFFIXES)} expected")
-    return (recording for file in files for recording in _recordings(file, h5py))
+    return (recording for file in parts(path) for recording in _recordings(file, h5py))
 
 
 def _import_h5py() -> ModuleType:

@@ -61,6 +61,27 @@ def read(
     Raises:
         RecordingError: there is no CSV file, or one has another form.
     """
+    reported: set[str] = set()
+
+    def report_once(guess: str, text: str) -> None:
+        if guess not in reported:
+            reported.add(guess)
+            report(text)
+
+    files = parts(path, columns)
+    return (_recording(file, sensors or {}, columns, report_once) for file in files)
+
+
+def parts(path: Path, columns: Columns | None = None) -> list[Path]:
+    """Return the file, or the CSV files of a folder with columns that can be read.
+
+    Args:
+        path: path of the file or folder.
+        columns: as in `read`.
+
+    Raises:
+        RecordingError: there is none.
+    """
     files = csv_files(path)
     if path.is_dir():
         files = [file for file in files if columns or _is_header(header_line(file))] or [
@@ -70,14 +91,7 @@ def read(
         raise RecordingError(
             f"no CSV file in {path} with a column {TIME!r} and taxel columns; both are expected"
         )
-    reported: set[str] = set()
-
-    def report_once(guess: str, text: str) -> None:
-        if guess not in reported:
-            reported.add(guess)
-            report(text)
-
-    return (_recording(file, sensors or {}, columns, report_once) for file in files)
+    return files
 
 
 def _is_header(names: tuple[str, ...]) -> bool:

@@ -28,16 +28,25 @@ def can_read(path: Path) -> bool:
     return any(_is_header(header_line(file)) for file in csv_files(path))
 
 
+def parts(path: Path) -> list[Path]:
+    """Return the file, or the files of this format in a folder.
+
+    Raises:
+        RecordingError: there is none.
+    """
+    files = [file for file in csv_files(path) if path.is_file() or _is_header(header_line(file))]
+    if not files:
+        raise RecordingError(f"no gtac file in {path}; CSV files with columns mag_x1.. expected")
+    return files
+
+
 def read(path: Path) -> Iterator[Recording]:
     """Read the recording in a CSV file, or those in the CSV files of a folder.
 
     Raises:
         RecordingError: there is no CSV file, or one has another form.
     """
-    files = [file for file in csv_files(path) if path.is_file() or _is_header(header_line(file))]
-    if not files:
-        raise RecordingError(f"no gtac file in {path}; CSV files with columns mag_x1.. expected")
-    return (_recording(file) for file in files)
+    return (_recording(file) for file in parts(path))
 
 
 def _is_header(names: tuple[str, ...]) -> bool:

@@ -36,12 +36,11 @@ def can_read(path: Path) -> bool:
     return bool(find_bags(path))
 
 
-def read(path: Path) -> Iterator[Recording]:
-    """Read the recording in a bag, or those in the bags of a folder.
+def parts(path: Path) -> list[Path]:
+    """Return the bag, or the bags of a folder.
 
     Raises:
-        RecordingError: there is no bag, or one is damaged or has no known topic.
-        MissingExtra: rosbags is not installed.
+        RecordingError: there is none.
     """
     bags = find_bags(path)
     if not bags and path.is_file():
@@ -49,6 +48,17 @@ def read(path: Path) -> Iterator[Recording]:
         raise RecordingError(f"{path} {problem}; a .bag, .db3 or .mcap file of ROS expected")
     if not bags:
         raise RecordingError(f"no bag of ROS in {path}; a folder with {METADATA} or .bag expected")
+    return bags
+
+
+def read(path: Path) -> Iterator[Recording]:
+    """Read the recording in a bag, or those in the bags of a folder.
+
+    Raises:
+        RecordingError: there is no bag, or one is damaged or has no known topic.
+        MissingExtra: rosbags is not installed.
+    """
+    bags = parts(path)
     check_rosbags()
     return (_recording(bag) for bag in bags)
 

@@ -2,7 +2,8 @@
 
 import csv
 import re
-from collections.abc import Sequence
+from collections.abc import Iterable, Iterator, Sequence
+from contextlib import contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING, NamedTuple
 
@@ -15,6 +16,12 @@ from holdfast.sensors.types import Array
 
 if TYPE_CHECKING:
     import pyarrow
+
+
+MAX_CELL_LENGTH = 1 << 20
+"""Maximum length of a cell [characters]; the csv module itself stops at 131,072."""
+MAX_ROW_SIZE = 1 << 26
+"""Maximum size of a row with long cells [bytes]."""
 
 
 class Table(NamedTuple):
@@ -66,11 +73,10 @@ def read_table(path: Path, text: Sequence[str] = ()) -> tuple[Table, dict[str, l
         text: names of the columns of text; they are NaN among the numbers.
 
     Raises:
-        RecordingError: the file cannot be read, is empty, has rows of different lengths, or a
-            cell that is not a number.
+        RecordingError: the file cannot be read, is empty, has rows of different lengths, a cell
+            that is not a number, or a row that is too long.
     """
     import pyarrow as pa
-    from pyarrow import csv as arrow
 
     comments, names, first_line = _head(path)
     keys = [str(place) for place in range(len(names))]
@@ -78,23 +84,67 @@ def read_table(path: Path, text: Sequence[str] = ()) -> tuple[Table, dict[str, l
     types = dict.fromkeys(keys, pa.float64())
     types.update({str(place): pa.string() for place in places.values()})
     try:
-        table = arrow.read_csv(
-            path,
-            read_options=arrow.ReadOptions(column_names=keys, skip_rows=first_line - 1),
-            convert_options=arrow.ConvertOptions(
-                column_types=types, null_values=["", "nan", "NaN", "NAN"]
-            ),
-        )
+        table = _read(path, types, first_line)
     except OSError as cause:
         raise RecordingError(f"cannot read {path}: {cause}") from cause
     except pa.ArrowException as cause:
         raise _cause_of(path, names, first_line, set(text), str(cause)) from cause
     if len(table) == 0:
         raise _without_samples(path)
+    _check_cells(path, table, names, places.values())
     cells = {
         name: [cell or "" for cell in table[place].to_pylist()] for name, place in places.items()
     }
     return Table(path, names, _numbers(table, set(places.values())), first_line, comments), cells
+
+
+def _read(path: Path, types: "dict[str, pyarrow.DataType]", first_line: int) -> "pyarrow.Table":
+    """Read the rows of a CSV file; rows of more than 1 MB need larger blocks."""
+    import pyarrow as pa
+    from pyarrow import csv as arrow
+
+    def read(block_size: int | None) -> "pyarrow.Table":
+        return arrow.read_csv(
+            path,
+            read_options=arrow.ReadOptions(
+                column_names=list(types), skip_rows=first_line - 1, block_size=block_size
+            ),
+            convert_options=arrow.ConvertOptions(
+                column_types=types, null_values=["", "nan", "NaN", "NAN"]
+            ),
+        )
+
+    try:
+        return read(None)
+    except pa.ArrowInvalid as cause:
+        if "straddling" not in str(cause):
+            raise
+    return read(MAX_ROW_SIZE)
+
+
+def _check_cells(
+    path: Path, table: "pyarrow.Table", names: Sequence[str], places: Iterable[int]
+) -> None:
+    """Check the length of the cells of text."""
+    from pyarrow import compute
+
+    for place in places:
+        longest = compute.max(compute.utf8_length(table[place])).as_py() or 0
+        if longest > MAX_CELL_LENGTH:
+            raise RecordingError(
+                f"{path}, column {names[place]!r}: a cell of {longest} characters given, at most "
+                f"{MAX_CELL_LENGTH} expected"
+            )
+
+
+@contextmanager
+def _long_cells() -> Iterator[None]:
+    """Let the csv module read cells of up to `MAX_CELL_LENGTH` characters."""
+    before = csv.field_size_limit(MAX_CELL_LENGTH)
+    try:
+        yield
+    finally:
+        csv.field_size_limit(before)
 
 
 def with_integer_type(values: Array) -> npt.NDArray[np.generic]:
@@ -131,12 +181,13 @@ def _head(path: Path) -> tuple[tuple[str, ...], tuple[str, ...], int]:
                 if line.startswith("#"):
                     comments.append(line[1:].strip())
                 elif line.strip():
-                    names = next(csv.reader([line.rstrip("\r\n")]))
+                    with _long_cells():
+                        names = next(csv.reader([line.rstrip("\r\n")]))
                     return tuple(comments), tuple(name.strip() for name in names), number + 1
     except OSError as cause:
         raise RecordingError(f"cannot read {path}: {cause.strerror}") from cause
     except (UnicodeError, csv.Error) as cause:
-        raise RecordingError(f"{path} is not CSV text: {cause}") from cause
+        raise RecordingError(f"{path} is not CSV text: {_text(cause)}") from cause
     raise RecordingError(f"{path} is empty; a header line and samples expected")
 
 
@@ -157,21 +208,47 @@ def _cause_of(
     if not any(line.strip() for line in lines):
         return _without_samples(path)
     try:
-        for number, row in enumerate(csv.reader(lines), start=first_line):
-            if row and len(row) != len(names):
-                return RecordingError(
-                    f"{path}, row {number}: {len(row)} cells given, {len(names)} expected as in "
-                    "the header"
-                )
-            for name, cell in zip(names, row, strict=False):
-                if name not in text and not _is_number(cell):
-                    return RecordingError(
-                        f"{path}, row {number}, column {name!r}: {cell[:40]!r} given, a number "
-                        "expected"
-                    )
-    except csv.Error as problem:  # a cell of more than 131,072 characters, for instance
-        cause = str(problem)
+        with _long_cells():
+            wrong = _wrong_row(path, names, first_line, text, lines)
+    except csv.Error as problem:
+        cause = _text(problem)
+    else:
+        if wrong is not None:
+            return wrong
+    if "straddling" in cause:
+        cause = f"a row of more than {MAX_ROW_SIZE} bytes"
     return RecordingError(f"{path} is not a table of numbers: {' '.join(cause.split())[:200]}")
+
+
+def _wrong_row(
+    path: Path, names: tuple[str, ...], first_line: int, text: set[str], lines: Iterable[str]
+) -> RecordingError | None:
+    """Return an error that names the first row or cell that is wrong; None if there is none."""
+    for number, row in enumerate(csv.reader(lines), start=first_line):
+        if row and len(row) != len(names):
+            return RecordingError(
+                f"{path}, row {number}: {len(row)} cells given, {len(names)} expected as in "
+                "the header"
+            )
+        for name, cell in zip(names, row, strict=False):
+            if name not in text and not _is_number(cell):
+                return RecordingError(
+                    f"{path}, row {number}, column {name!r}: {_start(cell)} given, "
+                    "a number expected"
+                )
+    return None
+
+
+def _start(cell: str) -> str:
+    """Return the start of a cell, with its length if it is longer."""
+    return repr(cell[:40]) + (f"... ({len(cell)} characters)" if len(cell) > 40 else "")
+
+
+def _text(problem: Exception) -> str:
+    """Return the text of an error of the csv module; a long cell has its own."""
+    if "field limit" in str(problem):
+        return f"a cell of more than {MAX_CELL_LENGTH} characters"
+    return str(problem)
 
 
 def _without_samples(path: Path) -> RecordingError:

@@ -34,11 +34,11 @@ def can_read(path: Path) -> bool:
     return bool(_folders(path))
 
 
-def read(path: Path) -> Iterator[Recording]:
-    """Read the recording in a folder `data_sample_*`, or those in a folder of such folders.
+def parts(path: Path) -> list[Path]:
+    """Return the folder of a recording, or the folders of recordings in a folder.
 
     Raises:
-        RecordingError: there is none, a file is missing, or files contradict each other.
+        RecordingError: there is none.
     """
     folders = _folders(path)
     if not folders:
@@ -47,7 +47,16 @@ def read(path: Path) -> Iterator[Recording]:
             f"{FILES['finger1']}, {FILES['finger2']}, robot_state.csv, marker.csv and "
             "slip_label.csv expected"
         )
-    return (_recording(folder) for folder in folders)
+    return folders
+
+
+def read(path: Path) -> Iterator[Recording]:
+    """Read the recording in a folder `data_sample_*`, or those in a folder of such folders.
+
+    Raises:
+        RecordingError: there is none, a file is missing, or files contradict each other.
+    """
+    return (_recording(folder) for folder in parts(path))
 
 
 def _folders(path: Path) -> list[Path]:

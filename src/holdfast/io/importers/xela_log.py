@@ -19,16 +19,25 @@ def can_read(path: Path) -> bool:
     return any(len(header_line(file)) == N_COLUMNS + 1 for file in csv_files(path))
 
 
+def parts(path: Path) -> list[Path]:
+    """Return the file, or the CSV files of a folder.
+
+    Raises:
+        RecordingError: there is none.
+    """
+    files = csv_files(path)
+    if not files:
+        raise RecordingError(f"no CSV file in {path}; xela-log files expected")
+    return files
+
+
 def read(path: Path) -> Iterator[Recording]:
     """Read the recording in a CSV file, or those in the CSV files of a folder.
 
     Raises:
         RecordingError: there is no CSV file, or one has another form.
     """
-    files = csv_files(path)
-    if not files:
-        raise RecordingError(f"no CSV file in {path}; xela-log files expected")
-    return (_recording(file) for file in files)
+    return (_recording(file) for file in parts(path))
 
 
 def _recording(path: Path) -> Recording:

@@ -23,6 +23,8 @@ from holdfast.sources.uri import Address
 
 MAX_QUEUED_MESSAGES = 256
 """Messages that wait for a busy reader; after that, the oldest ones are dropped."""
+MAX_DECODERS = 64
+"""Definitions of messages that are kept; of more, the oldest is parsed again when it comes."""
 SOCKET_READ_SIZE = 1 << 20
 """Bytes to read from a socket at a time. If a message is longer, rospy lags behind."""
 
@@ -133,6 +135,8 @@ class Ros1Subscription(Subscription):
         """Return the decoder of the definition that the publisher sent in its header."""
         kind, text = header.get("type", ""), header.get("message_definition", "")
         if (kind, text) not in self._decoders:
+            if len(self._decoders) == MAX_DECODERS:
+                del self._decoders[next(iter(self._decoders))]
             self._decoders[kind, text] = self._new_decoder(kind, text)
         return self._decoders[kind, text]
 

@@ -1,0 +1,228 @@
+"""Calls on a Dask cluster: few at a time, repeated if a worker dies, of one version of holdfast."""
+
+from collections.abc import Callable, Hashable, Iterable, Iterator
+from contextlib import contextmanager, suppress
+from functools import lru_cache
+from hashlib import sha256
+from itertools import islice
+from pathlib import Path
+from queue import Empty, SimpleQueue
+from typing import TYPE_CHECKING, Any, TypeVar
+
+from holdfast.errors import EngineError, MissingExtra
+
+if TYPE_CHECKING:
+    from distributed import Client, Future
+
+T = TypeVar("T")
+K = TypeVar("K", bound=Hashable)
+Arguments = tuple[object, ...]
+Call = tuple[K, Arguments]
+
+CONNECT_TIMEOUT = 10.0
+"""Time within which a scheduler must answer [s]."""
+
+NO_WORKER_TIMEOUT = 30.0
+"""Time for which a cluster may have neither a worker nor a new result [s]."""
+
+CALLS_PER_THREAD = 4
+"""Number of calls that a cluster holds for each of its threads; more would fill its memory."""
+
+
+def call_on_cluster(
+    function: Callable[..., T], calls: Iterable[Call[K]], scheduler: str, shared: Arguments = ()
+) -> Iterator[tuple[K, T]]:
+    """Make calls on a Dask cluster, which repeats the calls of a worker that died.
+
+    If a worker dies, Dask counts a failure of every call that the worker held (decision 0006).
+    So a call that Dask cancels is repeated alone. Every call uses one thread.
+
+    Args:
+        function: that the workers can import.
+        calls: the name of each call and its arguments; they are read as the workers need them.
+        scheduler: address of the scheduler.
+        shared: first arguments of every call; each worker has one copy.
+
+    Yields:
+        The name of a call and its result, as soon as it exists.
+
+    Raises:
+        EngineError: the scheduler does not answer, there are no workers, a worker has no holdfast
+            or another version, or the worker of one call died each time.
+        MissingExtra: dask is not installed.
+    """
+    with _client(scheduler) as client:
+        _check_workers(client)
+        copies = client.scatter(list(shared), broadcast=True, hash=False) if shared else []
+        given = (package_digest(), function, *copies)
+        suspects: list[Call[K]] = []
+        yield from _submit(client, given, calls, suspects)
+        for call in suspects:
+            failed: list[Call[K]] = []
+            yield from _submit(client, given, [call], failed)
+            if failed:
+                raise EngineError(f"{call[0]}: its worker died each time, killed or out of memory")
+
+
+@lru_cache
+def file_digests() -> dict[Path, str]:
+    """Return a digest of each file of the package, by its path in the package."""
+    package = Path(__file__).parent
+    return {
+        path.relative_to(package): sha256(path.read_bytes()).hexdigest()
+        for path in sorted(package.rglob("*"))
+        if path.is_file() and "__pycache__" not in path.parts
+    }
+
+
+def package_digest() -> str:
+    """Return a digest of all files of the package."""
+    lines = (f"{name.as_posix()} {content}\n" for name, content in file_digests().items())
+    return sha256("".join(lines).encode()).hexdigest()
+
+
+@contextmanager
+def one_thread() -> Iterator[None]:
+    """Make NumPy and compiled kernels use one thread.
+
+    Workers would compete for processors otherwise, and a sum over several threads is rounded
+    differently.
+    """
+    import numba
+    from threadpoolctl import threadpool_limits
+
+    before = numba.get_num_threads()
+    numba.set_num_threads(1)
+    try:
+        with threadpool_limits(1):
+            yield
+    finally:
+        numba.set_num_threads(before)
+
+
+def _call(source: str, function: Callable[..., T], *arguments: object) -> T:
+    """Make a call on a worker, which must have the same source."""
+    if source != package_digest():
+        raise EngineError(_OTHER_VERSION.format("a worker of the cluster"))
+    with one_thread():
+        return function(*arguments)
+
+
+_OTHER_VERSION = "{} has another version of holdfast: install the same version on all machines"
+_NO_HOLDFAST = "{} cannot import this holdfast: install the same version for it and for its workers"
+
+
+def _submit(
+    client: "Client", given: Arguments, calls: Iterable[Call[K]], suspects: list[Call[K]]
+) -> Iterator[tuple[K, Any]]:
+    """Make calls on a cluster; append to `suspects` those whose workers died."""
+    from distributed import KilledWorker
+
+    done: SimpleQueue[Future] = SimpleQueue()
+    waiting: dict[str, tuple[Call[K], Future]] = {}
+    rest = iter(calls)
+    while True:
+        n_free = CALLS_PER_THREAD * max(sum(client.nthreads().values()), 1) - len(waiting)
+        for call in islice(rest, max(n_free, 0)):
+            future = client.submit(_call, *given, *call[1], pure=False)
+            waiting[future.key] = call, future
+            future.add_done_callback(done.put)
+        if not waiting:
+            return
+        call, future = waiting.pop(_next_done(done, client).key)
+        try:
+            result = _result(future)
+        except KilledWorker:
+            suspects.append(call)
+        else:
+            yield call[0], result
+
+
+@contextmanager
+def _client(scheduler: str) -> Iterator["Client"]:
+    """Connect to a scheduler; at the end, drop the calls that are not done."""
+    try:
+        import distributed  # noqa: F401 (fills dask's configuration, so it must be first)
+        from dask import config
+    except ImportError as missing:
+        raise MissingExtra("distributed", "cluster") from missing
+    large = {"distributed.admin.large-graph-warning-threshold": "1GB"}
+    with config.set(large), _connect(scheduler) as client:
+        yield client
+
+
+def _connect(scheduler: str) -> "Client":
+    from asyncio import run, wait_for
+    from concurrent.futures import ThreadPoolExecutor
+    from logging import CRITICAL, getLogger
+
+    from distributed import Client
+
+    getLogger("distributed.client").setLevel(CRITICAL)  # our errors say the same in one line
+    try:
+        with ThreadPoolExecutor(1) as thread:  # the calling thread may have an event loop
+            thread.submit(run, wait_for(_connect_once(scheduler), CONNECT_TIMEOUT)).result()
+        return Client(scheduler, timeout=CONNECT_TIMEOUT, set_as_default=False)
+    except Exception as cause:  # a server of any other kind may answer there
+        raise EngineError(
+            f"no Dask scheduler answers at {scheduler}: start one with `dask scheduler` "
+            "and give the address that it shows, tcp://HOST:8786"
+        ) from cause
+
+
+async def _connect_once(scheduler: str) -> None:
+    """Test the connection: a `Client` that cannot connect leaves threads and delays the exit."""
+    from distributed.comm import connect
+
+    comm = await connect(scheduler)
+    await comm.close()
+
+
+def _check_workers(client: "Client") -> None:
+    """Wait for a worker, and check the version of holdfast of all workers."""
+    from distributed import TimeoutError as NoWorker
+
+    try:
+        client.wait_for_workers(1, timeout=NO_WORKER_TIMEOUT)
+    except NoWorker:
+        raise _without_workers(client) from None
+    expected = package_digest()
+    for address, found in client.run(package_digest, on_error="return").items():
+        if isinstance(found, Exception) and ModuleNotFoundError.__name__ in repr(found):
+            raise EngineError(_NO_HOLDFAST.format(f"the worker at {address}")) from found
+        if not isinstance(found, OSError) and found != expected:  # OSError: it died meanwhile
+            raise EngineError(_OTHER_VERSION.format(f"the worker at {address}"))
+
+
+def _next_done(done: "SimpleQueue[Future]", client: "Client") -> "Future":
+    """Wait for the next future that is done."""
+    while True:
+        with suppress(Empty):
+            return done.get(timeout=NO_WORKER_TIMEOUT)
+        if not client.nthreads():
+            raise _without_workers(client)
+
+
+def _without_workers(client: "Client") -> EngineError:
+    scheduler = client.scheduler.address
+    return EngineError(
+        f"the Dask scheduler at {scheduler} has no workers: "
+        f"start some with `dask worker {scheduler} --nthreads 1`"
+    )
+
+
+def _result(future: "Future") -> Any:  # noqa: ANN401 (any function's)
+    from distributed.client import FutureCancelledError
+
+    try:
+        return future.result()
+    except FutureCancelledError as cause:
+        raise EngineError("the Dask scheduler is gone") from cause
+    except ModuleNotFoundError as cause:
+        if cause.name is None or cause.name.split(".")[0] != "holdfast":
+            raise
+        raise EngineError(_NO_HOLDFAST.format("a worker of the cluster")) from cause
+    except RuntimeError as cause:
+        if "deserialization of the task graph" not in str(cause):
+            raise
+        raise EngineError(_NO_HOLDFAST.format("the Dask scheduler")) from cause

@@ -1,0 +1,119 @@
+"""The verbs that take `--engine` give the same files on a cluster, and refuse a wrong address."""
+
+import json
+
+import msgspec
+import pytest
+
+from holdfast import cluster as cluster_module
+from holdfast.cli import main
+from holdfast.io import save_recording
+from holdfast.synthetic import synthetic_recording
+from holdfast.twin import simulation
+from holdfast.twin.profile import profile
+
+SHORT = msgspec.structs.replace(profile("reference"), idle=(0.2, 0.3), hold=1.0)
+HEADER = "# sensor: anyskin\ntime," + ",".join(f"t{n:02d}_{a}" for n in range(1, 6) for a in "xyz")
+VERBS = {
+    "simulate": ("twin",),
+    "import": ("in", "out"),
+    "train": ("data", "-o", "model.json"),
+    "evaluate": ("builtin:twin", "data"),
+}
+
+
+@pytest.fixture(scope="module")
+def cluster():
+    """The address of a cluster of two threads of this process."""
+    distributed = pytest.importorskip("distributed")
+    with distributed.LocalCluster(
+        n_workers=2, threads_per_worker=1, processes=False, protocol="tcp://", host="127.0.0.1",
+        dashboard_address="127.0.0.1:0", silence_logs=50,
+    ) as running:  # fmt: skip
+        yield running.scheduler_address
+
+
+@pytest.fixture(autouse=True)
+def folder(tmp_path, monkeypatch):
+    """A working folder with recordings and a folder to import."""
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.setattr(simulation, "profile", lambda name: SHORT)
+    for name in ("data", "in"):
+        (tmp_path / name).mkdir()
+    for k in range(2):
+        save_recording(synthetic_recording(f"grasp-{k}", k, ("thumb",)), f"data/grasp-{k}.parquet")
+    for name in "ab":
+        rows = "".join(f"{k / 100},{','.join(str(k + c) for c in range(15))}\n" for k in range(40))
+        (tmp_path / "in" / f"{name}.csv").write_text(f"{HEADER}\n{rows}")
+    return tmp_path
+
+
+def run(capsys, *words):
+    code = main(list(map(str, words)))
+    out, err = capsys.readouterr()
+    assert code == 0, err
+    return json.loads(out)
+
+
+def contents(folder):
+    return {path.name: path.read_bytes() for path in folder.iterdir()}
+
+
+@pytest.mark.parametrize("verb", VERBS)
+def test_no_scheduler_at_the_address(capsys, monkeypatch, folder, verb):
+    monkeypatch.setattr(cluster_module, "CONNECT_TIMEOUT", 0.5)
+    before = sorted(folder.iterdir())
+    assert main([verb, *VERBS[verb], "--engine", "dask:tcp://127.0.0.1:1"]) == 2
+    out, err = capsys.readouterr()
+    assert (out, err.count("\n")) == ("", 1)
+    assert err.startswith("holdfast: no Dask scheduler answers at tcp://127.0.0.1:1: start one")
+    assert sorted(folder.iterdir()) == before
+
+
+@pytest.mark.parametrize("verb", VERBS)
+def test_unknown_engines(capsys, verb):
+    assert main([verb, *VERBS[verb], "--engine", "spark:x"]) == 2
+    assert "unknown engine 'spark:x'; there are loky and dask" in capsys.readouterr().err
+
+
+def test_simulate(capsys, cluster, folder):
+    words = ("--objects", "flask", "--cases", 1, "--repeats", 1, "--json")
+    alone = run(capsys, "simulate", "alone", *words, "--jobs", 1)
+    there = run(capsys, "simulate", "there", *words, "--engine", f"dask:{cluster}")
+    assert there["recordings"] == alone["recordings"]
+    assert contents(folder / "there") == contents(folder / "alone")
+
+
+def test_import(capsys, cluster, folder):
+    alone = run(capsys, "import", "in", "alone", "--json")
+    there = run(capsys, "import", "in", "there", "--engine", f"dask:{cluster}", "--json")
+    assert [each["name"] for each in there["recordings"]] == ["a", "b"]
+    assert there["recordings"][0]["path"] == "there/a.parquet"
+    assert there["n_samples"] == alone["n_samples"] == 80
+    assert contents(folder / "there") == contents(folder / "alone")
+
+
+def test_train_and_evaluate(capsys, cluster, folder):
+    words = ("train", "data", "--trials", 0, "--json")
+    alone = run(capsys, *words, "-o", "alone.json")
+    there = run(capsys, *words, "-o", "there.json", "--engine", f"dask:{cluster}")
+    assert (folder / "there.json").read_bytes() == (folder / "alone.json").read_bytes()
+    assert there["cross_validation"] == alone["cross_validation"]
+    assert not (folder / "there.json.search").exists()
+    words = ("evaluate", "there.json", "data", "--json")
+    assert run(capsys, *words, "--engine", f"dask:{cluster}") == run(capsys, *words)
+
+
+def test_a_search_on_a_cluster_is_not_resumed(capsys, cluster):
+    words = ("train", "data", "-o", "model.json", "--resume", "--engine", f"dask:{cluster}")
+    assert main(list(words)) == 2
+    assert "--resume is for --engine loky" in capsys.readouterr().err
+
+
+def test_a_folder_that_the_workers_do_not_share(capsys, cluster, monkeypatch):
+    from holdfast.cli import simulate
+
+    monkeypatch.setattr(simulate, "simulate_grasp", lambda grasp, out, force: [grasp.name])
+    words = ("--objects", "flask", "--cases", "1", "--repeats", "1", "--engine", f"dask:{cluster}")
+    assert main(["simulate", "there", *words]) == 2
+    assert "flask-case1-1.parquet, but it is not on this machine" in capsys.readouterr().err
