@@ -1,6 +1,6 @@
 """Evaluation of models: the decisions of a model beside the labels, and their metrics."""
 
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -13,6 +13,7 @@ from holdfast.metrics import (
     Metrics,
     RecordingResults,
     score_recording,
+    summarise,
     summarise_results,
 )
 from holdfast.metrics.decisions import hand_decisions
@@ -86,7 +87,7 @@ class Evaluation:
 
 def evaluate(
     model: Model,
-    recordings: Sequence[Recording],
+    recordings: Iterable[Recording],
     seed: int = 0,
     engine: Engine = Engine(),  # noqa: B008 (a tuple: it cannot change)
 ) -> Metrics:
@@ -94,7 +95,7 @@ def evaluate(
 
     Args:
         model: to evaluate.
-        recordings: labelled.
+        recordings: labelled; of an iterator, they are evaluated in this process.
         seed: of the bootstrap.
         engine: that reads the recordings. On a cluster, all machines need the recordings at the
             same paths.
@@ -103,7 +104,9 @@ def evaluate(
         ModelError: a recording has other fingers or sensors.
         EngineError: the engine cannot be used.
     """
-    return evaluate_recordings(model, recordings, seed, engine).metrics
+    if isinstance(recordings, Sequence):
+        return evaluate_recordings(model, recordings, seed, engine).metrics
+    return summarise((compute_decisions(model, recording) for recording in recordings), seed=seed)
 
 
 def evaluate_recordings(
