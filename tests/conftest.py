@@ -5,6 +5,7 @@ import os
 import re
 import shutil
 import signal
+from contextlib import suppress
 from pathlib import Path
 
 import hypothesis
@@ -96,8 +97,9 @@ def pytest_sessionstart(session):
     for folder in package.rglob("__pycache__"):
         for cache in folder.glob("*.nb[ci]"):
             source = folder.parent / f"{cache.name.split('.')[0]}.py"
-            if cache.stat().st_mtime < newest(source):
-                cache.unlink(missing_ok=True)
+            with suppress(FileNotFoundError):  # another run of the tests deletes them too
+                if cache.stat().st_mtime < newest(source):
+                    cache.unlink()
 
 
 @functools.cache

@@ -34,6 +34,21 @@ def test_the_page_is_what_the_template_gives():
     )
 
 
+def test_the_readme_quotes_the_published_run():
+    laws = json.loads((PUBLISHED / "trial.json").read_text("utf-8"))["laws"]
+    ours, fixed = laws["holdfast"], laws["fixed"]
+    readme = (ROOT / "README.md").read_text("utf-8")
+    assert (
+        f"On {ours['n']} trials of the twin it dropped {ours['dropped']['value']:.1f} % of the "
+        f"objects, a grip of fixed force {fixed['dropped']['value']:.1f} %, with "
+        f"{ours['force_ratio_mean']['value']:.1f} times the least force"
+    ) in readme
+    rivals = [laws[name] for name in ("pr2", "wong-zhu", "friction-margin")]
+    force = ours["force_ratio_mean"]["value"]
+    assert all(one["force_ratio_mean"]["value"] > force for one in rivals)
+    assert sum(one["dropped"]["value"] < ours["dropped"]["value"] for one in rivals) == 1
+
+
 def test_the_links_of_the_page_exist():
     for target in script.render(PUBLISHED).split("](")[1:]:
         assert (ROOT / "docs" / target.split(")")[0].split("#")[0]).exists(), target
