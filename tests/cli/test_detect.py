@@ -278,7 +278,11 @@ def test_refusals(capsys, model, grasp, save, tmp_path):
         f"{tmp_path} is a folder; a recording's file expected"
     )
     assert refusal(capsys, missing, grasp) == (
-        f"cannot read the model {missing}: No such file or directory"
+        f"{missing} is a source; MODEL SOURCE expected, such as builtin:any {missing}"
+    )
+    no_model = tmp_path / "none.json"
+    assert refusal(capsys, no_model, grasp) == (
+        f"cannot read the model {no_model}: No such file or directory"
     )
     assert refusal(capsys, "builtin:best", grasp) == (
         "unknown model 'builtin:best'; built in are builtin:any, builtin:twin, builtin:noise-floor"

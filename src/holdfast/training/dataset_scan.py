@@ -1,8 +1,8 @@
 """Scan of a dataset before training: names, sensors, labels, and checks that they agree."""
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -15,6 +15,33 @@ RELATIVE_SAMPLE_RATE = 20.0
 """Approximate number of samples per second that train a model of any rate [Hz].
 
 So a fast sensor counts no more than a slow one. Neighbouring samples are nearly copies."""
+
+
+class OneRecording(Sequence[Recording]):
+    """One recording of a dataset, which is read when it is accessed.
+
+    Another process gets a slice of the dataset, so that it reads the recording itself.
+
+    Args:
+        recordings: a dataset, or any sequence; one without slices stays in this process.
+        place: index of the recording.
+    """
+
+    def __init__(self, recordings: Sequence[Recording], place: int) -> None:
+        self._recordings, self._place = recordings, place
+
+    def __len__(self) -> int:
+        return 1
+
+    def __getitem__(self, index: Any) -> Any:  # noqa: ANN401 (an index, or a slice)
+        return self._recordings[range(self._place, self._place + 1)[index]]
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        return _unchanged, (self._recordings[self._place : self._place + 1],)
+
+
+def _unchanged(part: Sequence[Recording]) -> Sequence[Recording]:
+    return part
 
 
 @dataclass(frozen=True)

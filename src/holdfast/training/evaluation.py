@@ -21,6 +21,7 @@ from holdfast.metrics.truth_labels import LabelRule, labels_by_truth
 from holdfast.model import Model
 from holdfast.parallel import Engine
 from holdfast.recordings import Recording, label_states
+from holdfast.training.dataset_scan import OneRecording
 from holdfast.training.progress import Progress, show_nothing
 from holdfast.training.splits import Integers
 from holdfast.training.verdict import LoadedTares
@@ -132,7 +133,7 @@ def evaluate_recordings(
         ModelError: a recording has other fingers or sensors.
         EngineError: the engine cannot be used.
     """
-    parts = ((recordings[place : place + 1],) for place in range(len(recordings)))
+    parts = ((OneRecording(recordings, place),) for place in range(len(recordings)))
     trained_on: list[str] = []
     tares: list[bool] = []
     kept: list[Decisions] = []

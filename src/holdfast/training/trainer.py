@@ -18,7 +18,12 @@ from holdfast.model import ANY_FINGER, Model
 from holdfast.parallel import Engine
 from holdfast.recordings import Recording
 from holdfast.training.adaptation import choose_adaptation
-from holdfast.training.dataset_scan import RecordingScan, combine_scans, scan_recording
+from holdfast.training.dataset_scan import (
+    OneRecording,
+    RecordingScan,
+    combine_scans,
+    scan_recording,
+)
 from holdfast.training.evaluation import combine_decisions, judge
 from holdfast.training.model_fit import TrainingData, fit_full_model, fit_model
 from holdfast.training.progress import Progress, show_nothing
@@ -130,7 +135,7 @@ class _Trainer:
         self.journal = journal if engine.scheduler is None else None
         self.n_loaded = 0
         self.warn, self.progress, self.engine = warn, progress, engine
-        parts = ((recordings[place : place + 1],) for place in range(len(recordings)))
+        parts = ((OneRecording(recordings, place),) for place in range(len(recordings)))
         scans = engine.map_ordered(_scan_part, parts, shared=(setting.relative,))
         read = progress(scans, "reading", len(recordings))
         self.scan = combine_scans(read, setting.rate, relative=setting.relative)
@@ -248,7 +253,7 @@ class _Trainer:
         used = list(models) if scanned.n_labelled else []
         if used and self.data_split.split not in ("time", "random"):
             used = [models[self.data_split.group_of[place] % len(models)]]
-        return place, scanned.name, self.recordings[place : place + 1], used
+        return place, scanned.name, OneRecording(self.recordings, place), used
 
     def _results(
         self, evaluated: Iterator[tuple[RecordingResults, bool]]

@@ -19,7 +19,7 @@ from holdfast.parallel import Engine
 from holdfast.recordings import Recording, Tactile, label_states
 from holdfast.resampling import resample
 from holdfast.sensors import Sensor
-from holdfast.training.dataset_scan import DatasetScan
+from holdfast.training.dataset_scan import DatasetScan, OneRecording
 from holdfast.training.progress import Progress, show_nothing
 from holdfast.training.setting import Setting
 from holdfast.training.splits import DataSplit, Integers
@@ -175,7 +175,7 @@ def _read(
     Other processes read a recording twice if samples are left out: first these numbers.
     """
     n_seen = Counter[str]()
-    parts = [(place, recordings[place : place + 1]) for place in plan.places]
+    parts = [(place, OneRecording(recordings, place)) for place in plan.places]
     counts: Iterator[Mapping[str, int]] | None = None
     if plan.step > 1 and not engine.in_this_process:
         counts = iter(list(engine.map_ordered(_count_usable, parts, shared=(plan,))))

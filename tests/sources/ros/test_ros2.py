@@ -160,7 +160,9 @@ def test_a_publisher_without_messages(domain, monkeypatch):
     del write
 
 
-def test_a_configuration_of_dds_that_is_none(domain, monkeypatch):
+def test_a_configuration_of_dds_that_is_none(monkeypatch):
+    domain = 97  # DDS reads its configuration when the first node of the process joins a domain
+    monkeypatch.setenv("ROS_DOMAIN_ID", str(domain))
     monkeypatch.setenv("CYCLONEDDS_URI", "<CycloneDDS><Domain><Nonsense/></Domain></CycloneDDS>")
     with pytest.raises(SourceError, match=f"^ROS domain {domain} cannot be joined: "):
         open_source("ros2:///a").open()
