@@ -3,9 +3,10 @@
 Four rules, each without units, so that they carry over between counts and newtons:
 
 1. Load. While a contact is not calm, each finger keeps the ratio of tangential to normal force
-   T/N that it had in the calm grip before: where the tangential force grows, the finger presses
-   more, before anything slips. People do the same (R. S. Johansson and G. Westling, Exp. Brain
-   Res. 56 (1984) 550-564: grip and load force rise in parallel).
+   T/N that it had in the calm grip before: where T grows, the finger presses more, before
+   anything slips. Only a growth of T counts: a fall of N that the law itself commands raises T/N
+   too. People do the same (R. S. Johansson and G. Westling, Exp. Brain Res. 56 (1984) 550-564:
+   grip and load force rise in parallel).
 2. Reaction. If the probability of stability of a finger falls below the threshold, all forces rise
    in one step. The step of a finger grows with its lack of probability and with sigma over its
    normal force; fingers that are stable take `support` of the largest step. A step shakes all
@@ -36,7 +37,10 @@ LEAST_SHARE = 0.15
 SMOOTHING = 0.02
 """Time constant of the tangential and normal forces [s]."""
 FOLLOW_TIME = 1.0
-"""Time constant with which the ratio T/N of the calm grip is followed [s]."""
+"""Time constant with which the forces of the calm grip are followed [s]."""
+LEAST_TANGENTIAL = 0.1
+"""Least tangential force that counts as that of the calm grip, as a share of the normal force of
+the start."""
 DEADBAND = 0.05
 """Least relative rise of force that the load asks for."""
 LARGEST_SHAKING = 0.25
@@ -47,21 +51,29 @@ NEVER = -math.inf
 class _Finger:
     """What the law remembers of a finger."""
 
-    __slots__ = ("counts", "load", "press", "probability", "ratio", "start", "target")
+    __slots__ = (
+        *("calm_load", "calm_scale", "counts", "least", "load"),
+        *("press", "probability", "ratio", "start", "target"),
+    )
 
     def __init__(self, touch: Touch, counts: bool) -> None:
         self.counts = counts
+        self.least = LEAST_TANGENTIAL * touch.start_normal
         self.start = touch.start_normal
-        self.load, self.press = touch.tangential, touch.normal
+        self.load = self.calm_load = touch.tangential
+        self.press = touch.normal
         self.ratio = self.load / self.press if self.press > 0 else 0.0
+        self.calm_scale = touch.scale
         self.probability = 1.0
         self.target = 0.0
 
     def needed(self) -> float:
-        """Return the scale at which T/N is that of the calm grip; 0 if that is not known."""
-        if not (self.counts and self.ratio > 0):
+        """Return the scale that the growth of T since the calm grip needs; 0 if not known."""
+        calm_load = max(self.calm_load, self.least)
+        if not (self.counts and self.ratio > 0 and calm_load > 0):
             return 0.0
-        return self.load / (self.ratio * self.start)
+        by_growth = self.calm_scale * self.load / calm_load
+        return min(by_growth, self.load / (self.ratio * self.start))
 
 
 class Stability(Law):
@@ -165,10 +177,12 @@ class Stability(Law):
         return lowest, second if self._n_counting > 1 else lowest
 
     def _follow(self, touches: Sequence[Touch], time: float, share: float) -> None:
-        """Follow the ratio T/N of the calm grip, and end the episode."""
-        for finger in self._fingers:
+        """Follow the calm grip, and end the episode."""
+        for finger, touch in zip(self._fingers, touches, strict=True):
+            finger.calm_load += share * (finger.load - finger.calm_load)
             if finger.press > 0:
                 finger.ratio += share * (finger.load / finger.press - finger.ratio)
+            finger.calm_scale = touch.scale
         if time - self._stepped_at > self.episode_time:
             self._base = _highest(touches)
 
@@ -222,6 +236,8 @@ class Stability(Law):
                 return needed, GripReason.LOAD
         if not touch.known or time - self._unsettled_at <= self.settle_time:
             return scale, _NONE
+        finger.calm_load += min(dt / FOLLOW_TIME, 1.0) * (finger.load - finger.calm_load)
+        finger.calm_scale = scale  # the load grows from here on: a fall is no growth
         sure = min((lowest - self.settled) / self.settled, 1.0)
         return min(scale, max(scale * (1.0 - self.fall * sure * dt), self._floor, 1.0)), _RELAX
 
