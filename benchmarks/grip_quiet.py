@@ -4,7 +4,7 @@ The trials are those of `holdfast trial`, with the load moved to the end of a lo
 profile of the trials the hand's own controller jerks a finger 7 times a minute; a reaction to
 such a glitch counts here, unless a fingertip slid in the 0.3 s before it.
 
-    python benchmarks/grip_quiet.py [--n 36] [--hold 15] [--seed 2]
+    python benchmarks/grip_quiet.py [--n 36] [--hold 15] [--seed 2] [--laws holdfast]
 """
 
 import argparse
@@ -36,9 +36,10 @@ if __name__ == "__main__":
     parser.add_argument("--n", type=int, default=36, help="number of holds")
     parser.add_argument("--hold", type=float, default=15.0, help="duration of a hold [s]")
     parser.add_argument("--seed", type=int, default=2)
+    parser.add_argument("--laws", nargs="+", choices=LAWS, default=list(LAWS))
     given = parser.parse_args()
     drawn = draw_trials(given.n, given.seed)
     print(f"{'law':16}{'no glitches':>20}{'7 a minute':>20}   false reactions a minute")
-    for name in LAWS:
+    for name in given.laws:
         cells = [rate(name, [quiet(one, given.hold, r) for one in drawn]) for r in (0.0, None)]
         print(f"{name:16}{cells[0]:>20}{cells[1]:>20}", flush=True)

@@ -243,6 +243,8 @@ class Stability(Law):
 
     def _balance(self, touches: Sequence[Touch], wishes: list[Wish]) -> list[Wish]:
         own = [scale for scale, _ in wishes]
+        if min(own) == max(own):
+            return wishes  # a grip that is only scaled stays balanced
         scales = balanced(own, self._forces, self._thumb)
         for k, scale in enumerate(scales):
             if scale > own[k]:
