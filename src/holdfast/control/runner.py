@@ -1,6 +1,5 @@
 """Step a grip loop with every estimate of a source, and while nothing arrives."""
 
-import math
 import time
 from collections import deque
 from collections.abc import Callable
@@ -43,7 +42,6 @@ class LoopRunner:
         self._requests: deque[tuple[Callable[[], None], Future[None]]] = deque()
         self._estimate: HandEstimate | None = None
         self._received = 0.0
-        self._now = -math.inf
 
     def put(self, update: StreamUpdate) -> None:
         """Append an update to the queue; a listener of a session."""
@@ -94,7 +92,7 @@ class LoopRunner:
         estimates = [] if update is None else update.estimates
         for one in estimates:
             self._estimate, self._received = one.estimate, time.monotonic()
-            self._step_at(one.estimate, one.estimate.time)
+            self._on_command(self.loop.step(one.estimate, one.estimate.time))
         if estimates:
             return
         if self._estimate is None:
@@ -102,12 +100,8 @@ class LoopRunner:
                 self._on_command(self.loop.step(NO_DATA, NO_DATA.time))
         elif self._speed:
             elapsed = self._speed * (time.monotonic() - self._received)
-            self._step_at(self._estimate, self._estimate.time + elapsed)
-
-    def _step_at(self, estimate: HandEstimate, now: float) -> None:
-        """Step with a time that never goes back: a sample may be late by more than a tick."""
-        self._now = max(self._now, now)
-        self._on_command(self.loop.step(estimate, self._now))
+            now = self._estimate.time + elapsed
+            self._on_command(self.loop.step(self._estimate, now))
 
     def _request(self, work: Callable[[], None]) -> "Future[None]":
         """Run `work` before the next step, and step at once."""

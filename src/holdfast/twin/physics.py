@@ -25,7 +25,7 @@ from holdfast.twin.hand import HandArrays, HandModel, apply_forces, fill_bodies
 from holdfast.twin.operator import MOVE, hold_wrench, move_wrench, push_wrench
 
 
-class Engine(NamedTuple):
+class HalfSteps(NamedTuple):
     """Addresses of MuJoCo's half steps, of a model and of its state.
 
     Attributes:
@@ -100,12 +100,12 @@ class Wrenches(NamedTuple):
     total: Array
 
 
-def engine_of(hand: HandModel) -> Engine:
+def engine_of(hand: HandModel) -> HalfSteps:
     """Return the addresses with which compiled code steps a model."""
     # The extension module finds the library that it was linked to, except on Windows.
     windows = Path(mujoco.__file__).with_name("mujoco.dll")
     library = ctypes.CDLL(str(windows) if sys.platform == "win32" else _functions.__file__)
-    return Engine(
+    return HalfSteps(
         _address(library.mj_step1),
         _address(library.mj_step2),
         hand.model._address,
@@ -140,7 +140,7 @@ _call = cast("Callable[[int, int, int], None]", intrinsic(_declare_call))
 
 @compiled
 def advance_sample(
-    engine: Engine,
+    engine: HalfSteps,
     steps: Steps,
     arrays: HandArrays,
     contact: Contact,

@@ -14,7 +14,7 @@ from holdfast.control.trial.figures import (
 from holdfast.control.trial.summary import Summary
 from holdfast.control.trial.tables import (
     NUMBERS,
-    Column,
+    LawColumn,
     fingers_table,
     kinds_table,
     laws_table,
@@ -147,7 +147,7 @@ def _within(value: float | None, goal: float) -> bool:
     return value is not None and value <= goal
 
 
-def _text(row: Summary, column: Column) -> str:
+def _text(row: Summary, column: LawColumn) -> str:
     """Return a number with its interval."""
     number = row[column.field]
     if number["value"] is None:

@@ -11,7 +11,7 @@ By = Mapping[str, Summary]
 """Summaries or comparisons by law."""
 
 
-class Column(NamedTuple):
+class LawColumn(NamedTuple):
     """Column of a table of laws.
 
     Attributes:
@@ -30,22 +30,22 @@ class Column(NamedTuple):
 
 
 NUMBERS = (
-    Column("dropped [%]", "dropped"),
-    Column("slip [mm]", "slip_median", 1e3, 2, "n"),
-    Column("reaction [ms]", "reaction_median", 1e3, 0, "n_slipped"),
-    Column("force / least", "force_ratio_mean", digits=2),
-    Column("peak / least peak", "peak_ratio_mean", digits=2),
-    Column("false reactions per minute", "false_reactions_per_minute"),
+    LawColumn("dropped [%]", "dropped"),
+    LawColumn("slip [mm]", "slip_median", 1e3, 2, "n"),
+    LawColumn("reaction [ms]", "reaction_median", 1e3, 0, "n_slipped"),
+    LawColumn("force / least", "force_ratio_mean", digits=2),
+    LawColumn("peak / least peak", "peak_ratio_mean", digits=2),
+    LawColumn("false reactions per minute", "false_reactions_per_minute"),
 )
 """Numbers of a law."""
 DIFFERENCES = (
-    Column("dropped [points]", "dropped"),
-    Column("slid less in [%]", "slid_less", digits=0),
-    Column("slid more in [%]", "slid_more", digits=0),
-    Column("reacted sooner in [%]", "reacted_sooner", digits=0),
-    Column("reacted later in [%]", "reacted_later", digits=0),
-    Column("force / least", "force_ratio_mean", digits=2),
-    Column("false reactions per minute", "false_reactions_per_minute"),
+    LawColumn("dropped [points]", "dropped"),
+    LawColumn("slid less in [%]", "slid_less", digits=0),
+    LawColumn("slid more in [%]", "slid_more", digits=0),
+    LawColumn("reacted sooner in [%]", "reacted_sooner", digits=0),
+    LawColumn("reacted later in [%]", "reacted_later", digits=0),
+    LawColumn("force / least", "force_ratio_mean", digits=2),
+    LawColumn("false reactions per minute", "false_reactions_per_minute"),
 )
 """Paired differences of a law to another."""
 SHORT = NUMBERS[:4]
@@ -120,21 +120,23 @@ def _table(name: str, title: str, note: str, rows: Iterator[Row], *lines: str) -
     )  # fmt: skip
 
 
-def _rows_of_parts(parts: Mapping[str, By], key: str, columns: tuple[Column, ...]) -> Iterator[Row]:
+def _rows_of_parts(
+    parts: Mapping[str, By], key: str, columns: tuple[LawColumn, ...]
+) -> Iterator[Row]:
     for part, by_law in parts.items():
         if any(summary["n"] for summary in by_law.values()):
             yield from _rows(by_law, columns, {key: part})
 
 
 def _rows(
-    by_law: By, columns: tuple[Column, ...], keys: Mapping[str, Key] | None = None
+    by_law: By, columns: tuple[LawColumn, ...], keys: Mapping[str, Key] | None = None
 ) -> Iterator[Row]:
     for law, summary in by_law.items():
         for column in columns:
             yield _row({**(keys or {}), "law": law, "figure": column.head}, summary, column)
 
 
-def _row(keys: dict[str, Key], summary: Summary, column: Column) -> Row:
+def _row(keys: dict[str, Key], summary: Summary, column: LawColumn) -> Row:
     number = summary[column.field]
     missing = math.inf if column.n_field and summary[column.n_field] else None
     value, interval = number["value"], number["interval"]
@@ -144,5 +146,5 @@ def _row(keys: dict[str, Key], summary: Summary, column: Column) -> Row:
     return Row(keys, _scaled(value, column, missing), None, summary["n"], ends)
 
 
-def _scaled(value: float | None, column: Column, missing: float | None) -> float | None:
+def _scaled(value: float | None, column: LawColumn, missing: float | None) -> float | None:
     return missing if value is None else column.factor * value

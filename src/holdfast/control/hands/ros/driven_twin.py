@@ -3,7 +3,7 @@
 import numpy as np
 
 from holdfast.control.command import FingerCommand, GripCommand, LoopState
-from holdfast.control.hands.ros.joint_hand import JointHand, Output
+from holdfast.control.hands.ros.joint_hand import JointHand, JointOutput
 from holdfast.control.hands.ros.joints import JOINTS_PER_FINGER, N_JOINTS
 from holdfast.control.hands.ros.kinds import ros_hand
 from holdfast.control.live_twin import LiveTwin
@@ -39,7 +39,7 @@ class DrivenTwin(LiveTwin):
     def __init__(self, uri: str, hand: str, *, speed: float = 1.0) -> None:
         super().__init__(uri, speed=speed)
         driven = ros_hand(hand, standby=True) if hand.startswith("ros2:") else None
-        if not isinstance(driven, JointHand) or driven.setup.output is not Output.LARGEST:
+        if not isinstance(driven, JointHand) or driven.setup.output is not JointOutput.LARGEST:
             raise ValueError(f"ros2:plexus?effort=0.1&max_effort=0.3 expected, {hand} given")
         self._setup = driven.setup
         self.topic = driven.setup.topic

@@ -20,7 +20,7 @@ SLACK = 1e-9
 """Rounding by which a torque may exceed its ceiling, as a share of it."""
 
 
-class Output(StrEnum):
+class JointOutput(StrEnum):
     """What a driver takes for each joint.
 
     TORQUES: the torque. LARGEST: the largest torque of its position control. POSITIONS: the
@@ -51,7 +51,7 @@ class JointSetup:
         home_topic: topic for this pose; None if it is the topic of the commands.
     """
 
-    output: Output
+    output: JointOutput
     topic: str
     message: str
     order: JointOrder
@@ -164,9 +164,9 @@ class JointHand(RosHand):
 
     def _message(self, time: float, torques: Array, grip: JointGrip) -> Mapping[str, Any]:
         setup = self.setup
-        if setup.output is Output.TORQUES:
+        if setup.output is JointOutput.TORQUES:
             return self._values(time, efforts=torques)
-        if setup.output is Output.LARGEST:
+        if setup.output is JointOutput.LARGEST:
             return self._values(time, efforts=np.abs(torques))
         targets = grip.positions + torques / setup.stiffness
         return self._values(time, positions=np.clip(targets, setup.lowest, setup.highest))

@@ -7,7 +7,7 @@ import numpy as np
 
 from holdfast.control.hands.base import Hand
 from holdfast.control.hands.ros import joints
-from holdfast.control.hands.ros.joint_hand import JointHand, JointSetup, Output
+from holdfast.control.hands.ros.joint_hand import JointHand, JointOutput, JointSetup
 from holdfast.control.hands.ros.joints import (
     N_JOINTS,
     THUMB_FIRST,
@@ -50,7 +50,7 @@ class JointKind:
         release: ways to open it, the default first.
     """
 
-    output: Output
+    output: JointOutput
     namespace: str
     topic: str
     message: str
@@ -71,7 +71,7 @@ class JointKind:
     @property
     def parameters(self) -> tuple[str, ...]:
         """Names of its parameters."""
-        stiffness = ("stiffness",) if self.output is Output.POSITIONS else ()
+        stiffness = ("stiffness",) if self.output is JointOutput.POSITIONS else ()
         return ("namespace", "states", "order", "prefix", "effort", "max_effort", *stiffness,
                 "release", "home")  # fmt: skip
 
@@ -82,9 +82,9 @@ class JointKind:
             return None if values is None else order.values(values)
 
         namespace = given.topic("namespace", self.namespace)
-        positions = self.output is Output.POSITIONS
+        positions = self.output is JointOutput.POSITIONS
         # Measured torques would take the ceiling away from joints that carry little now.
-        largest = self.output is Output.LARGEST
+        largest = self.output is JointOutput.LARGEST
         torques = None
         if given.has("effort") or largest:
             torques = given.joints("effort", each=not largest)
@@ -168,17 +168,17 @@ Kind = JointKind | EnvelopKind | GripperKind
 KINDS: dict[str, dict[str, Kind]] = {
     "ros2": {
         "plexus": JointKind(
-            Output.LARGEST, "/allegro_hand_position_effort_controller", "efforts", FLOATS,
+            JointOutput.LARGEST, "/allegro_hand_position_effort_controller", "efforts", FLOATS,
             "/joint_states", THUMB_FIRST, "ah_joint", home_topic="commands",
             release=("limp", "home"),
         ),
         "v4": JointKind(
-            Output.POSITIONS, "/allegro_hand_position_controller", "commands", FLOATS,
+            JointOutput.POSITIONS, "/allegro_hand_position_controller", "commands", FLOATS,
             "/joint_states", THUMB_FIRST, "ah_joint",
             max_torque=joints.V4_MAX_TORQUE, stiffness=joints.ROS2_STIFFNESS, home=joints.V4_HOME,
         ),
         "v5": JointKind(
-            Output.POSITIONS, "/allegroHand", "joint_cmd", JOINT_STATE,
+            JointOutput.POSITIONS, "/allegroHand", "joint_cmd", JOINT_STATE,
             "/allegroHand/joint_states", THUMB_LAST, "joint_",
         ),
         "v5-envelop": EnvelopKind("/allegroHand", "/allegroHand_0"),
@@ -186,12 +186,12 @@ KINDS: dict[str, dict[str, Kind]] = {
     },
     "ros1": {
         "positions": JointKind(
-            Output.POSITIONS, "/allegroHand", "joint_cmd", JOINT_STATE,
+            JointOutput.POSITIONS, "/allegroHand", "joint_cmd", JOINT_STATE,
             "/allegroHand/joint_states", THUMB_LAST, "joint_",
             max_torque=joints.V4_MAX_TORQUE, stiffness=joints.ROS1_STIFFNESS, home=joints.V4_HOME,
         ),
         "efforts": JointKind(
-            Output.TORQUES, "/allegroHand", "torque_cmd", JOINT_STATE,
+            JointOutput.TORQUES, "/allegroHand", "torque_cmd", JOINT_STATE,
             "/allegroHand/joint_states", THUMB_LAST, "joint_",
             max_torque=joints.V4_MAX_TORQUE, release=("limp",),
         ),
