@@ -21,12 +21,19 @@ class Taxel:
     def __init__(self, share):
         self.share = share
         self.changed = []
+        self.longest = 0  # samples without a change, but not by a fault
         self.steps = []  # (number, squared change, squared change of the change)
         self.step = np.zeros(3)
 
-    def watch(self, before, now, number, fresh):
+    def watch(self, before, now, number, fresh, n_before, long):
         change = now - before
+        self.zero = not now.any()
         if change.any():
+            still = self.still(number) - 1
+            if not self.changed:
+                self.longest = n_before - 1
+            elif len(self.changed) < 10 or still < max(long, 10 * (self.longest + 1)):
+                self.longest = max(self.longest, still)
             if self.still(number) * self.share > 1:
                 self.step = np.zeros(3)
             self.changed.append(number)
@@ -46,8 +53,13 @@ class Taxel:
     def still(self, number):
         return number - (self.changed[-1] if self.changed else 0)
 
-    def busy(self, share):
-        return bool(self.changed) and len(self.changed) > share * self.changed[-1]
+    def busy(self):
+        return bool(self.changed) and len(self.changed) > 0.5 * self.changed[-1]
+
+    def suspect(self, number, period):
+        if len(self.changed) < 10:
+            return self.still(number) >= 2 / period
+        return self.still(number) >= max(0.5 / period, 10 * (self.longest + 1))
 
 
 class Finger:
@@ -68,7 +80,7 @@ class Finger:
         self.stretch = []  # forces since the last interruption
         self.last = None
         self.gapped = False
-        self.frozen = self.changes = self.pulling = 0
+        self.frozen = self.changes = self.pulling = self.longest_rest = 0
         self.largest = 0.0
         self.noise = NAN
         self.baseline = None
@@ -107,6 +119,8 @@ class Finger:
             return self.refuse("out_of_range", (readings < low) | (readings > high))
         if self.samples:
             changed = (self.samples[-1][1] != readings).any()
+            if changed and self.frozen >= 0.5 / self.period and not self.is_stuck():
+                self.longest_rest = max(self.longest_rest, self.frozen)
             self.changes += bool(changed)
             self.frozen = 0 if changed else self.frozen + 1
             if changed:
@@ -144,26 +158,34 @@ class Finger:
     def watch_taxels(self, before, now, fresh):
         self.n_news += 1
         for i, taxel in self.taxels.items():
-            taxel.watch(before[i], now[i], self.n_news, fresh)
+            taxel.watch(before[i], now[i], self.n_news, fresh, len(self.samples), 0.5 / self.period)
         low, high = self.sensor.limits or (-math.inf, math.inf)
-        dead, stuck, moving = set(), set(), 0
-        long = 0.5 / self.period
-        for i, taxel in self.taxels.items():
-            still = taxel.still(self.n_news)
-            if 2 * still < long:
-                moving += taxel.busy(0.5)
-            elif not taxel.changed and still >= 2 / self.period:
+        suspects = {
+            i for i, taxel in self.taxels.items() if taxel.suspect(self.n_news, self.period)
+        }
+        silent = {i for i, taxel in self.taxels.items() if not taxel.changed and taxel.zero}
+        live = [self.taxels[i] for i in self.taxels if i not in suspects | silent]
+        moving = [taxel for taxel in live if self.moves(taxel)]
+        dead, stuck = set(), set()
+        if not moving or len(moving) < 0.8 * len(live):
+            suspects = set()
+        for i in suspects:
+            taxel = self.taxels[i]
+            least = 10 * (max(other.longest for other in moving) + 1)
+            if taxel.zero or (len(taxel.changed) < 10 and taxel.still(self.n_news) < least):
+                continue
+            if not taxel.changed:
                 dead.add(i)
-            elif ((now[i] <= low) | (now[i] >= high)).any():
-                continue  # saturated
-            elif still >= long and len(taxel.changed) >= long and taxel.busy(0.9):
+            elif not ((now[i] <= low) | (now[i] >= high)).any():
                 stuck.add(i)
-        if moving < 0.8 * len(self.used):
-            dead, stuck = set(), set()
         noisy = self.noisy()
         named = {"dead": dead, "stuck": stuck, "noisy": noisy}
         self.wrong = {fault for fault, taxels in named.items() if taxels}
         self.wrong_taxels = {i for i in dead | stuck | noisy if i < 63}
+
+    def moves(self, taxel):
+        long = 0.5 / self.period
+        return 2 * taxel.still(self.n_news) < long and taxel.busy() and taxel.longest < long
 
     def noisy(self):
         if len(self.used) < 4:
@@ -200,17 +222,20 @@ class Finger:
         return self.baseline is not None
 
     def find_faults(self, readings):
-        half_a_second = 0.5 / self.period
         faults, taxels = set(self.wrong), set(self.wrong_taxels)
-        transitions = len(self.samples) - 1 - self.frozen
-        lively = 2 * self.changes > transitions and self.changes >= half_a_second
-        if lively and self.frozen >= half_a_second:
+        if self.is_stuck():
             faults.add("stuck")
         low, high = self.sensor.limits or (-math.inf, math.inf)
         at_limit = {i for i in self.used if ((readings[i] <= low) | (readings[i] >= high)).any()}
         if at_limit:
             faults.add("saturated")
         return faults, taxels | {i for i in at_limit if i < 63}
+
+    def is_stuck(self):
+        half_a_second = 0.5 / self.period
+        transitions = len(self.samples) - 1 - self.frozen
+        lively = 2 * self.changes > transitions and self.changes >= half_a_second
+        return lively and self.frozen >= max(half_a_second, 10 * self.longest_rest)
 
     def loaded(self, readings):
         if self.kind != "seconds":

@@ -19,6 +19,7 @@ from .test_against_naive import same
 
 UNKNOWN = ContactState.UNKNOWN
 TIP = sensor(6, "tip", limits=(0.0, 65_535.0))
+FLAT = sensor(6, "flat", limits=None)
 IN_NEWTONS = sensor(6, "newtons", limits=None, unit="N")
 
 
@@ -42,6 +43,11 @@ class TestFaults:
     def test_a_quiet_sensor_is_not_stuck(self):
         values = np.full((900, 2, 3), 500.0)
         values[::70, 0, 0] += 1
+        assert set(self.faults(values)) == {()}
+
+    def test_a_sensor_that_rested_before_it_was_touched_may_rest_again(self):
+        values = np.full((600, 2, 3), 500.0)
+        values[60:300] = lively(300)[60:]
         assert set(self.faults(values)) == {()}
 
     def test_a_sensor_that_settles_is_not_stuck(self):
@@ -154,10 +160,26 @@ class TestDead:
         values[:, 2:] = 0.0  # two of six feel something
         assert told_faults(values, sensor(6, "tip", limits=None)) == [(((), ()), 900)]
 
-    def test_two_dead_among_six_look_like_a_dead_band(self):
+    @pytest.mark.parametrize("n_dead", [2, 3, 5])
+    def test_whatever_their_share(self, n_dead):
         values = white()
-        values[:, 4:] = 30_000.0
-        assert told_faults(values) == [(((), ()), 900)]
+        values[:, :n_dead] = 30_000.0
+        bad = ((Fault.DEAD,), tuple(range(n_dead)))
+        found = told_faults(values)
+        assert [faults for faults, _ in found] == [((), ()), bad]
+        assert 200 <= found[0][1] <= 205  # of five in six, some samples change nothing
+
+    @pytest.mark.parametrize("n_silent", [1, 3])
+    def test_taxels_that_send_zeros_are_at_rest(self, n_silent):
+        values = white(which=FLAT)
+        values[:, :n_silent] = 0.0
+        assert told_faults(values, FLAT) == [(((), ()), 900)]
+
+    def test_integers_that_idle_while_others_carry_the_load(self):
+        """Noise of less than a step: a taxel changes only while a load moves it."""
+        values = np.full((1500, 6, 3), 7.0)
+        values[100:, :3] += np.rint(np.random.default_rng(3).normal(scale=4, size=(1400, 3, 3)))
+        assert told_faults(values, FLAT) == [(((), ()), 1500)]
 
     @pytest.mark.parametrize("parts", [2, 3, 6])
     def test_taxels_that_are_read_in_turns(self, parts):
@@ -174,6 +196,29 @@ class TestStuckTaxel:
         values[300:500, 2] = values[300, 2]
         found = told_faults(values)
         assert found == [(((), ()), 350), (((Fault.STUCK,), (2,)), 150), (((), ()), 400)]
+
+    @pytest.mark.parametrize("n_stuck", [2, 3, 5])
+    def test_whatever_their_share(self, n_stuck):
+        values = white()
+        values[300:500, :n_stuck] = values[300, :n_stuck]
+        bad = ((Fault.STUCK,), tuple(range(n_stuck)))
+        assert told_faults(values) == [(((), ()), 350), (bad, 150), (((), ()), 400)]
+
+    def test_noise_of_less_than_a_count(self):
+        values = white(1500, level=0.4)  # a taxel changes in seven of ten samples
+        values[900:, :4] = values[900, :4]
+        found = told_faults(values)
+        assert [faults for faults, _ in found] == [((), ()), ((Fault.STUCK,), (0, 1, 2, 3))]
+        assert found[0][1] < 1200
+
+    def test_again_and_again(self):
+        values = white(3000)
+        for start in range(300, 3000, 300):
+            values[start : start + 100, 2] = values[start, 2]
+        assert told_faults(values)[:-1] == [
+            (((), ()), 350), *[(((Fault.STUCK,), (2,)), 50), (((), ()), 250)] * 8,
+            (((Fault.STUCK,), (2,)), 50),
+        ]  # fmt: skip
 
     def test_windows_start_again_after_it(self):
         values = white()

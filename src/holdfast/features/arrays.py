@@ -29,7 +29,8 @@ N_PULLED = 6  # successive samples whose normal readings add up to a pull
 HISTORY_END = 7  # one past the newest value in the history; windows before it are contiguous
 TAXEL_FAULTS = 8  # faults of single taxels at the last sample that changed any reading
 FAULTY_TAXELS = 9  # bits of those taxels
-COUNTS_WIDTH = 10
+LONGEST_REST = 10  # most successive samples without a change, if long and not by a fault
+COUNTS_WIDTH = 11
 
 # Columns of Memory.levels.
 FIRST_TIME = 0  # time of the first finite sample [s]
@@ -46,7 +47,8 @@ N_CHANGED = 3  # samples that changed the taxel
 CHANGED_AT = 4  # N_CHANGES of its finger when the taxel last changed
 FIRST_POWER = 5  # smoothed mean square of its first differences
 SECOND_POWER = 6  # smoothed mean square of its second differences
-TAXELS_WIDTH = 7
+LONGEST_STILL = 7  # most successive samples without a change, among those that changed the finger
+TAXELS_WIDTH = 8
 
 # Columns of Layout.constants.
 LOW_LIMIT, HIGH_LIMIT = 0, 1  # smallest and largest reading that the sensor can send
