@@ -2,10 +2,11 @@
 
     holdfast simulate calm --objects can --repeats 1 --profile gentle
     holdfast simulate few --objects can,ball --cases 2 --repeats 1
-    holdfast simulate hands --randomize --repeats 40 --seed 11
+    holdfast simulate rough --objects ball --cases 2 --repeats 1 --profile vigorous
     holdfast simulate other --objects can,ball,bottle --repeats 1 --seed 3
-    holdfast train other --trials 0 --out paper.json
-    python benchmarks/frozen_skin.py calm few --models builtin:any builtin:twin paper.json
+    holdfast train other --trials 0 --output paper.json
+    python benchmarks/frozen_skin.py calm few rough --models builtin:any builtin:twin paper.json
+    holdfast simulate hands --randomize --repeats 40 --seed 11
     python benchmarks/frozen_skin.py --healthy hands --data DATA
 
 Some taxels of every finger keep one value: from the start of the recording, or from some time in a

@@ -52,7 +52,8 @@ class ArrivalDetector:
     It buffers the first half second until it has measured the rate of the source, then
     processes the buffer. It resamples a source whose rate is not within 20 % of the model's.
     A finger is UNKNOWN while the source reports a fault of it. Modules that the model does
-    not use are ignored. All other samples give the same estimates as in a recording.
+    not use are ignored. All other samples give the same estimates as in a recording of the same
+    rate: a recording has the rate of all its samples, a stream that of its first half second.
 
     Args:
         model: with a tare that can be taken live.

@@ -1,0 +1,71 @@
+"""Where live estimates equal those of a recording, and that the documents say where not."""
+
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from holdfast.detector import Detector, detect
+from holdfast.live.arrival_detector import ArrivalDetector
+from holdfast.model import Model
+from holdfast.recordings import Recording
+
+from . import build
+
+DOCS = Path(__file__).parents[2] / "docs"
+MODELS = ("builtin:any", "builtin:twin", "builtin:noise-floor")
+
+
+def live(model, recording):
+    """All estimates of a stream of the samples, by finger."""
+    sensors = {name: module.sensor for name, module in recording.modules.items()}
+    detector = ArrivalDetector(model, sensors)
+    found = [one for arrival in build.arrivals_of(recording) for one in detector.update(arrival)]
+    return {name: [one.estimate.fingers[name] for one in found] for name in sensors}
+
+
+def batch(model, recording, bounds):
+    """All estimates of a recording that comes in parts, by finger."""
+    detector = Detector.for_recording(model, recording)
+    parts = [
+        {name: module.slice(a, b) for name, module in recording.modules.items()}
+        for a, b in zip(bounds[:-1], bounds[1:], strict=True)
+    ]
+    traces = [detector.run(Recording("part", modules)).fingers for modules in parts]
+    return {
+        name: [one for fingers in traces for one in fingers[name].estimates()]
+        for name in recording.modules
+    }
+
+
+@pytest.mark.parametrize("name", MODELS)
+def test_the_same_bits_at_a_constant_rate_in_any_chunks(name):
+    model, recording = Model.load(name), build.grasp()
+    n = len(next(iter(recording.modules.values())).times)
+    cuts = np.random.default_rng(2).choice(np.arange(1, n), size=6, replace=False)
+    mine = live(model, recording)
+    for bounds in ([0, n], [0, *sorted(cuts.tolist()), n]):
+        for finger, estimates in batch(model, recording, bounds).items():
+            assert list(map(repr, mine[finger])) == list(map(repr, estimates))
+    whole = detect(model, recording)
+    for finger, estimates in mine.items():
+        assert list(map(repr, estimates)) == list(map(repr, whole.fingers[finger].estimates()))
+
+
+def test_other_estimates_where_the_rate_changes_which_the_documents_state():
+    """A repair of this difference changes these documents too."""
+    model, recording = Model.load("builtin:any"), build.grasp()
+    modules = {}
+    for name, module in recording.modules.items():
+        middle = module.times[len(module.times) // 2]
+        times = np.where(module.times < middle, module.times, 2 * module.times - middle)
+        modules[name] = replace(module, times=times, labels=())
+    slower = Recording("slower", modules)
+    mine = [one.stable_probability for one in live(model, slower)["index"]]
+    other = detect(model, slower).fingers["index"].stable_probability
+    assert np.nanmax(np.abs(np.array(mine) - other)) > 0.01
+    for page in ("live.md", "decisions/0003-one-kernel-live-and-offline.md"):
+        text = (DOCS / page).read_text("utf-8")
+        for where in ("rate changes", "bursts", "dropped", "constant rate with exact stamps"):
+            assert where in text, (page, where)
