@@ -136,12 +136,17 @@ class DetectionSummary:
         }
 
     def print(self) -> None:
-        """Print two tables: shares and counts, and the first events."""
+        """Print tables of shares, of reasons and faults, and of the first events."""
         names = [name for name in self._counts if name != HAND] + [HAND]
         states = (f"{state} %" for state in ContactState)
         print_table(
-            (self._name, "samples", *states, "reasons for UNKNOWN", "faults"),
-            [(name, *self._counts[name].row()) for name in names],
+            (self._name, "samples", *states),
+            [(name, *self._counts[name].shares()) for name in names],
+        )
+        print_line()
+        print_table(
+            ("finger", "reasons for UNKNOWN", "faults"),
+            [(name, *self._counts[name].causes()) for name in names if name != HAND],
         )
         events = self._sorted_events()
         print_line()
@@ -179,11 +184,15 @@ class _StateCounts:
             "faults": _ordered(self.faults, Fault),
         }
 
-    def row(self) -> tuple[object, ...]:
-        """Return the cells of a table row."""
+    def shares(self) -> tuple[object, ...]:
+        """Return the number of samples and the share of each state as cells of a table."""
         counts = self.to_dict()
-        shares = (f"{100 * share:.1f}" for share in counts["states"].values())
-        return counts["n_samples"], *shares, _text(counts["reasons"]), _text(counts["faults"])
+        return counts["n_samples"], *(f"{100 * share:.1f}" for share in counts["states"].values())
+
+    def causes(self) -> tuple[str, str]:
+        """Return the counts of reasons and of faults as cells of a table."""
+        counts = self.to_dict()
+        return _text(counts["reasons"]), _text(counts["faults"])
 
 
 def _ordered(counts: Counter[Any], members: Iterable[Any]) -> dict[str, int]:
