@@ -411,6 +411,29 @@ def test_a_terminal_shows_the_changes_that_lasted(capsys, monkeypatch, save):
     assert json.loads(capsys.readouterr().out.splitlines()[0])["finger"] == "thumb"
 
 
+def since_1970(recording):
+    """Return a recording with the times of a clock that counts from 1970."""
+    modules = {
+        name: Tactile(m.sensor, m.times + 1795364053.99, m.readings)
+        for name, m in recording.modules.items()
+    }
+    return replace(recording, modules=modules)
+
+
+def test_a_person_reads_no_times_since_1970(capsys, monkeypatch, save):
+    grasp = save(since_1970(synthetic_recording("a", 1, ("thumb", "index"))))
+    assert summary(capsys, NOISE_FLOOR, grasp)["events"][0]["time"] > 1795364053
+    assert main(["detect", NOISE_FLOOR, str(grasp), "--summary"]) == 0
+    lines = capsys.readouterr().out.splitlines()
+    start = lines.index("times since the first sample, at 1795364053.990 s")
+    assert 0 < float(lines[start + 2].split()[0]) < 12
+    monkeypatch.setattr("sys.stdout.isatty", lambda: True, raising=False)
+    assert main(["detect", NOISE_FLOOR, str(grasp)]) == 0
+    out, err = capsys.readouterr()
+    assert err == "times since the first sample, at 1795364053.990 s\n"
+    assert all(0 < float(row.split()[0]) < 12 for row in out.splitlines()[1:])
+
+
 def test_faults_that_last_are_printed_once(capsys, monkeypatch, save):
     grasp = save(synthetic_recording("a", 1, ("thumb", "index")))
     update = ArrivalDetector.update

@@ -128,6 +128,18 @@ def test_the_tables_fit_with_long_names(capsys, grasp, tmp_path):
         assert re.search(r" (150\.0|0\.00) ", out)
 
 
+def test_markers_since_1970_are_shown_since_the_first_sample(capsys, grasp, tmp_path):
+    times = grasp.modules["thumb"].times + 1795364053.99
+    modules = {name: Tactile(m.sensor, times, m.readings) for name, m in grasp.modules.items()}
+    markers = ((1795364059.29, "shaken"),)
+    late = replace(grasp, modules=modules, markers=markers, truth=None)
+    save_recording(late, tmp_path / "late.parquet")
+    assert main(["info", str(tmp_path / "late.parquet")]) == 0
+    out = capsys.readouterr().out
+    assert re.search(r"^markers since the first sample$", out, re.MULTILINE)
+    assert re.search(r"^ +5\.300 +shaken$", out, re.MULTILINE)
+
+
 def test_findings_are_listed(capsys, grasp, path):
     save_labels(grasp, path, author="rule:signal")
     save_recording(replace(grasp, metadata={"starts_loaded": True}), path, force=True)

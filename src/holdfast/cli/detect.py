@@ -120,6 +120,8 @@ def _print_changes(chunks: Iterator["EstimateChunk"], *, live: bool) -> None:
                 sys.stdout.flush()
         return
     lines = [line for chunk in chunks for line in changes.add(chunk)]
+    if changes.origin:
+        print_message(f"times since the first sample, at {changes.origin:.3f} s")
     for line in (HEADER, *lines):
         print_line(line)
 

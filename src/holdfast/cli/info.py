@@ -205,9 +205,13 @@ def _print_one(document: Mapping[str, Any]) -> None:
     _print_modules(document["modules"])
     _print_findings(document["findings"])
     if document["markers"]:
-        print_line()
+        from holdfast.recordings import shown_origin
+
+        origin = shown_origin(document["start"])
+        print_line("\nmarkers since the first sample" if origin else "")
         print_table(
-            ("marker [s]", "text"), [(f"{m['time']:.3f}", m["text"]) for m in document["markers"]]
+            ("marker [s]", "text"),
+            [(f"{m['time'] - origin:.3f}", m["text"]) for m in document["markers"]],
         )
 
 
