@@ -14,8 +14,10 @@ from holdfast.synthetic import synthetic_recording
 def print_changes(source: str, model: str, speed: float = 1.0) -> None:
     """Print one line for each change that lasted, until the source ends or Ctrl-C."""
     with open_source(source, speed=speed) as opened:
-        for change in StreamDetector(Model.load(model), opened).changes():
-            print(f"{change.time:7.2f} s  {change.finger:8} {change.previous} -> {change.state}")
+        detector = StreamDetector(Model.load(model), opened)
+        for change in detector.changes():
+            time = change.time - detector.start  # the clock of a device counts from 1970
+            print(f"{time:7.2f} s  {change.finger:8} {change.previous} -> {change.state}")
 
 
 def main(source: str = "", model: str = "builtin:twin") -> None:

@@ -19,10 +19,15 @@ def main(folder: str = "", model: str = "") -> None:
     for name, finger in metrics.fingers.items():
         print(f"  {name}: {finger.accuracy:.1f} % right, AUC in contact {finger.auc_contact:.3f}")
     hand = metrics.events.hand
-    print(f"  {hand.n_events} events; missed within 0.1 s: {hand.missed['0.1']} %")
-    print(f"  {hand.false_alarms_per_minute:.1f} false alarms per minute of stable label")
+    print(f"  {hand.n_events} events; missed within 0.1 s: {text(hand.missed['0.1'])} %")
+    print(f"  {text(hand.false_alarms_per_minute)} false alarms per minute of stable label")
     if model:
         trained.model.save(Path(model))
+
+
+def text(value: float | None) -> str:
+    """Return a number with one digit; a dash if it is not known, as without events."""
+    return "-" if value is None else f"{value:.1f}"
 
 
 if __name__ == "__main__":

@@ -18,6 +18,8 @@ from holdfast.sensors.types import Array, Unit, rebuilt
 
 GAP_PERIODS = 3.0
 """A step in time of more sample periods is a gap."""
+MAX_SHOWN_CLOCK = 1e5
+"""If a recording starts later than this, times are shown since its start [s]."""
 
 
 @dataclass(frozen=True)
@@ -303,6 +305,21 @@ class Recording:
             for name, module in self.modules.items()
         }
         return replace(self, modules=modules)
+
+
+def shown_origin(start: float) -> float:
+    """Return the time that is shown to a person as 0 [s].
+
+    It is the start of a recording whose clock counts from 1970, and 0 for any other.
+
+    Args:
+        start: time of the first sample [s].
+
+    Example:
+        >>> shown_origin(12.5), shown_origin(1795364053.99)
+        (0.0, 1795364053.99)
+    """
+    return start if abs(start) > MAX_SHOWN_CLOCK else 0.0
 
 
 def label_states(labels: Sequence[Label], times: Array) -> npt.NDArray[np.int8]:

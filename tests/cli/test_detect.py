@@ -186,9 +186,22 @@ class TestSummary:
     def test_the_table(self, capsys, model, grasp):
         assert main(["detect", str(model), str(grasp), "--summary"]) == 0
         out = capsys.readouterr().out
-        assert re.search(r"^thumb +\d+( +\d+\.\d){4} +tare 75, warm_up 13 +-$", out, re.MULTILINE)
+        assert re.search(r"^thumb +\d+( +\d+\.\d){4}$", out, re.MULTILINE)
+        assert re.search(r"^thumb +tare 75, warm_up 13 +-$", out, re.MULTILINE)
+        assert max(map(len, out.splitlines())) <= 80
         assert re.search(r"^ +\d+\.\d{3} +hand +\w+ +UNKNOWN$", out, re.MULTILINE)
         assert re.search(r"^and \d+ more events \(--json prints all\)$", out, re.MULTILINE)
+
+    def test_the_table_fits_with_long_names(self, capsys, save):
+        whole = synthetic_recording("a", 1, ("thumb", "index"))
+        long = {f"{name}_{'of_the_left_hand_' * 3}": m for name, m in whole.modules.items()}
+        path = save(
+            replace(whole, modules=long), "2025-11-22_grasp-of-the-red-carton_case2-01.mcap"
+        )
+        assert main(["detect", NOISE_FLOOR, str(path), "--summary"]) == 0
+        lines = capsys.readouterr().out.splitlines()
+        assert max(map(len, lines)) <= 80
+        assert {"thumb_of_the_left_", "index_of_the_left_"} <= {line[:18] for line in lines}
 
     def test_debouncing_reduces_the_events(self, capsys, model, grasp):
         raw = summary(capsys, model, grasp)["events"]
@@ -396,6 +409,29 @@ def test_a_terminal_shows_the_changes_that_lasted(capsys, monkeypatch, save):
     assert any("-> UNSTABLE    P(stable) " in row for row in rows)
     assert main(["detect", NOISE_FLOOR, str(grasp), "--json"]) == 0
     assert json.loads(capsys.readouterr().out.splitlines()[0])["finger"] == "thumb"
+
+
+def since_1970(recording):
+    """Return a recording with the times of a clock that counts from 1970."""
+    modules = {
+        name: Tactile(m.sensor, m.times + 1795364053.99, m.readings)
+        for name, m in recording.modules.items()
+    }
+    return replace(recording, modules=modules)
+
+
+def test_a_person_reads_no_times_since_1970(capsys, monkeypatch, save):
+    grasp = save(since_1970(synthetic_recording("a", 1, ("thumb", "index"))))
+    assert summary(capsys, NOISE_FLOOR, grasp)["events"][0]["time"] > 1795364053
+    assert main(["detect", NOISE_FLOOR, str(grasp), "--summary"]) == 0
+    lines = capsys.readouterr().out.splitlines()
+    start = lines.index("times since the first sample, at 1795364053.990 s")
+    assert 0 < float(lines[start + 2].split()[0]) < 12
+    monkeypatch.setattr("sys.stdout.isatty", lambda: True, raising=False)
+    assert main(["detect", NOISE_FLOOR, str(grasp)]) == 0
+    out, err = capsys.readouterr()
+    assert err == "times since the first sample, at 1795364053.990 s\n"
+    assert all(0 < float(row.split()[0]) < 12 for row in out.splitlines()[1:])
 
 
 def test_faults_that_last_are_printed_once(capsys, monkeypatch, save):

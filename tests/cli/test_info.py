@@ -108,11 +108,36 @@ def test_the_table(capsys, path):
     assert err == ""
     assert re.search(r"^duration +\d+\.\d{3} s from 0\.000 s$", out, re.MULTILINE)
     assert re.search(r"^complete +yes$", out, re.MULTILINE)
-    assert re.search(r"^notes +very .*\.\.\.$", out, re.MULTILINE)
+    assert re.search(r"^notes +very [^\n]*\n +very .*\.\.\.$", out, re.MULTILINE)
     assert re.search(r"^truth +phase, thumb\.slip_speed$", out, re.MULTILINE)
-    assert re.search(r"^thumb +uskin-curved +30 +count .* none$", out, re.MULTILINE)
+    assert re.search(r"^thumb +uskin-curved +30 +count +1725 +150\.0 +0 +0$", out, re.MULTILINE)
+    assert re.search(r"^thumb( +\d\.\d\d){3} +none$", out, re.MULTILINE)
     assert re.search(r"^ +5\.300 +shaken$", out, re.MULTILINE)
-    assert max(map(len, out.splitlines())) < 150
+    assert max(map(len, out.splitlines())) <= 80
+
+
+def test_the_tables_fit_with_long_names(capsys, grasp, tmp_path):
+    name = "2025-11-22_grasp-of-the-red-carton_case2_repetition-01"
+    modules = {f"{name}_{'of_the_left_hand_' * 3}": m for name, m in grasp.modules.items()}
+    path = tmp_path / f"{name}.parquet"
+    save_recording(replace(grasp, modules=modules), path)
+    for given in (path, tmp_path):
+        assert main(["info", str(given)]) == 0
+        out = capsys.readouterr().out
+        assert max(map(len, out.splitlines())) <= 80
+        assert re.search(r" (150\.0|0\.00) ", out)
+
+
+def test_markers_since_1970_are_shown_since_the_first_sample(capsys, grasp, tmp_path):
+    times = grasp.modules["thumb"].times + 1795364053.99
+    modules = {name: Tactile(m.sensor, times, m.readings) for name, m in grasp.modules.items()}
+    markers = ((1795364059.29, "shaken"),)
+    late = replace(grasp, modules=modules, markers=markers, truth=None)
+    save_recording(late, tmp_path / "late.parquet")
+    assert main(["info", str(tmp_path / "late.parquet")]) == 0
+    out = capsys.readouterr().out
+    assert re.search(r"^markers since the first sample$", out, re.MULTILINE)
+    assert re.search(r"^ +5\.300 +shaken$", out, re.MULTILINE)
 
 
 def test_findings_are_listed(capsys, grasp, path):
@@ -130,7 +155,9 @@ def test_findings_are_listed(capsys, grasp, path):
     )
     assert max(map(len, findings)) <= 80
     assert main(["info", str(path.parent)]) == 0
-    assert capsys.readouterr().out.rstrip().endswith(" starts_loaded, hidden_labels")
+    out = capsys.readouterr().out
+    assert out.rstrip().endswith(" starts_loaded, hidden_labels")
+    assert max(map(len, out.splitlines())) <= 80
 
 
 def test_a_cut_file_is_shown(capsys, grasp, tmp_path):

@@ -97,7 +97,7 @@ def test_info_of_built_in_models(capsys, monkeypatch):
     assert "tuned on    nothing" in printed
     assert all(len(line) <= 80 for line in printed.splitlines())
     code, printed, _ = run(capsys, "info", "builtin:noise-floor")
-    assert "the noise of the tare" in printed
+    assert "the noise of the tare" in " ".join(printed.split())
     assert "trained on  nothing" in printed
 
 

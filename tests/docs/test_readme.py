@@ -1,3 +1,4 @@
+import dataclasses
 import json
 import re
 
@@ -7,6 +8,7 @@ from msgspec.structs import replace
 from holdfast.cli import demo
 from holdfast.cli import simulate as simulate_verb
 from holdfast.io import save_recording
+from holdfast.recordings import Tactile
 from holdfast.study.summary import STRONGEST
 from holdfast.synthetic import synthetic_recording
 from holdfast.twin import simulation
@@ -54,6 +56,22 @@ def test_a_hand_of_ones_own(folder, hand):
         "holdfast play": "holdfast play --port 0",
     }
     assert blocks.run_page(README, replaced, HAND) == 3
+
+
+def test_the_live_program_prints_times_that_a_person_can_read(folder, capsys):
+    """Devices send times since 1970."""
+    recording = synthetic_recording("live", 0)
+    modules = {
+        name: Tactile(m.sensor, m.times + 1795364053.99, m.readings)
+        for name, m in recording.modules.items()
+    }
+    save_recording(dataclasses.replace(recording, modules=modules), folder / "live.parquet")
+    replaced = {'open_source("xela://auto")': 'open_source("live.parquet", speed=0)'}
+    blocks.run_page(README, replaced, ("Python",))
+    lines = capsys.readouterr().out.splitlines()
+    assert lines
+    for line in lines:
+        assert re.fullmatch(r"\d{1,2}\.\d\d s  \w+: [A-Z_]+", line)
 
 
 def test_every_section_is_run():

@@ -1,3 +1,4 @@
+import math
 import time
 from dataclasses import replace
 
@@ -333,6 +334,13 @@ def test_a_detector_fed_without_it_refuses_unused_modules_and_does_not_resample(
     assert stream.rate == pytest.approx(60.0)
     assert np.median(np.diff(times)) == pytest.approx(1 / 150)
     assert len(times) > 2 * n_instants
+
+
+def test_the_start_is_the_time_of_the_first_estimate():
+    stream = StreamDetector(build.model(), build.Script.of(build.grasp()))
+    assert math.isnan(stream.start)
+    times = [estimate.time for estimate in stream]
+    assert stream.start == times[0] < times[-1]
 
 
 def test_events_are_the_changes_of_the_estimates():

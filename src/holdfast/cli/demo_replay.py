@@ -135,7 +135,7 @@ def _show_table(model: "Model", source: "Source", true_events: TrueEvents) -> in
 
     updated_at, n_updates = 0.0, 0
     console = Console(stderr=True, highlight=False)
-    with Live(console=console, auto_refresh=False, transient=True) as screen:
+    with Live(console=console, auto_refresh=False, transient=True, redirect_stdout=False) as screen:
         for estimate in print_changes(model, source, true_events, console.print):
             n_updates += 1
             if time.monotonic() - updated_at > REFRESH_INTERVAL:

@@ -25,7 +25,7 @@ from holdfast.cli.options import (
     report_missing_fingers,
 )
 from holdfast.cli.terminal.console import print_json, print_line, print_message
-from holdfast.cli.terminal.progress import ProgressBar
+from holdfast.cli.terminal.progress import progress
 from holdfast.cli.terminal.stopping import StopRequest, handle_stop_signals
 
 if TYPE_CHECKING:
@@ -85,6 +85,8 @@ def detect(
         chunks = _detect_live(loaded, source, rate, ignore, seconds)
     else:
         chunks = _detect_recording(loaded, Path(source), rate, ignore)
+        if summary or not (as_json and sys.stdout.isatty()):  # lines on the screen need no bar
+            chunks = progress(chunks, "detecting")
     if summary:
         _print_summary(chunks, model, as_json=as_json)
         return
@@ -118,6 +120,8 @@ def _print_changes(chunks: Iterator["EstimateChunk"], *, live: bool) -> None:
                 sys.stdout.flush()
         return
     lines = [line for chunk in chunks for line in changes.add(chunk)]
+    if changes.origin:
+        print_message(f"times since the first sample, at {changes.origin:.3f} s")
     for line in (HEADER, *lines):
         print_line(line)
 
@@ -151,18 +155,16 @@ def _detect_recording(
     from holdfast.live.readings_monitor import ReadingsMonitor
 
     detector = None
-    with ProgressBar("detecting") as bar:
-        for part in _read_parts(model, path, rate):
-            if detector is None:
-                detector = Detector.for_recording(model, part, ignore=parse_taxels(ignore))
-                report_missing_fingers(model, part.name, part.modules)
-                readings = ReadingsMonitor(
-                    model.fingers_of({name: m.sensor for name, m in part.modules.items()})
-                )
-            for notice in readings.update_recording(part):
-                print_message(notice)
-            yield chunk_from_detection(detector.run(part))
-            bar.advance(max(module.n_samples for module in part.modules.values()))
+    for part in _read_parts(model, path, rate):
+        if detector is None:
+            detector = Detector.for_recording(model, part, ignore=parse_taxels(ignore))
+            report_missing_fingers(model, part.name, part.modules)
+            readings = ReadingsMonitor(
+                model.fingers_of({name: m.sensor for name, m in part.modules.items()})
+            )
+        for notice in readings.update_recording(part):
+            print_message(notice)
+        yield chunk_from_detection(detector.run(part))
 
 
 def _read_parts(model: "Model", path: Path, rate: RatePolicy) -> Iterator["Recording"]:

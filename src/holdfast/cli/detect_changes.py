@@ -8,6 +8,7 @@ from holdfast.contact import ContactEstimate, ContactEvent, ContactState, Reason
 from holdfast.detector import HAND
 from holdfast.live.fault_notices import FAULT_TEXTS
 from holdfast.live.lasting_changes import LastingChanges
+from holdfast.recordings import shown_origin
 
 HEADER = f"{'time':>9}    {'finger':8}  {'from':10}    {'to':10}  why"
 REASON_WORDS = {
@@ -24,18 +25,24 @@ class ChangeLines:
     """Find the changes of each finger and of the hand that lasted, as lines of text.
 
     Args:
-        from_first: give times relative to the first sample: clocks of devices count from 1970.
+        from_first: give times relative to the first sample. Without it, only times since 1970
+            are given like that.
+
+    Attributes:
+        origin: time that is printed as 0 [s]; NaN before the first chunk.
     """
 
     def __init__(self, *, from_first: bool) -> None:
-        self._start = nan if from_first else 0.0
+        self.origin = nan
+        self._from_first = from_first
         self._changes: dict[str, LastingChanges] = {}
         self._why: dict[str, tuple[ContactState, str]] = {}
 
     def add(self, chunk: EstimateChunk) -> list[str]:
         """Return the lines for the next chunk of the same source, in the order of time."""
-        if isnan(self._start) and chunk.hand:
-            self._start = chunk.hand[0][0]
+        if isnan(self.origin) and chunk.hand:
+            first = chunk.hand[0][0]
+            self.origin = first if self._from_first else shown_origin(first)
         found: list[tuple[ContactEvent, str]] = []
         for finger, estimates in chunk.fingers.items():
             found += self._finger_changes(finger, estimates)
@@ -57,7 +64,7 @@ class ChangeLines:
         return changes.update([state], time)
 
     def _line(self, event: ContactEvent, reason: str) -> str:
-        time = event.time - self._start
+        time = event.time - self.origin
         text = f"{time:9.3f} s  {event.finger:8}  {event.previous:10} -> {event.state:10}  {reason}"
         return text.rstrip()
 

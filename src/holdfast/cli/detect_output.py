@@ -20,6 +20,7 @@ from holdfast.contact import (
     StateChanges,
 )
 from holdfast.detector import HAND
+from holdfast.recordings import shown_origin
 
 if TYPE_CHECKING:
     from holdfast.detector import Detection
@@ -109,10 +110,13 @@ class DetectionSummary:
         self._counts: dict[str, _StateCounts] = {}
         self._changes: dict[str, StateChanges] = {}
         self._events: dict[str, list[ContactEvent]] = {}
+        self._start: float | None = None
 
     def add(self, chunk: EstimateChunk) -> None:
         """Add the next chunk of the same recording or source."""
         self._name = chunk.name
+        if self._start is None and chunk.hand:
+            self._start = chunk.hand[0][0]
         for finger, estimates in chunk.fingers.items():
             self._add_changes(finger, map(attrgetter("time", "state"), estimates))
             counts = self._counts.setdefault(finger, _StateCounts())
@@ -136,18 +140,30 @@ class DetectionSummary:
         }
 
     def print(self) -> None:
-        """Print two tables: shares and counts, and the first events."""
+        """Print tables of shares, of reasons and faults, and of the first events."""
         names = [name for name in self._counts if name != HAND] + [HAND]
         states = (f"{state} %" for state in ContactState)
         print_table(
-            (self._name, "samples", *states, "reasons for UNKNOWN", "faults"),
-            [(name, *self._counts[name].row()) for name in names],
+            (self._name, "samples", *states),
+            [(name, *self._counts[name].shares()) for name in names],
         )
-        events = self._sorted_events()
         print_line()
         print_table(
+            ("finger", "reasons for UNKNOWN", "faults"),
+            [(name, *self._counts[name].causes()) for name in names if name != HAND],
+        )
+        self._print_events()
+
+    def _print_events(self) -> None:
+        events = self._sorted_events()
+        origin = shown_origin(self._start or 0.0)
+        print_line(f"\ntimes since the first sample, at {origin:.3f} s" if origin else "")
+        print_table(
             ("time [s]", "finger", "state", "previous"),
-            [(f"{e.time:.3f}", e.finger, e.state, e.previous) for e in events[:MAX_EVENTS_SHOWN]],
+            [
+                (f"{one.time - origin:.3f}", one.finger, one.state, one.previous)
+                for one in events[:MAX_EVENTS_SHOWN]
+            ],
         )
         if len(events) > MAX_EVENTS_SHOWN:
             print_line(f"and {len(events) - MAX_EVENTS_SHOWN} more events (--json prints all)")
@@ -179,11 +195,15 @@ class _StateCounts:
             "faults": _ordered(self.faults, Fault),
         }
 
-    def row(self) -> tuple[object, ...]:
-        """Return the cells of a table row."""
+    def shares(self) -> tuple[object, ...]:
+        """Return the number of samples and the share of each state as cells of a table."""
         counts = self.to_dict()
-        shares = (f"{100 * share:.1f}" for share in counts["states"].values())
-        return counts["n_samples"], *shares, _text(counts["reasons"]), _text(counts["faults"])
+        return counts["n_samples"], *(f"{100 * share:.1f}" for share in counts["states"].values())
+
+    def causes(self) -> tuple[str, str]:
+        """Return the counts of reasons and of faults as cells of a table."""
+        counts = self.to_dict()
+        return _text(counts["reasons"]), _text(counts["faults"])
 
 
 def _ordered(counts: Counter[Any], members: Iterable[Any]) -> dict[str, int]:

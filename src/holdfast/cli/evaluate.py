@@ -1,8 +1,6 @@
 """`holdfast evaluate`: metrics of a model on labelled recordings."""
 
 from pathlib import Path
-from shutil import get_terminal_size
-from textwrap import fill
 from typing import TYPE_CHECKING, Annotated
 
 import typer
@@ -18,7 +16,13 @@ from holdfast.cli.options import (
     save_plot,
     start_engine,
 )
-from holdfast.cli.terminal.console import print_json, print_line, print_message, print_table
+from holdfast.cli.terminal.console import (
+    print_json,
+    print_line,
+    print_message,
+    print_paragraph,
+    print_table,
+)
 from holdfast.cli.terminal.progress import progress
 
 if TYPE_CHECKING:
@@ -95,8 +99,9 @@ def warn_about_training(trained_on: list[str], n_recordings: int) -> None:
 
 
 def print_verdict(sentence: str) -> None:
-    """Print the sentence on what a model is good for, as wide as the terminal."""
-    print_line(fill(sentence, get_terminal_size().columns) + "\n")
+    """Print the sentence on what a model is good for."""
+    print_paragraph(sentence)
+    print_line()
 
 
 def print_metrics(metrics: "Metrics") -> None:
@@ -151,7 +156,8 @@ def _print_intervals(intervals: "Intervals") -> None:
     ]
     groups = "" if intervals.n_groups is None else f" in {intervals.n_groups} groups"
     of = f"{intervals.n_recordings} recordings{groups}"
-    print_line(f"\n{100 * intervals.level:g} % intervals over {of}: " + ", ".join(parts))
+    print_line()
+    print_paragraph(f"{100 * intervals.level:g} % intervals over {of}: " + ", ".join(parts))
 
 
 def _format(value: float | None, digits: int) -> str:

@@ -1,10 +1,9 @@
 """`holdfast info`: the content of a recording, or of a folder of recordings."""
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
-from shutil import get_terminal_size
-from textwrap import fill
+from statistics import mean
 from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
@@ -18,7 +17,13 @@ from holdfast.cli.options import (
     check_plot,
     save_plot,
 )
-from holdfast.cli.terminal.console import print_error, print_json, print_line, print_table
+from holdfast.cli.terminal.console import (
+    print_error,
+    print_json,
+    print_line,
+    print_paragraph,
+    print_table,
+)
 from holdfast.cli.terminal.progress import progress
 
 if TYPE_CHECKING:
@@ -197,25 +202,26 @@ def _print_one(document: Mapping[str, Any]) -> None:
         rows.append(("truth", _shorten(", ".join(_channels(document["truth"])))))
     print_table(("recording", document["name"]), rows)
     print_line()
-    header = ("module", "sensor", "taxels", "unit", "samples", "rate [Hz]", "gaps", "repeats")
-    labels = tuple(f"{state} [s]" for state in _label_states())
-    print_table((*header, *labels, "faults"), _module_rows(document["modules"]))
+    _print_modules(document["modules"])
     _print_findings(document["findings"])
     if document["markers"]:
-        print_line()
+        from holdfast.recordings import shown_origin
+
+        origin = shown_origin(document["start"])
+        print_line("\nmarkers since the first sample" if origin else "")
         print_table(
-            ("marker [s]", "text"), [(f"{m['time']:.3f}", m["text"]) for m in document["markers"]]
+            ("marker [s]", "text"),
+            [(f"{m['time'] - origin:.3f}", m["text"]) for m in document["markers"]],
         )
 
 
 def _print_findings(findings: list[Mapping[str, str]]) -> None:
-    """Print one paragraph for each finding, as wide as the terminal."""
+    """Print one paragraph for each finding."""
     if findings:
         print_line("\nfindings:")
-    width = get_terminal_size().columns
     for one in findings:
         text = f"{one['module']}: {one['text']}" if one["module"] else one["text"]
-        print_line(fill(text, width, initial_indent="- ", subsequent_indent="  "))
+        print_paragraph(text, "- ", "  ")
 
 
 def _channels(truth: Mapping[str, Any]) -> list[str]:
@@ -223,36 +229,58 @@ def _channels(truth: Mapping[str, Any]) -> list[str]:
     return [*truth["hand"], *(f"{finger}.{name}" for finger, names in fingers for name in names)]
 
 
-def _module_rows(modules: Mapping[str, Mapping[str, Any]]) -> list[tuple[object, ...]]:
-    return [
-        (
-            name,
-            m["sensor"],
-            m["n_taxels"],
-            m["unit"],
-            m["n_samples"],
-            f"{m['rate']:.1f}",
-            m["gaps"],
-            m["repeats"],
-            *(f"{m['labels'][state]:.2f}" for state in _label_states()),
-            ", ".join(f"{fault} {n}" for fault, n in m["faults"].items()) or "none",
-        )
-        for name, m in modules.items()
-    ]
+def _print_modules(modules: Mapping[str, Mapping[str, Any]]) -> None:
+    """Print two tables: the samples of each module, then its labels and faults."""
+    print_table(
+        ("module", "sensor", "taxels", "unit", "samples", "rate [Hz]", "gaps", "repeats"),
+        [
+            (name, m["sensor"], m["n_taxels"], m["unit"], m["n_samples"], f"{m['rate']:.1f}",
+             m["gaps"], m["repeats"])
+            for name, m in modules.items()
+        ],
+    )  # fmt: skip
+    print_line()
+    print_table(
+        ("module", *_label_headings(), "faults"),
+        [
+            (
+                name,
+                *_label_cells([m]),
+                ", ".join(f"{x} {n}" for x, n in m["faults"].items()) or "none",
+            )
+            for name, m in modules.items()
+        ],
+    )
+
+
+def _label_headings() -> list[str]:
+    return [f"{state} [s]" for state in _label_states()]
+
+
+def _label_cells(modules: Sequence[Mapping[str, Any]]) -> list[str]:
+    """Return the duration of the labels of each state, the mean over the modules."""
+    return [f"{mean(m['labels'][state] for m in modules):.2f}" for state in _label_states()]
 
 
 def _print_all(documents: list[dict[str, Any]]) -> None:
-    labels = tuple(f"{state} [s]" for state in _label_states())
+    """Print two tables: the labels of each recording, then its samples and findings."""
+    readable = [document for document in documents if "error" not in document]
+    if readable:
+        print_table(
+            ("labels of", *_label_headings()),
+            [(x["name"], *_label_cells([*x["modules"].values()])) for x in readable],
+        )
+        print_line()
     print_table(
-        ("recording", "modules", "samples", "rate [Hz]", "duration [s]", "gaps", *labels, "state"),
+        ("recording", "modules", "samples", "rate [Hz]", "duration [s]", "gaps", "state"),
         [_summary(document) for document in documents],
     )
 
 
 def _summary(document: Mapping[str, Any]) -> tuple[object, ...]:
-    """Return a row of the table; the seconds of labels are the mean over the modules."""
+    """Return a row of the table of recordings."""
     if "error" in document:
-        return (document["name"], *8 * ("-",), "unreadable")
+        return (document["name"], *5 * ("-",), "unreadable")
     modules = list(document["modules"].values())
     rates = sorted(m["rate"] for m in modules if m["n_samples"])
     faults = sorted({fault for m in modules for fault in m["faults"]})
@@ -264,7 +292,6 @@ def _summary(document: Mapping[str, Any]) -> tuple[object, ...]:
         f"{rates[len(rates) // 2]:.1f}",
         f"{document['duration']:.2f}",
         sum(m["gaps"] for m in modules),
-        *(f"{sum(m['labels'][s] for m in modules) / len(modules):.2f}" for s in _label_states()),
         ", ".join(([] if document["complete"] else ["cut off"]) + [*faults, *found]) or "ok",
     )
 

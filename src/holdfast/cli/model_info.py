@@ -2,8 +2,6 @@
 
 from collections.abc import Iterator
 from pathlib import Path
-from shutil import get_terminal_size
-from textwrap import wrap
 from typing import TYPE_CHECKING, Any
 
 from holdfast.cli.terminal.console import print_json, print_table
@@ -11,8 +9,6 @@ from holdfast.cli.terminal.console import print_json, print_table
 if TYPE_CHECKING:
     from holdfast.model import FingerModel, Model
 
-LABEL_WIDTH = 14
-"""Columns of the table before the text."""
 N_NAMES = 3
 """Number of names that are printed of a long list."""
 
@@ -30,13 +26,7 @@ def print_model(path: Path, as_json: bool) -> None:
     if as_json:
         print_json(document)
         return
-    width = max(get_terminal_size().columns - LABEL_WIDTH, 30)
-    rows = [
-        (label if k == 0 else "", line)
-        for label, text in _rows(document)
-        for k, line in enumerate(wrap(text, width))
-    ]
-    print_table(("model", document["name"] or path.name), rows)
+    print_table(("model", document["name"] or path.name), _rows(document))
 
 
 def model_document(model: "Model") -> dict[str, Any]:

@@ -1,5 +1,6 @@
 """Detect contact states from a live source. `StreamDetector` reads it and owns the only clock."""
 
+import math
 import time
 from collections.abc import Iterator, Mapping
 from typing import NamedTuple
@@ -57,6 +58,8 @@ class StreamDetector:
         source: the source.
         fingers: sensor of each finger that the model uses.
         silent: True while no samples arrive.
+        start: time of the first estimate [s]; NaN before it. Clocks of devices count from 1970,
+            so that a person can read `change.time - detector.start` rather than `change.time`.
 
     Raises:
         ModelError: the source has none of the model's fingers, or another sensor; or the
@@ -94,6 +97,7 @@ class StreamDetector:
     ) -> None:
         self.source = source
         self.silent = False
+        self.start = math.nan
         self._detector = ArrivalDetector(
             model, source.sensors, strict=strict, ignore=ignore,
             watch_rate=isinstance(source, DeviceSource),
@@ -200,6 +204,8 @@ class StreamDetector:
         return self.source.paced and time.monotonic() - self._last_sample_at >= timeout
 
     def _update(self, arrival: Arrival | None, estimates: list[StreamEstimate]) -> StreamUpdate:
+        if estimates and math.isnan(self.start):
+            self.start = estimates[0].estimate.time
         events = [event for one in estimates for event in self._events(one.estimate)]
         return StreamUpdate(arrival, estimates, events)
 

@@ -30,15 +30,13 @@ from holdfast.plots.time_series import (
     draw_sigma,
     finger_series,
 )
-from holdfast.recordings import Recording, Tactile
+from holdfast.recordings import Recording, Tactile, shown_origin
 
 MM_PER_M = 1e3
 ROW_HEIGHTS = {"force": 1.75, "sigma": 0.9, "slip": 0.75}
 """Heights of the axes of a finger [inch]."""
 LEGEND_HEIGHT = 0.75
 MAX_FINGERS_IN_COLUMN = 3
-MAX_SHOWN_CLOCK = 1e5
-"""If a recording starts later than this, times are shown since its start [s]."""
 SHADE_ALPHA = 0.25
 MARKER_LETTER_WIDTH = 0.011
 """Width of a letter of a marker, as a fraction of the width of the axes."""
@@ -61,7 +59,7 @@ def plot_recording(
     """
     chosen = tare or Tare.parse(0.5)
     fingers = _fingers(recording)
-    origin = recording.start if abs(recording.start) > MAX_SHOWN_CLOCK else 0.0
+    origin = shown_origin(recording.start)
     curves = {
         name: _since(finger_series(recording, name, chosen, window), origin) for name in fingers
     }

@@ -1,4 +1,6 @@
+import io
 import json
+from contextlib import redirect_stdout
 
 import numpy as np
 import pytest
@@ -84,6 +86,63 @@ def test_json_refuses_other_objects():
 def test_table(capsys):
     print_table(("name", "rate"), [("a", 5), ("long", "-"), ("b", "12.5")])
     assert capsys.readouterr().out == "name  rate\na        5\nlong     -\nb     12.5\n"
+
+
+class TestWidth:
+    """Tables that are wider than the terminal."""
+
+    def test_headings_stand_above_their_numbers(self, capsys, monkeypatch):
+        monkeypatch.setenv("COLUMNS", "20")
+        print_table(("", "missed in 0.1 s", "n"), [("thumb", 7.5, 14), ("hand", "-", 3)])
+        assert capsys.readouterr().out == (
+            "       missed in\n           0.1 s   n\nthumb        7.5  14\nhand           -   3\n"
+        )
+
+    def test_text_is_wrapped_and_complete(self, capsys, monkeypatch):
+        monkeypatch.setenv("COLUMNS", "34")
+        print_table(("finger", "taxels"), [("thumb_distal_phalanx_of_the_left_hand", 30)])
+        assert capsys.readouterr().out == (
+            "finger                      taxels\n"
+            "thumb_distal_phalanx_of_        30\n"
+            "the_left_hand\n"
+        )
+
+    def test_a_table_that_fits_is_not_changed(self, capsys, monkeypatch):
+        monkeypatch.setenv("COLUMNS", "12")
+        print_table(("no name", "n s"), [("a", 1)])
+        assert capsys.readouterr().out == "no name  n s\na          1\n"
+
+    def test_numbers_are_never_cut(self, capsys, monkeypatch):
+        monkeypatch.setenv("COLUMNS", "10")
+        print_table(("a", "b"), [("x" * 30, 123456789.5), ("y", 1.0)])
+        lines = capsys.readouterr().out.splitlines()
+        assert lines[1] == f"{'x' * 12}  123456789.5"
+        assert "".join(line.split()[0] for line in lines[1:4]) == "x" * 30
+
+    @settings(deadline=None)
+    @given(
+        st.lists(st.text("ab-_/. ", max_size=300), min_size=1, max_size=5),
+        st.lists(st.integers(0, 10**6), min_size=1, max_size=4),
+    )
+    def test_every_table_of_few_columns_fits(self, names, numbers):
+        header = ("name", "notes of a person", *("number of samples",) * len(numbers))
+        text = printed_table(header, [(name, name[::-1], *numbers) for name in names])
+        lines = text.splitlines()
+        assert max(map(len, lines)) <= 80
+        assert sorted(text.replace(" ", "")) == sorted(
+            "".join(
+                str(cell)
+                for row in (header, *((name, name[::-1], *numbers) for name in names))
+                for cell in row
+            ).replace(" ", "")
+            + "\n" * len(lines)
+        )
+
+
+def printed_table(header, rows):
+    with redirect_stdout(io.StringIO()) as out:
+        print_table(header, rows)
+    return out.getvalue()
 
 
 def test_empty_table(capsys):

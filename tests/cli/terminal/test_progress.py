@@ -50,6 +50,31 @@ def test_costs_weigh_the_progress(capsys, clock):
     ]
 
 
+def test_no_remaining_time_before_three_percent(capsys, clock):
+    """The first steps of a long work include its start, such as imports."""
+    with ProgressBar("reading", 4000.0) as bar:
+        clock(61.0)
+        bar.advance()
+        clock(61.0)
+        bar.advance(118.0)
+        clock(61.0)
+        bar.advance()
+    assert capsys.readouterr().err.splitlines() == [
+        "reading: 0%",
+        "reading: 3%",
+        "reading: 3%, about 99 min left",
+    ]
+
+
+def test_no_remaining_time_before_three_seconds(clock):
+    bar = ProgressBar("reading", 10.0)
+    clock(2.9)
+    bar.advance(5.0)
+    assert math.isnan(bar._expected_duration())
+    clock(0.1)
+    assert bar._expected_duration() == pytest.approx(6.0)
+
+
 def test_a_bar_appears_before_the_first_step_is_done(capsys, monkeypatch):
     on_terminal(monkeypatch)
     monkeypatch.setattr(module, "DISPLAY_DELAY", 0.01)

@@ -5,7 +5,13 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from holdfast.cli.label.inputs import RuleOptions
-from holdfast.cli.terminal.console import print_json, print_line, print_message, print_table
+from holdfast.cli.terminal.console import (
+    print_json,
+    print_line,
+    print_message,
+    print_paragraph,
+    print_table,
+)
 from holdfast.cli.terminal.progress import progress
 
 if TYPE_CHECKING:
@@ -165,8 +171,9 @@ def _print(agreement: "Agreement") -> None:
             for finger, each in pooled.items()
         ]
     print_table(header, rows)
-    print_line(
-        "\nonset differences: B minus A, for onsets of instability in both; "
+    print_line()
+    print_paragraph(
+        "onset differences: B minus A, for onsets of instability in both; "
         "not in A, not in B: number of intervals that only the other has"
     )
 

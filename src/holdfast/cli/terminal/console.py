@@ -5,10 +5,16 @@ terminal: characters that are not printable are shown as escapes.
 """
 
 import sys
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from itertools import zip_longest
+from shutil import get_terminal_size
+from textwrap import fill, wrap
 
 MAX_ERROR_LENGTH = 2000
 """Number of characters of an error message that are printed."""
+MIN_TEXT_WIDTH = 12
+"""Width to which a column of text can shrink, if its longest cell is wider."""
+_GAP = "  "
 
 
 def visible(text: str, allowed: str = "\n") -> str:
@@ -77,8 +83,23 @@ def print_json(value: object) -> None:
     sys.stdout.write(f"{visible_json(text)}\n")
 
 
+def print_paragraph(text: str, first: str = "", later: str = "") -> None:
+    """Print a text on stdout in lines as wide as the terminal.
+
+    Args:
+        text: a text of one paragraph.
+        first: what the first line begins with.
+        later: what all other lines begin with.
+    """
+    width = get_terminal_size().columns
+    print_line(fill(visible(text), width, initial_indent=first, subsequent_indent=later))
+
+
 def print_table(header: Sequence[str], rows: Iterable[Sequence[object]]) -> None:
     """Print rows in aligned columns on stdout; columns of numbers are aligned right.
+
+    If the table is wider than the terminal (than 80 columns without one), headings and columns
+    of text are wrapped. Numbers are not.
 
     Example:
         >>> print_table(("sensor", "taxels"), [("gtac", 15), ("anyskin", 5)])
@@ -87,16 +108,68 @@ def print_table(header: Sequence[str], rows: Iterable[Sequence[object]]) -> None
         anyskin       5
     """
     lines = [[visible(str(cell), allowed="") for cell in row] for row in (header, *rows)]
-    columns = [_align(column) for column in zip(*lines, strict=True)]
-    for cells in zip(*columns, strict=True):
-        print_line("  ".join(cells).rstrip())
+    columns = list(zip(*lines, strict=True))
+    numeric = [all(_is_number(cell) for cell in column[1:]) for column in columns]
+    ranges = [_width_range(*both) for both in zip(columns, numeric, strict=True)]
+    widths = _fit(ranges, numeric)
+    for k, row in enumerate(lines):
+        cells = [_wrap(cell, width) for cell, width in zip(row, widths, strict=True)]
+        height = max(map(len, cells))
+        if k == 0 and any(numeric):  # a heading stands directly above its numbers
+            cells = [[""] * (height - len(cell)) + cell for cell in cells]
+        for parts in zip_longest(*cells, fillvalue=""):
+            print_line(_GAP.join(map(_align, parts, widths, numeric)).rstrip())
 
 
-def _align(column: Sequence[str]) -> list[str]:
-    width = max(len(cell) for cell in column)
-    if all(_is_number(cell) for cell in column[1:]):
-        return [cell.rjust(width) for cell in column]
-    return [cell.ljust(width) for cell in column]
+def _align(cell: str, width: int, numeric: bool) -> str:
+    return cell.rjust(width) if numeric else cell.ljust(width)
+
+
+def _width_range(column: Sequence[str], numeric: bool) -> tuple[int, int]:
+    """Return the smallest and the natural width of a column whose first cell is its heading."""
+    widest = max(map(len, column))
+    if not numeric:
+        return min(widest, MIN_TEXT_WIDTH), widest
+    return max(map(len, (*column[0].split(), *column[1:], ""))), widest
+
+
+def _fit(ranges: Sequence[tuple[int, int]], numeric: Sequence[bool]) -> list[int]:
+    """Return the widths of the columns of a table that fits the terminal, if it can.
+
+    The headings of numbers are wrapped first, because that makes only one row higher.
+    """
+    available = get_terminal_size().columns
+    widths = [max(least, min(widest, available)) for least, widest in ranges]
+    for _ in range(sum(widths) + len(_GAP) * (len(widths) - 1) - available):
+        room = [
+            (width > least and is_number, width - least)
+            for width, (least, _), is_number in zip(widths, ranges, numeric, strict=True)
+        ]
+        widths[room.index(max(room))] -= max(room)[1] > 0
+    return widths
+
+
+def _wrap(text: str, width: int) -> list[str]:
+    """Break a text between words, and a word that is too long after "_", "-", "/" or ".".
+
+    Example:
+        >>> _wrap("thumb_distal_phalanx of the left hand", 14)
+        ['thumb_distal_', 'phalanx of the', 'left hand']
+    """
+    if len(text) <= width:
+        return [text]
+    parts = (part for word in text.split(" ") for part in _split(word, width))
+    return wrap(" ".join(parts), width, break_on_hyphens=False)
+
+
+def _split(word: str, width: int) -> Iterator[str]:
+    """Yield the parts of a word, each at most `width` long."""
+    start = 0
+    while len(word) - start > width:
+        end = max(word.rfind(mark, start, start + width) for mark in "_-/.") + 1 or start + width
+        yield word[start:end]
+        start = end
+    yield word[start:]
 
 
 def _is_number(text: str) -> bool:

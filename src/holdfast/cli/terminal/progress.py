@@ -21,6 +21,12 @@ DISPLAY_DELAY = 2.0
 MESSAGE_INTERVAL = 60.0
 """Minimum time between two progress messages where stderr is no terminal [s]."""
 
+MIN_ESTIMATE_SHARE = 0.03
+"""Share of the work that must be done before the remaining time is estimated."""
+
+MIN_ESTIMATE_TIME = 3.0
+"""Time that the work must have taken before the remaining time is estimated [s]."""
+
 
 def progress(
     items: Iterable[T],
@@ -46,7 +52,9 @@ def progress(
 class ProgressBar:
     """Progress on stderr with the remaining time.
 
-    On a terminal it is a bar, elsewhere one message per minute. It appears after two seconds.
+    On a terminal it is a bar, elsewhere one message per minute. It appears after two seconds, and
+    the remaining time after three seconds and 3 % of the work. Stdout is not touched: it may be
+    a file or a pipe.
 
     Args:
         description: one or two words for the bar.
@@ -96,14 +104,16 @@ class ProgressBar:
         if self._total and now - self._last_message_at > MESSAGE_INTERVAL:
             self._last_message_at = now
             left = self._expected_duration() - (now - self._started_at)
-            share = self._done / self._total
-            print_message(f"{self._description}: {share:.0%}, about {left / 60:.0f} min left")
+            text = "" if math.isnan(left) else f", about {left / 60:.0f} min left"
+            print_message(f"{self._description}: {self._done / self._total:.0%}{text}")
 
     def _expected_duration(self) -> float:
-        """Return the expected time from start to end [s]; NaN if it is not known."""
-        if not self._done or not self._total:
+        """Return the expected time from start to end [s]; NaN if it is not known yet."""
+        taken = time.monotonic() - self._started_at
+        share = self._done / self._total if self._total else 0.0
+        if share < MIN_ESTIMATE_SHARE or taken < MIN_ESTIMATE_TIME:
             return math.nan
-        return (time.monotonic() - self._started_at) * self._total / self._done
+        return taken / share
 
 
 def _start_bar(description: str, total: float | None) -> "Progress":
@@ -125,6 +135,7 @@ def _start_bar(description: str, total: float | None) -> "Progress":
         TimeLeft(),
         console=Console(stderr=True),
         transient=True,
+        redirect_stdout=False,  # messages on stderr appear above the bar; data are left alone
     )
     bar.add_task(description, total=total, ends=math.nan)
     bar.start()

@@ -36,7 +36,12 @@ class StatusLine:
             from rich.console import Console
             from rich.live import Live
 
-            self._live = Live(console=Console(stderr=True), auto_refresh=False, transient=True)
+            self._live = Live(
+                console=Console(stderr=True),
+                auto_refresh=False,
+                transient=True,
+                redirect_stdout=False,
+            )
             self._live.start()
         else:
             self._next_update += MESSAGE_INTERVAL
