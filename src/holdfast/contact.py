@@ -124,8 +124,9 @@ class ContactEstimate(msgspec.Struct, frozen=True, gc=False):
             NaN without a full window.
         force: F_tip = (F_x, F_y, F_z) in the fingertip frame [unit of the readings].
         faults: faults of the readings, or of their arrival.
-        faulty_taxels: indices in the module, from 0, of the taxels that are faulty by
-            themselves; empty where the finger as a whole is faulty.
+        faulty_taxels: indices in the readings of the module, from 0, of the taxels that are
+            faulty by themselves; empty where the finger as a whole is faulty. Documents and
+            messages have the numbers of these taxels, from 1 (`sensors.taxel_numbers`).
         cause: the likely cause while UNSTABLE, for a model that tells causes apart; else None.
     """
 
@@ -353,7 +354,7 @@ def faults_of(mask: int) -> tuple[Fault, ...]:
 
 @lru_cache(maxsize=4096)
 def taxels_of(mask: int) -> tuple[int, ...]:
-    """Return the taxels whose bits are set in a mask; bit i is taxel i."""
+    """Return the indices, from 0, of the taxels whose bits are set in a mask."""
     return tuple(taxel for taxel in range(mask.bit_length()) if mask >> taxel & 1)
 
 

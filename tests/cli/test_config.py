@@ -8,7 +8,7 @@ model = "builtin:twin"
 host = "10.0.0.2:5000"
 sensor = "uskin-4x4"
 values = "calibrated"
-ignore = {index = [7, 12], thumb = [0]}
+ignore = {index = [7, 12], thumb = [1]}
 [fingers]
 1 = "thumb"
 2 = "index"
@@ -52,7 +52,7 @@ def test_a_verb_without_arguments_uses_the_file(folder, seen):
     assert seen == {
         "model": "builtin:twin",
         "source": "xela://10.0.0.2:5000?fingers=1:thumb,2:index&sensor=uskin-4x4&values=calibrated",
-        "ignore": "index:7,index:12,thumb:0",
+        "ignore": "index:7,index:12,thumb:1",
     }
 
 
@@ -133,7 +133,8 @@ def test_files_are_beside_the_configuration(folder):
         ("host = ", "is not TOML: Invalid value"),
         ('host = "a"\nsource = "b"', "source or host expected, both given"),
         ('[fingers]\nthumb = "1"', "the number of a module, 'thumb' given"),
-        ("ignore = {index = [-1]}", "taxels from 0 expected"),
+        ("ignore = {index = [-1]}", "ignore: taxels from 1 expected, -1 given for index"),
+        ("ignore = {index = [7, 0]}", "ignore: taxels from 1 expected, 0 given for index"),
     ],
 )  # fmt: skip
 def test_a_wrong_file_is_one_line(folder, seen, capsys, text, message):

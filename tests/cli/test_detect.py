@@ -6,6 +6,7 @@ from dataclasses import replace
 
 import msgspec
 import numpy as np
+import pyarrow.parquet as pq
 import pytest
 
 from holdfast.classifiers import LinearClassifier
@@ -106,7 +107,7 @@ def plain(estimate):
         "instability": sigma,
         "force": force,
         "faults": [fault.value for fault in estimate.faults],
-        "faulty_taxels": list(estimate.faulty_taxels),
+        "faulty_taxels": [taxel + 1 for taxel in estimate.faulty_taxels],
         "cause": estimate.cause,
     }
 
@@ -217,6 +218,48 @@ class TestSummary:
         assert summary(capsys, path, grasp, "--raw")["events"] == raw
 
 
+class TestNumbersOfTaxels:
+    """Taxels are counted from 1 everywhere, as in the columns of files."""
+
+    @pytest.fixture
+    def spoilt(self, save):
+        """A grasp in which taxels 1, 7 and 30 of the index, by the file, are not numbers."""
+        recording = synthetic_recording("spoilt", 1, ("index",))
+        module = recording.modules["index"]
+        path = save(Recording("spoilt", {"index": module}), "whole.parquet")
+        names = pq.read_schema(path).names
+        assert {"index.t01.x", "index.t07.x", "index.t30.x"} < set(names)
+        assert "index.t00.x" not in names
+        readings = module.readings.astype(float)
+        for column in ("index.t01.x", "index.t07.x", "index.t30.x"):
+            taxel = [name for name in names if name.endswith(".x")].index(column)
+            readings[300:, taxel] = np.nan
+        return save(Recording("spoilt", {"index": replace(module, readings=readings)}))
+
+    def test_lines_have_the_numbers_of_the_file(self, capsys, model, spoilt):
+        got, _ = lines(capsys, model, spoilt)
+        assert {tuple(line["faulty_taxels"]) for line in got[320:]} == {(1, 7, 30)}
+
+    def test_the_numbers_are_those_of_the_option(self, capsys, model, spoilt):
+        got, _ = lines(capsys, model, spoilt, "--ignore", "index:1,index:7,index:30")
+        assert {tuple(line["faulty_taxels"]) for line in got} == {()}
+        assert {tuple(line["faults"]) for line in got} == {()}
+
+    def test_the_numbers_are_those_of_the_configuration(
+        self, capsys, model, spoilt, tmp_path, monkeypatch
+    ):
+        config = tmp_path / "holdfast.toml"
+        config.write_text("ignore = {index = [1, 7, 30]}")
+        monkeypatch.setenv("HOLDFAST_CONFIG", str(config))
+        got, _ = lines(capsys, model, spoilt)
+        assert {tuple(line["faulty_taxels"]) for line in got} == {()}
+
+    def test_the_numbers_are_those_of_the_sensor(self, capsys):
+        assert main(["sensors", "uskin-curved"]) == 0
+        rows = capsys.readouterr().out.splitlines()[-30:]
+        assert [int(row.split()[0]) for row in rows] == list(range(1, 31))
+
+
 class TestRate:
     @pytest.fixture
     def slow(self, save):
@@ -310,8 +353,12 @@ def test_refusals(capsys, model, grasp, save, tmp_path):
         "--ignore: FINGER:TAXEL,... expected, '7' given"
     )
     assert refusal(capsys, model, grasp, "--ignore", "index:99") == (
-        "index: taxel 99 to be ignored; it has the taxels 0 to 29"
+        "index: taxel 99 to be ignored; it has the taxels 1 to 30"
     )
+    for taxel in (0, 31):
+        assert refusal(capsys, model, grasp, "--ignore", f"index:3,index:{taxel}") == (
+            f"index: taxel {taxel} to be ignored; it has the taxels 1 to 30"
+        )
     assert refusal(capsys, model, grasp, "--debounce=-1") == (
         "a duration of at least 0 s expected, -1.0 given"
     )

@@ -87,10 +87,46 @@ def test_new_labels_do_not_hide_training_recordings(capsys, folder, tmp_path):
     assert len(json.loads(out)["trained_on"]) == 1
 
 
+def mixed(folder, place, *, labels=True):
+    """A folder with a recording that the model was trained on, and one that is new."""
+    save_recording(load_dataset(folder / "seen")[0], place / "seen.parquet")
+    new = load_dataset(folder / "new")[0]
+    save_recording(new if labels else new.with_labels({}), place / "new.parquet")
+    return place
+
+
+def test_no_verdict_on_training_recordings(capsys, folder):
+    _, out, _ = run(capsys, folder / "model.json", folder / "seen", "--json")
+    assert json.loads(out)["verdict"] is None
+    _, out, _ = run(capsys, folder / "model.json", folder / "seen")
+    assert " ".join(out.split()).startswith(
+        "No verdict: the model was trained on 2 of these 2 recordings. It needs labelled "
+        "recordings that the model has not seen. by sample"
+    )
+
+
+def test_the_verdict_is_from_unseen_recordings_only(capsys, folder, tmp_path):
+    model = folder / "model.json"
+    _, out, _ = run(capsys, model, mixed(folder, tmp_path), "--json")
+    _, alone, _ = run(capsys, model, tmp_path / "new.parquet", "--json")
+    assert json.loads(out)["verdict"] == (
+        json.loads(alone)["verdict"]
+        + " From 1 of 2 recordings: the model was trained on the others."
+    )
+    assert len(json.loads(out)["recordings"]) == 2
+
+
+def test_no_verdict_if_the_unseen_recordings_have_no_labels(capsys, folder, tmp_path):
+    place = mixed(folder, tmp_path, labels=False)
+    _, out, _ = run(capsys, folder / "model.json", place, "--json")
+    assert json.loads(out)["verdict"] is None
+
+
 def test_one_recording_and_the_table(capsys, folder):
     code, out, _ = run(capsys, folder / "model.json", folder / "new" / "grasp-2.parquet")
     assert code == 0
-    assert "AUC in contact" in out
+    assert out.index("AUC in contact") < out.index("AUC of all") < out.index("thumb")
+    assert "AUC of all: also against no contact" in out
     assert out.endswith(f"{folder / 'model.json'} on 1 recordings\n")
 
 

@@ -3,9 +3,11 @@ import math
 import re
 
 import pytest
+from matplotlib.axes import Axes
 
 from holdfast.cli import main
 from holdfast.cli.sensors import _ranges
+from holdfast.plots.sensors import plot_hand, plot_sensor
 from holdfast.sensors import Sensor, built_in_hands, built_in_sensors, hand, sensor
 
 URDF = """<robot name="finger"><link name="tip"/>
@@ -83,6 +85,26 @@ def test_plots(name, suffix, magic, capsys, tmp_path):
     shown(capsys, name, "--plot", plot)
     assert plot.read_bytes().startswith(magic)
     assert list(tmp_path.iterdir()) == [plot]
+
+
+@pytest.mark.parametrize("name", ["uskin-curved", "allegro-uskin"])
+def test_plots_have_the_numbers_of_taxels(name, monkeypatch):
+    texts = []
+    write = Axes.text
+
+    def seen(axes, x, y, text, **given):
+        texts.append(text)
+        return write(axes, x, y, text, **given)
+
+    monkeypatch.setattr(Axes, "text", seen)
+    if name in built_in_hands():
+        plot_hand(hand(name))
+        sizes = [module.sensor.n_taxels for module in hand(name).modules.values()]
+    else:
+        plot_sensor(sensor(name))
+        sizes = [sensor(name).n_taxels]
+    numbers = [int(text) for text in texts if text.isdecimal()]
+    assert numbers == [number for size in sizes for number in range(1, size + 1)]
 
 
 def test_plots_a_sensor_of_one_oblique_taxel(capsys, tmp_path):

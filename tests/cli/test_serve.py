@@ -165,6 +165,10 @@ def test_refusals(capsys, grasp, tmp_path):
     )
     assert "port" in refusal(capsys, MODEL, grasp, "--port", 99999)
     assert refusal(capsys, MODEL, grasp, "--ignore", "index").startswith("--ignore: FINGER:TAXEL")
+    for taxel in (0, 31):
+        assert refusal(capsys, MODEL, grasp, "--ignore", f"thumb:1,thumb:{taxel}") == (
+            f"thumb: taxel {taxel} to be ignored; it has the taxels 1 to 30"
+        )
 
 
 class TestHand:

@@ -3,7 +3,7 @@ import json
 import pytest
 
 from holdfast.cli import main
-from holdfast.io import save_recording
+from holdfast.io import load_dataset, save_recording
 from holdfast.model import Model
 from holdfast.synthetic import synthetic_recording
 from holdfast.training import Setting, train
@@ -64,6 +64,16 @@ def test_json_and_info(capsys, folder, tmp_path):
     assert document["tuning"]["recordings"] == ["grasp-0", "grasp-1"]
     assert document["training"]["recordings"] == ["grasp-2", "grasp-3"]
     assert set(document["fingers"]) == set(FINGERS)
+
+
+def test_no_verdict_on_training_recordings(capsys, folder, tmp_path):
+    model, data = tmp_path / "model.json", folder / "data"
+    train(load_dataset(data), Setting(trials=0)).model.save(model)
+    words = ["tune", model, data, "--false-alarms", 30, "-o"]
+    assert json.loads(run(capsys, *words, tmp_path / "a.json", "--json")[1])["verdict"] is None
+    _, out, err = run(capsys, *words, tmp_path / "b.json")
+    assert out.startswith("No verdict: the model was trained on 2 of these 2 recordings.")
+    assert "their metrics are optimistic" in err
 
 
 def test_what_exists_is_kept(capsys, folder, tmp_path):

@@ -420,8 +420,14 @@ class TestIgnore:
         ("ignore", "message"),
         [
             ({"ring": [0]}, "taxels of 'ring' to be ignored; the model is for thumb"),
-            ({"thumb": [0, 6]}, "thumb: taxel 6 to be ignored; it has the taxels 0 to 5"),
-            ({"thumb": [-1]}, "thumb: taxel -1 to be ignored; it has the taxels 0 to 5"),
+            (
+                {"thumb": [0, 6]},
+                "thumb: taxel index 6 to be ignored; it has the indices 0 to 5",
+            ),
+            (
+                {"thumb": [-1]},
+                "thumb: taxel index -1 to be ignored; it has the indices 0 to 5",
+            ),
         ],
     )
     def test_refuses_unknown_fingers_and_taxels(self, ignore, message):

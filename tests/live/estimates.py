@@ -21,7 +21,7 @@ def finger(state=ContactState.STABLE, **given):
 
 def estimate(time=7.0, **fingers):
     """Estimate of a thumb in newtons with a dead taxel, and a pad of the index in counts."""
-    thumb = finger(faults=(Fault.DEAD,), faulty_taxels=(3, 7))
+    thumb = finger(faults=(Fault.DEAD,), faulty_taxels=(3, 7))  # indices
     pad = finger(ContactState.UNSTABLE, force=(100.0, 0.0, -5.5))
     both = {"thumb": thumb, "index/1": pad} | fingers
     both = {name: msgspec.structs.replace(one, time=time) for name, one in both.items()}
@@ -89,5 +89,5 @@ def check_received(received):
         "state": "STABLE",
         "reason": "",
         "faults": "dead",
-        "faulty_taxels": "3, 7",
+        "faulty_taxels": "4, 8",
     }

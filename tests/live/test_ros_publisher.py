@@ -156,6 +156,10 @@ class TestDiagnostics:
         assert (found["thumb"].level, found["thumb"].message) == (WARN, "dead")
         assert (found["hand"].level, found["hand"].message) == (WARN, "problem of thumb")
 
+    def test_faulty_taxels_are_numbers_from_1(self):
+        assert estimate().fingers["thumb"].faulty_taxels == (3, 7)  # indices
+        assert dict(self.of()["thumb"].values)["faulty_taxels"] == "4, 8"
+
     @pytest.mark.parametrize(
         ("reason", "faults", "published"),
         [

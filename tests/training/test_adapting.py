@@ -165,6 +165,9 @@ def test_warn_of_recordings_that_the_model_was_trained_on(known, few):
     ]
     assert set(known.training.recordings.values()) <= set(adapted.training.recordings.values())
     assert adapted.training.recordings["grasp-30"] == seen.digest
+    trained = train([seen, *few], Setting.adapting(known, trials=0))
+    assert (trained.known, trained.verdict) == (("grasp-30",), None)
+    assert train(few, Setting.adapting(known, trials=0)).verdict is not None
     assert adapted.training.recordings["grasp-41 (init)"] == tiny_recording(41).digest
 
 

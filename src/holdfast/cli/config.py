@@ -25,7 +25,7 @@ class Config(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
         fingers: name of each module by its number.
         sensor: name of a built-in sensor, or a JSON file; for devices that do not name theirs.
         values: `counts` or `calibrated`.
-        ignore: taxels to ignore by finger, counted from 0.
+        ignore: taxels to ignore by finger, counted from 1.
     """
 
     model: str | None = None
@@ -123,8 +123,20 @@ def _check(config: Config, path: Path) -> None:
         raise ValueError(
             f'{path}: fingers: 1 = "thumb" expected, the number of a module, {wrong[0]!r} given'
         )
-    if any(taxel < 0 for taxels in config.ignore.values() for taxel in taxels):
-        raise ValueError(f"{path}: ignore: taxels from 0 expected")
+    if config.ignore:
+        _check_ignored(config.ignore, path)
+
+
+def _check_ignored(ignored: dict[str, list[int]], path: Path) -> None:
+    from holdfast.sensors.taxel_numbers import FIRST_TAXEL
+
+    for finger, taxels in ignored.items():
+        for taxel in taxels:
+            if taxel < FIRST_TAXEL:
+                raise ValueError(
+                    f"{path}: ignore: taxels from {FIRST_TAXEL} expected, {taxel} given for "
+                    f"{finger}"
+                )
 
 
 def _beside(path: Path, value: str) -> str:

@@ -157,11 +157,11 @@ def _detect_recording(
     detector = None
     for part in _read_parts(model, path, rate):
         if detector is None:
-            detector = Detector.for_recording(model, part, ignore=parse_taxels(ignore))
+            sensors = {name: module.sensor for name, module in part.modules.items()}
+            taxels = parse_taxels(ignore, sensors)
+            detector = Detector.for_recording(model, part, ignore=taxels)
             report_missing_fingers(model, part.name, part.modules)
-            readings = ReadingsMonitor(
-                model.fingers_of({name: m.sensor for name, m in part.modules.items()})
-            )
+            readings = ReadingsMonitor(model.fingers_of(sensors))
         for notice in readings.update_recording(part):
             print_message(notice)
         yield chunk_from_detection(detector.run(part))

@@ -21,6 +21,7 @@ from holdfast.contact import (
 )
 from holdfast.detector import HAND
 from holdfast.recordings import shown_origin
+from holdfast.sensors import taxel_numbers
 
 if TYPE_CHECKING:
     from holdfast.detector import Detection
@@ -68,7 +69,10 @@ def chunk_from_stream(name: str, estimates: Iterable["StreamEstimate"]) -> Estim
 
 
 class EstimateLine(Struct, gc=False):
-    """One JSON line: the estimate of a finger at a sample; NaN becomes null."""
+    """One JSON line: the estimate of a finger at a sample; NaN becomes null.
+
+    Taxels are numbers, from 1.
+    """
 
     time: float
     finger: str
@@ -87,7 +91,7 @@ def json_lines(chunk: EstimateChunk) -> Iterator[str]:
     lines = [
         EstimateLine(
             one.time, finger, one.state, one.reason, one.stable_probability, one.instability,
-            one.force, one.faults, one.faulty_taxels, one.cause,
+            one.force, one.faults, taxel_numbers(one.faulty_taxels), one.cause,
         )
         for finger, estimates in chunk.fingers.items()
         for one in estimates

@@ -29,6 +29,11 @@ if TYPE_CHECKING:
     from holdfast.metrics import EventMetrics, Intervals, Metrics, SampleMetrics
 
 PERCENT_FIELDS = ("accuracy", "fdr", "fpr", "fnr")
+AUC_NOTE = (
+    "AUC in contact: stable against unstable. AUC of all: also against no contact,\n"
+    "where the force decides, not the probability."
+)
+"""Explanation of the two AUCs below their table."""
 
 
 def evaluate(
@@ -45,9 +50,9 @@ def evaluate(
 
     Print metrics by sample (accuracy, FDR, FPR, FNR, AUC) and by event (missed events, detection
     delay, false alarms), for each finger and for the hand, with bootstrap intervals over the
-    recordings. A sentence before them says what the model is good for. Recordings that the model
-    was trained on are named, because their metrics are optimistic. The figure shows errors and
-    delays.
+    recordings. A sentence before them says what the model is good for, from the recordings that
+    it was not trained on. The others are named, because their metrics are optimistic. The figure
+    shows errors and delays.
 
     Example:
       holdfast evaluate model.json recordings/
@@ -60,7 +65,7 @@ def evaluate(
     from holdfast.io import load_dataset
     from holdfast.model import Model
     from holdfast.training.evaluation import evaluate_recordings
-    from holdfast.training.verdict import verdict
+    from holdfast.training.verdict import no_verdict
 
     if plot is not None:
         check_plot(plot, force)
@@ -78,12 +83,11 @@ def evaluate(
         from holdfast.plots.evaluation import draw_evaluation
 
         save_plot(draw_evaluation(metrics, found.decisions), plot, force)
-    sentence = verdict(metrics, found.tares)
     if as_json:
-        document = {"trained_on": found.trained_on, "verdict": sentence}
+        document = {"trained_on": found.trained_on, "verdict": found.verdict}
         print_json({**msgspec.to_builtins(metrics), **document})
         return
-    print_verdict(sentence)
+    print_verdict(found.verdict or no_verdict(len(found.trained_on), len(recordings)))
     print_metrics(metrics)
     print_line(f"\n{model} on {len(recordings)} recordings")
 
@@ -109,9 +113,10 @@ def print_metrics(metrics: "Metrics") -> None:
     rows = [_sample_row(name, finger) for name, finger in metrics.fingers.items()]
     print_line("by sample")
     print_table(
-        ("", "n", "accuracy %", "FDR %", "FPR %", "FNR %", "AUC", "AUC in contact"),
+        ("", "n", "accuracy %", "FDR %", "FPR %", "FNR %", "AUC in contact", "AUC of all"),
         [*rows, _sample_row("all", metrics.pooled)],
     )
+    print_line(AUC_NOTE)
     print_line(f"\nby event (onset of instability in a held contact, {_onsets(metrics)})")
     events = [*metrics.events.fingers.items(), ("hand", metrics.events.hand)]
     print_table(
@@ -133,7 +138,7 @@ def _onsets(metrics: "Metrics") -> str:
 
 def _sample_row(name: str, metrics: "SampleMetrics") -> tuple[str, ...]:
     percents = (_format(getattr(metrics, field), 1) for field in PERCENT_FIELDS)
-    aucs = (_format(metrics.auc, 3), _format(metrics.auc_contact, 3))
+    aucs = (_format(metrics.auc_contact, 3), _format(metrics.auc, 3))
     return name, str(metrics.n), *percents, *aucs
 
 
@@ -150,8 +155,13 @@ def _event_row(name: str, metrics: "EventMetrics") -> tuple[str, ...]:
 def _print_intervals(intervals: "Intervals") -> None:
     parts = [
         f"{name} {_format(low, digits)} to {_format(high, digits)}"
-        for name, digits in (("accuracy", 1), ("fdr", 1), ("fnr", 1), ("auc", 3))
-        if (interval := getattr(intervals, name)) is not None
+        for name, field, digits in (
+            ("accuracy", "accuracy", 1),
+            ("FDR", "fdr", 1),
+            ("FNR", "fnr", 1),
+            ("AUC in contact", "auc_contact", 3),
+        )
+        if (interval := getattr(intervals, field)) is not None
         for low, high in [interval]
     ]
     groups = "" if intervals.n_groups is None else f" in {intervals.n_groups} groups"

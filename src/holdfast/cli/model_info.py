@@ -100,8 +100,11 @@ def _contact(part: dict[str, Any]) -> str:
 
 
 def _trained(training: dict[str, Any]) -> str:
-    auc = training["figures"].get("auc")
-    figure = "" if auc is None else f"; AUC {auc:.3f} out of fold, by {training['split']}"
+    figures = training["figures"]
+    name, auc = "AUC in contact", figures.get("auc_contact")
+    if auc is None:
+        name, auc = "AUC of all", figures.get("auc")
+    figure = "" if auc is None else f"; {name} {auc:.3f} out of fold, by {training['split']}"
     names = training["recordings"]
     return f"{len(names)} recordings ({_few(names)}){figure}"
 

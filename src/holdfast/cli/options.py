@@ -17,6 +17,7 @@ if TYPE_CHECKING:
     from holdfast.live.stream_detector import StreamDetector
     from holdfast.model import Model
     from holdfast.parallel import Engine
+    from holdfast.sensors import Sensor
     from holdfast.sources import Source
 
 TOKEN_VARIABLE = "HOLDFAST_TOKEN"
@@ -107,7 +108,7 @@ RawOption = Annotated[
 ]
 IgnoreOption = Annotated[
     str,
-    typer.Option("--ignore", help="Taxels to ignore, counted from 0: index:7,index:12."),
+    typer.Option("--ignore", help="Taxels to ignore, counted from 1: index:7,index:12."),
 ]
 SpeedOption = Annotated[
     float,
@@ -238,9 +239,8 @@ def create_stream_detector(
     """Create the detector of an open source, and report fingers that the source lacks."""
     from holdfast.live.stream_detector import StreamDetector
 
-    stream = StreamDetector(
-        model, source, strict=rate is RatePolicy.STRICT, ignore=parse_taxels(ignore)
-    )
+    taxels = parse_taxels(ignore, source.sensors)
+    stream = StreamDetector(model, source, strict=rate is RatePolicy.STRICT, ignore=taxels)
     report_missing_fingers(model, source.name, source.sensors)
     return stream
 
@@ -255,23 +255,42 @@ def report_missing_fingers(model: "Model", name: str, modules: Mapping[str, obje
         )
 
 
-def parse_taxels(text: str) -> dict[str, tuple[int, ...]]:
-    """Return the taxels of each finger from the text of `--ignore`.
+def parse_taxels(text: str, sensors: Mapping[str, "Sensor"]) -> dict[str, tuple[int, ...]]:
+    """Return the indices of the taxels of each finger from the text of `--ignore`.
+
+    Args:
+        text: FINGER:TAXEL,... with the numbers of the taxels, from 1.
+        sensors: of the modules. The taxels of other fingers are not checked.
 
     Raises:
-        ValueError: the text is not FINGER:TAXEL,...
+        ValueError: the text is not FINGER:TAXEL,..., or a sensor has no such taxel.
 
     Example:
-        >>> parse_taxels("index:7,index:12,thumb:0")
-        {'index': (7, 12), 'thumb': (0,)}
+        >>> from holdfast.sensors import sensor
+        >>> parse_taxels("index:7,index:12,thumb:1", {"index": sensor("uskin-4x4")})
+        {'index': (6, 11), 'thumb': (0,)}
     """
+    from holdfast.sensors import taxel_index
+
     taxels: dict[str, tuple[int, ...]] = {}
     for part in filter(None, text.split(",")):
         finger, _, number = part.strip().rpartition(":")
         if not (finger and number.isdecimal()):
             raise ValueError(f"--ignore: FINGER:TAXEL,... expected, {text!r} given")
-        taxels[finger] = (*taxels.get(finger, ()), int(number))
+        if finger in sensors:
+            _check_taxel(finger, int(number), sensors[finger].n_taxels)
+        taxels[finger] = (*taxels.get(finger, ()), taxel_index(int(number)))
     return taxels
+
+
+def _check_taxel(finger: str, number: int, n_taxels: int) -> None:
+    from holdfast.sensors import taxel_number
+
+    first, last = taxel_number(0), taxel_number(n_taxels - 1)
+    if not first <= number <= last:
+        raise ValueError(
+            f"{finger}: taxel {number} to be ignored; it has the taxels {first} to {last}"
+        )
 
 
 def check_speed(source: str, speed: float) -> None:

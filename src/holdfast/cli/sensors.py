@@ -41,7 +41,7 @@ def sensors(
     """List the known sensors and hands, or show one of them.
 
     For a sensor: its taxels, unit, rate, limits and normal. For a hand: its modules and their
-    indices in the flat packet. The figure shows the taxels.
+    indices in the flat packet, from 0. The figure shows the taxels with their numbers, from 1.
 
     --template prints the file of a sensor of your own: a flat grid, row by row from the top left,
     with z along the outward normal (docs/sensors.md).
@@ -208,6 +208,8 @@ def _hand_summary(hand: "Hand") -> dict[str, Any]:
 
 
 def _print_sensor(sensor: "Sensor") -> None:
+    from holdfast.sensors import taxel_number
+
     limits = "unknown" if sensor.limits is None else "{:g} to {:g}".format(*sensor.limits)
     normal = ", ".join(f"{value:.3g}" for value in sensor.normal)
     print_table(
@@ -222,7 +224,11 @@ def _print_sensor(sensor: "Sensor") -> None:
     )
     print_line()
     rows = [
-        (k + 1, *(f"{1e3 * p:.1f}" for p in position), *(f"{z:.2f}" for z in rotation[:, 2]))
+        (
+            taxel_number(k),
+            *(f"{1e3 * p:.1f}" for p in position),
+            *(f"{z:.2f}" for z in rotation[:, 2]),
+        )
         for k, (position, rotation) in enumerate(
             zip(sensor.positions, sensor.rotations, strict=True)
         )
@@ -235,7 +241,7 @@ def _print_hand(hand: "Hand") -> None:
         (name, m.sensor.name, m.sensor.n_taxels, m.link, _ranges(m.flat_indices.tolist()))
         for name, m in hand.modules.items()
     ]
-    print_table(("module", "sensor", "taxels", "link", "flat indices"), rows)
+    print_table(("module", "sensor", "taxels", "link", "flat indices, from 0"), rows)
 
 
 def _ranges(indices: list[int]) -> str:

@@ -133,6 +133,7 @@ def train(
     from holdfast.io import load_dataset
     from holdfast.labelling.review.findings import report_hidden_labels
     from holdfast.training import train as fit
+    from holdfast.training.verdict import no_verdict
 
     setting = _setting(
         init,
@@ -175,7 +176,9 @@ def train(
             }
         )
         return
-    print_verdict(trained.verdict)
+    print_verdict(
+        trained.verdict or no_verdict(len(trained.known), len(recordings), "the model of --init")
+    )
     print_metrics(trained.cross_validation)
     print_line(
         f"\n{model}: trained on {len(recordings)} recordings; "

@@ -46,7 +46,7 @@ def tune(
     from holdfast.model import Model
     from holdfast.training import tune as choose
     from holdfast.training.evaluation import was_trained_on
-    from holdfast.training.verdict import verdict_of_events
+    from holdfast.training.verdict import no_verdict, verdict_of_events
 
     refuse_overwrite(out, force=force)
     loaded = Model.load(model)
@@ -62,11 +62,11 @@ def tune(
     tuned = choose(loaded, recordings, false_alarms, progress=with_progress)
     warn_about_training(trained_on, len(recordings))
     tuned.model.save(out, force=force)
-    sentence = verdict_of_events(tuned.chosen.events)
+    sentence = None if trained_on else verdict_of_events(tuned.chosen.events)
     if as_json:
         print_json(_document(tuned, out, sentence, trained_on))
         return
-    print_verdict(sentence)
+    print_verdict(sentence or no_verdict(len(trained_on), len(recordings)))
     _print_points(tuned)
     print_line(
         f"\n{out}: STABLE from a probability of {tuned.chosen.threshold:.3g} on, was "
@@ -74,7 +74,9 @@ def tune(
     )
 
 
-def _document(tuned: "Tuned", out: Path, sentence: str, trained_on: list[str]) -> dict[str, object]:
+def _document(
+    tuned: "Tuned", out: Path, sentence: str | None, trained_on: list[str]
+) -> dict[str, object]:
     return {
         "model": out,
         "verdict": sentence,

@@ -46,7 +46,7 @@ class FingerTrace(NamedTuple):
         instability: (n,) sigma [unit of the readings].
         force: (n, 3) F_tip in the fingertip frame [unit of the readings].
         faults: (n,) bits in the order of `Fault`.
-        faulty_taxels: (n,) bit i is set if taxel i is faulty by itself.
+        faulty_taxels: (n,) bit i is set if the taxel at index i is faulty by itself.
         cause: (n,) codes of the causes while UNSTABLE: 1 is the first of `Cause`; 0 for none.
     """
 

@@ -63,7 +63,7 @@ class Detector:
             the model names.
         rate: samples per second of the source [Hz], for a model of any rate; by default the
             rate of the first sensor.
-        ignore: taxels by finger, from 0, that contribute nothing and cause no fault.
+        ignore: indices by finger, from 0, of taxels that contribute nothing and cause no fault.
 
     Raises:
         ModelError: the model is for any finger and `fingers` is missing; a finger has another
@@ -106,7 +106,7 @@ class Detector:
             model: features, classifiers and decision rule.
             recording: the recording; or its first part, if `run` receives it in parts. A tare by
                 interval then needs that interval in the first part.
-            ignore: taxels by finger, from 0, that contribute nothing and cause no fault.
+            ignore: indices by finger, from 0, of taxels that contribute nothing and cause no fault.
 
         Raises:
             ModelError: the recording has none of the model's fingers, or another sensor.
@@ -358,6 +358,7 @@ def _ignoring(plan: StreamPlan, ignore: IgnoredTaxels | None) -> StreamPlan:
         for taxel in taxels:
             if not 0 <= taxel < n_taxels:
                 raise ValueError(
-                    f"{finger}: taxel {taxel} to be ignored; it has the taxels 0 to {n_taxels - 1}"
+                    f"{finger}: taxel index {taxel} to be ignored; "
+                    f"it has the indices 0 to {n_taxels - 1}"
                 )
     return replace(plan, ignore=ignore or {})

@@ -76,7 +76,7 @@ class StreamPlan:
         window: N_w of the sigma that is reported [samples].
         tare: how the baseline is found.
         rate: samples per second [Hz].
-        ignore: taxels by finger, from 0, that contribute nothing and cause no fault.
+        ignore: indices by finger, from 0, of taxels that contribute nothing and cause no fault.
     """
 
     sensors: Mapping[str, Sensor]

@@ -36,6 +36,7 @@ from holdfast.io.timed_arrays import (
     time_spans,
 )
 from holdfast.recordings import Recording
+from holdfast.sensors import taxel_numbers
 from holdfast.sensors.types import Array
 
 HEADER_KEY = "holdfast.header"
@@ -254,7 +255,7 @@ def _column_names(spec: ArraySpec) -> list[str]:
     if spec.track != "truth":
         n_taxels = spec.shape[0]
         width = max(2, len(str(n_taxels)))
-        taxels = [f"t{taxel + 1:0{width}d}" for taxel in range(n_taxels)]
+        taxels = [f"t{number:0{width}d}" for number in taxel_numbers(range(n_taxels))]
         return [f"{spec.column}.{taxel}.{axis}" for taxel, axis in product(taxels, "xyz")]
     places = product(*(range(size) for size in spec.shape))
     return [".".join([spec.column, *map(str, place)]) for place in places]

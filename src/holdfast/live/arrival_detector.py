@@ -59,7 +59,7 @@ class ArrivalDetector:
         model: with a tare that can be taken live.
         sensors: of the source, by module.
         strict: refuse a rate that is not the model's instead of resampling.
-        ignore: taxels by finger, from 0, that contribute nothing and cause no fault.
+        ignore: indices by finger, from 0, of taxels that contribute nothing and cause no fault.
         watch_rate: report the fault RATE while a finger has another rate than at the start.
 
     Attributes:

@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, NamedTuple
 from holdfast.contact import ContactEstimate, ContactState, HandEstimate, Reason
 from holdfast.live.grip import Grip, GripDocument
 from holdfast.openable import Openable
+from holdfast.sensors import taxel_numbers
 from holdfast.sensors.types import Unit
 
 if TYPE_CHECKING:
@@ -315,7 +316,7 @@ def _diagnostic(name: str, finger: ContactEstimate) -> DiagnosticStatus:
         ("state", str(finger.state)),
         ("reason", str(finger.reason)),
         ("faults", faults),
-        ("faulty_taxels", ", ".join(map(str, finger.faulty_taxels))),
+        ("faulty_taxels", ", ".join(map(str, taxel_numbers(finger.faulty_taxels)))),
     )
     return DiagnosticStatus(
         name, level, faults or (str(finger.reason) if is_lost else "well"), values

@@ -15,7 +15,7 @@ from holdfast.live.session import Session
 from holdfast.live.stream_detector import StreamUpdate
 from holdfast.live.web import schema
 from holdfast.model import Model
-from holdfast.sensors import Sensor
+from holdfast.sensors import Sensor, taxel_numbers
 
 MAX_BUFFERED_UPDATES = 4096
 """Maximum number of updates between two documents; older ones are dropped."""
@@ -180,7 +180,7 @@ def finger_document(
         instability=estimate.instability,
         force=estimate.force,
         faults=estimate.faults,
-        faulty_taxels=estimate.faulty_taxels,
+        faulty_taxels=taxel_numbers(estimate.faulty_taxels),
         cause=estimate.cause,
         taxels=taxels,
     )

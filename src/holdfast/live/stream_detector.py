@@ -52,7 +52,7 @@ class StreamDetector:
         model: with a tare that can be taken live.
         source: an open source.
         strict: refuse a rate that is not the model's instead of resampling.
-        ignore: taxels by finger, from 0, that contribute nothing and cause no fault.
+        ignore: indices by finger, from 0, of taxels that contribute nothing and cause no fault.
 
     Attributes:
         source: the source.

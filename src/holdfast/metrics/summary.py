@@ -211,7 +211,7 @@ def summarise_results(
         seed: as in `summarise`.
         level: as in `summarise`.
     """
-    total = _Total()
+    total = ResultTotal()
     for each in results:
         total.add(each)
     return total.metrics(n_resamples, seed, level)
@@ -224,10 +224,15 @@ class _Group:
         self.samples, self.hand = SampleTotal(), list[EventCounts]()
 
 
-class _Total:
-    """Results of the recordings so far."""
+class ResultTotal:
+    """Results of the recordings so far, and their metrics.
 
-    def __init__(self) -> None:
+    Args:
+        intervals: keep what the bootstrap needs of each recording.
+    """
+
+    def __init__(self, *, intervals: bool = True) -> None:
+        self._keeps_groups = intervals
         self.recordings: list[RecordingMetrics] = []
         self.fingers: dict[str, SampleTotal] = {}
         self.pooled = SampleTotal()
@@ -242,7 +247,7 @@ class _Total:
         self.recordings.append(results.metrics)
         self.events.append(results.events)
         self.hands.append(results.hand)
-        group = self._group() if results.events else _Group()
+        group = self._group() if results.events and self._keeps_groups else _Group()
         if results.hand is not None:
             group.hand.append(results.hand)
         for name, samples in results.samples.items():
@@ -253,8 +258,8 @@ class _Total:
         if self.n_scores > MAX_EXACT_SCORES and not self.binned:
             self._bin()
 
-    def metrics(self, n_resamples: int, seed: int, level: float) -> Metrics:
-        """Compute the metrics."""
+    def metrics(self, n_resamples: int = 1000, seed: int = 0, level: float = 0.95) -> Metrics:
+        """Compute the metrics; the arguments are those of `summarise`."""
         return Metrics(
             fingers={name: metrics_of_samples(own.samples) for name, own in self.fingers.items()},
             pooled=metrics_of_samples(self.pooled.samples),

@@ -93,16 +93,17 @@ def _draw_recordings(
     """Draw a row for each recording, the best on top, and a dot for each finger."""
     ordered = sorted(metrics.recordings, key=lambda each: _mean(each.fingers, "accuracy"))
     _draw_dots(left, metrics, ordered, "accuracy", styles)
-    _draw_dots(right, metrics, ordered, "auc", styles)
+    _draw_dots(right, metrics, ordered, "auc_contact", styles)
     right.axvline(0.5, color=GREY, linewidth=0.8, linestyle=":")
     left.set_xlim(min(left.get_xlim()[0], 48), 101)
     right.set_xlim(min(right.get_xlim()[0], 0.48), 1.01)
     add_labels(left, "accuracy [%]")
-    add_labels(right, "AUC, stable against the rest (dotted: chance)")
+    add_labels(right, "AUC in contact, stable against unstable (dotted: chance)")
     accuracy = _text(metrics.pooled.accuracy, ": {:.1f} % of all")
     add_title(left, f"correct samples{accuracy}")
     add_title(
-        right, f"samples in the right order{_text(metrics.pooled.auc, ': AUC {:.3f} of all')}"
+        right,
+        f"samples in the right order{_text(metrics.pooled.auc_contact, ': AUC {:.3f} of all')}",
     )
     left.set_ylim(-0.7, max(len(ordered), 1) - 0.3)
     if len(ordered) <= MAX_NAMED_RECORDINGS:

@@ -9,7 +9,7 @@ from matplotlib.figure import Figure
 from matplotlib.patches import FancyBboxPatch
 from mpl_toolkits.mplot3d import Axes3D  # type: ignore[import-untyped]
 
-from holdfast.sensors import Hand, HandModule, Sensor
+from holdfast.sensors import Hand, HandModule, Sensor, taxel_number
 from holdfast.sensors.types import Array
 
 MM_PER_M = 1e3
@@ -49,14 +49,14 @@ def plot_sensor(sensor: Sensor) -> Figure:
 
 
 def plot_hand(hand: Hand) -> Figure:
-    """Draw the flat map of a hand: every taxel with its flat index, coloured by finger."""
+    """Draw the flat map of a hand: every taxel with its number, coloured by finger."""
     cells = np.concatenate([module.grid for module in hand.modules.values()])
     n_rows, n_columns = cells.max(axis=0) + 1
     figure = Figure(figsize=(0.3 * n_columns + 0.6, 0.3 * n_rows + 0.6), dpi=160)
     axes = figure.add_axes((0.01, 0.01, 0.98, 0.96))
     axes.set_title(
-        f"{hand.name}: {hand.n_taxels} taxels in {len(hand.modules)} modules, numbered by "
-        "their place in the flat packet",
+        f"{hand.name}: {hand.n_taxels} taxels in {len(hand.modules)} modules, numbered in "
+        "each module",
         fontsize=8,
     )
     for name, module in hand.modules.items():
@@ -119,7 +119,7 @@ def _draw_front(axes: Axes, sensor: Sensor, colours: Array, view: tuple[Array, A
     )
     for k, (x, y) in enumerate(places):
         ink = "white" if colours[k, :3].mean() < 0.55 else "black"
-        axes.text(x, y, str(k + 1), ha="center", va="center", fontsize=6.5, color=ink)
+        axes.text(x, y, str(taxel_number(k)), ha="center", va="center", fontsize=6.5, color=ink)
     _label_front(axes, view)
 
 
@@ -137,13 +137,14 @@ def _label_front(axes: Axes, view: tuple[Array, Array]) -> None:
 def _draw_module(axes: Axes, name: str, module: HandModule) -> None:
     colour = PART_COLOURS.get(name.split("/", maxsplit=1)[0], "#777777")
     strength = 0.55 if "/" not in name else 0.28
-    for (row, column), index in zip(module.grid, module.flat_indices, strict=True):
+    for k, (row, column) in enumerate(module.grid):
         cell = FancyBboxPatch(
             (column + 0.1, row + 0.1), 0.8, 0.8, boxstyle="round,pad=0,rounding_size=0.2",
             facecolor=(colour, strength), edgecolor=colour, linewidth=0.6,
         )  # fmt: skip
         axes.add_patch(cell)
-        axes.text(column + 0.5, row + 0.52, str(index), ha="center", va="center", fontsize=4.6)
+        number = str(taxel_number(k))
+        axes.text(column + 0.5, row + 0.52, number, ha="center", va="center", fontsize=4.6)
     _label_module(axes, name, module.grid, colour)
 
 

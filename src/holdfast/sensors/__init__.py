@@ -7,6 +7,7 @@ from holdfast.sensors.built_in import (
     hand,
     sensor,
 )
+from holdfast.sensors.taxel_numbers import taxel_index, taxel_number, taxel_numbers
 from holdfast.sensors.types import Hand, HandModule, Sensor
 
 __all__ = [
@@ -18,4 +19,7 @@ __all__ = [
     "flat_sensor",
     "hand",
     "sensor",
+    "taxel_index",
+    "taxel_number",
+    "taxel_numbers",
 ]

@@ -11,6 +11,7 @@ import numpy as np
 import numpy.typing as npt
 
 from holdfast.files import check_keys, read_input
+from holdfast.sensors.taxel_numbers import taxel_number
 
 Array = npt.NDArray[np.float64]
 Unit = Literal["count", "N"]
@@ -203,7 +204,7 @@ class HandModule:
 
     Attributes:
         sensor: type of the sensor.
-        flat_indices: (n_taxels,) place of taxel 1, 2, ... in the flat packet of the hand.
+        flat_indices: (n_taxels,) index of taxel 1, 2, ... in the flat packet of the hand, from 0.
         link: link of the hand that carries the sensor.
         positions: (n_taxels, 3) positions in the frame of that link [m].
         rotations: (n_taxels, 3, 3) from taxel frame to the frame of that link.
@@ -328,13 +329,13 @@ def _exact_rotations(rotations: Array, name: str) -> Array:
     worst = int(error.argmax())
     if error[worst] > ROTATION_TOLERANCE:
         raise ValueError(
-            f"{name}: the rotation of taxel {worst + 1} is {error[worst]:.1e} away from a proper "
-            f"rotation; at most {ROTATION_TOLERANCE:.0e} expected"
+            f"{name}: the rotation of taxel {taxel_number(worst)} is {error[worst]:.1e} away from "
+            f"a proper rotation; at most {ROTATION_TOLERANCE:.0e} expected"
         )
     signs = np.linalg.det(exact)
     if signs.min() < 0:
         raise ValueError(
-            f"{name}: the rotation of taxel {int(signs.argmin()) + 1} is a reflection "
+            f"{name}: the rotation of taxel {taxel_number(int(signs.argmin()))} is a reflection "
             "(determinant -1); a rotation expected"
         )
     return rotations if error[worst] < EXACT_TOLERANCE else exact

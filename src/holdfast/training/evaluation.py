@@ -1,6 +1,6 @@
 """Evaluation of models: the decisions of a model beside the labels, and their metrics."""
 
-from collections.abc import Callable, Iterable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -12,9 +12,9 @@ from holdfast.metrics import (
     FingerDecisions,
     Metrics,
     RecordingResults,
+    ResultTotal,
     score_recording,
     summarise,
-    summarise_results,
 )
 from holdfast.metrics.decisions import hand_decisions
 from holdfast.metrics.truth_labels import LabelRule, labels_by_truth
@@ -24,7 +24,7 @@ from holdfast.recordings import Recording, label_states
 from holdfast.training.dataset_scan import OneRecording
 from holdfast.training.progress import Progress, show_nothing
 from holdfast.training.splits import Integers
-from holdfast.training.verdict import LoadedTares
+from holdfast.training.verdict import LoadedTares, verdict
 
 TARE_LOADED = 1 << SIGNAL_FAULTS.index(Fault.TARE_LOADED)
 """Bit of the fault of a tare that was taken under load."""
@@ -75,15 +75,29 @@ class Evaluation:
 
     Attributes:
         metrics: of all recordings.
+        unseen: of the recordings that the model was not trained on, without intervals where
+            there are others.
         trained_on: names of the recordings that the model was trained on.
-        tares: recordings whose tare was taken under load, of all.
+        tares: recordings whose tare was taken under load, of those that are unseen.
         decisions: about each recording, if they are kept.
     """
 
     metrics: Metrics
+    unseen: Metrics
     trained_on: list[str]
     tares: LoadedTares
     decisions: list[Decisions]
+
+    @property
+    def verdict(self) -> str | None:
+        """What the model is good for; None if it was trained on all labelled recordings."""
+        n, n_unseen = len(self.metrics.recordings), len(self.unseen.recordings)
+        if n_unseen == n:
+            return verdict(self.unseen, self.tares)
+        if self.unseen.pooled.n + self.unseen.pooled.n_undecided == 0:
+            return None
+        sentence = verdict(self.unseen, self.tares)
+        return f"{sentence} From {n_unseen} of {n} recordings: the model was trained on the others."
 
 
 def evaluate(
@@ -137,17 +151,24 @@ def evaluate_recordings(
     trained_on: list[str] = []
     tares: list[bool] = []
     kept: list[Decisions] = []
-
-    def results() -> Iterator[RecordingResults]:
-        found = engine.map_ordered(_evaluate_part, parts, shared=(model, keep))
-        for own, loaded, known, decisions in progress(found, "evaluating", len(recordings)):
-            trained_on.extend([own.metrics.name] if known else [])
+    total, unseen = ResultTotal(), ResultTotal(intervals=False)
+    found = engine.map_ordered(_evaluate_part, parts, shared=(model, keep))
+    for own, loaded, known, decisions in progress(found, "evaluating", len(recordings)):
+        total.add(own)
+        kept.extend(decisions)
+        if known:
+            trained_on.append(own.metrics.name)
+        else:
+            unseen.add(own)
             tares.append(loaded)
-            kept.extend(decisions)
-            yield own
-
-    metrics = summarise_results(results(), seed=seed)
-    return Evaluation(metrics, trained_on, LoadedTares(sum(tares), len(tares)), kept)
+    metrics = total.metrics(seed=seed)
+    return Evaluation(
+        metrics,
+        unseen.metrics() if trained_on else metrics,
+        trained_on,
+        LoadedTares(sum(tares), len(tares)),
+        kept,
+    )
 
 
 def _evaluate_part(

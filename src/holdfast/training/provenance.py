@@ -11,6 +11,9 @@ from holdfast.model import Model, Training
 from holdfast.training.dataset_scan import DatasetScan
 from holdfast.training.setting import Setting
 
+FIGURES = ("accuracy", "fdr", "fnr", "auc_contact", "auc")
+"""Metrics out of fold that a model file has."""
+
 
 def training_record(
     setting: Setting,
@@ -32,7 +35,7 @@ def training_record(
         recordings=_digests(setting.init, scan),
         split=setting.split,
         parameters={finger: dict(found) for finger, found in parameters.items()},
-        figures={name: getattr(pooled, name) for name in ("accuracy", "fdr", "fnr", "auc")},
+        figures={name: getattr(pooled, name) for name in FIGURES},
         seed=setting.seed,
         samples=dict(thinned) or UNSET,
         versions={name: version(name) for name in ("holdfast", "numpy", "scikit-learn")},
@@ -64,13 +67,18 @@ def adaptation_warnings(init: Model, scan: DatasetScan, fingers: Collection[str]
             f"{', '.join(names)}: the sensor is {given_text}, {name} was trained on "
             f"{expected_text}; its features are used unchanged, its weights may not fit"
         )
-    digests = _training_recordings(init).values()
-    if known := [each.name for each in scan.recordings if each.digest in digests]:
+    if known := known_recordings(init, scan):
         first = ", ".join(known[:3]) + (" ..." if len(known) > 3 else "")
         yield (
             f"{name} was trained on {len(known)} of these {len(scan.recordings)} recordings "
             f"({first}): the metrics on them are too good"
         )
+
+
+def known_recordings(init: Model, scan: DatasetScan) -> list[str]:
+    """Return the names of the recordings that the model to adapt was trained on."""
+    digests = _training_recordings(init).values()
+    return [each.name for each in scan.recordings if each.digest in digests]
 
 
 def _digests(init: Model | None, scan: DatasetScan) -> dict[str, str]:

@@ -27,7 +27,7 @@ from holdfast.training.dataset_scan import (
 from holdfast.training.evaluation import combine_decisions, judge
 from holdfast.training.model_fit import TrainingData, fit_full_model, fit_model
 from holdfast.training.progress import Progress, show_nothing
-from holdfast.training.provenance import adaptation_warnings, training_record
+from holdfast.training.provenance import adaptation_warnings, known_recordings, training_record
 from holdfast.training.setting import SEARCH_SAMPLES, Setting, Split
 from holdfast.training.splits import DataSplit, inner_folds, split_data
 from holdfast.training.training_samples import gather_samples, thin, thinning_step
@@ -60,17 +60,19 @@ class Trained:
         cross_validation: metrics of predictions out of fold.
         split: unit that the cross-validation left out.
         tares: recordings whose tare was taken under load, of all.
+        known: names of the recordings that the model to adapt was trained on.
     """
 
     model: Model
     cross_validation: Metrics
     split: Split = "recording"
     tares: LoadedTares | None = None
+    known: tuple[str, ...] = ()
 
     @property
-    def verdict(self) -> str:
-        """What the model is good for, in one sentence."""
-        return verdict(self.cross_validation, self.tares)
+    def verdict(self) -> str | None:
+        """What the model is good for, in one sentence; None if some recordings are `known`."""
+        return None if self.known else verdict(self.cross_validation, self.tares)
 
 
 def train(
@@ -118,7 +120,9 @@ def train(
         trainer.setting, trainer.scan, final, metrics.pooled, trainer.data.thinned
     )
     model = msgspec.structs.replace(model, training=provenance)
-    return Trained(model, metrics, trainer.setting.split, trainer.tares)
+    init = trainer.setting.init
+    known = () if init is None else tuple(known_recordings(init, trainer.scan))
+    return Trained(model, metrics, trainer.setting.split, trainer.tares, known)
 
 
 class _Trainer:

@@ -36,6 +36,20 @@ def verdict(metrics: Metrics, tares: LoadedTares | None = None) -> str:
     return (_unusable(metrics.pooled) or _by_events(metrics.pooled, events)) + ending
 
 
+def no_verdict(n_seen: int, n_recordings: int, model: str = "the model") -> str:
+    """Return why there is no verdict: the model was trained on these recordings.
+
+    Args:
+        n_seen: number of recordings that it was trained on.
+        n_recordings: number of all recordings.
+        model: its name in the sentence.
+    """
+    return (
+        f"No verdict: {model} was trained on {n_seen} of these {n_recordings} recordings. It "
+        "needs labelled recordings that the model has not seen."
+    )
+
+
 def verdict_of_events(events: EventMetrics) -> str:
     """Return what a threshold is good for, in one sentence, without metrics by sample."""
     return f"{_use(events)}: {_alarms(events)}, {_missed(events)}."

@@ -12,13 +12,13 @@ from holdfast.contact import Fault
 from holdfast.detector import detect
 from holdfast.io import load_recording
 from holdfast.live.session import Session
-from holdfast.live.status import operating_points
+from holdfast.live.status import finger_document, operating_points
 from holdfast.live.stream_detector import StreamDetector, compile_kernels
 from holdfast.live.web import schema
 from holdfast.live.web.service import LiveService
 from holdfast.model import ThresholdPoint, Tuning
 from holdfast.web.guard import Guard
-from live import build
+from live import build, estimates
 
 PATIENCE = 30.0
 
@@ -387,6 +387,13 @@ def test_a_fault_that_lasts_is_a_problem_and_a_notice():
     assert [notice["text"] for notice in notices] == [text]
     assert set(hello["faults"]) == set(map(str, Fault))
     assert hello["debounce"] == {"min_duration": 0.0, "hysteresis": 0.1, "hold": 0.1}
+
+
+def test_faulty_taxels_are_numbers_from_1():
+    hand = estimates.estimate()
+    assert hand.fingers["thumb"].faulty_taxels == (3, 7)  # indices
+    document = msgspec.to_builtins(finger_document(hand.fingers["thumb"]))
+    assert document["faulty_taxels"] == (4, 8)
 
 
 @pytest.mark.parametrize("body", [b"{", b"[" * 50_000, b"[]", b'{"name": 3}', b'{"nam": "a"}'])

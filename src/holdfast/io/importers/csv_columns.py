@@ -6,11 +6,12 @@ They are written as in `--columns`: `time=stamp:ms,taxels=F{axis}{taxel},label=s
 import re
 from collections.abc import Collection, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
-from itertools import takewhile
+from itertools import product, takewhile
 
 import numpy as np
 
 from holdfast.errors import RecordingError
+from holdfast.sensors.taxel_numbers import FIRST_TAXEL, taxel_number, taxel_numbers
 from holdfast.sensors.types import Array
 
 Layout = Mapping[str, Mapping[tuple[int, str], str]]
@@ -194,14 +195,14 @@ def pattern_layout(pattern: str, names: Sequence[str]) -> Layout:
     for name in names:
         if match := re.fullmatch(expression, name):
             words = match.groupdict()
-            key = (int(words.get("taxel", "1")), words["axis"].lower())
+            key = (int(words.get("taxel", str(FIRST_TAXEL))), words["axis"].lower())
             found.setdefault(words.get("module", ""), {})[key] = name
     return {module: _from_one(columns) for module, columns in found.items()}
 
 
 def _from_one(columns: Mapping[tuple[int, str], str]) -> dict[tuple[int, str], str]:
     first = min(taxel for taxel, _ in columns)
-    return {(taxel - first + 1, axis): name for (taxel, axis), name in columns.items()}
+    return {(taxel_number(taxel - first), axis): name for (taxel, axis), name in columns.items()}
 
 
 def _run_layout(text: str, names: Sequence[str]) -> Layout:
@@ -212,7 +213,7 @@ def _run_layout(text: str, names: Sequence[str]) -> Layout:
     run = names[names.index(ends[0]) : names.index(ends[1]) + 1]
     if not run or len(run) % 3:
         raise RecordingError(f"taxels={text}: {len(run)} columns given; 3 for each taxel expected")
-    return {"": {(k // 3 + 1, "xyz"[k % 3]): name for k, name in enumerate(run)}}
+    return {"": {(taxel_number(k // 3), "xyz"[k % 3]): name for k, name in enumerate(run)}}
 
 
 def _guessed_taxels(names: Sequence[str], n_taxels: Collection[int]) -> str | None:
@@ -245,7 +246,7 @@ def _patterns(name: str) -> Iterator[str]:
 
 def _is_complete(columns: Collection[tuple[int, str]]) -> bool:
     n = len(columns) // 3
-    return n > 0 and set(columns) == {(k + 1, axis) for k in range(n) for axis in "xyz"}
+    return n > 0 and set(columns) == set(product(taxel_numbers(range(n)), "xyz"))
 
 
 def _with_module(patterns: Sequence[str]) -> str:

@@ -16,7 +16,7 @@ from holdfast.errors import RecordingError
 from holdfast.io.importers.csv_columns import Columns, Layout, seconds_of
 from holdfast.io.importers.table import Table, csv_files, header_line, read_table, with_integer_type
 from holdfast.recordings import Label, Recording, Tactile, labels_from_samples
-from holdfast.sensors import Sensor, built_in_sensors, sensor
+from holdfast.sensors import Sensor, built_in_sensors, sensor, taxel_numbers
 from holdfast.sensors.types import Array, Unit
 
 TIME = "time"
@@ -237,7 +237,7 @@ def _module(
     sensors: Mapping[str, Sensor],
 ) -> Tactile:
     one = sensors.get(name) or sensors.get(ANY_MODULE) or _sensor(name, settings, columns)
-    wanted = [(taxel + 1, axis) for taxel in range(one.n_taxels) for axis in "xyz"]
+    wanted = [(number, axis) for number in taxel_numbers(range(one.n_taxels)) for axis in "xyz"]
     if set(columns) != set(wanted):
         n_given = len({taxel for taxel, _ in columns})
         raise RecordingError(

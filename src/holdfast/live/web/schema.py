@@ -102,6 +102,7 @@ class FingerDocument(Struct, frozen=True, kw_only=True, gc=False):
     """Newest estimate of a finger: see `holdfast.ContactEstimate`.
 
     Attributes:
+        faulty_taxels: numbers of the taxels that are faulty by themselves, from 1.
         taxels: readings minus the tare, in taxel frames [unit]; null before the tare.
     """
 

@@ -108,13 +108,15 @@ def test_cards_show_the_current_state(visit, service):
         r"88\s%[\s\S]*3.30[\s\S]*13.0[\s\S]*3.00[\s\S]*4.00[\s\S]*12.0",
     )
     assert page.locator(".card").count() == 4
-    faults = {"faults": ["stuck", "saturated"], "faulty_taxels": [3, 11]}
+    faults = {"faults": ["stuck", "saturated"], "faulty_taxels": [4, 12]}
     nothing = {"stable_probability": None, "instability": None, "force": [None] * 3, "taxels": None}
     change(service, state="UNKNOWN", reason="tare", **nothing, **faults)
     shows(page, "#hand-word", "^UNKNOWN$")
     shows(page, '[aria-label="ring"] .head', "taking tare")
     shows(page, '[aria-label="ring"] .faults', r"stuck\s*saturated\s*taxels 4, 12")
     shows(page, '[aria-label="ring"] .values', r"–[\s\S]*–[\s\S]*–")
+    crossed = "[...holdfast.cards.cards.get('ring').map.faulty].join()"  # indices
+    assert page.evaluate(crossed) == "3,11"
     shape = page.locator('[aria-label="ring"] .head use').get_attribute("href")
     assert shape == "#shape-unknown"
 

@@ -169,7 +169,7 @@ class Card {
     this.faultsKey = key;
     const texts = this.hello.faults ?? {}, words = faults.map((fault) => faultWord(fault, texts));
     if (taxels.length) {
-      const first = taxels.slice(0, 4).map((k) => k + 1).join(", ");
+      const first = taxels.slice(0, 4).join(", ");
       words.push(`${taxels.length > 1 ? "taxels" : "taxel"} ${first}${taxels.length > 4 ? " …" : ""}`);
     }
     // There is room for three; the tooltip has all.

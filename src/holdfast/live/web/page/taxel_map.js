@@ -7,6 +7,8 @@ import { number, unitWord } from "./format.js";
 const FONT = font(11);
 // Minimum full scale by unit: smaller readings are noise.
 const MIN_SCALES = { count: 50, N: 0.1 };
+// Number of the first taxel: documents count taxels from it, arrays from 0.
+const FIRST_TAXEL = 1;
 // Length of an arrow at full scale, in radii of a disc; the margin of the map has room for it.
 const ARROW = 2.2;
 // Time constant of the scale [s]: long enough that discs stay comparable while a grasp changes.
@@ -69,10 +71,14 @@ export class TaxelMap {
     this.size = [0, 0];
   }
 
-  /** Update with the tared readings in taxel frames; null if there are none. */
+  /**
+   * Update the map.
+   * @param taxels tared readings in taxel frames; null if there are none.
+   * @param faulty numbers of the faulty taxels.
+   */
   update(taxels, faulty) {
     const { right, up } = this.layout;
-    this.faulty = new Set(faulty);
+    this.faulty = new Set(faulty.map((number) => number - FIRST_TAXEL));
     this.known = Array.isArray(taxels) && taxels.length === this.values.length;
     if (!this.known) return;
     this.values = taxels.map((reading, k) => toMapFrame(reading, this.sensor.rotations[k], right[k], up[k]));
