@@ -81,6 +81,17 @@ def test_what_falls_is_drawn_falling_and_what_rises_rising(points, sign):
     assert moves.max() <= 0 and moves.min() < -1000
 
 
+def test_a_slope_stays_straight():
+    times = np.arange(4096) / 150
+    readings = np.zeros((4096, 16, 3))
+    readings[..., 2] = np.linspace(1000, 0, 4096)[:, None]
+    slope = Recording("slope", {"thumb": Tactile(sensor("uskin-4x4"), times, readings)})
+    series = Signals(slope, "none").part(points=100).fingers["thumb"]
+    np.testing.assert_allclose(
+        series["F_a"], np.interp(series["t"], times, 16 * readings[:, 0, 2]), rtol=1e-5
+    )
+
+
 @pytest.mark.parametrize("points", [10, 100, 400])
 def test_unknown_values_do_not_change_the_order(points):
     times, values = np.arange(3000) / 150, np.linspace(9000, 100, 3000)

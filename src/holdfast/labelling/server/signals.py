@@ -78,7 +78,7 @@ class _Level(NamedTuple):
     """Minima and maxima of blocks of neighbouring samples.
 
     Attributes:
-        times: (n, 2) of the first sample of each block, and of one half way to the last [s].
+        times: (n, 2) of the first and of the last sample of each block [s].
         low: (n, n_series) minima; NaN where all samples are unknown.
         high: (n, n_series) maxima.
         falls: (n, n_series) whether the maximum comes before the minimum.
@@ -245,7 +245,7 @@ def _halved(level: _Level) -> _Level:
     n = len(level.times) // 2 * 2
     earlier, later = (_Level(*(array[k:n:2] for array in level)) for k in (0, 1))
     half = _Level(
-        np.column_stack([earlier.times[:, 0], later.times[:, 0]]),
+        np.column_stack([earlier.times[:, 0], later.times[:, 1]]),
         np.fmin(earlier.low, later.low),
         np.fmax(earlier.high, later.high),
         _falls(earlier, later),
