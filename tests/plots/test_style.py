@@ -1,7 +1,7 @@
 import subprocess
 import sys
 
-from holdfast.plots.style import PAPER, series_styles
+from holdfast.plots.style import PAPER, page_figure, series_styles
 
 
 def test_eighteen_styles_are_different():
@@ -18,3 +18,11 @@ def test_pyplot_is_not_imported():
         "assert 'matplotlib.pyplot' not in sys.modules"
     )
     subprocess.run([sys.executable, "-c", program], check=True)
+
+
+def test_a_notebook_shows_a_figure_as_a_picture_that_is_always_the_same():
+    figure = page_figure(2.0)
+    figure.add_subplot().plot([0, 1])
+    picture = figure._repr_png_()
+    assert picture.startswith(b"\x89PNG") and len(picture) > 2000
+    assert picture == figure._repr_png_()

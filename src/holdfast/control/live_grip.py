@@ -8,11 +8,19 @@ from typing import Self
 
 import msgspec
 
-from holdfast.control.command import LoopState
+from holdfast.control.command import GripCommand, LoopState
 from holdfast.control.loop import GripLoop
 from holdfast.control.runner import LoopRunner
 from holdfast.errors import HandError
-from holdfast.live.grip import GripDocument, GripEntry, GripFinger, GripLimits, GripListener
+from holdfast.live.grip import (
+    GripDocument,
+    GripEntry,
+    GripFault,
+    GripFinger,
+    GripLimits,
+    GripListener,
+)
+from holdfast.live.grip_faults import explain_fault
 from holdfast.live.session import Session
 
 N_ENTRIES = 20
@@ -83,12 +91,14 @@ class LiveGrip:
         loop, last = self._loop, self._loop.last
         controller = loop.controller
         highest = controller.highest_scales
+        limits = GripLimits(**msgspec.structs.asdict(controller.limits))
+        state = LoopState.FAULT if self.failure else last.state if last else LoopState.IDLE
         return GripDocument(
             hand=loop.hand.name,
             law=self._law,
             armed=loop.armed,
-            limits=GripLimits(**msgspec.structs.asdict(controller.limits)),
-            state=LoopState.FAULT if self.failure else last.state if last else LoopState.IDLE,
+            limits=limits,
+            state=state,
             reason=last.reason if last else "",
             stopped=loop.stopped,
             released=last is not None and last.release,
@@ -104,6 +114,17 @@ class LiveGrip:
             n_sent=loop.n_sent,
             failure=str(self.failure or ""),
             events=list(self._log.entries),
+            fault=self._fault(limits, last) if state is LoopState.FAULT else None,
+        )
+
+    def _fault(self, limits: GripLimits, last: GripCommand | None) -> GripFault:
+        """Return the explanation of the fault."""
+        return explain_fault(
+            last.reason if last else "",
+            limits,
+            armed=self._loop.armed,
+            released=last is not None and last.release,
+            failure=str(self.failure or ""),
         )
 
     def _ended(self) -> "Future[None] | None":

@@ -47,6 +47,24 @@ class GripEntry(Struct, frozen=True, gc=False):
     text: str
 
 
+class GripFault(Struct, frozen=True, kw_only=True, gc=False):
+    """Explanation of a fault for a person, see `holdfast.live.grip_faults`.
+
+    Attributes:
+        reason: of the fault; "hand" if the loop has ended because of the hand.
+        happened: what happened, and what it means.
+        commanded: what the hand is commanded now.
+        continues: what goes on without a reset.
+        reset: what a reset does.
+    """
+
+    reason: str
+    happened: str
+    commanded: str
+    continues: str
+    reset: str
+
+
 class GripDocument(Struct, frozen=True, kw_only=True, gc=False):
     """State and newest command of the loop.
 
@@ -64,6 +82,7 @@ class GripDocument(Struct, frozen=True, kw_only=True, gc=False):
         n_sent: number of commands that were sent.
         failure: why the loop has ended for good; empty while it runs.
         events: newest events, oldest first.
+        fault: explanation of the fault; null if there is none.
     """
 
     hand: str
@@ -79,6 +98,7 @@ class GripDocument(Struct, frozen=True, kw_only=True, gc=False):
     n_sent: int
     failure: str
     events: list[GripEntry]
+    fault: GripFault | None = None
 
 
 GripListener = Callable[[str, float], None]

@@ -9,6 +9,7 @@ from matplotlib.figure import Figure
 from matplotlib.patches import FancyBboxPatch
 from mpl_toolkits.mplot3d import Axes3D  # type: ignore[import-untyped]
 
+from holdfast.plots.style import PageFigure
 from holdfast.sensors import Hand, HandModule, Sensor, taxel_number
 from holdfast.sensors.types import Array
 
@@ -28,7 +29,7 @@ PART_COLOURS = {
 
 def plot_sensor(sensor: Sensor) -> Figure:
     """Draw the taxels of a sensor in space with their normals, and numbered from outside."""
-    figure = Figure(figsize=(8.2, 4.2), dpi=160, layout="constrained")
+    figure = PageFigure(figsize=(8.2, 4.2), dpi=160, layout="constrained")
     unit = "counts" if sensor.unit == "count" else "newtons"
     figure.suptitle(
         f"{sensor.name}: {sensor.n_taxels} taxels, {sensor.rate:g} Hz, readings in {unit}",
@@ -52,7 +53,7 @@ def plot_hand(hand: Hand) -> Figure:
     """Draw the flat map of a hand: every taxel with its number, coloured by finger."""
     cells = np.concatenate([module.grid for module in hand.modules.values()])
     n_rows, n_columns = cells.max(axis=0) + 1
-    figure = Figure(figsize=(0.3 * n_columns + 0.6, 0.3 * n_rows + 0.6), dpi=160)
+    figure = PageFigure(figsize=(0.3 * n_columns + 0.6, 0.3 * n_rows + 0.6), dpi=160)
     axes = figure.add_axes((0.01, 0.01, 0.98, 0.96))
     axes.set_title(
         f"{hand.name}: {hand.n_taxels} taxels in {len(hand.modules)} modules, numbered in "

@@ -1,5 +1,6 @@
 """Style that all figures share: sizes, colours, axes and legends. No screen is needed."""
 
+import io
 from collections.abc import Collection, Iterable, Mapping, Sequence
 from typing import Literal, NamedTuple
 
@@ -14,6 +15,8 @@ PAGE_WIDTH = 7.2
 """Width of a figure [inch]: the text width of a page with two columns."""
 FONT_SIZE = 7.5
 """Font size at that width [pt]."""
+NOTEBOOK_RESOLUTION = 110
+"""Resolution of a figure in a notebook [dots per inch]."""
 INK = "#333333"
 GREY = "#999999"
 FAINT = "#e6e6e6"
@@ -62,14 +65,24 @@ def series_styles(names: Iterable[str]) -> dict[str, SeriesStyle]:
     return styles | {PAPER: SeriesStyle("black", "x", (0, (4, 2)))}
 
 
-def page_figure(height: float, width: float = PAGE_WIDTH) -> Figure:
+class PageFigure(Figure):
+    """Figure that a notebook shows as a picture, without pyplot, which would keep it."""
+
+    def _repr_png_(self) -> bytes:
+        """Return the figure as a PNG file; a notebook calls it."""
+        file = io.BytesIO()
+        self.savefig(file, format="png", dpi=NOTEBOOK_RESOLUTION, metadata={"Software": None})
+        return file.getvalue()
+
+
+def page_figure(height: float, width: float = PAGE_WIDTH) -> PageFigure:
     """Return an empty figure.
 
     Args:
         height: of the figure [inch].
         width: of the figure [inch]; by default that of a page.
     """
-    return Figure(figsize=(width, height), dpi=200, layout="constrained")
+    return PageFigure(figsize=(width, height), dpi=200, layout="constrained")
 
 
 def panels(

@@ -101,7 +101,8 @@ def finger_series(
 def envelope(times: Array, values: Array, n_stretches: int = 2000) -> tuple[Array, Array]:
     """Return the minimum and the maximum of each of `n_stretches` stretches of samples.
 
-    A curve of them looks like the curve of all samples. Short curves are returned unchanged.
+    The earlier one comes first, so that a curve of them looks like the curve of all samples: what
+    falls is drawn falling. Short curves are returned unchanged.
 
     Args:
         times: (n,) [s].
@@ -109,12 +110,13 @@ def envelope(times: Array, values: Array, n_stretches: int = 2000) -> tuple[Arra
         n_stretches: number of stretches; each gives two points.
 
     Returns:
-        Times and values, (2 n_stretches,); NaN where a stretch has no value.
+        Times of the first and the last sample of each stretch, and values, (2 n_stretches,); NaN
+        where a stretch has no value.
 
     Example:
         >>> times, values = envelope(np.arange(6.0), np.array([0, 1, 2, 9, -9, 0.0]), 2)
         >>> times.tolist(), values.tolist()
-        ([0.0, 2.0, 3.0, 5.0], [0.0, 2.0, -9.0, 9.0])
+        ([0.0, 2.0, 3.0, 5.0], [0.0, 2.0, 9.0, -9.0])
     """
     n = len(values)
     if n <= 2 * n_stretches:
@@ -122,8 +124,19 @@ def envelope(times: Array, values: Array, n_stretches: int = 2000) -> tuple[Arra
     edges = np.linspace(0, n, n_stretches + 1).astype(int)
     low = np.fmin.reduceat(values, edges[:-1])
     high = np.fmax.reduceat(values, edges[:-1])
+    falls = _first_of_each(values, high, edges) < _first_of_each(values, low, edges)
+    pairs = np.where(falls, [high, low], [low, high])
     ends = times[np.stack([edges[:-1], edges[1:] - 1], axis=1)]
-    return ends.ravel(), np.stack([low, high], axis=1).ravel()
+    return ends.ravel(), pairs.T.ravel()
+
+
+def _first_of_each(values: Array, extremes: Array, edges: Codes) -> Codes:
+    """Return the position of the first sample of each stretch that equals its extreme.
+
+    Without one, because the extreme is NaN, it is that of a later stretch, or the last edge.
+    """
+    found = np.flatnonzero(values == np.repeat(extremes, np.diff(edges)))
+    return np.append(found, len(values))[np.searchsorted(found, edges[:-1])]
 
 
 def draw_curve(

@@ -12,6 +12,7 @@ from typing import NamedTuple
 
 import msgspec
 import numpy as np
+import numpy.typing as npt
 from scipy.ndimage import maximum_filter1d, uniform_filter1d
 
 from holdfast.features import DEFAULT_WINDOW, Tare, haar_features
@@ -62,7 +63,9 @@ class SignalPart(msgspec.Struct, frozen=True):
         start: of the part [s].
         end: of the part [s].
         exact: whether all samples are included; otherwise minima and maxima of neighbours.
-        fingers: by finger, `t` [s] and each of `SERIES`; None where a value is unknown.
+        fingers: by finger, `t` [s] and each of `SERIES`; None where a value is unknown. Where
+            not `exact`, two values of a series belong to each block of neighbours: minimum and
+            maximum, the earlier one first.
     """
 
     start: float
@@ -75,14 +78,16 @@ class _Level(NamedTuple):
     """Minima and maxima of blocks of neighbouring samples.
 
     Attributes:
-        times: (n, 2) of the first sample of each block, and of one half way to the last [s].
+        times: (n, 2) of the first and of the last sample of each block [s].
         low: (n, n_series) minima; NaN where all samples are unknown.
         high: (n, n_series) maxima.
+        falls: (n, n_series) whether the maximum comes before the minimum.
     """
 
     times: Array
     low: Array
     high: Array
+    falls: npt.NDArray[np.bool_]
 
 
 class FingerSignals:
@@ -122,8 +127,7 @@ class FingerSignals:
             return True, _series(self.times[first:last], self.values[first:last])
         depth = max(int(np.ceil(np.log2(n / max(points - 2, 1)))), 1)
         level = self._blocks(first, last, min(depth, max(self._levels)))
-        pairs = np.stack([level.low, level.high], axis=1)
-        return False, _series(level.times.ravel(), pairs.reshape(-1, len(SERIES)))
+        return False, _series(level.times.ravel(), _in_order(level))
 
     def _blocks(self, first: int, last: int, depth: int) -> _Level:
         """Return the blocks of 2^depth samples that contain samples `first` up to `last`."""
@@ -141,7 +145,8 @@ class FingerSignals:
     def _reduced(self, start: int, stop: int, depth: int) -> _Level:
         """Return the blocks of samples `start` up to `stop`, which is a whole number of blocks."""
         times, values = self.times[start:stop], self.values[start:stop]
-        level = _Level(np.column_stack([times, times]), values, values)
+        falls = np.zeros(values.shape, dtype=bool)
+        level = _Level(np.column_stack([times, times]), values, values, falls)
         for _ in range(depth):
             level = _halved(level)
         return level
@@ -238,13 +243,32 @@ def _with_gaps(module: Tactile, values: Array) -> tuple[Array, Array]:
 def _halved(level: _Level) -> _Level:
     """Return the next level: two neighbouring blocks become one; the last may stay alone."""
     n = len(level.times) // 2 * 2
-    times = np.column_stack([level.times[0:n:2, 0], level.times[1:n:2, 0]])
-    low = np.fmin(level.low[0:n:2], level.low[1:n:2])
-    high = np.fmax(level.high[0:n:2], level.high[1:n:2])
+    earlier, later = (_Level(*(array[k:n:2] for array in level)) for k in (0, 1))
+    half = _Level(
+        np.column_stack([earlier.times[:, 0], later.times[:, 1]]),
+        np.fmin(earlier.low, later.low),
+        np.fmax(earlier.high, later.high),
+        _falls(earlier, later),
+    )
     if n == len(level.times):
-        return _Level(times, low, high)
-    halves = zip((times, low, high), level, strict=True)
-    return _Level(*(np.concatenate([half, own[n:]]) for half, own in halves))
+        return half
+    return _Level(*(np.concatenate([ours, own[n:]]) for ours, own in zip(half, level, strict=True)))
+
+
+def _falls(earlier: _Level, later: _Level) -> npt.NDArray[np.bool_]:
+    """Return where the maximum of two neighbouring blocks comes before their minimum."""
+    unknown = np.isnan(earlier.low)
+    low_is_later = (later.low < earlier.low) | unknown
+    high_is_later = (later.high > earlier.high) | unknown
+    of_one_block = np.where(low_is_later, later.falls, earlier.falls)
+    return np.where(low_is_later == high_is_later, of_one_block, low_is_later)
+
+
+def _in_order(level: _Level) -> Array:
+    """Return (2 n, n_series) minimum and maximum of each block, the earlier one first."""
+    first = np.where(level.falls, level.high, level.low)
+    second = np.where(level.falls, level.low, level.high)
+    return np.stack([first, second], axis=1).reshape(-1, len(SERIES))
 
 
 def _series(times: Array, values: Array) -> Series:

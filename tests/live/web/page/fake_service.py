@@ -13,6 +13,7 @@ import time
 from importlib import resources
 from pathlib import Path
 
+import msgspec
 import numpy as np
 from aiohttp import WSCloseCode, web
 
@@ -20,6 +21,8 @@ from holdfast.contact import ContactState, Fault, Reason
 from holdfast.detector import detect
 from holdfast.io import load_recording
 from holdfast.live.fault_notices import FAULT_TEXTS
+from holdfast.live.grip import GripLimits
+from holdfast.live.grip_faults import explain_fault
 from holdfast.model import Model
 from holdfast.sensors import sensor
 from holdfast.web.guard import SECURITY_HEADERS
@@ -218,6 +221,17 @@ def gripping(names=("thumb", "index", "middle", "ring"), **fields):
     } | fields  # fmt: skip
 
 
+def explained(grip):
+    """Return the document of a grip loop with the explanation of its fault."""
+    if grip is None or grip["state"] != "FAULT":
+        return grip
+    fault = explain_fault(
+        grip["reason"], msgspec.convert(grip["limits"], GripLimits),
+        armed=grip["armed"], released=grip["released"], failure=grip["failure"],
+    )  # fmt: skip
+    return grip | {"fault": msgspec.to_builtins(fault)}
+
+
 class Service:
     """Fake service with its own port and thread."""
 
@@ -339,18 +353,18 @@ class Service:
         return web.json_response({})
 
     async def get_grip(self, _):
-        return web.json_response(self.grip)
+        return web.json_response(explained(self.grip))
 
     async def stop_grip(self, request):
         if self.stop_fails:
             request.transport.abort()
             return web.Response()
         self.grip |= {"state": "FAULT", "reason": "stopped", "stopped": True}
-        return web.json_response(self.grip)
+        return web.json_response(explained(self.grip))
 
     async def reset_grip(self, _):
         self.grip |= {"state": "HOLD", "reason": "", "stopped": False}
-        return web.json_response(self.grip)
+        return web.json_response(explained(self.grip))
 
     async def live(self, request):
         socket = web.WebSocketResponse()
@@ -373,7 +387,7 @@ class Service:
             message = self.tape.message(start, self.at) | self.patch
             message["thresholds"] = dict.fromkeys(self.tape.tracks, self.threshold)
             message["notices"], self.notices = self.notices, []
-            message["grip"] = self.grip
+            message["grip"] = explained(self.grip)
             if self.recording:
                 self.recording["seconds"] += PERIOD
                 self.recording["n_bytes"] += 14_000

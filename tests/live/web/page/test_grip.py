@@ -1,7 +1,10 @@
 """The panel of the grip loop and the emergency stop, in a browser, with a fake service."""
 
+import re
+
 import pytest
 
+from holdfast.live.grip_faults import GRIP_FAULTS
 from live.web.page.fake_service import Service, Tape, gripping, made_up
 from live.web.page.test_main import requests, shows, until, wait_for_samples
 from web.screens import PHONE, SCREENS, flaws
@@ -214,3 +217,68 @@ def test_six_fingers_on_a_phone(visit):
         shows(page, "#grip-word", "REACT")
         wait_for_samples(page)
         assert flaws(page, PHONE) == []
+
+
+LOST = {"state": "FAULT", "reason": "lost"}
+
+
+def hold_limits():
+    return gripping()["limits"] | {"on_fault": "hold", "recovery": 0.5}
+
+
+def test_a_fault_is_explained_in_words_and_put_in_the_notices(visit, holding):
+    holding.grip = gripping(limits=hold_limits(), **LOST)
+    page = visit(holding.url)
+    shows(page, "#grip-fault", "All fingers of the grip lost contact")
+    shows(page, "#grip-fault", "Held: the last command stays")
+    shows(page, "#grip-fault", "in later grasps too, until Reset")
+    shows(page, "#grip-fault", "Reset continues with these forces if the grip still touches")
+    shows(page, "#hand-grip", "GRIP FAULT")
+    shows(page, "#notices", r"grip FAULT \(lost\): All fingers[\s\S]*Held[\s\S]*Reset")
+    wait_for_samples(page)
+    assert page.locator("#notices li").count() == 1
+    holding.grip = gripping(state="HOLD")
+    shows(page, "#notices", "grip: the fault has ended, now HOLD")
+    assert page.locator("#grip-fault").is_hidden()
+    assert page.locator("#hand-grip").is_hidden()
+
+
+def test_in_a_fault_nothing_looks_as_if_the_loop_were_in_control(visit, holding):
+    page = visit(holding.url)
+    shows(page, "#grip-armed", "^ARMED$")
+    shows(page, "#hand-word", "^STABLE$")
+    fill = "e => getComputedStyle(e).backgroundColor"
+    boxes = [page.locator(one) for one in ("#hand", '[aria-label="index"] .head', "#grip-armed")]
+    in_control = [box.evaluate(fill) for box in boxes]
+    holding.grip = gripping(limits=hold_limits(), **LOST)
+    shows(page, "#grip-armed", "^HELD$")
+    shows(page, "#grip-fingers li:nth-child(2)", r"1.50×[\s\S]*held")
+    shows(page, "#hand-word", "^STABLE$")  # the estimate stays what it is
+    assert all(box.evaluate(fill) != old for box, old in zip(boxes, in_control, strict=True))
+    bar = page.locator("#grip-fingers li:nth-child(2) .fill")
+    assert bar.evaluate(fill) != page.locator(".log .fill").first.evaluate(fill)
+
+
+@pytest.mark.parametrize(
+    ("fields", "word", "finger"),
+    [
+        ({"released": True, **LOST}, "RELEASED", r"index\s*–[\s\S]*released"),
+        ({"released": True, "state": "IDLE"}, "RELEASED", r"index\s*–[\s\S]*released"),
+        ({"failure": "no answer", **LOST}, "NOTHING SENT", r"index\s*–"),
+        ({"armed": False, **LOST}, "DRY RUN", r"1.50×[\s\S]*held"),
+    ],
+)
+def test_what_is_commanded(visit, holding, fields, word, finger):
+    holding.grip = gripping(**fields)
+    page = visit(holding.url)
+    shows(page, "#grip-armed", f"^{word}$")
+    shows(page, "#grip-fingers li:nth-child(2)", finger)
+
+
+@pytest.mark.parametrize("reason", GRIP_FAULTS)
+def test_every_fault_is_explained(visit, holding, reason):
+    failure = "the hand does not answer" if reason == "hand" else ""
+    holding.grip = gripping(state="FAULT", reason=reason, released=True, failure=failure)
+    page = visit(holding.url)
+    shows(page, "#fault-happened", re.escape(GRIP_FAULTS[reason].happened))
+    assert flaws(page, (1280, 720)) == []

@@ -97,6 +97,14 @@ def test_everything_fits_without_scrolling(visit, service, size, scheme, state, 
     assert small == 0
 
 
+EVENTS = """(events) => {
+  holdfast.events.clear();
+  for (const [finger, previous, state, time] of events) {
+    holdfast.events.add({ finger, previous, state, time });
+  }
+}"""
+
+
 def test_cards_show_the_current_state(visit, service):
     change(service, state="STABLE", stable_probability=0.876, instability=3.3, force=[3, 4, 12])
     page = visit(service.url)
@@ -119,6 +127,40 @@ def test_cards_show_the_current_state(visit, service):
     assert page.evaluate(crossed) == "3,11"
     shape = page.locator('[aria-label="ring"] .head use').get_attribute("href")
     assert shape == "#shape-unknown"
+
+
+def test_without_contact_no_probability_of_stability_is_shown(visit, service):
+    change(service, state="NO_CONTACT", stable_probability=0.94)
+    page = visit(service.url)
+    shows(page, "#hand-word", "^NO CONTACT$")
+    shows(page, '[aria-label="index"] .meter', r"^stable\s*–$")
+    bar = page.locator('[aria-label="index"] .meter .fill').first
+    assert bar.get_attribute("style") == "transform: scaleX(0);"
+    change(service, state="STABLE", stable_probability=0.94)
+    shows(page, '[aria-label="index"] .meter', r"94\s%")
+
+
+def test_one_line_of_events_for_one_change(visit, service):
+    page = visit(service.url)
+    wait_for_samples(page)
+    service.muted = True
+    page.evaluate(EVENTS, [
+        ["thumb", "UNSTABLE", "STABLE", 7.0], ["index", "UNSTABLE", "STABLE", 7.2],
+        ["hand", "UNSTABLE", "STABLE", 7.2],
+        ["index", "STABLE", "UNSTABLE", 8.0], ["hand", "STABLE", "UNSTABLE", 8.0],
+        ["thumb", "STABLE", "UNSTABLE", 8.1],
+        ["ring", "STABLE", "NO_CONTACT", 9.0], ["middle", "STABLE", "NO_CONTACT", 9.1],
+        ["index", "UNSTABLE", "STABLE", 9.2],
+        ["index", "STABLE", "UNSTABLE", 9.3],  # another one than at 8.0
+    ])  # fmt: skip
+    lines = [" ".join(one.split()[2:]) for one in page.locator("#events li").all_inner_texts()]
+    assert lines == [
+        "index stable → unstable",
+        "index unstable → stable",
+        "ring, middle stable → no contact",
+        "hand stable → unstable index, thumb",
+        "hand unstable → stable thumb, index",
+    ]
 
 
 def test_changes_are_announced_to_screen_readers(visit, service):

@@ -117,3 +117,18 @@ def test_fingers_sampled_in_turn_have_lines_without_gaps(module):
         [[0, 0, 2, 2, 4, None], [3, 3, 3, 3, 3, 0]],
         [[None, 1, 1, 3, 3, 5], [0, 3, 3, 3, 3, 3]],
     ]
+
+
+PROBABILITIES = """async () => {
+  const { SampleStore } = await import("/page/store.js");
+  const store = new SampleStore(["a"], 100), nothing = [0, 0, 0, 0];
+  const own = { force: [nothing, nothing, nothing], instability: nothing,
+                stable_probability: [null, 0.9, 0.8, 0.7], state: [0, 1, 2, 3] };
+  store.append({ times: [0, 0.01, 0.02, 0.03], fingers: { a: own } }, 3, 0.05);
+  const kept = [...store.fingers.get("a").probability.subarray(0, 4)];
+  return kept.map((value) => (Number.isNaN(value) ? null : value));
+}"""
+
+
+def test_without_contact_there_is_no_probability(module):
+    assert module.evaluate(PROBABILITIES) == pytest.approx([None, None, 0.8, 0.7])

@@ -3,7 +3,7 @@
 import { make, shape, setText } from "../web/dom.js";
 import { fingerColour } from "../web/theme.js";
 import { Scale, TaxelMap } from "./taxel_map.js";
-import { debounceNote, faultWord, number, percent, reasonWord, stateKey, stateWord, unitWord } from "./format.js";
+import { debounceNote, faultWord, number, percent, reasonWord, shownProbability, stateKey, stateWord, unitWord } from "./format.js";
 
 // Range of the sigma bar by unit, from noise to a strong slip.
 const SIGMA_RANGES = { count: [1, 1000], N: [1e-3, 1] };
@@ -142,8 +142,9 @@ class Card {
   update(finger, frozen) {
     const note = debounceNote(finger, this.threshold, this.hello.debounce);
     this.showState(finger.state, note?.short ?? reasonWord(finger.reason), note?.long);
-    setText(this.probability.value, percent(finger.stable_probability));
-    setBar(this.probability, finger.stable_probability ?? 0);
+    const probability = shownProbability(finger.state, finger.stable_probability);
+    setText(this.probability.value, percent(probability));
+    setBar(this.probability, probability ?? 0);
     setText(this.sigma.value, number(finger.instability));
     setBar(this.sigma, logFraction(finger.instability, SIGMA_RANGES[this.sensor.unit] ?? SIGMA_RANGES.count));
     const force = finger.force ?? [null, null, null], known = force.every((x) => x !== null);

@@ -21,6 +21,8 @@ export const stateKey = (state) =>
 
 export const stateWord = (state) => withSpaces(state ?? "UNKNOWN");
 export const reasonWord = (reason) => (reason ? REASONS[reason] ?? withSpaces(reason) : "");
+/** Return the probability of stability to show; null without contact, where nothing can be stable. */
+export const shownProbability = (state, probability) => (state === "NO_CONTACT" ? null : probability ?? null);
 /** Return the name of a fault; `texts` are those of the service, by fault. */
 export const faultWord = (fault, texts) => texts?.[fault]?.words ?? withSpaces(fault);
 

@@ -3,7 +3,7 @@
 import { callService } from "../web/api.js";
 import { byId, make, setText } from "../web/dom.js";
 import { toast } from "./controls.js";
-import { withSpaces } from "./format.js";
+import { NO_VALUE, withSpaces } from "./format.js";
 import { EmergencyStop } from "./stop.js";
 
 const POLL_INTERVAL = 1000, POLL_TIMEOUT = 1000; // [ms]
@@ -22,6 +22,21 @@ export function limitsText(limits) {
   return `${scaleText(limits.min_scale)} to ${scaleText(limits.max_scale)} · ${force} · on a fault or stop: ${limits.on_fault}`;
 }
 
+/** Return in one word what is sent: whether commands are, and in a fault, which. */
+export function commandWord(grip) {
+  if (!grip.armed) return "DRY RUN";
+  if (grip.failure) return "NOTHING SENT";
+  if (grip.released) return "RELEASED";
+  return grip.state === "FAULT" ? "HELD" : "ARMED";
+}
+
+/** Return the explanation of a fault as a notice; empty without a fault. */
+export function faultNotice(grip) {
+  if (grip?.state !== "FAULT" || !grip.fault) return "";
+  const { reason, happened, commanded, continues, reset } = grip.fault;
+  return `grip FAULT (${withSpaces(reason)}): ${[happened, commanded, continues, reset].join(" ")}`;
+}
+
 /** Return the entries after the one that was seen last. */
 export function newEntries(entries, last) {
   const key = ({ time, text }) => `${time} ${text}`;
@@ -29,9 +44,14 @@ export function newEntries(entries, last) {
 }
 
 export class GripPanel {
-  /** @param onEvent is called with the time [s] and text of each event of the loop. */
-  constructor(onEvent) {
+  /**
+   * @param onEvent is called with the time [s] and text of each event of the loop.
+   * @param onFault is called with a text when a fault begins, has another reason, or ends.
+   */
+  constructor(onEvent, onFault) {
     this.onEvent = onEvent;
+    this.onFault = onFault;
+    this.noticed = "";
     this.grip = null;
     this.lastEntry = "";
     this.link = "connecting";
@@ -71,8 +91,10 @@ export class GripPanel {
     if (this.grip === null) return;
     const reason = grip.stopped ? "stopped by a person" : withSpaces(grip.reason);
     this.showState(grip.state.toLowerCase(), grip.state, grip.failure || reason);
-    setText(byId("grip-armed"), grip.armed ? "ARMED" : "DRY RUN");
-    byId("grip").dataset.armed = String(grip.armed);
+    const word = commandWord(grip);
+    setText(byId("grip-armed"), word);
+    byId("grip").dataset.command = word.toLowerCase().replace(" ", "-");
+    this.showFault(grip);
     setText(byId("grip-hand"), `${grip.hand} · law ${grip.law}`);
     setText(byId("grip-limits"), limitsText(grip.limits));
     this.showFingers(grip);
@@ -89,13 +111,26 @@ export class GripPanel {
     setText(byId("grip-reason"), reason);
   }
 
+  // A contact may be STABLE in a fault: the page must not look as if the loop were in control.
+  showFault(grip) {
+    const isFault = grip.state === "FAULT", { fault } = grip;
+    document.body.classList.toggle("grip-fault", isFault);
+    byId("hand-grip").hidden = !isFault;
+    byId("grip-fault").hidden = !isFault || !fault;
+    if (isFault && fault) for (const key of ["happened", "commanded", "continues", "reset"]) setText(byId(`fault-${key}`), fault[key]);
+    const notice = faultNotice(grip);
+    if (notice === this.noticed) return;
+    this.onFault(notice || `grip: the fault has ended, now ${grip.state}`);
+    this.noticed = notice;
+  }
+
   showFingers(grip) {
     const names = Object.keys(grip.fingers);
     if (names.join() !== [...this.fingers.keys()].join()) {
       this.fingers = new Map(names.map((name) => [name, new FingerScale(name)]));
       byId("grip-fingers").replaceChildren(...[...this.fingers.values()].map(({ element }) => element));
     }
-    for (const [name, row] of this.fingers) row.update(grip.fingers[name], grip.limits);
+    for (const [name, row] of this.fingers) row.update(grip.fingers[name], grip);
   }
 
   showButtons(grip) {
@@ -141,9 +176,11 @@ class FingerScale {
       make("div", "meter", make("div", "bar", this.fill, this.mark)), make("div", "below", this.limit, this.reason));
   }
 
-  update({ scale, highest, reason }, limits) {
-    setText(this.value, scaleText(scale));
-    setText(this.reason, withSpaces(reason));
+  update({ scale, highest, reason }, { limits, state, released, failure }) {
+    const isFault = state === "FAULT";
+    this.element.classList.toggle("passive", isFault || released);
+    setText(this.value, released || failure ? NO_VALUE : scaleText(scale));
+    setText(this.reason, released ? "released" : isFault && !failure ? "held" : withSpaces(reason));
     setText(this.limit, `${scaleText(limits.min_scale)} to ${scaleText(highest)}`);
     this.fill.style.transform = `scaleX(${share(scale, limits).toFixed(3)})`;
     this.mark.style.left = `${100 * share(highest, limits)}%`;

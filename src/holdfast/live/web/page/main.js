@@ -29,7 +29,8 @@ class Page {
     this.cards = new Cards(byId("cards"), (name) => this.chooseFinger(this.plots.chosen === name ? null : name));
     this.controls = new Controls((text) => this.addMarker(text));
     this.threshold = new ThresholdPanel();
-    this.grip = new GripPanel((time, text) => this.events.addMarker(time, text, "grip"));
+    this.grip = new GripPanel((time, text) => this.events.addMarker(time, text, "grip"),
+      (text) => this.notices.add({ time: Date.now() / 1000, text }));
     this.status = { link: "connecting", reason: "", ended: false, silent: false, problem: "" };
     this.store = null;
     this.frozen = null; // a copy of the store while the plots are paused

@@ -1,6 +1,6 @@
 // Samples of the last minute, in memory of constant size.
 
-import { UNKNOWN } from "./format.js";
+import { STATES, UNKNOWN, shownProbability } from "./format.js";
 
 export const SECONDS = 60;
 const COLUMNS = ["fx", "fy", "fz", "force", "sigma", "probability"];
@@ -126,8 +126,8 @@ function writeSample(columns, index, from, k) {
   columns.fz[index] = z;
   columns.force[index] = Math.sqrt(x * x + y * y + z * z);
   columns.sigma[index] = value(from?.instability, k);
-  columns.probability[index] = value(from?.stable_probability, k);
   columns.state[index] = from?.state?.[k] ?? UNKNOWN;
+  columns.probability[index] = shownProbability(STATES[columns.state[index]], from?.stable_probability?.[k]) ?? NaN;
 }
 
 /**
