@@ -18,9 +18,10 @@ SLIPPING = {"probability": 0.0, "state": ContactState.UNSTABLE}
 
 
 class Tape(Hand):
-    """Hand that keeps its commands, and may fail."""
+    """Hand that keeps its commands, and may fail. It asks for every command."""
 
     name = "tape:"
+    heartbeat, needs_idle = 0.0, True
 
     def __init__(self):
         self.commands, self.fails = [], False
