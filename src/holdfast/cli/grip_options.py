@@ -8,6 +8,8 @@ from typing import TYPE_CHECKING, Annotated, NamedTuple
 
 import typer
 
+from holdfast.cli.terminal.console import print_message
+
 if TYPE_CHECKING:
     from holdfast.control import Limits
     from holdfast.control.hands import Hand
@@ -198,6 +200,8 @@ def open_loop(
         if watchdog is not None:
             stack.push(watchdog)  # it runs already
         yield stack.enter_context(loop)
+    if hand.n_refused:
+        print_message(f"{hand.n_refused} joint states of {hand.name} were refused")
 
 
 def _check_fingers(hand: "Hand", stream: "StreamDetector") -> None:
