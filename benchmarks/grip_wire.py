@@ -114,8 +114,7 @@ class Listener:
 def holding(uri: str, hand: str, output) -> Iterator[subprocess.Popen]:
     """`holdfast hold`, armed, until the end of the block."""
     process = subprocess.Popen(
-        [HOLDFAST, "hold", "builtin:any", uri, "--hand", hand, "--armed", "--confirm", hand,
-         "--min-scale", "0.8", "--max-scale", "3"],
+        [HOLDFAST, "hold", "builtin:any", uri, "--hand", hand, "--armed", "--confirm", hand],
         stdout=output, stderr=output, text=True,
     )  # fmt: skip
     try:

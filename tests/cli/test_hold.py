@@ -1,14 +1,22 @@
 import json
+from inspect import signature
+from pathlib import Path
+from typing import get_args
 
 import msgspec
 import pytest
 
 from holdfast.cli import main
-from holdfast.control import GripCommand, watchdog
+from holdfast.cli.grip_options import GripSettings
+from holdfast.cli.hold import hold
+from holdfast.cli.serve import serve
+from holdfast.control import GripCommand, Limits, watchdog
 from holdfast.control.hands.ros import ros_hand
+from holdfast.control.trial.run import LIMITS
 from holdfast.io import load_recording, save_recording
 from holdfast.synthetic import synthetic_recording
 
+DOCS = Path(__file__).parents[2] / "docs"
 TWIN = "twin:?object=ball&case=1&profile=finger-vigorous"
 PLEXUS = "ros2:plexus?effort=0.06&max_effort=0.1"
 
@@ -54,11 +62,26 @@ def test_armed_commands_reach_the_hand_and_stdout(tmp_path, grasp, capsys, monke
     assert printed[0]["state"] == "IDLE"
 
 
+@pytest.mark.parametrize("verb", [hold, serve])
+def test_the_limits_are_those_of_the_trials(verb):
+    given = signature(verb).parameters
+    names = ("max_scale", "min_scale", "max_force", "on_fault")
+    settings = GripSettings(**{name: given[name].default for name in names})
+    assert settings.limits() == LIMITS == Limits()
+    shown = {name: get_args(given[name].annotation)[1].show_default for name in names[:2]}
+    assert shown == {"max_scale": str(LIMITS.max_scale), "min_scale": str(LIMITS.min_scale)}
+
+
+def test_the_published_trials_have_these_limits():
+    published = json.loads((DOCS / "grip" / "trial.json").read_text("utf-8"))["limits"]
+    assert published == msgspec.to_builtins(Limits())
+
+
 @pytest.mark.parametrize(
     ("hand", "message"),
     [
         ("ros2:plexus?effort=1", "max_effort: a number or 16 numbers"),
-        (PLEXUS, "at most 0.1 N m expected, 0.12 N m given at max_scale 2: lower"),
+        (PLEXUS, "at most 0.1 N m expected, 0.18 N m given at max_scale 3: lower"),
     ],
 )
 def test_limits_that_the_hand_does_not_have_are_one_line(grasp, capsys, hand, message):

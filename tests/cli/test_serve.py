@@ -204,7 +204,14 @@ class TestHand:
         # On a busy machine the loop has pauses of more than 0.1 s.
         monkeypatch.setattr(watchdog.Watchdog.__init__, "__defaults__", (300.0,))
         hand = tmp_path / "hand"
-        found = when_served(lambda url: ask(f"{url}api/v1/grip/stop", "POST"))
+
+        def work(url):
+            for method, what in (("POST", "tare"), ("DELETE", "threshold")):
+                with pytest.raises(urllib.error.HTTPError, match="409"):
+                    ask(f"{url}api/v1/{what}", method)
+            return ask(f"{url}api/v1/grip/stop", "POST")
+
+        found = when_served(work)
         words = ("--port", 0, "--json", "--hand", f"log:{hand}", "--on-fault", "open", "--armed")
         assert run(capsys, MODEL, grasp, *words, "--confirm", f"log:{hand}")[0] == 0
         assert (found[0]["armed"], found[0]["released"]) == (True, True)

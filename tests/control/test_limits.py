@@ -8,7 +8,7 @@ from holdfast.control import Limits
 @pytest.mark.parametrize(
     ("given", "message"),
     [
-        ({"max_scale": 0.9}, "min_scale <= 1 <= max_scale expected, 1 and 0.9 given"),
+        ({"max_scale": 0.9}, "min_scale <= 1 <= max_scale expected, 0.8 and 0.9 given"),
         ({"min_scale": 1.2}, "min_scale <= 1 <= max_scale expected, 1.2 and 3 given"),
         ({"rise": 0.0}, "rise: a finite number above 0 expected, 0.0 given"),
         ({"fall": math.nan}, "fall: a finite number above 0 expected, nan given"),

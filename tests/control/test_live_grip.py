@@ -20,7 +20,7 @@ class FakeSession:
 
     def __init__(self):
         self.source, self.listeners = self, []
-        self.paced, self.speed = True, 1.0
+        self.paced, self.speed, self.lock = True, 1.0, ""
 
     def add_listener(self, listener):
         self.listeners.append(listener)
@@ -57,6 +57,14 @@ class Rig:
 @pytest.fixture
 def rig():
     return Rig()
+
+
+@pytest.mark.parametrize("armed", [True, False])
+def test_an_armed_loop_locks_tare_and_thresholds(rig, armed):
+    rig.loop.armed = armed
+    with rig.grip:
+        assert bool(rig.session.lock) is armed
+    assert rig.session.lock == ""
 
 
 def test_the_document_has_the_newest_command(rig):

@@ -18,9 +18,10 @@ SLIPPING = {"probability": 0.0, "state": ContactState.UNSTABLE}
 
 
 class Tape(Hand):
-    """Hand that keeps its commands, and may fail."""
+    """Hand that keeps its commands, and may fail. It asks for every command."""
 
     name = "tape:"
+    heartbeat, needs_idle = 0.0, True
 
     def __init__(self):
         self.commands, self.fails = [], False
@@ -115,7 +116,7 @@ def test_a_controller_beyond_its_limits_is_stopped_by_the_guard(tape):
         loop.step(hand(time), time)
     assert {one.scale for one in tape.commands[0].fingers.values()} == {1.0}
     assert tape.commands[0].state is LoopState.FAULT
-    assert texts == ["grip FAULT (limit): thumb: a scale of 99 given, 1 to 3 expected"]
+    assert texts == ["grip FAULT (limit): thumb: a scale of 99 given, 0.8 to 3 expected"]
 
 
 class TestStop:

@@ -121,3 +121,13 @@ class TestInOneProcess:
     def test_without_a_start_there_is_no_heartbeat(self):
         with pytest.raises(HandError, match="has taken over or ended"):
             Watchdog("log:x", "hold").beat(COMMAND)
+
+
+@pytest.mark.parametrize(("on_fault", "n"), [("hold", 0), ("open", N_SAFE_COMMANDS)])
+def test_before_the_grip_it_can_open_the_hand_only(tmp_path, on_fault, n):
+    path = tmp_path / "hand"
+    watchdog = Watchdog(f"log:{path}", on_fault, timeout=3600.0)
+    watchdog.start()
+    watchdog.beat(msgspec.structs.replace(COMMAND, state=LoopState.IDLE))
+    watchdog.abandon()
+    assert [one.release for one in commands(path)] == [True] * n

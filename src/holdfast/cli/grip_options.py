@@ -8,6 +8,8 @@ from typing import TYPE_CHECKING, Annotated, NamedTuple
 
 import typer
 
+from holdfast.cli.terminal.console import print_message
+
 if TYPE_CHECKING:
     from holdfast.control import Limits
     from holdfast.control.hands import Hand
@@ -42,10 +44,12 @@ ConfirmOption = Annotated[
     str, typer.Option("--confirm", help="URI of the hand again, with --armed.")
 ]
 MaxScaleOption = Annotated[
-    float, typer.Option("--max-scale", help="Largest multiple of the first force.")
+    float | None,
+    typer.Option("--max-scale", help="Largest multiple of the first force.", show_default="3.0"),
 ]
 MinScaleOption = Annotated[
-    float, typer.Option("--min-scale", help="Smallest multiple of the first force.")
+    float | None,
+    typer.Option("--min-scale", help="Smallest multiple of the first force.", show_default="0.8"),
 ]
 MaxForceOption = Annotated[
     float | None,
@@ -70,14 +74,16 @@ class GripSettings(NamedTuple):
 
     Attributes:
         hand: URI of the hand; empty if none is controlled.
+        max_scale: highest force scale; None for the default of `Limits`.
+        min_scale: lowest force scale; None for the default of `Limits`.
     """
 
     hand: str = ""
     law: str = "holdfast"
     armed: bool = False
     confirm: str = ""
-    max_scale: float = 2.0
-    min_scale: float = 1.0
+    max_scale: float | None = None
+    min_scale: float | None = None
     max_force: float | None = None
     on_fault: FaultAction = FaultAction.HOLD
     newtons: float | None = None
@@ -104,10 +110,9 @@ class GripSettings(NamedTuple):
         """
         from holdfast.control import Limits
 
-        return Limits(
-            min_scale=self.min_scale, max_scale=self.max_scale, max_force=self.max_force,
-            on_fault=self.on_fault.value,
-        )  # fmt: skip
+        scales = {"min_scale": self.min_scale, "max_scale": self.max_scale}
+        given = {name: scale for name, scale in scales.items() if scale is not None}
+        return Limits(max_force=self.max_force, on_fault=self.on_fault.value, **given)
 
 
 def find_source_and_hand(
@@ -195,6 +200,8 @@ def open_loop(
         if watchdog is not None:
             stack.push(watchdog)  # it runs already
         yield stack.enter_context(loop)
+    if hand.n_refused:
+        print_message(f"{hand.n_refused} joint states of {hand.name} were refused")
 
 
 def _check_fingers(hand: "Hand", stream: "StreamDetector") -> None:

@@ -55,8 +55,8 @@ def hold(
     law: LawOption = "holdfast",
     armed: ArmedOption = False,
     confirm: ConfirmOption = "",
-    max_scale: MaxScaleOption = 2.0,
-    min_scale: MinScaleOption = 1.0,
+    max_scale: MaxScaleOption = None,
+    min_scale: MinScaleOption = None,
     max_force: MaxForceOption = None,
     on_fault: FaultOption = FaultAction.HOLD,
     newtons: NewtonsOption = None,
@@ -88,7 +88,7 @@ def hold(
       holdfast hold builtin:any xela://auto --hand log:commands.jsonl
       holdfast hold model.json xela://auto --hand call:my_gripper:set_force --armed \
         --confirm call:my_gripper:set_force --max-scale 1.2 --on-fault open
-      holdfast hold builtin:any xela://auto --hand "ros2:plexus?effort=0.1&max_effort=0.2"
+      holdfast hold builtin:any xela://auto --hand "ros2:plexus?effort=0.1&max_effort=0.3"
     """
     from holdfast.live.session import Session
 

@@ -11,6 +11,9 @@ FaultAction = Literal["hold", "open"]
 class Limits(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
     """Limits of a grip controller. A scale is a multiple of the force at the start of the grip.
 
+    The defaults are those of `holdfast hold`, `serve --hand` and `trial`
+    (`docs/decisions/0013-one-set-of-grip-limits.md`).
+
     Attributes:
         min_scale: lowest force scale; 1 never relaxes below the first grip.
         max_scale: highest force scale.
@@ -31,7 +34,7 @@ class Limits(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=Tr
         ValueError: a limit is out of range, or two contradict each other.
     """
 
-    min_scale: float = 1.0
+    min_scale: float = 0.8
     max_scale: float = 3.0
     rise: float = 30.0
     fall: float = 3.0

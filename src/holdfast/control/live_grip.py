@@ -25,6 +25,11 @@ from holdfast.live.session import Session
 
 N_ENTRIES = 20
 """Number of newest events that are kept."""
+LOCK = (
+    "the hand is armed: the tare and the thresholds are locked; start again without --armed to "
+    "change them"
+)
+"""Reason of the lock of a session whose estimates move a hand."""
 
 
 class EventLog:
@@ -53,6 +58,8 @@ class LiveGrip:
     """Loop that is stepped in a thread of its own, with the updates of a session.
 
     It is a context manager: leaving it ends the thread, before the loop sends its last command.
+    An armed loop locks the session: with another threshold or tare, the same contact would move
+    the hand.
     If the hand refuses a command, the thread ends, and the watchdog brings the hand into its
     safe state; `document` shows why, and leaving the context raises the error.
 
@@ -144,6 +151,8 @@ class LiveGrip:
             self._log(f"grip FAULT (hand): {failure}", last.time if last else 0.0)
 
     def __enter__(self) -> Self:
+        if self._loop.armed:
+            self._session.lock = LOCK
         self._session.add_listener(self._runner.put)
         self._thread.start()
         return self
@@ -157,5 +166,6 @@ class LiveGrip:
         self._session.remove_listener(self._runner.put)
         self._over.set()
         self._thread.join()
+        self._session.lock = ""
         if self.failure is not None and kind is None:
             raise self.failure

@@ -78,6 +78,7 @@ class LiveTwin(Source, Hand):
 
     def open(self) -> None:
         """Begin the grasp."""
+        self.forget()
         self._shift = 0.0
         self.simulation = Simulation(self.grasp)
         self._scales = np.ones(len(FINGERS))
@@ -103,6 +104,7 @@ class LiveTwin(Source, Hand):
 
     def _begin_again(self, ended_at: float) -> None:
         """Begin the grasp once more, after a pause."""
+        self._sent = None  # the new grasp has no command yet
         self.simulation = Simulation(self.grasp)
         self._scales = np.ones(len(FINGERS))
         self._shift += ended_at + PAUSE
@@ -119,4 +121,5 @@ class LiveTwin(Source, Hand):
 
     def close(self) -> None:
         """End the grasp."""
+        self.forget()
         self.simulation = None

@@ -35,7 +35,7 @@ class GripLoop:
 
     Attributes:
         last: the last command; None before the first.
-        n_sent: number of commands that were sent.
+        n_sent: number of commands that were sent; a hand gets no command twice, see `Hand`.
     """
 
     _now = -math.inf
@@ -117,8 +117,7 @@ class GripLoop:
         if self._watchdog is not None:
             self._watchdog.beat(command)
         if is_new:
-            self.hand.send(command)
-            self.n_sent += 1
+            self.n_sent += self.hand.send(command)
 
     def __enter__(self) -> Self:
         return self

@@ -17,7 +17,7 @@ from typing import Self
 
 import msgspec
 
-from holdfast.control.command import GripCommand, GripReason
+from holdfast.control.command import GripCommand, GripReason, LoopState
 from holdfast.control.guard import safe_command
 from holdfast.control.hands import Hand, open_hand
 from holdfast.control.limits import FaultAction
@@ -170,9 +170,11 @@ def _watch(pipe: int, timeout: float) -> GripCommand | None:
 
 
 def _take_over(hand: Hand, last: GripCommand, *, release: bool) -> None:
-    """Send the safe command several times."""
+    """Send the safe command several times; none to hold a hand that has no grip yet."""
+    if last.state is LoopState.IDLE and not release:
+        return
     command = safe_command(last, GripReason.WATCHDOG, release=release)
     for _ in range(N_SAFE_COMMANDS):
         with suppress(HandError):  # the next attempt may pass
-            hand.send(command)
+            hand.send(command, repeat=True)
         time.sleep(SAFE_COMMAND_PERIOD)

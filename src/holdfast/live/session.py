@@ -12,7 +12,7 @@ from typing import NamedTuple, Self
 
 import numpy as np
 
-from holdfast.errors import SourceError
+from holdfast.errors import SourceError, StreamError
 from holdfast.live.stream_detector import StreamDetector, StreamUpdate
 from holdfast.sources import Arrival
 
@@ -54,6 +54,7 @@ class Session:
         n_refused: packets that could not be decoded.
         ended: True if the source has ended, or the detector has failed.
         failure: the exception that ended the session.
+        lock: why the tare and the thresholds cannot be changed now; empty if they can.
     """
 
     def __init__(self, stream: StreamDetector) -> None:
@@ -62,6 +63,7 @@ class Session:
         self.n_packets = self.n_lost = self.n_refused = 0
         self.ended = False
         self.failure: Exception | None = None
+        self.lock = ""
         self._n_samples = dict.fromkeys(self.source.sensors, 0)
         self._listeners: list[Listener] = []
         self._requests: deque[tuple[Callable[[], None], Future[None]]] = deque()
@@ -106,9 +108,10 @@ class Session:
         """Discard the tare, and take a new one from the next samples.
 
         Raises:
-            StreamError: a finger is in contact.
+            StreamError: a finger is in contact, or the session is locked.
             SourceError: the source has ended or is silent.
         """
+        self._check_lock()
         if self.ended:
             raise SourceError("the source has ended: no tare can be taken")
         self._request(self._restart_tare, "no tare can be taken")
@@ -120,13 +123,19 @@ class Session:
             threshold: from 0 to 1; None for the thresholds of the model.
 
         Raises:
+            StreamError: the session is locked.
             SourceError: the source has ended or is silent.
             ValueError: the threshold is not from 0 to 1.
         """
+        self._check_lock()
         consequence = "the threshold was not changed"
         if self.ended:
             raise SourceError(f"the source has ended: {consequence}")
         self._request(lambda: self.stream.set_threshold(threshold), consequence)
+
+    def _check_lock(self) -> None:
+        if self.lock:
+            raise StreamError(self.lock)
 
     def latency(self) -> Latency:
         """Compute the percentiles of the newest latencies."""

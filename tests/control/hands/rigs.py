@@ -17,6 +17,12 @@ from .ros.drivers import ROS1, ROS2, Ros2Driver
 taken = []
 _numbers = itertools.count()
 LOCAL = ["twin", "log", "call"]
+WITH_STATES = [
+    f"{scheme}:{name}"
+    for scheme, drivers in (("ros2", ROS2), ("ros1", ROS1))
+    for name, driver in drivers.items()
+    if driver.states is not None
+]
 NAMES = [*LOCAL, *(f"ros2:{name}" for name in ROS2), *(f"ros1:{name}" for name in ROS1)]
 
 
@@ -28,16 +34,24 @@ def new_domain():
 class TwinRig:
     """The twin."""
 
-    per_finger, idle_is_silent, driver = True, False, None
+    per_finger, driver = True, None
     fingers = ("thumb", "index", "middle", "ring")
 
     def __init__(self, folder):
-        self.hand = LiveTwin("twin:?object=ball", speed=0)
+        self.hand, self._n = LiveTwin("twin:?object=ball", speed=0), 0
+        send = self.hand._send
+
+        def count(command):
+            send(command)
+            self._n += 1
+
+        self.hand._send = count
 
     def start(self):
-        pass
+        self._n = 0
 
     def forces(self, n):
+        assert self._n == n
         if self.hand.simulation.protocol.is_released(self.hand.simulation.time + 1e-6):
             return "open"
         return dict(zip(self.fingers, self.hand._scales.tolist(), strict=True))
@@ -49,7 +63,7 @@ class TwinRig:
 class LogRig:
     """A file."""
 
-    per_finger, idle_is_silent, fingers, driver = True, False, None, None
+    per_finger, fingers, driver = True, None, None
 
     def __init__(self, folder):
         self._path = folder / "hand"
@@ -71,7 +85,7 @@ class LogRig:
 class CallRig:
     """A function of Python."""
 
-    per_finger, idle_is_silent, fingers, driver = False, False, None, None
+    per_finger, fingers, driver = False, None, None
 
     def __init__(self, folder):
         sys.modules["holdfast_test_rigs"] = sys.modules[__name__]
@@ -95,8 +109,6 @@ def take(scale):
 class RosRig:
     """A hand on topics, with a driver on the other side."""
 
-    idle_is_silent = True
-
     def __init__(self, hand, driver):
         self.hand, self.peer, self.driver = hand, driver, driver.driver
         self.per_finger = self.driver.effort is None
@@ -104,6 +116,14 @@ class RosRig:
 
     def start(self):
         self.peer.messages.clear()
+        self.hand.heartbeat = None
+
+    @contextmanager
+    def spoiled(self, position):
+        """Every third reading of the first joint is wrong."""
+        self.peer.spoil(position)
+        yield
+        self.peer.spoil(None)
 
     @contextmanager
     def other_hand(self, *, standby=False):

@@ -1,5 +1,7 @@
 """What every hand must fulfil. The hands of ROS have a driver on the other side of the topics."""
 
+import math
+
 import msgspec
 import pytest
 
@@ -8,7 +10,8 @@ from holdfast.control.hands import open_hand
 from holdfast.control.hands.ros import ros_hand
 from holdfast.errors import HandError
 
-from .rigs import LOCAL, NAMES, Rigs
+from .rigs import LOCAL, NAMES, WITH_STATES, Rigs
+from .ros.drivers import POSITIONS
 
 SCALES = {"thumb": 1.4, "index": 1.1, "middle": 1.2, "ring": 1.3}
 COMMAND = GripCommand(1.0, LoopState.REACT, {f: FingerCommand(s) for f, s in SCALES.items()})
@@ -42,6 +45,7 @@ def rig(rigs, request):
 
 each = pytest.mark.parametrize("rig", NAMES, indirect=True)
 each_on_topics = pytest.mark.parametrize("rig", ON_TOPICS, indirect=True)
+each_with_states = pytest.mark.parametrize("rig", WITH_STATES, indirect=True)
 each_with_fingers = pytest.mark.parametrize("rig", WITH_FINGERS, indirect=True)
 
 
@@ -104,12 +108,58 @@ def test_an_unknown_finger_is_refused(rig):
         rig.forces(1)
 
 
-@each_on_topics
+@each
 def test_nothing_is_commanded_before_the_grip_begins(rig):
+    """Neither the commands of an idle loop, nor the stop of one."""
     with rig.hand as hand:
-        hand.send(IDLE)
-        hand.send(COMMAND)
+        assert [hand.send(IDLE), hand.send(IDLE), hand.send(HOLD)] == [False] * 3
+        assert hand.send(COMMAND)
         rig.forces(1)
+
+
+@each
+def test_a_command_that_does_not_change_is_sent_once(rig):
+    later = [msgspec.structs.replace(COMMAND, time=1.0 + 0.01 * k) for k in range(20)]
+    with rig.hand as hand:
+        assert [hand.send(one) for one in later] == [True] + [False] * 19
+        assert hand.send(RELEASE)
+        assert not hand.send(RELEASE)
+        assert rig.forces(2) == "open"
+
+
+@each
+def test_a_new_grip_gets_its_first_command(rig):
+    with rig.hand as hand:
+        assert [hand.send(one) for one in (COMMAND, IDLE, COMMAND)] == [True, False, True]
+        rig.forces(2)
+
+
+@each
+def test_a_hand_that_asks_for_a_heartbeat_gets_its_command_again(rig):
+    with rig.hand as hand:
+        for heartbeat, expected in ((None, [True, False]), (3600.0, [False]), (0.0, [True, True])):
+            hand.heartbeat = heartbeat
+            assert [hand.send(COMMAND) for _ in expected] == expected
+        rig.forces(3)
+        hand.heartbeat = None
+
+
+@each
+def test_who_takes_over_sends_in_any_case(rig):
+    with rig.hand as hand:
+        assert [hand.send(RELEASE, repeat=True) for _ in range(3)] == [True] * 3
+        assert rig.forces(3) == "open"
+
+
+@each_with_states
+@pytest.mark.parametrize("position", [1e6, POSITIONS[0] + 2 * math.pi, 0.4])
+def test_a_wrong_joint_reading_defines_no_command(rig, position):
+    """Beyond the limits of the joint it is refused; within them the median leaves it out."""
+    before = rig.hand.n_refused
+    with rig.spoiled(position), rig.hand as hand:
+        hand.send(COMMAND)
+        assert rig.forces(1) == pytest.approx(SCALES, rel=1e-5)
+        assert (hand.n_refused > before) is (position != 0.4)
 
 
 @each_on_topics

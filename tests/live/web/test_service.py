@@ -345,6 +345,27 @@ def test_the_threshold_is_changed_and_noticed():
     assert texts == reports == ["threshold set to 0.75", "threshold of the model restored"]
 
 
+def test_tare_and_thresholds_of_a_locked_session_are_refused():
+    calls = [
+        ("POST", "/api/v1/tare", None),
+        ("POST", "/api/v1/threshold", {"value": 1.0}),
+        ("DELETE", "/api/v1/threshold", None),
+    ]
+
+    async def work():
+        found = []
+        async with served(patient(10)) as (client, session):
+            before = dict(session.stream.thresholds)
+            session.lock = "the hand is armed"
+            for method, path, body in calls:
+                async with client.request(method, path, json=body) as answer:
+                    found.append((answer.status, await answer.json()))
+            assert session.stream.thresholds == before
+        return found
+
+    assert run(work()) == [(409, {"error": "the hand is armed"})] * len(calls)
+
+
 @pytest.mark.parametrize("body", [b"{}", b'{"value": 1.5}', b'{"value": null}', b'{"value": "a"}'])
 def test_an_invalid_threshold_is_refused(body):
     async def work():

@@ -4,6 +4,7 @@ import hashlib
 import math
 import os
 import tempfile
+import time
 from abc import abstractmethod
 from collections.abc import Iterable
 from contextlib import suppress
@@ -11,7 +12,7 @@ from pathlib import Path
 from types import TracebackType
 from typing import Self
 
-from holdfast.control.command import GripCommand
+from holdfast.control.command import GripCommand, LoopState
 from holdfast.control.limits import Limits
 from holdfast.errors import HandError
 from holdfast.openable import Openable
@@ -26,10 +27,21 @@ class Hand(Openable):
     Attributes:
         name: URI of the hand.
         fingers: fingers that the hand has; None if it takes the commands of any.
+        heartbeat: time after which it needs its command again, although nothing changed [s]; None
+            if it keeps its last command, and gets each command once.
+        needs_idle: whether it needs commands while the loop is IDLE, before the grip begins.
+        n_refused: number of messages of the hand that were refused, because they cannot be right.
     """
 
     name: str = ""
     fingers: tuple[str, ...] | None = None
+    heartbeat: float | None = None
+    needs_idle: bool = False
+    n_refused: int = 0
+
+    _begun = False
+    _sent: object = None
+    _sent_at = -math.inf
 
     @property
     def resource(self) -> str:
@@ -57,20 +69,38 @@ class Hand(Openable):
             HandError: the hand does not answer, or is another one than expected.
         """
 
-    def send(self, command: GripCommand) -> None:
-        """Send a command.
+    def send(self, command: GripCommand, *, repeat: bool = False) -> bool:
+        """Send a command that the hand does not have yet.
+
+        Before the grip begins, a hand gets no command but one that opens it.
+
+        Args:
+            command: the command.
+            repeat: whether to send it in any case, as a watchdog does that takes over.
+
+        Returns:
+            Whether it was sent.
 
         Raises:
             HandError: the hand refuses it, or is disconnected.
         """
-        if unknown := self._unknown(command.fingers):
-            raise HandError(unknown)
-        for finger, one in command.fingers.items():
-            if not (math.isfinite(one.scale) and one.scale >= 0.0):
-                raise HandError(
-                    f"{self.name}: a scale of at least 0 expected, {one.scale:g} given for {finger}"
-                )
+        self._check_command(command)
+        self._watch()
+        self._follow(command.state)
+        if not (command.release or self._begun or self.needs_idle or repeat):
+            return False
+        content, now = self._content(command), time.monotonic()
+        is_due = self.heartbeat is not None and now - self._sent_at >= self.heartbeat
+        if content == self._sent and not (is_due or repeat):
+            return False
+        self._sent = None  # not known until it was sent
         self._send(command)
+        self._sent, self._sent_at = content, now
+        return True
+
+    def forget(self) -> None:
+        """Forget the grip and the last command, so that the next one is sent in any case."""
+        self._begun, self._sent = False, None
 
     @abstractmethod
     def _send(self, command: GripCommand) -> None:
@@ -80,9 +110,46 @@ class Hand(Openable):
             HandError: the hand refuses it, or is disconnected.
         """
 
+    def _watch(self) -> None:
+        """Check that the hand answers; called at every command, also if it is not sent.
+
+        Raises:
+            HandError: it does not.
+        """
+
+    def _begin(self) -> None:
+        """Prepare for a grip that begins; called before its first command is sent.
+
+        Raises:
+            HandError: the hand cannot take commands for this grip.
+        """
+
+    def _content(self, command: GripCommand) -> object:
+        """Return what the hand gets of a command: equal for commands that are the same to it."""
+        scales = {finger: one.scale for finger, one in command.fingers.items()}
+        return command.release, None if command.release else scales
+
+    def _follow(self, state: LoopState) -> None:
+        """Follow the begin and the end of the grip."""
+        if state is LoopState.IDLE:
+            self._begun = False
+        elif state is not LoopState.FAULT and not self._begun:
+            self._begin()
+            self._begun, self._sent = True, None
+
+    def _check_command(self, command: GripCommand) -> None:
+        """Raise `HandError` for a finger that the hand lacks, or a scale that is no force."""
+        if unknown := self._unknown(command.fingers):
+            raise HandError(unknown)
+        for finger, one in command.fingers.items():
+            if not (math.isfinite(one.scale) and one.scale >= 0.0):
+                raise HandError(
+                    f"{self.name}: a scale of at least 0 expected, {one.scale:g} given for {finger}"
+                )
+
     @abstractmethod
     def close(self) -> None:
-        """Disconnect. It has no effect on a hand that is closed."""
+        """Disconnect, and `forget` what was sent. It has no effect on a hand that is closed."""
 
     def _unknown(self, fingers: Iterable[str]) -> str:
         """Return a message about fingers that the hand does not have; empty if there are none."""

@@ -4,6 +4,7 @@ from pathlib import Path
 from typing import BinaryIO
 
 import msgspec
+from msgspec import structs
 
 from holdfast.control.command import GripCommand
 from holdfast.control.hands.base import Hand
@@ -11,7 +12,7 @@ from holdfast.errors import HandError
 
 
 class LogFile(Hand):
-    """Hand that appends each command to a file.
+    """Hand that appends each command to a file, except one that differs in its time alone.
 
     Args:
         name: URI of the hand.
@@ -42,8 +43,12 @@ class LogFile(Hand):
         except OSError as cause:
             raise HandError(f"cannot write {self._path}: {cause.strerror}") from cause
 
+    def _content(self, command: GripCommand) -> object:
+        return structs.replace(command, time=0.0)
+
     def close(self) -> None:
         """Close the file."""
+        self.forget()
         if self._file is not None:
             self._file.close()
             self._file = None

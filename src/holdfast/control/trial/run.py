@@ -21,8 +21,9 @@ from holdfast.twin.hand import FINGERS, GRAVITY, RATE
 from holdfast.twin.loads import load_state
 from holdfast.twin.simulation import Simulation
 
-LIMITS = Limits(min_scale=0.8, max_scale=3.0)
-"""Limits of all laws. The lowest scale is 1.6 times the least force of an unloaded object."""
+LIMITS = Limits()
+"""Limits of all laws: those that `holdfast hold` has by default. The lowest scale is 1.6 times the
+least force of an unloaded object."""
 NEWTONS_PER_COUNT = (0.000729, 0.000628, 0.000628)
 """Calibration for the laws that need newtons, from the data sheet of the flat sensor: normal and
 tangential axes of the fingertip frame [N/count]."""

@@ -17,6 +17,18 @@ PLEXUS = "/allegro_hand_position_effort_controller"
 V4 = "/allegro_hand_position_controller/commands"
 
 
+def wrong(values, value, joint=0):
+    """Values of which one is wrong."""
+    return [value if k == joint else one for k, one in enumerate(values)]
+
+
+def readings(position, every, n):
+    """Positions and efforts of the n-th joint states; every so many, those of joint 0 are wrong."""
+    if position is None or n % every:
+        return POSITIONS, EFFORTS
+    return wrong(POSITIONS, position), wrong(EFFORTS, 2 * EFFORTS[0])
+
+
 def ratios(values, order, base):
     """The ratio of the four joints of each finger, which is the same for all four."""
     found = {}
@@ -134,19 +146,24 @@ class Ros2Driver:
             definition = hand_definition(kind)
             reader = self._node.reader(topic, definition)
             self._readers.append((topic, reader, MessageDecoder(definition, ros2=True)))
-        self._write = None
+        self._write, self._spoiled, self._n_states = None, (None, 1), 0
         if driver.states is not None:
             definition = hand_definition(JOINT_STATE)
-            names, efforts = changes.get("names", driver.names), changes.get("efforts", EFFORTS)
+            names, efforts = changes.get("names", driver.names), changes.get("efforts")
             # Other joints of the robot, and the hand's in another order: names decide.
             names = ["arm_1", *reversed(names)] if names else []
             turned = (lambda values: [9.0, *reversed(values)]) if names else list
-            message = joint_message(
-                1.0, names, positions=turned(POSITIONS), efforts=turned(efforts) if efforts else []
-            )
             write = self._node.writer(driver.states, definition)
-            data = MessageEncoder(definition)(message)
-            self._write = lambda: write(data)
+            encode = MessageEncoder(definition)
+
+            def publish(positions, measured):
+                given = measured if efforts is None else efforts
+                message = joint_message(
+                    1.0, names, positions=turned(positions), efforts=turned(given) if given else []
+                )
+                write(encode(message))
+
+            self._write = publish
         self._lock = threading.Lock()
         self._ending = threading.Event()
         self._thread = threading.Thread(target=self._run)
@@ -158,7 +175,13 @@ class Ros2Driver:
                 self.messages += [(topic, decode(data)) for data in reader.take(0.0)]
             with self._lock:
                 if self._write is not None:
-                    self._write()
+                    self._n_states += 1
+                    self._write(*readings(*self._spoiled, self._n_states))
+
+    def spoil(self, position, every=3):
+        """Publish a wrong position [rad] of joint 0 every so many states; None for right ones."""
+        with self._lock:
+            self._spoiled = position, every
 
     def stop_states(self):
         """Publish no joint states any more; none is on its way when this returns."""

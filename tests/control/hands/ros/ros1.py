@@ -26,7 +26,7 @@ class Ros1World:
         self.master = Master(folder)
         self._drivers = self._start("drivers")
         self.processes = [self._start("hands"), self._start("hands")]
-        self.messages = []
+        self.messages, self._spoiled = [], threading.Event()
         n_topics = sum(len(driver.topics) for driver in ROS1.values())
         assert json.loads(self._drivers.stdout.readline()) == n_topics
         self._thread = threading.Thread(target=self._read)
@@ -40,7 +40,18 @@ class Ros1World:
 
     def _read(self):
         for line in self._drivers.stdout:
-            self.messages.append(json.loads(line))
+            found = json.loads(line)
+            if found == "spoiled":
+                self._spoiled.set()
+            else:
+                self.messages.append(found)
+
+    def spoil(self, position, every):
+        """Let the drivers publish wrong joint states, and wait until they do."""
+        self._spoiled.clear()
+        self._drivers.stdin.write(json.dumps([position, every]) + "\n")
+        self._drivers.stdin.flush()
+        assert self._spoiled.wait(PATIENCE)
 
     def close(self):
         for process in (self._drivers, *self.processes):
@@ -77,6 +88,9 @@ class Ros1Driver:
     def messages(self):
         return self._world.messages
 
+    def spoil(self, position, every=3):
+        self._world.spoil(position, every)
+
     def wait(self, n):
         end = time.monotonic() + PATIENCE
         while len(self.messages) < n:
@@ -112,13 +126,26 @@ class DistantHand:
     def check(self, limits, fingers):
         self._ask("check", limits.max_scale, fingers)
 
-    def send(self, command):
+    def send(self, command, *, repeat=False):
         scales = {name: str(one.scale) for name, one in command.fingers.items()}
-        self._ask("send", command.time, command.state, command.release, scales)
+        return self._ask("send", command.time, command.state, command.release, scales, repeat)
+
+    @property
+    def heartbeat(self):
+        return self._ask("get", "heartbeat")
+
+    @heartbeat.setter
+    def heartbeat(self, value):
+        self._ask("set", "heartbeat", value)
+
+    @property
+    def n_refused(self):
+        return self._ask("get", "n_refused")
 
     def _ask(self, *words):
         self._process.stdin.write(json.dumps([self.name, self._standby, *words]) + "\n")
         self._process.stdin.flush()
-        kind, text = json.loads(self._process.stdout.readline())
+        kind, answer = json.loads(self._process.stdout.readline())
         if kind:
-            raise (ValueError if kind == "ValueError" else getattr(errors, kind))(text)
+            raise (ValueError if kind == "ValueError" else getattr(errors, kind))(answer)
+        return answer

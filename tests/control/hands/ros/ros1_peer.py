@@ -1,14 +1,16 @@
 """Processes of ROS 1: a driver of a hand, and a hand of holdfast that takes orders on stdin.
 
-python ros1_peer.py drivers   publishes joint states; prints each message that it gets as JSON
+python ros1_peer.py drivers   publishes joint states; prints each message that it gets as JSON;
+                              a line [position, every] on stdin makes some joint states wrong
 python ros1_peer.py hands     does what the lines on stdin say; prints an answer to each
 """
 
 import json
 import sys
+import threading
 import time
 
-from control.hands.ros.drivers import EFFORTS, POSITIONS, ROS1
+from control.hands.ros.drivers import ROS1, readings
 from holdfast.control import FingerCommand, GripCommand, Limits, LoopState
 from holdfast.control.hands import open_hand
 from holdfast.control.hands.ros import ros_hand
@@ -38,10 +40,22 @@ def drivers():
     states = {driver.states: driver.names for driver in ROS1.values() if driver.states}
     publishers = {topic: rospy.Publisher(topic, kind, queue_size=1) for topic in states}
     emit(len(keep))
+    spoiled = [(None, 1)]
+    threading.Thread(target=listen, args=(spoiled,), daemon=True).start()
+    n = 0
     while True:
+        n += 1
+        positions, efforts = readings(*spoiled[-1], n)
         for topic, publisher in publishers.items():
-            publisher.publish(name=states[topic], position=POSITIONS, effort=EFFORTS)
+            publisher.publish(name=states[topic], position=positions, effort=efforts)
         time.sleep(0.01)
+
+
+def listen(spoiled):
+    """Append each line of stdin, and answer it."""
+    for line in sys.stdin:
+        spoiled.append(json.loads(line))
+        emit("spoiled")
 
 
 def hands():
@@ -54,23 +68,26 @@ def hands():
         if (uri, standby) not in made:
             made[uri, standby] = open_hand(uri, standby=standby)
         try:
-            obey(made[uri, standby], word, given)
+            answer = obey(made[uri, standby], word, given)
         except Exception as failure:
             emit([type(failure).__name__, str(failure)])
         else:
-            emit(["", ""])
+            emit(["", answer])
 
 
 def obey(made, word, given):
     if word == "check":
         limits, fingers = given
-        made.check(Limits(max_scale=limits), fingers)
-    elif word == "send":
-        time, state, release, scales = given
+        return made.check(Limits(max_scale=limits), fingers)
+    if word == "send":
+        time, state, release, scales, repeat = given
         fingers = {name: FingerCommand(float(scale)) for name, scale in scales.items()}
-        made.send(GripCommand(time, LoopState(state), fingers, release))
-    else:
-        getattr(made, word)()
+        return made.send(GripCommand(time, LoopState(state), fingers, release), repeat=repeat)
+    if word == "set":
+        return setattr(made, *given)
+    if word == "get":
+        return getattr(made, *given)
+    return getattr(made, word)()
 
 
 if __name__ == "__main__":

@@ -47,6 +47,7 @@ SIXTEEN = ",".join(["0.1"] * 16)
             f"ros2:v5?max_effort=1&stiffness=-1&home={SIXTEEN}",
             "stiffness: numbers above 0 exp",
         ),
+        ("ros2:v4?lowest=2", "lowest below highest expected for each joint"),
         ("ros2:v5-envelop?effort=1", "max_effort: a number expected, nothing given"),
         ("ros2:v5-envelop?effort=-1&max_effort=1", "effort: a number above 0 expected, -1 given"),
         ("ros2:gripper?effort=1&max_effort=1", "topic=/TOPIC expected, nothing given"),

@@ -1,5 +1,6 @@
 """Hands of ROS 2 beyond the contract: what they need to begin, and how they notice silence."""
 
+import re
 import time
 from dataclasses import replace
 
@@ -11,6 +12,7 @@ from control.hands.rigs import new_domain
 from holdfast.control import FingerCommand, GripCommand, Limits, LoopState
 from holdfast.control.hands import open_hand
 from holdfast.control.hands.ros import ros_hand
+from holdfast.control.hands.ros.joints import LIMIT_TOLERANCE
 from holdfast.control.watchdog import Watchdog
 from holdfast.errors import HandError
 
@@ -117,14 +119,14 @@ class TestBeginOfTheGrip:
                 {"ring": 1.0, "thumb": 1.2, "index": 1.0, "middle": 1.0}
             )
 
-    def test_the_base_is_a_mean_over_the_time_in_which_the_hand_was_stable(self, driver):
+    def test_the_base_is_a_median_over_the_time_in_which_the_hand_was_stable(self, driver):
         peer = driver(ROS2["v4"])
         with open_hand("ros2:v4") as hand:
             peer.stop_states()
             hand._poll()
             _, states = hand._states[-1]
             hand._states.clear()
-            for factor in (0.5, 0.9):
+            for factor in (0.5, 0.9, 0.6, 9.0, 0.7):
                 changed = states._replace(efforts=factor * states.efforts)
                 hand._states.append((time.monotonic(), changed))
             hand.send(COMMAND)
@@ -144,6 +146,50 @@ class TestBeginOfTheGrip:
             hand.send(GripCommand(1.0, LoopState.REACT, {"thumb": FingerCommand(50.0)}))
             _, message = peer.wait(1)[-1]
         assert list(message["data"][:4]) == [1.396, 1.163, 1.644, 1.719]
+
+
+class TestWrongJointStates:
+    """What a hand reads must be within the limits of its joints."""
+
+    def test_a_hand_without_a_valid_state_is_not_opened(self, driver, impatient):
+        peer = driver(ROS2["v4"])
+        peer.spoil(1e6, every=1)
+        with pytest.raises(HandError) as failure:
+            open_hand("ros2:v4").open()
+        assert re.search(
+            r"0 valid joint states on /joint_states in ROS domain \d+ in 0.2 s, at least 5 "
+            r"expected \(\d+ refused: thumb joint 0 at 1e\+06 rad, 0.263 to 1.396 expected\)$",
+            str(failure.value),
+        )
+
+    def test_states_that_become_wrong_are_a_fault(self, driver):
+        peer = driver(ROS2["v4"])
+        with open_hand("ros2:v4") as hand:
+            hand.send(COMMAND)
+            peer.spoil(1e6, every=1)
+            text = r"no valid joint states on /joint_states for 0.\d s \(\d+ refused: thumb joint 0"
+            with pytest.raises(HandError, match=text):
+                send_for_a_minute(hand)
+
+    @pytest.mark.parametrize(
+        ("beyond", "is_refused"), [(LIMIT_TOLERANCE - 0.01, False), (LIMIT_TOLERANCE + 0.01, True)]
+    )
+    def test_a_reading_may_be_a_little_beyond_its_limit(self, driver, beyond, is_refused):
+        peer = driver(ROS2["v4"])
+        peer.spoil(1.396 + beyond)
+        with open_hand("ros2:v4") as hand:
+            assert (hand.n_refused > 0) is is_refused
+
+    def test_limits_can_be_given(self, driver):
+        peer = driver(ROS2["v5"])
+        peer.spoil(0.5)
+        with open_hand(ROS2["v5"].uri) as hand:
+            assert hand.n_refused == 0
+        with open_hand(f"{ROS2['v5'].uri}&lowest=-0.3&highest=0.35") as hand:
+            assert hand.n_refused > 0
+            hand.send(GripCommand(1.0, LoopState.REACT, {"thumb": FingerCommand(5.0)}))
+            _, message = peer.wait(1)[-1]
+        assert max(message["position"]) == 0.35
 
 
 class TestSilence:

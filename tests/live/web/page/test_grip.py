@@ -158,6 +158,25 @@ def test_it_repeats_the_stop_until_the_server_answers(visit, holding):
     assert page.locator("#stop-feedback").is_hidden()
 
 
+def test_tare_and_threshold_are_locked_while_armed(visit, holding):
+    page = visit(holding.url)
+    shows(page, "#grip-armed", "^ARMED$")
+    page.click("#threshold-toggle")
+    shows(page, "#threshold-expected", "^The hand is armed: the tare and the thresholds are locked")
+    for name in ("tare", "threshold", "threshold-own"):
+        assert page.locator(f"#{name}").is_disabled()
+    for name in ("tare", "threshold"):
+        assert page.locator(f"#{name}").get_attribute("title").startswith("The hand is armed")
+    page.keyboard.press("t")
+    shows(page, "#toasts", "The hand is armed: the tare")
+    assert requests(holding) == []
+    holding.grip = gripping(armed=False)
+    shows(page, "#grip-armed", "^DRY RUN$")
+    assert page.locator("#threshold").is_enabled()
+    page.click("#tare")
+    until_called(page, holding, ("POST", "tare"))
+
+
 def test_a_server_that_is_gone_is_shown(visit):
     with Service(Tape(*made_up())) as service:
         service.grip = gripping()

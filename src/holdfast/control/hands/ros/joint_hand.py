@@ -8,12 +8,12 @@ from typing import Any
 import numpy as np
 
 from holdfast.control.command import GripCommand
-from holdfast.control.hands.ros.joints import N_JOINTS, JointGrip, JointOrder
+from holdfast.control.hands.ros.joints import LIMIT_TOLERANCE, N_JOINTS, JointGrip, JointOrder
 from holdfast.control.hands.ros.link import Link
 from holdfast.control.hands.ros.ros_hand import RosHand
 from holdfast.control.limits import Limits
 from holdfast.errors import HandError
-from holdfast.ros.hand_messages import JOINT_STATE, array_message, joint_message
+from holdfast.ros.hand_messages import JOINT_STATE, JointStates, array_message, joint_message
 from holdfast.sensors.types import Array
 
 SLACK = 1e-9
@@ -45,8 +45,8 @@ class JointSetup:
         torques: torques when the grip begins [N m]; None to take those of the joint states.
         states: topic of the joint states; None if they are not needed.
         stiffness: torque of the position control for each radian of error [N m/rad].
-        lowest: lowest set-point [rad].
-        highest: highest set-point [rad].
+        lowest: lower limits of the joints, of readings and of set-points [rad].
+        highest: upper limits of the joints [rad].
         home: pose of the open hand [rad]; None to open without torque.
         home_topic: topic for this pose; None if it is the topic of the commands.
     """
@@ -78,7 +78,8 @@ class JointHand(RosHand):
 
     Force and torque are proportional in a given pose, so the torque of each joint when the grip
     began is multiplied by the scale of its finger. Set-points follow from torques by the
-    stiffness k of the position control: q = q_begin + scale * torque_begin / k.
+    stiffness k of the position control: q = q_begin + scale * torque_begin / k. q_begin and
+    torque_begin are medians over the joint states of the last 0.2 s.
 
     Args:
         name: URI of the hand.
@@ -128,22 +129,37 @@ class JointHand(RosHand):
             )
         self._grip = JointGrip(positions, torques)
 
+    def _checked(self, states: JointStates) -> JointStates:
+        """Return joint states in the order of the hand.
+
+        Raises:
+            ValueError: a joint is missing, a value is not finite, or a joint is beyond its limits.
+        """
+        setup = self.setup
+        ordered = setup.order.sort(states)
+        below, above = setup.lowest - ordered.positions, ordered.positions - setup.highest
+        beyond = np.maximum(below, above)
+        worst = int(np.argmax(beyond))
+        if beyond[worst] > LIMIT_TOLERANCE:
+            raise ValueError(
+                f"{setup.order.describe(worst)} at {ordered.positions[worst]:g} rad, "
+                f"{setup.lowest[worst]:g} to {setup.highest[worst]:g} expected"
+            )
+        return ordered
+
     def _measured(self) -> tuple[Array, Array]:
-        """Return the mean positions and torques (16,) of the last joint states.
+        """Return the median positions and torques (16,) of the last joint states.
 
         Positions are NaN without joint states, and torques 0 where a state has none.
         """
-        order = self.setup.order
-        if not self._states:
+        states = [one for _, one in self._states]
+        if not states:
             return np.full(N_JOINTS, np.nan), np.zeros(N_JOINTS)
-        try:
-            states = [order.sort(one) for _, one in self._states]
-        except ValueError as cause:
-            topic = self.setup.states
-            raise HandError(f"{self.name}: joint states of {topic}: {cause}") from cause
         efforts = [one.efforts for one in states if len(one.efforts)]
-        torques = np.mean(efforts, axis=0) if len(efforts) == len(states) else np.zeros(N_JOINTS)
-        return np.mean([one.positions for one in states], axis=0), torques
+        torques = np.zeros(N_JOINTS)
+        if len(efforts) == len(states):
+            torques = np.median(efforts, axis=0)
+        return np.median([one.positions for one in states], axis=0), torques
 
     def _press(self, command: GripCommand) -> None:
         if self._grip is None:

@@ -32,6 +32,12 @@ ROS2_STIFFNESS = _table((0.4167, 0.6667, 0.75, 0.4167), thumb=(0.8333, 0.5833, 0
 V4_LOWEST = _table((-0.47, -0.196, -0.174, -0.227), thumb=(0.263, -0.105, -0.189, -0.162))
 V4_HIGHEST = _table((0.47, 1.61, 1.709, 1.618), thumb=(1.396, 1.163, 1.644, 1.719))
 """Limits of the joints of V4 [rad]; those in the table of the twin."""
+WIDEST = _table((np.pi,) * 4)
+"""Limits of joints whose limits are not known, to both sides of 0 [rad]: a reading that is wrong
+by a whole turn is always beyond them."""
+LIMIT_TOLERANCE = 0.1
+"""Angle by which a reading may be beyond the limits of its joint [rad]: hands are calibrated by
+eye, and their stops yield."""
 V4_HOME = {
     name: tuple(float(np.deg2rad(angle)) for angle in degrees)
     for name, degrees in _table(

@@ -19,6 +19,7 @@ from holdfast.control.hands.ros.link import Link
 from holdfast.control.hands.ros.parameters import Parameters
 from holdfast.control.hands.ros.scalar_hand import ScalarHand, ScalarSetup
 from holdfast.ros.hand_messages import FLOAT32, FLOAT64, FLOATS, JOINT_STATE
+from holdfast.sensors.types import Array
 from holdfast.sources.uri import Address, parse
 
 COMMON = ("shared",)
@@ -73,7 +74,7 @@ class JointKind:
         """Names of its parameters."""
         stiffness = ("stiffness",) if self.output is JointOutput.POSITIONS else ()
         return ("namespace", "states", "order", "prefix", "effort", "max_effort", *stiffness,
-                "release", "home")  # fmt: skip
+                "lowest", "highest", "release", "home")  # fmt: skip
 
     def _setup(self, given: Parameters) -> JointSetup:
         order = JointOrder(given.fingers(self.order), given.prefix(self.prefix))
@@ -89,6 +90,7 @@ class JointKind:
         if given.has("effort") or largest:
             torques = given.joints("effort", each=not largest)
         is_v4 = self.max_torque is not None
+        lowest, highest = _joint_limits(given, order, is_v4=is_v4)
         release = given.word("release", self.release)
         return JointSetup(
             output=self.output,
@@ -101,8 +103,8 @@ class JointKind:
             stiffness=given.positive_joints("stiffness", table(self.stiffness))
             if positions
             else np.ones(N_JOINTS),
-            lowest=order.values(joints.V4_LOWEST) if is_v4 else np.full(N_JOINTS, -np.inf),
-            highest=order.values(joints.V4_HIGHEST) if is_v4 else np.full(N_JOINTS, np.inf),
+            lowest=lowest,
+            highest=highest,
             home=given.joints("home", table(self.home), each=True) if release == "home" else None,
             home_topic=self.home_topic and f"{namespace}/{self.home_topic}",
         )
@@ -239,6 +241,20 @@ def _ros1_link(address: Address) -> Link:
 
 
 _LINKS: dict[str, Callable[[Address], Link]] = {"ros2": _ros2_link, "ros1": _ros1_link}
+
+
+def _joint_limits(given: Parameters, order: JointOrder, *, is_v4: bool) -> tuple[Array, Array]:
+    """Return the lower and upper limits of the joints (16,) [rad].
+
+    Raises:
+        ValueError: a lower limit is not below the upper one.
+    """
+    highest = order.values(joints.V4_HIGHEST if is_v4 else joints.WIDEST)
+    lowest = order.values(joints.V4_LOWEST) if is_v4 else -highest
+    lowest, highest = given.joints("lowest", lowest), given.joints("highest", highest)
+    if not (lowest < highest).all():
+        raise ValueError(f"{given.text}: lowest below highest expected for each joint")
+    return lowest, highest
 
 
 def _shared(given: Parameters) -> bool:

@@ -25,8 +25,8 @@ class Publisher(Protocol):
 class StateReader(Protocol):
     """Subscription to the joint states of a hand."""
 
-    def take(self) -> JointStates | None:
-        """Return the newest state since the last call; None without a new one.
+    def take(self) -> list[JointStates]:
+        """Return the states since the last call, the oldest first.
 
         Raises:
             HandError: the message is damaged.

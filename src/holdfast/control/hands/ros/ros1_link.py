@@ -11,6 +11,8 @@ from holdfast.ros.hand_messages import JOINT_STATE, JointStates
 
 QUEUE_SIZE = 10
 """Messages that rospy keeps for a slow subscriber; the oldest is dropped first."""
+STATE_QUEUE_SIZE = 256
+"""Joint states that wait until they are read; the oldest is dropped first."""
 
 
 class Ros1Link(Link):
@@ -50,11 +52,11 @@ class Ros1Link(Link):
 
     def joint_states(self, topic: str) -> StateReader:
         """Subscribe to the joint states of a topic."""
-        newest: deque[Any] = deque(maxlen=1)
+        waiting: deque[Any] = deque(maxlen=STATE_QUEUE_SIZE)
         kind = self._type(JOINT_STATE)
-        made = self._rospy.Subscriber(topic, kind, newest.append, tcp_nodelay=True)
+        made = self._rospy.Subscriber(topic, kind, waiting.append, tcp_nodelay=True)
         self._registered.append(made)
-        return _StateReader(newest)
+        return _StateReader(waiting)
 
     def n_other_publishers(self, topic: str) -> int:
         """Return the number of publishers on a topic, other than those of this process."""
@@ -111,12 +113,9 @@ class _Publisher:
 
 
 class _StateReader:
-    def __init__(self, newest: deque[Any]) -> None:
-        self._newest = newest
+    def __init__(self, waiting: deque[Any]) -> None:
+        self._waiting = waiting
 
-    def take(self) -> JointStates | None:
-        try:
-            message = self._newest.popleft()
-        except IndexError:
-            return None
-        return JointStates.of_message(message.name, message.position, message.effort)
+    def take(self) -> list[JointStates]:
+        messages = [self._waiting.popleft() for _ in range(len(self._waiting))]
+        return [JointStates.of_message(m.name, m.position, m.effort) for m in messages]

@@ -87,16 +87,14 @@ class _StateReader:
         self._topic, self._reader = topic, reader
         self._decode = MessageDecoder(hand_definition(JOINT_STATE), ros2=True)
 
-    def take(self) -> JointStates | None:
-        newest: bytes | None = None
+    def take(self) -> list[JointStates]:
+        waiting: list[bytes] = []
         while found := self._reader.take(0.0):
-            newest = found[-1]
+            waiting += found
             if len(found) < dds.MAX_MESSAGES_PER_READ:
                 break
-        if newest is None:
-            return None
         try:
-            message = self._decode(newest)
+            messages = [self._decode(data) for data in waiting]
         except ValueError as cause:
             raise HandError(f"{self._topic} sends damaged joint states: {cause}") from cause
-        return JointStates.of_message(message["name"], message["position"], message["effort"])
+        return [JointStates.of_message(m["name"], m["position"], m["effort"]) for m in messages]

@@ -7,7 +7,7 @@ from collections.abc import Callable, Mapping
 from functools import partial
 from typing import Any
 
-from holdfast.control.command import GripCommand, LoopState
+from holdfast.control.command import GripCommand
 from holdfast.control.hands.base import Hand
 from holdfast.control.hands.ros.link import Link, Publisher, StateReader
 from holdfast.errors import HandError
@@ -18,10 +18,12 @@ OPEN_TIMEOUT = 5.0
 DISCOVERY_TIME = 0.5
 """Time in which other publishers are found [s]."""
 STATE_TIMEOUT = 0.5
-"""Time without joint states after which a hand does not answer any more [s]."""
+"""Time without valid joint states after which a hand does not answer any more [s]."""
 STATE_MEMORY = 0.2
-"""Time over which joint states are averaged at the begin of a grip; the hand has been STABLE for
-as long [s]."""
+"""Time of the joint states whose median counts at the begin of a grip; the hand has been STABLE
+for as long [s]."""
+MIN_STATES = 5
+"""Least number of these joint states, so that two wrong ones cannot define their median."""
 POLL_INTERVAL = 0.01
 """Time between two checks while the hand is opened [s]."""
 
@@ -30,7 +32,8 @@ class RosHand(Hand):
     """Hand that takes commands on topics.
 
     It commands nothing before the grip begins (state IDLE), because another program closes the
-    hand. What is in force then is the base that the scales multiply.
+    hand. What is in force then is the base that the scales multiply. Joint states that cannot be
+    right are ignored and counted in `n_refused`.
 
     Args:
         name: URI of the hand.
@@ -60,7 +63,7 @@ class RosHand(Hand):
         self._publishers: dict[str, Publisher] = {}
         self._reader: StateReader | None = None
         self._states: deque[tuple[float, JointStates]] = deque()
-        self._begun = False
+        self._refusal = ""
 
     @property
     def resource(self) -> str:
@@ -68,7 +71,7 @@ class RosHand(Hand):
         return f"{next(iter(self._topics))} {self._link.where}"
 
     def open(self) -> None:
-        """Wait until the hand listens and sends joint states.
+        """Wait until the hand listens and sends valid joint states.
 
         Raises:
             HandError: it does not within 5 s, or another program publishes commands.
@@ -90,35 +93,33 @@ class RosHand(Hand):
 
     def close(self) -> None:
         """Disconnect. It has no effect on a hand that is closed."""
+        self.forget()
         self._publishers.clear()
         self._reader = None
         self._states.clear()
-        self._begun = False
+        self._refusal = ""
         self._link.close()
 
-    def _send(self, command: GripCommand) -> None:
+    def _watch(self) -> None:
         if not self._publishers:
             raise HandError(f"{self.name} is not open")
         self._poll()
         if not self._standby:
             self._check_answers()
-        if command.state is LoopState.IDLE:
-            self._begun = False
-        elif command.state is not LoopState.FAULT and not self._begun:
-            self._begin()
-            self._begun = True
+
+    def _send(self, command: GripCommand) -> None:
         if command.release:
             self._release()
-        elif self._begun:
+        elif not self._standby:
             self._press(command)
 
-    @abstractmethod
-    def _begin(self) -> None:
-        """Take what is in force when the grip begins.
+    def _checked(self, states: JointStates) -> JointStates:
+        """Return joint states in the order of the hand.
 
         Raises:
-            HandError: it is not known, or it exceeds a ceiling at the highest scale.
+            ValueError: they cannot be right.
         """
+        return states
 
     @abstractmethod
     def _press(self, command: GripCommand) -> None:
@@ -132,14 +133,17 @@ class RosHand(Hand):
         self._publishers[topic](message)
 
     def _poll(self) -> bool:
-        """Read the newest joint states; return whether there are any so far."""
-        found = None if self._reader is None else self._reader.take()
-        if found is not None:
-            now = time.monotonic()
-            self._states.append((now, found))
-            while now - self._states[0][0] > STATE_MEMORY:
-                self._states.popleft()
-        return bool(self._states)
+        """Read the new joint states; return whether there are enough for a grip to begin."""
+        now = time.monotonic()
+        for found in () if self._reader is None else self._reader.take():
+            try:
+                self._states.append((now, self._checked(found)))
+            except ValueError as cause:
+                self.n_refused += 1
+                self._refusal = str(cause)
+        while len(self._states) > MIN_STATES and now - self._states[0][0] > STATE_MEMORY:
+            self._states.popleft()
+        return len(self._states) >= MIN_STATES
 
     def _check_answers(self) -> None:
         for topic, publish in self._publishers.items():
@@ -152,10 +156,15 @@ class RosHand(Hand):
             return
         silence = time.monotonic() - self._states[-1][0]
         if silence > STATE_TIMEOUT:
+            valid = "valid " if self._refusal else ""
             raise HandError(
-                f"{self.name}: no joint states on {self._states_topic} for {silence:.1f} s; the "
-                "hand keeps its last command"
+                f"{self.name}: no {valid}joint states on {self._states_topic} for {silence:.1f} s"
+                f"{self._refused()}; the hand keeps its last command"
             )
+
+    def _refused(self) -> str:
+        """Return how many joint states were refused, and why the last one was."""
+        return f" ({self.n_refused} refused: {self._refusal})" if self._refusal else ""
 
     def _wait(self, done: Callable[[], object], begun_at: float, why: Callable[[], str]) -> None:
         while not done():
@@ -180,8 +189,11 @@ class RosHand(Hand):
         )
 
     def _no_states(self) -> str:
+        where = f"{self._states_topic} {self._link.where} in {OPEN_TIMEOUT:g} s"
+        if self._states or self._refusal:
+            return (
+                f"{self.name}: {len(self._states)} valid joint states on {where}, at least "
+                f"{MIN_STATES} expected{self._refused()}"
+            )
         others = ", ".join(self._link.published_topics()) or "none"
-        return (
-            f"{self.name}: no joint states on {self._states_topic} {self._link.where} in "
-            f"{OPEN_TIMEOUT:g} s; published topics: {others}"
-        )
+        return f"{self.name}: no joint states on {where}; published topics: {others}"

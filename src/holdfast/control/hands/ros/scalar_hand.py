@@ -76,8 +76,8 @@ class ScalarHand(RosHand):
         if problem := self._excess(self._setup.effort * limits.max_scale):
             raise ValueError(f"{problem} at max_scale {limits.max_scale:g}: lower one of them")
 
-    def _begin(self) -> None:
-        """Do nothing: the value of the grip is given."""
+    def _content(self, command: GripCommand) -> object:
+        return command.release, None if command.release else largest_scale(command)
 
     def _press(self, command: GripCommand) -> None:
         value = self._setup.effort * largest_scale(command)

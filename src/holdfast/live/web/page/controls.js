@@ -6,6 +6,8 @@ import { clock, fileSize } from "./format.js";
 
 const TOAST_TIME = 6000; // [ms]
 const MAX_TOASTS = 4;
+/** Why tare and thresholds cannot be changed while the hand is armed. */
+export const LOCKED = "The hand is armed: the tare and the thresholds are locked";
 
 /** Show a short message; `kind` is "good" or "bad". */
 export function toast(text, kind) {
@@ -22,6 +24,8 @@ export class Controls {
     this.recording = null;
     this.canRecord = true;
     this.connected = false;
+    this.locked = false;
+    this.tareTitle = byId("tare").title;
     byId("tare").addEventListener("click", () => this.tare());
     byId("record").addEventListener("click", () => this.record());
     byId("marker").addEventListener("submit", (event) => { event.preventDefault(); this.mark(); });
@@ -44,6 +48,9 @@ export class Controls {
     this.show();
   }
 
+  /** Lock the tare while the hand is armed; the service refuses it too. */
+  setLocked(locked) { this.locked = locked; }
+
   update(recording) {
     this.recording = recording ?? null;
     this.show();
@@ -51,7 +58,8 @@ export class Controls {
 
   show() {
     const button = byId("record"), r = this.recording;
-    byId("tare").disabled = !this.connected;
+    byId("tare").disabled = !this.connected || this.locked;
+    byId("tare").title = this.locked ? LOCKED : this.tareTitle;
     button.disabled = !this.connected || !this.canRecord;
     button.title = this.canRecord ? (r ? r.path : "Start or stop a recording (R)") : "This service does not record";
     button.setAttribute("aria-pressed", String(r !== null));
@@ -73,6 +81,7 @@ export class Controls {
   }
 
   tare() {
+    if (this.locked) return toast(LOCKED, "bad"); // by the key T
     return this.request(byId("tare"), async () => {
       await callService("POST", "tare");
       toast("Taking the tare: nothing may touch the fingers", "good");

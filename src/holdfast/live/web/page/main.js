@@ -73,6 +73,7 @@ class Page {
     this.status.silent = Boolean(message.health?.silent);
     this.status.problem = (message.problems ?? []).map(({ text }) => text).join(" · ");
     this.plots.thresholds = message.thresholds ?? {};
+    for (const part of [this.controls, this.threshold]) part.setLocked(Boolean(message.grip?.armed));
     this.threshold.update(message.thresholds);
     this.now = message.time;
     this.store.append(message.series, Math.max(0, STATES.indexOf(message.hand)), this.maxGap);
