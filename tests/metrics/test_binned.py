@@ -95,7 +95,7 @@ class TestSummary:
 
     def test_memory_does_not_grow_with_the_samples(self, monkeypatch):
         monkeypatch.setattr(summary, "MAX_EXACT_SCORES", 100)
-        total = summary._Total()
+        total = summary.ResultTotal()
         for each in recordings(5, n_samples=500):
             total.add(summary.score_recording(each))
         totals = (*total.fingers.values(), total.pooled, *(g.samples for g in total.groups))
