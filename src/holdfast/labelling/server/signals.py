@@ -89,6 +89,10 @@ class _Level(NamedTuple):
     high: Array
     falls: npt.NDArray[np.bool_]
 
+    def part(self, blocks: slice) -> "_Level":
+        """Return some of the blocks."""
+        return _Level(self.times[blocks], self.low[blocks], self.high[blocks], self.falls[blocks])
+
 
 class FingerSignals:
     """Force and sigma of one finger, with minima and maxima at every zoom.
@@ -133,7 +137,7 @@ class FingerSignals:
         """Return the blocks of 2^depth samples that contain samples `first` up to `last`."""
         blocks = slice(first >> depth, ((last - 1) >> depth) + 1)
         if depth in self._levels:
-            return _Level(*(array[blocks] for array in self._levels[depth]))
+            return self._levels[depth].part(blocks)
         return self._reduced(blocks.start << depth, blocks.stop << depth, depth)
 
     def _first_level(self) -> _Level:
@@ -243,7 +247,7 @@ def _with_gaps(module: Tactile, values: Array) -> tuple[Array, Array]:
 def _halved(level: _Level) -> _Level:
     """Return the next level: two neighbouring blocks become one; the last may stay alone."""
     n = len(level.times) // 2 * 2
-    earlier, later = (_Level(*(array[k:n:2] for array in level)) for k in (0, 1))
+    earlier, later = level.part(slice(0, n, 2)), level.part(slice(1, n, 2))
     half = _Level(
         np.column_stack([earlier.times[:, 0], later.times[:, 1]]),
         np.fmin(earlier.low, later.low),
