@@ -27,7 +27,7 @@ class CommandGuard:
         >>> guard = CommandGuard(Limits(max_scale=2.0))
         >>> bad = GripCommand(0.0, LoopState.HOLD, {"thumb": FingerCommand(7.0)})
         >>> guard.admit(bad).fingers["thumb"].scale, guard.violation
-        (1.0, 'thumb: a scale of 7 given, 1 to 2 expected')
+        (1.0, 'thumb: a scale of 7 given, 0.8 to 2 expected')
     """
 
     def __init__(self, limits: Limits) -> None:

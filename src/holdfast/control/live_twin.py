@@ -39,7 +39,7 @@ class LiveTwin(Source, Hand):
         >>> from holdfast.control import FingerCommand, LoopState
         >>> with LiveTwin("twin:?object=ball", speed=0) as twin:
         ...     arrival = twin.read(0.0)
-        ...     twin.send(GripCommand(0.0, LoopState.HOLD, {"thumb": FingerCommand(1.2)}))
+        ...     _ = twin.send(GripCommand(0.0, LoopState.HOLD, {"thumb": FingerCommand(1.2)}))
         ...     arrival.samples["thumb"].shape
         (30, 3)
     """

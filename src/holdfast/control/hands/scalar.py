@@ -26,8 +26,8 @@ class ScalarGripper(Hand):
         >>> from holdfast.control import FingerCommand, LoopState
         >>> fingers = {"finger1": FingerCommand(1.2), "finger2": FingerCommand(1.5)}
         >>> with ScalarGripper(print) as gripper:
-        ...     gripper.send(GripCommand(0.0, LoopState.REACT, fingers))
-        ...     gripper.send(GripCommand(0.1, LoopState.FAULT, fingers, release=True))
+        ...     _ = gripper.send(GripCommand(0.0, LoopState.REACT, fingers))
+        ...     _ = gripper.send(GripCommand(0.1, LoopState.FAULT, fingers, release=True))
         1.5
         0.0
     """
