@@ -1,6 +1,7 @@
 """Where live estimates equal those of a recording, and that the documents say where not."""
 
 from dataclasses import replace
+from itertools import pairwise
 from pathlib import Path
 
 import numpy as np
@@ -30,7 +31,7 @@ def batch(model, recording, bounds):
     detector = Detector.for_recording(model, recording)
     parts = [
         {name: module.slice(a, b) for name, module in recording.modules.items()}
-        for a, b in zip(bounds[:-1], bounds[1:], strict=True)
+        for a, b in pairwise(bounds)
     ]
     traces = [detector.run(Recording("part", modules)).fingers for modules in parts]
     return {
