@@ -24,7 +24,7 @@ import pyarrow.parquet as pq
 from holdfast.errors import RecordingError
 from holdfast.files import whole_file
 from holdfast.io.header import Header, decode_header, encode_header, header_of
-from holdfast.io.safe_reading import check_size, one_line
+from holdfast.io.safe_reading import JSON_EXPANSION, ReadBudget, check_size, one_line
 from holdfast.io.timed_arrays import (
     TRUTH_TIME,
     ArraySpec,
@@ -143,6 +143,7 @@ def write_checksum(path: Path) -> None:
 
 
 def _open(path: Path) -> tuple[Header, pq.ParquetFile]:
+    budget = ReadBudget(path)
     _check_ends(path)
     try:
         _check_checksum(path)
@@ -156,8 +157,9 @@ def _open(path: Path) -> tuple[Header, pq.ParquetFile]:
         file = pq.ParquetFile(path, page_checksum_verification=True)
     except (pa.ArrowException, OSError) as cause:
         raise RecordingError(f"{path} is damaged: {one_line(cause)}") from cause
-    metadata = file.metadata.metadata or {}
-    return decode_header(metadata.get(HEADER_KEY.encode(), b""), path), file
+    header = (file.metadata.metadata or {}).get(HEADER_KEY.encode(), b"")
+    budget.keep(JSON_EXPANSION * len(header))
+    return decode_header(header, path), file
 
 
 def _check_ends(path: Path) -> None:
