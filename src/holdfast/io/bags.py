@@ -88,6 +88,14 @@ class Bag:
             self._budget.unpack(len(data))
             yield by_number[number], nanoseconds * 1e-9, data
 
+    def keep(self, n_bytes: int) -> None:
+        """Count the size of a value that is kept of a message [bytes].
+
+        Raises:
+            RecordingError: the values take more memory than the bag may have.
+        """
+        self._budget.keep(n_bytes, 1)
+
     def _topic(self, one: BagConnection) -> BagTopic:
         return BagTopic(
             one.topic, short_name(one.kind), self._definition(one), one.n_messages, one.number
@@ -202,6 +210,7 @@ def _poses(path: Path) -> Iterator[tuple[str, str, tuple[float, ...]]]:
         for topic, _, data in bag.messages(topics):
             for pose in decoders[topic.number](data):
                 row = (pose.time, *pose.position, *pose.quaternion)
+                bag.keep(0)
                 yield pose.body or topic.name, pose.frame, row
 
 

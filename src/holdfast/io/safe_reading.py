@@ -122,6 +122,11 @@ class ReadBudget:
             )
 
     @property
+    def path(self) -> Path:
+        """Path of the file."""
+        return self._path
+
+    @property
     def free(self) -> int:
         """Memory that is left [bytes]."""
         return self._limit - self._kept

@@ -34,8 +34,9 @@ class FolderBag:
         self,
         storages: Sequence[BagStorage],
         topics: Sequence[Any],
-        packed: bool,
         budget: ReadBudget,
+        *,
+        packed: bool,
     ) -> None:
         self._storages = storages
         self._packed = packed
@@ -92,7 +93,7 @@ def open_folder(path: Path, budget: ReadBudget) -> Iterator[FolderBag]:
             files = [_unpacked_file(file, folder, budget) for file in files]
         storages = [stack.enter_context(_OPENERS[storage](file, budget)) for file in files]
         topics = metadata["topics_with_message_count"]
-        yield FolderBag(storages, topics, mode == "message", budget)
+        yield FolderBag(storages, topics, budget, packed=mode == "message")
 
 
 def _metadata(path: Path) -> Mapping[str, Any]:

@@ -71,7 +71,7 @@ class SqliteBag:
         """Yield connection, time [ns] and bytes of each message of connections, by time."""
         places = ",".join("?" for _ in numbers)
         query = (
-            "SELECT topic_id, timestamp, data FROM messages "  # noqa: S608 (only question marks)
+            "SELECT topic_id, timestamp, data FROM messages "
             f"WHERE topic_id IN ({places}) ORDER BY timestamp"
         )
         with self._refusals():

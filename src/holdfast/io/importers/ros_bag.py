@@ -192,8 +192,10 @@ class _BagImport:
                 )
 
     def _add(self, topic: str, sample: DeviceSample, time: float) -> None:
-        if not len(readings_of(sample, "count")):  # XELA's server sends this for a sensor off
+        readings = readings_of(sample, "count")
+        if not len(readings):  # XELA's server sends this for a sensor off
             return
+        self._bag.keep(readings.nbytes)
         number = 0 if sample.number is None else sample.number
         self._tracks.setdefault((topic, number), _DeviceTrack(sample)).add(sample, time)
 
