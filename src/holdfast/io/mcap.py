@@ -39,6 +39,9 @@ from holdfast.io.timed_arrays import (
 )
 from holdfast.recordings import Recording
 
+MAX_SCHEMA_SIZE = 1 << 20
+"""Maximum size of a schema or channel [bytes]; those of recordings have less than a kilobyte."""
+
 
 class _Channel(NamedTuple):
     """Topic of messages, number of their schema, and whether they are counted."""
@@ -205,13 +208,17 @@ class _Channels:
 
     def add(self, opcode: int, content: bytes) -> None:
         """Keep what is needed of a record, if it is a schema or a channel."""
+        if opcode not in (Opcode.SCHEMA, Opcode.CHANNEL):
+            return
+        if len(content) > MAX_SCHEMA_SIZE:
+            raise ValueError(f"a schema or channel of {len(content)} bytes")
         stream = ReadDataStream(BytesIO(content))
         if opcode == Opcode.SCHEMA:
             schema = Schema.read(stream)
             if schema.id not in self._schemas:
                 self._budget.keep(len(schema.name), 1)
                 self._schemas[schema.id] = schema.name
-        elif opcode == Opcode.CHANNEL:
+        else:
             channel = Channel.read(stream)
             if channel.id not in self._channels:
                 self._budget.keep(len(channel.topic), 1)

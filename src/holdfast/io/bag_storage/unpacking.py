@@ -8,6 +8,7 @@ from typing import Protocol
 
 import zstandard
 
+from holdfast.io.mcap_records import MAX_CHUNK_SIZE
 from holdfast.io.safe_reading import ReadBudget
 
 BLOCK_SIZE = 1 << 20
@@ -32,15 +33,18 @@ def unpack(data: bytes, compression: str, budget: ReadBudget, size: int | None =
         size: expected number of bytes; None if any number is right.
 
     Raises:
-        RecordingError: they take more memory than the budget has.
-        ValueError: the compression is unknown, or the data are damaged or of another size.
+        RecordingError: they take more memory or work than the budget has.
+        ValueError: the compression is unknown, or the data are damaged, of another size, or
+            larger than a chunk may be.
     """
-    if size is not None:
-        budget.unpack(size)
-    limit = budget.free if size is None else size
-    found = _unpacked(data, compression, limit)
+    if (size or 0) > MAX_CHUNK_SIZE:
+        raise ValueError(f"at most {MAX_CHUNK_SIZE} unpacked bytes expected, {size} given")
+    budget.unpack(size or 0)
+    found = _unpacked(data, compression, MAX_CHUNK_SIZE if size is None else size)
+    if len(found) > MAX_CHUNK_SIZE:
+        raise ValueError(f"at most {MAX_CHUNK_SIZE} unpacked bytes expected, more given")
     if size is None:
-        budget.unpack(len(found))  # refuses what is longer than the memory that is left
+        budget.unpack(len(found))
     elif len(found) != size:
         raise ValueError(f"{size} bytes expected in packed data, {len(found)} or more given")
     return found

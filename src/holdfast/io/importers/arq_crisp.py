@@ -111,10 +111,11 @@ def _recordings(path: Path, h5py: ModuleType) -> Iterator[Recording]:
         with h5py.File(path, "r") as file:
             budget = ReadBudget(path)
             names = _names_of_recordings(file, h5py, budget)
+            seen: set[int] = set()
             if not names:
                 raise RecordingError(f"{path}: no group with {DATA} in it")
             for name in sorted(names, key=lambda name: natural_order(Path(name.replace("/", "_")))):
-                arrays = _Arrays(path, file[name], h5py, budget)
+                arrays = _Arrays(path, file[name], h5py, budget, seen)
                 yield _recording(f"{path}: {name}", name.split("/"), arrays)
     except RecordingError:
         raise
@@ -164,6 +165,13 @@ class _Arrays:
 
     Only arrays inside of the file itself are read. HDF5 can also store the names of other files
     (external links, external storage, virtual arrays), and would read any file of the user.
+
+    Args:
+        path: path of the file.
+        group: the group.
+        h5py: the module.
+        budget: of the file.
+        seen: addresses of the arrays that were read.
     """
 
     def __init__(
@@ -172,11 +180,13 @@ class _Arrays:
         group: Any,  # noqa: ANN401 (h5py.Group)
         h5py: ModuleType,
         budget: ReadBudget,
+        seen: set[int],
     ) -> None:
         self._path = path
         self._group = group
         self._h5py = h5py
         self._budget = budget
+        self._seen = seen
 
     def __contains__(self, name: str) -> bool:
         return name in self.names()
@@ -201,6 +211,12 @@ class _Arrays:
             )
         if item.dtype.kind not in "biuf":
             raise RecordingError(f"{self._path}: numbers expected in {name}, {item.dtype} given")
+        if (address := h5py.h5o.get_info(item.id).addr) in self._seen:
+            raise RecordingError(
+                f"{self._path}: {self._group.name}/{name} is an array of another group too; each "
+                "group is a recording and has arrays of its own"
+            )
+        self._seen.add(address)
         self._check_size(name, item)
         return np.asarray(item[()], dtype=np.float64)
 
