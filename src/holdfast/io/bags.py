@@ -5,7 +5,7 @@ decodes them by the definitions in the bag, which are data: nothing from a bag i
 """
 
 import re
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from contextlib import AbstractContextManager, contextmanager
 from pathlib import Path
 from typing import NamedTuple
@@ -226,5 +226,9 @@ def _is_bag(path: Path) -> bool:
 def _storage(path: Path, budget: ReadBudget) -> AbstractContextManager[BagStorage]:
     if path.is_dir():
         return open_folder(path, budget)
-    openers = {".bag": open_ros1, ".db3": open_sqlite, ".mcap": open_mcap}
+    openers: dict[str, Callable[[Path, ReadBudget], AbstractContextManager[BagStorage]]] = {
+        ".bag": open_ros1,
+        ".db3": open_sqlite,
+        ".mcap": open_mcap,
+    }
     return openers[path.suffix](path, budget)

@@ -1,8 +1,8 @@
 """Bags of ROS 2 in a folder: metadata.yaml and one or more files."""
 
 import re
-from collections.abc import Collection, Iterator, Mapping, Sequence
-from contextlib import ExitStack, contextmanager
+from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
+from contextlib import AbstractContextManager, ExitStack, contextmanager
 from pathlib import Path, PurePath
 from tempfile import TemporaryDirectory
 from typing import Any
@@ -22,7 +22,10 @@ MAX_METADATA_SIZE = 1 << 20
 MAX_VERSION = 9
 """Newest version of that file that is known."""
 
-_OPENERS = {"mcap": open_mcap, "sqlite3": open_sqlite}
+_OPENERS: dict[str, Callable[[Path, ReadBudget], AbstractContextManager[BagStorage]]] = {
+    "mcap": open_mcap,
+    "sqlite3": open_sqlite,
+}
 _ANCHOR = re.compile(r"(?:^|[\s\[\]{},:-])[&*][^\s&]")
 """Name of a part of a YAML text; a text that repeats named parts can expand without end."""
 
