@@ -10,6 +10,7 @@ from attack.documents import (
     attack_models,
     attack_others,
 )
+from attack.expansions import attack_expansions
 from attack.imports import attack_imports
 from attack.recordings import (
     DAMAGES,
@@ -39,6 +40,7 @@ def attacks(scale: float) -> Iterator[Result]:
     yield attack_definitions(n(10_000))
     yield from attack_imports(n(3_000))
     yield attack_kills(n(200))
+    yield from attack_expansions()
     yield _memory()
 
 

@@ -1,34 +1,38 @@
 """Bags of ROS 1 (.bag) and ROS 2 (.db3, .mcap): their topics and messages, and poses in them.
 
-The package rosbags reads the containers only. Messages stay bytes until `holdfast.ros` decodes
-them by the definitions in the bag, which are data: nothing from a bag is executed.
+`holdfast.io.bag_storage` reads the containers only. Messages stay bytes until `holdfast.ros`
+decodes them by the definitions in the bag, which are data: nothing from a bag is executed.
 """
 
 import re
-from collections.abc import Iterable, Iterator, Mapping
-from contextlib import contextmanager
+from collections.abc import Callable, Iterable, Iterator, Mapping
+from contextlib import AbstractContextManager, contextmanager
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 
 from holdfast.errors import MissingExtra, RecordingError
+from holdfast.io.bag_storage import BagConnection, BagStorage
+from holdfast.io.bag_storage.folder import METADATA, open_folder
+from holdfast.io.bag_storage.mcap import open_mcap
+from holdfast.io.bag_storage.ros1 import open_ros1
+from holdfast.io.bag_storage.sqlite import open_sqlite
 from holdfast.io.importers.table import natural_order
+from holdfast.io.safe_reading import ReadBudget, one_line
 from holdfast.ros.definitions import Definition, parse_definition, short_name
 from holdfast.ros.pose_messages import PoseDecoder, has_poses, known_pose_definition
 from holdfast.ros.sensor_messages import known_definition
 from holdfast.sensors.types import Array
 
-METADATA = "metadata.yaml"
-"""File in the folder of a ROS 2 bag."""
 MAGICS = {
     ".bag": re.compile(rb"#ROSBAG V"),
     ".db3": re.compile(rb"SQLite format 3\x00"),
     ".mcap": re.compile(rb"\x89MCAP0\r\n\x01.{8}\x04\x00\x00\x00ros2", re.DOTALL),
 }
 """First bytes of the files of bags, by suffix. MCAP has the profile of ROS 2."""
-MAX_CAUSE_LENGTH = 200
-"""Number of characters of an error of rosbags that are shown."""
+MAX_MESSAGE_SIZE = 1 << 22
+"""Maximum size of a message that is decoded [bytes]; one of 368 taxels has some 10 kB."""
 
 
 class BagTopic(NamedTuple):
@@ -39,14 +43,14 @@ class BagTopic(NamedTuple):
         kind: type of its messages, as ROS 1 writes it: `package/Type`.
         definition: definition of its messages; None if it is missing or cannot be parsed.
         n_messages: number of messages that the bag lists.
-        connection: connection of rosbags; a topic has one for each of its publishers.
+        number: number of its connection; a topic has one for each of its publishers.
     """
 
     name: str
     kind: str
     definition: Definition | None
     n_messages: int
-    connection: Any
+    number: int
 
 
 class Bag:
@@ -57,39 +61,59 @@ class Bag:
         topics: its topics, in the order of their names.
     """
 
-    def __init__(self, reader: Any, *, ros2: bool) -> None:  # noqa: ANN401 (class of rosbags)
-        self._reader = reader
+    def __init__(self, storage: BagStorage, budget: ReadBudget, *, ros2: bool) -> None:
+        self._storage = storage
+        self._budget = budget
+        self._definitions: dict[tuple[str, str], Definition | None] = {}
         self.ros2 = ros2
-        connections = sorted(reader.connections, key=lambda one: str(one.topic))
+        connections = sorted(storage.connections, key=lambda one: one.topic)
         self.topics = [self._topic(connection) for connection in connections]
 
     def messages(self, topics: Iterable[BagTopic]) -> Iterator[tuple[BagTopic, float, bytes]]:
-        """Yield topic, time of recording [s] and bytes of each message, in the order of time."""
-        by_connection = {topic.connection.id: topic for topic in topics}
-        if not by_connection:
-            return
-        wanted = [topic.connection for topic in by_connection.values()]
-        for connection, nanoseconds, data in self._reader.messages(wanted):
-            yield by_connection[connection.id], nanoseconds * 1e-9, bytes(data)
+        """Yield topic, time of recording [s] and bytes of each message, in the order of time.
 
-    def _topic(self, connection: Any) -> BagTopic:  # noqa: ANN401 (rosbags.interfaces.Connection)
+        Raises:
+            RecordingError: a message is too large, or there are too many.
+        """
+        by_number = {topic.number: topic for topic in topics}
+        if not by_number:
+            return
+        for number, nanoseconds, data in self._storage.messages(list(by_number)):
+            if len(data) > MAX_MESSAGE_SIZE:
+                raise ValueError(
+                    f"a message of {len(data)} bytes on {by_number[number].name}; at most "
+                    f"{MAX_MESSAGE_SIZE} expected"
+                )
+            self._budget.step()
+            self._budget.unpack(len(data))
+            yield by_number[number], nanoseconds * 1e-9, data
+
+    def keep(self, n_bytes: int) -> None:
+        """Count the size of a value that is kept of a message [bytes].
+
+        Raises:
+            RecordingError: the values take more memory than the bag may have.
+        """
+        self._budget.keep(n_bytes, 1)
+
+    def _topic(self, one: BagConnection) -> BagTopic:
         return BagTopic(
-            connection.topic,
-            short_name(connection.msgtype),
-            self._definition(connection),
-            connection.msgcount,
-            connection,
+            one.topic, short_name(one.kind), self._definition(one), one.n_messages, one.number
         )
 
-    def _definition(self, connection: Any) -> Definition | None:  # noqa: ANN401
+    def _definition(self, one: BagConnection) -> Definition | None:
         """Return the definition in the bag; if there is none, the one of a known type."""
-        stored = connection.msgdef
-        try:
-            if stored.format.name == "MSG" and stored.data.strip():
-                return parse_definition(connection.msgtype, stored.data)
-        except ValueError:
-            return None
-        kind = connection.msgtype
+        key = (one.kind, one.definition)
+        if key not in self._definitions:
+            self._definitions[key] = self._parsed(*key)
+        return self._definitions[key]
+
+    def _parsed(self, kind: str, text: str) -> Definition | None:
+        if text.strip():
+            try:
+                return parse_definition(kind, text)
+            except ValueError:
+                return None
         return known_definition(kind, ros2=self.ros2) or known_pose_definition(kind, ros2=self.ros2)
 
 
@@ -115,7 +139,7 @@ def check_rosbags() -> None:
 
 @contextmanager
 def open_bag(path: Path) -> Iterator[Bag]:
-    """Open a bag for reading; errors of rosbags inside the block become `RecordingError`.
+    """Open a bag for reading; errors of libraries inside the block become `RecordingError`.
 
     Raises:
         RecordingError: the bag cannot be read, is cut or damaged.
@@ -124,15 +148,17 @@ def open_bag(path: Path) -> Iterator[Bag]:
     check_rosbags()
     ros2 = path.suffix != ".bag" or path.is_dir()
     try:
-        with _reader(path, ros2=ros2) as reader:
-            yield Bag(reader, ros2=ros2)
+        budget = ReadBudget(path)
+        with _storage(path, budget) as storage:
+            yield Bag(storage, budget, ros2=ros2)
     except RecordingError:
         raise
     except OSError as cause:
         raise RecordingError(f"cannot read {path}: {cause.strerror or cause}") from cause
-    except Exception as cause:  # rosbags raises errors of any type for a damaged bag
-        text = " ".join(str(cause).split())[:MAX_CAUSE_LENGTH] or type(cause).__name__
-        raise RecordingError(f"{path} is cut or damaged: {text}") from cause
+    except MemoryError as cause:
+        raise RecordingError(f"{path} does not fit into memory: {one_line(cause)}") from cause
+    except Exception as cause:  # libraries raise errors of any type for a damaged bag
+        raise RecordingError(f"{path} is cut or damaged: {one_line(cause)}") from cause
 
 
 def read_poses(path: Path, wanted: Mapping[str, str]) -> dict[str, Array]:
@@ -176,14 +202,15 @@ def _poses(path: Path) -> Iterator[tuple[str, str, tuple[float, ...]]]:
     """Yield topic or child frame, parent frame, and time and pose, of each pose in a bag."""
     with open_bag(path) as bag:
         decoders = {
-            topic.connection.id: PoseDecoder(topic.definition, ros2=bag.ros2)
+            topic.number: PoseDecoder(topic.definition, ros2=bag.ros2)
             for topic in bag.topics
             if topic.definition is not None and has_poses(topic.definition)
         }
-        topics = [topic for topic in bag.topics if topic.connection.id in decoders]
+        topics = [topic for topic in bag.topics if topic.number in decoders]
         for topic, _, data in bag.messages(topics):
-            for pose in decoders[topic.connection.id](data):
+            for pose in decoders[topic.number](data):
                 row = (pose.time, *pose.position, *pose.quaternion)
+                bag.keep(0)
                 yield pose.body or topic.name, pose.frame, row
 
 
@@ -196,11 +223,12 @@ def _is_bag(path: Path) -> bool:
         return MAGICS[path.suffix].match(file.read(64)) is not None
 
 
-def _reader(path: Path, *, ros2: bool) -> Any:  # noqa: ANN401 (one of two classes of rosbags)
-    if ros2:
-        from rosbags.rosbag2 import Reader
-
-        return Reader(path)
-    from rosbags.rosbag1 import Reader as Reader1
-
-    return Reader1(path)
+def _storage(path: Path, budget: ReadBudget) -> AbstractContextManager[BagStorage]:
+    if path.is_dir():
+        return open_folder(path, budget)
+    openers: dict[str, Callable[[Path, ReadBudget], AbstractContextManager[BagStorage]]] = {
+        ".bag": open_ros1,
+        ".db3": open_sqlite,
+        ".mcap": open_mcap,
+    }
+    return openers[path.suffix](path, budget)

@@ -182,15 +182,14 @@ def labels_from_csv(path: str | Path, *, author: str = "") -> dict[str, tuple[La
     """
     try:
         text = read_input(path, MAX_FILE_SIZE).decode("utf-8-sig")
-        rows = list(csv.DictReader(StringIO(text)))
+        labels: dict[str, list[Label]] = {}
+        for number, row in enumerate(csv.DictReader(StringIO(text)), start=2):
+            finger, label = _from_row(row, f"{path}, row {number}", author)
+            labels.setdefault(finger, []).append(label)
     except OSError as cause:
         raise RecordingError(f"cannot read {path}: {cause.strerror}") from cause
     except (UnicodeError, csv.Error) as cause:
         raise RecordingError(f"{path} is not CSV text: {cause}") from cause
-    labels: dict[str, list[Label]] = {}
-    for number, row in enumerate(rows, start=2):
-        finger, label = _from_row(row, f"{path}, row {number}", author)
-        labels.setdefault(finger, []).append(label)
     return {finger: tuple(intervals) for finger, intervals in labels.items()}
 
 

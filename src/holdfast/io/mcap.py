@@ -1,11 +1,16 @@
 """MCAP files of recordings: save, load, and recover what is left of a cut file."""
 
+import struct
 from collections.abc import Iterator
+from io import BytesIO
 from pathlib import Path
 from typing import NamedTuple
 
 import msgspec
 import numpy as np
+from mcap.data_stream import ReadDataStream
+from mcap.exceptions import McapError
+from mcap.opcode import Opcode
 from mcap.records import Channel, Message, Schema
 from mcap.writer import MCAP0_MAGIC as MAGIC
 
@@ -13,7 +18,7 @@ from holdfast.errors import RecordingError
 from holdfast.files import whole_file
 from holdfast.io.header import Header, decode_header, header_of
 from holdfast.io.mcap_messages import decode_samples, decode_text, number_of_type
-from holdfast.io.mcap_records import check_checksums, has_end, read_chunks
+from holdfast.io.mcap_records import check_checksums, has_end, read_chunks, records_in
 from holdfast.io.mcap_writer import (
     HEADER_TOPIC,
     LIBRARY,
@@ -21,7 +26,7 @@ from holdfast.io.mcap_writer import (
     MESSAGE_SECONDS,
     MessageLog,
 )
-from holdfast.io.safe_reading import check_size, size_limit
+from holdfast.io.safe_reading import JSON_EXPANSION, ReadBudget, one_line
 from holdfast.io.timed_arrays import (
     TRUTH,
     ArraySpec,
@@ -33,6 +38,17 @@ from holdfast.io.timed_arrays import (
     time_spans,
 )
 from holdfast.recordings import Recording
+
+MAX_SCHEMA_SIZE = 1 << 20
+"""Maximum size of a schema or channel [bytes]; those of recordings have less than a kilobyte."""
+
+
+class _Channel(NamedTuple):
+    """Topic of messages, number of their schema, and whether they are counted."""
+
+    topic: str
+    schema_id: int
+    is_counted: bool
 
 
 class _McapMessage(NamedTuple):
@@ -66,16 +82,17 @@ def load(path: Path) -> Recording:
     Raises:
         RecordingError: the file is damaged or not a recording, or nothing can be recovered.
     """
+    budget = ReadBudget(path)
     complete = _is_complete(path)
-    messages = _messages(path, complete)
-    header = _header(path, messages, complete)
+    messages = _messages(path, complete, budget)
+    header = _header(path, messages, complete, budget)
     specs = array_specs(header)
     parts: dict[str, list[TimedArray]] = {
         spec.topic: [(np.empty(0), spec.empty())] if spec.number else [] for spec in specs
     }
     markers: list[tuple[float, str]] = []
-    size = _JoinedSize(path)
-    for topic, samples in _samples(path, header, messages, markers):
+    size = _JoinedSize(budget)
+    for topic, samples in _samples(path, header, _with_markers(messages, markers, budget)):
         parts[topic].append(samples)
         size.add(topic, samples)
     arrays = {
@@ -99,12 +116,15 @@ def read_groups(path: Path) -> tuple[Header, Iterator[TimedArrays], bool]:
     Raises:
         RecordingError: as in `load`.
     """
+    budget = ReadBudget(path)
     complete = _is_complete(path)
-    messages = _messages(path, complete)
-    header = _header(path, messages, complete)
-    markers = [decode_text(m.data) for m in messages if m.topic == MARKERS_TOPIC]
+    messages = _messages(path, complete, budget)
+    header = _header(path, messages, complete, budget)
+    markers: list[tuple[float, str]] = []
+    for _ in _with_markers(messages, markers, budget):
+        pass
     header = msgspec.structs.replace(header, markers=markers)
-    samples = _samples(path, header, _messages(path, complete), [])
+    samples = _samples(path, header, _messages(path, complete, ReadBudget(path)))
     return header, ({topic: pair} for topic, pair in samples), complete
 
 
@@ -143,38 +163,85 @@ def _is_complete(path: Path) -> bool:
     return complete
 
 
-def _header(path: Path, messages: Iterator[_McapMessage], complete: bool) -> Header:
+def _header(
+    path: Path, messages: Iterator[_McapMessage], complete: bool, budget: ReadBudget
+) -> Header:
     """Return the header, which is in the first message."""
     first = next(messages, None)
     if first is not None and first.topic == HEADER_TOPIC:
+        budget.keep(JSON_EXPANSION * len(first.data))
         return decode_header(decode_text(first.data)[1], path)
     if complete:
         raise RecordingError(f"{path} is an MCAP file but no recording of holdfast")
     raise RecordingError(f"{path} is cut so early that nothing can be recovered: it has no header")
 
 
-def _samples(
-    path: Path,
-    header: Header,
-    messages: Iterator[_McapMessage],
-    markers: list[tuple[float, str]],
-) -> Iterator[tuple[str, TimedArray]]:
-    """Yield topic, times and values of each message; append markers to the list."""
-    specs = {spec.topic: spec for spec in array_specs(header)}
+def _with_markers(
+    messages: Iterator[_McapMessage], markers: list[tuple[float, str]], budget: ReadBudget
+) -> Iterator[_McapMessage]:
+    """Yield all messages but markers, which are appended to the list."""
     for message in messages:
         if message.topic == MARKERS_TOPIC:
+            budget.keep(len(message.data), 1)
             markers.append(decode_text(message.data))
-        elif message.topic != HEADER_TOPIC:
+        else:
+            yield message
+
+
+def _samples(
+    path: Path, header: Header, messages: Iterator[_McapMessage]
+) -> Iterator[tuple[str, TimedArray]]:
+    """Yield topic, times and values of each message of samples."""
+    specs = {spec.topic: spec for spec in array_specs(header)}
+    for message in messages:
+        if message.topic not in (MARKERS_TOPIC, HEADER_TOPIC):
             yield message.topic, _decoded(path, message, specs.get(message.topic))
+
+
+class _Channels:
+    """Channels and names of schemas of a file, by their numbers."""
+
+    def __init__(self, budget: ReadBudget) -> None:
+        self._budget = budget
+        self._schemas: dict[int, str] = {}
+        self._channels: dict[int, _Channel] = {}
+
+    def add(self, opcode: int, content: bytes) -> None:
+        """Keep what is needed of a record, if it is a schema or a channel."""
+        if opcode not in (Opcode.SCHEMA, Opcode.CHANNEL):
+            return
+        if len(content) > MAX_SCHEMA_SIZE:
+            raise ValueError(f"a schema or channel of {len(content)} bytes")
+        stream = ReadDataStream(BytesIO(content))
+        if opcode == Opcode.SCHEMA:
+            schema = Schema.read(stream)
+            if schema.id not in self._schemas:
+                self._budget.keep(len(schema.name), 1)
+                self._schemas[schema.id] = schema.name
+        else:
+            channel = Channel.read(stream)
+            if channel.id not in self._channels:
+                self._budget.keep(len(channel.topic), 1)
+                is_counted = channel.message_encoding == "cdr"
+                self._channels[channel.id] = _Channel(channel.topic, channel.schema_id, is_counted)
+
+    def of(self, message: Message) -> tuple[_Channel, str]:
+        """Return the channel of a message and the name of its schema.
+
+        Raises:
+            ValueError: the message is before its channel or schema.
+        """
+        channel = self._channels.get(message.channel_id)
+        if channel is None or channel.schema_id not in self._schemas:
+            raise ValueError("a message without its channel")
+        return channel, self._schemas[channel.schema_id]
 
 
 class _JoinedSize:
     """Size in memory of arrays that are read in parts; texts are as long as the longest."""
 
-    def __init__(self, path: Path) -> None:
-        self._path = path
-        self._limit = size_limit(path)
-        self._total = 0
+    def __init__(self, budget: ReadBudget) -> None:
+        self._budget = budget
         self._texts: dict[str, tuple[int, int]] = {}
 
     def add(self, topic: str, samples: TimedArray) -> None:
@@ -184,14 +251,13 @@ class _JoinedSize:
             RecordingError: the arrays are too large.
         """
         times, values = samples
-        self._total += times.nbytes + values.nbytes
+        n_bytes = times.nbytes + values.nbytes
         if values.dtype.kind == "U":
             n, width = self._texts.get(topic, (0, 0))
             widest = max(width, values.itemsize)
             self._texts[topic] = n + values.size, widest
-            self._total += (n + values.size) * widest - n * width - values.nbytes
-        if self._total > self._limit:
-            check_size(self._path, self._total)
+            n_bytes += (n + values.size) * widest - n * width - values.nbytes
+        self._budget.keep(n_bytes, 1)
 
 
 def _decoded(path: Path, message: _McapMessage, spec: ArraySpec | None) -> TimedArray:
@@ -212,22 +278,25 @@ def _with_equal_truth(arrays: dict[str, TimedArray]) -> TimedArrays:
     return arrays | {topic: (arrays[topic][0][:n], arrays[topic][1][:n]) for topic in truth}
 
 
-def _messages(path: Path, complete: bool) -> Iterator[_McapMessage]:
+def _messages(path: Path, complete: bool, budget: ReadBudget) -> Iterator[_McapMessage]:
     """Yield the messages with valid checksums in order; a missing number is damage."""
-    schemas: dict[int, Schema] = {}
-    channels: dict[int, Channel] = {}
+    try:
+        yield from _numbered_messages(path, complete, budget)
+    except (ValueError, McapError, struct.error) as cause:
+        raise RecordingError(f"{path} is damaged: {one_line(cause)}") from cause
+
+
+def _numbered_messages(path: Path, complete: bool, budget: ReadBudget) -> Iterator[_McapMessage]:
+    channels = _Channels(budget)
     expected = 0
-    for chunk in read_chunks(path, complete):
-        for record in chunk:
-            if isinstance(record, Schema):
-                schemas[record.id] = record
-            elif isinstance(record, Channel):
-                channels[record.id] = record
-            elif isinstance(record, Message):
-                channel = channels.get(record.channel_id)
-                if channel is None or channel.schema_id not in schemas:
-                    raise RecordingError(f"{path} is damaged: a message without its channel")
-                if channel.message_encoding == "cdr" and record.sequence != expected & 0xFFFFFFFF:
-                    raise RecordingError(f"{path} is damaged: message {expected} is missing")
-                expected += 1
-                yield _McapMessage(channel.topic, schemas[channel.schema_id].name, record.data)
+    chunks = read_chunks(path, complete, budget)
+    for opcode, content in (record for chunk in chunks for record in records_in(chunk, budget)):
+        if opcode != Opcode.MESSAGE:
+            channels.add(opcode, content)
+            continue
+        message = Message.read(ReadDataStream(BytesIO(content)), len(content))
+        channel, schema = channels.of(message)
+        if channel.is_counted and message.sequence != expected & 0xFFFFFFFF:
+            raise RecordingError(f"{path} is damaged: message {expected} is missing")
+        expected += 1
+        yield _McapMessage(channel.topic, schema, message.data)

@@ -24,7 +24,7 @@ import pyarrow.parquet as pq
 from holdfast.errors import RecordingError
 from holdfast.files import whole_file
 from holdfast.io.header import Header, decode_header, encode_header, header_of
-from holdfast.io.safe_reading import check_size, one_line
+from holdfast.io.safe_reading import JSON_EXPANSION, ReadBudget, check_size, one_line
 from holdfast.io.timed_arrays import (
     TRUTH_TIME,
     ArraySpec,
@@ -144,6 +144,7 @@ def write_checksum(path: Path) -> None:
 
 
 def _open(path: Path) -> tuple[Header, pq.ParquetFile]:
+    budget = ReadBudget(path)
     _check_ends(path)
     try:
         _check_checksum(path)
@@ -157,8 +158,9 @@ def _open(path: Path) -> tuple[Header, pq.ParquetFile]:
         file = pq.ParquetFile(path, page_checksum_verification=True)
     except (pa.ArrowException, OSError) as cause:
         raise RecordingError(f"{path} is damaged: {one_line(cause)}") from cause
-    metadata = file.metadata.metadata or {}
-    return decode_header(metadata.get(HEADER_KEY.encode(), b""), path), file
+    header = (file.metadata.metadata or {}).get(HEADER_KEY.encode(), b"")
+    budget.keep(JSON_EXPANSION * len(header))
+    return decode_header(header, path), file
 
 
 def _check_ends(path: Path) -> None:
@@ -287,8 +289,8 @@ def _padded(values: npt.NDArray[Any], n_rows: int) -> pa.Array:
 
 
 def _groups(header: Header, file: pq.ParquetFile, path: Path) -> Iterator[TimedArrays]:
-    convert = partial(_arrays, _specs(header, file, path))
-    return (_group(file, group, path, convert) for group in range(file.num_row_groups))
+    read = _GroupReader(file, path, partial(_arrays, _specs(header, file, path)))
+    return (read(group) for group in range(file.num_row_groups))
 
 
 def _groups_ahead(header: Header, file: pq.ParquetFile, path: Path) -> Iterator[TimedArrays]:
@@ -296,13 +298,13 @@ def _groups_ahead(header: Header, file: pq.ParquetFile, path: Path) -> Iterator[
 
     Where memory is short, a new thread can end the process; so `load` has none.
     """
-    convert = partial(_columns, _specs(header, file, path))
+    read = _GroupReader(file, path, partial(_columns, _specs(header, file, path)))
     groups = range(file.num_row_groups)
     with ThreadPoolExecutor(1) as reader:
-        waiting = deque(reader.submit(_group, file, k, path, convert) for k in groups[:1])
+        waiting = deque(reader.submit(read, k) for k in groups[:1])
         for group in groups:
             if group + 1 < len(groups):
-                waiting.append(reader.submit(_group, file, group + 1, path, convert))
+                waiting.append(reader.submit(read, group + 1))
             yield waiting.popleft().result()
 
 
@@ -313,27 +315,45 @@ def _specs(header: Header, file: pq.ParquetFile, path: Path) -> list[ArraySpec]:
     return specs
 
 
-def _group(
-    file: pq.ParquetFile, group: int, path: Path, convert: Callable[[pa.Table], TimedArrays]
-) -> TimedArrays:
-    _check_group(file.metadata.row_group(group), path)
-    try:
-        return convert(file.read_row_group(group))
-    except (pa.ArrowException, OSError, ValueError) as cause:
-        raise RecordingError(
-            f"{path} is damaged in row group {group}: {one_line(cause)}"
-        ) from cause
+class _GroupReader:
+    """Reader of the row groups of a file.
 
+    Args:
+        file: the file.
+        path: its path.
+        convert: makes arrays of the table of a row group.
+    """
 
-def _check_group(group: pq.RowGroupMetaData, path: Path) -> None:
-    """Check that a row group is not larger than recordings have."""
-    if group.num_rows > GROUP_ROWS:
-        raise RecordingError(
-            f"{path} is damaged: a row group of at most {GROUP_ROWS} rows expected, "
-            f"{group.num_rows} given"
-        )
-    check_size(path, group.num_rows * group.num_columns * 8)
-    check_size(path, group.total_byte_size)
+    def __init__(
+        self, file: pq.ParquetFile, path: Path, convert: Callable[[pa.Table], TimedArrays]
+    ) -> None:
+        self._file = file
+        self._path = path
+        self._convert = convert
+        self._budget = ReadBudget(path)
+
+    def __call__(self, group: int) -> TimedArrays:
+        """Return the arrays of a row group.
+
+        Raises:
+            RecordingError: it is damaged or too large.
+        """
+        self._check(self._file.metadata.row_group(group))
+        try:
+            return self._convert(self._file.read_row_group(group))
+        except (pa.ArrowException, OSError, ValueError) as cause:
+            raise RecordingError(
+                f"{self._path} is damaged in row group {group}: {one_line(cause)}"
+            ) from cause
+
+    def _check(self, group: pq.RowGroupMetaData) -> None:
+        """Check that a row group is not larger than recordings have."""
+        if group.num_rows > GROUP_ROWS:
+            raise RecordingError(
+                f"{self._path} is damaged: a row group of at most {GROUP_ROWS} rows expected, "
+                f"{group.num_rows} given"
+            )
+        self._budget.unpack(max(group.num_rows * group.num_columns * 8, group.total_byte_size))
 
 
 def _size(spec: ArraySpec) -> int:

@@ -11,7 +11,7 @@ import numpy as np
 from holdfast.errors import OutputError, RecordingError
 from holdfast.io.header import Header
 from holdfast.io.label_files import labels_for, labels_path
-from holdfast.io.safe_reading import recording_errors
+from holdfast.io.safe_reading import ReadBudget, recording_errors
 from holdfast.io.timed_arrays import (
     TACTILE,
     TimedArray,
@@ -164,7 +164,7 @@ def _chunks_of(
     header, groups, complete = file_format.read_groups(path)
     file_labels = _labels_beside(file_format, path, header, complete) if labels else None
     markers = sorted(header.markers)
-    for arrays, end in _chunk_arrays(groups, n_samples):
+    for arrays, end in _chunk_arrays(groups, n_samples, path):
         n_markers = sum(marker[0] < end for marker in markers)
         part = msgspec.structs.replace(header, markers=markers[:n_markers])
         markers = markers[n_markers:]
@@ -191,21 +191,24 @@ def _with_labels(chunk: Recording, labels: Mapping[str, tuple[Label, ...]]) -> R
 
 
 def _chunk_arrays(
-    groups: Iterable[TimedArrays], n_samples: int
+    groups: Iterable[TimedArrays], n_samples: int, path: Path
 ) -> Iterator[tuple[TimedArrays, float]]:
     """Yield the arrays of each chunk, and the time at which the next chunk begins."""
     parts: list[TimedArrays] = []
+    budget = ReadBudget(path)
     n_buffered = dict[str, int]()
     for group in groups:
         parts.append(group)
-        for topic, (times, _) in group.items():
+        for topic, (times, values) in group.items():
             n_buffered[topic] = n_buffered.get(topic, 0) + len(times)
+            budget.keep(times.nbytes + values.nbytes, 1)
         if max((n for topic, n in n_buffered.items() if _is_tactile(topic)), default=0) > n_samples:
             chunks = _split(_joined(parts), n_samples)
             starts = [_start(chunk) for chunk in chunks]
             n_ready = int(np.searchsorted(starts[1:], _end(chunks[-1]) - MAX_MODULE_LAG))
             yield from zip(chunks[:n_ready], starts[1:], strict=False)
             rest = _joined(chunks[n_ready:])
+            budget = ReadBudget(path)
             parts, n_buffered = [rest], {topic: len(times) for topic, (times, _) in rest.items()}
     if parts:
         chunks = _split(_joined(parts), n_samples)

@@ -1,5 +1,6 @@
 """What a file may do to its reader: raise errors of any type, or take more memory than expected."""
 
+import errno
 import os
 from collections.abc import Iterator
 from contextlib import contextmanager
@@ -13,6 +14,14 @@ MAX_EXPANSION = 50
 """Size in memory that a large file may have, as a multiple of its own size."""
 LIMIT_VARIABLE = "HOLDFAST_MAX_BYTES"
 """Environment variable that replaces both [bytes]."""
+MAX_WORK = 4
+"""Bytes that may be unpacked in all while a file is read, as a multiple of its size in memory."""
+ITEM_SIZE = 512
+"""Size in memory that an object counts besides its bytes, such as a message [bytes]."""
+STEP_WORK = 2048
+"""Work that a record counts, however short it is [bytes that are unpacked]."""
+JSON_EXPANSION = 32
+"""Size in memory of a decoded JSON text, as a multiple of its length; an empty list has 21."""
 MAX_CAUSE_LENGTH = 200
 """Number of characters of a foreign error that are shown."""
 
@@ -43,8 +52,21 @@ def one_line(cause: BaseException) -> str:
     return " ".join(str(cause).split())[:MAX_CAUSE_LENGTH] or type(cause).__name__
 
 
+def stored_size(path: Path) -> int:
+    """Return the size of a file without its holes, or of the files in a folder [bytes].
+
+    A sparse file has a size of any number of bytes, of which the disk has only some.
+    """
+    if path.is_dir():
+        return sum(stored_size(file) for file in path.iterdir() if file.is_file())
+    stat = path.stat()
+    if 512 * getattr(stat, "st_blocks", stat.st_size) >= stat.st_size or not stat.st_size:
+        return stat.st_size
+    return _size_of_extents(path)
+
+
 def size_limit(path: Path) -> int:
-    """Return the maximum size in memory of the content of a file [bytes].
+    """Return the maximum size in memory of the content of a file or folder [bytes].
 
     It is 1 GiB, or 50 times the size of the file if that is more: real recordings shrink to a
     third or a tenth when they are compressed. `HOLDFAST_MAX_BYTES` replaces it.
@@ -54,7 +76,7 @@ def size_limit(path: Path) -> int:
     """
     given = os.environ.get(LIMIT_VARIABLE)
     if not given:
-        return max(MIN_SIZE_LIMIT, MAX_EXPANSION * path.stat().st_size)
+        return max(MIN_SIZE_LIMIT, MAX_EXPANSION * stored_size(path))
     if not (given.isascii() and given.isdigit() and len(given) < 20 and int(given)):
         raise RecordingError(f"{LIMIT_VARIABLE}: a whole number of bytes expected, {given!r} given")
     return int(given)
@@ -69,8 +91,105 @@ def check_size(path: Path, n_bytes: int) -> None:
     if n_bytes > (limit := size_limit(path)):
         raise RecordingError(
             f"{path} takes {_megabytes(n_bytes)} in memory, {_megabytes(limit)} are allowed for a "
-            f"file of {_megabytes(path.stat().st_size)}; set {LIMIT_VARIABLE} to read it anyway"
+            f"file of {_megabytes(stored_size(path))}; set {LIMIT_VARIABLE} to read it anyway"
         )
+
+
+class ReadBudget:
+    """Memory and work that one file may cost while it is read.
+
+    Every reader has one for each file. Memory is limited by `size_limit`, work by `MAX_WORK`
+    times as much, so that a reader that forgets what it has read also ends.
+
+    Args:
+        path: path of the file or folder.
+
+    Raises:
+        RecordingError: it is a sparse file that is larger than what may be read from it.
+    """
+
+    def __init__(self, path: Path) -> None:
+        self._path = path
+        self._limit = size_limit(path)
+        self._kept = 0
+        self._work = 0
+        size = path.stat().st_size
+        if not path.is_dir() and size > max(self._limit, stored_size(path)):
+            raise RecordingError(
+                f"{path} is a sparse file: {_megabytes(size)} long, of which "
+                f"{_megabytes(stored_size(path))} are stored; at most "
+                f"{_megabytes(self._limit)} are read from it"
+            )
+
+    @property
+    def path(self) -> Path:
+        """Path of the file."""
+        return self._path
+
+    @property
+    def free(self) -> int:
+        """Memory that is left [bytes]."""
+        return self._limit - self._kept
+
+    def keep(self, n_bytes: int, n_items: int = 0) -> None:
+        """Count memory that is in use until the file is read.
+
+        Args:
+            n_bytes: size of the values [bytes].
+            n_items: number of objects that hold them.
+
+        Raises:
+            RecordingError: the memory is used up.
+        """
+        self._kept += n_bytes + n_items * ITEM_SIZE
+        if self._kept > self._limit:
+            check_size(self._path, self._kept)
+
+    def unpack(self, n_bytes: int) -> None:
+        """Count bytes that are in memory only until the next bytes are unpacked.
+
+        Raises:
+            RecordingError: the memory or the work is used up.
+        """
+        if self._kept + n_bytes > self._limit:
+            check_size(self._path, self._kept + n_bytes)
+        self._add_work(n_bytes)
+
+    def step(self, n_steps: int = 1) -> None:
+        """Count records that are read, or other steps of about a microsecond.
+
+        Raises:
+            RecordingError: the work is used up.
+        """
+        self._add_work(n_steps * STEP_WORK)
+
+    def _add_work(self, n_bytes: int) -> None:
+        self._work += n_bytes
+        if self._work > MAX_WORK * self._limit:
+            raise RecordingError(
+                f"{self._path} takes too long to read: a file of "
+                f"{_megabytes(stored_size(self._path))} has records of more than "
+                f"{_megabytes(MAX_WORK * self._limit)} when it is unpacked, where a short record "
+                f"counts {STEP_WORK} bytes; set {LIMIT_VARIABLE} to read it anyway"
+            )
+
+
+def _size_of_extents(path: Path) -> int:
+    """Return the number of bytes of a file that are not in holes."""
+    n_bytes = 0
+    with path.open("rb") as file:
+        size = os.fstat(file.fileno()).st_size
+        end = 0
+        while end < size:
+            try:
+                start = os.lseek(file.fileno(), end, os.SEEK_DATA)
+                end = os.lseek(file.fileno(), start, os.SEEK_HOLE)
+            except OSError as cause:
+                if cause.errno == errno.ENXIO:  # only a hole is left
+                    return n_bytes
+                return size  # the file system does not report holes
+            n_bytes += end - start
+    return n_bytes
 
 
 def _megabytes(n_bytes: int) -> str:

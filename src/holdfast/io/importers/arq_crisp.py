@@ -5,8 +5,10 @@ held, or held with the arm at rest; 1 slip with the arm at rest; 2 release; 3 gr
 the arm in motion; 5 slip with the arm in motion; 6 anything else.
 """
 
-from collections.abc import Iterator, Mapping, Sequence
+import zlib
+from collections.abc import Iterator
 from dataclasses import replace
+from math import prod
 from pathlib import Path
 from types import ModuleType
 from typing import Any
@@ -16,7 +18,7 @@ import numpy as np
 from holdfast.contact import Cause, ContactState
 from holdfast.errors import MissingExtra, RecordingError
 from holdfast.io.importers.table import natural_order, with_integer_type
-from holdfast.io.safe_reading import check_size, one_line
+from holdfast.io.safe_reading import ReadBudget, one_line
 from holdfast.recordings import Label, Recording, Tactile, labels_from_samples
 from holdfast.sensors import Sensor, sensor
 from holdfast.sensors.types import Array
@@ -26,6 +28,12 @@ MAGIC = b"\x89HDF\r\n\x1a\n"
 SOURCE = "ARQ-CRISP"
 DATA, TIMES, LABELS = "tactile_data_raw", "tactile_timestamps", "tactile_slips_label"
 MILLISECOND = 1e-3
+MAX_DEPTH = 16
+"""Maximum depth of groups inside groups; the data sets have four."""
+MAX_DEFLATE = 1032
+"""Largest number of bytes that one byte of a deflated chunk can become."""
+N_COPIES = 3
+"""Number of arrays of the size of a data set in memory while it is converted."""
 PITCH = (7.24e-3, 7.17e-3)
 """Distances between the taxels of the 4 x 6 patch [m]; those of the 3 x 6 patch are unknown, and
 the same are assumed."""
@@ -101,12 +109,13 @@ def _recordings(path: Path, h5py: ModuleType) -> Iterator[Recording]:
         )
     try:
         with h5py.File(path, "r") as file:
-            names: list[str] = []
-            file.visititems(lambda name, item: names.append(name) if DATA in _keys(item) else None)
+            budget = ReadBudget(path)
+            names = _names_of_recordings(file, h5py, budget)
+            seen: set[int] = set()
             if not names:
                 raise RecordingError(f"{path}: no group with {DATA} in it")
             for name in sorted(names, key=lambda name: natural_order(Path(name.replace("/", "_")))):
-                arrays = _Arrays(path, file[name], h5py)
+                arrays = _Arrays(path, file[name], h5py, budget, seen)
                 yield _recording(f"{path}: {name}", name.split("/"), arrays)
     except RecordingError:
         raise
@@ -116,8 +125,39 @@ def _recordings(path: Path, h5py: ModuleType) -> Iterator[Recording]:
         ) from cause
 
 
-def _keys(item: object) -> Sequence[str]:
-    return tuple(item) if isinstance(item, Mapping) else ()
+def _names_of_recordings(file: Any, h5py: ModuleType, budget: ReadBudget) -> list[str]:  # noqa: ANN401
+    """Return the names of the groups with data; a group with many names is visited once.
+
+    Raises:
+        RecordingError: groups are nested too deep, or there are too many.
+    """
+    names: list[str] = []
+    seen: set[int] = set()
+    waiting = [("", file["/"])]
+    while waiting:
+        name, group = waiting.pop()
+        address = h5py.h5o.get_info(group.id).addr
+        if address in seen:
+            continue
+        seen.add(address)
+        if name.count("/") >= MAX_DEPTH:
+            raise RecordingError(
+                f"{budget.path}: groups are nested more than {MAX_DEPTH} deep; 4 expected"
+            )
+        if name and DATA in group:
+            names.append(name)
+            continue
+        for key in group:
+            budget.keep(len(name) + len(key), 1)
+            if _is_group(group, key, h5py):
+                waiting.append((f"{name}/{key}".lstrip("/"), group[key]))
+    return names
+
+
+def _is_group(group: Any, key: str, h5py: ModuleType) -> bool:  # noqa: ANN401 (h5py.Group)
+    """Return whether a name in a group is a group inside the same file."""
+    is_inside = isinstance(group.get(key, getlink=True), h5py.HardLink)
+    return is_inside and group.get(key, getclass=True) is h5py.Group
 
 
 class _Arrays:
@@ -125,12 +165,28 @@ class _Arrays:
 
     Only arrays inside of the file itself are read. HDF5 can also store the names of other files
     (external links, external storage, virtual arrays), and would read any file of the user.
+
+    Args:
+        path: path of the file.
+        group: the group.
+        h5py: the module.
+        budget: of the file.
+        seen: addresses of the arrays that were read.
     """
 
-    def __init__(self, path: Path, group: Any, h5py: ModuleType) -> None:  # noqa: ANN401 (h5py)
+    def __init__(
+        self,
+        path: Path,
+        group: Any,  # noqa: ANN401 (h5py.Group)
+        h5py: ModuleType,
+        budget: ReadBudget,
+        seen: set[int],
+    ) -> None:
         self._path = path
         self._group = group
         self._h5py = h5py
+        self._budget = budget
+        self._seen = seen
 
     def __contains__(self, name: str) -> bool:
         return name in self.names()
@@ -155,8 +211,55 @@ class _Arrays:
             )
         if item.dtype.kind not in "biuf":
             raise RecordingError(f"{self._path}: numbers expected in {name}, {item.dtype} given")
-        check_size(self._path, 8 * item.size)
+        if (address := h5py.h5o.get_info(item.id).addr) in self._seen:
+            raise RecordingError(
+                f"{self._path}: {self._group.name}/{name} is an array of another group too; each "
+                "group is a recording and has arrays of its own"
+            )
+        self._seen.add(address)
+        self._check_size(name, item)
         return np.asarray(item[()], dtype=np.float64)
+
+    def _check_size(self, name: str, item: Any) -> None:  # noqa: ANN401 (h5py.Dataset)
+        """Check the size of an array and of its chunks, which can be packed and can be larger.
+
+        Raises:
+            RecordingError: they are too large, or packed in another way than by deflate.
+        """
+        self._budget.unpack(N_COPIES * 8 * item.size)
+        if item.chunks is None:
+            return
+        n_bytes = prod(item.chunks) * item.dtype.itemsize
+        self._budget.unpack(n_bytes)
+        filters = item.id.get_create_plist()
+        kinds = [filters.get_filter(k)[0] for k in range(filters.get_nfilters())]
+        h5z = self._h5py.h5z
+        known = {h5z.FILTER_DEFLATE, h5z.FILTER_SHUFFLE, h5z.FILTER_FLETCHER32}
+        if not known.issuperset(kinds) or len(set(kinds)) < len(kinds):
+            raise RecordingError(
+                f"{self._path}: {name} is packed by the filters {kinds}; gzip, shuffle and "
+                "fletcher32 expected, each once"
+            )
+        if h5z.FILTER_DEFLATE in kinds:
+            self._check_chunks(name, item, n_bytes)
+
+    def _check_chunks(self, name: str, item: Any, n_bytes: int) -> None:  # noqa: ANN401
+        """Check that no deflated chunk becomes larger than a chunk is.
+
+        HDF5 unpacks a chunk to the end, whatever its size should be.
+        """
+        for k in range(item.id.get_num_chunks()):
+            self._budget.step()
+            chunk = item.id.get_chunk_info(k)
+            if chunk.size * MAX_DEFLATE <= self._budget.free:
+                self._budget.unpack(n_bytes)
+                continue
+            _, packed = item.id.read_direct_chunk(chunk.chunk_offset)
+            self._budget.unpack(n_bytes)
+            if len(zlib.decompressobj().decompress(packed, n_bytes + 1)) > n_bytes:
+                raise RecordingError(
+                    f"{self._path} is damaged: a chunk of {name} has more than {n_bytes} bytes"
+                )
 
 
 def _recording(place: str, parts: list[str], group: _Arrays) -> Recording:

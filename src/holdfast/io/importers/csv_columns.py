@@ -22,6 +22,10 @@ TIME_UNITS = {"s": 1.0, "ms": 1e-3, "us": 1e-6, "ns": 1e-9}
 PLAUSIBLE_RATES = (5.0, 5000.0)
 """Rates that decide the unit of times without one [Hz]; it is unambiguous, because units are a
 factor of 1000 apart."""
+MAX_PATTERNS = 1 << 18
+"""Maximum number of patterns that a guess compares; 368 taxels have some thousand."""
+MAX_GUESSED_NAME = 200
+"""Maximum length of the name of a column that a guess considers [characters]."""
 RUN = ".."
 """Between the first and the last of consecutive columns."""
 
@@ -218,30 +222,41 @@ def _run_layout(text: str, names: Sequence[str]) -> Layout:
 
 def _guessed_taxels(names: Sequence[str], n_taxels: Collection[int]) -> str | None:
     """Return the pattern of the taxel columns: the one that most columns fit completely."""
-    candidates = dict.fromkeys(one for name in names for one in _patterns(name))
-    sizes: dict[str, int] = {}
-    for pattern in candidates:
-        columns = next(iter(pattern_layout(pattern, names).values()), {})
-        if _is_complete(columns) and (not n_taxels or len(columns) // 3 in n_taxels):
-            sizes[pattern] = len(columns)
+    found: dict[str, dict[tuple[int, str], str]] = {}
+    pairs = ((name, *one) for name in names for one in _patterns(name))
+    for n, (name, pattern, key) in enumerate(pairs):
+        if n == MAX_PATTERNS:
+            raise RecordingError(
+                f"the names of {len(names)} columns have too many numbers and axes to guess from: "
+                "give --columns"
+            )
+        found.setdefault(pattern, {})[key] = name
+    sizes = {
+        pattern: len(columns)
+        for pattern, columns in found.items()
+        if _is_complete(_from_one(columns)) and (not n_taxels or len(columns) // 3 in n_taxels)
+    }
     if not sizes:
         return None
     most = max(sizes.values())
     return _with_module([pattern for pattern, size in sizes.items() if size == most])
 
 
-def _patterns(name: str) -> Iterator[str]:
-    """Yield a name with each of its numbers and axis letters replaced by a placeholder."""
+def _patterns(name: str) -> Iterator[tuple[str, tuple[int, str]]]:
+    """Yield a name with each of its numbers and axis letters replaced, and that taxel and axis."""
+    if len(name) > MAX_GUESSED_NAME:
+        return
     tokens = _TOKEN.findall(name)
     numbers = [k for k, token in enumerate(tokens) if token.isdigit()]
     for k, token in enumerate(tokens):
         if token[-1].lower() not in "xyz":
             continue
-        axis = {k: token[:-1] + "{axis}"}
+        letter, axis = token[-1].lower(), {k: token[:-1] + "{axis}"}
         for number in numbers:
             both = axis | {number: "{taxel}"}
-            yield "".join(both.get(place, word) for place, word in enumerate(tokens))
-        yield "".join(axis.get(place, word) for place, word in enumerate(tokens))
+            pattern = "".join(both.get(place, word) for place, word in enumerate(tokens))
+            yield pattern, (int(tokens[number]), letter)
+        yield "".join(axis.get(place, word) for place, word in enumerate(tokens)), (1, letter)
 
 
 def _is_complete(columns: Collection[tuple[int, str]]) -> bool:

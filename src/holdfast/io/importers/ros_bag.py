@@ -4,6 +4,7 @@ The topics are those of XELA's uSkin and of Contactile's PapillArray. Topics of 
 ignored.
 """
 
+from collections import Counter
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -13,7 +14,8 @@ import numpy as np
 import numpy.typing as npt
 
 from holdfast.errors import RecordingError
-from holdfast.io.bags import METADATA, Bag, BagTopic, check_rosbags, find_bags, open_bag
+from holdfast.io.bag_storage.folder import METADATA
+from holdfast.io.bags import Bag, BagTopic, check_rosbags, find_bags, open_bag
 from holdfast.recordings import Recording, Tactile
 from holdfast.ros.sensor_messages import (
     DeviceSample,
@@ -139,8 +141,7 @@ class _BagImport:
 
     def recording(self) -> Recording:
         topics = self._tactile_topics()
-        for topic in topics:
-            self._read(topic)
+        self._read(topics)
         if not any(track.readings for track in self._tracks.values()):
             names = ", ".join(topic.name for topic in topics)
             raise RecordingError(f"{self._path} has no messages on {names}; at least one expected")
@@ -174,22 +175,27 @@ class _BagImport:
         except ValueError:  # messages of another kind
             return None
 
-    def _read(self, topic: _TactileTopic) -> None:
-        n_read = 0
-        for _, time, data in self._bag.messages(topic.parts):
-            n_read += 1
-            for sample in topic.decode(data):
-                self._add(topic.name, sample, time)
-        n_expected = sum(part.n_messages for part in topic.parts)
-        if n_read < n_expected:
-            raise RecordingError(
-                f"{self._path} is cut or damaged: {n_read} messages on {topic.name}, "
-                f"{n_expected} expected"
-            )
+    def _read(self, topics: list[_TactileTopic]) -> None:
+        """Read the samples of all topics, in the order of time."""
+        decoders = {topic.name: topic.decode for topic in topics}
+        n_read = Counter[str]()
+        for part, time, data in self._bag.messages(part for one in topics for part in one.parts):
+            n_read[part.name] += 1
+            for sample in decoders[part.name](data):
+                self._add(part.name, sample, time)
+        for topic in topics:
+            n_expected = sum(part.n_messages for part in topic.parts)
+            if n_read[topic.name] < n_expected:
+                raise RecordingError(
+                    f"{self._path} is cut or damaged: {n_read[topic.name]} messages on "
+                    f"{topic.name}, {n_expected} expected"
+                )
 
     def _add(self, topic: str, sample: DeviceSample, time: float) -> None:
-        if not len(readings_of(sample, "count")):  # XELA's server sends this for a sensor off
+        readings = readings_of(sample, "count")
+        if not len(readings):  # XELA's server sends this for a sensor off
             return
+        self._bag.keep(readings.nbytes)
         number = 0 if sample.number is None else sample.number
         self._tracks.setdefault((topic, number), _DeviceTrack(sample)).add(sample, time)
 

@@ -5,13 +5,14 @@ import re
 from collections.abc import Iterable, Iterator, Sequence
 from contextlib import contextmanager
 from pathlib import Path
-from typing import TYPE_CHECKING, NamedTuple
+from typing import TYPE_CHECKING, NamedTuple, TextIO
 
 import numpy as np
 import numpy.typing as npt
 
 from holdfast.errors import RecordingError
 from holdfast.files import check_regular
+from holdfast.io.safe_reading import ReadBudget
 from holdfast.sensors.types import Array
 
 if TYPE_CHECKING:
@@ -21,7 +22,9 @@ if TYPE_CHECKING:
 MAX_CELL_LENGTH = 1 << 20
 """Maximum length of a cell [characters]; the csv module itself stops at 131,072."""
 MAX_ROW_SIZE = 1 << 26
-"""Maximum size of a row with long cells [bytes]."""
+"""Maximum size of a row with long cells, and of all lines before the first row [bytes]."""
+COLUMN_SIZE = 1 << 13
+"""Size in memory that a column counts besides its values [bytes]."""
 
 
 class Table(NamedTuple):
@@ -79,6 +82,7 @@ def read_table(path: Path, text: Sequence[str] = ()) -> tuple[Table, dict[str, l
     import pyarrow as pa
 
     comments, names, first_line = _head(path)
+    ReadBudget(path).keep(len(names) * COLUMN_SIZE)
     keys = [str(place) for place in range(len(names))]
     places = {name: names.index(name) for name in text if name in names}
     types = dict.fromkeys(keys, pa.float64())
@@ -104,15 +108,16 @@ def _read(path: Path, types: "dict[str, pyarrow.DataType]", first_line: int) -> 
     from pyarrow import csv as arrow
 
     def read(block_size: int | None) -> "pyarrow.Table":
-        return arrow.read_csv(
-            path,
-            read_options=arrow.ReadOptions(
-                column_names=list(types), skip_rows=first_line - 1, block_size=block_size
-            ),
-            convert_options=arrow.ConvertOptions(
-                column_types=types, null_values=["", "nan", "NaN", "NAN"]
-            ),
-        )
+        with pa.OSFile(str(path)) as file:  # by its path, a packed file would be unpacked
+            return arrow.read_csv(
+                file,
+                read_options=arrow.ReadOptions(
+                    column_names=list(types), skip_rows=first_line - 1, block_size=block_size
+                ),
+                convert_options=arrow.ConvertOptions(
+                    column_types=types, null_values=["", "nan", "NaN", "NAN"]
+                ),
+            )
 
     try:
         return read(None)
@@ -177,7 +182,7 @@ def _head(path: Path) -> tuple[tuple[str, ...], tuple[str, ...], int]:
         check_regular(path)
         with path.open(encoding="utf-8-sig", newline="") as file:
             comments: list[str] = []
-            for number, line in enumerate(file, start=1):
+            for number, line in enumerate(_first_lines(file), start=1):
                 if line.startswith("#"):
                     comments.append(line[1:].strip())
                 elif line.strip():
@@ -189,6 +194,36 @@ def _head(path: Path) -> tuple[tuple[str, ...], tuple[str, ...], int]:
     except (UnicodeError, csv.Error) as cause:
         raise RecordingError(f"{path} is not CSV text: {_text(cause)}") from cause
     raise RecordingError(f"{path} is empty; a header line and samples expected")
+
+
+def _first_lines(file: TextIO) -> Iterator[str]:
+    """Yield the lines of a file; those before the first row must not be longer than a row.
+
+    Raises:
+        csv.Error: they are.
+    """
+    n_left = MAX_ROW_SIZE
+    while line := file.readline(n_left + 1):
+        n_left -= len(line)
+        if n_left < 0:
+            raise csv.Error(f"more than {MAX_ROW_SIZE} characters before the first row")
+        yield line
+
+
+def _lines(path: Path, first_line: int) -> Iterator[str]:
+    """Yield the lines of a file from a line on.
+
+    Raises:
+        csv.Error: a line is too long.
+    """
+    with path.open(encoding="utf-8-sig", errors="replace", newline="") as file:
+        number = 0
+        while line := file.readline(MAX_ROW_SIZE + 1):
+            if len(line) > MAX_ROW_SIZE:
+                raise csv.Error(f"a row of more than {MAX_ROW_SIZE} bytes")
+            number += 1
+            if number >= first_line:
+                yield line
 
 
 def _numbers(table: "pyarrow.Table", text: set[int]) -> Array:
@@ -203,20 +238,16 @@ def _cause_of(
     path: Path, names: tuple[str, ...], first_line: int, text: set[str], cause: str
 ) -> RecordingError:
     """Return an error that names the wrong cell or row; the file is read a second time."""
-    with path.open(encoding="utf-8-sig", errors="replace", newline="") as file:
-        lines = list(file)[first_line - 1 :]
-    if not any(line.strip() for line in lines):
-        return _without_samples(path)
     try:
+        if not any(line.strip() for line in _lines(path, first_line)):
+            return _without_samples(path)
         with _long_cells():
-            wrong = _wrong_row(path, names, first_line, text, lines)
+            wrong = _wrong_row(path, names, first_line, text, _lines(path, first_line))
     except csv.Error as problem:
         cause = _text(problem)
     else:
         if wrong is not None:
             return wrong
-    if "straddling" in cause:
-        cause = f"a row of more than {MAX_ROW_SIZE} bytes"
     return RecordingError(f"{path} is not a table of numbers: {' '.join(cause.split())[:200]}")
 
 

@@ -16,6 +16,7 @@ import numpy.typing as npt
 
 from holdfast.contact import Cause, ContactState
 from holdfast.errors import RecordingError
+from holdfast.files import read_input
 from holdfast.io.importers.table import Table, read_table, with_integer_type
 from holdfast.recordings import Label, Recording, Tactile, Truth, labels_from_samples
 from holdfast.sensors import sensor
@@ -23,6 +24,8 @@ from holdfast.sensors.types import Array
 
 FILES = {"finger1": "xela_sensor1.csv", "finger2": "xela_sensor2.csv"}
 N_JOINTS = 7
+MAX_METADATA_SIZE = 1 << 20
+"""Maximum size of the file of metadata [bytes]."""
 LOST_MARKER_VALUE = 10.0
 """Value of all components of the pose of a marker that the camera has lost."""
 
@@ -150,9 +153,9 @@ def _robot(table: Table) -> Mapping[str, npt.NDArray[Any]]:
 def _metadata(path: Path) -> dict[str, Any]:
     metadata: dict[str, Any] = {"object": "box", "source": SOURCE, "starts_loaded": True}
     if path.is_file():
-        rows = list(csv.DictReader(path.read_text("utf-8-sig").splitlines()))
-        if rows:
-            metadata.update({key: _value(text) for key, text in rows[0].items() if key})
+        text = read_input(path, MAX_METADATA_SIZE).decode("utf-8-sig")
+        row = next(csv.DictReader(text.splitlines()), {})
+        metadata.update({key: _value(text) for key, text in row.items() if key})
     return metadata
 
 
