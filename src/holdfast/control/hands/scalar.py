@@ -1,7 +1,11 @@
 """Grippers with one force: a Python function gets the largest scale of all fingers."""
 
+import sys
 from collections.abc import Callable
+from contextlib import suppress
 from importlib import import_module
+from pathlib import Path
+from types import ModuleType
 
 from holdfast.control.command import GripCommand
 from holdfast.control.hands.base import Hand
@@ -34,12 +38,14 @@ class ScalarGripper(Hand):
     def from_path(cls, path: str, name: str) -> "ScalarGripper":
         """Return the gripper of a function, given as MODULE:FUNCTION.
 
+        The module is one that Python finds, or else one in the working folder.
+
         Raises:
             ValueError: there is no such module or function.
         """
         module, _, function = path.partition(":")
         try:
-            found = getattr(import_module(module), function)
+            found = getattr(_import(module), function)
         except (ImportError, AttributeError, ValueError) as cause:
             raise ValueError(f"{name}: call:MODULE:FUNCTION expected ({cause})") from cause
         if not callable(found):
@@ -61,6 +67,23 @@ class ScalarGripper(Hand):
     def close(self) -> None:
         """Take no more commands."""
         self._is_open = False
+
+
+def _import(name: str) -> ModuleType:
+    """Import a module; search the working folder last, and for this import only.
+
+    Raises:
+        ImportError: there is no such module.
+    """
+    here = str(Path.cwd())
+    if here in sys.path:
+        return import_module(name)
+    sys.path.append(here)
+    try:
+        return import_module(name)
+    finally:
+        with suppress(ValueError):  # the module may have removed it
+            sys.path.remove(here)
 
 
 def largest_scale(command: GripCommand) -> float:
