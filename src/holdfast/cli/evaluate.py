@@ -2,7 +2,7 @@
 
 from pathlib import Path
 from shutil import get_terminal_size
-from textwrap import fill
+from textwrap import wrap
 from typing import TYPE_CHECKING, Annotated
 
 import typer
@@ -18,7 +18,13 @@ from holdfast.cli.options import (
     save_plot,
     start_engine,
 )
-from holdfast.cli.terminal.console import print_json, print_line, print_message, print_table
+from holdfast.cli.terminal.console import (
+    print_json,
+    print_line,
+    print_lines,
+    print_message,
+    print_table,
+)
 from holdfast.cli.terminal.progress import progress
 
 if TYPE_CHECKING:
@@ -81,7 +87,8 @@ def evaluate(
         return
     print_verdict(sentence)
     print_metrics(metrics)
-    print_line(f"\n{model} on {len(recordings)} recordings")
+    print_line()
+    print_line(f"{model} on {len(recordings)} recordings")
 
 
 def warn_about_training(trained_on: list[str], n_recordings: int) -> None:
@@ -96,7 +103,7 @@ def warn_about_training(trained_on: list[str], n_recordings: int) -> None:
 
 def print_verdict(sentence: str) -> None:
     """Print the sentence on what a model is good for, as wide as the terminal."""
-    print_line(fill(sentence, get_terminal_size().columns) + "\n")
+    print_lines([*wrap(sentence, get_terminal_size().columns), ""])
 
 
 def print_metrics(metrics: "Metrics") -> None:
@@ -107,7 +114,8 @@ def print_metrics(metrics: "Metrics") -> None:
         ("", "n", "accuracy %", "FDR %", "FPR %", "FNR %", "AUC", "AUC in contact"),
         [*rows, _sample_row("all", metrics.pooled)],
     )
-    print_line(f"\nby event (onset of instability in a held contact, {_onsets(metrics)})")
+    print_line()
+    print_line(f"by event (onset of instability in a held contact, {_onsets(metrics)})")
     events = [*metrics.events.fingers.items(), ("hand", metrics.events.hand)]
     print_table(
         ("", "events", "missed in 0.05 s %", "0.1 s %", "0.2 s %", "median delay s", "p95 s",
@@ -151,7 +159,8 @@ def _print_intervals(intervals: "Intervals") -> None:
     ]
     groups = "" if intervals.n_groups is None else f" in {intervals.n_groups} groups"
     of = f"{intervals.n_recordings} recordings{groups}"
-    print_line(f"\n{100 * intervals.level:g} % intervals over {of}: " + ", ".join(parts))
+    print_line()
+    print_line(f"{100 * intervals.level:g} % intervals over {of}: " + ", ".join(parts))
 
 
 def _format(value: float | None, digits: int) -> str:

@@ -4,7 +4,7 @@ from collections.abc import Iterable, Mapping
 from dataclasses import replace
 from pathlib import Path
 from shutil import get_terminal_size
-from textwrap import fill
+from textwrap import wrap
 from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
@@ -18,7 +18,13 @@ from holdfast.cli.options import (
     check_plot,
     save_plot,
 )
-from holdfast.cli.terminal.console import print_error, print_json, print_line, print_table
+from holdfast.cli.terminal.console import (
+    print_error,
+    print_json,
+    print_line,
+    print_lines,
+    print_table,
+)
 from holdfast.cli.terminal.progress import progress
 
 if TYPE_CHECKING:
@@ -211,11 +217,11 @@ def _print_one(document: Mapping[str, Any]) -> None:
 def _print_findings(findings: list[Mapping[str, str]]) -> None:
     """Print one paragraph for each finding, as wide as the terminal."""
     if findings:
-        print_line("\nfindings:")
+        print_lines(("", "findings:"))
     width = get_terminal_size().columns
     for one in findings:
         text = f"{one['module']}: {one['text']}" if one["module"] else one["text"]
-        print_line(fill(text, width, initial_indent="- ", subsequent_indent="  "))
+        print_lines(wrap(text, width, initial_indent="- ", subsequent_indent="  "))
 
 
 def _channels(truth: Mapping[str, Any]) -> list[str]:

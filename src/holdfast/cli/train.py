@@ -177,8 +177,9 @@ def train(
         return
     print_verdict(trained.verdict)
     print_metrics(trained.cross_validation)
+    print_line()
     print_line(
-        f"\n{model}: trained on {len(recordings)} recordings; "
+        f"{model}: trained on {len(recordings)} recordings; "
         f"cross-validation leaves out {LEFT_OUT[trained.split]}"
     )
 

@@ -165,8 +165,9 @@ def _print(agreement: "Agreement") -> None:
             for finger, each in pooled.items()
         ]
     print_table(header, rows)
+    print_line()
     print_line(
-        "\nonset differences: B minus A, for onsets of instability in both; "
+        "onset differences: B minus A, for onsets of instability in both; "
         "not in A, not in B: number of intervals that only the other has"
     )
 
