@@ -200,14 +200,13 @@ def _start(n_jobs: int, tasks: Iterable[object]) -> Iterator[Any]:
 def _backend_type() -> type[Any]:
     """Return the back end of joblib, whose later processes have a safe path as well.
 
-    joblib starts a new process in place of one whose memory grew, from a thread of its own. The
-    environment of the first ones and of their helpers is that of `safe_path`.
+    joblib starts a new process in place of one whose memory grew, from a thread of its own. Such
+    a process has the values that some variables had when the pool was started.
     """
     from joblib.parallel import LokyBackend
 
-    class SafeBackend(LokyBackend):  # type: ignore[misc]
-        def _prepare_worker_env(self, n_jobs: int) -> dict[str, str]:
-            return {**super()._prepare_worker_env(n_jobs), SAFE_PATH_VARIABLE: "1"}
+    class SafeBackend(LokyBackend):
+        MAX_NUM_THREADS_VARS = (*LokyBackend.MAX_NUM_THREADS_VARS, SAFE_PATH_VARIABLE)
 
     return SafeBackend
 
