@@ -12,8 +12,9 @@ from contextlib import suppress
 from functools import cache, partial
 from pathlib import Path
 from threading import Thread
-from typing import NamedTuple, Self, TypeVar
+from typing import Any, NamedTuple, Self, TypeVar, cast
 
+from holdfast.children import SAFE_PATH_VARIABLE, safe_path
 from holdfast.cluster import Arguments, Call, call_on_cluster
 from holdfast.errors import EngineError
 
@@ -165,7 +166,7 @@ def _in_processes(
     A process that dies breaks the whole pool. Then each call that was running is made again
     alone, and the other calls in a new pool.
     """
-    from joblib import Parallel, delayed
+    from joblib import delayed
     from joblib.externals.loky.process_executor import TerminatedWorkerError
 
     # loky replaces a worker whose memory grew, with a warning. No result is lost.
@@ -178,10 +179,36 @@ def _in_processes(
         call_named = delayed(_call_in_worker)
         tasks = (call_named(os.getpid(), function, *call) for call in _record(rest, started))
         with suppress(TerminatedWorkerError):
-            for name, result in Parallel(n_jobs, return_as="generator_unordered")(tasks):
+            for name, result in _start(n_jobs, tasks):
                 del started[name]
                 yield name, result
             ended = True
+
+
+def _start(n_jobs: int, tasks: Iterable[object]) -> Iterator[Any]:
+    """Start the processes and the first tasks; return the iterator over the results."""
+    from joblib import Parallel
+
+    with safe_path:
+        results: Iterator[Any] = Parallel(
+            n_jobs, backend=_backend_type()(), return_as="generator_unordered"
+        )(tasks)
+    return results
+
+
+@cache
+def _backend_type() -> type[Any]:
+    """Return the back end of joblib, whose later processes have a safe path as well.
+
+    joblib starts a new process in place of one whose memory grew, from a thread of its own. Such
+    a process has the values that some variables had when the pool was started.
+    """
+    from joblib.parallel import LokyBackend
+
+    class SafeBackend(LokyBackend):
+        MAX_NUM_THREADS_VARS = (*LokyBackend.MAX_NUM_THREADS_VARS, SAFE_PATH_VARIABLE)
+
+    return SafeBackend
 
 
 def _record(calls: Iterator[Call[K]], started: dict[K, Arguments]) -> Iterator[Call[K]]:
@@ -213,14 +240,14 @@ def _end_with(parent: int) -> None:
 
 def _call_alone(function: Callable[..., T], name: object, arguments: Arguments) -> T:
     """Make one call in another process; only this call can be the cause if the process dies."""
-    from joblib import Parallel, delayed
+    from joblib import delayed
     from joblib.externals.loky.process_executor import TerminatedWorkerError
 
     for _ in range(MAX_RETRIES):
         with suppress(TerminatedWorkerError):
             call = delayed(_call_in_worker)(os.getpid(), function, None, arguments)
-            result: T = Parallel(n_jobs=2)([call])[0][1]
-            return result
+            ((_, result),) = _start(2, [call])
+            return cast(T, result)
     raise EngineError(
         f"{name}: its process died {1 + MAX_RETRIES} times, killed or out of memory; "
         "try with fewer jobs"

@@ -136,6 +136,16 @@ def test_times_of_any_kind_of_number_come_back_from_csv(tmp_path):
     assert (got.start, got.end) == (0.1, 0.5)
 
 
+@pytest.mark.parametrize(
+    "finger", ["=1+1", "+1", "-1", "@A1", "\t=1", "\r=1", "'=1", "a\rb", "'a'"]
+)
+def test_a_finger_is_no_formula_in_csv_and_comes_back(tmp_path, finger):
+    path = tmp_path / "labels.csv"
+    path.write_bytes(labels_to_csv({finger: MINE}).encode())
+    assert not path.read_text().splitlines()[1].startswith(("=", "+", "-", "@", "\t", "\r"))
+    assert list(labels_from_csv(path)) == [finger]
+
+
 def test_csv_goes_out_and_comes_in(tmp_path):
     path = tmp_path / "labels.csv"
     path.write_text(labels_to_csv({"thumb": MINE, "index": MINE[:1]}))

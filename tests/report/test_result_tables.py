@@ -8,6 +8,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from holdfast.csv_cells import cell_text
 from holdfast.report.result_tables import (
     ResultTable,
     Row,
@@ -96,10 +97,15 @@ def test_csv_holds_every_value_to_the_last_digit(given_rows):
     header, *lines = csv.reader(io.StringIO(to_csv(made), newline=""))
     assert header == ["classifier", "figure", "ours", "paper", "difference", "n", "low", "high"]
     read = [
-        (name, *(float(x) if x else None for x in (ours, paper)))
+        (cell_text(name), *(float(x) if x else None for x in (ours, paper)))
         for name, _, ours, paper, *_ in lines
     ]
     assert read == given_rows
+
+
+def test_csv_has_no_formulas():
+    made = to_csv(table(row(-1.0, classifier="=1+1")))
+    assert made.splitlines()[1] == "'=1+1,Acc,-1.0,,,"
 
 
 def test_csv_by_hand():

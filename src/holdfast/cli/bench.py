@@ -71,7 +71,8 @@ def _print_batch(batch: dict[str, Any]) -> None:
 
 
 def _print_update(update: dict[str, Any]) -> None:
-    print_line(f"\nupdate of a hand, {update['n_fingers']} fingers of {update['n_taxels']} taxels")
+    print_line()
+    print_line(f"update of a hand, {update['n_fingers']} fingers of {update['n_taxels']} taxels")
     print_line("  " + ", ".join(f"{p} {1e6 * update[p]:.1f} us" for p in ("p50", "p99", "p999")))
     print_line(_speedup("pywt + scikit-learn", update["speedup_over_pywt_sklearn"]))
 

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from holdfast.cli.options import JsonOption
-from holdfast.cli.terminal.console import print_json, print_line, print_message
+from holdfast.cli.terminal.console import print_json, print_line, print_lines, print_message
 
 if TYPE_CHECKING:
     from holdfast.metrics import Metrics
@@ -169,7 +169,8 @@ def _print_results(metrics: "Metrics", trained: "Trained", n: int) -> None:
     hand = metrics.events.hand
     missed, delay = hand.missed["0.1"], hand.delay_median
     detected = "-" if missed is None else f"{100 - missed:.0f} %"
-    print_line(f"\n{DEMO_MODEL} on {n} grasps of objects that it was not trained on:")
+    print_line()
+    print_line(f"{DEMO_MODEL} on {n} grasps of objects that it was not trained on:")
     print_line(f"  {hand.n_events} disturbances of a held object, {detected} detected within 0.1 s")
     print_line(f"  median delay {'-' if delay is None else f'{1000 * delay:.0f} ms'}")
     print_line(f"  {_text(hand.false_alarms_per_minute)} false alarms per minute of quiet hold")
@@ -184,7 +185,8 @@ def _text(value: float | None) -> str:
 
 
 def _print_next_steps(out: Path, shown: Path, seconds: float) -> None:
-    print_line(f"\nfinished in {seconds:.0f} s; recordings and model.json are in {out}/. Next:")
+    print_line()
+    print_line(f"finished in {seconds:.0f} s; recordings and model.json are in {out}/. Next:")
     for command, purpose in (
         (f"info {shown} --plot grasp.png", "a picture of this grasp"),
         (f"evaluate {DEMO_MODEL} {out}/recordings", "all figures"),
@@ -192,4 +194,4 @@ def _print_next_steps(out: Path, shown: Path, seconds: float) -> None:
         ("serve builtin:any xela://auto", "a live page of your own hand"),
         ("import --help", "your own recordings"),
     ):
-        print_line(f"  # {purpose}\n  holdfast {command}")
+        print_lines((f"  # {purpose}", f"  holdfast {command}"))

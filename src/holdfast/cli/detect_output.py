@@ -161,7 +161,9 @@ class DetectionSummary:
     def _print_events(self) -> None:
         events = self._sorted_events()
         origin = shown_origin(self._start or 0.0)
-        print_line(f"\ntimes since the first sample, at {origin:.3f} s" if origin else "")
+        print_line()
+        if origin:
+            print_line(f"times since the first sample, at {origin:.3f} s")
         print_table(
             ("time [s]", "finger", "state", "previous"),
             [

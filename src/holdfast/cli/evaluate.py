@@ -89,7 +89,8 @@ def evaluate(
         return
     print_verdict(found.verdict or no_verdict(len(found.trained_on), len(recordings)))
     print_metrics(metrics)
-    print_line(f"\n{model} on {len(recordings)} recordings")
+    print_line()
+    print_line(f"{model} on {len(recordings)} recordings")
 
 
 def warn_about_training(trained_on: list[str], n_recordings: int) -> None:
@@ -117,7 +118,8 @@ def print_metrics(metrics: "Metrics") -> None:
         [*rows, _sample_row("all", metrics.pooled)],
     )
     print_line(AUC_NOTE)
-    print_line(f"\nby event (onset of instability in a held contact, {_onsets(metrics)})")
+    print_line()
+    print_line(f"by event (onset of instability in a held contact, {_onsets(metrics)})")
     events = [*metrics.events.fingers.items(), ("hand", metrics.events.hand)]
     print_table(
         ("", "events", "missed in 0.05 s %", "0.1 s %", "0.2 s %", "median delay s", "p95 s",

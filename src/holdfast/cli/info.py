@@ -21,6 +21,7 @@ from holdfast.cli.terminal.console import (
     print_error,
     print_json,
     print_line,
+    print_lines,
     print_paragraph,
     print_table,
 )
@@ -208,7 +209,9 @@ def _print_one(document: Mapping[str, Any]) -> None:
         from holdfast.recordings import shown_origin
 
         origin = shown_origin(document["start"])
-        print_line("\nmarkers since the first sample" if origin else "")
+        print_line()
+        if origin:
+            print_line("markers since the first sample")
         print_table(
             ("marker [s]", "text"),
             [(f"{m['time'] - origin:.3f}", m["text"]) for m in document["markers"]],
@@ -218,7 +221,7 @@ def _print_one(document: Mapping[str, Any]) -> None:
 def _print_findings(findings: list[Mapping[str, str]]) -> None:
     """Print one paragraph for each finding."""
     if findings:
-        print_line("\nfindings:")
+        print_lines(("", "findings:"))
     for one in findings:
         text = f"{one['module']}: {one['text']}" if one["module"] else one["text"]
         print_paragraph(text, "- ", "  ")

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from holdfast.cli.options import ForcePlotOption, JsonOption, PlotOption, check_plot, save_plot
-from holdfast.cli.terminal.console import print_json, print_line, print_table
+from holdfast.cli.terminal.console import print_json, print_line, print_lines, print_table
 
 if TYPE_CHECKING:
     from holdfast.sensors import Hand, Sensor
@@ -108,7 +108,7 @@ def _print_template(grid: str, pitch: float, rate: float, unit: str) -> None:
         unit="N" if unit == "N" else "count",
     )
     fields = [f"{json.dumps(key)}: {_lines(value)}" for key, value in made.to_dict().items()]
-    print_line("{\n  " + ",\n  ".join(fields) + "\n}")
+    print_lines(("{\n  " + ",\n  ".join(fields) + "\n}").split("\n"))
 
 
 def _lines(value: object) -> str:

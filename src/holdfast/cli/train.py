@@ -180,8 +180,9 @@ def train(
         trained.verdict or no_verdict(len(trained.known), len(recordings), "the model of --init")
     )
     print_metrics(trained.cross_validation)
+    print_line()
     print_line(
-        f"\n{model}: trained on {len(recordings)} recordings; "
+        f"{model}: trained on {len(recordings)} recordings; "
         f"cross-validation leaves out {LEFT_OUT[trained.split]}"
     )
 

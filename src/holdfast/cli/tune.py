@@ -68,8 +68,9 @@ def tune(
         return
     print_verdict(sentence or no_verdict(len(trained_on), len(recordings)))
     _print_points(tuned)
+    print_line()
     print_line(
-        f"\n{out}: STABLE from a probability of {tuned.chosen.threshold:.3g} on, was "
+        f"{out}: STABLE from a probability of {tuned.chosen.threshold:.3g} on, was "
         f"{tuned.before.threshold:.3g}"
     )
 

@@ -17,6 +17,7 @@ from typing import Self
 
 import msgspec
 
+from holdfast.children import python_command
 from holdfast.control.command import GripCommand, GripReason, LoopState
 from holdfast.control.guard import safe_command
 from holdfast.control.hands import Hand, open_hand
@@ -30,7 +31,7 @@ START_TIMEOUT = 60.0
 N_SAFE_COMMANDS, SAFE_COMMAND_PERIOD = 5, 0.02
 """Number of times that the safe command is sent, in case one is lost, and the time between [s]."""
 READY, FAREWELL = b"ready\n", b"farewell\n"
-_PROGRAM = "import sys; from holdfast.control.watchdog import main; sys.exit(main(*sys.argv[1:]))"
+_PROGRAM = "from holdfast.control.watchdog import main; sys.exit(main(*sys.argv[1:]))"
 _MAX_LINE = 65536
 
 
@@ -58,7 +59,7 @@ class Watchdog:
         """
         # In a session of its own, Ctrl-C does not reach it.
         self._process = process = subprocess.Popen(
-            [sys.executable, "-c", _PROGRAM, *self._arguments],
+            python_command(_PROGRAM, *self._arguments),
             stdin=subprocess.PIPE, stdout=subprocess.PIPE, bufsize=0, start_new_session=True,
         )  # fmt: skip
         output = process.stdout

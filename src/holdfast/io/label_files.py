@@ -10,6 +10,7 @@ from typing import Literal
 import msgspec
 
 from holdfast.contact import Cause, ContactState
+from holdfast.csv_cells import cell_text, csv_text
 from holdfast.errors import RecordingError
 from holdfast.files import read_input, write_whole
 from holdfast.io.header import LabelData, label_data, label_of
@@ -159,15 +160,13 @@ def labels_for(path: Path, digest: str) -> Mapping[str, tuple[Label, ...]] | Non
 
 def labels_to_csv(labels: Mapping[str, Sequence[Label]]) -> str:
     """Write labels by finger as CSV: finger,start,end,state,cause; times in seconds."""
-    text = StringIO()
-    writer = csv.writer(text, lineterminator="\n")
-    writer.writerow(CSV_COLUMNS)
-    for finger, intervals in labels.items():
-        for label in intervals:
-            # repr of a NumPy number is not a plain number
-            span = (repr(float(label.start)), repr(float(label.end)))
-            writer.writerow([finger, *span, label.state.value.lower(), label.cause or ""])
-    return text.getvalue()
+    rows = [
+        # a NumPy number is not written like a plain number
+        (finger, float(x.start), float(x.end), x.state.value.lower(), x.cause or "")
+        for finger, intervals in labels.items()
+        for x in intervals
+    ]
+    return csv_text([CSV_COLUMNS, *rows])
 
 
 def labels_from_csv(path: str | Path, *, author: str = "") -> dict[str, tuple[Label, ...]]:
@@ -203,6 +202,6 @@ def _from_row(row: Mapping[str, str | None], place: str, author: str) -> tuple[s
         cause = Cause(values["cause"].lower()) if values["cause"] else None
         state = ContactState(values["state"].upper())
         start, end = float(values["start"]), float(values["end"])
-        return values["finger"], Label(start, end, state, cause, "csv", 1.0, author)
+        return cell_text(values["finger"]), Label(start, end, state, cause, "csv", 1.0, author)
     except ValueError as problem:
         raise RecordingError(f"{place}: {problem}") from problem

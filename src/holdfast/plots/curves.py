@@ -17,6 +17,7 @@ from holdfast.plots.style import (
     add_labels,
     add_legend,
     legend_handles,
+    literal,
     page_figure,
     panels,
     series_styles,
@@ -128,7 +129,7 @@ def draw_reliability(curves: Mapping[str, Array], notes: Mapping[str, str] | Non
     add_labels(below, "probability of stability", "samples [%]")
     handles = legend_handles({name: styles[name] for name in curves}, [curves])
     for handle, name in zip(handles, curves, strict=True):
-        handle.set_label(", ".join(filter(None, (name, (notes or {}).get(name)))))
+        handle.set_label(literal(", ".join(filter(None, (name, (notes or {}).get(name))))))
     axes.legend(handles=handles, loc="upper left", fontsize=FONT_SIZE, frameon=False)
     return figure
 

@@ -18,6 +18,7 @@ from holdfast.plots.style import (
     add_labels,
     add_legend,
     legend_handles,
+    literal,
     page_figure,
     panels,
     series_styles,
@@ -56,10 +57,10 @@ def draw_dots(
             if name in values:
                 _draw_dot(axes, row, values[name], bold=name in strong)
         add_labels(axes, x)
-    grid[0].set_yticks(range(len(names)), names)
+    grid[0].set_yticks(range(len(names)), map(literal, names))
     grid[0].set_ylim(-0.7, len(names) - 0.3)
-    for label in grid[0].get_yticklabels():
-        label.set_fontweight("bold" if label.get_text() in strong else "normal")
+    for name, label in zip(names, grid[0].get_yticklabels(), strict=True):
+        label.set_fontweight("bold" if name in strong else "normal")
     if any(each.paper is not None for values in groups.values() for each in values.values()):
         diamond = Line2D([], [], color=INK, marker="D", markerfacecolor="white", linestyle="")
         diamond.set(label=PAPER, markersize=4.5)
@@ -99,7 +100,7 @@ def _draw_panel(
         shift = 0.7 * ((rank + 0.5) / len(methods) - 0.5)
         x = np.array([names.index(name) for name in values]) + shift
         _draw_intervals(axes, x, list(values.values()), styles[method])
-    axes.set_xticks(range(len(names)), names)
+    axes.set_xticks(range(len(names)), map(literal, names))
     axes.set_xlim(-0.5, len(names) - 0.5)
     for edge in range(1, len(names)):
         axes.axvline(edge - 0.5, color=FAINT, linewidth=0.5)

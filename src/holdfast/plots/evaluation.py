@@ -25,6 +25,7 @@ from holdfast.plots.style import (
     add_labels,
     add_legend,
     add_title,
+    literal,
     page_figure,
     series_styles,
     style_axes,
@@ -107,7 +108,7 @@ def _draw_recordings(
     )
     left.set_ylim(-0.7, max(len(ordered), 1) - 0.3)
     if len(ordered) <= MAX_NAMED_RECORDINGS:
-        left.set_yticks(range(len(ordered)), [_shortened(each.name) for each in ordered])
+        left.set_yticks(range(len(ordered)), [literal(_shortened(each.name)) for each in ordered])
     else:
         left.set_yticks([])
         add_labels(left, y=f"{len(ordered)} recordings, by accuracy")
@@ -197,7 +198,7 @@ def _events_title(hand: EventMetrics) -> str:
 def _add_legend(figure: Figure, styles: Mapping[str, SeriesStyle]) -> None:
     axes = figure.axes[0]
     fingers = [
-        axes.plot([], [], linewidth=0.9, markersize=4, label=name, **style._asdict())[0]
+        axes.plot([], [], linewidth=0.9, markersize=4, label=literal(name), **style._asdict())[0]
         for name, style in styles.items()
     ]
     hand = axes.plot([], [], color=HAND_COLOUR, label="all samples, or the hand")

@@ -16,6 +16,7 @@ from holdfast.plots.style import (
     STATE_COLOURS,
     add_labels,
     add_legend,
+    literal,
     page_figure,
     style_axes,
 )
@@ -112,7 +113,9 @@ def _draw_strips(axes: Axes, series: FingerSeries, strips: Mapping[str, Codes]) 
         for state, colour in STATE_COLOURS.items():
             bars = [(start, end - start) for first, start, end in spans if codes[first] == state]
             axes.broken_barh(bars, (row - 0.4, 0.8), facecolors=colour, linewidth=0)
-        names.append(name if name == LABEL_STRIP else f"{name}\n{_accuracy(series.labels, codes)}")
+        names.append(
+            name if name == LABEL_STRIP else f"{literal(name)}\n{_accuracy(series.labels, codes)}"
+        )
     axes.set_yticks(range(len(strips)), names)
     axes.set_ylim(len(strips) - 0.5, -0.5)
 
@@ -132,7 +135,7 @@ def _finish(figure: Figure, rows: Sequence[Axes], series: FingerSeries) -> None:
         if len(series.times) > 1:
             axes.set_xlim(series.times[0], series.times[-1])
     add_labels(rows[-1], x="time [s]")
-    rows[0].set_title(series.name, fontsize=FONT_SIZE + 0.5, loc="left", pad=14, color=INK)
+    rows[0].set_title(literal(series.name), fontsize=FONT_SIZE + 0.5, loc="left", pad=14, color=INK)
     figure.align_ylabels([axes for axes in rows if not axes.yaxis_inverted()])
     add_legend(figure, phase_handles(series), "outside lower center")
 

@@ -18,6 +18,7 @@ from holdfast.plots.style import (
     add_labels,
     add_legend,
     add_title,
+    literal,
     page_figure,
     style_axes,
 )
@@ -74,7 +75,7 @@ def plot_recording(
         for axis in axes:
             axis.set_axis_off()
     figure.align_ylabels()
-    figure.suptitle(_title(recording, chosen, window), fontsize=FONT_SIZE + 1.5)
+    figure.suptitle(literal(_title(recording, chosen, window)), fontsize=FONT_SIZE + 1.5)
     add_legend(figure, _handles(list(fingers.values())), "outside lower center")
     return figure
 
@@ -169,7 +170,7 @@ def _draw_markers(axes: Sequence[Axes], recording: Recording, origin: float, nam
             axis.axvline(at, color=INK, linewidth=0.7, linestyle=":", zorder=3)
         if named and at >= free and at + letter * len(text) <= right:
             axes[0].annotate(
-                text, (at, 1), xycoords=("data", "axes fraction"), xytext=(0, 2),
+                literal(text), (at, 1), xycoords=("data", "axes fraction"), xytext=(0, 2),
                 textcoords="offset points", fontsize=FONT_SIZE - 1, color=INK, ha="left",
                 va="bottom",
             )  # fmt: skip

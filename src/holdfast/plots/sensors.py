@@ -9,7 +9,7 @@ from matplotlib.figure import Figure
 from matplotlib.patches import FancyBboxPatch
 from mpl_toolkits.mplot3d import Axes3D  # type: ignore[import-untyped]
 
-from holdfast.plots.style import PageFigure
+from holdfast.plots.style import PageFigure, literal
 from holdfast.sensors import Hand, HandModule, Sensor, taxel_number
 from holdfast.sensors.types import Array
 
@@ -32,7 +32,7 @@ def plot_sensor(sensor: Sensor) -> Figure:
     figure = PageFigure(figsize=(8.2, 4.2), dpi=160, layout="constrained")
     unit = "counts" if sensor.unit == "count" else "newtons"
     figure.suptitle(
-        f"{sensor.name}: {sensor.n_taxels} taxels, {sensor.rate:g} Hz, readings in {unit}",
+        f"{literal(sensor.name)}: {sensor.n_taxels} taxels, {sensor.rate:g} Hz, readings in {unit}",
         fontsize=10,
     )
     right, up = _view(sensor.normal)
@@ -56,7 +56,7 @@ def plot_hand(hand: Hand) -> Figure:
     figure = PageFigure(figsize=(0.3 * n_columns + 0.6, 0.3 * n_rows + 0.6), dpi=160)
     axes = figure.add_axes((0.01, 0.01, 0.98, 0.96))
     axes.set_title(
-        f"{hand.name}: {hand.n_taxels} taxels in {len(hand.modules)} modules, numbered in "
+        f"{literal(hand.name)}: {hand.n_taxels} taxels in {len(hand.modules)} modules, numbered in "
         "each module",
         fontsize=8,
     )
@@ -152,7 +152,7 @@ def _draw_module(axes: Axes, name: str, module: HandModule) -> None:
 def _label_module(axes: Axes, name: str, grid: npt.NDArray[np.int64], colour: str) -> None:
     (top, left), (_, right) = grid.min(axis=0), grid.max(axis=0)
     axes.text(
-        (left + right + 1) / 2, top - 0.12, name,
+        (left + right + 1) / 2, top - 0.12, literal(name),
         ha="center", va="bottom", fontsize=6.5, color=colour, fontweight="bold",
     )  # fmt: skip
 

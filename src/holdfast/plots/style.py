@@ -108,9 +108,21 @@ def style_axes(axes: Axes) -> None:
     axes.set_axisbelow(True)
 
 
+def literal(name: str) -> str:
+    r"""Return a name as a text that matplotlib draws as it is, not as a formula.
+
+    Names of fingers, recordings, sensors and markers come from files of others.
+
+    Example:
+        >>> print(literal("$can$"))
+        \$can\$
+    """
+    return name.replace("$", r"\$")
+
+
 def add_title(axes: Axes, text: str) -> None:
-    """Add a title above the left end of the axes."""
-    axes.set_title(text, fontsize=FONT_SIZE + 0.5, loc="left")
+    """Add a title above the left end of the axes; it has no formulas."""
+    axes.set_title(literal(text), fontsize=FONT_SIZE + 0.5, loc="left")
 
 
 def add_labels(axes: Axes, x: str | None = None, y: str | None = None) -> None:
@@ -140,7 +152,7 @@ def add_legend(
 def legend_handles(
     styles: Mapping[str, SeriesStyle], groups: Iterable[Collection[str]], *, lines: bool = True
 ) -> list[Line2D]:
-    """Return legend handles for the names that appear in some group.
+    """Return legend handles for the names that appear in some group; they have no formulas.
 
     Args:
         styles: of all names.
@@ -151,7 +163,7 @@ def legend_handles(
     return [
         Line2D(
             [], [], color=style.color, marker=style.marker, markersize=4, linewidth=1.1,
-            linestyle=style.linestyle if lines else "", label=name,
+            linestyle=style.linestyle if lines else "", label=literal(name),
         )
         for name, style in styles.items()
         if name in shown

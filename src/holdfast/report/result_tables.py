@@ -4,14 +4,14 @@ A row is one value: what it is about, ours, the paper's. CSV and JSON write the 
 `holdfast.report.table_layouts` lays them out as lines and columns.
 """
 
-import csv
-import io
 import math
 import re
 from collections.abc import Iterable, Mapping
 from typing import Any, NamedTuple
 
 import msgspec
+
+from holdfast.csv_cells import csv_text
 
 Key = str | int | float
 RESERVED_KEYS = (
@@ -185,16 +185,13 @@ def to_csv(table: ResultTable) -> str:
     `value,n,low,high`. An empty field is unknown, `inf` is infinite.
     """
     keys = _keys(table.rows)
-    file = io.StringIO()
-    writer = csv.writer(file, lineterminator="\n")
     names = list(_values(table, Row({}, None)))
-    writer.writerow([*keys, *names, "n", "low", "high"])
+    lines: list[list[object]] = [[*keys, *names, "n", "low", "high"]]
     for row in table.rows:
         values = (*_values(table, row).values(), row.n, *(row.interval or (None, None)))
-        writer.writerow(
-            [*(row.keys.get(key, "") for key in keys), *(_csv_field(value) for value in values)]
-        )
-    return file.getvalue()
+        known = [row.keys.get(key, "") for key in keys]
+        lines.append([*known, *(_csv_field(value) for value in values)])
+    return csv_text(lines)
 
 
 def _values(table: ResultTable, row: Row) -> dict[str, float | None]:

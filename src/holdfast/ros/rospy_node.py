@@ -13,7 +13,9 @@ from collections.abc import Iterator, Sequence
 from contextlib import suppress
 from http.client import HTTPConnection, HTTPException
 from importlib import import_module
+from ipaddress import ip_address
 from pathlib import Path
+from socket import gethostname
 from types import ModuleType
 from typing import Any
 from urllib.parse import urlsplit
@@ -94,6 +96,23 @@ def master_uri(given: str | None) -> str:
         if parts.scheme == "http" and parts.hostname and parts.port:
             return given.rstrip("/")
     raise ValueError(f"a ROS master like {DEFAULT_MASTER} expected, {given!r} given")
+
+
+def master_address(uri: str) -> str:
+    """Return host and port of a ROS master, `localhost` for all names of this machine.
+
+    Names of other machines are not looked up.
+
+    Example:
+        >>> master_address("http://127.0.0.1:11311"), master_address("http://Robot:11311/")
+        ('localhost:11311', 'robot:11311')
+    """
+    parts = urlsplit(uri)
+    host = parts.hostname or ""
+    here = host in ("localhost", gethostname().lower())
+    with suppress(ValueError):  # a name, not an address
+        here = ip_address(host).is_loopback
+    return f"{'localhost' if here else host}:{parts.port}"
 
 
 def check_master(master: str) -> None:

@@ -2,13 +2,13 @@
 
 import json
 import subprocess
-import sys
 from collections.abc import Iterable, Iterator
 from contextlib import suppress
 from dataclasses import asdict, replace
 from pathlib import Path
 from tempfile import TemporaryDirectory
 
+from holdfast.children import python_command
 from holdfast.files import file_stem
 from holdfast.io import read_chunks, save_recording
 from holdfast.recordings import Recording
@@ -17,7 +17,7 @@ from holdfast.sources.uri import Address
 from holdfast.twin.profile import ATTEMPTS, profile
 from holdfast.twin.simulation import CASES, Grasp, simulate
 
-SIMULATION_CODE = "import sys; from holdfast.sources.twin import write; write(*sys.argv[1:])"
+SIMULATION_CODE = "from holdfast.sources.twin import write; write(*sys.argv[1:])"
 """Program of the process that simulates the next grasp."""
 
 
@@ -92,7 +92,7 @@ class _Simulator:
 
     def _run(self, grasp: str) -> subprocess.Popen[bytes]:
         null = subprocess.DEVNULL
-        command = [sys.executable, "-c", SIMULATION_CODE, grasp, str(self._path)]
+        command = python_command(SIMULATION_CODE, grasp, str(self._path))
         return subprocess.Popen(command, stdin=null, stdout=null, stderr=null)
 
     def is_ready(self, timeout: float) -> bool:

@@ -9,13 +9,13 @@ are above and below it: the three fingers share the load of the thumb.
 
 from typing import NamedTuple
 
-import mujoco
 import numpy as np
 from scipy.optimize import least_squares
 
 from holdfast.compiled import compiled
 from holdfast.sensors.types import Array
 from holdfast.twin.hand import FINGERS, JOINTS, MIRRORED, MOUNTS, N_JOINTS, HandModel
+from holdfast.twin.mujoco_import import mujoco
 from holdfast.twin.objects import GraspObject, distance_to
 
 MIDDLE_PLACE = (0.108, 0.020, 0.021)

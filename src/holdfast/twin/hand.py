@@ -10,11 +10,11 @@ from functools import cached_property
 from importlib import resources
 from typing import NamedTuple
 
-import mujoco
 import numpy as np
 
 from holdfast.compiled import compiled
 from holdfast.sensors.types import Array
+from holdfast.twin.mujoco_import import mujoco
 from holdfast.twin.objects import GraspObject
 from holdfast.twin.surface import AXIS
 

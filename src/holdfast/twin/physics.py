@@ -10,9 +10,7 @@ from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import NamedTuple, cast
 
-import mujoco
 from llvmlite import ir
-from mujoco import _functions
 from numba import types
 from numba.core import cgutils
 from numba.extending import intrinsic
@@ -22,6 +20,7 @@ from holdfast.sensors.types import Array
 from holdfast.twin.contact import Constants, Contact, touch
 from holdfast.twin.control import Controller, control
 from holdfast.twin.hand import HandArrays, HandModel, apply_forces, fill_bodies
+from holdfast.twin.mujoco_import import mujoco
 from holdfast.twin.operator import MOVE, hold_wrench, move_wrench, push_wrench
 
 
@@ -104,7 +103,7 @@ def engine_of(hand: HandModel) -> HalfSteps:
     """Return the addresses with which compiled code steps a model."""
     # The extension module finds the library that it was linked to, except on Windows.
     windows = Path(mujoco.__file__).with_name("mujoco.dll")
-    library = ctypes.CDLL(str(windows) if sys.platform == "win32" else _functions.__file__)
+    library = ctypes.CDLL(str(windows) if sys.platform == "win32" else mujoco._functions.__file__)
     return HalfSteps(
         _address(library.mj_step1),
         _address(library.mj_step2),

@@ -11,13 +11,13 @@ from os import environ
 from pathlib import Path
 from typing import IO, NamedTuple, Protocol, cast
 
-import mujoco
 import numpy as np
 import numpy.typing as npt
 
 from holdfast.errors import OutputError
 from holdfast.sensors.types import Array
 from holdfast.twin.hand import RATE
+from holdfast.twin.mujoco_import import mujoco
 from holdfast.twin.protocol import Command
 from holdfast.twin.simulation import Grasp, simulate
 from holdfast.twin.world import World

@@ -1,6 +1,5 @@
 """Physics of a grasp, step by step: hand, object, contact, controller and operator."""
 
-import mujoco
 import numpy as np
 
 from holdfast.sensors.types import Array
@@ -9,6 +8,7 @@ from holdfast.twin.control import STEPS_PER_CONTROL, Controller
 from holdfast.twin.grasp import ClosingPath, object_pose
 from holdfast.twin.hand import FINGERS, GRAVITY, N_JOINTS, SUBSTEPS, TIMESTEP, HandModel
 from holdfast.twin.loads import LoadState
+from holdfast.twin.mujoco_import import mujoco
 from holdfast.twin.objects import GraspObject
 from holdfast.twin.physics import Action, Steps, Wrenches, advance_sample, engine_of
 from holdfast.twin.protocol import OPEN_GAP, Command, Plan

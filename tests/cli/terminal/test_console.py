@@ -11,6 +11,7 @@ from holdfast.cli.terminal.console import (
     print_error,
     print_json,
     print_line,
+    print_lines,
     print_message,
     print_table,
     visible,
@@ -21,15 +22,16 @@ HOSTILE = "can\x1b]0;title\x07\x1b[2J\x9b31m\r\x7f\u202eevil\ud800"
 SHOWN = r"can\x1b]0;title\x07\x1b[2J\x9b31m\r\x7f\u202eevil\ud800"
 
 
-def test_nothing_that_is_printed_controls_the_terminal(capsys):
-    print_line(HOSTILE)
-    print_message(HOSTILE)
+def test_nothing_that_is_printed_controls_the_terminal_or_begins_a_line(capsys):
+    print_line(f"{HOSTILE}\nnext")
+    print_message(f"{HOSTILE}\nnext")
     print_error(f"two\nlines {HOSTILE}")
     print_table(("name",), [(f"{HOSTILE}\nnext",)])
+    print_lines((f"{HOSTILE}\nnext", "last"))
     out, err = capsys.readouterr()
-    assert out == f"{SHOWN}\nname\n{SHOWN}\\nnext\n"
+    assert out == f"{SHOWN}\\nnext\nname\n{SHOWN}\\nnext\n{SHOWN}\\nnext\nlast\n"
     words = SHOWN.replace(r"\r", " ")
-    assert err == f"{SHOWN}\nholdfast: two lines {words}\n"
+    assert err == f"{SHOWN}\\nnext\nholdfast: two lines {words}\n"
 
 
 def test_json_has_no_control_characters(capsys):
@@ -44,7 +46,7 @@ def test_json_has_no_control_characters(capsys):
 @settings(deadline=None)
 @given(st.text())
 def test_visible_text_is_printable_and_json_keeps_its_value(text):
-    assert visible(text, allowed="").isprintable()
+    assert visible(text).isprintable()
     assert visible(visible(text)) == visible(text)
     encoded = json.dumps(text, ensure_ascii=False)
     assert visible_json(encoded).isprintable()

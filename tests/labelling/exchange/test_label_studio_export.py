@@ -101,11 +101,13 @@ def test_the_task_of_a_recording_without_labels():
 
 
 def test_the_config_has_the_names_of_tasks_and_signals():
-    recording = tiny_recording(1, ("thumb", "index/1"))
-    root = ElementTree.fromstring(labelling_config({"thumb": "count", "index/1": "N"}))
+    recording = tiny_recording(1, ("thumb", "index/1", "=1+1"))
+    units = {"thumb": "count", "index/1": "N", "=1+1": "N"}
+    root = ElementTree.fromstring(labelling_config(units))
     groups = {each.get("name"): each for each in root.iter("TimeSeriesLabels")}
     series = {each.get("name"): each for each in root.iter("TimeSeries")}
     columns = set(table(signals_csv(recording)))
+    assert not any(column.startswith("=") for column in columns)
     for result in task_of(recording, "x.csv")["annotations"][0]["result"]:
         group = groups[result["from_name"]]
         assert group.get("toName") == result["to_name"]

@@ -170,7 +170,8 @@ def print_documents(documents: Sequence[dict[str, Any]]) -> None:
         key=lambda item: item[1]["confidence"],
     )
     if doubtful:
-        print_line("\nlabels of low confidence, check these first:")
+        print_line()
+        print_line("labels of low confidence, check these first:")
         _print_doubtful(doubtful)
 
 

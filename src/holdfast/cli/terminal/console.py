@@ -1,14 +1,14 @@
 """Print results on stdout, and messages on stderr.
 
 Names come from files, servers and topics of others. Nothing that is printed here can control the
-terminal: characters that are not printable are shown as escapes.
+terminal or begin a line: characters that are not printable are shown as escapes.
 """
 
 import sys
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from itertools import zip_longest
 from shutil import get_terminal_size
-from textwrap import fill, wrap
+from textwrap import wrap
 
 MAX_ERROR_LENGTH = 2000
 """Number of characters of an error message that are printed."""
@@ -17,22 +17,16 @@ MIN_TEXT_WIDTH = 12
 _GAP = "  "
 
 
-def visible(text: str, allowed: str = "\n") -> str:
-    r"""Return a text with every character that is not printable as an escape.
-
-    Args:
-        text: any text.
-        allowed: characters that are kept although they are not printable.
+def visible(text: str) -> str:
+    r"""Return a text in one line, with every character that is not printable as an escape.
 
     Example:
-        >>> visible("Möhre"), visible("\x1b[2Jcan\u202e")
-        ('Möhre', '\\x1b[2Jcan\\u202e')
+        >>> visible("Möhre"), visible("\x1b[2Jcan\n\u202e")
+        ('Möhre', '\\x1b[2Jcan\\n\\u202e')
     """
     if text.isprintable():
         return text
-    return "".join(
-        c if c.isprintable() or c in allowed else c.encode("unicode_escape").decode() for c in text
-    )
+    return "".join(c if c.isprintable() else c.encode("unicode_escape").decode() for c in text)
 
 
 def visible_json(text: str) -> str:
@@ -51,7 +45,7 @@ def _json_escape(character: str) -> str:
 
 
 def print_message(text: str) -> None:
-    """Print a message for a person on stderr."""
+    """Print a message for a person on stderr, in one line."""
     sys.stderr.write(f"{visible(text)}\n")
 
 
@@ -66,6 +60,12 @@ def print_error(text: str) -> None:
 def print_line(text: str = "") -> None:
     """Print a line of a result on stdout."""
     sys.stdout.write(f"{visible(text)}\n")
+
+
+def print_lines(lines: Iterable[str]) -> None:
+    """Print lines of a result on stdout."""
+    for line in lines:
+        print_line(line)
 
 
 def print_json(value: object) -> None:
@@ -92,7 +92,7 @@ def print_paragraph(text: str, first: str = "", later: str = "") -> None:
         later: what all other lines begin with.
     """
     width = get_terminal_size().columns
-    print_line(fill(visible(text), width, initial_indent=first, subsequent_indent=later))
+    print_lines(wrap(visible(text), width, initial_indent=first, subsequent_indent=later))
 
 
 def print_table(header: Sequence[str], rows: Iterable[Sequence[object]]) -> None:
@@ -107,7 +107,7 @@ def print_table(header: Sequence[str], rows: Iterable[Sequence[object]]) -> None
         gtac         15
         anyskin       5
     """
-    lines = [[visible(str(cell), allowed="") for cell in row] for row in (header, *rows)]
+    lines = [[visible(str(cell)) for cell in row] for row in (header, *rows)]
     columns = list(zip(*lines, strict=True))
     numeric = [all(_is_number(cell) for cell in column[1:]) for column in columns]
     ranges = [_width_range(*both) for both in zip(columns, numeric, strict=True)]

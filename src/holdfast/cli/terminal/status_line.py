@@ -77,7 +77,7 @@ class StatusLine:
         from rich.text import Text
 
         line = Text("   ").join(
-            Text(visible(text, ""), "bold red" if bad else "") for text, bad in parts
+            Text(visible(text), "bold red" if bad else "") for text, bad in parts
         )
         line.no_wrap, line.overflow = True, "ellipsis"
         self._live.update(line, refresh=True)

@@ -1,6 +1,7 @@
 """Hands that take commands, by URI."""
 
-from holdfast.control.hands.base import Claim, Hand
+from holdfast.control.hands.base import Hand
+from holdfast.control.hands.claim import Claim
 
 SCHEMES = {
     "twin": "the twin, with the source twin:...",

@@ -1,16 +1,9 @@
 """What every hand does with commands."""
 
-import hashlib
 import math
-import os
-import tempfile
 import time
 from abc import abstractmethod
 from collections.abc import Iterable
-from contextlib import suppress
-from pathlib import Path
-from types import TracebackType
-from typing import Self
 
 from holdfast.control.command import GripCommand, LoopState
 from holdfast.control.limits import Limits
@@ -45,7 +38,7 @@ class Hand(Openable):
 
     @property
     def resource(self) -> str:
-        """What only one controller may command; two URIs of one hand have the same."""
+        """Name of what only one controller may command; the same for all URIs of one hand."""
         return self.name
 
     def check(self, limits: Limits, fingers: Iterable[str]) -> None:
@@ -159,46 +152,3 @@ class Hand(Openable):
             if finger not in self.fingers:
                 return f"{self.name} has {', '.join(self.fingers)}; {finger!r} commanded"
         return ""
-
-
-class Claim:
-    """Claim on a hand, so that one process of this machine controls it at a time.
-
-    The claim of a process that died ends with it.
-
-    Args:
-        name: URI of the hand.
-    """
-
-    def __init__(self, name: str) -> None:
-        digest = hashlib.sha256(name.encode()).hexdigest()[:16]
-        self._path = Path(tempfile.gettempdir()) / f"holdfast-hand-{digest}.lock"
-        self._name = name
-        self._file: int | None = None
-
-    def __enter__(self) -> Self:
-        import fcntl
-
-        try:
-            self._file = os.open(self._path, os.O_RDWR | os.O_CREAT, 0o666)
-            fcntl.flock(self._file, fcntl.LOCK_EX | fcntl.LOCK_NB)
-        except OSError as cause:
-            self._release()
-            raise HandError(
-                f"{self._name} has another controller already: stop that one first"
-            ) from cause
-        return self
-
-    def __exit__(
-        self,
-        kind: type[BaseException] | None,
-        error: BaseException | None,
-        trace: TracebackType | None,
-    ) -> None:
-        self._release()
-
-    def _release(self) -> None:
-        if self._file is not None:
-            with suppress(OSError):
-                os.close(self._file)
-            self._file = None

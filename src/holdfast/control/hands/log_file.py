@@ -1,5 +1,6 @@
 """A hand that is a file: every command is a line of JSON. For dry runs and tests."""
 
+import os
 from pathlib import Path
 from typing import BinaryIO
 
@@ -23,6 +24,11 @@ class LogFile(Hand):
         self.name = name
         self._path = Path(path)
         self._file: BinaryIO | None = None
+
+    @property
+    def resource(self) -> str:
+        """What only one controller may command: the file, by its real path."""
+        return f"log:{os.path.realpath(self._path)}"
 
     def open(self) -> None:
         """Open the file.

@@ -1,7 +1,5 @@
 """Contents of `trial.json` and `trials.csv`, from the results of all trials."""
 
-import csv
-import io
 from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 from typing import Any
@@ -12,6 +10,7 @@ from holdfast.control.trial.plan import TrialPlan
 from holdfast.control.trial.run import LIMITS, TrialResult
 from holdfast.control.trial.summary import Summary, compare, summarize
 from holdfast.control.trial.trials import GRIP_MULTIPLE
+from holdfast.csv_cells import csv_text
 from holdfast.twin.loads import LoadKind
 
 OWN, BASELINE = "holdfast", "fixed"
@@ -72,15 +71,15 @@ def example_of(results: Results) -> int | None:
 
 def trials_csv(results: Results) -> str:
     """Return a line for each trial with each law; `inf` is infinite, an empty field unknown."""
-    file = io.StringIO()
     names = list(TrialResult.__struct_fields__)
-    writer = csv.writer(file, lineterminator="\n")
-    writer.writerow(names)
-    for each in results.values():
-        for one in each:
-            values = (getattr(one, name) for name in names)
-            writer.writerow("" if str(value) == "nan" else value for value in values)
-    return file.getvalue()
+    rows = [
+        [_known(getattr(one, name)) for name in names] for each in results.values() for one in each
+    ]
+    return csv_text([names, *rows])
+
+
+def _known(value: object) -> object:
+    return "" if str(value) == "nan" else value
 
 
 def _is_saved(result: TrialResult) -> bool:

@@ -19,6 +19,7 @@ import msgspec
 import numpy as np
 
 from holdfast.contact import LABEL_STATES, Cause, ContactState
+from holdfast.csv_cells import csv_text, text_cell
 from holdfast.errors import OutputError, RecordingError
 from holdfast.features import DEFAULT_WINDOW
 from holdfast.files import file_stem, refuse_overwrite, write_whole
@@ -129,8 +130,8 @@ def signals_csv(recording: Recording, window: int = DEFAULT_WINDOW) -> str:
         for column in _latest_values(module, longest.times, window).T
     ]
     text = StringIO()
+    text.write(csv_text([["time", *_column_names(recording.modules)]]))
     writer = csv.writer(text, lineterminator="\n")
-    writer.writerow(["time", *_column_names(recording.modules)])
     cells = [list(map(repr, longest.times.tolist())), *(list(_cells(each)) for each in columns)]
     writer.writerows(zip(*cells, strict=True))
     return text.getvalue()
@@ -209,7 +210,7 @@ def _finger_config(finger: str, unit: str, names: Sequence[str]) -> str:
     channels = "\n".join(
         f"    <Channel column={quoteattr(column)} legend={quoteattr(name)} "
         f"units={quoteattr(unit)}/>"
-        for column, name in zip(_column_names([finger]), SERIES, strict=True)
+        for column, name in zip(map(text_cell, _column_names([finger])), SERIES, strict=True)
     )
     series = quoteattr(_series_name(finger))
     return (

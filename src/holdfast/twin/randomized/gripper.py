@@ -7,13 +7,13 @@ moves the bodies; skin and object meet in `holdfast.twin.contact`.
 
 from dataclasses import dataclass
 
-import mujoco
 import numpy as np
 
 from holdfast.compiled import compiled
 from holdfast.sensors.types import Array
 from holdfast.twin.contact import LOAD, SLIP, constants_of, new_contact, touch
 from holdfast.twin.hand import HandModel, object_xml
+from holdfast.twin.mujoco_import import mujoco
 from holdfast.twin.objects import GraspObject, distance_to
 from holdfast.twin.protocol import OPEN_GAP
 from holdfast.twin.randomized.palm import PalmMotion

@@ -42,6 +42,11 @@ class Link(Openable):
 
     where: str = ""
 
+    @property
+    def network(self) -> str:
+        """Name of the network; the same for all ways in which it can be given."""
+        return self.where
+
     @abstractmethod
     def open(self) -> None:
         """Join ROS.

@@ -31,6 +31,11 @@ class Ros1Link(Link):
         self._rospy: Any = None
         self._registered: list[Any] = []
 
+    @property
+    def network(self) -> str:
+        """Name of the network: the master, with one name for this machine."""
+        return f"at the ROS master {rospy_node.master_address(self._master)}"
+
     def open(self) -> None:
         """Make this process a node.
 

@@ -68,7 +68,7 @@ class RosHand(Hand):
     @property
     def resource(self) -> str:
         """What only one controller may command: the topic of the commands."""
-        return f"{next(iter(self._topics))} {self._link.where}"
+        return f"{next(iter(self._topics))} {self._link.network}"
 
     def open(self) -> None:
         """Wait until the hand listens and sends valid joint states.

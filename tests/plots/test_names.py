@@ -1,0 +1,84 @@
+"""Names of others in figures: they are drawn as they are, never as formulas."""
+
+import io
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from matplotlib.text import Text
+
+from holdfast.metrics import summarise
+from holdfast.plots.curves import draw_reliability
+from holdfast.plots.dots import IntervalEstimate, draw_dots, draw_groups
+from holdfast.plots.evaluation import draw_evaluation
+from holdfast.plots.experiment import draw_experiment, draw_forces
+from holdfast.plots.recording import plot_recording
+from holdfast.plots.sensors import plot_hand, plot_sensor
+from holdfast.plots.trials import ForceCourse, draw_courses
+from holdfast.sensors import Hand, hand, sensor
+from holdfast.synthetic import synthetic_recording
+
+from .test_evaluation import example_decisions
+from .test_experiment import series
+
+NAME = r"$\bad{$"
+"""As a formula, it is an error."""
+ESTIMATES = {NAME: IntervalEstimate(1.0, 0.5, 1.5), "other": IntervalEstimate(2.0)}
+COURSE = ForceCourse(np.arange(3.0), np.ones(3), np.ones(3), np.zeros(3))
+
+
+def recording():
+    made = synthetic_recording(NAME, 1, (NAME, "index"))
+    return plot_recording(replace(made, markers=((made.start + 6.0, NAME),)))
+
+
+def evaluation():
+    first, *others = example_decisions(2, names=(NAME, "index"))
+    decisions = [replace(first, name=NAME), *others]
+    return draw_evaluation(summarise(decisions, n_resamples=10), decisions)
+
+
+def flat_map():
+    given = hand("allegro-uskin")
+    modules = {name.replace("thumb", NAME): module for name, module in given.modules.items()}
+    return plot_hand(Hand(NAME, modules))
+
+
+@pytest.mark.parametrize(
+    ("draw", "n_names"),
+    [
+        (recording, 3),
+        (evaluation, 2),
+        (flat_map, 2),
+        (lambda: plot_sensor(replace(sensor("anyskin"), name=NAME)), 1),
+        (lambda: draw_forces(series(name=NAME)), 1),
+        (lambda: draw_experiment(series(), {NAME: series().labels}), 1),
+        (lambda: draw_dots({"x": ESTIMATES}, {NAME}), 1),
+        (lambda: draw_groups({"x": {NAME: ESTIMATES}}, "y"), 2),
+        (lambda: draw_reliability({NAME: np.array([[0.5, 0.5, 10.0]])}), 1),
+        (lambda: draw_courses({NAME: COURSE}), 1),
+    ],
+    ids=[
+        "recording",
+        "evaluation",
+        "hand",
+        "sensor",
+        "forces",
+        "experiment",
+        "dots",
+        "groups",
+        "reliability",
+        "courses",
+    ],
+)
+def test_a_name_with_two_dollars_is_drawn(draw, n_names):
+    figure = draw()
+    figure.savefig(io.BytesIO(), format="png", dpi=50)
+    texts = [text.get_text().replace(r"\$", "$") for text in figure.findobj(Text)]
+    assert sum(NAME in text for text in texts) >= n_names
+
+
+def test_names_of_strong_methods_are_bold():
+    figure = draw_dots({"x": ESTIMATES}, {NAME})
+    weights = {x.get_text(): x.get_fontweight() for x in figure.axes[0].get_yticklabels()}
+    assert weights == {NAME.replace("$", r"\$"): "bold", "other": "normal"}

@@ -1,0 +1,171 @@
+"""Child processes do not import modules from the working folder, in any command."""
+
+import json
+import os
+import subprocess
+import sys
+from concurrent.futures import ThreadPoolExecutor
+from threading import Barrier
+
+import pytest
+
+from holdfast.children import SAFE_PATH_VARIABLE, python_command, safe_path
+from holdfast.control.watchdog import N_SAFE_COMMANDS
+from holdfast.io import save_recording
+from holdfast.parallel import map_ordered
+from holdfast.synthetic import synthetic_recording
+
+OTHER_MODULES = (
+    "cloudpickle", "cyclonedds", "glfw", "holdfast", "joblib", "matplotlib", "mcap", "msgspec",
+    "mujoco", "numba", "numpy", "pyarrow", "rich", "scipy", "sklearn", "threadpoolctl", "typer",
+)  # fmt: skip
+MARK = "import os\nopen({marker!r}, 'a').write({name!r} + ' ')\n"
+COMMAND = "import sys\nfrom holdfast.cli import main\nsys.exit(main())\n"
+STUDY = """
+import sys
+from pathlib import Path
+from holdfast.parallel import Engine
+from holdfast.tasks import Task, TaskRunner
+tasks = [Task(str(k), divmod, (k, 3), tuple[int, int]) for k in range(4)]
+print(TaskRunner(Path(sys.argv[1]), Engine(2)).run(tasks))
+"""
+WATCHDOG = """
+import sys
+from holdfast.control import FingerCommand, GripCommand, LoopState
+from holdfast.control.hands import open_hand
+from holdfast.control.watchdog import Watchdog
+open_hand(sys.argv[1])
+watchdog = Watchdog(sys.argv[1], "open", timeout=3600.0)
+watchdog.start()
+watchdog.beat(GripCommand(1.0, LoopState.REACT, {"thumb": FingerCommand(1.3)}))
+watchdog.abandon()
+"""
+GRIPPER = """
+import beside
+def set_force(scale):
+    beside.write(scale)
+"""
+BESIDE = """
+def write(scale):
+    with open("commands", "a") as file:
+        file.write(f"{scale}\\n")
+"""
+TWIN = "twin:?object=can&seed=1"
+
+
+@pytest.fixture(scope="module")
+def recordings(tmp_path_factory):
+    folder = tmp_path_factory.mktemp("recordings")
+    for seed in range(4):
+        made = synthetic_recording(f"grasp{seed}", seed, ("thumb", "index"))
+        save_recording(made, folder / f"grasp{seed}.parquet")
+    return folder
+
+
+@pytest.fixture
+def run(tmp_path):
+    """Runs a program in a folder with a module of each name, as a console script is run."""
+    folder, scripts, marker = tmp_path / "data", tmp_path / "scripts", tmp_path / "imported"
+    folder.mkdir()
+    scripts.mkdir()
+    for name in (*sys.stdlib_module_names, *OTHER_MODULES):
+        (folder / f"{name}.py").write_text(MARK.format(marker=str(marker), name=name))
+    (folder / "my_gripper.py").write_text(GRIPPER)
+    (folder / "beside.py").write_text(BESIDE)
+
+    def run(*words, program=COMMAND):
+        (scripts / "program.py").write_text(program)
+        environment = {k: v for k, v in os.environ.items() if k != SAFE_PATH_VARIABLE}
+        done = subprocess.run(
+            [sys.executable, str(scripts / "program.py"), *map(str, words)],
+            cwd=folder, env=environment, stdin=subprocess.DEVNULL, capture_output=True, text=True,
+            check=False,
+        )  # fmt: skip
+        assert done.returncode == 0, done.stderr
+        assert not marker.exists(), marker.read_text()
+        return folder
+
+    return run
+
+
+def test_simulation(run, tmp_path):
+    run("simulate", tmp_path / "twin", "--objects", "can,ball", "--cases", "1", "--repeats", "1",
+        "--jobs", "2")  # fmt: skip
+
+
+def test_training_and_audit_of_labels(run, tmp_path, recordings):
+    program = (
+        "import sys\n"
+        "from holdfast.cli import main\n"
+        "folder, model = sys.argv[1:]\n"
+        "sys.exit(main(['train', folder, '-o', model, '--trials', '0', '--jobs', '2'])\n"
+        "         or main(['label', '--audit', folder, '--jobs', '2']))\n"
+    )
+    run(recordings, tmp_path / "model.json", program=program)
+
+
+def test_tasks_of_the_study(run, tmp_path):
+    run(tmp_path / "study", program=STUDY)
+
+
+@pytest.mark.parametrize("hand", ["log:commands", "call:my_gripper:set_force"])
+def test_the_watchdog_of_a_hand(run, hand):
+    """A function of this folder that is named as the hand is the only thing that runs."""
+    folder = run(hand, program=WATCHDOG)
+    assert len((folder / "commands").read_text().splitlines()) == N_SAFE_COMMANDS
+
+
+def test_a_dry_run_of_a_loop(run):
+    run("hold", "builtin:twin", TWIN, "--hand", "twin:", "--seconds", "0.1")
+
+
+def test_the_twin_that_simulates_the_next_grasp(run, tmp_path):
+    """The page and the recorder loop as well; this is the source that both read."""
+    program = (
+        "import sys\n"
+        "from holdfast.sources import open_source\n"
+        "with open_source(sys.argv[1], speed=0, loop=True) as source:\n"
+        "    while not any('-2' in n for n in source.read(60.0).notices):\n"
+        "        pass\n"
+    )
+    run(TWIN, program=program)
+
+
+def test_a_child_finds_the_modules_of_its_parent(monkeypatch, tmp_path):
+    (tmp_path / "beside.py").write_text("NAME = 'beside'")
+    monkeypatch.syspath_prepend(tmp_path)
+    program = "import beside, json; print(json.dumps([beside.NAME, sys.argv[1:], sys.path]))"
+    done = subprocess.run(python_command(program, "a", "b"), stdout=subprocess.PIPE, check=True)
+    assert json.loads(done.stdout) == ["beside", ["a", "b"], sys.path]
+
+
+def has_safe_path(number):
+    del number
+    return sys.flags.safe_path, os.environ.get(SAFE_PATH_VARIABLE)
+
+
+def test_workers_have_a_safe_path_and_this_process_keeps_its_environment():
+    before = os.environ.get(SAFE_PATH_VARIABLE)
+    assert set(map_ordered(has_safe_path, ((k,) for k in range(4)), 2)) == {(True, "1")}
+    assert os.environ.get(SAFE_PATH_VARIABLE) == before
+
+
+@pytest.mark.parametrize("before", [None, "", "1"])
+def test_the_environment_is_restored_by_the_last_thread(monkeypatch, before):
+    monkeypatch.delenv(SAFE_PATH_VARIABLE, raising=False)
+    if before is not None:
+        monkeypatch.setenv(SAFE_PATH_VARIABLE, before)
+    barrier = Barrier(4)
+
+    def enter():
+        with safe_path:
+            barrier.wait()
+            assert os.environ[SAFE_PATH_VARIABLE] == "1"
+            with safe_path:
+                pass
+            assert os.environ[SAFE_PATH_VARIABLE] == "1"
+
+    with ThreadPoolExecutor(4) as threads:
+        for done in [threads.submit(enter) for _ in range(4)]:
+            done.result()
+    assert os.environ.get(SAFE_PATH_VARIABLE) == before
