@@ -3,6 +3,7 @@
     uv run python benchmarks/attack.py network               # more than a million packets
     uv run python benchmarks/attack.py network --scale 0.01 --json
     uv run python benchmarks/attack.py files                 # more than 200,000 files, 200 kills
+    uv run python benchmarks/attack.py grip                  # clocks, bursts, paused processes
 
 The exit code is 1 if an attack gave a wrong value, an exception that is not documented, or took
 longer than it may. All traffic stays on this machine.
@@ -13,7 +14,7 @@ import importlib
 import json
 import sys
 
-PARTS = ("network", "files")
+PARTS = ("network", "files", "grip")
 
 
 def main() -> int:

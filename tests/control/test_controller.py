@@ -5,7 +5,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from control.build import FINGERS, RATE, finger, hand, holding, run, scales
+from control.build import FINGERS, NORMAL, RATE, finger, hand, holding, run, scales
 from holdfast.contact import ContactEstimate, ContactState, HandEstimate, Reason
 from holdfast.control import LAWS, GripController, GripReason, Limits, LoopState
 from holdfast.sensors import sensor
@@ -232,6 +232,125 @@ class TestFaults:
         controller, time = holding()
         controller.update(hand(time), time + 0.2)
         assert [str(event) for event in controller.events()] == ["grip FAULT (stale)"]
+
+
+class TestSilence:
+    @pytest.mark.parametrize("law", sorted(LAWS))
+    def test_no_force_changes_without_a_new_estimate(self, law):
+        controller, time = holding(law)
+        time += 1 / RATE
+        estimate = hand(time, **SLIPPING)
+        first = controller.update(estimate, time)
+        for k in range(1, 200):
+            command = controller.update(estimate, time + k / 1000)
+            assert scales(command) == scales(first)
+        assert command.reason is GripReason.STALE
+
+    def test_the_force_goes_on_with_the_next_estimate(self):
+        controller, time = holding()
+        commands, time = run(controller, time, 0.02, **SLIPPING)
+        controller.update(hand(time, **SLIPPING), time + 0.004)
+        after = controller.update(hand(time + 1 / RATE, **SLIPPING), time + 1 / RATE)
+        assert scales(after)["index"] > scales(commands[-1])["index"]
+
+
+def lively(k, noise, **changes):
+    """An estimate whose forces change from sample to sample, as those of a noisy sensor do."""
+    changes = {name: {"normal": NORMAL[name] + noise(k), **changes} for name in FINGERS}
+    return hand(k / RATE, **changes)
+
+
+class TestFrozenReadings:
+    """Forces that repeat exactly: the fault of a noisy sensor, the rest of a quiet one."""
+
+    def held(self, noise, n_free=400, **limits):
+        """A controller that holds, with forces that changed by a noise; the next sample."""
+        controller = GripController(Limits(**limits), newtons_per_unit=1e-3)
+        for k in range(n_free):
+            estimate = lively(k, noise, state=ContactState.NO_CONTACT)
+            controller.update(
+                HandEstimate(k / RATE, ContactState.NO_CONTACT, estimate.fingers), k / RATE
+            )
+        k = n_free
+        while controller.state is LoopState.IDLE:
+            controller.update(lively(k, noise), k / RATE)
+            k += 1
+        return controller, k
+
+    @pytest.mark.parametrize("on_fault", ["hold", "open"])
+    def test_a_noisy_sensor_that_repeats_itself_is_a_fault_within_100_ms(self, on_fault):
+        controller, k = self.held(lambda k: k * 37 % 11, on_fault=on_fault)
+        last = controller.update(lively(k, lambda k: 3.5), k / RATE)
+        assert last.state is LoopState.HOLD
+        for n in range(1, round(0.1 * RATE) + 1):
+            command = controller.update(lively(k + n, lambda k: 3.5), (k + n) / RATE)
+        assert (command.state, command.reason) == (LoopState.FAULT, GripReason.FROZEN)
+        assert command.release is (on_fault == "open")
+
+    def test_one_finger_is_enough(self):
+        controller, k = self.held(lambda k: k * 37 % 11)
+        for n in range(round(0.1 * RATE) + 2):
+            estimate = lively(k + n, lambda k: k * 37 % 11)
+            still = hand((k + n) / RATE).fingers["middle"]
+            fingers = {**estimate.fingers, "middle": still}
+            command = controller.update(
+                HandEstimate(estimate.time, estimate.state, fingers), estimate.time
+            )
+        assert command.reason is GripReason.FROZEN
+
+    def test_no_force_rises_before_it(self):
+        controller, k = self.held(lambda k: k * 37 % 11)
+        slip = {"probability": 0.05, "state": ContactState.UNSTABLE}
+        highest = []
+        for n in range(20):
+            command = controller.update(lively(k + n, lambda k: 3.5, **slip), (k + n) / RATE)
+            highest.append(max(scales(command).values()))
+        assert highest[3] == highest[-1] < 3.0
+
+    @pytest.mark.parametrize(
+        "noise",
+        [lambda k: 0.0, lambda k: k // 30 % 2, lambda k: k % 40 == 0, lambda k: k // 8],
+        ids=["none", "slow flicker", "rare counts", "drift"],
+    )
+    def test_a_quiet_sensor_may_rest(self, noise):
+        """Integers that repeat because nothing moves are no fault."""
+        controller, k = self.held(noise)
+        for n in range(300):
+            command = controller.update(lively(k + n, lambda k: 0.0), (k + n) / RATE)
+            assert command.state is not LoopState.FAULT
+
+    def test_without_a_free_sensor_before_the_grip_nothing_is_known(self):
+        controller, k = self.held(lambda k: k * 37 % 11, n_free=0)
+        for n in range(100):
+            command = controller.update(lively(k + n, lambda k: 0.0), (k + n) / RATE)
+        assert command.state is LoopState.HOLD
+
+    def test_a_server_that_sends_each_sample_twice_is_healthy(self):
+        controller, k = self.held(lambda k: k // 2 * 37 % 11)
+        for n in range(300):
+            command = controller.update(lively(k + n, lambda k: k // 2 * 37 % 11), (k + n) / RATE)
+            assert command.state is not LoopState.FAULT
+
+
+class TestResume:
+    def test_a_clock_that_went_back_is_accepted_and_the_law_goes_on(self):
+        controller, time = holding()
+        commands, time = run(controller, time, 0.1, **SLIPPING)
+        held = scales(commands[-1])["index"]
+        commands, time = run(controller, time - 50.0, 0.1)
+        assert commands[-1].reason is GripReason.CLOCK
+        controller.resume()
+        commands, time = run(controller, time, 0.5)
+        assert {command.state for command in commands} <= {LoopState.HOLD, LoopState.RELAX}
+        commands, time = run(controller, time, 0.3, **SLIPPING)
+        assert scales(commands[-1])["index"] > held
+
+    def test_a_fault_that_was_reported_holds_for_one_update(self):
+        controller, time = holding(recovery=0.0)
+        controller.report(GripReason.HAND)
+        first = controller.update(hand(time + 0.01), time + 0.01)
+        assert (first.state, first.reason) == (LoopState.FAULT, GripReason.HAND)
+        assert controller.update(hand(time + 0.02), time + 0.02).state is LoopState.HOLD
 
 
 class TestUnits:

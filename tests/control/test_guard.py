@@ -90,3 +90,19 @@ def test_commands_pass_after_the_clock_went_back():
     guard = CommandGuard(LIMITS)
     guard.admit(command(1.0, 100.0))
     assert guard.admit(command(1.0, 0.5)) is not None
+
+
+def test_a_burst_of_samples_does_not_pass_the_highest_rate():
+    guard = CommandGuard(LIMITS)
+    sent = [guard.admit(command(1.0, k / 50), clock=7.0 + k / 1000) for k in range(20)]
+    assert [k for k, one in enumerate(sent) if one is not None] == [0, 10]
+
+
+def test_after_a_resume_any_time_is_accepted_and_nothing_rises_at_once():
+    guard = CommandGuard(LIMITS)
+    guard.admit(command(1.0, 100.0))
+    guard.resume()
+    guard.check(command(1.0, 5.0))
+    assert guard.admit(command(1.05, 5.01)).state is LoopState.HOLD
+    guard.resume()
+    assert guard.admit(command(1.2, 5.1)).reason is GripReason.LIMIT

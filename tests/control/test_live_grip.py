@@ -5,7 +5,7 @@ import msgspec
 import pytest
 
 from control.build import FINGERS, RATE, hand, holding
-from control.test_loop import Tape
+from control.test_loop import LateBeats, Tape
 from control.test_runner import update
 from holdfast.control import GripReason
 from holdfast.control.live_grip import N_ENTRIES, EventLog, LiveGrip
@@ -128,6 +128,39 @@ def test_a_hand_that_fails_ends_the_loop_and_is_reported(rig):
         with pytest.raises(HandError, match="the loop has ended: no"):
             grip.stop().result(0)
     assert rig.log.entries[-1].text == "grip FAULT (hand): no"
+
+
+def test_a_loop_whose_watchdog_took_over_ends_with_the_safe_command():
+    """The page goes on, so the loop is left much later."""
+    rig = Rig(on_fault="open")
+    rig.loop._watchdog = LateBeats(before=3)
+    with pytest.raises(HandError, match="taken over"), rig.grip as grip:
+        rig.send(1)
+        rig.wait(lambda: grip.failure is not None)
+        assert rig.tape.commands[-1].release
+
+
+def test_a_stop_that_timed_out_ends_no_loop(rig):
+    """The time-out of the HTTP request cancels what it waited for."""
+    busy, goes_on = threading.Event(), threading.Event()
+    send = rig.tape._send
+
+    def slow(command):
+        busy.set()
+        goes_on.wait(PATIENCE)
+        send(command)
+
+    rig.tape._send = slow
+    with rig.grip as grip:
+        rig.send(1)
+        busy.wait(PATIENCE)
+        stopped = grip.stop()
+        stopped.cancel()
+        goes_on.set()
+        rig.wait(lambda: grip.document().reason == "stopped")
+        rig.send(1)
+        grip.stop().result(PATIENCE)
+        assert grip.failure is None
 
 
 def test_leaving_ends_the_thread(rig):

@@ -1,3 +1,5 @@
+import math
+
 import pytest
 
 from control.build import FINGERS, RATE, hand, holding, scales
@@ -44,6 +46,9 @@ class Beats:
 
     def beat(self, command):
         self.commands.append(command)
+
+    def check(self):
+        pass
 
 
 @pytest.fixture
@@ -241,3 +246,147 @@ def test_a_time_that_is_no_time_is_a_fault_and_is_forgotten(tape, given):
     loop.step(hand(time), time)
     assert loop.step(hand(time), given).reason is GripReason.CLOCK
     assert loop.step(hand(time + 1 / RATE), time + 1 / RATE).state is LoopState.HOLD
+
+
+class TestClock:
+    """A clock of the source that jumps ahead, and comes back or does not."""
+
+    @pytest.mark.parametrize("on_fault", ["hold", "open"])
+    def test_one_stamp_from_the_future_is_a_fault_that_a_reset_ends(self, tape, on_fault):
+        controller, time = holding(on_fault=on_fault)
+        loop = GripLoop(controller, tape, armed=True)
+        time = stepped(loop, time)
+        loop.step(hand(time + 100.0), time + 100.0)
+        assert (loop.last.state, loop.last.reason) == (LoopState.FAULT, GripReason.CLOCK)
+        time = stepped(loop, time, n=1)
+        loop.resume()
+        stepped(loop, time, n=60)
+        assert loop.last.state is LoopState.HOLD
+
+    def test_with_hold_the_loop_recovers_from_it_by_itself(self, tape):
+        controller, time = holding()
+        loop = GripLoop(controller, tape, armed=True)
+        time = stepped(loop, time)
+        loop.step(hand(time + 100.0), time + 100.0)
+        stepped(loop, time, n=100)
+        assert loop.last.state is LoopState.HOLD
+
+    def test_a_clock_that_stays_ahead_is_accepted_after_a_fault(self, tape):
+        controller, time = holding()
+        loop = GripLoop(controller, tape, armed=True)
+        time = stepped(loop, time)
+        time = stepped(loop, time + 100.0, n=1)
+        assert loop.last.reason is GripReason.CLOCK
+        stepped(loop, time, n=100)
+        assert loop.last.state is LoopState.HOLD
+
+    def test_a_clock_that_jumped_back_is_accepted_by_a_reset(self, tape):
+        controller, time = holding()
+        loop = GripLoop(controller, tape, armed=True)
+        time = stepped(loop, stepped(loop, time), n=16, index=SLIPPING)
+        held = scales(loop.last)
+        time = stepped(loop, time - 100.0)
+        assert loop.last.state is LoopState.FAULT
+        loop.resume()
+        time = stepped(loop, time)
+        assert loop.last.state in (LoopState.HOLD, LoopState.RELAX)
+        stepped(loop, time, n=60, index=SLIPPING)
+        assert scales(loop.last)["index"] > held["index"]
+
+    @pytest.mark.parametrize("on_fault", ["hold", "open"])
+    def test_every_command_has_a_time(self, tape, on_fault):
+        controller, time = holding(on_fault=on_fault)
+        beats, times = Beats(), []
+        loop = GripLoop(
+            controller, tape, armed=True, watchdog=beats, log=lambda _, at: times.append(at)
+        )
+        for bad in (math.nan, time, math.inf, -math.inf, math.nan):
+            loop.step(hand(bad), bad)
+        assert tape.commands[-1].reason is GripReason.CLOCK
+        assert tape.commands[-1].release is (on_fault == "open")
+        assert all(math.isfinite(command.time) for command in (*tape.commands, *beats.commands))
+        assert all(map(math.isfinite, times))
+
+
+class LateBeats(Beats):
+    """Watchdog that has taken over, as the loop finds out before or after a command."""
+
+    def __init__(self, before=math.inf, after=math.inf):
+        super().__init__()
+        self._before, self._after = before, after
+
+    def beat(self, command):
+        super().beat(command)
+        if len(self.commands) > self._before:
+            raise HandError("taken over")
+
+    def check(self):
+        if len(self.commands) > self._after:
+            raise HandError("taken over")
+
+
+class TestTakenOver:
+    @pytest.mark.parametrize("beats", [LateBeats(before=3), LateBeats(after=3)])
+    def test_the_last_command_is_the_safe_one(self, tape, beats):
+        controller, time = holding(on_fault="open")
+        loop = GripLoop(controller, tape, armed=True, watchdog=beats)
+        with pytest.raises(HandError, match="taken over"), loop:
+            stepped(loop, time)
+        assert len(tape.commands) <= 5
+        assert tape.commands[-1].release
+
+    def test_the_safe_command_holds_what_was_sent_last(self, tape):
+        controller, time = holding()
+        loop = GripLoop(controller, tape, armed=True, watchdog=LateBeats(before=3))
+        with pytest.raises(HandError, match="taken over"), loop:
+            time = stepped(loop, time, n=3)
+            stepped(loop, time, **dict.fromkeys(FINGERS, SLIPPING))
+        assert scales(loop.last)["index"] > 1.0
+        assert scales(tape.commands[-1]) == dict.fromkeys(FINGERS, 1.0)
+
+    def test_an_orderly_end_after_it_does_not_close_the_hand(self, tape):
+        controller, time = holding(on_fault="open")
+        loop = GripLoop(controller, tape, armed=True, watchdog=LateBeats(before=10))
+        with pytest.raises(HandError, match="taken over"), loop:
+            stepped(loop, time, n=10)
+        assert tape.commands[-1].release
+
+
+class TestFollow:
+    def test_it_sends_nothing_and_the_next_step_has_its_force(self, tape):
+        controller, time = holding()
+        loop = GripLoop(controller, tape, armed=True)
+        time = stepped(loop, time, n=1)
+        for _ in range(5):
+            time += 1 / RATE
+            loop.follow(hand(time, **dict.fromkeys(FINGERS, SLIPPING)), time)
+        assert len(tape.commands) == 1
+        stepped(loop, time, n=1)
+        assert len(tape.commands) == 2
+        assert scales(loop.last)["index"] > 1.2
+        assert loop.guard.violation == ""
+
+    def test_the_guard_checks_it(self, tape):
+        controller, time = holding()
+        loop = GripLoop(controller, tape, armed=True)
+        time = stepped(loop, time, n=1)
+        good, controller.update = controller.update, lambda estimate, time: GripCommand(
+            time, LoopState.HOLD, {name: FingerCommand(99.0) for name in FINGERS}
+        )  # fmt: skip
+        loop.follow(hand(time + 1 / RATE), time + 1 / RATE)
+        controller.update = good
+        stepped(loop, time + 1 / RATE, n=1)
+        assert tape.commands[-1].reason is GripReason.LIMIT
+
+
+def test_a_silent_hand_is_a_fault_in_which_no_force_changes(tape, monkeypatch):
+    controller, time = holding()
+    loop = GripLoop(controller, tape, armed=True)
+    time = stepped(loop, time)
+    monkeypatch.setattr(Tape, "silent", True)
+    time = stepped(loop, time, index=SLIPPING)
+    assert (loop.last.state, loop.last.reason) == (LoopState.FAULT, GripReason.HAND)
+    assert scales(loop.last) == dict.fromkeys(FINGERS, 1.0)
+    monkeypatch.setattr(Tape, "silent", False)
+    stepped(loop, time, n=100)
+    assert loop.last.state is LoopState.HOLD

@@ -5,7 +5,7 @@ import pytest
 
 from holdfast.control import GripReason
 from holdfast.live.grip import GripLimits
-from holdfast.live.grip_faults import GRIP_FAULTS, HAND, explain_fault
+from holdfast.live.grip_faults import ENDED, GRIP_FAULTS, explain_fault
 
 RISES = {"", "unstable", "slip", "load", "margin", "balance", "relax"}
 """Reasons of a change of force, which are no faults."""
@@ -26,7 +26,7 @@ def explained(reason, *, armed=True, released=False, failure="", **fields):
 
 
 def test_every_reason_of_a_fault_has_an_explanation():
-    assert set(GRIP_FAULTS) == {str(one) for one in GripReason} - RISES | {HAND}
+    assert set(GRIP_FAULTS) == {str(one) for one in GripReason} - RISES | {ENDED}
 
 
 def test_the_guide_has_the_same_explanations():
@@ -64,7 +64,7 @@ def test_a_dry_run():
 @pytest.mark.parametrize(("on_fault", "action"), [("hold", "keeps the last"), ("open", "opens")])
 def test_a_loop_that_has_ended(on_fault, action):
     fault = explained("lost", failure="no answer", on_fault=on_fault)
-    assert fault.reason == HAND
+    assert fault.reason == ENDED
     assert action in fault.commanded
     assert fault.reset == "Reset has no effect: end this program, and start it again."
 

@@ -22,7 +22,11 @@ class LoopState(StrEnum):
 
 
 class GripReason(StrEnum):
-    """Reason of a change of force, or of a fault."""
+    """Reason of a change of force, or of a fault.
+
+    Of the faults, STALE: no sample in time. FROZEN: readings repeat exactly. BEHIND: the loop was
+    not stepped for too long. HAND: the hand sends nothing.
+    """
 
     NONE = ""
     UNSTABLE = "unstable"
@@ -32,6 +36,9 @@ class GripReason(StrEnum):
     BALANCE = "balance"
     RELAX = "relax"
     STALE = "stale"
+    FROZEN = "frozen"
+    BEHIND = "behind"
+    HAND = "hand"
     NOT_FINITE = "not_finite"
     CLOCK = "clock"
     FINGER_FAULT = "finger_fault"

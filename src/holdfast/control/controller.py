@@ -1,7 +1,7 @@
 """The grip controller: from the estimates of a hand to a command. No I/O and no clock."""
 
 import math
-from collections import deque
+from collections import defaultdict, deque
 from collections.abc import Mapping
 
 from holdfast.contact import ContactState, HandEstimate, Reason
@@ -9,6 +9,7 @@ from holdfast.control.command import FingerCommand, GripCommand, GripEvent, Grip
 from holdfast.control.laws import Law, Touch, law_named
 from holdfast.control.laws.base import Three
 from holdfast.control.limits import Limits
+from holdfast.control.repeats import RepeatMonitor
 from holdfast.sensors import Sensor
 from holdfast.sensors.types import Array
 
@@ -33,8 +34,9 @@ class GripController:
 
     The grip begins when the hand has been STABLE for 0.2 s: forces and scales refer to this
     moment, and the fingers in contact are the loaded fingers. The controller reads the raw
-    probability of every sample, not the debounced state. UNKNOWN never lowers a force. No input
-    raises an exception or gives a command outside the limits.
+    probability of every sample, not the debounced state. UNKNOWN never lowers a force, and no force
+    changes without a new sample. No input raises an exception or gives a command outside the
+    limits.
 
     Args:
         limits: limits of the commands.
@@ -79,6 +81,7 @@ class GripController:
         self._thumb = thumb
         ceiling = math.inf if limits.max_force is None else limits.max_force
         self._ceiling = OVERLOAD * ceiling
+        self._monitors: defaultdict[str, RepeatMonitor] = defaultdict(RepeatMonitor)
         self.reset()
 
     def reset(self) -> None:
@@ -90,11 +93,14 @@ class GripController:
         self._commands: dict[str, FingerCommand] = {}
         self._latched = self._stopped = False
         self._all_known = False
-        self._time = math.nan
+        self._repeats: list[RepeatMonitor] = []
+        self._time = self._estimated_at = math.nan
+        self._shift = 0.0  # of the law's clock, which continues where that of the source jumped
+        self._clock_is_new = False
         self._stable_since = math.nan
         self._valid_since = math.nan
         self._raised_at = -math.inf
-        self._fault = GripReason.NONE
+        self._fault = self._reported = GripReason.NONE
         self._events: deque[GripEvent] = deque(maxlen=MAX_EVENTS)
 
     def stop(self) -> None:
@@ -106,8 +112,10 @@ class GripController:
         """End a stop or a fault, by the decision of a person. It has no effect elsewhere.
 
         A grip that still touches the object goes on with its scales. After "open", or without
-        contact, the controller returns to IDLE, as by `reset`.
+        contact, the controller returns to IDLE, as by `reset`. The time of the next update may be
+        any: that is how a clock that has jumped is accepted.
         """
+        self._clock_is_new = True
         if not self._stopped and self._fault is _NONE:
             return
         touching = any(touch.touching for touch in self._touches)
@@ -116,6 +124,7 @@ class GripController:
             return
         self._latched = self._stopped = False
         self._fault = _NONE
+        self._bad_since = [math.inf] * len(self._bad_since)
         self._change(_HOLD, self._time)
 
     @property
@@ -134,6 +143,10 @@ class GripController:
         self._events.clear()
         return events
 
+    def report(self, fault: GripReason) -> None:
+        """Report a fault outside the estimates, as that of a silent hand, to the next update."""
+        self._reported = fault
+
     def update(self, estimate: HandEstimate, time: float) -> GripCommand:
         """Process an estimate, or the passing of time if the estimate is the last one again.
 
@@ -143,18 +156,43 @@ class GripController:
                 where samples are late.
 
         Returns:
-            The command. Its scales change only in the states REACT and RELAX.
+            The command. Its scales change only in the states REACT and RELAX, and only with a new
+            estimate: otherwise it is the last command again, with the time of that one.
         """
+        is_new = self._is_new(estimate)
+        fault, self._reported = self._reported, _NONE
+        if self._clock_is_new and math.isfinite(time):
+            self._accept_clock(time)
         dt = time - self._time
         if self._stopped:
             return self._in_stop(estimate, time, dt)
         if self.state is LoopState.IDLE:
             return self._idle(estimate, time)
         problem = self._problem(estimate, time, dt)
+        if problem is not GripReason.CLOCK:
+            problem = fault or problem
         if problem is not _NONE or self._fault is not _NONE:
             return self._in_fault(problem, time)
+        if not is_new or any(monitor.repeating for monitor in self._repeats):
+            return GripCommand(self._time, self.state, self._commands.copy())
         self._time = time
         return self._control(time, min(dt, self.limits.stale_after))
+
+    def _is_new(self, estimate: HandEstimate) -> bool:
+        """Return whether an estimate is not the last one again; update the monitors if so."""
+        if estimate.time == self._estimated_at:
+            return False
+        self._estimated_at = estimate.time
+        for name, finger in estimate.fingers.items():
+            self._monitors[name].update(finger)
+        return True
+
+    def _accept_clock(self, time: float) -> None:
+        """Continue at another time; that of the law goes on as if none had passed."""
+        self._clock_is_new = False
+        if not math.isnan(self._time):
+            self._shift += self._time - time
+            self._time = time
 
     def _idle(self, estimate: HandEstimate, time: float) -> GripCommand:
         """Wait for a grip; begin it when the hand has been stable for long enough."""
@@ -183,6 +221,7 @@ class GripController:
             touch.start()
         self._highest = [self.limits.highest_scale(touch.start_normal) for touch in touches]
         self._bad_since = [math.inf] * (len(touches) + 1)  # of each finger, and of the grip
+        self._repeats = [self._monitors[touch.finger] for touch in touches]
         names = self.loaded_fingers
         opposed = self._thumb in names and len(names) > 1
         self.law.start(touches, names.index(str(self._thumb)) if opposed else -1)
@@ -205,6 +244,8 @@ class GripController:
                 problem = GripReason.NOT_FINITE
             elif touch.normal > self._ceiling:
                 problem = GripReason.OVERLOAD
+            elif self._repeats[k].frozen:
+                problem = GripReason.FROZEN
             else:
                 self._bad_since[k] = math.inf
             if problem is not _NONE:
@@ -256,8 +297,9 @@ class GripController:
     def _control(self, time: float, dt: float) -> GripCommand:
         """Apply the law within the limits."""
         limits, commands, highest = self.limits, self._commands, self._highest
-        wishes = self.law.wishes(self._touches, time, dt)
-        may_fall = self._all_known and time - self._raised_at >= limits.cooldown
+        clock = time + self._shift
+        wishes = self.law.wishes(self._touches, clock, dt)
+        may_fall = self._all_known and clock - self._raised_at >= limits.cooldown
         rising = falling = False
         for k, touch in enumerate(self._touches):
             scale = touch.scale
@@ -272,7 +314,7 @@ class GripController:
             elif commands[touch.finger].reason is not _NONE:
                 commands[touch.finger] = FingerCommand(scale)
         if rising:
-            self._raised_at = time
+            self._raised_at = clock
         state = _REACT if rising else _RELAX if falling else _HOLD
         if state is not self.state:
             self._change(state, time)

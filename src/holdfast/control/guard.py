@@ -39,7 +39,6 @@ class CommandGuard:
         self.resume()
         self._scales: dict[str, float] = {}
         self._checked_at = -math.inf
-        self._sent_at = -math.inf
         self._sent = LoopState.IDLE, GripReason.NONE
 
     def stop(self) -> None:
@@ -49,32 +48,46 @@ class CommandGuard:
     def resume(self) -> None:
         """End a stop or a violation; the last scales stay those from which a rise is measured.
 
-        The next command is not held back.
+        The next command is not held back, must not rise, and may have any time.
         """
         self.violation, self.stopped = "", False
-        self._sent_at = -math.inf
+        self._checked_at = -math.inf
+        self._sent_at = self._sent_at_clock = -math.inf
 
-    def admit(self, command: GripCommand) -> GripCommand | None:
+    def admit(self, command: GripCommand, clock: float = math.nan) -> GripCommand | None:
         """Return the command to send.
+
+        Args:
+            command: of the controller.
+            clock: time now on a clock of the host, which a burst of samples does not advance [s];
+                NaN where time passes by the samples alone.
 
         Returns:
             The command; the safe command in its place; or None if the last one was sent less
-            than a period of `Limits.max_rate` ago. A new FAULT, or a new reason of it, is
-            never held back.
+            than a period of `Limits.max_rate` ago, on either clock. A new FAULT, or a new reason
+            of it, is never held back.
         """
+        command = self.check(command)
+        early = self._is_early(command.time - self._sent_at)
+        early = early or self._is_early(clock - self._sent_at_clock)
+        kind = command.state, command.reason
+        if early and (command.state is not LoopState.FAULT or kind == self._sent):
+            return None
+        self._sent_at, self._sent_at_clock, self._sent = command.time, clock, kind
+        return command
+
+    def check(self, command: GripCommand) -> GripCommand:
+        """Return a command that is not sent, or the safe command in its place."""
         self.violation = self.violation or self._violation(command)
         if self.stopped or self.violation:
             command = self._safe(command)
         self._scales = {name: one.scale for name, one in command.fingers.items()}
         if math.isfinite(command.time):
             self._checked_at = max(self._checked_at, command.time)
-        elapsed = command.time - self._sent_at
-        early = 0.0 <= elapsed < (1.0 - SLACK) / self.limits.max_rate
-        kind = command.state, command.reason
-        if early and (command.state is not LoopState.FAULT or kind == self._sent):
-            return None
-        self._sent_at, self._sent = command.time, kind
         return command
+
+    def _is_early(self, elapsed: float) -> bool:
+        return 0.0 <= elapsed < (1.0 - SLACK) / self.limits.max_rate
 
     def _violation(self, command: GripCommand) -> str:
         limits = self.limits

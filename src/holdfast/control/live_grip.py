@@ -60,8 +60,8 @@ class LiveGrip:
     It is a context manager: leaving it ends the thread, before the loop sends its last command.
     An armed loop locks the session: with another threshold or tare, the same contact would move
     the hand.
-    If the hand refuses a command, the thread ends, and the watchdog brings the hand into its
-    safe state; `document` shows why, and leaving the context raises the error.
+    If the hand refuses a command, the thread ends with the safe command, and the watchdog sends
+    it too; `document` shows why, and leaving the context raises the error.
 
     Args:
         law: name of the law.
@@ -146,6 +146,7 @@ class LiveGrip:
         try:
             self._runner.run(self._over.is_set)
         except Exception as failure:  # leaving the context raises it
+            self._loop.make_safe()
             self.failure = failure
             last = self._loop.last
             self._log(f"grip FAULT (hand): {failure}", last.time if last else 0.0)

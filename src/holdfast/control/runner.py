@@ -2,30 +2,47 @@
 
 import time
 from collections import deque
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from concurrent.futures import Future
-from queue import Empty, SimpleQueue
+from threading import Event
+from typing import NamedTuple
 
 from holdfast.contact import ContactState, HandEstimate
-from holdfast.control.command import GripCommand
+from holdfast.control.command import GripCommand, GripReason
 from holdfast.control.loop import GripLoop
 from holdfast.live.stream_detector import StreamUpdate
 
 TICK = 0.01
 """Time without samples after which the loop is stepped, so that it detects silence [s]."""
+MAX_PAUSE = 0.1
+"""Longest time between two steps of the loop; a longer one is the fault `behind` [s]."""
+MAX_PENDING = 512
+"""Number of newest updates that wait for the next step: more than come in `MAX_PAUSE`."""
 NO_DATA = HandEstimate(0.0, ContactState.UNKNOWN, {})
 """Estimate with which a loop is stepped that is stopped before the first one."""
+
+
+class _Arrived(NamedTuple):
+    """Update, and the time at which its last byte was received, by `time.monotonic` [s]."""
+
+    update: StreamUpdate
+    received: float
 
 
 class LoopRunner:
     """Step a loop with the updates that it gets, in one thread.
 
     `put`, `stop` and `reset` may be called in any thread and return at once. A stop does not
-    wait for the updates in the queue.
+    wait for the updates that are pending.
+
+    A paced source goes on while the hand takes a command. So each step takes all pending updates:
+    the controller gets every estimate, and the hand only the command of the newest one. Its age
+    counts from the arrival of its samples.
 
     Args:
         loop: the loop to step.
-        speed: ratio of the source's time to real time; 0 for a source that is not paced.
+        speed: ratio of the source's time to real time; 0 for a source that is not paced: then
+            each estimate has its command, and only the times of the samples count.
         on_command: is called with every command.
     """
 
@@ -38,14 +55,17 @@ class LoopRunner:
         self.loop = loop
         self._speed = speed
         self._on_command = on_command
-        self._updates: SimpleQueue[StreamUpdate | None] = SimpleQueue()
+        self._pending: deque[_Arrived] = deque(maxlen=MAX_PENDING)
+        self._wake = Event()
         self._requests: deque[tuple[Callable[[], None], Future[None]]] = deque()
         self._estimate: HandEstimate | None = None
         self._received = 0.0
+        self._stepped_at: float | None = None
 
     def put(self, update: StreamUpdate) -> None:
-        """Append an update to the queue; a listener of a session."""
-        self._updates.put(update)
+        """Append an update to those that are pending; a listener of a session."""
+        self._pending.append(_arrived(update))
+        self._wake.set()
 
     def stop(self) -> "Future[None]":
         """Bring the hand into its safe state; the result is there when the command was sent."""
@@ -58,17 +78,15 @@ class LoopRunner:
         return self._request(self.loop.resume)
 
     def run(self, is_over: Callable[[], bool]) -> None:
-        """Step the loop until `is_over` and the queue is empty.
+        """Step the loop until `is_over` and nothing is pending.
 
         Raises:
             HandError: as `GripLoop.step`.
         """
-        while not (is_over() and self._updates.empty()):
-            try:
-                update = self._updates.get(timeout=TICK)
-            except Empty:
-                update = None
-            self.process(update)
+        while not is_over() or self._pending:
+            self._wake.wait(TICK)
+            self._wake.clear()
+            self._process([self._pending.popleft() for _ in range(len(self._pending))])
 
     def process(self, update: StreamUpdate | None) -> None:
         """Answer the requests, and step the loop with an update; None if nothing arrived.
@@ -76,11 +94,17 @@ class LoopRunner:
         Raises:
             HandError: as `GripLoop.step`; waiting requests get it too.
         """
+        self._process([] if update is None else [_arrived(update)])
+
+    def _process(self, arrived: Sequence[_Arrived]) -> None:
         requests = [self._requests.popleft() for _ in range(len(self._requests))]
         try:
             for work, _ in requests:
                 work()
-            self._step(update)
+            if self._speed:
+                self._step(arrived, time.monotonic())
+            else:
+                self._step_each(arrived)
         except Exception as failure:
             for _, future in requests:
                 future.set_exception(failure)
@@ -88,24 +112,56 @@ class LoopRunner:
         for _, future in requests:
             future.set_result(None)
 
-    def _step(self, update: StreamUpdate | None) -> None:
-        estimates = [] if update is None else update.estimates
-        for one in estimates:
-            self._estimate, self._received = one.estimate, time.monotonic()
-            self._on_command(self.loop.step(one.estimate, one.estimate.time))
+    def _step(self, arrived: Sequence[_Arrived], now: float) -> None:
+        """Step the loop of a paced source once, with the newest estimate."""
+        behind = self._stepped_at is not None and now - self._stepped_at > MAX_PAUSE
+        estimates = [one.estimate for update, _ in arrived for one in update.estimates]
+        for estimate in estimates[:-1]:
+            self.loop.follow(estimate, estimate.time)
         if estimates:
-            return
+            newest = estimates[-1]
+            if self._estimate is None or newest.time != self._estimate.time:
+                self._received = max(one.received for one in arrived if one.update.estimates)
+            self._estimate = newest
         if self._estimate is None:
-            if self.loop.stopped:
-                self._on_command(self.loop.step(NO_DATA, NO_DATA.time))
-        elif self._speed:
-            elapsed = self._speed * (time.monotonic() - self._received)
-            now = self._estimate.time + elapsed
-            self._on_command(self.loop.step(self._estimate, now))
+            self._step_without_samples()
+            return
+        self._stepped_at = now
+        fault = GripReason.BEHIND if behind else GripReason.NONE
+        at = self._estimate.time + self._age(now)
+        self._on_command(self.loop.step(self._estimate, at, fault, now))
+
+    def _age(self, now: float) -> float:
+        """Return the age of the newest estimate by the clock of the source; 0 if it is new [s]."""
+        age = now - self._received
+        return 0.0 if age < TICK else self._speed * age
+
+    def _step_each(self, arrived: Sequence[_Arrived]) -> None:
+        """Step the loop of a source that is not paced, with each estimate."""
+        estimates = [one.estimate for update, _ in arrived for one in update.estimates]
+        for estimate in estimates:
+            self._estimate = estimate
+            self._on_command(self.loop.step(estimate, estimate.time))
+        if not estimates:
+            self._step_without_samples()
+
+    def _step_without_samples(self) -> None:
+        """Send the safe command of a stop, where no time passes without samples."""
+        if self.loop.stopped:
+            estimate = self._estimate or NO_DATA
+            self._on_command(self.loop.step(estimate, estimate.time))
 
     def _request(self, work: Callable[[], None]) -> "Future[None]":
         """Run `work` before the next step, and step at once."""
         future: Future[None] = Future()
+        future.set_running_or_notify_cancel()  # whoever waits for it cannot cancel it
         self._requests.append((work, future))
-        self._updates.put(None)
+        self._wake.set()
         return future
+
+
+def _arrived(update: StreamUpdate) -> _Arrived:
+    """Return an update with the time of its arrival: now, if it has no samples."""
+    now = time.monotonic()
+    arrival = update.arrival
+    return _Arrived(update, now if arrival is None else min(arrival.received, now))

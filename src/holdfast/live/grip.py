@@ -51,7 +51,7 @@ class GripFault(Struct, frozen=True, kw_only=True, gc=False):
     """Explanation of a fault for a person, see `holdfast.live.grip_faults`.
 
     Attributes:
-        reason: of the fault; "hand" if the loop has ended because of the hand.
+        reason: of the fault; "ended" if the loop has ended for good.
         happened: what happened, and what it means.
         commanded: what the hand is commanded now.
         continues: what goes on without a reset.

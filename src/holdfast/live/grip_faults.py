@@ -6,8 +6,8 @@ from typing import NamedTuple
 
 from holdfast.live.grip import GripFault, GripLimits
 
-HAND = "hand"
-"""Reason of a fault that ended the loop: a command did not reach the hand."""
+ENDED = "ended"
+"""Reason of a fault that ended the loop for good."""
 
 
 class FaultMeaning(NamedTuple):
@@ -33,6 +33,14 @@ GRIP_FAULTS: Mapping[str, FaultMeaning] = {
     "stale": FaultMeaning(
         "Samples of a finger came too late, or no samples arrive.",
         "The loop does not see the contact: check the sensor, its cable and the network.",
+    ),
+    "frozen": FaultMeaning(
+        "The readings of a finger repeat exactly.",
+        "Its sensor sends old readings: check the sensor and its cable.",
+    ),
+    "behind": FaultMeaning(
+        "The loop was behind the samples.",
+        "The hand takes too long for a command, or this computer is busy: check its load.",
     ),
     "finger_fault": FaultMeaning(
         "A finger of the grip has no estimate.",
@@ -60,7 +68,11 @@ GRIP_FAULTS: Mapping[str, FaultMeaning] = {
         "Check hand and object before you reset it.",
         lasts=True,
     ),
-    HAND: FaultMeaning(
+    "hand": FaultMeaning(
+        "The hand sends no joint states.",
+        "The driver of the hand is silent: check it and the network.",
+    ),
+    ENDED: FaultMeaning(
         "A command did not reach the hand.",
         "The hand refused it or is not connected, or the watchdog has taken over.",
         lasts=True,
@@ -87,7 +99,7 @@ def explain_fault(
         released: whether the hand is commanded to be open.
         failure: why the loop has ended for good; empty while it runs.
     """
-    key = HAND if failure else reason
+    key = ENDED if failure else reason
     meaning = GRIP_FAULTS.get(key, UNKNOWN_FAULT)
     return GripFault(
         reason=key,

@@ -41,6 +41,14 @@ class Hand(Openable):
         """Name of what only one controller may command; the same for all URIs of one hand."""
         return self.name
 
+    @property
+    def silent(self) -> bool:
+        """Whether an open hand that reports its state has not done so for too long.
+
+        No force changes meanwhile.
+        """
+        return False
+
     def check(self, limits: Limits, fingers: Iterable[str]) -> None:
         """Check, before anything is sent, that the hand can do what the limits allow.
 

@@ -2,7 +2,9 @@
 
 import re
 import time
+from collections import deque
 from dataclasses import replace
+from types import SimpleNamespace
 
 import pytest
 
@@ -200,6 +202,18 @@ class TestSilence:
             peer.close()
             with pytest.raises(HandError, match="nothing listens on /gripper/force any more"):
                 send_for_a_minute(hand)
+
+    @pytest.mark.parametrize(("period", "longest"), [(0.01, 0.1), (0.05, 0.15), (0.1, 0.3)])
+    def test_it_is_silent_sooner_than_it_fails(self, driver, monkeypatch, period, longest):
+        driver(ROS2["v4"])
+        with open_hand("ros2:v4") as hand:
+            monkeypatch.setattr(hand, "_reader", SimpleNamespace(take=lambda: None))
+            newest = hand._states[-1][1]
+            for age, silent in ((longest - 0.02, False), (longest + 0.02, True)):
+                monkeypatch.setattr(ros_hand, "time", SimpleNamespace(monotonic=lambda: 7.0))
+                hand._states = deque([(7.0 - age - period, newest), (7.0 - age, newest)])
+                assert hand.silent is silent
+            monkeypatch.undo()
 
     def test_joint_states_that_stop(self, driver):
         peer = driver(ROS2["v4"])

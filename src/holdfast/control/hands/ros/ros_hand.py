@@ -19,6 +19,9 @@ DISCOVERY_TIME = 0.5
 """Time in which other publishers are found [s]."""
 STATE_TIMEOUT = 0.5
 """Time without valid joint states after which a hand does not answer any more [s]."""
+SILENCE_TIME, SILENCE_PERIODS = 0.1, 3.0
+"""A hand is silent without joint states for this time [s], or this number of their periods if that
+is longer."""
 STATE_MEMORY = 0.2
 """Time of the joint states whose median counts at the begin of a grip; the hand has been STABLE
 for as long [s]."""
@@ -69,6 +72,17 @@ class RosHand(Hand):
     def resource(self) -> str:
         """What only one controller may command: the topic of the commands."""
         return f"{next(iter(self._topics))} {self._link.network}"
+
+    @property
+    def silent(self) -> bool:
+        """Whether there have been no joint states for 0.1 s, or for three of their periods."""
+        if self._reader is None or not self._poll():
+            return False
+        times = [at for at, _ in self._states]
+        if len(times) < 2:  # their period is not known
+            return time.monotonic() - times[-1] > STATE_TIMEOUT
+        period = (times[-1] - times[0]) / (len(times) - 1)
+        return time.monotonic() - times[-1] > max(SILENCE_TIME, SILENCE_PERIODS * period)
 
     def open(self) -> None:
         """Wait until the hand listens and sends valid joint states.
