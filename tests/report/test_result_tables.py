@@ -105,7 +105,7 @@ def test_csv_holds_every_value_to_the_last_digit(given_rows):
 
 def test_csv_has_no_formulas():
     made = to_csv(table(row(-1.0, classifier="=1+1")))
-    assert made.splitlines()[1] == "'=1+1,Acc,-1.0,,,"
+    assert made.splitlines()[1] == "'=1+1,Acc,-1.0,,,,,"
 
 
 def test_csv_by_hand():
