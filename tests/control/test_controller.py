@@ -213,6 +213,15 @@ class TestFaults:
         commands, _ = run(controller, time, 2.0)
         assert commands[-1].state is LoopState.FAULT
 
+    def test_a_lasting_fault_replaces_one_that_ends_by_itself(self):
+        controller, time = holding(recovery=0.5)
+        assert controller.update(hand(time), time + 0.2).reason is GripReason.STALE
+        gone = {name: {"state": ContactState.NO_CONTACT, "normal": 0.0} for name in FINGERS}
+        commands, time = run(controller, time + 0.2, 0.1, **gone)
+        assert commands[-1].reason is GripReason.LOST
+        commands, _ = run(controller, time, 2.0)
+        assert (commands[-1].state, commands[-1].reason) == (LoopState.FAULT, GripReason.LOST)
+
     def test_hold_recovers_after_valid_data_and_open_does_not(self):
         for on_fault, after in (("hold", LoopState.HOLD), ("open", LoopState.FAULT)):
             controller, time = holding(on_fault=on_fault, recovery=0.5)

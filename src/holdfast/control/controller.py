@@ -23,6 +23,8 @@ DEFAULT_RATE = 150.0
 """Rate of the samples, if no sensor is given [Hz]."""
 MIN_FINGERS = 2
 """Number of fingers in contact from which there is a grip; one, for a hand of one finger."""
+LASTING_FAULTS = (GripReason.LOST, GripReason.STOPPED)
+"""Faults that only a reset ends; they replace the reason of one that ends by itself."""
 KEEP = FingerCommand(1.0)
 
 _NONE, _UNKNOWN = GripReason.NONE, ContactState.UNKNOWN
@@ -280,10 +282,10 @@ class GripController:
             self._time = time
         if problem is not GripReason.NONE:
             self._valid_since = math.nan
-            if self._fault is GripReason.NONE:
+            lasting = problem in LASTING_FAULTS
+            if self._fault is GripReason.NONE or (lasting and self._fault not in LASTING_FAULTS):
                 self._fault = problem
                 self._change(LoopState.FAULT, time, problem)
-            lasting = problem in (GripReason.LOST, GripReason.STOPPED)
             self._latched |= self.limits.on_fault == "open" or lasting
         elif not self._valid_since <= time:
             self._valid_since = time
