@@ -170,7 +170,7 @@ class TestBehind:
 
     def test_a_pause_of_the_loop_is_a_fault(self, held, clock):
         runner, tape, time = held
-        clock[0] = runner._stepped_at + module.MAX_PAUSE
+        clock[0] = runner._stepped_at + module.MAX_PAUSE - 0.001
         runner.process(update(hand(time + 1 / RATE)))
         assert tape.commands[-1].state is LoopState.HOLD
         clock[0] += module.MAX_PAUSE + 0.001
