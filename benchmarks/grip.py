@@ -10,7 +10,7 @@ import time
 
 import numpy as np
 
-from holdfast.control import LAWS, GripController, Limits
+from holdfast.grip import LAWS, GripController, Limits
 from holdfast.detector import Detector
 from holdfast.model import Model
 from holdfast.sensors import sensor

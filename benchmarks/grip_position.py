@@ -16,13 +16,13 @@ from dataclasses import replace
 
 import numpy as np
 
-from holdfast.control import FingerCommand, GripCommand, LoopState
-from holdfast.control.hands.ros.kinds import KINDS
-from holdfast.control.hands.ros.link import Link
-from holdfast.control.hands.ros.parameters import Parameters
-from holdfast.control.trial.trials import Trial, draw_trial
+from holdfast.grip import FingerCommand, GripCommand, LoopState
+from holdfast.devices.hands.ros.kinds import KINDS
+from holdfast.devices.hands.ros.link import Link
+from holdfast.devices.hands.ros.parameters import Parameters
+from holdfast_lab.trial.trials import Trial, draw_trial
 from holdfast.ros.hand_messages import JointStates
-from holdfast.sources.uri import parse
+from holdfast.devices.uri import parse
 from holdfast.twin.contact import LOAD
 from holdfast.twin.control import PROPORTIONAL
 from holdfast.twin.hand import FINGERS, N_JOINTS

@@ -10,9 +10,9 @@ such a glitch counts here, unless a fingertip slid in the 0.3 s before it.
 import argparse
 from dataclasses import replace
 
-from holdfast.control import LAWS
-from holdfast.control.trial.run import run_trial
-from holdfast.control.trial.trials import Trial, draw_trials
+from holdfast.grip import LAWS
+from holdfast_lab.trial.run import run_trial
+from holdfast_lab.trial.trials import Trial, draw_trials
 from holdfast.parallel import map_ordered
 
 

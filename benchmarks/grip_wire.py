@@ -23,11 +23,11 @@ from threading import Event, Thread
 import numpy as np
 
 from holdfast.contact import CONTACT_FORCE, SLIP_SPEED
-from holdfast.control.hands.ros.driven_twin import DrivenTwin
-from holdfast.control.trial.run import RISE
-from holdfast.control.trial.trials import KINDS, Trial, draw_trials
-from holdfast.live.xela_server import XelaServer
-from holdfast.ros import dds
+from holdfast.devices.hands.ros.driven_twin import DrivenTwin
+from holdfast_lab.trial.run import RISE
+from holdfast_lab.trial.trials import KINDS, Trial, draw_trials
+from holdfast.live.publishers.xela_server import XelaServer
+from holdfast.devices.ros import dds
 from holdfast.ros.cdr import MessageDecoder, MessageEncoder
 from holdfast.ros.hand_messages import FLOATS, JOINT_STATE, hand_definition, joint_message
 from holdfast.twin.contact import LOAD, SLIP

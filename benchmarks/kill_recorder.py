@@ -27,7 +27,7 @@ from holdfast.io import load_recording
 from holdfast.live.recorder import Recorder
 from holdfast.recordings import Recording
 from holdfast.sensors import hand
-from holdfast.sources import Arrival
+from holdfast.devices.sources import Arrival
 
 RATE = 150.0
 MAX_LOST_TIME = 0.5

@@ -26,7 +26,7 @@ from holdfast.live.session import Session
 from holdfast.live.stream_detector import StreamDetector
 from holdfast.live.web.service import LiveService
 from holdfast.model import Model
-from holdfast.sources import open_source
+from holdfast.devices.sources import open_source
 from holdfast.synthetic import synthetic_recording
 from holdfast.web.guard import Guard
 

@@ -21,7 +21,7 @@ from holdfast.detector import detect
 from holdfast.live.arrival_detector import ArrivalDetector
 from holdfast.model import Model
 from holdfast.recordings import Recording
-from holdfast.sources import Arrival
+from holdfast.devices.sources import Arrival
 from holdfast.synthetic import synthetic_recording
 
 MODELS = ("builtin:any", "builtin:twin", "builtin:noise-floor")

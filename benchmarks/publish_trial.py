@@ -7,7 +7,7 @@
 folder of a finished `holdfast trial` to docs/grip/, in place of the old ones, and writes the page;
 `render` writes the page again. docs/grip-trials.md is written from docs/grip/grip-trials.md.j2.
 Change the template, not the page: every figure in it is taken from trial.json, and
-tests/test_docs_trial.py renders it again.
+lab/tests/test_docs_trial.py renders it again.
 """
 
 import argparse
@@ -19,9 +19,9 @@ from typing import Any
 
 from jinja2 import Environment, FileSystemLoader, StrictUndefined
 
-from holdfast.control.trial.report import summary_text
-from holdfast.control.trial.tables import all_tables
-from holdfast.report.table_layouts import to_markdown
+from holdfast_lab.trial.report import summary_text
+from holdfast_lab.trial.tables import all_tables
+from holdfast_lab.report.table_layouts import to_markdown
 
 DOCS = Path(__file__).parents[1] / "docs"
 PAGE = "grip-trials.md"

@@ -15,7 +15,7 @@ import numpy as np
 
 from holdfast.live.recorder import Recorder
 from holdfast.sensors import sensor
-from holdfast.sources import Arrival
+from holdfast.devices.sources import Arrival
 
 RATE = 150.0
 SENSORS = {f"finger{k}": sensor("uskin-curved") for k in range(12)}

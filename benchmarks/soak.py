@@ -29,9 +29,9 @@ from holdfast.live.stream_detector import StreamDetector, StreamUpdate
 from holdfast.live.web.service import LiveService
 from holdfast.model import Model
 from holdfast.sensors import hand
-from holdfast.sources.base import DeviceSource
-from holdfast.sources.xela.decoder import XelaDecoder
-from holdfast.sources.xela.encoder import XelaEncoder
+from holdfast.devices.sources.base import DeviceSource
+from holdfast.devices.sources.xela.decoder import XelaDecoder
+from holdfast.devices.sources.xela.encoder import XelaEncoder
 from holdfast.synthetic import synthetic_recording
 from holdfast.web.guard import Guard
 from holdfast.web.server import listening

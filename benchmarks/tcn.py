@@ -15,14 +15,14 @@ from pathlib import Path
 
 from joblib import Parallel, delayed
 
-from holdfast.study.evaluation.evaluate_method import (
+from holdfast_lab.study.evaluation.evaluate_method import (
     EvaluationEffort,
     EvaluationJob,
     MethodEvaluation,
     evaluate_method,
 )
-from holdfast.study.methods import METHODS
-from holdfast.study.plan import Corpus, scan_corpus
+from holdfast_lab.study.methods import METHODS
+from holdfast_lab.study.plan import Corpus, scan_corpus
 
 COMPARED = ("logreg", "svm_unweighted", "log_two", "anyskin", "holdfast", "tcn")
 TITLES = {"recording": "by recording", "object": "by object"}

@@ -10,7 +10,7 @@ from threading import Barrier
 import pytest
 
 from holdfast.children import SAFE_PATH_VARIABLE, python_command, safe_path
-from holdfast.control.watchdog import N_SAFE_COMMANDS
+from holdfast.live.loop.watchdog import N_SAFE_COMMANDS
 from holdfast.io import save_recording
 from holdfast.parallel import map_ordered
 from holdfast.synthetic import synthetic_recording
@@ -25,15 +25,15 @@ STUDY = """
 import sys
 from pathlib import Path
 from holdfast.parallel import Engine
-from holdfast.tasks import Task, TaskRunner
+from holdfast_lab.tasks import Task, TaskRunner
 tasks = [Task(str(k), divmod, (k, 3), tuple[int, int]) for k in range(4)]
 print(TaskRunner(Path(sys.argv[1]), Engine(2)).run(tasks))
 """
 WATCHDOG = """
 import sys
-from holdfast.control import FingerCommand, GripCommand, LoopState
-from holdfast.control.hands import open_hand
-from holdfast.control.watchdog import Watchdog
+from holdfast.grip import FingerCommand, GripCommand, LoopState
+from holdfast.devices.hands import open_hand
+from holdfast.live.loop.watchdog import Watchdog
 open_hand(sys.argv[1])
 watchdog = Watchdog(sys.argv[1], "open", timeout=3600.0)
 watchdog.start()
@@ -123,7 +123,7 @@ def test_the_twin_that_simulates_the_next_grasp(run, tmp_path):
     """The page and the recorder loop as well; this is the source that both read."""
     program = (
         "import sys\n"
-        "from holdfast.sources import open_source\n"
+        "from holdfast.devices.sources import open_source\n"
         "with open_source(sys.argv[1], speed=0, loop=True) as source:\n"
         "    while not any('-2' in n for n in source.read(60.0).notices):\n"
         "        pass\n"

@@ -16,7 +16,7 @@ from typing import IO
 
 from attack.result import Result
 from holdfast.io import save_recording
-from holdfast.sources import Source, open_source
+from holdfast.devices.sources import Source, open_source
 from holdfast.synthetic import synthetic_recording
 
 TOKEN = "a-secret-of-the-attack"

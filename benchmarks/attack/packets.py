@@ -15,10 +15,10 @@ from holdfast.recordings import Recording
 from holdfast.ros.cdr import MessageDecoder, MessageEncoder
 from holdfast.ros.sensor_messages import SampleDecoder, known_definition
 from holdfast.sensors import hand, sensor
-from holdfast.sources.anyskin import AnySkinDecoder
-from holdfast.sources.ros.message_assembler import MessageAssembler
-from holdfast.sources.xela.decoder import XelaDecoder
-from holdfast.sources.xela.encoder import XelaEncoder
+from holdfast.devices.sources.anyskin import AnySkinDecoder
+from holdfast.devices.sources.ros.message_assembler import MessageAssembler
+from holdfast.devices.sources.xela.decoder import XelaDecoder
+from holdfast.devices.sources.xela.encoder import XelaEncoder
 from holdfast.synthetic import synthetic_recording
 
 EPOCH = 1.7e9

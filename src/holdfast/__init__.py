@@ -20,8 +20,8 @@ if TYPE_CHECKING:
     from holdfast.contact import Fault as Fault
     from holdfast.contact import HandEstimate as HandEstimate
     from holdfast.contact import Reason as Reason
-    from holdfast.control import GripCommand as GripCommand
-    from holdfast.control import GripController as GripController
+    from holdfast.grip import GripCommand as GripCommand
+    from holdfast.grip import GripController as GripController
     from holdfast.detector import Detector as Detector
     from holdfast.detector import detect as detect
     from holdfast.errors import HoldfastError as HoldfastError
@@ -49,9 +49,9 @@ if TYPE_CHECKING:
     from holdfast.sensors import Hand as Hand
     from holdfast.sensors import Sensor as Sensor
     from holdfast.sensors import sensor as sensor
-    from holdfast.sources import Arrival as Arrival
-    from holdfast.sources import Source as Source
-    from holdfast.sources import open_source as open_source
+    from holdfast.devices.sources import Arrival as Arrival
+    from holdfast.devices.sources import Source as Source
+    from holdfast.devices.sources import open_source as open_source
     from holdfast.training import StabilityClassifier as StabilityClassifier
     from holdfast.training import evaluate as evaluate
     from holdfast.training import train as train

@@ -9,7 +9,7 @@ from holdfast.cli import doctor as verb
 from holdfast.cli import main
 from holdfast.cli.doctor import EXTRA_PURPOSES
 from holdfast.errors import install_command
-from holdfast.sources.xela import places
+from holdfast.devices.sources.xela import places
 
 
 def report(capsys):
@@ -87,7 +87,7 @@ def test_the_configuration_of_the_hand(capsys, monkeypatch, tmp_path):
 
 
 def test_what_can_be_reached(capsys, monkeypatch):
-    monkeypatch.setattr("holdfast.sources.xela.places.own_address", lambda: None)
+    monkeypatch.setattr("holdfast.devices.sources.xela.places.own_address", lambda: None)
     found = report(capsys)["sources"]
     assert set(found) == {"xela", "ros1", "ros2", "serial"}
     assert "127.0.0.1:5000" in found["xela"]
@@ -109,7 +109,7 @@ def test_missing_extras_are_reported(monkeypatch):
 
 
 def test_a_bad_master_is_reported(capsys, monkeypatch):
-    monkeypatch.setattr("holdfast.ros.rospy_node.rospy_module", lambda: None)
+    monkeypatch.setattr("holdfast.devices.ros.rospy_node.rospy_module", lambda: None)
     monkeypatch.setenv("ROS_MASTER_URI", "nonsense")
     assert report(capsys)["sources"]["ros1"] == (
         "a ROS master like http://localhost:11311 expected, 'nonsense' given"

@@ -10,9 +10,10 @@ from holdfast.cli import main
 from holdfast.cli.grip_options import GripSettings
 from holdfast.cli.hold import hold
 from holdfast.cli.serve import serve
-from holdfast.control import GripCommand, Limits, watchdog
-from holdfast.control.hands.ros import ros_hand
-from holdfast.control.trial.run import LIMITS
+from holdfast.grip import GripCommand, Limits
+from holdfast.live.loop import watchdog
+from holdfast.devices.hands.ros import ros_hand
+from holdfast_lab.trial.run import LIMITS
 from holdfast.io import load_recording, save_recording
 from holdfast.synthetic import synthetic_recording
 

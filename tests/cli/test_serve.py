@@ -12,9 +12,9 @@ import pytest
 from holdfast.cli import main
 from holdfast.cli import serve as verb
 from holdfast.cli.serve import open_browser
-from holdfast.control import watchdog
-from holdfast.control.hands import Claim
-from holdfast.control.hands.log_file import LogFile
+from holdfast.live.loop import watchdog
+from holdfast.devices.hands import Claim
+from holdfast.devices.hands.log_file import LogFile
 from holdfast.errors import HandError
 from holdfast.io import load_recording, save_recording
 from holdfast.model import Model

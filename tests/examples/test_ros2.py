@@ -11,8 +11,8 @@ import pytest
 pytest.importorskip("cyclonedds", reason="cyclonedds is not installed")
 
 from holdfast.contact import ContactState
-from holdfast.live.ros2_publisher import DEFINITIONS, Ros2Publisher
-from holdfast.live.ros_publisher import DIAGNOSTICS, diagnostics_of
+from holdfast.live.publishers.ros2_publisher import DEFINITIONS, Ros2Publisher
+from holdfast.live.publishers.ros_publisher import DIAGNOSTICS, diagnostics_of
 from holdfast.ros.definitions import NUMBER_CODES, parse_definition
 from live.estimates import estimate
 

@@ -6,7 +6,7 @@ from concurrent.futures import Future
 import msgspec
 
 from holdfast.contact import ContactEstimate, ContactState, Fault, HandEstimate, Reason
-from holdfast.live.grip import GripDocument, GripEntry, GripFinger, GripLimits
+from holdfast.live.loop.documents import GripDocument, GripEntry, GripFinger, GripLimits
 
 UNITS = {"thumb": "N", "index/1": "count"}
 

@@ -15,7 +15,7 @@ import pytest
 
 from holdfast.detector import detect
 from holdfast.live.stream_detector import StreamDetector
-from holdfast.sources import open_source
+from holdfast.devices.sources import open_source
 
 from . import build
 
@@ -51,7 +51,7 @@ FINGERS = ("thumb", "index", "middle", "ring")
 @pytest.mark.parametrize("words", [("--separate",), ("--whole-hand", "--version", "1.7")])
 def test_estimates_over_the_network_are_those_of_the_recording(tmp_path, monkeypatch, words):
     for name in ("MIN_LATE_DELAY", "MIN_CLOCK_JUMP"):  # a busy machine is late
-        monkeypatch.setattr(f"holdfast.sources.timeline.{name}", math.inf)
+        monkeypatch.setattr(f"holdfast.devices.sources.timeline.{name}", math.inf)
     monkeypatch.setattr("holdfast.live.arrival_detector.MIN_SILENCE_TIMEOUT", PATIENCE)
     path, recording = build.grasp_file(tmp_path, fingers=FINGERS)
     model = build.model()

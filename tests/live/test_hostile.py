@@ -11,9 +11,9 @@ from holdfast.detector import detect
 from holdfast.live.session import Session
 from holdfast.live.stream_detector import StreamDetector
 from holdfast.sensors import sensor
-from holdfast.sources import open_source
-from holdfast.sources.xela.encoder import XelaEncoder
-from sources.xela.servers import HANG_UP, free_port, server
+from holdfast.devices.sources import open_source
+from holdfast.devices.sources.xela.encoder import XelaEncoder
+from devices.sources.xela.servers import HANG_UP, free_port, server
 
 from . import build
 from .test_session import wait_for
@@ -26,7 +26,7 @@ NAMES = "fingers=1:thumb,2:index,3:middle"
 def any_pace(monkeypatch):
     """Accept bursts: these tests send seconds of packets at once."""
     for name in ("MIN_LATE_DELAY", "MIN_CLOCK_JUMP"):  # a busy machine is late
-        monkeypatch.setattr(f"holdfast.sources.timeline.{name}", math.inf)
+        monkeypatch.setattr(f"holdfast.devices.sources.timeline.{name}", math.inf)
 
 
 def packets_of(recording, epoch=EPOCH):

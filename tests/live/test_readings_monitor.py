@@ -8,7 +8,7 @@ from holdfast.live.arrival_detector import ArrivalDetector
 from holdfast.live.readings_monitor import MISSING_AXES, PULLED, STILL, ReadingsMonitor
 from holdfast.recordings import Recording, Tactile
 from holdfast.sensors import sensor
-from holdfast.sources import Arrival
+from holdfast.devices.sources import Arrival
 from holdfast.synthetic import synthetic_recording
 
 PATCH = sensor("uskin-4x4")

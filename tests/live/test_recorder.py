@@ -19,8 +19,8 @@ from holdfast.io.mcap_writer import RecordingWriter
 from holdfast.live import recorder as module
 from holdfast.live.recorder import Recorder
 from holdfast.sensors import sensor
-from holdfast.sources import Arrival, open_source
-from holdfast.sources.base import notice_arrival
+from holdfast.devices.sources import Arrival, open_source
+from holdfast.devices.sources.base import notice_arrival
 
 ANYSKIN = sensor("anyskin")
 TWO = {"thumb": ANYSKIN, "index": ANYSKIN}
@@ -368,7 +368,7 @@ def test_the_system_is_called_to_write_to_the_disk(path):
 import numpy as np
 from holdfast.live.recorder import Recorder
 from holdfast.sensors import sensor
-from holdfast.sources import Arrival
+from holdfast.devices.sources import Arrival
 
 with Recorder({str(path)!r}, {{"thumb": sensor("anyskin")}}, fsync=True) as recorder:
     recorder.put(Arrival(0.0, {{"thumb": np.zeros((5, 3))}}, received=0.0))
@@ -397,7 +397,7 @@ import numpy as np
 from holdfast.errors import OutputError
 from holdfast.live.recorder import Recorder
 from holdfast.sensors import sensor
-from holdfast.sources import Arrival
+from holdfast.devices.sources import Arrival
 
 recorder = Recorder(sys.argv[1], {"thumb": sensor("anyskin")})
 noise = np.random.default_rng(0)

@@ -8,13 +8,13 @@ import pytest
 from matplotlib.text import Text
 
 from holdfast.metrics import summarise
-from holdfast.plots.curves import draw_reliability
-from holdfast.plots.dots import IntervalEstimate, draw_dots, draw_groups
+from holdfast_lab.figures.curves import draw_reliability
+from holdfast_lab.figures.dots import IntervalEstimate, draw_dots, draw_groups
 from holdfast.plots.evaluation import draw_evaluation
-from holdfast.plots.experiment import draw_experiment, draw_forces
+from holdfast_lab.figures.experiment import draw_experiment, draw_forces
 from holdfast.plots.recording import plot_recording
 from holdfast.plots.sensors import plot_hand, plot_sensor
-from holdfast.plots.trials import ForceCourse, draw_courses
+from holdfast_lab.figures.trials import ForceCourse, draw_courses
 from holdfast.sensors import Hand, hand, sensor
 from holdfast.synthetic import synthetic_recording
 

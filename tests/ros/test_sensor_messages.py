@@ -6,7 +6,7 @@ from holdfast.ros.sensor_messages import SENS_STREAM, SampleDecoder, known_defin
 
 pytest.importorskip("rosbags", reason="rosbags is not installed")
 
-from sources.ros_build import (
+from devices.sources.ros_build import (
     OLD,
     PILLARS,
     XELA,

@@ -42,7 +42,7 @@ class Config(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
         Args:
             source: path or URI from the command line, or `hand`.
         """
-        from holdfast.sources.uri import DEVICE_MODULES, is_uri, parse
+        from holdfast.devices.uri import DEVICE_MODULES, is_uri, parse
 
         if source == HAND and not Path(HAND).exists():
             source = self.source or f"xela://{self.host or 'auto'}"

@@ -147,7 +147,7 @@ def _replay_on_page(model: "Model", path: Path, out: Path, speed: float) -> None
     from holdfast.cli.serve import open_browser, run_page
     from holdfast.live.session import Session
     from holdfast.live.stream_detector import StreamDetector
-    from holdfast.sources import open_source
+    from holdfast.devices.sources import open_source
 
     stay = sys.stdin.isatty()
     with (

@@ -15,7 +15,7 @@ if TYPE_CHECKING:
     from holdfast.metrics import InstabilityEvent
     from holdfast.model import Model
     from holdfast.recordings import Recording
-    from holdfast.sources import Source
+    from holdfast.devices.sources import Source
 
 MIN_DURATION = 0.15
 """Minimum time that a new state must last to be printed [s]."""
@@ -103,7 +103,7 @@ def replay(model: "Model", path: Path, speed: float, true_events: TrueEvents) ->
     Returns:
         Number of estimates.
     """
-    from holdfast.sources import open_source
+    from holdfast.devices.sources import open_source
 
     with open_source(str(path), speed=speed) as source:
         if speed and sys.stderr.isatty():

@@ -76,7 +76,7 @@ def detect(
       holdfast detect builtin:noise-floor grasp.mcap --summary
       holdfast detect model.json grasp.parquet --debounce 0.05 --hysteresis 0.1
     """
-    from holdfast.sources.uri import is_uri
+    from holdfast.devices.uri import is_uri
 
     live = is_uri(source)
     _check_seconds(seconds, source, live=live)
@@ -201,7 +201,7 @@ def _detect_live(
     """Yield the estimates of each arrival, until a signal or for `seconds`."""
     from holdfast.cli.detect_output import chunk_from_stream
     from holdfast.live.stream_detector import compile_kernels
-    from holdfast.sources import open_source
+    from holdfast.devices.sources import open_source
 
     compile_kernels()
     with handle_stop_signals() as stop, open_source(uri) as source:

@@ -193,8 +193,8 @@ def check_sources() -> dict[str, str]:
 
 
 def _xela() -> str:
-    from holdfast.sources.uri import parse
-    from holdfast.sources.xela.places import places
+    from holdfast.devices.uri import parse
+    from holdfast.devices.sources.xela.places import places
 
     addresses = places(parse("xela://auto")[1])
     for address in addresses:
@@ -205,7 +205,7 @@ def _xela() -> str:
 
 def _ros1() -> str:
     from holdfast.errors import HoldfastError
-    from holdfast.ros.rospy_node import check_master, master_uri, rospy_module
+    from holdfast.devices.ros.rospy_node import check_master, master_uri, rospy_module
 
     try:
         rospy_module()

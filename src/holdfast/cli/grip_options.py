@@ -11,12 +11,12 @@ import typer
 from holdfast.cli.terminal.console import print_message
 
 if TYPE_CHECKING:
-    from holdfast.control import Limits
-    from holdfast.control.hands import Hand
-    from holdfast.control.loop import GripLoop, Log
-    from holdfast.control.watchdog import Watchdog
+    from holdfast.grip import Limits
+    from holdfast.devices.hands import Hand
+    from holdfast.live.loop.grip_loop import GripLoop, Log
+    from holdfast.live.loop.watchdog import Watchdog
     from holdfast.live.stream_detector import StreamDetector
-    from holdfast.sources import Source
+    from holdfast.devices.sources import Source
 
 
 class FaultAction(StrEnum):
@@ -95,7 +95,7 @@ class GripSettings(NamedTuple):
             ValueError: the limits contradict each other, there is no such law, or there are
                 values without a hand.
         """
-        from holdfast.control.laws import law_named
+        from holdfast.grip.laws import law_named
 
         self.limits()
         law_named(self.law)
@@ -108,7 +108,7 @@ class GripSettings(NamedTuple):
         Raises:
             ValueError: they contradict each other.
         """
-        from holdfast.control import Limits
+        from holdfast.grip import Limits
 
         scales = {"min_scale": self.min_scale, "max_scale": self.max_scale}
         given = {name: scale for name, scale in scales.items() if scale is not None}
@@ -123,9 +123,9 @@ def find_source_and_hand(
     Raises:
         ValueError: the hand is the twin and the source is not, or a URI is not valid.
     """
-    from holdfast.control.hands import open_hand
-    from holdfast.control.live_twin import LiveTwin
-    from holdfast.sources import open_source
+    from holdfast.devices.hands import open_hand
+    from holdfast.devices.live_twin import LiveTwin
+    from holdfast.devices.sources import open_source
 
     if hand == TWIN:
         if not source.startswith(TWIN):
@@ -159,8 +159,8 @@ def connect_hand(stack: ExitStack, settings: GripSettings, hand: "Hand") -> "Wat
     Raises:
         HandError: the hand does not answer, or has another controller.
     """
-    from holdfast.control.hands import Claim
-    from holdfast.control.watchdog import Watchdog
+    from holdfast.devices.hands import Claim
+    from holdfast.live.loop.watchdog import Watchdog
 
     if not settings.armed or settings.hand == TWIN:
         return None
@@ -186,8 +186,8 @@ def open_loop(
         ValueError: the law needs newtons, the hand cannot do what the limits allow, or the model
             has no estimates of a finger.
     """
-    from holdfast.control import GripController
-    from holdfast.control.loop import GripLoop
+    from holdfast.grip import GripController
+    from holdfast.live.loop.grip_loop import GripLoop
 
     limits = settings.limits()
     hand.check(limits, stream.fingers)

@@ -39,13 +39,13 @@ from holdfast.cli.terminal.console import print_line, print_message
 from holdfast.cli.terminal.stopping import StopRequest, handle_stop_signals
 
 if TYPE_CHECKING:
-    from holdfast.control import GripCommand
-    from holdfast.control.loop import GripLoop
-    from holdfast.control.runner import LoopRunner
+    from holdfast.grip import GripCommand
+    from holdfast.live.loop.grip_loop import GripLoop
+    from holdfast.live.loop.runner import LoopRunner
     from holdfast.live.recorder import Recorder
     from holdfast.live.session import Session
     from holdfast.live.stream_detector import StreamDetector, StreamUpdate
-    from holdfast.sources import Source
+    from holdfast.devices.sources import Source
 
 
 def hold(
@@ -163,7 +163,7 @@ def _run(
     loop: "GripLoop", session: "Session", log: _Log, seconds: float | None, stop: StopRequest
 ) -> None:
     """Step the loop until the source ends, the time is over, or Ctrl-C."""
-    from holdfast.control.runner import LoopRunner
+    from holdfast.live.loop.runner import LoopRunner
 
     source = session.source
     runner = LoopRunner(loop, source.speed if source.paced else 0.0, log.command)

@@ -18,7 +18,7 @@ if TYPE_CHECKING:
     from holdfast.model import Model
     from holdfast.parallel import Engine
     from holdfast.sensors import Sensor
-    from holdfast.sources import Source
+    from holdfast.devices.sources import Source
 
 TOKEN_VARIABLE = "HOLDFAST_TOKEN"
 """Environment variable with the token of the pages."""
@@ -215,7 +215,7 @@ def load_model(
     from msgspec.structs import replace
 
     from holdfast.model import Debounce, Model
-    from holdfast.sources.uri import is_uri
+    from holdfast.devices.uri import is_uri
 
     is_source = is_uri(name) and not name.startswith("builtin:")
     if is_source or name.endswith((".parquet", ".mcap")):
@@ -300,7 +300,7 @@ def check_speed(source: str, speed: float) -> None:
         ValueError: the speed is negative or not finite, or the source is a device and the
             speed is not 1.
     """
-    from holdfast.sources.uri import is_uri
+    from holdfast.devices.uri import is_uri
 
     if not (math.isfinite(speed) and speed >= 0):
         raise ValueError(f"--speed: at least 0 expected, {speed:g} given")

@@ -15,7 +15,7 @@ from holdfast.cli.terminal.stopping import StopRequest, handle_stop_signals
 
 if TYPE_CHECKING:
     from holdfast.live.recorder import Recorder, RecorderStatus
-    from holdfast.sources import Arrival, Source
+    from holdfast.devices.sources import Arrival, Source
 
 READ_TIMEOUT = 0.1
 """Time to wait for the source before keys and signals are checked [s]."""
@@ -79,7 +79,7 @@ def record(
     check_speed(source, speed)
     metadata = _metadata(object_name, case, note, settings or [])
     path = _output_path(source, out, object_name, force=force)
-    from holdfast.sources import open_source
+    from holdfast.devices.sources import open_source
 
     with handle_stop_signals() as stop, open_source(source, speed=speed) as opened:
         stop.graceful = True
@@ -168,7 +168,7 @@ def _output_path(source: str, out: Path, object_name: str, *, force: bool) -> Pa
 def _recording_name(source: str, object_name: str) -> str:
     """Return the name of the source recording, or the object or device with the time."""
     from holdfast.files import file_stem
-    from holdfast.sources.uri import is_uri
+    from holdfast.devices.uri import is_uri
 
     if not is_uri(source):
         return file_stem(Path(source).stem)

@@ -50,15 +50,15 @@ from holdfast.cli.options import (
 from holdfast.cli.terminal.console import print_json, print_message
 
 if TYPE_CHECKING:
-    from holdfast.control.hands import Hand
-    from holdfast.control.live_grip import LiveGrip
-    from holdfast.control.watchdog import Watchdog
-    from holdfast.live.grip import Grip
-    from holdfast.live.ros_publisher import RosPublisher
+    from holdfast.devices.hands import Hand
+    from holdfast.live.loop.live_grip import LiveGrip
+    from holdfast.live.loop.watchdog import Watchdog
+    from holdfast.live.loop.documents import Grip
+    from holdfast.live.publishers.ros_publisher import RosPublisher
     from holdfast.live.session import Session
     from holdfast.live.stream_detector import StreamDetector
     from holdfast.model import Model
-    from holdfast.sources import Source
+    from holdfast.devices.sources import Source
     from holdfast.web.guard import Guard
 
 DEFAULT_HOST, DEFAULT_PORT = "127.0.0.1", 8080
@@ -162,7 +162,7 @@ def serve(
 
 def _find(source: str, hand: str, *, speed: float, loop: bool) -> "tuple[Source, Hand | None]":
     """Return the source, and the hand if one is given; neither is open yet."""
-    from holdfast.sources import open_source
+    from holdfast.devices.sources import open_source
 
     if hand:
         return find_source_and_hand(source, hand, speed=speed, loop=loop)
@@ -174,7 +174,7 @@ def _live_grip(
     settings: GripSettings, hand: "Hand", session: "Session", watchdog: "Watchdog | None"
 ) -> "Iterator[LiveGrip]":
     """Yield the loop of a hand, which runs in a thread. Without `--armed` nothing is sent."""
-    from holdfast.control.live_grip import EventLog, LiveGrip
+    from holdfast.live.loop.live_grip import EventLog, LiveGrip
 
     log = EventLog()
     with (
@@ -199,11 +199,11 @@ def _create_publishers(
 ) -> "Iterator[RosPublisher]":
     units = {name: sensor.unit for name, sensor in stream.fingers.items()}
     if ros2:
-        from holdfast.live.ros2_publisher import Ros2Publisher
+        from holdfast.live.publishers.ros2_publisher import Ros2Publisher
 
         yield Ros2Publisher(units, grip=grip)
     if ros1:
-        from holdfast.live.ros1_publisher import Ros1Publisher
+        from holdfast.live.publishers.ros1_publisher import Ros1Publisher
 
         yield Ros1Publisher(units, grip=grip)
 

@@ -134,7 +134,7 @@ HOLDFAST_FEATURES = (
     *_rich("finger"),
     *_rich("hand"),
 )
-"""The project's own features, named `holdfast`: see `holdfast.study.methods.holdfast`."""
+"""The project's own features, named `holdfast`: see `holdfast_lab.study.methods.holdfast`."""
 
 
 ANY_LAGS = (0.017, 0.067, 0.133, 0.267, 0.533)

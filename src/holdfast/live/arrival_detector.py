@@ -19,7 +19,7 @@ from holdfast.model import Model
 from holdfast.recordings import GAP_PERIODS
 from holdfast.resampling import Resampler
 from holdfast.sensors import Sensor
-from holdfast.sources import Arrival
+from holdfast.devices.sources import Arrival
 
 RATE_MEASUREMENT_TIME = 0.5
 """Length of the first part of a stream, from which its rate is measured [s]."""

@@ -7,7 +7,7 @@ from typing import Any
 from holdfast.live.arrival_detector import ArrivalDetector, StreamEstimate
 from holdfast.model import Model
 from holdfast.sensors import Sensor
-from holdfast.sources import Arrival
+from holdfast.devices.sources import Arrival
 
 
 class Judge(ArrivalDetector):

@@ -15,7 +15,7 @@ from holdfast.errors import OutputError
 from holdfast.io.mcap_writer import RecordingWriter
 from holdfast.live.recording_buffer import RecordingBuffer
 from holdfast.sensors import Sensor
-from holdfast.sources import Arrival
+from holdfast.devices.sources import Arrival
 
 if TYPE_CHECKING:
     from holdfast.live.session import Session

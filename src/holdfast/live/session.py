@@ -14,7 +14,7 @@ import numpy as np
 
 from holdfast.errors import SourceError, StreamError
 from holdfast.live.stream_detector import StreamDetector, StreamUpdate
-from holdfast.sources import Arrival
+from holdfast.devices.sources import Arrival
 
 MAX_LATENCIES = 8192
 """Number of newest latencies from which the percentiles are computed."""

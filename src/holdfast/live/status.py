@@ -9,7 +9,7 @@ import numpy as np
 from holdfast.contact import ContactEstimate, ContactState, HandEstimate
 from holdfast.live.arrival_detector import StreamEstimate
 from holdfast.live.fault_notices import FAULT_TEXTS, FaultWatch
-from holdfast.live.grip import Grip
+from holdfast.live.loop.documents import Grip
 from holdfast.live.recorder import Recorder
 from holdfast.live.session import Session
 from holdfast.live.stream_detector import StreamUpdate

@@ -14,8 +14,8 @@ from holdfast.live.arrival_detector import ArrivalDetector, Samples, StreamEstim
 from holdfast.live.lasting_changes import DEFAULT_DURATION, LastingChanges
 from holdfast.model import Model
 from holdfast.sensors import sensor
-from holdfast.sources import Arrival, Source
-from holdfast.sources.base import DeviceSource
+from holdfast.devices.sources import Arrival, Source
+from holdfast.devices.sources.base import DeviceSource
 
 
 def compile_kernels() -> None:

@@ -10,8 +10,8 @@ from holdfast.io import import_recordings, load_recording, save_recording
 from holdfast.io.recording_files import is_recording
 from holdfast.ros.sensor_messages import DeviceSample
 from holdfast.sensors import hand
-from holdfast.sources.ros.message_assembler import MessageAssembler
-from holdfast.sources.xela.decoder import XelaDecoder
+from holdfast.devices.sources.ros.message_assembler import MessageAssembler
+from holdfast.devices.sources.xela.decoder import XelaDecoder
 from holdfast.synthetic import synthetic_recording
 
 pytest.importorskip("rosbags", reason="rosbags is not installed")
@@ -20,7 +20,7 @@ from rosbags.rosbag1 import Writer as Writer1
 from rosbags.rosbag2 import StoragePlugin
 from rosbags.rosbag2 import Writer as Writer2
 
-from sources.ros_build import (
+from devices.sources.ros_build import (
     OLD,
     PILLARS,
     XELA,
@@ -31,7 +31,7 @@ from sources.ros_build import (
     x_server,
     x_stream,
 )
-from sources.xela import build as xela_packets
+from devices.sources.xela import build as xela_packets
 
 EPOCH = 1_619_157_045.0
 N = 30

@@ -5,7 +5,7 @@ import pytest
 
 from holdfast.errors import HandError
 from holdfast.io import load_recording
-from holdfast.live.grip import GripDocument
+from holdfast.live.loop.documents import GripDocument
 from holdfast.live.web import grip_routes
 from live.estimates import FakeGrip
 from live.web.test_service import kernels, patient, run, served, wait_for

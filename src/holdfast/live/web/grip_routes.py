@@ -9,7 +9,7 @@ import msgspec
 from aiohttp import web
 
 from holdfast.errors import HoldfastError
-from holdfast.live.grip import Grip
+from holdfast.live.loop.documents import Grip
 from holdfast.web.body import json_error
 
 ANSWER_TIMEOUT = 1.0

@@ -5,7 +5,7 @@ from typing import Literal
 from msgspec import Struct
 
 from holdfast.contact import Cause, ContactState, Fault, Reason
-from holdfast.live.grip import GripDocument
+from holdfast.live.loop.documents import GripDocument
 
 SCHEMA = "holdfast.live/1"
 """Name of the schema. New fields may be added under this name; existing ones do not change."""

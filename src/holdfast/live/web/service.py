@@ -13,7 +13,7 @@ import msgspec
 from aiohttp import WSMsgType, web
 
 from holdfast.errors import HoldfastError
-from holdfast.live.grip import Grip
+from holdfast.live.loop.documents import Grip
 from holdfast.live.recorder import SessionRecorder
 from holdfast.live.session import Session
 from holdfast.live.status import (

@@ -21,8 +21,8 @@ from holdfast.contact import ContactState, Fault, Reason
 from holdfast.detector import detect
 from holdfast.io import load_recording
 from holdfast.live.fault_notices import FAULT_TEXTS
-from holdfast.live.grip import GripLimits
-from holdfast.live.grip_faults import explain_fault
+from holdfast.live.loop.documents import GripLimits
+from holdfast.live.loop.grip_faults import explain_fault
 from holdfast.model import Model
 from holdfast.sensors import sensor
 from holdfast.web.guard import SECURITY_HEADERS

@@ -4,7 +4,7 @@ import re
 
 import pytest
 
-from holdfast.live.grip_faults import GRIP_FAULTS
+from holdfast.live.loop.grip_faults import GRIP_FAULTS
 from live.web.page.fake_service import Service, Tape, gripping, made_up
 from live.web.page.test_main import requests, shows, until, wait_for_samples
 from web.screens import PHONE, SCREENS, flaws

@@ -1,0 +1,245 @@
+"""Part of the study: all methods on the same recordings, by sample, event and circumstance."""
+
+from collections.abc import Mapping, Sequence
+
+import numpy as np
+
+from holdfast.metrics.events import POST_DURATIONS
+from holdfast_lab.figures.curves import Curve, draw_alarms, draw_reliability
+from holdfast_lab.figures.dots import IntervalEstimate, draw_dots, draw_groups
+from holdfast_lab.report.html_report import ReportFigure
+from holdfast_lab.report.result_tables import ResultTable, Row
+from holdfast.sensors.types import Array
+from holdfast_lab.study.comparison import costs, error_tables, event_tables, sample_tables, strongest
+from holdfast_lab.study.comparison.jobs import (
+    DEFAULT_SECONDS,
+    METHOD_SECONDS,
+    REFERENCE_METHOD,
+    SPLIT_TITLES,
+    Results,
+    method_job,
+    method_results,
+    method_task,
+    method_titles,
+)
+from holdfast_lab.study.evaluation.alarm_statistics import AlarmStatistics
+from holdfast_lab.study.evaluation.evaluate_method import (
+    COMPARED_RATE,
+    FALSE_ALARM_RATES,
+    MethodEvaluation,
+    evaluate_pooled,
+)
+from holdfast_lab.study.methods import METHODS
+from holdfast_lab.study.paper.random_split import ConfusionCounts
+from holdfast_lab.study.plan import StudyPlan
+from holdfast_lab.tasks import Task
+
+TABLES = (
+    strongest.table,
+    sample_tables.methods,
+    sample_tables.hands,
+    event_tables.events,
+    event_tables.slips,
+    event_tables.glitches,
+    event_tables.glitch_rates,
+    sample_tables.splits,
+    error_tables.phases,
+    error_tables.force,
+    error_tables.directions,
+    sample_tables.reliability,
+    costs.table,
+)
+"""Functions that make the tables, in their order."""
+
+ALARM_CURVES = (
+    "logreg", "zhang", "slip_servo", "anyskin", "jl_global_logreg", "tcn", "trees", "holdfast",
+)  # fmt: skip
+"""Methods in the figure of alarms, one of each kind: more curves would be hard to read."""
+DETAIL_METHODS = ("logreg", "svm", "zhang", "trees", "holdfast")
+"""Methods in the figures of reliability and errors."""
+
+
+def tasks(plan: StudyPlan) -> list[Task]:
+    """Return the evaluation tasks of all methods, those by a random split, and the costs."""
+    evaluated = [method_task(plan, name) for name in method_titles(plan)]
+    pooled = [_pooled_task(plan, name) for name in sample_tables.pooled_methods(plan)]
+    return [*evaluated, *pooled, *costs.tasks(plan)]
+
+
+def _pooled_task(plan: StudyPlan, name: str) -> Task:
+    cost = METHOD_SECONDS.get(name, DEFAULT_SECONDS) / 4
+    arguments = (method_job(plan, name),)
+    return Task(f"pooled/{name}", evaluate_pooled, arguments, ConfusionCounts, cost=cost)
+
+
+def tables(plan: StudyPlan, results: Results) -> list[ResultTable]:
+    """Return all tables of the comparison that have rows."""
+    made = [make(plan, results) for make in TABLES]
+    return [table for table in made if table.rows]
+
+
+def figures(plan: StudyPlan, results: Results) -> list[ReportFigure]:
+    """Return all figures of the comparison."""
+    drawn = [
+        _accuracy_figure(plan, results),
+        _alarm_figure(plan, results),
+        _reliability_figure(plan, results),
+        _grip_figure(plan, results),
+        _direction_figure(plan, results),
+    ]
+    return [figure for figure in drawn if figure is not None]
+
+
+def _accuracy_figure(plan: StudyPlan, results: Results) -> ReportFigure:
+    rows = [
+        row
+        for row in sample_tables.hands(plan, results).rows
+        if row.keys["figure"] == "accuracy [%]"
+    ]
+    groups = {
+        f"accuracy of hands,\n{title} [%]": _estimates(
+            [row for row in rows if row.keys["on"] == title], "method"
+        )
+        for title in (SPLIT_TITLES[key] for key in ("recording", "object", "others"))
+    }
+    groups = {head: values for head, values in groups.items() if values}
+    emphasised = [METHODS[name].title for name in (REFERENCE_METHOD, "holdfast") if name in METHODS]
+    caption = (
+        "All methods evaluated as hands, the task that they have in common. Lines: 95 % "
+        "intervals, by bootstrap over recordings."
+    )
+    return ReportFigure("methods", caption, draw_dots(groups, emphasised))
+
+
+def _alarm_figure(plan: StudyPlan, results: Results) -> ReportFigure:
+    post = f"{1000 * POST_DURATIONS[0]:.0f} ms"
+    groups: dict[str, dict[str, Curve]] = {
+        f"events missed at {post} [%]": {},
+        f"slips not detected within {post} [%]": {},
+    }
+    for title, evaluation in _by_recording(plan, results, ALARM_CURVES).items():
+        for group, curve in zip(groups.values(), _alarm_curves(evaluation), strict=True):
+            group[title] = curve
+    caption = (
+        "Missed events and slips against false alarms, by recording. Thresholds are chosen on "
+        "training recordings for false alarms under a stable label of "
+        f"{', '.join(f'{rate:g}' for rate in FALSE_ALARM_RATES)} per minute; the figure shows "
+        "the rates that result on the other recordings. Large marks: chosen for "
+        f"{COMPARED_RATE:g} per minute. A glitch of the hand's controller is an event here."
+    )
+    return ReportFigure("alarms", caption, draw_alarms(groups, bar=COMPARED_RATE))
+
+
+def _alarm_curves(evaluation: MethodEvaluation) -> tuple[Curve, Curve]:
+    """Return missed events, and slips not detected, over false alarms under a stable label."""
+    by_rate = evaluation.alarms.by_rate
+    rates = np.array([_false_alarms_per_minute(alarms) for alarms in by_rate])
+    missed = np.array([_missed_share(alarms) for alarms in by_rate])
+    not_detected = 100 - np.array([_slips_detected_share(alarms) for alarms in by_rate])
+    chosen = FALSE_ALARM_RATES.index(COMPARED_RATE)
+    return Curve(rates, missed, chosen=chosen), Curve(rates, not_detected, chosen=chosen)
+
+
+def _false_alarms_per_minute(alarms: Sequence[AlarmStatistics]) -> float:
+    seconds = sum(each.stable_seconds for each in alarms)
+    return 60 * sum(each.n_under_stable for each in alarms) / seconds if seconds else np.nan
+
+
+def _missed_share(alarms: Sequence[AlarmStatistics]) -> float:
+    n_events = sum(len(each.delays) for each in alarms)
+    return _percent(sum(each.n_missed(POST_DURATIONS[0]) for each in alarms), n_events)
+
+
+def _slips_detected_share(alarms: Sequence[AlarmStatistics]) -> float:
+    n_slips = sum(len(each.slip_delays) for each in alarms)
+    return _percent(sum(each.n_slips_found(POST_DURATIONS[0]) for each in alarms), n_slips)
+
+
+def _percent(part: int, whole: int) -> float:
+    return 100 * part / whole if whole else np.nan
+
+
+def _reliability_figure(plan: StudyPlan, results: Results) -> ReportFigure:
+    evaluations = _by_recording(plan, results, DETAIL_METHODS)
+    curves = {title: _reliability_bins(each) for title, each in evaluations.items()}
+    notes = {title: _brier_note(each) for title, each in evaluations.items()}
+    caption = "Reliability of the probabilities, by recording. On the dotted line they are right."
+    return ReportFigure("reliability", caption, draw_reliability(curves, notes))
+
+
+def _reliability_bins(evaluation: MethodEvaluation) -> Array:
+    """Return (m, 3): mean probability, share of stable samples, and samples of each used bin."""
+    total = np.array(evaluation.calibration, dtype=np.float64).sum(axis=0)
+    p, stable, n = total[total[:, 2] > 0].T
+    return np.column_stack([p / n, stable / n, n])
+
+
+def _brier_note(evaluation: MethodEvaluation) -> str:
+    brier = evaluation.metrics.pooled.brier
+    return "" if brier is None else f"Brier {brier:.3f}"
+
+
+def _grip_figure(plan: StudyPlan, results: Results) -> ReportFigure | None:
+    rows = error_tables.force(plan, results).rows
+    groups = {
+        kind: _groups(plan, [row for row in rows if row.keys["error"] == kind], "grip")
+        for kind in error_tables.ERROR_KINDS
+    }
+    if not any(groups.values()):
+        return None
+    caption = (
+        "Errors by grip force, by recording. The paper states that grip force has no influence."
+    )
+    return ReportFigure("grip", caption, draw_groups(groups, "samples [%]"))
+
+
+def _direction_figure(plan: StudyPlan, results: Results) -> ReportFigure | None:
+    rows = error_tables.directions(plan, results).rows
+    groups = {"direction of the push": _groups(plan, rows, "direction")}
+    if not any(groups.values()):
+        return None
+    caption = (
+        "Disturbances called stable, by direction, by recording. The paper states that "
+        "disturbances in all directions are found."
+    )
+    drawn = draw_groups(groups, "disturbed, called stable [%]", per_row=1)
+    return ReportFigure("directions", caption, drawn)
+
+
+def _groups(
+    plan: StudyPlan, rows: Sequence[Row], key: str
+) -> dict[str, Mapping[str, IntervalEstimate]]:
+    """Return the values of the rows by recording, by method and by the values of `key`."""
+    own = [row for row in rows if row.keys["on"] == SPLIT_TITLES["recording"]]
+    drawn = {
+        title: _estimates([r for r in own if _short_title(str(r.keys["method"])) == title], key)
+        for title in _short_titles(plan, DETAIL_METHODS).values()
+    }
+    return {title: values for title, values in drawn.items() if values}
+
+
+def _estimates(rows: Sequence[Row], key: str) -> dict[str, IntervalEstimate]:
+    return {
+        str(row.keys[key]): IntervalEstimate(row.ours, *(row.interval or (None, None)))
+        for row in rows
+    }
+
+
+def _by_recording(
+    plan: StudyPlan, results: Results, names: Sequence[str]
+) -> dict[str, MethodEvaluation]:
+    """Return the evaluations by recording of some methods, by short title."""
+    evaluations = {
+        title: dict(method_results(plan, results, name)).get("recording")
+        for name, title in _short_titles(plan, names).items()
+    }
+    return {title: each for title, each in evaluations.items() if each is not None}
+
+
+def _short_titles(plan: StudyPlan, names: Sequence[str]) -> dict[str, str]:
+    """Return the titles of methods without the text in brackets, for legends."""
+    return {n: _short_title(title) for n, title in method_titles(plan).items() if n in names}
+
+
+def _short_title(title: str) -> str:
+    return title.split(" (", maxsplit=1)[0]

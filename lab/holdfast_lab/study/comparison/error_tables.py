@@ -1,0 +1,127 @@
+"""Tables of the comparison by circumstance: phase, grip force, direction of the disturbance."""
+
+from collections.abc import Iterator, Sequence
+from itertools import chain
+
+import numpy as np
+
+from holdfast.contact import CONTACT_FORCE, Phase
+from holdfast_lab.report.result_tables import Key, ResultTable, Row
+from holdfast.sensors.types import Array
+from holdfast_lab.study.comparison.jobs import SPLIT_TITLES, Results, method_results, method_titles
+from holdfast_lab.study.comparison.rows import ratio_row
+from holdfast_lab.study.evaluation.error_breakdown import (
+    DIRECTIONS,
+    OBLIQUE,
+    Count,
+    DisturbanceErrors,
+    ErrorBreakdown,
+    GripErrors,
+)
+from holdfast_lab.study.plan import StudyPlan
+
+QUARTERS = ("lightest quarter", "second", "third", "firmest quarter")
+SHOWN_SPLITS = ("recording", "others")
+STABLE_MISSED = "stable called otherwise [%]"
+NOT_STABLE_MISSED = "not stable called stable [%]"
+ERROR_KINDS = (STABLE_MISSED, NOT_STABLE_MISSED)
+
+Keys = dict[str, Key]
+Line = tuple[Keys, Sequence[ErrorBreakdown]]
+
+
+def phases(plan: StudyPlan, results: Results) -> ResultTable:
+    """Return the table of errors by phase of the experiment."""
+    rows: list[Row] = []
+    for keys, breakdowns in _lines(plan, results):
+        for phase in map(str, Phase):
+            n, wrong = np.array([each.phases.get(phase, (0, 0)) for each in breakdowns]).T
+            if n.sum():
+                rows.append(ratio_row(keys | {"phase": phase}, wrong, n, plan.seed))
+    note = "Share of wrong samples in each phase of the true course of the grasp; all fingers."
+    title = "Errors by phase [%]"
+    return ResultTable("phases", title, note, rows, ("on", "method"), column="phase")
+
+
+def force(plan: StudyPlan, results: Results) -> ResultTable:
+    """Return the table of errors by grip force. The paper states that it has no influence."""
+    rows: list[Row] = []
+    lines = [line for line in _lines(plan, results) if any(each.grips for each in line[1])]
+    edges = force_quartiles(lines[0][1]) if lines else np.empty(0)
+    for keys, breakdowns in lines:
+        for quarter, title in enumerate(QUARTERS):
+            for kind in ERROR_KINDS:
+                n, wrong = _counts_of_quarter(breakdowns, edges, quarter, kind)
+                figure = keys | {"error": kind, "grip": title}
+                rows.append(ratio_row(figure, wrong, n, plan.seed))
+    bounds = ", ".join(f"{edge:.2f}" for edge in edges)
+    note = (
+        "Quarters of the fingers by the mean of their true contact force while the object is "
+        f"locked, over the recordings evaluated by recording (limits {bounds} N). Samples while "
+        "the object is held; methods that decide for fingers."
+    )
+    return ResultTable(
+        "force", "Errors by grip force [%]", note, rows, ("on", "error", "method"), column="grip"
+    )
+
+
+def directions(plan: StudyPlan, results: Results) -> ResultTable:
+    """Return the table of missed disturbances by direction. The paper states: all are found."""
+    rows: list[Row] = []
+    n_disturbances: dict[str, int] = {}
+    for keys, breakdowns in _lines(plan, results):
+        for direction in (*DIRECTIONS, OBLIQUE):
+            found = [_disturbances(each, direction) for each in breakdowns]
+            n = [sum(each.n for each in of_recording) for of_recording in found]
+            wrong = [sum(each.n_wrong for each in of_recording) for of_recording in found]
+            if sum(n):
+                rows.append(ratio_row(keys | {"direction": direction}, wrong, n, plan.seed))
+                n_disturbances.setdefault(direction, sum(map(len, found)))
+    ordered = [each for each in (*DIRECTIONS, OBLIQUE) if each in n_disturbances]
+    counts = ", ".join(f"{direction} {n_disturbances[direction]}" for direction in ordered)
+    note = (
+        "Share of the samples labelled not stable, during a disturbance, that are called stable; "
+        "all fingers. Directions of the mean outside force in the world frame, within 30 degrees; "
+        f"gravity acts downwards. Disturbances by recording: {counts or 'none'}."
+    )
+    title = "Disturbed called stable, by direction [%]"
+    return ResultTable("directions", title, note, rows, ("on", "method"), column="direction")
+
+
+def _disturbances(breakdown: ErrorBreakdown, direction: str) -> list[DisturbanceErrors]:
+    """Return the disturbances in a direction that have labelled samples."""
+    return [each for each in breakdown.disturbances if each.n and each.direction == direction]
+
+
+def force_quartiles(breakdowns: Sequence[ErrorBreakdown]) -> Array:
+    """Return the three quartiles of the force of the fingers that hold the object [N]."""
+    forces = [grip.force for grip in _holding_grips(breakdowns)]
+    return np.quantile(forces, (0.25, 0.5, 0.75)) if forces else np.empty(0)
+
+
+def _holding_grips(breakdowns: Sequence[ErrorBreakdown]) -> Iterator[GripErrors]:
+    grips = chain.from_iterable(each.grips for each in breakdowns)
+    return (grip for grip in grips if grip.force > CONTACT_FORCE)
+
+
+def _counts_of_quarter(
+    breakdowns: Sequence[ErrorBreakdown], edges: Array, quarter: int, kind: str
+) -> Array:
+    """Return (2, n_recordings) samples, and wrong samples, of the fingers in one quarter."""
+    counts = np.zeros((2, len(breakdowns)))
+    for column, each in enumerate(breakdowns):
+        for grip in _holding_grips([each]):
+            if np.searchsorted(edges, grip.force) == quarter:
+                counts[:, column] += _count_of(grip, kind)
+    return counts
+
+
+def _count_of(grip: GripErrors, kind: str) -> Count:
+    return grip.stable if kind == STABLE_MISSED else grip.not_stable
+
+
+def _lines(plan: StudyPlan, results: Results) -> Iterator[Line]:
+    for name, title in method_titles(plan).items():
+        for key, evaluation in method_results(plan, results, name):
+            if key in SHOWN_SPLITS and any(each.phases for each in evaluation.breakdown):
+                yield {"on": SPLIT_TITLES[key], "method": title}, evaluation.breakdown

@@ -1,0 +1,160 @@
+"""The evaluation jobs of the study: which methods, on which recordings, at which size."""
+
+from collections.abc import Iterator, Mapping
+from importlib.util import find_spec
+from typing import Any
+
+from holdfast_lab.study.evaluation.evaluate_method import (
+    EvaluationEffort,
+    EvaluationJob,
+    MethodEvaluation,
+    Split,
+    evaluate_method,
+)
+from holdfast_lab.study.evaluation.variation import Variation
+from holdfast_lab.study.methods import METHODS, PAPER_FAMILY
+from holdfast_lab.study.plan import StudyPlan
+from holdfast_lab.tasks import Task
+
+REFERENCE_METHOD = "logreg"
+"""The paper's method, which all others are compared with."""
+MAIN_METHODS = (*PAPER_FAMILY, "zhang", "holdfast")
+"""Methods that are evaluated on every corpus."""
+QUICK_METHODS = (*PAPER_FAMILY, "holdfast")
+"""Those of them that a quick study evaluates on every corpus."""
+NETWORK = "tcn"
+SLOW_METHODS = ("jl_local_svm", "jl_global_svm", NETWORK)
+"""Methods that a quick study leaves out."""
+METHOD_SECONDS = {
+    "svm": 60.0,
+    "svm_unweighted": 60.0,
+    "trees": 300.0,
+    "jl_local_svm": 150.0,
+    "jl_global_svm": 230.0,
+    NETWORK: 6000.0,
+}
+"""Approximate duration of the slow evaluations [s]."""
+DEFAULT_SECONDS = 30.0
+"""Approximate duration of the other evaluations [s]."""
+
+QUICK_EFFORT = EvaluationEffort(folds=3, inner=2, max_samples=10_000)
+NETWORK_EFFORT = EvaluationEffort(folds=2, inner=2, stride=3, max_samples=6_000)
+"""A fit of the network takes a minute for 20,000 windows of a finger."""
+
+SPLIT_TITLES = {
+    "recording": "by recording",
+    "object": "by object",
+    "others": "unseen objects",
+    "fresh": "other seeds",
+    "gentle": "gentle profile",
+    "vigorous": "vigorous profile",
+    "glitch-0": "no glitches",
+    "glitch-1": "1 glitch a minute",
+    "glitch-7": "7 glitches a minute",
+}
+"""Titles of splits and corpora in tables, by name. The first two are splits of "main"."""
+GLITCH_RATE_SPLITS = ("glitch-0", "glitch-1", "glitch-7")
+"""Corpora of the same objects that differ in the rate of glitches."""
+
+Results = Mapping[str, Any]
+"""Results of the tasks of the study, by name of the task."""
+
+
+def method_titles(plan: StudyPlan) -> dict[str, str]:
+    """Return the titles of the compared methods, by name.
+
+    Methods for whole hands are left out if there is one finger.
+    """
+    left_out = SLOW_METHODS if plan.quick else () if is_torch_installed() else (NETWORK,)
+    one_finger = len(plan.main.fingers) < 2
+    return {
+        name: each.title
+        for name, each in METHODS.items()
+        if name not in left_out and not (each.whole_hand and one_finger)
+    }
+
+
+def is_torch_installed() -> bool:
+    """Return whether torch, which the network needs, is installed."""
+    return find_spec("torch") is not None
+
+
+def network_note(plan: StudyPlan) -> str:
+    """Return a note on how the network was evaluated, or why it was not."""
+    if plan.quick:
+        return "Left out of a quick study: the TCN and the linear SVMs of James & Lepora."
+    if not is_torch_installed():
+        return "Left out: the TCN, because torch is not installed (pip install 'holdfast[deep]')."
+    effort = NETWORK_EFFORT
+    return (
+        f"The TCN is evaluated at a smaller size: {effort.folds} folds, {effort.max_samples:,} "
+        f"windows of a finger to train, every {effort.stride}rd sample evaluated. It is trained "
+        "until the loss of held-out training recordings has stopped falling."
+    )
+
+
+def method_task(plan: StudyPlan, method: str) -> Task:
+    """Return the task that evaluates a method on all corpora that the plan has for it."""
+    return evaluation_task(f"methods/{method}", method_job(plan, method), quick=plan.quick)
+
+
+def evaluation_task(name: str, job: EvaluationJob, *, quick: bool = False) -> Task:
+    """Return a task that does a job, with an approximate cost for recordings of the twin [s].
+
+    Args:
+        name: of the task.
+        job: to do.
+        quick: whether the study is quick, with fewer folds.
+    """
+    parts = len(job.splits) + 0.5 * len(job.tests)
+    seconds = METHOD_SECONDS.get(job.method, DEFAULT_SECONDS) * parts / 2.5
+    cost = seconds * (0.5 if quick else 1.0)
+    return Task(name, evaluate_method, (job,), dict[str, MethodEvaluation], cost=cost)
+
+
+def method_job(plan: StudyPlan, method: str) -> EvaluationJob:
+    """Return the complete evaluation job of a method."""
+    tests = tuple(plan.corpora[role] for role in _test_roles(plan, method))
+    splits: tuple[Split, ...] = ("recording", "object")
+    if plan.quick and method not in QUICK_METHODS:
+        splits = ("recording",)
+    return EvaluationJob(
+        method,
+        plan.main,
+        splits,
+        tests,
+        Variation(),
+        method_effort(plan, method),
+        plan.seed,
+        compared_methods(plan),
+    )
+
+
+def compared_methods(plan: StudyPlan) -> tuple[str, ...]:
+    """Return the names of the methods that are compared on the same samples."""
+    return tuple(method_titles(plan))
+
+
+def method_effort(plan: StudyPlan, method: str) -> EvaluationEffort:
+    """Return the size of the evaluation of a method."""
+    if method == NETWORK:
+        return NETWORK_EFFORT
+    return QUICK_EFFORT if plan.quick else EvaluationEffort()
+
+
+def method_results(
+    plan: StudyPlan, results: Results, method: str
+) -> Iterator[tuple[str, MethodEvaluation]]:
+    """Yield the results of a method on each split and corpus, by key of `SPLIT_TITLES`."""
+    evaluations: Mapping[str, MethodEvaluation] = results[f"methods/{method}"]
+    for key in SPLIT_TITLES:
+        name = plan.corpora[key].name if key in plan.corpora else key
+        if name in evaluations:
+            yield key, evaluations[name]
+
+
+def _test_roles(plan: StudyPlan, method: str) -> list[str]:
+    """Return the roles of the corpora, other than "main", that a method is tested on."""
+    if method in (QUICK_METHODS if plan.quick else MAIN_METHODS):
+        return [role for role in list(SPLIT_TITLES)[2:] if role in plan.corpora]
+    return [role for role in ("others",) if role in plan.corpora and not plan.quick]

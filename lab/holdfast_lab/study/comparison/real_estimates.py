@@ -1,0 +1,206 @@
+"""Estimates of every compared method on recordings of a real hand, sample by sample.
+
+Each recording is estimated by a fit that did not use it. The estimates are kept as they are, so
+that all methods can be scored on the samples at which every one of them has an estimate.
+"""
+
+from collections.abc import Mapping
+from dataclasses import replace
+from typing import Any
+
+import msgspec
+import numpy as np
+import numpy.typing as npt
+
+from holdfast.contact import STABLE, UNKNOWN, UNSTABLE, Cause
+from holdfast.metrics import FingerDecisions, hand_decisions
+from holdfast.metrics.decisions import Codes
+from holdfast.metrics.masks import Mask
+from holdfast.recordings import Recording, Tactile, label_states
+from holdfast.sensors.types import Array
+from holdfast_lab.study.evaluation.evaluate_method import (
+    HOLD_TIME,
+    EvaluationEffort,
+    EvaluationJob,
+    ScoredRecording,
+    score_splits,
+)
+from holdfast_lab.study.plan import Corpus
+
+MAX_FOLDS = 20
+"""Maximum number of folds. With more recordings, a fold leaves several out."""
+
+
+class Column(msgspec.Struct, frozen=True):
+    """A one-dimensional array that can be stored.
+
+    Example:
+        >>> Column.of(np.array([0.5, np.nan])).array.tolist()
+        [0.5, nan]
+    """
+
+    dtype: str
+    data: bytes
+
+    @classmethod
+    def of(cls, array: npt.NDArray[Any]) -> "Column":
+        """Return the column of an array."""
+        return cls(array.dtype.str, array.tobytes())
+
+    @property
+    def array(self) -> npt.NDArray[Any]:
+        """The (n,) array, read-only."""
+        return np.frombuffer(self.data, dtype=self.dtype)
+
+
+class UnitEstimates(msgspec.Struct, frozen=True):
+    """Estimates of a finger, or of the hand, one for each of its samples.
+
+    Attributes:
+        probability: of stability; NaN where it is not known.
+        states: codes of the states.
+    """
+
+    probability: Column
+    states: Column
+
+
+class RecordingEstimates(msgspec.Struct, frozen=True):
+    """Estimates of one method about one recording.
+
+    Attributes:
+        name: of the recording.
+        fingers: at the times of each finger; none of a whole-hand method.
+        hand: at every time of any finger.
+        alarm_states: codes of the states of the hand whose changes are the alarms.
+        known: whether there is an estimate of every finger, at the times of the hand.
+    """
+
+    name: str
+    fingers: dict[str, UnitEstimates]
+    hand: UnitEstimates
+    alarm_states: Column
+    known: Column
+
+
+class UnitLabels(msgspec.Struct, frozen=True):
+    """Labels of a finger, or of the hand, one for each of its samples.
+
+    Attributes:
+        times: [s].
+        codes: of the labelled states.
+        slip: whether the label is slip.
+    """
+
+    times: Column
+    codes: Column
+    slip: Column
+
+
+class RecordingLabels(msgspec.Struct, frozen=True):
+    """Labels of one recording: of its fingers, and of the hand at every time of any finger."""
+
+    name: str
+    fingers: dict[str, UnitLabels]
+    hand: UnitLabels
+
+
+def recording_labels(real: Corpus) -> list[RecordingLabels]:
+    """Return the labels of every recording that has one of the fingers of the corpus."""
+    return [_labels(each) for each in load_fingers(real)]
+
+
+def load_fingers(real: Corpus) -> list[Recording]:
+    """Return the recordings of a corpus with its fingers only.
+
+    A recording without any of these fingers is left out.
+    """
+    found = []
+    for recording in real.load():
+        modules: dict[str, Tactile] = {
+            name: recording.modules[name]
+            for name in real.fingers
+            if name in recording.modules and recording.modules[name].n_samples
+        }
+        if modules:
+            found.append(replace(recording, modules=modules))
+    return found
+
+
+def n_folds(real: Corpus) -> int:
+    """Return the number of folds: one for each recording, but at most `MAX_FOLDS`."""
+    return min(len(real.recordings), MAX_FOLDS)
+
+
+def method_estimates(method: str, real: Corpus, seed: int) -> list[RecordingEstimates]:
+    """Return the estimates of a method about each recording, by a fit without that recording.
+
+    The method decides at its own threshold. Its alarms are those of states that are held for
+    `HOLD_TIME`, so that one slip is one alarm.
+
+    Args:
+        method: its name.
+        real: the recordings.
+        seed: of all random numbers.
+    """
+    effort = EvaluationEffort(folds=n_folds(real), inner=1)
+    job = EvaluationJob(method, real, ("recording",), effort=effort, seed=seed)
+    return [_estimates(each) for _, scored in score_splits(job) for each in scored]
+
+
+def _estimates(scored: ScoredRecording) -> RecordingEstimates:
+    recording = scored.recording
+    decided = scored.scores.decide(recording, recording.labels)
+    hand = scored.scores.hand(recording)
+    return RecordingEstimates(
+        recording.name,
+        {
+            name: unit_estimates(f.stable_probability, f.states)
+            for name, f in decided.fingers.items()
+        },
+        unit_estimates(hand.probability, hand.states()),
+        Column.of(hand.hold(HOLD_TIME).states()),
+        Column.of(hand.known),
+    )
+
+
+def unit_estimates(probability: Array, states: Codes) -> UnitEstimates:
+    """Return the estimates of a finger or a hand from (n,) arrays."""
+    return UnitEstimates(Column.of(probability), Column.of(states))
+
+
+def _labels(recording: Recording) -> RecordingLabels:
+    modules = recording.modules
+    codes = {name: label_states(each.labels, each.times) for name, each in modules.items()}
+    slip = {name: _slip_samples(each) for name, each in modules.items()}
+    hand = _of_hand(modules, codes)
+    sliding = {name: np.where(own, UNSTABLE, STABLE) for name, own in slip.items()}
+    hand_slip = _of_hand(modules, sliding).labels == UNSTABLE
+    fingers = {n: _unit_labels(m.times, codes[n], slip[n]) for n, m in modules.items()}
+    return RecordingLabels(
+        recording.name, fingers, _unit_labels(hand.times, hand.labels, hand_slip)
+    )
+
+
+def _slip_samples(module: Tactile) -> Mask:
+    """Return the (n,) samples that are labelled as slip; an unstable label without cause counts."""
+    slips = [label for label in module.labels if label.cause in (Cause.SLIP, None)]
+    return np.asarray(label_states(slips, module.times) == UNSTABLE)
+
+
+def _of_hand(modules: Mapping[str, Tactile], codes: Mapping[str, Codes]) -> FingerDecisions:
+    """Return the hand with the labels that follow from those of its fingers."""
+    fingers = {
+        name: FingerDecisions(
+            each.times,
+            codes[name],
+            np.full(each.n_samples, UNKNOWN),
+            np.full(each.n_samples, np.nan),
+        )
+        for name, each in modules.items()
+    }
+    return hand_decisions(fingers, len(fingers))
+
+
+def _unit_labels(times: Array, codes: Codes, slip: Mask) -> UnitLabels:
+    return UnitLabels(Column.of(times), Column.of(codes), Column.of(slip & (codes != UNKNOWN)))

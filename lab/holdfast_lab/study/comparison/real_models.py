@@ -1,0 +1,146 @@
+"""Estimates of `builtin:any` on recordings of a real hand: as it ships, adapted, and from nothing.
+
+Features, tare, contact threshold and hold time are those of the model file.
+"""
+
+from collections.abc import Iterator, Sequence
+from dataclasses import replace
+from typing import Literal
+
+import numpy as np
+
+from holdfast.contact import STABLE, UNKNOWN, UNSTABLE, enough_contacts
+from holdfast.errors import ModelError, TrainingError
+from holdfast.metrics import FingerDecisions, hand_decisions
+from holdfast.metrics.events import TIME_TOLERANCE
+from holdfast.model import Model
+from holdfast.recordings import Recording, Tactile
+from holdfast.sensors.types import Array
+from holdfast_lab.study.comparison.real_estimates import (
+    MAX_FOLDS,
+    Column,
+    RecordingEstimates,
+    load_fingers,
+    n_folds,
+    unit_estimates,
+)
+from holdfast_lab.study.evaluation.evaluate_method import held_out_folds
+from holdfast_lab.study.plan import Corpus
+from holdfast.training import Setting, compute_decisions, train
+from holdfast.training.setting import Split
+
+SHIPPED = "builtin:any"
+"""The model that ships, which was never trained on a real hand."""
+
+Making = Literal["untouched", "adapted to one", "adapted to all", "from nothing"]
+"""How the model is made: as it ships; adapted to one of the other recordings, or to all of them;
+with its features, but fitted to all other recordings without its weights."""
+
+
+def model_estimates(making: Making, real: Corpus, seed: int) -> list[RecordingEstimates]:
+    """Return the estimates of the model about each recording, made without that recording.
+
+    Adapting is `holdfast train --init builtin:any`. Where the other recordings cannot adapt the
+    model, because a class is missing, it stays as it ships. A model from nothing has the reference
+    parameters, as the methods of the study have.
+
+    Args:
+        making: how the model is made.
+        real: the recordings.
+        seed: of the folds, and of the choice of one of the other recordings.
+    """
+    recordings = load_fingers(real)
+    found: dict[int, RecordingEstimates] = {}
+    for held in _folds(recordings, real, seed):
+        others = [each for place, each in enumerate(recordings) if place not in held]
+        model = _model(making, others, seed + min(held))
+        found |= {place: _estimates(model, recordings[place]) for place in held}
+    return [found[place] for place in sorted(found)]
+
+
+def _folds(recordings: Sequence[Recording], real: Corpus, seed: int) -> Iterator[frozenset[int]]:
+    """Yield the folds, which are those of all other methods."""
+    objects = [each.metadata.get("object") for each in recordings]
+    names = [None if held is None else str(held) for held in objects]
+    return held_out_folds(names, "recording", n_folds(real), seed)
+
+
+def _model(making: Making, others: Sequence[Recording], seed: int) -> Model | None:
+    """Return the model for a fold; None if it cannot be fitted from nothing."""
+    shipped = Model.load(SHIPPED)
+    adapting = Setting.adapting(shipped)
+    match making:
+        case "untouched":
+            return shipped
+        case "adapted to one":
+            return _trained(_one_with_both_classes(others, seed), adapting) or shipped
+        case "adapted to all":
+            return _trained(others, adapting) or shipped
+        case "from nothing":
+            return _trained(others, replace(adapting, init=None, trials=0))
+
+
+def _one_with_both_classes(others: Sequence[Recording], seed: int) -> list[Recording]:
+    """Return one recording, drawn from those with both classes on every finger; none without."""
+    able = [each for each in others if all(map(_has_both_classes, each.modules.values()))]
+    return [able[np.random.default_rng(seed).integers(len(able))]] if able else []
+
+
+def _has_both_classes(module: Tactile) -> bool:
+    codes = module.label_states
+    return len(np.unique(codes[codes != UNKNOWN] == STABLE)) == 2
+
+
+def _trained(recordings: Sequence[Recording], setting: Setting) -> Model | None:
+    """Return the model that `holdfast train` makes; None if it cannot with these recordings.
+
+    Its cross-validation is by recording where that is possible and fast. It is not used here.
+    """
+    split: Split = "recording" if 2 <= len(recordings) <= MAX_FOLDS else "random"
+    try:
+        return train(recordings, replace(setting, split=split)).model
+    except (ModelError, TrainingError):
+        return None
+
+
+def _estimates(model: Model | None, recording: Recording) -> RecordingEstimates:
+    """Return the estimates of a model; all are unknown if it is not for such a recording."""
+    try:
+        decided = {} if model is None else compute_decisions(model, recording).fingers
+    except ModelError:
+        decided = {}
+    fingers = {n: _latest(decided.get(n), m.times) for n, m in recording.modules.items()}
+    hand = hand_decisions(fingers, len(fingers))
+    at_hand = [_latest(each, hand.times) for each in fingers.values()]
+    return RecordingEstimates(
+        recording.name,
+        {name: unit_estimates(f.stable_probability, f.states) for name, f in fingers.items()},
+        unit_estimates(_hand_probability(at_hand), hand.states),
+        Column.of(hand.states),
+        Column.of(np.all([each.states != UNKNOWN for each in at_hand], axis=0)),
+    )
+
+
+def _latest(decided: FingerDecisions | None, times: Array) -> FingerDecisions:
+    """Return the latest decision at each time, without labels; UNKNOWN before the first."""
+    unlabelled = np.full(len(times), UNKNOWN, dtype=np.int8)
+    if decided is None:
+        return FingerDecisions(times, unlabelled, unlabelled, np.full(len(times), np.nan))
+    place = np.searchsorted(decided.times, times + TIME_TOLERANCE, side="right")
+    states = np.append(np.int8(UNKNOWN), decided.states)[place]
+    probability = np.append(np.nan, decided.stable_probability)[place]
+    return FingerDecisions(times, unlabelled, states, probability)
+
+
+def _hand_probability(fingers: Sequence[FingerDecisions]) -> Array:
+    """Return the smallest probability of the fingers in contact.
+
+    If too few are in contact to hold an object, it is the smallest of all fingers: a finger that
+    is called NO_CONTACT keeps its probability, as in all metrics.
+    """
+    probability = np.array([each.stable_probability for each in fingers])
+    states = np.array([each.states for each in fingers])
+    in_contact = (states == STABLE) | (states == UNSTABLE)
+    held = enough_contacts(in_contact.sum(axis=0), len(fingers))
+    counted = np.where(held, in_contact, states != UNKNOWN)
+    return np.asarray(np.where(counted, probability, 1.0).min(axis=0))

@@ -1,0 +1,194 @@
+"""Table rows from counts by recording, with intervals by bootstrap over recordings."""
+
+from collections.abc import Mapping, Sequence
+
+import numpy as np
+import numpy.typing as npt
+
+from holdfast.metrics import Interval, Metrics, SampleMetrics, bootstrap_interval, ratio_of_sums
+from holdfast.metrics.intervals import Statistic, quantile_of
+from holdfast.metrics.statistics import quantile
+from holdfast_lab.report.result_tables import Key, Row
+from holdfast.sensors.types import Array
+from holdfast_lab.study.evaluation.evaluate_method import MethodEvaluation
+
+Keys = Mapping[str, Key]
+
+PERCENT = 100.0
+WITHOUT_ESTIMATE = "without estimate [%]"
+
+SAMPLE_METRICS = {
+    "accuracy [%]": "accuracy",
+    "FDR [%]": "fdr",
+    "FNR [%]": "fnr",
+    "AUC": "auc",
+    "AUC contact": "auc_contact",
+    "Brier": "brier",
+}
+"""Name of a sample metric, by the head of its column."""
+DIGITS = {"AUC": 3, "AUC contact": 3, "Brier": 3}
+"""Digits after the decimal point, by the head of the column."""
+
+
+def ratio_row(
+    keys: Keys,
+    parts: npt.ArrayLike,
+    wholes: npt.ArrayLike,
+    seed: int,
+    scale: float = PERCENT,
+    paper: float | None = None,
+) -> Row:
+    """Return the ratio of two sums over recordings. Recordings with a whole of 0 are left out.
+
+    Args:
+        keys: of the row.
+        parts: (n_recordings,).
+        wholes: (n_recordings,).
+        seed: of the bootstrap.
+        scale: factor of the ratio.
+        paper: the value that the paper prints.
+    """
+    part, whole = np.asarray(parts, dtype=np.float64), np.asarray(wholes, dtype=np.float64)
+    part, whole = part[whole > 0] * scale, whole[whole > 0]
+    n = len(whole)
+    ours = float(part.sum() / whole.sum()) if n else None
+    interval = bootstrap_interval(ratio_of_sums(part, whole), n, seed=seed) if n else None
+    return Row(dict(keys), ours, paper, n, interval)
+
+
+def quotient_row(keys: Keys, base: Array, ours: Array, seed: int) -> Row:
+    """Return the share of errors of a baseline divided by ours; infinite if we have none.
+
+    The interval is paired: a resample draws the same recordings for both.
+
+    Args:
+        keys: of the row.
+        base: (n_recordings, 2) errors, and all samples or events, of the baseline.
+        ours: the same of our method, for the same recordings.
+        seed: of the bootstrap.
+    """
+    counts = np.column_stack([base, ours]).astype(np.float64)
+    counts = counts[(counts[:, 1] > 0) & (counts[:, 3] > 0)]
+
+    def statistic(draws: Array) -> Array:
+        wrong, n, our_wrong, our_n = (draws @ counts).T
+        with np.errstate(divide="ignore", invalid="ignore"):
+            return np.asarray((wrong / n) / (our_wrong / our_n))
+
+    n = len(counts)
+    value = float(statistic(np.ones((1, n)))[0]) if n else None
+    interval = bootstrap_interval(statistic, n, seed=seed)
+    return Row(dict(keys), None if value is None or np.isnan(value) else value, None, n, interval)
+
+
+def quantile_row(keys: Keys, values: Sequence[Sequence[float]], q: float, seed: int) -> Row:
+    """Return a quantile of the values of all recordings; values may be infinite.
+
+    Args:
+        keys: of the row.
+        values: of each recording. Recordings without values are left out.
+        q: from 0 to 1.
+        seed: of the bootstrap.
+    """
+    known: list[Array] = [np.array(each, dtype=np.float64) for each in values if len(each)]
+    ours = quantile(np.sort(np.concatenate([np.empty(0), *known])), q)
+    interval = bootstrap_interval(quantile_of(known, q), len(known), seed=seed) if known else None
+    return Row(dict(keys), ours, None, len(known), interval)
+
+
+def count_row(keys: Keys, counts: Sequence[int]) -> Row:
+    """Return the sum of the counts of all recordings."""
+    return Row(dict(keys), float(sum(counts)), None, len(counts))
+
+
+def sample_rows(
+    keys: Keys,
+    metrics: Metrics,
+    figures: Sequence[str] = tuple(SAMPLE_METRICS),
+    paper: Mapping[str, float] | None = None,
+) -> list[Row]:
+    """Return metrics by sample, pooled over fingers and recordings.
+
+    Args:
+        keys: of the rows.
+        metrics: of a method.
+        figures: heads of the columns, of `SAMPLE_METRICS`.
+        paper: the values that the paper prints, by the same heads.
+    """
+    rows = []
+    for figure in figures:
+        name = SAMPLE_METRICS[figure]
+        interval: Interval | None = None
+        n = sum(any(map(_has_samples, each.fingers.values())) for each in metrics.recordings)
+        if metrics.intervals is not None:
+            interval, n = getattr(metrics.intervals, name), metrics.intervals.n_recordings
+        ours: float | None = getattr(metrics.pooled, name)
+        row_keys = {**keys, "figure": figure}
+        rows.append(Row(row_keys, ours, (paper or {}).get(figure), n, interval))
+    return rows
+
+
+def _has_samples(metrics: SampleMetrics) -> bool:
+    return metrics.n > 0
+
+
+def without_estimate_row(keys: Keys, counts: Sequence[tuple[int, int]], seed: int) -> Row:
+    """Return the share of labelled samples without an estimate [%].
+
+    Args:
+        keys: of the row, but for its figure.
+        counts: labelled samples, and those of them without an estimate, of each recording.
+        seed: of the bootstrap.
+    """
+    n, n_without = np.array(counts, dtype=np.float64).reshape(-1, 2).T
+    return ratio_row({**keys, "figure": WITHOUT_ESTIMATE}, n_without, n, seed)
+
+
+def correct_and_all(metrics: Metrics) -> dict[str, tuple[int, int]]:
+    """Return the number of correct samples, and of all samples, of each recording."""
+    counts = {}
+    for recording in metrics.recordings:
+        tables = np.array([f.confusion for f in recording.fingers.values()]).reshape(-1, 2, 2)
+        total = tables.sum(axis=0)
+        counts[recording.name] = (int(np.trace(total)), int(total.sum()))
+    return counts
+
+
+def difference_row(keys: Keys, first: Metrics, second: Metrics, seed: int) -> Row:
+    """Return the accuracy of `first` minus that of `second`, on the same recordings [points].
+
+    The interval is paired: a resample draws the same recordings for both.
+    """
+    one, other = correct_and_all(first), correct_and_all(second)
+    names = [name for name in one if name in other and one[name][1] and other[name][1]]
+    counts = np.array([(*one[name], *other[name]) for name in names], dtype=np.float64)
+    statistic = _accuracy_difference(counts.reshape(-1, 4))
+    ours = float(statistic(np.ones((1, len(names))))[0]) if names else None
+    interval = bootstrap_interval(statistic, len(names), seed=seed)
+    return Row(dict(keys), ours, None, len(names), interval)
+
+
+def _accuracy_difference(counts: Array) -> Statistic:
+    def statistic(draws: Array) -> Array:
+        correct, n, other_correct, other_n = (draws @ counts).T
+        return np.asarray(PERCENT * (correct / n - other_correct / other_n))
+
+    return statistic
+
+
+def calibration_row(keys: Keys, evaluation: MethodEvaluation, seed: int) -> Row:
+    """Return the calibration error: |mean probability - share of stable samples|, by ten bins.
+
+    The error is the mean over samples.
+    """
+    table = np.array(evaluation.calibration, dtype=np.float64)
+    table = table.reshape(len(evaluation.names), -1, 3)
+    table = table[table[:, :, 2].sum(axis=1) > 0]
+
+    def statistic(draws: Array) -> Array:
+        p, stable, n = np.einsum("dr,rbk->kdb", draws, table)
+        return np.asarray(np.abs(p - stable).sum(axis=1) / n.sum(axis=1))
+
+    n = len(table)
+    ours = float(statistic(np.ones((1, n)))[0]) if n else None
+    return Row(dict(keys), ours, None, n, bootstrap_interval(statistic, n, seed=seed))

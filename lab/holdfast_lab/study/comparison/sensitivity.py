@@ -1,0 +1,291 @@
+"""Part of the study: results when one condition is varied.
+
+The conditions are noise on the readings, the margin of labels, the sampling rate and the profile
+of the twin. One more table compares how noise affects the paper's sigma and an energy.
+"""
+
+from collections.abc import Iterator, Mapping, Sequence
+from typing import NamedTuple
+
+import numpy as np
+
+from holdfast.contact import UNSTABLE_MARGIN
+from holdfast.metrics.events import POST_DURATIONS
+from holdfast_lab.figures.curves import Curve, draw_lines
+from holdfast_lab.report.html_report import ReportFigure
+from holdfast_lab.report.result_tables import Key, ResultTable, Row
+from holdfast_lab.study.comparison.event_tables import FALSE_ALARMS_UNDER_STABLE
+from holdfast_lab.study.comparison.jobs import (
+    SPLIT_TITLES,
+    Results,
+    evaluation_task,
+    method_effort,
+    method_job,
+)
+from holdfast_lab.study.comparison.rows import DIGITS, difference_row, ratio_row, sample_rows
+from holdfast_lab.study.evaluation.evaluate_method import COMPARED_RATE, EvaluationJob, MethodEvaluation
+from holdfast_lab.study.evaluation.variation import Variation
+from holdfast_lab.study.methods import METHODS
+from holdfast_lab.study.methods.wavelets import CUTS
+from holdfast_lab.study.plan import StudyPlan
+from holdfast_lab.tasks import Task
+from holdfast.twin.profile import profile, profiles
+
+VARIED_METHODS = ("logreg", "zhang", "holdfast")
+QUICK_VARIED_METHODS = ("logreg", "holdfast")
+"""Those of them that a quick study varies."""
+NOISE_LEVELS = (0.0, 1.0, 2.0, 4.0, 8.0)
+"""Standard deviations of the added noise [unit of the readings]."""
+SAMPLE_STEPS = (1, 2, 3, 5)
+"""Numbers n of which every n-th sample is kept."""
+MARGINS = (0.0, 0.05, UNSTABLE_MARGIN, 0.2)
+"""Margins of labels [s]."""
+PROFILES = ("recording", "gentle", "vigorous")
+
+NOISE = "noise"
+MARGIN = "margin [s]"
+RATE = "rate [Hz]"
+SAMPLE_FIGURES = ("accuracy [%]", "FDR [%]", "AUC contact")
+SLIPS_DETECTED = f"slips detected within {1000 * POST_DURATIONS[0]:.0f} ms [%]"
+ACCURACY_DIFFERENCE = "accuracy less sigma's [points]"
+CURVES = ("accuracy [%]", "AUC contact", SLIPS_DETECTED)
+"""Figures of the tables that are drawn as curves."""
+NOTE = (
+    "By recording. Slips and false alarms: at the threshold for "
+    f"{COMPARED_RATE:g} false alarm per minute under a stable label in training, chosen for each "
+    "value separately. A slip without an alarm is missed; a glitch of the controller is an event."
+)
+
+Keys = dict[str, Key]
+
+
+class Sweep(NamedTuple):
+    """One condition and its values.
+
+    Attributes:
+        name: of its table and figure.
+        title: of both.
+        key: name of the condition in the table, with its unit.
+        variations: by value.
+        note: how the condition is varied.
+    """
+
+    name: str
+    title: str
+    key: str
+    variations: Mapping[float, Variation]
+    note: str
+
+
+def tasks(plan: StudyPlan) -> list[Task]:
+    """Return an evaluation task for each method, condition and value.
+
+    Without a variation the task is that of the comparison of methods.
+    """
+    named: dict[str, Task] = {}
+    for sweep in sweeps(plan):
+        for method in varied_methods(plan):
+            for variation in sweep.variations.values():
+                task = _task(plan, method, variation)
+                named[task.name] = task
+    for cut in CUTS:
+        for variation in _noise(plan).values():
+            task = _task(plan, cut, variation)
+            named[task.name] = task
+    return list(named.values())
+
+
+def tables(plan: StudyPlan, results: Results) -> list[ResultTable]:
+    """Return a table for each condition, for the profiles, and for sigma against energy."""
+    swept = [_sweep_table(plan, results, sweep) for sweep in sweeps(plan)]
+    return [*swept, _profile_table(plan, results), _sigma_energy_table(plan, results)]
+
+
+def figures(plan: StudyPlan, results: Results) -> list[ReportFigure]:
+    """Return the tables of the conditions as curves."""
+    swept = [_draw(_sweep_table(plan, results, each), each, CURVES) for each in sweeps(plan)]
+    sweep = Sweep("sigma_energy", "Sigma beside energy", NOISE, _noise(plan), "")
+    sigma_energy = _draw(_sigma_energy_table(plan, results), sweep, CURVES[:2])
+    return [*swept, sigma_energy]
+
+
+def varied_methods(plan: StudyPlan) -> list[str]:
+    """Return the names of the methods that are evaluated under variations."""
+    names = QUICK_VARIED_METHODS if plan.quick else VARIED_METHODS
+    return [name for name in names if name in METHODS]
+
+
+def sweeps(plan: StudyPlan) -> list[Sweep]:
+    """Return the conditions that are varied. The margin is one only if the truth is known."""
+    unit = plan.main.load()[0].modules[plan.main.fingers[0]].unit
+    noise = Sweep(
+        "noise",
+        "Sensitivity to noise",
+        NOISE,
+        _noise(plan),
+        f"Standard deviation of white noise added to every reading [{unit}], in training and "
+        "in test; the readings already contain the noise of the twin.",
+    )
+    margins = Sweep(
+        "margins",
+        "Sensitivity to the margin of labels",
+        MARGIN,
+        _margins(plan),
+        "Time by which labels extend every disturbance at both ends, in training and in the "
+        "figures by sample; slips and alarms are counted by labels without margin.",
+    )
+    rates = Sweep(
+        "rates",
+        "Sensitivity to the sampling rate",
+        RATE,
+        {round(plan.main.rate / step, 1): Variation(every=step) for step in _steps(plan)},
+        "Every 1st, 2nd, ... sample, in training and in test. Windows keep their number of "
+        "samples, so they last longer.",
+    )
+    return [sweep for sweep in (noise, margins, rates) if sweep.variations]
+
+
+def _noise(plan: StudyPlan) -> dict[float, Variation]:
+    levels = (NOISE_LEVELS[0], NOISE_LEVELS[-1]) if plan.quick else NOISE_LEVELS
+    return {level: Variation(noise=level) for level in levels}
+
+
+def _steps(plan: StudyPlan) -> tuple[int, ...]:
+    return (1, 3) if plan.quick else SAMPLE_STEPS
+
+
+def _margins(plan: StudyPlan) -> dict[float, Variation]:
+    """Return the variations by margin; none without a truth.
+
+    The margin that the labels of the recordings have already is no variation.
+    """
+    first = plan.main.load()[0]
+    if first.truth is None or "phase" not in first.truth.hand:
+        return {}
+    known = str(first.metadata.get("profile"))
+    own = profile(known).label_margin if known in profiles() else UNSTABLE_MARGIN
+    margins = (0.0, UNSTABLE_MARGIN) if plan.quick else MARGINS
+    return {
+        margin: Variation() if margin == own else Variation(margin=margin) for margin in margins
+    }
+
+
+def _task(plan: StudyPlan, method: str, variation: Variation) -> Task:
+    job = _job(plan, method, variation)
+    return evaluation_task(_task_name(method, variation), job, quick=plan.quick)
+
+
+def _task_name(method: str, variation: Variation) -> str:
+    margin = "" if variation.margin is None else f"/margin-{variation.margin:g}"
+    return f"sensitivity/{method}/noise-{variation.noise:g}/every-{variation.every}{margin}"
+
+
+def _job(plan: StudyPlan, method: str, variation: Variation) -> EvaluationJob:
+    """Return the job of a method; without a variation, the same job as in the comparison.
+
+    Equal jobs are done once.
+    """
+    if method in METHODS and variation == Variation():
+        return method_job(plan, method)
+    effort = method_effort(plan, method)
+    compared = tuple(varied_methods(plan)) if method in METHODS else tuple(CUTS)
+    return EvaluationJob(
+        method, plan.main, ("recording",), (), variation, effort, plan.seed, compared
+    )
+
+
+def _sweep_table(plan: StudyPlan, results: Results, sweep: Sweep) -> ResultTable:
+    rows: list[Row] = []
+    for method in varied_methods(plan):
+        for value, variation in sorted(sweep.variations.items()):
+            evaluation = results[_task_name(method, variation)]["recording"]
+            keys: Keys = {"method": METHODS[method].title, sweep.key: value}
+            rows += _rows(keys, evaluation, plan.seed)
+    lines = ("method", sweep.key)
+    return ResultTable(
+        sweep.name, sweep.title, f"{sweep.note} {NOTE}", rows, lines, digits_of=DIGITS
+    )
+
+
+def _profile_table(plan: StudyPlan, results: Results) -> ResultTable:
+    rows: list[Row] = []
+    for method in varied_methods(plan):
+        evaluations = results[_task_name(method, Variation())]
+        for key in PROFILES:
+            name = plan.corpora[key].name if key in plan.corpora else key
+            if name in evaluations:
+                on = "same profile, by recording" if key == "recording" else SPLIT_TITLES[key]
+                keys: Keys = {"method": METHODS[method].title, "on": on}
+                rows += _rows(keys, evaluations[name], plan.seed)
+    note = (
+        "Fitted to main, evaluated on recordings with another grip force and other disturbances "
+        "by the operator, without a new fit; slips and alarms at the threshold chosen on main."
+    )
+    title = "Sensitivity to the profile"
+    return ResultTable("profiles", title, note, rows, ("method", "on"), digits_of=DIGITS)
+
+
+def _sigma_energy_table(plan: StudyPlan, results: Results) -> ResultTable:
+    rows: list[Row] = []
+    for value, variation in _noise(plan).items():
+        first = results[_task_name("sigma_cut", variation)]["recording"].metrics
+        for name, cut in CUTS.items():
+            metrics = results[_task_name(name, variation)]["recording"].metrics
+            keys: Keys = {NOISE: value, "measure": cut.title}
+            rows += sample_rows(keys, metrics, ("accuracy [%]", "AUC", "AUC contact"))
+            if name != "sigma_cut":
+                figure = keys | {"figure": ACCURACY_DIFFERENCE}
+                rows.append(difference_row(figure, metrics, first, plan.seed))
+    note = (
+        "One feature and one threshold, the one with the best balanced accuracy in training, by "
+        "recording. Sigma: the standard deviation of the Haar details; energy: the sum of their "
+        "squares. Both are of the same window of 14 samples of the same signal, so they differ "
+        "only by the mean of the details. Both are on a logarithmic scale, which changes no "
+        "threshold. AUC contact: stable against unstable, which depends on no threshold. The "
+        "difference is paired."
+    )
+    lines = (NOISE, "measure")
+    title = "Sigma beside energy as noise grows"
+    return ResultTable("sigma_energy", title, note, rows, lines, digits_of=DIGITS)
+
+
+def _rows(keys: Keys, evaluation: MethodEvaluation, seed: int) -> Iterator[Row]:
+    yield from sample_rows(keys, evaluation.metrics, SAMPLE_FIGURES)
+    alarms = evaluation.alarms.compared
+    n_slips = [len(each.slip_delays) for each in alarms]
+    if sum(n_slips):
+        found = [each.n_slips_found(POST_DURATIONS[0]) for each in alarms]
+        yield ratio_row(keys | {"figure": SLIPS_DETECTED}, found, n_slips, seed)
+    minutes = [each.stable_seconds / 60 for each in alarms]
+    n_false = [each.n_under_stable for each in alarms]
+    figure = keys | {"figure": FALSE_ALARMS_UNDER_STABLE}
+    yield ratio_row(figure, n_false, minutes, seed, scale=1.0)
+
+
+def _draw(table: ResultTable, sweep: Sweep, columns: Sequence[str]) -> ReportFigure:
+    """Draw columns of a table over the values of a condition, one curve for each other key."""
+    head = table.lines[0] if table.lines[0] != sweep.key else table.lines[1]
+    groups: dict[str, dict[str, Curve]] = {}
+    for column in columns:
+        rows = [row for row in table.rows if row.keys["figure"] == column]
+        names = dict.fromkeys(str(row.keys[head]) for row in rows)
+        curves = {n: _curve([r for r in rows if r.keys[head] == n], sweep.key) for n in names}
+        if curves:
+            groups[column] = curves
+    caption = f"{table.title}. Bands: 95 % intervals, by bootstrap over recordings."
+    return ReportFigure(f"{sweep.name}_curves", caption, draw_lines(groups, sweep.key))
+
+
+def _curve(rows: Sequence[Row], key: str) -> Curve:
+    rows = sorted(rows, key=lambda row: float(row.keys[key]))
+    ends = [row.interval or (None, None) for row in rows]
+    x, y, low, high = (
+        np.array([np.nan if each is None else float(each) for each in values])
+        for values in (
+            [float(row.keys[key]) for row in rows],
+            [row.ours for row in rows],
+            [low for low, _ in ends],
+            [high for _, high in ends],
+        )
+    )
+    return Curve(x, y, low, high)

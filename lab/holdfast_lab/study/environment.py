@@ -1,0 +1,74 @@
+"""How a study was made: its recordings, and what was run."""
+
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+from holdfast_lab.report.environment import fact_texts
+from holdfast_lab.study.plan import Corpus, StudyPlan
+
+ROLES = {
+    "main": "used for training",
+    "fresh": "the same objects with another seed and another skin; not used for training",
+    "others": "objects that are not used for training",
+    "gentle": "a gentler profile of the twin",
+    "vigorous": "a more vigorous profile of the twin",
+    "finger": "the protocol of holdfast 0.1, in which only a finger pushes",
+    "noiseless": "the first grasps of main with whole counts and no other noise",
+    "glitch-0": "other objects, without glitches of the hand's controller",
+    "glitch-1": "other objects, with 1 glitch a minute",
+    "glitch-7": "other objects, with 7 glitches a minute",
+    "real": "recordings of a real hand or gripper",
+}
+"""What the recordings of each role are."""
+
+
+def data(plan: StudyPlan) -> dict[str, dict[str, Any]]:
+    """Return a description of each corpus of a plan, by its role."""
+    corpora = plan.corpora | ({"real": plan.real} if plan.real is not None else {})
+    return {role: _describe(corpus) for role, corpus in corpora.items()}
+
+
+def report_facts(summary: Mapping[str, Any]) -> dict[str, object]:
+    """Return the head of the report, from the contents of `study.json`."""
+    return {
+        "data": {role: _corpus_text(corpus) for role, corpus in summary["data"].items()},
+        **fact_texts(summary),
+    }
+
+
+def run_notes(summary: Mapping[str, Any]) -> list[str]:
+    """Return sentences on what was run and what was left out."""
+    notes = [
+        f"{role}: {corpus['recordings']} recordings; {ROLES.get(role, 'others')}."
+        for role, corpus in summary["data"].items()
+    ]
+    if summary["quick"]:
+        notes.append(
+            "This is a quick study. It uses fewer recordings, windows, methods and trials than "
+            "the full one, and its intervals are wide. Quote the full study."
+        )
+    notes.append(
+        f"{summary['tasks']} tasks with seed {summary['seed']}. Results that were stored by an "
+        "earlier run are not counted in the time."
+    )
+    return [*notes, *(f"Left out: {each}" for each in summary["left_out"])]
+
+
+def _describe(corpus: Corpus) -> dict[str, Any]:
+    return {
+        "name": Path(corpus.folder).name,
+        "digest": corpus.digest,
+        "recordings": len(corpus.recordings),
+        "samples": corpus.n_samples,
+        "fingers": list(corpus.fingers),
+        "rate": corpus.rate,
+        "tare": corpus.tare,
+    }
+
+
+def _corpus_text(corpus: Mapping[str, Any]) -> str:
+    return (
+        f"{corpus['recordings']} recordings, {corpus['samples']:,} samples of single fingers, "
+        f"{corpus['rate']:.0f} Hz, {', '.join(corpus['fingers'])}; digest {corpus['digest'][:12]}"
+    )

@@ -1,0 +1,62 @@
+"""The methods that the study compares, in one file for each family."""
+
+from holdfast_lab.study.methods.force_rules import DIFFERENCE, FRICTION, TANGENTIAL
+from holdfast_lab.study.methods.holdfast import HOLDFAST
+from holdfast_lab.study.methods.learning import ANYSKIN, JAMES_LEPORA, TCN
+from holdfast_lab.study.methods.method import (
+    HAND,
+    FingerSignal,
+    HandSignal,
+    Method,
+    hand_signal,
+    stretchwise,
+)
+from holdfast_lab.study.methods.vibration import SLIP_SERVO, SPECTRUM
+from holdfast_lab.study.methods.wavelets import (
+    ENERGY,
+    LOG_TWO,
+    LOGREG,
+    LOGREG_UNWEIGHTED,
+    SVM,
+    SVM_UNWEIGHTED,
+    TREES,
+    ZHANG,
+)
+
+METHODS: dict[str, Method] = {
+    each.name: each
+    for each in (
+        LOGREG,
+        LOGREG_UNWEIGHTED,
+        SVM,
+        SVM_UNWEIGHTED,
+        LOG_TWO,
+        ENERGY,
+        HOLDFAST,
+        ZHANG,
+        FRICTION,
+        SLIP_SERVO,
+        SPECTRUM,
+        DIFFERENCE,
+        TANGENTIAL,
+        ANYSKIN,
+        *JAMES_LEPORA,
+        TCN,
+        TREES,
+    )
+}
+"""All methods by name, in the order of the tables."""
+
+PAPER_FAMILY = tuple(name for name, each in METHODS.items() if each.category == "paper")
+"""Names of the paper's method and of its variants. Ours is compared with the best of them."""
+
+__all__ = [
+    "HAND",
+    "METHODS",
+    "PAPER_FAMILY",
+    "FingerSignal",
+    "HandSignal",
+    "Method",
+    "hand_signal",
+    "stretchwise",
+]

@@ -1,0 +1,153 @@
+"""The labelled samples of one finger, pooled over all recordings of a corpus.
+
+Each sample belongs to one of 25 parts, which is drawn at random from its recording and position.
+The part does not depend on finger, window and features.
+"""
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from functools import lru_cache
+from typing import NamedTuple
+
+import msgspec
+import numpy as np
+import numpy.typing as npt
+
+from holdfast.classifiers import Samples
+from holdfast.features import FEATURE_NAMES, Tare, haar_features
+from holdfast.recordings import Recording
+from holdfast.sensors.types import Array
+from holdfast_lab.study.evaluation.variation import Variation
+from holdfast_lab.study.methods import FingerSignal, hand_signal
+from holdfast_lab.study.methods.wavelets import detail_energy
+from holdfast_lab.study.paper.label_sources import LabelSource, relabelled
+from holdfast_lab.study.plan import Corpus
+from holdfast.training.training_samples import (
+    concatenate,
+    labelled_samples,
+    resample_if_needed,
+    usable_rows,
+)
+
+N_PARTS = 25
+
+ENERGY = "energy"
+"""Zhang's feature: the energy of the Haar details of F_x."""
+COLUMNS = (*FEATURE_NAMES, ENERGY)
+
+Integers = npt.NDArray[np.int64]
+
+
+@dataclass(frozen=True, eq=False)
+class SamplePool:
+    """The labelled samples of one finger of all recordings.
+
+    Attributes:
+        samples: with all features of `COLUMNS`; the groups are the recordings.
+        parts: (n,) random part of each sample, 0 to 24.
+        objects: of each recording; None if it is not known.
+    """
+
+    samples: Samples
+    parts: Integers
+    objects: tuple[str | None, ...]
+
+    def select(self, names: Sequence[str]) -> Samples:
+        """Return the samples with some of the features."""
+        columns = [COLUMNS.index(name) for name in names]
+        return self.samples._replace(features=self.samples.features[:, columns])
+
+
+class Treatment(msgspec.Struct, frozen=True):
+    """A change of all recordings, in training and in test. The default changes nothing.
+
+    Attributes:
+        labels: where labels come from.
+        noise: standard deviation of white noise added to every reading [unit of the readings].
+    """
+
+    labels: LabelSource = "recording"
+    noise: float = 0.0
+
+    def apply(self, recording: Recording, tare: str) -> Recording:
+        """Return the changed recording; labels are made from the readings without added noise."""
+        return Variation(noise=self.noise).apply(relabelled(recording, self.labels, tare))
+
+
+UNTREATED = Treatment()
+
+
+def pool_samples(
+    corpus: Corpus,
+    rate: float,
+    finger: str,
+    window: int,
+    seed: int,
+    treatment: Treatment = UNTREATED,
+) -> SamplePool:
+    """Return the labelled samples of a finger in a corpus.
+
+    Args:
+        corpus: of recordings; the last four are kept in memory.
+        rate: to which recordings with another rate are resampled [Hz].
+        finger: name of the finger.
+        window: N_w [samples].
+        seed: of the parts.
+        treatment: of the recordings.
+    """
+    samples = [Samples(np.empty((0, len(COLUMNS))), np.empty(0, bool), np.empty(0, np.int64))]
+    parts = [np.empty(0, dtype=np.int64)]
+    forces = _corpus_forces(corpus, rate, treatment)
+    for number, recording in enumerate(forces):
+        if finger not in recording.fingers:
+            continue
+        signal, states = recording.fingers[finger]
+        features = _columns(signal, window)
+        rows = usable_rows(features, states)
+        samples.append(labelled_samples(features, states, rows, number))
+        drawn = np.random.default_rng([seed, number]).integers(N_PARTS, size=len(states))
+        parts.append(drawn[rows])
+    objects = tuple(recording.object for recording in forces)
+    return SamplePool(concatenate(samples), np.concatenate(parts), objects)
+
+
+class _RecordingForces(NamedTuple):
+    """Forces and label codes of the labelled fingers of a recording, without its readings."""
+
+    fingers: dict[str, tuple[FingerSignal, npt.NDArray[np.int8]]]
+    object: str | None
+
+
+@lru_cache(maxsize=4)
+def _corpus_forces(
+    corpus: Corpus, rate: float, treatment: Treatment
+) -> tuple[_RecordingForces, ...]:
+    """Return the forces of all recordings; a worker reads a corpus once for all its tasks."""
+    return tuple(_read_forces(corpus, rate, treatment))
+
+
+def _read_forces(corpus: Corpus, rate: float, treatment: Treatment) -> Iterator[_RecordingForces]:
+    for given in corpus.load():
+        recording = resample_if_needed(treatment.apply(given, corpus.tare), rate)
+        hand = hand_signal(recording, Tare.parse(corpus.tare))
+        fingers = {
+            name: (_without_readings(signal), recording.modules[name].label_states)
+            for name, signal in hand.fingers.items()
+        }
+        held_object = recording.metadata.get("object")
+        yield _RecordingForces(fingers, None if held_object is None else str(held_object))
+
+
+def _without_readings(signal: FingerSignal) -> FingerSignal:
+    empty = np.empty((len(signal.times), 0, 3))
+    return FingerSignal(signal.sensor, signal.times, empty, signal.force, signal.rate)
+
+
+def _columns(signal: FingerSignal, window: int) -> Array:
+    """Return the features of `COLUMNS` (n, 7); NaN without a full window."""
+    table = np.full((len(signal.times), len(COLUMNS)), np.nan)
+    normal = signal.normal_magnitude
+    for rows in signal.stretches:
+        table[rows, :-1] = haar_features(signal.force[rows], window)
+        table[rows, -1] = detail_energy(normal[rows], window)
+    return table

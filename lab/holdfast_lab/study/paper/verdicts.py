@@ -1,0 +1,405 @@
+"""Part of the study: experiments 1 and 2 of the paper in numbers, over all recordings."""
+
+import math
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from typing import Any
+
+import msgspec
+import numpy as np
+
+from holdfast.contact import HELD_PHASES, MERGE_GAP, NO_CONTACT, STABLE, UNKNOWN, UNSTABLE, Phase
+from holdfast.metrics import Decisions, FingerDecisions
+from holdfast.metrics.decisions import Codes
+from holdfast.metrics.events import MIN_STABLE_DURATION, TIME_TOLERANCE
+from holdfast.metrics.masks import join_runs, runs
+from holdfast.recordings import Truth
+from holdfast_lab.report.html_report import ReportFigure
+from holdfast_lab.report.result_tables import Key, ResultTable, Row
+from holdfast.sensors.types import Array
+from holdfast_lab.study.comparison.rows import count_row, quantile_row, ratio_row
+from holdfast_lab.study.evaluation.evaluate_method import held_out_folds
+from holdfast_lab.study.evaluation.fitted_method import FittedMethod, gather_training_samples
+from holdfast_lab.study.evaluation.recording_features import RecordingFeatures, corpus_features
+from holdfast_lab.study.evaluation.variation import Variation
+from holdfast_lab.study.methods import METHODS
+from holdfast_lab.study.paper.label_sources import has_truth
+from holdfast_lab.study.plan import Corpus, StudyPlan
+from holdfast_lab.tasks import Task
+
+VERDICT_METHODS = ("logreg", "svm", "holdfast")
+QUICK_VERDICT_METHODS = ("logreg", "holdfast")
+ROLE_TITLES = {
+    "main": "by recording",
+    "fresh": "other seeds",
+    "others": "unseen objects",
+    "gentle": "gentle profile",
+    "vigorous": "vigorous profile",
+}
+"""Roles whose recordings are evaluated, and their titles. "main" is evaluated out of fold."""
+ONLY_FAILED = ("gentle", "vigorous")
+"""Roles of which only the failed grasps are evaluated."""
+DIGITS = {"delay median [s]": 3, "delay 95 % [s]": 3, "disturbances": 0, "failed grasps": 0}
+
+Keys = dict[str, Key]
+
+
+class DisturbanceOutcome(msgspec.Struct, frozen=True):
+    """One disturbance of a held object, and its detection by the hand.
+
+    Attributes:
+        start: of the outside force [s].
+        end: of the outside force [s].
+        slides: whether the object slides on a finger meanwhile.
+        was_stable: whether the hand was called stable directly before.
+        delay: time from the start to the first alarm [s]; infinite without an alarm.
+    """
+
+    start: float
+    end: float
+    slides: bool
+    was_stable: bool
+    delay: float
+
+
+class GraspVerdict(msgspec.Struct, frozen=True):
+    """Decisions of one method on one grasp.
+
+    Attributes:
+        role: of the corpus.
+        recording: name of the recording.
+        object: in the hand.
+        case: "1", "2" or "failed".
+        contact: [samples in contact from the start of the closing to the release, of those not
+            called stable], all fingers.
+        unstable: the same of the samples labelled unstable.
+        first_stable: by finger, time from the lock to the first stable estimate [s]; infinite
+            without one.
+        lasting_stable: the same, to the first estimate that stays stable for half a second.
+        disturbances: in order of time.
+    """
+
+    role: str
+    recording: str
+    object: str
+    case: str
+    contact: tuple[int, int]
+    unstable: tuple[int, int]
+    first_stable: list[float]
+    lasting_stable: list[float]
+    disturbances: list[DisturbanceOutcome]
+
+
+def tasks(plan: StudyPlan) -> list[Task]:
+    """Return a task for each method; none without a truth."""
+    if not has_truth(plan.main.load()[0]):
+        return []
+    corpora = {role: plan.corpora[role] for role in ROLE_TITLES if role in plan.corpora}
+    folds, max_samples = (3, 10_000) if plan.quick else (5, 20_000)
+    return [
+        Task(
+            f"verdicts/{name}",
+            grasp_verdicts,
+            (name, corpora, folds, max_samples, plan.seed),
+            list[GraspVerdict],
+            cost=40.0,
+        )
+        for name in _methods(plan)
+    ]
+
+
+def tables(plan: StudyPlan, results: Mapping[str, Any]) -> list[ResultTable]:
+    """Return the tables of experiment 1, experiment 2 and single disturbances."""
+    found = {n: results[f"verdicts/{n}"] for n in _methods(plan) if f"verdicts/{n}" in results}
+    makers = (_failed_table, _disturbed_table, _single_table)
+    made = [make(found, plan.seed) for make in makers] if found else []
+    return [table for table in made if table.rows]
+
+
+def figures(plan: StudyPlan, results: Mapping[str, Any]) -> list[ReportFigure]:
+    """Return no figures; those of the experiments show single recordings."""
+    del plan, results
+    return []
+
+
+def grasp_verdicts(
+    name: str, corpora: Mapping[str, Corpus], n_folds: int, max_samples: int, seed: int
+) -> list[GraspVerdict]:
+    """Return the verdicts of a method on all recordings, none of them used for its own fit.
+
+    Args:
+        name: of the method, one for fingers.
+        corpora: by role; "main" for training.
+        n_folds: of the main recordings.
+        max_samples: of a finger, that train a classifier.
+        seed: of folds and fits.
+    """
+    method = METHODS[name]
+    main = corpus_features(method, corpora["main"], Variation())
+    cases = {role: _cases(corpus) for role, corpus in corpora.items()}
+    training = gather_training_samples(main, max_samples)
+    everything = set(range(len(main)))
+    found: dict[int, GraspVerdict] = {}
+    for held in held_out_folds(training.objects, "recording", n_folds, seed):
+        fitted = FittedMethod.fit(method, training, everything - held, seed)
+        for place in held:
+            case = cases["main"][main[place].name]
+            found[place] = _verdict("main", case, main[place], fitted)
+    verdicts = [found[place] for place in sorted(found)]
+    fitted = FittedMethod.fit(method, training, everything, seed)
+    for role, corpus in corpora.items():
+        names = tuple(
+            recording
+            for recording in corpus.recordings
+            if role not in ONLY_FAILED or cases[role][recording] == "failed"
+        )
+        if role != "main" and names:
+            chosen = msgspec.structs.replace(corpus, recordings=names)
+            verdicts += [
+                _verdict(role, cases[role][each.name], each, fitted)
+                for each in corpus_features(method, chosen, Variation())
+            ]
+    return verdicts
+
+
+def _cases(corpus: Corpus) -> dict[str, str]:
+    return {each.name: str(each.metadata.get("case", "")) for each in corpus.load()}
+
+
+def _verdict(
+    role: str, case: str, recording: RecordingFeatures, fitted: FittedMethod
+) -> GraspVerdict:
+    decisions = fitted.scores(recording).decide(recording, recording.exact_labels)
+    contact, unstable = _contact_counts(decisions, recording.truth)
+    stable_after = [
+        stable_after_lock(each.times, each.states, recording.truth)
+        for each in decisions.fingers.values()
+    ]
+    known = [each for each in stable_after if each is not None]
+    return GraspVerdict(
+        role=role,
+        recording=recording.name,
+        object=recording.object or "",
+        case=case,
+        contact=contact,
+        unstable=unstable,
+        first_stable=[first for first, _ in known],
+        lasting_stable=[lasting for _, lasting in known],
+        disturbances=find_disturbances(decisions.hand, recording.truth),
+    )
+
+
+def _contact_counts(
+    decisions: Decisions, truth: Truth | None
+) -> tuple[tuple[int, int], tuple[int, int]]:
+    """Return samples, and those not called stable: in contact, and labelled unstable.
+
+    They are the samples of a grasp: from the start of the closing until the release begins.
+    """
+    contact, unstable = np.zeros(2, dtype=int), np.zeros(2, dtype=int)
+    if truth is not None:
+        for each in decisions.fingers.values():
+            phase = truth.hand["phase"][_at(truth, each.times)]
+            closing = np.flatnonzero(phase == Phase.CLOSING)
+            grasp = np.zeros(len(phase), dtype=bool)
+            grasp[closing[0] if len(closing) else len(phase) :] = True
+            grasp &= (phase != Phase.RELEASED) & (each.states != UNKNOWN)
+            grasp &= (each.labels != UNKNOWN) & (each.labels != NO_CONTACT)
+            not_stable = each.states != STABLE
+            is_unstable = grasp & (each.labels == UNSTABLE)
+            contact += (grasp.sum(), (grasp & not_stable).sum())
+            unstable += (is_unstable.sum(), (is_unstable & not_stable).sum())
+    return (int(contact[0]), int(contact[1])), (int(unstable[0]), int(unstable[1]))
+
+
+def stable_after_lock(
+    times: Array, states: Codes, truth: Truth | None
+) -> tuple[float, float] | None:
+    """Return the times from the lock to the first, and to the first lasting, stable estimate [s].
+
+    Infinite where there is none while the object is held. None if it was never locked.
+
+    Args:
+        times: (n,) of the estimates [s].
+        states: (n,) of the estimates.
+        truth: with the phases of the experiment.
+    """
+    if truth is None:
+        return None
+    held = np.isin(truth.hand["phase"], HELD_PHASES)
+    if not held.any():
+        return None
+    locked_at = float(truth.times[np.argmax(held)])
+    stable = (times >= locked_at - TIME_TOLERANCE) & held[_at(truth, times)] & (states == STABLE)
+    first, lasting = math.inf, math.inf
+    for start, end in runs(stable):
+        begin = max(float(times[start]) - locked_at, 0.0)
+        first = min(first, begin)
+        if times[end - 1] - times[start] >= MIN_STABLE_DURATION - TIME_TOLERANCE:
+            lasting = begin
+            break
+    return first, lasting
+
+
+def find_disturbances(
+    hand: FingerDecisions | None, truth: Truth | None
+) -> list[DisturbanceOutcome]:
+    """Return the disturbances of a held object, each with its detection by an alarm.
+
+    An alarm is a change of the hand from STABLE to another known state. Disturbances with a
+    shorter rest between them than a person would see are one.
+    """
+    if hand is None or truth is None:
+        return []
+    phase = truth.hand["phase"]
+    disturbed = np.isin(phase, (Phase.DISTURBED, Phase.SLIPPING))
+    alarm = np.zeros(len(hand.states), dtype=bool)
+    alarm[1:] = (
+        (hand.states[:-1] == STABLE) & (hand.states[1:] != STABLE) & (hand.states[1:] != UNKNOWN)
+    )
+    found = []
+    for start, end in runs(join_runs(disturbed, truth.times, MERGE_GAP)):
+        onset, last = float(truth.times[start]), float(truth.times[end - 1])
+        inside = (hand.times >= onset - TIME_TOLERANCE) & (hand.times <= last + TIME_TOLERANCE)
+        before = int(np.searchsorted(hand.times, onset - TIME_TOLERANCE)) - 1
+        alarms = hand.times[alarm & inside]
+        found.append(
+            DisturbanceOutcome(
+                start=onset,
+                end=last,
+                slides=bool((phase[start:end] == Phase.SLIPPING).any()),
+                was_stable=before >= 0 and bool(hand.states[before] == STABLE),
+                delay=max(float(alarms[0]) - onset, 0.0) if len(alarms) else math.inf,
+            )
+        )
+    return found
+
+
+def _at(truth: Truth, times: Array) -> Any:  # noqa: ANN401 (indices)
+    last = np.searchsorted(truth.times, times + TIME_TOLERANCE, side="right") - 1
+    return np.clip(last, 0, len(truth.times) - 1)
+
+
+def _failed_table(found: Mapping[str, Sequence[GraspVerdict]], seed: int) -> ResultTable:
+    rows: list[Row] = []
+    for name, verdicts in found.items():
+        failed = [each for each in verdicts if each.case == "failed"]
+        for title, chosen in _groups(failed):
+            keys: Keys = {"on": title, "method": METHODS[name].title}
+            rows.append(count_row(keys | {"figure": "failed grasps"}, [1] * len(chosen)))
+            for figure, counts in (
+                ("of the grasp, called unstable [%]", [each.contact for each in chosen]),
+                ("of its unstable samples [%]", [each.unstable for each in chosen]),
+            ):
+                n, called = np.array(counts).reshape(-1, 2).T
+                rows.append(ratio_row(keys | {"figure": figure}, called, n, seed))
+    note = (
+        "Grasps that never locked the object, or lost it. The grasp: samples of all fingers in "
+        "contact, from the start of the closing until the release begins; called unstable: not "
+        "called stable. A grasp that held the object for a while before it lost it also has "
+        "stable samples; the last column counts the samples that exact labels call unstable. "
+        "The paper shows one failed grasp and says that both classifiers were right."
+    )
+    title = "Experiment 1: failed grasps"
+    return ResultTable(
+        "experiment_1", title, note, rows, ("on", "method"), digits_of={"failed grasps": 0}
+    )
+
+
+def _disturbed_table(found: Mapping[str, Sequence[GraspVerdict]], seed: int) -> ResultTable:
+    rows: list[Row] = []
+    for name, verdicts in found.items():
+        whole = [each for each in verdicts if each.role not in ONLY_FAILED]
+        for title, chosen in _groups([each for each in whole if each.case != "failed"]):
+            rows += _disturbed_rows({"on": title, "method": METHODS[name].title}, chosen, seed)
+    note = (
+        "Grasps that held the object. Time from the lock to the first stable estimate of a "
+        "finger, and to the first that stays stable for half a second; infinite if there is none. "
+        "A disturbance lasts from the first to the last touch of the operator. It is detected by "
+        "an alarm of the hand meanwhile: a change from STABLE to another state. Without an alarm "
+        "it is missed, also if the hand was not called stable before, which is the next column. "
+        "A missed disturbance has an infinite delay. The hand is not held unstable after an "
+        "alarm."
+    )
+    title = "Experiment 2: locked, disturbed, released"
+    lines = ("on", "method")
+    digits = DIGITS | dict.fromkeys(_LOCK_FIGURES, 3)
+    return ResultTable("experiment_2", title, note, rows, lines, digits_of=digits)
+
+
+_LOCK_FIGURES = (
+    "lock to first stable, median [s]",
+    "lock to lasting stable, median [s]",
+    "lock to lasting stable, 95 % [s]",
+)
+
+
+def _disturbed_rows(keys: Keys, chosen: Sequence[GraspVerdict], seed: int) -> Iterator[Row]:
+    first = [each.first_stable for each in chosen]
+    lasting = [each.lasting_stable for each in chosen]
+    for figure, values, q in zip(
+        _LOCK_FIGURES, (first, lasting, lasting), (0.5, 0.5, 0.95), strict=True
+    ):
+        yield quantile_row(keys | {"figure": figure}, values, q, seed)
+    n = [len(each.disturbances) for each in chosen]
+    yield count_row(keys | {"figure": "disturbances"}, n)
+    detected = [sum(math.isfinite(d.delay) for d in each.disturbances) for each in chosen]
+    yield ratio_row(keys | {"figure": "detected [%]"}, detected, n, seed)
+    already = [sum(not d.was_stable for d in each.disturbances) for each in chosen]
+    yield ratio_row(keys | {"figure": "not stable before [%]"}, already, n, seed)
+    delays = [[d.delay for d in each.disturbances] for each in chosen]
+    yield quantile_row(keys | {"figure": "delay median [s]"}, delays, 0.5, seed)
+    yield quantile_row(keys | {"figure": "delay 95 % [s]"}, delays, 0.95, seed)
+
+
+def _single_table(found: Mapping[str, Sequence[GraspVerdict]], seed: int) -> ResultTable:
+    del seed
+    rows: list[Row] = []
+    digits: dict[str, int] = {}
+    for name, verdicts in found.items():
+        short = METHODS[name].title.split(" (", maxsplit=1)[0]
+        detected, delay = f"{short}: detected", f"{short}: delay [s]"
+        digits |= {detected: 0, delay: 3}
+        for each in _first_of_each_object(verdicts):
+            for number, disturbance in enumerate(each.disturbances, 1):
+                keys: Keys = {"recording": each.recording, "disturbance": number}
+                if name == next(iter(found)):
+                    rows.append(Row(keys | {"figure": "from [s]"}, disturbance.start))
+                    rows.append(Row(keys | {"figure": "to [s]"}, disturbance.end))
+                    rows.append(Row(keys | {"figure": "slides"}, float(disturbance.slides)))
+                found_it = math.isfinite(disturbance.delay)
+                rows.append(Row(keys | {"figure": detected}, float(found_it)))
+                rows.append(Row(keys | {"figure": delay}, disturbance.delay))
+    note = (
+        "Every disturbance of one recording of each object: the first by name with disturbances, "
+        "from recordings not used for training. 1: detected by an alarm; 0: missed."
+    )
+    title = "Experiment 2: single disturbances"
+    lines = ("recording", "disturbance")
+    digits |= {"slides": 0, "from [s]": 2, "to [s]": 2}
+    return ResultTable("disturbances", title, note, rows, lines, digits_of=digits)
+
+
+def _first_of_each_object(verdicts: Iterable[GraspVerdict]) -> list[GraspVerdict]:
+    """Return the first recording with disturbances of each object; fresh ones, if there are."""
+    disturbed = [each for each in verdicts if each.disturbances and each.case != "failed"]
+    roles = {each.role for each in disturbed}
+    role = "fresh" if "fresh" in roles else "main"
+    first: dict[str, GraspVerdict] = {}
+    for each in sorted(disturbed, key=lambda each: each.recording):
+        if each.role == role:
+            first.setdefault(each.object, each)
+    return list(first.values())
+
+
+def _groups(verdicts: Sequence[GraspVerdict]) -> Iterator[tuple[str, list[GraspVerdict]]]:
+    """Yield the verdicts of each role, and of all roles if there are several."""
+    roles = [role for role in ROLE_TITLES if any(each.role == role for each in verdicts)]
+    for role in roles:
+        yield ROLE_TITLES[role], [each for each in verdicts if each.role == role]
+    if len(roles) > 1:
+        yield "all", list(verdicts)
+
+
+def _methods(plan: StudyPlan) -> list[str]:
+    names = QUICK_VERDICT_METHODS if plan.quick else VERDICT_METHODS
+    return [name for name in names if name in METHODS]

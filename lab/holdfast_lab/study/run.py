@@ -1,0 +1,136 @@
+"""A whole study: run the tasks of all parts, then write tables, figures and the report."""
+
+import time
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from typing import Any, Protocol
+
+from holdfast.parallel import Engine
+from holdfast_lab.report.environment import machine, versions
+from holdfast_lab.report.folder import ReportKind, check_output_folder, write_report
+from holdfast_lab.report.html_report import ReportFigure
+from holdfast_lab.report.result_tables import ResultTable, to_json
+from holdfast_lab.study import environment
+from holdfast_lab.study.comparison import all_methods, real_recordings, sensitivity
+from holdfast_lab.study.methods import METHODS
+from holdfast_lab.study.paper import (
+    attribution,
+    claims,
+    experiments,
+    label_tables,
+    paper_tables,
+    verdicts,
+)
+from holdfast_lab.study.plan import StudyPlan
+from holdfast_lab.study.sections import PartOutput, report_sections
+from holdfast_lab.tasks import Notify, ShowProgress, Task, TaskRunner
+
+STUDY = ReportKind("study", "study.json")
+TITLE = "Slip and disturbance at the fingertips: the study"
+
+
+class StudyPart(Protocol):
+    """A module of the study: its tasks, and the tables and figures of their results."""
+
+    def tasks(self, plan: StudyPlan) -> list[Task]:
+        """Return what has to be computed."""
+        ...
+
+    def tables(self, plan: StudyPlan, results: Mapping[str, Any]) -> list[ResultTable]:
+        """Return the tables of the results."""
+        ...
+
+    def figures(self, plan: StudyPlan, results: Mapping[str, Any]) -> list[ReportFigure]:
+        """Return the figures of the results."""
+        ...
+
+
+PARTS: Mapping[str, StudyPart] = {
+    "paper": paper_tables,
+    "experiments": experiments,
+    "verdicts": verdicts,
+    "labels": label_tables,
+    "attribution": attribution,
+    "claims": claims,
+    "comparison": all_methods,
+    "sensitivity": sensitivity,
+    "real": real_recordings,
+}
+"""The parts of the study, by name."""
+
+
+def run_study(
+    plan: StudyPlan,
+    out: str | Path,
+    engine: Engine = Engine(),  # noqa: B008 (a tuple: it cannot change)
+    *,
+    progress: ShowProgress = lambda items, *_: iter(items),
+    notify: Notify = lambda _: None,
+    force: bool = False,
+    made_in: float = 0.0,
+    left_out: Sequence[str] = (),
+) -> list[ResultTable]:
+    """Run a study and write it to a folder. The same plan gives the same tables.
+
+    The result of each task is stored in `out/work`. A study that was stopped therefore continues
+    where it stopped, and a repeated study is finished at once.
+
+    Args:
+        plan: of the study.
+        out: the folder; it may hold `work` and `data`.
+        engine: that runs the tasks.
+        progress: that passes on the finished tasks.
+        notify: that is called with messages for the user.
+        force: replace a study in `out`, except `work` and `data`.
+        made_in: time that was needed to make the data [s].
+        left_out: sentences on what a reader would expect and does not find.
+
+    Returns:
+        All tables, in the order of the report.
+
+    Raises:
+        OutputError: as `check_output_folder`.
+        TrainingError: the data are not enough to train a method.
+        EngineError: as `TaskRunner.run`.
+    """
+    check_output_folder(out, STUDY, force=force)
+    start = time.perf_counter()
+    tasks = [task for part in PARTS.values() for task in part.tasks(plan)]
+    results = TaskRunner(Path(out), engine, progress, notify).run(tasks)
+    notify("making tables and figures")
+    outputs = {
+        name: PartOutput(part.tables(plan, results), part.figures(plan, results))
+        for name, part in PARTS.items()
+    }
+    seconds = {"data": made_in, "study": time.perf_counter() - start}
+    summary = _summary(plan, seconds, len(tasks), [*left_out, *whole_hand_note(plan)])
+    sections = report_sections(outputs, environment.run_notes(summary), twin=plan.main.is_simulated)
+    tables = [table for section in sections for table in section.tables]
+    document = {"tables": {table.name: to_json(table) for table in tables}, **summary}
+    facts = environment.report_facts(summary)
+    write_report(out, STUDY, TITLE, facts, sections, document, force=force)
+    return tables
+
+
+def whole_hand_note(plan: StudyPlan) -> list[str]:
+    """Return a sentence on the methods that a study of one finger leaves out, else nothing."""
+    if len(plan.main.fingers) > 1:
+        return []
+    titles = ", ".join(method.title for method in METHODS.values() if method.whole_hand)
+    return [f"{titles}, because only the {plan.main.fingers[0]} has labels of both classes."]
+
+
+def _summary(
+    plan: StudyPlan, seconds: Mapping[str, float], n_tasks: int, left_out: Sequence[str]
+) -> dict[str, Any]:
+    """Return the contents of `study.json`, except the tables."""
+    return {
+        "seed": plan.seed,
+        "quick": plan.quick,
+        "data": environment.data(plan),
+        "versions": versions(),
+        "machine": machine(),
+        "seconds": {name: round(value, 1) for name, value in seconds.items()},
+        "tasks": n_tasks,
+        "left_out": list(left_out),
+    }

@@ -1,0 +1,243 @@
+"""Sections of the report in reading order, each with a text on how to read it."""
+
+from collections.abc import Iterable, Mapping, Sequence
+from typing import NamedTuple, TypeVar
+
+import msgspec
+
+from holdfast_lab.report.html_report import SUMMARY, ReportFigure, Section
+from holdfast_lab.report.result_tables import ResultTable
+from holdfast_lab.study.summary import summary_text
+
+E = TypeVar("E", ResultTable, ReportFigure)
+
+
+class SectionOutline(NamedTuple):
+    """A section before its tables and figures are made.
+
+    Attributes:
+        title: of one line.
+        text: how to read the section, in paragraphs.
+        part: of the study whose tables and figures belong here, unless an outline names them.
+        names: of tables and figures of any part that belong here; they come first.
+    """
+
+    title: str
+    text: str
+    part: str = ""
+    names: tuple[str, ...] = ()
+
+
+class PartOutput(NamedTuple):
+    """Tables and figures of one part of the study."""
+
+    tables: Sequence[ResultTable]
+    figures: Sequence[ReportFigure]
+
+
+TWIN_NOTE = (
+    "These recordings are simulated: skin, friction and operator are models. The values compare "
+    "methods; they do not predict how well a method works on a real hand."
+)
+"""Note of every table that is made from recordings of the twin."""
+
+READ_ON = (
+    "Every value has its interval and its number of recordings in its table; differences smaller "
+    "than the intervals may be chance."
+)
+"""End of the summary."""
+
+OUTLINES = (
+    SectionOutline(
+        "The paper's tables",
+        """Each cell holds our value. Below it, in small print, are its 95 % interval and, if the
+paper prints one, the paper's value with the difference (ours minus the paper's). Values are
+percentages of labelled samples. Stable (1) is the positive class.
+
+The paper splits samples at random. Nearly identical samples of one recording are then on both
+sides of the split. Here each line names the data on which a classifier was tested. "Training
+data" are the samples of the fit itself. "Cross-validated" and "held out" are other samples of the
+same recordings. Only "fresh recordings" (or "other recordings") and "other objects" are new data,
+as in actual use. Read those lines first.
+
+- FPR: fraction of the unstable samples that are called stable (missed dangers).
+- FNR: fraction of the stable samples that are called unstable (needless alarms).
+- FDR: fraction of the samples called stable that are not stable.
+- N_w: number of samples in the window of the features; at 150 Hz, 14 samples are 93 ms.""",
+        "paper",
+        ("confusion", "window", "ablation", "zhang", "fingers"),
+    ),
+    SectionOutline(
+        "The paper's figures",
+        """Each figure shows one finger in one recording. The shades are the phases of the
+experiment, if the recording has them. A recording is chosen by what was done in it and by its
+name, not by the look of its figure. Recordings that were not used for training are preferred.
+If no recording is of a failed grasp, the figure of experiment 1 is missing.""",
+        "experiments",
+    ),
+    SectionOutline(
+        "The paper's experiments in numbers",
+        """The paper shows experiments 1 and 2 as one picture each. Here they are counted over all
+recordings, by fits that did not use them. Experiment 1: how much of a failed grasp is called
+unstable. Experiment 2: the time from the lock to the first stable estimate, and which
+disturbances are detected. The last table lists single disturbances.""",
+        "verdicts",
+        ("experiment_1", "experiment_2", "disturbances"),
+    ),
+    SectionOutline(
+        "What the distance to the paper is due to",
+        """The paper's method on the reference recordings, and then with one thing switched at a
+time: the labels, the disturbances, the classifier, the noise, the window. A difference is due to
+that one thing. What no line explains stays open: the paper's data are not published.""",
+        "attribution",
+    ),
+    SectionOutline(
+        "Labels, and what the sensor shows",
+        """Labels are a choice. Exact labels come from the simulated forces; a person draws them
+from the plot of the force. The first table trains and tests on both. The second table counts
+unstable samples in which nothing at the sensor changes by more than its noise. No detector can
+find those within its window, so they set a ceiling.""",
+        "labels",
+        ("labels", "ceiling"),
+    ),
+    SectionOutline(
+        "Claims that the paper does not test",
+        """The paper states both, without a measurement. The expected direction and size were
+written into the program before the first run. The verdict follows from the value and its
+interval by a fixed rule, which is printed below the table.""",
+        "claims",
+    ),
+    SectionOutline(
+        "Where the paper disagrees with itself",
+        """Lines with the same subject are statements of the paper about one thing. They
+contradict each other, or they leave open what a repetition needs. For this reason some tables
+are given twice in this report, and a difference to one printed value means little.""",
+        "",
+        ("discrepancies",),
+    ),
+    SectionOutline(
+        "Results on new data",
+        """The same classifiers on new recordings, on other objects, and out of fold. With a random
+split the accuracy is higher; the difference shows how much a random split overestimates it. Quote
+the values of new data.""",
+        "",
+        ("unseen", "splits"),
+    ),
+    SectionOutline(
+        "Methods compared",
+        """Every method is fitted to the same recordings and evaluated on the same other
+recordings, for each finger or for the whole hand. Differences to the paper's method are paired by
+recording. If the interval of a difference does not contain zero, one of the two methods is better
+on these data, even if the intervals of the two methods overlap. A method for fingers and a method
+for the whole hand solve different tasks. The table of hands evaluates all of them on the same
+task.""",
+        "comparison",
+        ("strongest", "methods", "hands", "cost"),
+    ),
+    SectionOutline(
+        "Events: detection delay and false alarms",
+        """A user does not see samples but events: an object that was held begins to move. "Missed
+at 50 ms" is the fraction of events without an alarm 50 ms after the onset. The delay counts from
+the onset, and is infinite for an event that was never detected. False alarms are counted per
+minute of undisturbed hold. A threshold with fewer missed events has more false alarms, so compare
+methods at similar rates of false alarms. All thresholds are chosen on training recordings
+only.""",
+        "",
+        ("events", "slips", "glitches", "alarms"),
+    ),
+    SectionOutline(
+        "Where the errors are",
+        """The same decisions by group: by phase of the experiment, by grip force and by direction
+of the push. The last table shows whether the probabilities are right: whether of 100 samples with
+a probability of 0.8 about 80 are stable. The Brier score is the mean squared error of the
+probability; 0 is best. The paper makes claims about grip force and direction, but does not test
+them.""",
+        "",
+        ("phases", "force", "grip", "directions", "reliability"),
+    ),
+    SectionOutline(
+        "Sensitivity",
+        """What happens if one condition changes: the noise of the readings, the margin by which
+labels of disturbances are extended, the profile of the twin (how hard it grips and how it is
+disturbed), or the sampling rate. Be careful with a method whose curve falls early: it may fail on
+another hand.""",
+        "sensitivity",
+    ),
+    SectionOutline(
+        "Real recordings",
+        """The model that ships, builtin:any, was trained on the twin only. It is evaluated on
+recordings of a real hand, as it ships and adapted to the other recordings. The methods are trained
+on the other recordings of the same hand, which gives them an advantage. Look at each recording:
+the pooled values of a few recordings say little. No value here is the accuracy on your hand.""",
+        "real",
+    ),
+)  # fmt: skip
+
+LIMITS = """These results come from recordings of a simulated hand. The simulation was not tuned to
+make the results better. It cannot show:
+
+- how good a method is on a given real hand: tremor, stiffness of the operator, texture and
+friction are plausible guesses that are not fitted to measurements;
+- the material between taxels and object: each node of the skin is a separate spring, without
+lateral coupling and torsion, and friction does not grow while an object is held;
+- defects of a real skin: dead taxels, magnetic disturbance by metal, irregular time stamps;
+- mechanics and wear of a hand: there is no play in gears and there are no cables, and only the
+fingertips touch the object;
+- how a person labels: these labels are computed from the true outside force, while a person is
+late and misses slips of a tenth of a millimetre;
+- the share of idle time: in about three of ten samples the hand is empty, and those are classified
+without error. More idle time gives a higher accuracy, not a better detector: look at phases and
+events."""
+
+
+def report_sections(
+    outputs: Mapping[str, PartOutput], run_notes: Sequence[str], *, twin: bool
+) -> list[Section]:
+    """Return the sections of the report: summary, run, results, limits of the twin.
+
+    Args:
+        outputs: tables and figures, by part.
+        run_notes: sentences on what was run and what was left out.
+        twin: whether the recordings, except the real ones, are of the twin.
+    """
+    summary = summary_text(table for output in outputs.values() for table in output.tables)
+    sections = [Section(SUMMARY, f"{summary}\n\n{READ_ON}")] if summary else []
+    sections.append(Section("What was run", "\n".join(f"- {note}" for note in run_notes)))
+    tables_by_part = {part: output.tables for part, output in outputs.items()}
+    figures_by_part = {part: output.figures for part, output in outputs.items()}
+    for outline in OUTLINES:
+        tables = _select(outline, tables_by_part)
+        figures = _select(outline, figures_by_part)
+        if tables or figures:
+            if twin:
+                tables = [_with_twin_note(table, outline) for table in tables]
+            sections.append(Section(outline.title, _join_lines(outline.text), tables, figures))
+    if twin:
+        sections.append(Section("What the twin cannot show", _join_lines(LIMITS)))
+    return sections
+
+
+def _select(outline: SectionOutline, by_part: Mapping[str, Sequence[E]]) -> list[E]:
+    """Return what an outline names, in that order, then the rest of its part."""
+    every = {each.name: each for part in by_part.values() for each in part}
+    named = [every[name] for name in outline.names if name in every]
+    return named + [each for each in by_part.get(outline.part, ()) if each.name not in _NAMED]
+
+
+_NAMED = frozenset(name for outline in OUTLINES for name in outline.names)
+
+
+def _with_twin_note(table: ResultTable, outline: SectionOutline) -> ResultTable:
+    """Add the note on the twin to a table that is made from recordings of the twin."""
+    if outline.part == "real" or not any(row.n for row in table.rows):
+        return table
+    return msgspec.structs.replace(table, note=f"{table.note} {TWIN_NOTE}".strip())
+
+
+def _join_lines(text: str) -> str:
+    """Join the lines of each paragraph and of each item of a list."""
+    return "\n\n".join(_join_paragraph(part.splitlines()) for part in text.split("\n\n"))
+
+
+def _join_paragraph(lines: Iterable[str]) -> str:
+    return "".join(f"\n{line}" if line.startswith("- ") else f" {line}" for line in lines).strip()

@@ -1,0 +1,82 @@
+"""Summary of a study: its main results in sentences, from the rows of its tables."""
+
+from collections.abc import Iterable, Iterator
+
+from holdfast_lab.report.result_tables import ResultTable, Row
+
+CLASSIFIERS = ("LogReg", "SVM")
+STRONGEST = {
+    "on": "unseen objects",
+    "error": "samples of fingers [%]",
+    "left out": "nothing",
+    "baseline of": "the paper's family",
+}
+"""Keys of the comparison with the strongest baseline that the summary reports."""
+EVENTS = {"on": "unseen objects", "threshold": "own, held 0.1 s", "a glitch is": "an event"}
+"""Keys of the events that the summary reports."""
+METHODS = ("holdfast", "LogReg (the paper)", "Linear SVM (the paper)")
+
+
+def summary_text(tables: Iterable[ResultTable]) -> str:
+    """Return the main results as a list, with a line for each that the tables have."""
+    rows = {table.name: table.rows for table in tables}
+    lines = [
+        *_accuracies(rows.get("confusion", [])),
+        *_strongest(rows.get("strongest", [])),
+        *_events(rows.get("events", [])),
+    ]
+    return "\n".join(f"- {line}" for line in lines)
+
+
+def _accuracies(rows: list[Row]) -> Iterator[str]:
+    for on, words in (
+        ("held out", "The paper's protocol (samples split at random)"),
+        ("other objects", "The same classifiers on objects that were not in training"),
+    ):
+        found = [
+            (name, row)
+            for name in CLASSIFIERS
+            for row in _select(rows, {"classifier": name, "on": on, "figure": "accuracy"})
+        ]
+        if found:
+            paper = _paper if on == "held out" else lambda _: ""  # it tested no other objects
+            parts = [f"{name} {_value(row)} % correct{paper(row)}" for name, row in found]
+            yield f"{words}: {', '.join(parts)}{_recordings(found[0][1])}."
+
+
+def _strongest(rows: list[Row]) -> Iterator[str]:
+    ours = _select(rows, {**STRONGEST, "figure": "holdfast [%]"})
+    baseline = _select(rows, {**STRONGEST, "figure": "baseline [%]"})
+    for mine, other in zip(ours, baseline, strict=False):
+        yield (
+            f"On unseen objects our own method has {_value(mine)} % errors by sample, the "
+            f"strongest baseline of the paper's family ({other.keys['baseline']}) "
+            f"{_value(other)} %{_recordings(mine)}."
+        )
+
+
+def _events(rows: list[Row]) -> Iterator[str]:
+    parts = [
+        f"{method} {_value(missed)} % (with {_value(false)} false alarms per minute)"
+        for method in METHODS
+        for missed in _select(rows, EVENTS | {"method": method, "figure": "missed at 100 ms [%]"})
+        for false in _select(rows, EVENTS | {"method": method, "figure": "false alarms per minute"})
+    ]
+    if parts:
+        yield f"Events on unseen objects that are missed within 0.1 s: {', '.join(parts)}."
+
+
+def _select(rows: list[Row], keys: dict[str, str]) -> list[Row]:
+    return [row for row in rows if keys.items() <= row.keys.items() and row.ours is not None]
+
+
+def _value(row: Row) -> str:
+    return f"{row.ours:.1f}"
+
+
+def _paper(row: Row) -> str:
+    return "" if row.paper is None else f" (paper: {row.paper:.1f} %)"
+
+
+def _recordings(row: Row) -> str:
+    return "" if row.n is None else f"; {row.n} recordings"

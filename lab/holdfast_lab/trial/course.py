@@ -1,0 +1,103 @@
+"""Course of a trial over time, beyond the loss of the object, for a figure and a film."""
+
+from collections.abc import Iterable, Iterator
+from typing import NamedTuple, Self
+
+import msgspec
+import numpy as np
+
+from holdfast.contact import CONTACT_FORCE
+from holdfast_lab.trial.run import RunningTrial, least_force_at
+from holdfast_lab.trial.trials import Trial
+from holdfast.sensors.types import Array
+from holdfast.twin.contact import LOAD, SLIP
+from holdfast.twin.hand import RATE
+from holdfast.twin.world import World
+
+LEAD_TIME = 0.5
+"""Time before the load with which a course begins [s]."""
+FALL_TIME = 0.4
+"""Time after the loss of the object with which it ends [s]."""
+
+
+class Instant(NamedTuple):
+    """One sample of a trial.
+
+    Attributes:
+        time: time since the load began [s].
+        force: sum of the normal forces [N].
+        least: least sum that holds the object [N].
+        slip_speed: largest slip speed of a fingertip in contact [m/s].
+        state: state of the loop.
+        is_lost: whether the object is lost.
+        world: physical state of the twin, valid until the next sample; None in an invented one.
+    """
+
+    time: float
+    force: float
+    least: float
+    slip_speed: float
+    state: str
+    is_lost: bool
+    world: World | None
+
+
+class TrialCourse(msgspec.Struct, frozen=True):
+    """Course of one trial with one law, by sample.
+
+    Attributes:
+        times: (n,) time since the load began [s].
+        force: (n,) sum of the normal forces [N].
+        least: (n,) least sum that holds the object [N].
+        slip_speed: (n,) largest slip speed of a fingertip in contact [m/s].
+        lost_at: time at which the object was lost [s]; None if it was held.
+    """
+
+    times: list[float]
+    force: list[float]
+    least: list[float]
+    slip_speed: list[float]
+    lost_at: float | None = None
+
+    @classmethod
+    def of(cls, instants: Iterable[Instant]) -> Self:
+        """Return the course of the samples."""
+        every = list(instants)
+        lost = (one.time for one in every if one.is_lost)
+        return cls(
+            times=[one.time for one in every],
+            force=[one.force for one in every],
+            least=[one.least for one in every],
+            slip_speed=[one.slip_speed for one in every],
+            lost_at=next(lost, None),
+        )
+
+
+def follow(trial: Trial, law: str, model: str) -> Iterator[Instant]:
+    """Run a trial with a law; yield its samples from shortly before the load to its end.
+
+    The simulation does not end when the object is lost, but `FALL_TIME` later.
+    """
+    running = RunningTrial(trial, law, model)
+    n_lost = 0
+    while not running.is_over and n_lost <= FALL_TIME * RATE:
+        command = running.step()
+        n_lost += running.is_lost
+        held_for = running.simulation.held_for
+        if held_for < trial.load.start - LEAD_TIME:
+            continue
+        tips = running.simulation.world.contact.tips
+        yield Instant(
+            time=held_for - trial.load.start,
+            force=float(tips[:, LOAD].sum()),
+            least=least_force_at(trial, held_for),
+            slip_speed=float(_speeds(tips).max()),
+            state=command.state.value,
+            is_lost=running.is_lost,
+            world=running.simulation.world,
+        )
+
+
+def _speeds(tips: Array) -> Array:
+    """Return the slip speed of each fingertip, 0 without contact [m/s]."""
+    return np.where(tips[:, LOAD] > CONTACT_FORCE, tips[:, SLIP], 0.0)

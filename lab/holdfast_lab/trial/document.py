@@ -1,0 +1,111 @@
+"""Contents of `trial.json` and `trials.csv`, from the results of all trials."""
+
+from collections.abc import Callable, Mapping, Sequence
+from pathlib import Path
+from typing import Any
+
+import msgspec
+
+from holdfast_lab.trial.plan import TrialPlan
+from holdfast_lab.trial.run import LIMITS, TrialResult
+from holdfast_lab.trial.summary import Summary, compare, summarize
+from holdfast_lab.trial.trials import GRIP_MULTIPLE
+from holdfast.csv_cells import csv_text
+from holdfast.twin.loads import LoadKind
+
+OWN, BASELINE = "holdfast", "fixed"
+"""The law of holdfast, and the hand without control; each other law is compared with both."""
+GOALS = {
+    "dropped": 5.0,
+    "reaction_median": 0.04,
+    "slip_median": 0.003,
+    "force_ratio_mean": 1.5,
+    "false_reactions_per_minute": 1.0,
+}
+"""Largest values that the law of holdfast should reach, by the field of `trial.json`."""
+Results = Mapping[str, Sequence[TrialResult]]
+"""Results of the trials by law."""
+
+
+def document_of(plan: TrialPlan, results: Results, example: int | None) -> dict[str, Any]:
+    """Return the numbers of `trial.json`; the field names are part of the contract.
+
+    Args:
+        plan: of the comparison.
+        results: by law, in the order of the trials.
+        example: number of the trial of the film; None if there is none.
+    """
+    return {
+        "laws": _summaries(results),
+        "unseen_objects": _summaries(results, _of("unseen", True)),
+        "seen_objects": _summaries(results, _of("unseen", False)),
+        "by_kind": {kind.value: _summaries(results, _of("kind", kind.value)) for kind in LoadKind},
+        "by_fingers": {str(n): _summaries(results, _of("n_fingers", n)) for n in (3, 4)},
+        "paired": {
+            other: {law: compare(results[law], results[other]) for law in results if law != other}
+            for other in (BASELINE, OWN)
+            if other in results
+        },
+        "example": None if example is None else _example(results, example),
+        "trials": [_plain(one) for each in results.values() for one in each],
+        "n_trials": plan.n,
+        "model": plan.model if plan.model.startswith("builtin:") else Path(plan.model).name,
+        "model_digest": plan.model_digest,
+        "goals": GOALS,
+        "first_grip": GRIP_MULTIPLE,
+        "limits": msgspec.to_builtins(LIMITS),
+        "seed": plan.seed,
+    }
+
+
+def example_of(results: Results) -> int | None:
+    """Return the number of the first trial that the baseline loses and the own law holds.
+
+    Returns:
+        The number; None if there is no such trial, or one of the two laws was not run.
+    """
+    pairs = zip(results.get(BASELINE, ()), results.get(OWN, ()), strict=False)
+    saved = (one.number for lost, one in pairs if lost.held and lost.dropped and _is_saved(one))
+    return next(saved, None)
+
+
+def trials_csv(results: Results) -> str:
+    """Return a line for each trial with each law; `inf` is infinite, an empty field unknown."""
+    names = list(TrialResult.__struct_fields__)
+    rows = [
+        [_known(getattr(one, name)) for name in names] for each in results.values() for one in each
+    ]
+    return csv_text([names, *rows])
+
+
+def _known(value: object) -> object:
+    return "" if str(value) == "nan" else value
+
+
+def _is_saved(result: TrialResult) -> bool:
+    return result.held and not result.dropped
+
+
+def _summaries(
+    results: Results, chosen: Callable[[TrialResult], bool] = lambda _: True
+) -> dict[str, Summary]:
+    """Return the numbers of each law over the trials that are chosen."""
+    return {law: summarize([one for one in each if chosen(one)]) for law, each in results.items()}
+
+
+def _of(field: str, value: object) -> Callable[[TrialResult], bool]:
+    """Return whether a field of a result has a value, as a function."""
+    return lambda one: bool(getattr(one, field) == value)
+
+
+def _example(results: Results, number: int) -> dict[str, Any]:
+    one = next(one for one in results[OWN] if one.number == number)
+    return {
+        "number": number, "object": one.object, "kind": one.kind, "n_fingers": one.n_fingers,
+        "lost_by": BASELINE, "held_by": OWN,
+    }  # fmt: skip
+
+
+def _plain(result: TrialResult) -> object:
+    """Return a result for JSON, null for what is infinite or unknown."""
+    return msgspec.json.decode(msgspec.json.encode(result))

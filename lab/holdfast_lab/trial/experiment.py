@@ -1,0 +1,118 @@
+"""A whole comparison of laws: run the trials, then write tables, figures and the report."""
+
+import time
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+from holdfast_lab.trial.course import TrialCourse
+from holdfast_lab.trial.document import (
+    BASELINE,
+    OWN,
+    Results,
+    document_of,
+    example_of,
+    trials_csv,
+)
+from holdfast_lab.trial.plan import TrialPlan
+from holdfast_lab.trial.report import Example, report_sections
+from holdfast_lab.trial.trials import draw_trial
+from holdfast.errors import OutputError
+from holdfast.parallel import Engine
+from holdfast_lab.report.environment import fact_texts, machine, versions
+from holdfast_lab.report.folder import ReportKind, check_output_folder, write_report
+from holdfast_lab.tasks import Notify, ShowProgress, TaskRunner
+
+COMPARISON = ReportKind("comparison of grip laws", "trial.json", ("trials.csv",))
+"""What the folder of a comparison holds."""
+TITLE = "Grip laws against each other on the twin"
+
+
+def run_trials(
+    plan: TrialPlan,
+    out: str | Path,
+    engine: Engine = Engine(),  # noqa: B008 (a tuple: it cannot change)
+    *,
+    progress: ShowProgress = lambda items, *_: iter(items),
+    notify: Notify = lambda _: None,
+    force: bool = False,
+) -> dict[str, Any]:
+    """Run all trials with all laws and write them to a folder.
+
+    The result of each trial is stored in `out/work`. A comparison that was stopped therefore
+    continues where it stopped, and with one law more, only the trials with that law are run.
+
+    Args:
+        plan: of the comparison.
+        out: the folder; it may hold `work`.
+        engine: that runs the trials.
+        progress: that passes on the finished trials.
+        notify: that is called with messages for the user.
+        force: replace a comparison in `out`, except `work`.
+
+    Returns:
+        The contents of `trial.json`.
+
+    Raises:
+        OutputError: as `check_output_folder`.
+        EngineError: as `TaskRunner.run`.
+    """
+    check_output_folder(out, COMPARISON, force=force)
+    start = time.perf_counter()
+    runner = TaskRunner(Path(out), engine, progress, notify)
+    results = _results(plan, runner)
+    number = example_of(results)
+    example = None if number is None else _example(plan, number, runner)
+    seconds = {"trials": round(time.perf_counter() - start, 1)}
+    notify("making tables and figures")
+    document = document_of(plan, results, number)
+    document |= {"versions": versions(), "machine": machine(), "seconds": seconds}
+    sections = report_sections(document, results, example)
+    others = {"trials.csv": trials_csv(results).encode()}
+    write_report(
+        out, COMPARISON, TITLE, _facts(document), sections, document, others=others, force=force
+    )
+    return document
+
+
+def _results(plan: TrialPlan, runner: TaskRunner) -> Results:
+    """Return the results of all trials, by law and in the order of the trials."""
+    tasks = {law: [plan.trial_task(number, law) for number in range(plan.n)] for law in plan.laws}
+    by_number = (task for same in zip(*tasks.values(), strict=True) for task in same)
+    done = runner.run(list(by_number))
+    return {law: [done[task.name] for task in each] for law, each in tasks.items()}
+
+
+def _example(plan: TrialPlan, number: int, runner: TaskRunner) -> Example:
+    """Return courses and film of a trial; the film is made in this process."""
+    laws = (BASELINE, OWN)
+    tasks = {law: plan.course_task(number, law) for law in laws}
+    done = runner.run(list(tasks.values()))
+    courses = {law: done[task.name] for law, task in tasks.items()}
+    task = plan.film_task(number, laws)
+    runner.notify("rendering the film of one trial")
+    try:
+        film = TaskRunner(runner.folder).run([task])[task.name]
+    except OutputError as cause:
+        return Example(_describe(plan, number, courses), courses, reason=str(cause))
+    return Example(_describe(plan, number, courses), courses, film)
+
+
+def _describe(plan: TrialPlan, number: int, courses: Mapping[str, TrialCourse]) -> str:
+    """Return a sentence on a trial."""
+    trial = draw_trial(number, plan.seed)
+    lost_at = courses[BASELINE].lost_at
+    when = "" if lost_at is None else f"; {BASELINE} loses it {lost_at:.2f} s later"
+    return (
+        f"Trial {number}: {trial.grasp.object}, {trial.n_fingers} fingers, load "
+        f"{trial.load.kind.value}{when}."
+    )
+
+
+def _facts(document: Mapping[str, Any]) -> dict[str, object]:
+    """Return the head of the report."""
+    return {
+        "trials": f"{document['n_trials']} with each of {len(document['laws'])} laws",
+        "model": f"{document['model']}, digest {document['model_digest'][:12]}",
+        **fact_texts(document),
+    }

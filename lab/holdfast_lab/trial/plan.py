@@ -1,0 +1,166 @@
+"""Plan of a comparison of laws, and its tasks, whose results are stored."""
+
+from dataclasses import dataclass
+from functools import cache
+from hashlib import sha256
+
+import msgspec
+
+from holdfast.grip.laws import LAWS, law_named
+from holdfast_lab.trial.course import TrialCourse, follow
+from holdfast_lab.trial.film import film
+from holdfast_lab.trial.run import TrialResult, run_trial
+from holdfast_lab.trial.trials import draw_trial
+from holdfast.detector import Detector
+from holdfast.errors import ModelError
+from holdfast.model import Model
+from holdfast.sensors import sensor
+from holdfast_lab.tasks import Task, source_digest
+from holdfast.twin.hand import FINGERS
+
+UNUSED = (
+    *("io", "labelling", "live", "plots", "ros", "sources", "study", "training", "web"),
+    *("control/hands", "control/guard.py", "control/live_twin.py", "control/loop.py"),
+    *("control/watchdog.py", "control/laws/__init__.py"),
+    *(f"control/trial/{name}.py" for name in ("document", "experiment", "figures", "report")),
+    *("control/trial/summary.py", "control/trial/tables.py"),
+)
+"""Files and folders of the package on which no trial depends."""
+OF_FILMS = ("control/trial/course.py", "control/trial/film.py", "twin/render.py")
+"""Files on which courses and films depend, and the result of a trial does not."""
+
+
+@dataclass(frozen=True)
+class TrialPlan:
+    """Plan of a comparison of laws on the same trials.
+
+    Attributes:
+        laws: names of the laws.
+        n: number of trials with each law.
+        seed: seed of the trials.
+        model: name or path of the detector's model.
+
+    Raises:
+        ValueError: a law does not exist or is given twice, or a number is too small.
+        ModelError: the model does not exist, or does not fit the hand of the twin.
+    """
+
+    laws: tuple[str, ...] = tuple(LAWS)
+    n: int = 240
+    seed: int = 0
+    model: str = "builtin:any"
+
+    def __post_init__(self) -> None:
+        for name in self.laws:
+            law_named(name)
+        twice = [name for name in self.laws if self.laws.count(name) > 1]
+        if twice:
+            raise ValueError(f"the law {twice[0]!r} is given twice")
+        if self.n < 1:
+            raise ValueError(f"at least 1 trial expected, {self.n} given")
+        if self.seed < 0:
+            raise ValueError(f"a seed of at least 0 expected, {self.seed} given")
+        _check_model(Model.load(self.model))
+
+    @property
+    def model_digest(self) -> str:
+        """Digest of the content of the model."""
+        return Model.load(self.model).digest
+
+    def trial_task(self, number: int, law: str) -> Task:
+        """Return the task of one trial with one law."""
+        version = _version(law, (*UNUSED, *OF_FILMS))
+        arguments = (self.seed, number, law, self.model, self.model_digest)
+        return Task(f"trial/{number}/{law}", run_numbered, arguments, TrialResult, version=version)
+
+    def course_task(self, number: int, law: str) -> Task:
+        """Return the task of the course of one trial with one law."""
+        arguments = (self.seed, number, law, self.model, self.model_digest)
+        version = _version(law)
+        return Task(f"course/{number}/{law}", course_of, arguments, TrialCourse, version=version)
+
+    def film_task(self, number: int, laws: tuple[str, str]) -> Task:
+        """Return the task of the film of one trial with two laws."""
+        arguments = (self.seed, number, laws, self.model, self.model_digest)
+        version = sha256("".join(map(_version, laws)).encode()).hexdigest()
+        return Task(f"film/{number}", film_of, arguments, bytes, version=version)
+
+
+def run_numbered(seed: int, number: int, law: str, model: str, digest: str) -> TrialResult:
+    """Run one trial of a set with a law.
+
+    Args:
+        seed: seed of the set.
+        number: number of the trial.
+        law: name of the law.
+        model: name or path of the model.
+        digest: digest of its content.
+
+    Raises:
+        ModelError: the model has another content.
+    """
+    _check_digest(model, digest)
+    return run_trial(draw_trial(number, seed), law, model)
+
+
+def course_of(seed: int, number: int, law: str, model: str, digest: str) -> TrialCourse:
+    """Return the course of one trial of a set, with the arguments of `run_numbered`."""
+    _check_digest(model, digest)
+    return TrialCourse.of(follow(draw_trial(number, seed), law, model))
+
+
+def film_of(seed: int, number: int, laws: tuple[str, str], model: str, digest: str) -> bytes:
+    """Return the film of one trial with two laws side by side, as a WebP file.
+
+    Raises:
+        OutputError: no back end of MuJoCo works here.
+    """
+    _check_digest(model, digest)
+    return film(draw_trial(number, seed), laws, model)
+
+
+@cache
+def _check_digest(model: str, digest: str) -> None:
+    if Model.load(model).digest != digest:
+        raise ModelError(f"the model {model} has another content here: copy it to every worker")
+
+
+def _check_model(model: Model) -> None:
+    """Check that a model has all fingers of the twin, and can be used live."""
+    lacking = [finger for finger in FINGERS if not {finger, "*"} & set(model.fingers)]
+    if lacking:
+        raise ModelError(
+            f"the trials need {', '.join(FINGERS)}; the model has no {', '.join(lacking)}, "
+            f"only {', '.join(model.fingers)}"
+        )
+    Detector(model, dict.fromkeys(FINGERS, sensor("uskin-curved")))
+
+
+@cache
+def _version(law: str, unused: tuple[str, ...] = UNUSED) -> str:
+    """Return a digest of what a trial depends on: the source, and the constants of its law.
+
+    The files of other laws are left out, so that a new law leaves the results of the others.
+
+    Args:
+        law: name of the law.
+        unused: files and folders that are left out.
+    """
+    others = {type(LAWS[name]()).__module__ for name in LAWS} - {type(LAWS[law]()).__module__}
+    files = [f"{module.removeprefix('holdfast.').replace('.', '/')}.py" for module in others]
+    source = source_digest((*unused, *sorted(files)))
+    constants = msgspec.json.encode(_contents(LAWS[law]()), order="deterministic")
+    return sha256(source.encode() + constants).hexdigest()
+
+
+def _contents(value: object) -> object:
+    """Return a law, or a part of it, as plain values."""
+    if isinstance(value, (str, int, float, bool, type(None))):
+        return value
+    if isinstance(value, (list, tuple)):
+        return [_contents(each) for each in value]
+    if isinstance(value, dict):
+        return {str(key): _contents(each) for key, each in value.items()}
+    kind = value if isinstance(value, type) else type(value)
+    attributes = getattr(value, "__dict__", {}) if kind is not value else {}
+    return [kind.__qualname__, {name: _contents(each) for name, each in attributes.items()}]

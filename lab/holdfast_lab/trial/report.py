@@ -1,0 +1,188 @@
+"""Report of a comparison of laws: its sections, and its main results in sentences."""
+
+from collections.abc import Iterator, Mapping, Sequence
+from typing import Any, NamedTuple
+
+from holdfast_lab.trial.course import TrialCourse
+from holdfast_lab.trial.document import BASELINE, GOALS, OWN, Results
+from holdfast_lab.trial.figures import (
+    course_figure,
+    distribution_figure,
+    kinds_figure,
+    trade_off_figure,
+)
+from holdfast_lab.trial.summary import Summary
+from holdfast_lab.trial.tables import (
+    NUMBERS,
+    LawColumn,
+    fingers_table,
+    kinds_table,
+    laws_table,
+    objects_table,
+    paired_table,
+)
+from holdfast_lab.report.html_report import SUMMARY, ReportFilm, Section
+from holdfast_lab.report.result_tables import number_text
+
+WHAT = """Each law of grip force runs on the same trials of the twin. In a trial the hand grips an
+object lightly, the operator lets go, and after 2.5 to 3.5 s a load comes: added weight, a pull in
+any of six directions, friction that drops, a shake, or a fast transport. Objects, loads and grips
+follow from the seed. The set of trials and the first grip, {grip:g} times the least force of the
+unloaded object, were fixed before any law but "fixed" ran on them. docs/grip.md names the source
+of each law and of its constants."""
+MEANINGS = """- Dropped: lost after the load or the loop began. Trials whose object was lost before
+both are left out of everything; trial.json counts them in n_not_held.
+- Slip: the largest distance that a fingertip slid after the load began. A drop counts as infinite.
+- Reaction: time from the first sample at which a fingertip slides faster than 1 mm/s to the first
+command that is 2 % above that at the load; 0 if the force rose before. No reaction counts as
+infinite, and so does a drop, whatever the force did. Where nothing slipped there is no onset, so
+such a trial has no reaction time: the median is over the others, which trial.json counts in
+n_slipped. The command acts one sample (6.7 ms) later.
+- Force / least: mean normal force over the mean of the least force by Coulomb friction, at each
+instant with its load, from the start of the loop until the end or the drop. Peak: the largest of
+one over the largest of the other.
+- False reactions: rises of force in the quiet hold before the load, per minute. The hold is not
+quiet for 0.3 s after a fingertip slid, as it does when the controller of the hand jerks.
+- Intervals: 95 %, by bootstrap over trials. All laws share the resamples. Where none of n trials
+was dropped the interval is 0 to 0, but a true share of up to about 3 in n is still plausible."""
+LIMITS_OF_TWIN = """These are results of a simulation. Its parameters have physical grounds and were
+not turned to make a law look good. It cannot show:
+
+- what the hand adds: gear backlash, friction in the joints, delays of the motor controller, torque
+limits, heat. The twin's fingers follow their set-points, and a command acts one sample later;
+- objects that yield, break or are damaged by a high force: a high force costs nothing here but the
+column with the force;
+- friction as of real surfaces: here it is Coulomb friction with one coefficient for an object. It
+does not grow with time, and does not depend on the load, on moisture or on the speed;
+- a real skin: each node is a separate spring, without lateral coupling and without drift by heat,
+and no taxel is dead;
+- other grips: all trials have the same hand in the same precision grip with three or four fingers,
+at two times the least force. A power grip behaves otherwise;
+- what people do: the loads are drawn from stated ranges, and come one at a time."""
+NO_FILM = "There is no film: {reason}."
+
+
+class Example(NamedTuple):
+    """The trial of the film.
+
+    Attributes:
+        what: sentence that describes the trial.
+        courses: its course by law.
+        film: WebP file; empty without a film.
+        reason: why there is no film.
+    """
+
+    what: str
+    courses: Mapping[str, TrialCourse]
+    film: bytes = b""
+    reason: str = ""
+
+
+def report_sections(
+    document: Mapping[str, Any], results: Results, example: Example | None
+) -> list[Section]:
+    """Return the sections of the report; the summary is the first.
+
+    Args:
+        document: contents of `trial.json`.
+        results: of all trials, by law.
+        example: the trial of the film, if there is one.
+    """
+    paired = [paired_table(document, other) for other in document["paired"]]
+    text = _joined(WHAT.format(grip=document["first_grip"]))
+    return [
+        Section(SUMMARY, summary_text(document)),
+        Section("One trial, lost and saved", *_example(example)),
+        Section("All laws", text, [laws_table(document)], [trade_off_figure(document)]),
+        Section("In pairs", PAIRED, [table for table in paired if table.rows]),
+        Section("Slip and reaction", "", [], [distribution_figure(results)]),
+        Section(
+            "Kinds of load, objects and fingers",
+            "",
+            [kinds_table(document), objects_table(document), fingers_table(document)],
+            [kinds_figure(document)],
+        ),
+        Section("What the numbers mean", _joined(MEANINGS)),
+        Section("What the twin cannot show", _joined(LIMITS_OF_TWIN)),
+    ]
+
+
+PAIRED = (
+    "The trials differ more than the laws do, so each law is compared with another on the same "
+    "trials. A value below 0 means that the law of the line has less."
+)
+
+
+def summary_text(document: Mapping[str, Any]) -> str:
+    """Return the main results: one sentence on all, then the goals, as a list."""
+    laws = document["laws"]
+    law = OWN if OWN in laws else next(iter(laws))
+    lines = [_main(document, law), *_goals(laws[law], law, document["unseen_objects"][law])]
+    return "\n".join(f"- {line}" for line in lines)
+
+
+def _main(document: Mapping[str, Any], law: str) -> str:
+    row = document["laws"][law]
+    parts = [f"{law} dropped {_text(row, NUMBERS[0])} % of the objects"]
+    if BASELINE in document["laws"] and law != BASELINE:
+        parts.append(f"a grip of fixed force {_text(document['laws'][BASELINE], NUMBERS[0])} %")
+    return f"On {row['n']} trials of the twin, {', '.join(parts)}."
+
+
+def _goals(row: Summary, law: str, unseen: Summary) -> Iterator[str]:
+    """Yield a sentence for each number that has a goal."""
+    for column in NUMBERS:
+        if column.field not in GOALS:
+            continue
+        value, goal = row[column.field]["value"], GOALS[column.field]
+        missing = bool(column.n_field and not row[column.n_field])
+        verdict = "nothing slipped" if missing else "reached" if _within(value, goal) else "missed"
+        yield (
+            f"{column.head}: {_text(row, column)} for {law}, on the six other objects "
+            f"{_text(unseen, column)}; the goal is at most {column.factor * goal:g}: {verdict}."
+        )
+
+
+def _within(value: float | None, goal: float) -> bool:
+    return value is not None and value <= goal
+
+
+def _text(row: Summary, column: LawColumn) -> str:
+    """Return a number with its interval."""
+    number = row[column.field]
+    if number["value"] is None:
+        return "infinite" if column.n_field and row[column.n_field] else "not known"
+    ends = [None if end is None else column.factor * end for end in number["interval"] or ()]
+    text = number_text(column.factor * number["value"], column.digits)
+    if not ends:
+        return text
+    low, high = ("infinite" if end is None else number_text(end, column.digits) for end in ends)
+    return f"{text} ({low} to {high})"
+
+
+def _example(example: Example | None) -> tuple[str, list[Any], list[Any]]:
+    """Return text, tables and figures of the section of the example."""
+    rule = f"It is chosen by a rule: the first of the set that {BASELINE} loses and {OWN} holds."
+    if example is None:
+        return (
+            f"{NO_FILM.format(reason='no trial is such, or one of the laws was not run')} {rule}",
+            [],
+            [],
+        )
+    figures: list[Any] = [course_figure(example.courses, example.what)]
+    if not example.film:
+        return f"{example.what} {rule}\n\n{NO_FILM.format(reason=example.reason)}", [], figures
+    caption = (
+        f"The same trial with {BASELINE} (left) and {OWN} (right), in real time. {example.what} "
+        "Arrows: forces of the fingertips on the object."
+    )
+    return f"{example.what} {rule}", [], [ReportFilm("film", caption, example.film), *figures]
+
+
+def _joined(text: str) -> str:
+    """Join the lines of each paragraph and of each item of a list."""
+    return "\n\n".join(_paragraph(part.splitlines()) for part in text.split("\n\n"))
+
+
+def _paragraph(lines: Sequence[str]) -> str:
+    return "".join(f"\n{line}" if line.startswith("- ") else f" {line}" for line in lines).strip()

@@ -1,0 +1,150 @@
+"""Tables of a comparison of laws, from the contents of `trial.json`."""
+
+import math
+from collections.abc import Iterator, Mapping
+from typing import Any, NamedTuple
+
+from holdfast_lab.trial.summary import Summary
+from holdfast_lab.report.result_tables import Key, ResultTable, Row
+
+By = Mapping[str, Summary]
+"""Summaries or comparisons by law."""
+
+
+class LawColumn(NamedTuple):
+    """Column of a table of laws.
+
+    Attributes:
+        head: head of the column, with its unit.
+        field: name of the number in `trial.json`.
+        factor: factor of the number.
+        digits: after the decimal point.
+        n_field: number without which there is no value; with it, a missing value is infinite.
+    """
+
+    head: str
+    field: str
+    factor: float = 1.0
+    digits: int = 1
+    n_field: str = ""
+
+
+NUMBERS = (
+    LawColumn("dropped [%]", "dropped"),
+    LawColumn("slip [mm]", "slip_median", 1e3, 2, "n"),
+    LawColumn("reaction [ms]", "reaction_median", 1e3, 0, "n_slipped"),
+    LawColumn("force / least", "force_ratio_mean", digits=2),
+    LawColumn("peak / least peak", "peak_ratio_mean", digits=2),
+    LawColumn("false reactions per minute", "false_reactions_per_minute"),
+)
+"""Numbers of a law."""
+DIFFERENCES = (
+    LawColumn("dropped [points]", "dropped"),
+    LawColumn("slid less in [%]", "slid_less", digits=0),
+    LawColumn("slid more in [%]", "slid_more", digits=0),
+    LawColumn("reacted sooner in [%]", "reacted_sooner", digits=0),
+    LawColumn("reacted later in [%]", "reacted_later", digits=0),
+    LawColumn("force / least", "force_ratio_mean", digits=2),
+    LawColumn("false reactions per minute", "false_reactions_per_minute"),
+)
+"""Paired differences of a law to another."""
+SHORT = NUMBERS[:4]
+"""Numbers in tables of parts of the trials."""
+
+
+def all_tables(document: Mapping[str, Any]) -> list[ResultTable]:
+    """Return all tables of the report, in its order."""
+    return [
+        laws_table(document),
+        objects_table(document),
+        *(
+            paired_table(document, other)
+            for other in document["paired"]
+            if len(document["laws"]) > 1
+        ),
+        kinds_table(document),
+        fingers_table(document),
+    ]
+
+
+def laws_table(document: Mapping[str, Any]) -> ResultTable:
+    """Return the table of all laws over all trials."""
+    return _table(
+        "laws",
+        "Laws of grip force on the same trials",
+        "Medians of slip and reaction; a drop counts as infinite in both.",
+        _rows(document["laws"], NUMBERS),
+    )
+
+
+def objects_table(document: Mapping[str, Any]) -> ResultTable:
+    """Return the table of all laws by set of objects."""
+    parts = {"the six": document["seen_objects"], "six others": document["unseen_objects"]}
+    return _table(
+        "objects",
+        "By set of objects",
+        "The model builtin:twin was trained on the six, and on none of the six others.",
+        _rows_of_parts(parts, "objects", NUMBERS),
+        "objects",
+    )
+
+
+def paired_table(document: Mapping[str, Any], other: str) -> ResultTable:
+    """Return the table of paired differences of all other laws to one."""
+    return _table(
+        f"paired-{other}",
+        f"Each law minus {other}, on the same trials",
+        "Differences of pairs: each resample of the bootstrap draws the same trials for both "
+        "laws. Two drops count as equal slip and equal reaction.",
+        _rows(document["paired"][other], DIFFERENCES),
+    )
+
+
+def kinds_table(document: Mapping[str, Any]) -> ResultTable:
+    """Return the table of all laws by kind of load."""
+    rows = _rows_of_parts(document["by_kind"], "load", SHORT)
+    return _table("kinds", "By kind of load", "", rows, "load")
+
+
+def fingers_table(document: Mapping[str, Any]) -> ResultTable:
+    """Return the table of all laws by number of fingers."""
+    rows = _rows_of_parts(document["by_fingers"], "fingers", SHORT)
+    return _table("fingers", "By number of fingers of the grip", "", rows, "fingers")
+
+
+def _table(name: str, title: str, note: str, rows: Iterator[Row], *lines: str) -> ResultTable:
+    return ResultTable(
+        name, title, note, list(rows), (*lines, "law"),
+        digits_of={column.head: column.digits for column in (*NUMBERS, *DIFFERENCES)},
+        counted="trials", has_paper=False,
+    )  # fmt: skip
+
+
+def _rows_of_parts(
+    parts: Mapping[str, By], key: str, columns: tuple[LawColumn, ...]
+) -> Iterator[Row]:
+    for part, by_law in parts.items():
+        if any(summary["n"] for summary in by_law.values()):
+            yield from _rows(by_law, columns, {key: part})
+
+
+def _rows(
+    by_law: By, columns: tuple[LawColumn, ...], keys: Mapping[str, Key] | None = None
+) -> Iterator[Row]:
+    for law, summary in by_law.items():
+        for column in columns:
+            yield _row({**(keys or {}), "law": law, "figure": column.head}, summary, column)
+
+
+def _row(keys: dict[str, Key], summary: Summary, column: LawColumn) -> Row:
+    number = summary[column.field]
+    missing = math.inf if column.n_field and summary[column.n_field] else None
+    value, interval = number["value"], number["interval"]
+    ends = None
+    if interval is not None:
+        ends = (_scaled(interval[0], column, missing), _scaled(interval[1], column, missing))
+    return Row(keys, _scaled(value, column, missing), None, summary["n"], ends)
+
+
+def _scaled(value: float | None, column: LawColumn, missing: float | None) -> float | None:
+    return missing if value is None else column.factor * value

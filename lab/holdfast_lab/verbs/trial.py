@@ -1,0 +1,98 @@
+"""`holdfast trial`: grip laws against each other on the twin."""
+
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Annotated, Any
+
+import typer
+
+from holdfast.cli.options import EngineOption, JobsOption, JsonOption, SeedOption, start_engine
+from holdfast.cli.terminal.console import print_json, print_line, print_message
+from holdfast.cli.terminal.progress import progress
+
+N_TRIALS, N_QUICK_TRIALS = 240, 60
+"""Number of trials; 60 have every object with every kind of load once."""
+
+
+def trial(
+    out: Annotated[Path, typer.Option("--out", "-o", help="Folder for the results.")],
+    laws: Annotated[
+        str, typer.Option("--laws", help="Laws to compare, separated by commas; all by default.")
+    ] = "",
+    model: Annotated[str, typer.Option("--model", help="Model of the detector.")] = "builtin:any",
+    quick: Annotated[
+        bool, typer.Option("--quick", help=f"{N_QUICK_TRIALS} trials instead of {N_TRIALS}.")
+    ] = False,
+    n: Annotated[
+        int | None, typer.Option("--n", help="Number of trials.", show_default=str(N_TRIALS))
+    ] = None,
+    seed: SeedOption = 0,
+    jobs: JobsOption = -1,
+    engine: EngineOption = "loky",
+    force: Annotated[
+        bool, typer.Option("--force", help="Overwrite a comparison; finished trials are kept.")
+    ] = False,
+    as_json: JsonOption = False,
+) -> None:
+    """Compare laws of grip force on the twin, all on the same trials.
+
+    In each trial the hand of the twin grips an object lightly, and then a load comes: added
+    weight, a pull, friction that drops, a shake, or a fast transport. Objects, loads and grips
+    follow from the seed. Write OUT/report.html with a film of one trial, trial.json, trials.csv,
+    and each table and figure. Finished trials are kept in OUT/work, so the same command continues
+    a comparison that was stopped, and one more law runs only its own trials. docs/grip.md
+    describes the trials and the numbers.
+
+    Example:
+      holdfast trial --out trials --quick
+      holdfast trial --out trials --laws fixed,holdfast --n 12 --json
+      holdfast trial --out trials --engine dask:tcp://10.0.0.1:8786
+    """
+    from holdfast.grip.laws import LAWS
+    from holdfast_lab.trial.experiment import COMPARISON, run_trials
+    from holdfast_lab.trial.plan import TrialPlan
+    from holdfast_lab.report.folder import check_output_folder
+
+    names = tuple(name.strip() for name in laws.split(",")) if laws else tuple(LAWS)
+    number = n if n is not None else N_QUICK_TRIALS if quick else N_TRIALS
+    plan = TrialPlan(names, number, seed, model)
+    check_output_folder(out, COMPARISON, force=force)
+    chosen = start_engine(engine, jobs)
+    try:
+        document = run_trials(
+            plan, out, chosen, progress=progress, notify=print_message, force=force
+        )
+    except KeyboardInterrupt:
+        print_message(f"the finished trials are in {out}: the same command continues them")
+        raise
+    if as_json:
+        print_json(document)
+    else:
+        _print_table(document["laws"])
+        print_line(f"{out / 'report.html'}: all tables and figures, and the film of one trial")
+
+
+def _print_table(laws: Mapping[str, Mapping[str, Any]]) -> None:
+    """Print a row for each law; infinite values as `inf`, unknown ones as `-`."""
+    print_line(
+        f"{'law':16}{'n':>5}{'dropped':>9}{'slip':>9}{'reaction':>10}{'force':>7}{'false':>8}"
+    )
+    print_line(f"{'':16}{'':>5}{'%':>9}{'mm':>9}{'ms':>10}{'ratio':>7}{'/min':>8}")
+    for law, row in laws.items():
+        numbers = [
+            _text(row["dropped"], 1.0, 9, 1),
+            _text(row["slip_median"], 1e3, 9, 2, infinite=row["n"] > 0),
+            _text(row["reaction_median"], 1e3, 10, 0, infinite=row["n_slipped"] > 0),
+            _text(row["force_ratio_mean"], 1.0, 7, 2),
+            _text(row["false_reactions_per_minute"], 1.0, 8, 1),
+        ]
+        print_line(f"{law:16}{row['n']:5}{''.join(numbers)}")
+
+
+def _text(
+    number: Mapping[str, Any], factor: float, width: int, digits: int, *, infinite: bool = False
+) -> str:
+    value = number["value"]
+    if value is None:
+        return f"{'inf' if infinite else '-':>{width}}"
+    return f"{factor * value:{width}.{digits}f}"

@@ -1,0 +1,67 @@
+import io
+
+import numpy as np
+
+from holdfast_lab.figures.curves import Curve, draw_alarms, draw_lines, draw_reliability
+from holdfast.plots.style import PAPER
+
+X = np.array([4.0, 8.0, 14.0])
+
+
+def drawn(figure):
+    """Drawing causes most warnings; they are errors here."""
+    figure.savefig(io.BytesIO(), format="png", dpi=50)
+    return figure
+
+
+def test_lines_have_bands_and_the_paper_is_black():
+    curve = Curve(X, np.array([90.0, 91, 92]), np.array([89.0, 90, 91]), np.array([91.0, 92, 93]))
+    figure = drawn(
+        draw_lines(
+            {"Acc [%]": {"ours": curve, PAPER: Curve(X, X + 80)}, "FNR [%]": {"b": curve}}, "N_w"
+        )
+    )
+    axes = figure.axes[0]
+    np.testing.assert_array_equal(axes.lines[0].get_ydata(), curve.y)
+    np.testing.assert_array_equal(axes.lines[1].get_ydata(), X + 80)
+    assert axes.lines[1].get_color() == "black"
+    (band,) = axes.collections
+    assert {91.0, 93.0} <= set(band.get_paths()[0].vertices[:, 1])
+    assert [label.get_text() for label in axes.get_xticklabels()] == ["4", "8", "14"]
+    assert (axes.get_xlabel(), axes.get_ylabel()) == ("N_w", "Acc [%]")
+    texts = [text.get_text() for text in figure.legends[0].get_texts()]
+    assert texts == ["ours", "b", PAPER]
+
+
+def test_many_values_on_a_logarithmic_axis():
+    x = np.geomspace(0.01, 100, 30)
+    axes = drawn(draw_lines({"y": {"a": Curve(x, x)}}, "x", log=True)).axes[0]
+    assert axes.get_xscale() == "log"
+    assert "0.01" in [label.get_text() for label in axes.get_xticklabels()]
+
+
+def test_a_rate_of_zero_false_alarms_is_marked_zero():
+    curve = Curve(np.array([0.0, 0.5, 10.0]), np.array([np.inf, 40.0, 5.0]), chosen=1)
+    axes = drawn(draw_alarms({"missed [%]": {"a": curve}}, bar=1.0)).axes[0]
+    line = next(each for each in axes.lines if len(each.get_xdata()) == 3)
+    floor = line.get_xdata()[0]
+    assert 0 < floor < 0.5
+    assert axes.xaxis.get_major_formatter()(floor, 0) == "0"
+    np.testing.assert_array_equal(line.get_ydata(), [np.nan, 40.0, 5.0])
+    (chosen,) = (each for each in axes.lines if np.shape(each.get_xdata()) == (1,))
+    assert (chosen.get_xdata()[0], chosen.get_ydata()[0]) == (0.5, 40.0)
+
+
+def test_alarms_without_curves():
+    drawn(draw_alarms({}))
+    drawn(draw_alarms({"missed": {}}))
+    drawn(draw_alarms({"missed": {"a": Curve(np.zeros(2), np.zeros(2))}}))
+
+
+def test_reliability_shows_bins_and_sample_counts():
+    table = np.array([[0.1, 0.2, 30], [0.9, 0.8, 10]])
+    figure = drawn(draw_reliability({"a": table, "b": np.empty((0, 3))}, {"a": "Brier 0.1"}))
+    np.testing.assert_array_equal(figure.axes[0].lines[1].get_ydata(), table[:, 1])
+    np.testing.assert_allclose(figure.axes[1].lines[0].get_ydata(), [75.0, 25.0])
+    texts = [text.get_text() for text in figure.axes[0].get_legend().get_texts()]
+    assert texts == ["a, Brier 0.1", "b"]

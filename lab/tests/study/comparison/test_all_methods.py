@@ -1,0 +1,361 @@
+from dataclasses import replace
+
+import msgspec
+import numpy as np
+import pytest
+
+from holdfast_lab.report.result_tables import to_json
+from holdfast_lab.report.table_layouts import to_html, to_latex
+from holdfast_lab.study.comparison import (
+    all_methods,
+    costs,
+    jobs,
+    real_recordings,
+    sample_tables,
+    sensitivity,
+    strongest,
+)
+from holdfast_lab.study.comparison.error_tables import force_quartiles
+from holdfast_lab.study.comparison.rows import correct_and_all
+from holdfast_lab.study.evaluation.error_breakdown import ErrorBreakdown, GripErrors
+from holdfast_lab.study.evaluation.evaluate_method import EvaluationEffort
+from holdfast_lab.study.methods import METHODS
+from holdfast_lab.study.plan import StudyPlan, scan_corpus
+from study.example_recordings import recording_with_truth, save_all
+
+FEW = ("logreg", "logreg_unweighted", "holdfast", "zhang", "jl_global_logreg")
+TABLES = (
+    "strongest", "methods", "hands", "events", "slips", "glitches", "glitch_rates", "splits",
+    "phases", "force", "directions", "reliability", "cost",
+)  # fmt: skip
+
+
+@pytest.fixture(scope="module")
+def plan(tmp_path_factory):
+    folder = tmp_path_factory.mktemp("comparison")
+    seeds = {
+        "main": range(4),
+        "others": range(10, 13),
+        "gentle": range(20, 22),
+        "glitch-1": range(30, 32),
+    }
+    corpora = {
+        name: scan_corpus(
+            name, save_all(folder / name, [recording_with_truth(f"grasp-{s}", s) for s in each])
+        )
+        for name, each in seeds.items()
+    }
+    return StudyPlan(corpora)
+
+
+@pytest.fixture(scope="module")
+def few():
+    """Reduce the study to few methods, folds and samples."""
+    chosen = {name: METHODS[name] for name in FEW}
+    with pytest.MonkeyPatch.context() as patch:
+        for module in (jobs, sample_tables, all_methods, sensitivity):
+            patch.setattr(module, "METHODS", chosen)
+        patch.setattr(
+            jobs, "EvaluationEffort", lambda: EvaluationEffort(folds=2, inner=2, max_samples=500)
+        )
+        patch.setattr(costs, "N_UPDATES", 50)
+        patch.setattr(sensitivity, "VARIED_METHODS", ("logreg",))
+        patch.setattr(sensitivity, "NOISE_LEVELS", (0.0, 2.0))
+        patch.setattr(sensitivity, "SAMPLE_STEPS", (1, 5))
+        patch.setattr(sensitivity, "MARGINS", (0.0, 0.1))
+        yield
+
+
+def results_of(tasks):
+    """Return the result of each task, through msgpack as the study keeps it."""
+    done = {}
+    results = {}
+    for task in tasks:
+        key = (task.function.__qualname__, msgspec.msgpack.encode(task.arguments))
+        if key not in done:
+            done[key] = msgspec.msgpack.encode(task.function(*task.arguments))
+        results[task.name] = msgspec.msgpack.decode(done[key], type=task.result)
+    return results
+
+
+@pytest.fixture(scope="module")
+def results(plan, few):
+    return results_of([*all_methods.tasks(plan), *sensitivity.tasks(plan)])
+
+
+@pytest.fixture(scope="module")
+def tables(plan, results):
+    return {table.name: table for table in all_methods.tables(plan, results)}
+
+
+def rows_of(table, **keys):
+    return [row for row in table.rows if keys.items() <= row.keys.items()]
+
+
+def test_names_of_tasks_are_unique_over_all_parts(plan, few):
+    both = StudyPlan(plan.corpora, real=plan.main)
+    tasks = [*all_methods.tasks(both), *sensitivity.tasks(both), *real_recordings.tasks(both)]
+    names = [task.name for task in tasks]
+    assert len(set(names)) == len(names)
+    assert all(task.cost > 0 for task in tasks)
+
+
+def test_the_tables_can_be_laid_out(tables):
+    assert tuple(tables) == TABLES
+    for table in tables.values():
+        assert table.rows and table.note
+        assert to_html(table) and to_latex(table) and to_json(table)
+
+
+def test_every_method_by_every_split(tables):
+    on = {(row.keys["method"], row.keys["on"]) for row in tables["methods"].rows}
+    titles = {METHODS[name].title for name in FEW}
+    assert {method for method, _ in on} == titles
+    everywhere = {"by recording", "by object", "unseen objects"}
+    assert {where for method, where in on if method == METHODS["logreg"].title} == {
+        *everywhere, "gentle profile", "1 glitch a minute",
+    }  # fmt: skip
+    assert {w for m, w in on if m == METHODS["jl_global_logreg"].title} == everywhere
+
+
+def test_differences_are_to_the_best_of_the_family_of_the_paper(results, tables):
+    """Fingers are compared with fingers of the paper's method, hands with its hands."""
+    for name, base in (("zhang", "metrics"), ("jl_global_logreg", "hand")):
+        for key in ("recording", "object", "others"):
+            (row,) = rows_of(
+                tables["methods"],
+                method=METHODS[name].title,
+                on=jobs.SPLIT_TITLES[key],
+                figure=sample_tables.ACCURACY_DIFFERENCE,
+            )
+            own = results[f"methods/{name}"][key].metrics
+            family = [results[f"methods/{each}"][key] for each in ("logreg", "logreg_unweighted")]
+            best = max((getattr(each, base) for each in family), key=accuracy)
+            assert correct_and_all(own).keys() == correct_and_all(best).keys()
+            assert row.ours == pytest.approx(accuracy(own) - accuracy(best))
+            low, high = row.interval
+            assert low <= row.ours <= high
+    for key in ("by recording", "by object", "unseen objects"):
+        with_row = {
+            row.keys["method"]
+            for row in rows_of(tables["methods"], figure=sample_tables.ACCURACY_DIFFERENCE, on=key)
+        }
+        assert len(with_row) == len(FEW) - 1
+
+
+def accuracy(metrics):
+    right, n = np.array(list(correct_and_all(metrics).values())).sum(axis=0)
+    return 100 * right / n
+
+
+def test_a_hand_has_one_decision_where_fingers_have_two(plan, results, tables):
+    (row,) = rows_of(
+        tables["hands"], method=METHODS["logreg"].title, on="by recording", figure="accuracy [%]"
+    )
+    hand = results["methods/logreg"]["recording"].hand
+    assert row.ours == pytest.approx(hand.pooled.accuracy)
+    assert hand.pooled.n <= 4 * 1725
+
+
+def test_all_methods_are_scored_on_the_same_samples(results):
+    """A hand has as many scored samples by every method; a longer history leaves more out."""
+    for key in ("recording", "others"):
+        n = {name: results[f"methods/{name}"][key].hand.pooled.n for name in FEW}
+        assert len(set(n.values())) == 1
+    without = {
+        name: sum(n for _, n in results[f"methods/{name}"]["recording"].hand_without_estimate)
+        for name in FEW
+    }
+    assert without["jl_global_logreg"] < without["logreg"] == without["zhang"]
+
+
+def test_the_share_without_an_estimate_is_a_column(results, tables):
+    for table, counts in (("methods", "without_estimate"), ("hands", "hand_without_estimate")):
+        (row,) = rows_of(
+            tables[table],
+            method=METHODS["logreg"].title,
+            on="by recording",
+            figure="without estimate [%]",
+        )
+        n, n_without = np.sum(getattr(results["methods/logreg"]["recording"], counts), axis=0)
+        assert row.ours == pytest.approx(100 * n_without / n)
+        assert row.ours > 0
+
+
+READINGS = ["an event", "a false alarm", "left out"]
+
+
+def test_every_table_of_events_has_all_readings_of_glitches(tables):
+    for name in ("events", "slips", "glitch_rates"):
+        found = list(dict.fromkeys(row.keys["a glitch is"] for row in tables[name].rows))
+        assert found == READINGS
+    assert {row.keys["on"] for row in tables["glitch_rates"].rows} == {"1 glitch a minute"}
+
+
+def test_a_glitch_is_one_more_event_where_it_counts_as_one(tables):
+    """Each of the four recordings has one disturbance, one release and one glitch."""
+    for reading, n in zip(READINGS, (12, 8, 8), strict=True):
+        keys = {"a glitch is": reading, "on": "by recording", "figure": "events"}
+        assert {row.ours for row in rows_of(tables["events"], **keys)} == {n}
+
+
+def test_false_alarms_add_up(tables):
+    for row in rows_of(tables["events"], figure="false alarms under stable label, per minute"):
+        place = {key: row.keys[key] for key in ("on", "threshold", "a glitch is", "method")}
+        parts = [
+            rows_of(tables["events"], **place, figure=figure)[0]
+            for figure in ("of a glitch", "other false alarms")
+        ]
+        assert row.ours == pytest.approx(sum(part.ours for part in parts))
+
+
+def test_slips_are_counted_if_the_truth_is_known(tables):
+    for row in rows_of(tables["slips"], figure="slips", on="by recording"):
+        assert row.ours == 4
+    for figure in ("detected within 200 ms [%]", "already not stable at onset [%]"):
+        found = rows_of(tables["slips"], figure=figure)
+        assert found
+        assert all(0 <= row.ours <= 100 for row in found)
+    for row in rows_of(tables["slips"], figure="slip distance 95 % [mm]"):
+        assert 0 <= row.ours <= 3.01 or np.isinf(row.ours)
+
+
+def test_glitches_are_described_by_the_truth(tables):
+    """One jump in each recording, after which nothing slides; held for 7.2 s."""
+    own = {row.keys["figure"]: row for row in rows_of(tables["glitches"], on="by recording")}
+    assert own["glitches"].ours == 4
+    assert own["glitches per minute held"].ours == pytest.approx(60 / 7.2, rel=0.01)
+    assert own["object slides [%]"].ours == 0
+    assert own["slip distance median [mm]"].ours is None
+
+
+def test_ours_beside_the_strongest_baseline(results, tables):
+    table = tables["strongest"]
+    assert {row.keys["on"] for row in table.rows} == {"unseen objects"}
+    (ratio,) = rows_of(
+        table,
+        error="samples of fingers [%]",
+        **{"left out": "nothing", "baseline of": "the paper's family"},
+        figure="ratio of errors",
+    )
+    errors = {
+        name: 100 - accuracy(results[f"methods/{name}"]["others"].fingers)
+        for name in ("logreg", "logreg_unweighted", "holdfast")
+    }
+    best = min(("logreg", "logreg_unweighted"), key=lambda name: errors[name])
+    assert ratio.keys["baseline"] == METHODS[best].title
+    assert ratio.ours == pytest.approx(errors[best] / errors["holdfast"])
+    low, high = ratio.interval
+    assert low <= ratio.ours and (high is None or ratio.ours <= high)
+    kinds = list(dict.fromkeys((r.keys["error"], r.keys["left out"]) for r in table.rows))
+    assert kinds == [(each.title, each.left_out) for each in strongest.MEASURES]
+    assert all(row.keys["baseline"] != METHODS["holdfast"].title for row in table.rows)
+
+
+def test_the_random_split_has_the_value_of_the_paper(tables):
+    values = {row.keys["method"]: row.paper for row in rows_of(tables["splits"], split="random")}
+    names = ("logreg", "logreg_unweighted", "holdfast")
+    assert [values.pop(METHODS[name].title) for name in names] == [95.3, 95.3, None]
+    assert not values
+    assert {r.keys["split"] for r in tables["splits"].rows} >= {"random", "by recording"}
+
+
+def test_every_part_of_the_errors_has_its_methods(tables):
+    assert {row.keys["phase"] for row in tables["phases"].rows} >= {"locked", "disturbed"}
+    assert {row.keys["direction"] for row in tables["directions"].rows} == {"down"}
+    methods = {row.keys["method"] for row in tables["force"].rows}
+    assert methods == {METHODS[name].title for name in FEW if not METHODS[name].whole_hand}
+    assert "down 4" in tables["directions"].note
+
+
+def test_quartiles_of_the_force_of_holding_fingers():
+    grips = [GripErrors(force, (1, 0), (1, 0)) for force in (0.01, 1.0, 2.0, 3.0, 4.0, 5.0)]
+    parts = [ErrorBreakdown({}, grips[:3], []), ErrorBreakdown({}, grips[3:], [])]
+    assert force_quartiles(parts).tolist() == [2.0, 3.0, 4.0]
+
+
+def test_costs_are_positive(tables):
+    assert all(row.ours > 0 and row.interval is None for row in tables["cost"].rows)
+    live = [row.keys["method"] for row in tables["cost"].rows if "live" in row.keys["figure"]]
+    assert live == [METHODS[name].title for name in ("logreg", "holdfast")]
+
+
+def test_the_figures_can_be_drawn(plan, results):
+    drawn = all_methods.figures(plan, results)
+    assert [each.name for each in drawn] == [
+        "methods", "alarms", "reliability", "grip", "directions",
+    ]  # fmt: skip
+    for each in drawn:
+        each.figure.draw_without_rendering()
+
+
+def test_without_torch_the_network_is_left_out_and_the_note_says_how_to_install_it(
+    plan, monkeypatch
+):
+    monkeypatch.setattr(jobs, "METHODS", METHODS)
+    monkeypatch.setattr(jobs, "find_spec", lambda _: None)
+    assert "tcn" not in jobs.method_titles(plan)
+    assert "pip install 'holdfast[deep]'" in jobs.network_note(plan)
+    monkeypatch.setattr(jobs, "find_spec", lambda _: object())
+    assert "tcn" in jobs.method_titles(plan)
+    assert "6,000 windows" in jobs.network_note(plan)
+    job = jobs.method_job(plan, "tcn")
+    assert (job.effort.stride, job.splits) == (3, ("recording", "object"))
+    assert "tcn" in job.compared
+
+
+def test_a_quick_study_evaluates_less(plan, monkeypatch):
+    monkeypatch.setattr(jobs, "METHODS", METHODS)
+    quick = StudyPlan(plan.corpora, quick=True)
+    assert not set(jobs.SLOW_METHODS) & set(jobs.method_titles(quick))
+    assert jobs.method_job(quick, "zhang").tests == ()
+    assert jobs.method_job(quick, "logreg").tests == tuple(
+        plan.corpora[role] for role in ("others", "gentle", "glitch-1")
+    )
+    assert sum(t.cost for t in all_methods.tasks(quick)) < sum(
+        t.cost for t in all_methods.tasks(plan)
+    )
+
+
+# Sensitivity, on the same recordings.
+
+
+def test_without_a_variation_the_job_is_that_of_the_comparison(plan, few):
+    by_name = {task.name: task for task in [*all_methods.tasks(plan), *sensitivity.tasks(plan)]}
+    base, plain = by_name["methods/logreg"], by_name["sensitivity/logreg/noise-0/every-1"]
+    assert (base.function, base.arguments) == (plain.function, plain.arguments)
+
+
+def test_tables_and_figures_of_the_conditions(plan, results):
+    tables = {table.name: table for table in sensitivity.tables(plan, results)}
+    assert tuple(tables) == ("noise", "margins", "rates", "profiles", "sigma_energy")
+    for table in tables.values():
+        assert to_html(table) and to_json(table)
+    noise = rows_of(tables["noise"], method=METHODS["logreg"].title, figure="accuracy [%]")
+    assert [row.keys["noise"] for row in noise] == [0.0, 2.0]
+    rates = rows_of(tables["rates"], method=METHODS["logreg"].title, figure="accuracy [%]")
+    assert [row.keys["rate [Hz]"] for row in rates] == [30.0, 150.0]
+    profiles = {row.keys["on"] for row in tables["profiles"].rows}
+    assert profiles == {"same profile, by recording", "gentle profile"}
+    drawn = sensitivity.figures(plan, results)
+    assert [each.name for each in drawn] == [
+        "noise_curves", "margins_curves", "rates_curves", "sigma_energy_curves",
+    ]  # fmt: skip
+    for each in drawn:
+        each.figure.draw_without_rendering()
+
+
+def test_sigma_beside_energy_is_compared_in_pairs(plan, results):
+    (table,) = (t for t in sensitivity.tables(plan, results) if t.name == "sigma_energy")
+    less = rows_of(table, figure=sensitivity.ACCURACY_DIFFERENCE, noise=2.0)
+    assert [row.keys["measure"] for row in less] == ["energy of F_a", "energy of F_x (Zhang)"]
+    by = {row.keys["measure"]: row.ours for row in rows_of(table, figure="accuracy [%]", noise=2.0)}
+    for row in less:
+        assert row.ours == pytest.approx(by[row.keys["measure"]] - by["sigma of F_a"])
+
+
+def test_without_a_truth_there_are_no_margins(plan, tmp_path):
+    blind = [replace(recording_with_truth(f"grasp-{s}", s), truth=None) for s in range(2)]
+    corpus = scan_corpus("main", save_all(tmp_path / "main", blind))
+    assert [s.name for s in sensitivity.sweeps(StudyPlan({"main": corpus}))] == ["noise", "rates"]
+    assert [s.name for s in sensitivity.sweeps(plan)] == ["noise", "margins", "rates"]

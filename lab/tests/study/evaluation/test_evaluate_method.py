@@ -1,0 +1,250 @@
+from dataclasses import replace
+
+import msgspec
+import numpy as np
+import pytest
+
+from holdfast.contact import STABLE, UNKNOWN, ContactState
+from holdfast.metrics import event_metrics
+from holdfast.recordings import Label
+from holdfast_lab.study.evaluation.evaluate_method import (
+    FALSE_ALARM_RATES,
+    EvaluationEffort,
+    EvaluationJob,
+    MethodEvaluation,
+    balanced_groups,
+    evaluate_method,
+    evaluate_pooled,
+    find_method,
+    held_out_folds,
+    score_splits,
+)
+from holdfast_lab.study.evaluation.glitch_readings import READINGS
+from holdfast_lab.study.evaluation.variation import Variation
+from holdfast_lab.study.plan import scan_corpus
+from study.example_recordings import recording_with_truth, save_all, save_synthetic
+
+EFFORT = EvaluationEffort(folds=3, inner=2, max_samples=1000)
+
+
+@pytest.fixture(scope="module")
+def recordings():
+    return [recording_with_truth(f"grasp-{seed}", seed) for seed in range(6)]
+
+
+@pytest.fixture(scope="module")
+def corpus(tmp_path_factory, recordings):
+    return scan_corpus("main", save_all(tmp_path_factory.mktemp("evaluation") / "main", recordings))
+
+
+@pytest.mark.parametrize("n", [2, 5, 12, 13])
+@pytest.mark.parametrize("split", ["recording", "object"])
+def test_every_recording_is_held_out_once(n, split):
+    objects = [f"object {k % 3}" for k in range(n)]
+    folds = list(held_out_folds(objects, split, 5, seed=1))
+    assert sorted(place for fold in folds for place in fold) == list(range(n))
+    if split == "object":
+        assert all(len({objects[place] for place in fold}) == 1 for fold in folds)
+        assert len(folds) == min(3, n)
+
+
+def test_recordings_of_an_object_are_spread_over_the_folds():
+    objects = ["ball"] * 10 + ["box"] * 10
+    groups = balanced_groups(objects, 5, seed=3)
+    for half in (groups[:10], groups[10:]):
+        assert np.bincount(half, minlength=5).tolist() == [2] * 5
+
+
+@pytest.mark.parametrize("objects", [["ball", "ball"], ["ball", None], [None, None]])
+def test_no_split_by_object_without_two_known_objects(objects):
+    assert list(held_out_folds(objects, "object", 5, 0)) == []
+
+
+@pytest.mark.parametrize("method", ["logreg", "jl_global_logreg"])
+def test_an_evaluated_recording_does_not_influence_its_scores(tmp_path, recordings, corpus, method):
+    """Inverting the labels of one fold changes the scores of all recordings but those of it."""
+    held = next(held_out_folds([r.metadata["object"] for r in recordings], "recording", 3, 0))
+    other = [inverted(r) if k in held else r for k, r in enumerate(recordings)]
+    inverted_corpus = scan_corpus("main", save_all(tmp_path / "main", other))
+    job = EvaluationJob(method, corpus, effort=EFFORT)
+    (_, scored), (_, inverted_scored) = (
+        next(score_splits(each))
+        for each in (job, msgspec.structs.replace(job, train=inverted_corpus))
+    )
+    for place, (case, twin) in enumerate(zip(scored, inverted_scored, strict=True)):
+        assert same(case, twin) == (place in held)
+
+
+def inverted(recording):
+    """Return the recording with all labels inverted, without truth."""
+    labels = {
+        name: [Label(each.start, each.end, _other(each.state)) for each in module.labels]
+        for name, module in recording.modules.items()
+    }
+    return replace(recording.with_labels(labels), truth=None)
+
+
+def _other(state):
+    return ContactState.UNSTABLE if state is ContactState.STABLE else ContactState.STABLE
+
+
+def same(case, twin):
+    margins = [
+        np.array_equal(margin, twin.scores.margins[unit], equal_nan=True)
+        for unit, margin in case.scores.margins.items()
+    ]
+    in_contact = [
+        np.array_equal(mask, twin.scores.in_contact[finger])
+        for finger, mask in case.scores.in_contact.items()
+    ]
+    return all(margins) and all(in_contact) and case.shifts == twin.shifts
+
+
+@pytest.fixture(scope="module")
+def evaluations(corpus, tmp_path_factory):
+    other = save_synthetic(tmp_path_factory.mktemp("evaluation-other") / "others", range(20, 23))
+    job = EvaluationJob(
+        "logreg", corpus, ("recording", "object"), (scan_corpus("others", other),), effort=EFFORT
+    )
+    data = msgspec.msgpack.encode(evaluate_method(job))
+    return msgspec.msgpack.decode(data, type=dict[str, MethodEvaluation])
+
+
+def test_a_job_has_a_result_for_each_split_and_each_corpus(evaluations, corpus):
+    assert set(evaluations) == {"recording", "object", "others"}
+    assert evaluations["object"].names == evaluations["recording"].names == list(corpus.recordings)
+    assert len(evaluations["others"].names) == 3
+    assert evaluations["recording"].fingers.pooled.accuracy > 75
+
+
+def test_without_a_truth_there_are_no_slips_and_no_phases(evaluations):
+    others = evaluations["others"]
+    assert all(alarms.slip_delays == [] for alarms in others.alarms.own)
+    assert all(glitches.n == 0 for glitches in others.glitches)
+    assert all(not each.phases for each in others.breakdown)
+    assert all(len(alarms.slip_delays) == 1 for alarms in evaluations["recording"].alarms.own)
+    assert all(glitches.n == 1 for glitches in evaluations["recording"].glitches)
+
+
+def test_events_are_counted_by_exact_labels(evaluations, corpus):
+    """Equal to `event_metrics` of the hand, by labels without margin."""
+    _, scored = next(score_splits(EvaluationJob("logreg", corpus, effort=EFFORT)))
+    for case, alarms in zip(scored, evaluations["recording"].alarms.own, strict=True):
+        labels = case.recording.hand_labels(case.recording.exact_labels).labels
+        score = case.scores.hand(case.recording)
+        known = event_metrics(score.times, labels, score.states())
+        assert len(alarms.delays) == known.n_events
+        assert alarms.n_under_stable == known.false_alarms["STABLE"]
+        assert alarms.n_false_alarms == sum(known.false_alarms.values())
+        assert (
+            alarms.n_stable
+            == (labels == STABLE).sum() - (score.states()[labels == STABLE] == 0).sum()
+        )
+
+
+def test_more_false_alarms_call_less_stable(evaluations):
+    curve = evaluations["recording"].alarms.by_rate
+    assert len(curve) == len(FALSE_ALARM_RATES)
+    not_stable = [sum(alarms.n_not_called_stable for alarms in point) for point in curve]
+    assert not_stable == sorted(not_stable)
+
+
+def test_glitches_are_counted_in_three_ways(evaluations):
+    """The jump of the recordings is an event, a false alarm if detected, or left out."""
+    readings = evaluations["recording"].readings
+    assert tuple(readings) == READINGS
+    own = {name: each.own for name, each in readings.items()}
+    for event, false, left_out in zip(*(own[name] for name in READINGS), strict=True):
+        assert len(event.delays) == len(false.delays) + 1 == len(left_out.delays) + 1
+        assert event.stable_seconds == pytest.approx(false.stable_seconds - 0.1, abs=0.02)
+        assert left_out.stable_seconds == pytest.approx(false.stable_seconds - 0.37, abs=0.03)
+        assert false.n_under_stable >= left_out.n_under_stable
+        assert left_out.n_of_glitch == 0
+
+
+def test_held_states_give_fewer_alarms(evaluations):
+    bare, held = evaluations["recording"].alarms.own, evaluations["recording"].alarms.held
+    assert sum(h.n_false_alarms for h in held) <= sum(h.n_false_alarms for h in bare)
+    assert sum(h.n_not_called_stable for h in held) >= sum(h.n_not_called_stable for h in bare)
+
+
+def test_a_whole_hand_method_has_no_fingers(corpus):
+    found = evaluate_method(EvaluationJob("jl_global_svm", corpus, effort=EFFORT))["recording"]
+    assert found.fingers is None
+    assert found.metrics is found.hand
+    assert found.hand.pooled.brier is not None
+
+
+def test_recordings_of_one_class_are_evaluated_too(tmp_path, recordings):
+    one = recordings[0].with_labels(
+        {f: [Label(2.0, 9.0, ContactState.STABLE)] for f in recordings[0].modules}
+    )
+    folder = save_all(tmp_path / "main", [one, *recordings[1:4]])
+    found = evaluate_method(EvaluationJob("zhang", scan_corpus("main", folder), effort=EFFORT))[
+        "recording"
+    ]
+    assert len(found.names) == 4
+
+
+def test_two_recordings_of_which_one_has_one_class(tmp_path, recordings):
+    """Half of the folds cannot be fitted: nothing is decided there, nothing fails."""
+    one = replace(recordings[0], truth=None).with_labels(
+        {f: [Label(2.0, 9.0, ContactState.STABLE)] for f in recordings[0].modules}
+    )
+    corpus = scan_corpus("main", save_all(tmp_path / "main", [one, recordings[1]]))
+    found = evaluate_method(EvaluationJob("logreg", corpus, effort=EFFORT))["recording"]
+    first, second = found.fingers.recordings
+    assert first.fingers["thumb"].n > 0
+    assert second.fingers["thumb"].n == 0
+
+
+def test_a_stride_evaluates_fewer_samples(corpus):
+    every, some = (
+        evaluate_method(
+            EvaluationJob("logreg", corpus, effort=msgspec.structs.replace(EFFORT, stride=stride))
+        )
+        for stride in (1, 3)
+    )
+    n = [each["recording"].fingers.pooled.n for each in (every, some)]
+    assert n[1] == pytest.approx(n[0] / 3, rel=0.01)
+
+
+def test_a_variation_is_applied_to_all_recordings(corpus):
+    slow = evaluate_method(
+        EvaluationJob("zhang", corpus, variation=Variation(every=5), effort=EFFORT)
+    )["recording"]
+    assert slow.fingers.pooled.n < 6 * 2 * 1725 / 5
+
+
+def test_methods_of_one_feature_are_found_too():
+    assert find_method("sigma_cut").title == "sigma of F_a"
+    assert find_method("svm").name == "svm"
+
+
+def test_a_random_split_evaluates_every_sample_once(corpus):
+    job = EvaluationJob("logreg", corpus, effort=EFFORT)
+    counts = np.array(evaluate_pooled(job))
+    honest = evaluate_method(job)["recording"].fingers
+    assert counts.shape == (6, 4)
+    assert counts.sum() == honest.pooled.n
+    assert evaluate_pooled(job) == counts.tolist()
+
+
+def test_methods_are_scored_where_all_of_them_have_an_estimate(corpus):
+    """Differences exist after one sample, the paper's features after 13."""
+    alone = EvaluationJob("difference", corpus, effort=EFFORT)
+    both = EvaluationJob("difference", corpus, effort=EFFORT, compared=("logreg", "difference"))
+    paper = EvaluationJob("logreg", corpus, effort=EFFORT, compared=("logreg", "difference"))
+    single, joint, known = (evaluate_method(job)["recording"] for job in (alone, both, paper))
+    assert joint.fingers.pooled.n == known.fingers.pooled.n < single.fingers.pooled.n
+    for _, scored in score_splits(paper):
+        for case in scored:
+            labels = case.recording.scored_labels
+            for name, finger in case.scores.decide(case.recording, labels).fingers.items():
+                assert (finger.states[labels[name] != UNKNOWN] != UNKNOWN).all()
+    assert joint.without_estimate == single.without_estimate
+    for (n, n_without), (n_paper, n_without_paper) in zip(
+        joint.without_estimate, known.without_estimate, strict=True
+    ):
+        assert n == n_paper
+        assert n_without < n_without_paper

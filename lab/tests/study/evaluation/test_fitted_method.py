@@ -1,0 +1,163 @@
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from holdfast.contact import NO_CONTACT, STABLE, UNKNOWN, UNSTABLE
+from holdfast.metrics import FingerDecisions, hand_decisions
+from holdfast_lab.study.evaluation.fitted_method import FittedMethod, gather_training_samples
+from holdfast_lab.study.evaluation.recording_features import RecordingFeatures, corpus_features
+from holdfast_lab.study.evaluation.scores import RecordingScores
+from holdfast_lab.study.evaluation.variation import Variation
+from holdfast_lab.study.methods import HAND, METHODS
+from holdfast_lab.study.plan import scan_corpus
+from study.example_recordings import save_synthetic
+
+
+def recording_at(times):
+    empty = {name: np.zeros(len(own), dtype=np.int8) for name, own in times.items()}
+    return RecordingFeatures("one", None, None, times, {}, empty, empty, empty, {}, {}, {})
+
+
+def state_of_finger(margin, in_contact, shift):
+    if np.isnan(margin):
+        return UNKNOWN
+    if not in_contact:
+        return NO_CONTACT
+    return STABLE if margin >= shift else UNSTABLE
+
+
+@pytest.mark.parametrize("seed", range(6))
+def test_the_state_of_a_hand_follows_from_its_fingers_at_any_threshold(seed):
+    generator = np.random.default_rng(seed)
+    times = {f"f{k}": np.sort(generator.random(60)) for k in range(1 + seed % 4)}
+    margins = {f: np.round(generator.normal(size=60), 1) for f in times}
+    for each in margins.values():
+        each[generator.random(60) < 0.1] = np.nan
+    in_contact = {f: generator.random(60) < 0.7 for f in times}
+    scores = RecordingScores(margins, dict.fromkeys(times, 0.3), in_contact)
+    score = scores.hand(recording_at(times))
+    for shift in (-np.inf, -1.0, 0.0, 0.4, np.inf):
+        fingers = {}
+        for f, own in times.items():
+            pairs = zip(margins[f], in_contact[f], strict=True)
+            states = [state_of_finger(m, t, shift) for m, t in pairs]
+            fingers[f] = FingerDecisions(own, states, states, np.full(60, np.nan))
+        expected = hand_decisions(fingers, len(fingers))
+        assert score.times.tolist() == expected.times.tolist()
+        assert score.states(shift).tolist() == expected.states.tolist()
+        assert not np.isnan(score.probability[score.states(shift) != UNKNOWN]).any()
+
+
+def test_the_probability_of_a_hand_is_the_smallest_of_the_fingers_in_contact():
+    times = {f: np.array([0.0, 1.0, 2.0]) for f in ("a", "b", "c")}
+    margins = {"a": np.array([0.0, 0.0, 0.0]), "b": np.array([1.0, 1.0, np.nan]),
+               "c": np.array([-5.0, 2.0, 2.0])}  # fmt: skip
+    in_contact = {"a": np.ones(3, bool), "b": np.ones(3, bool), "c": np.array([False, True, True])}
+    scores = RecordingScores(margins, {"a": 2.0, "b": 0.0, "c": 0.0}, in_contact)
+    found = scores.hand(recording_at(times)).probability
+    odds = np.exp([1.0, 1.0, 2.0])
+    assert found == pytest.approx(odds / (1 + odds))
+
+
+def test_a_whole_hand_method_decides_for_no_finger():
+    times = {f: np.array([0.0, 1.0, 2.0]) for f in ("a", "b")}
+    in_contact = {"a": np.ones(3, bool), "b": np.array([True, True, False])}
+    scores = RecordingScores({HAND: np.array([np.nan, 1.0, 1.0])}, {HAND: 0.0}, in_contact)
+    recording = recording_at(times)
+    decided = scores.decide(recording, recording.labels)
+    assert not decided.fingers
+    assert decided.hand.states.tolist() == [UNKNOWN, STABLE, NO_CONTACT]
+
+
+@pytest.fixture(scope="module")
+def corpus(tmp_path_factory):
+    return scan_corpus("main", save_synthetic(tmp_path_factory.mktemp("fitted") / "main", range(4)))
+
+
+def test_training_samples_are_bounded_and_spread_over_all_recordings(corpus):
+    training = gather_training_samples(
+        corpus_features(METHODS["logreg"], corpus, Variation()), max_samples=100
+    )
+    for samples in training.samples.values():
+        assert len(samples.stable) <= 100
+        assert np.bincount(samples.groups).min() >= 20
+        assert np.isfinite(samples.features).all()
+
+
+def test_a_fit_does_not_depend_on_other_recordings(corpus):
+    method = METHODS["logreg"]
+    recordings = corpus_features(method, corpus, Variation())
+    other = [*recordings[:3], scrambled(recordings[3])]
+    fitted_methods = [
+        FittedMethod.fit(method, gather_training_samples(each), {0, 1, 2}, 0)
+        for each in (recordings, other)
+    ]
+    assert fitted_methods[0].classifiers == fitted_methods[1].classifiers
+    assert fitted_methods[0].contact_thresholds == fitted_methods[1].contact_thresholds
+    assert FittedMethod.fit(method, gather_training_samples(other), {1, 2, 3}, 0).classifiers != (
+        FittedMethod.fit(method, gather_training_samples(recordings), {1, 2, 3}, 0).classifiers
+    )
+
+
+def scrambled(recording):
+    generator = np.random.default_rng(9)
+    labels = {f: generator.permutation(codes) for f, codes in recording.labels.items()}
+    features = {u: 7 * generator.permutation(rows) for u, rows in recording.features.items()}
+    at_rest = {f: (n, 3 * a, 9 * b) for f, (n, a, b) in recording.at_rest.items()}
+    return replace(
+        recording, labels=labels, exact_labels=labels, features=features, at_rest=at_rest
+    )
+
+
+def test_a_missing_finger_is_not_evaluated(corpus):
+    method = METHODS["logreg"]
+    recordings = corpus_features(method, corpus, Variation())
+    lacking = without(recordings[3], "index")
+    fitted = FittedMethod.fit(
+        method, gather_training_samples([*recordings[:3], lacking]), {0, 1, 2, 3}, 0
+    )
+    decided = fitted.scores(lacking).decide(lacking, lacking.labels)
+    assert set(decided.fingers) == {"thumb"}
+    assert (decided.hand.states == STABLE).any()
+
+
+def test_a_hand_without_a_finger_is_unknown_to_a_whole_hand_method(corpus):
+    method = METHODS["jl_global_logreg"]
+    recordings = corpus_features(method, corpus, Variation())
+    lacking = without(recordings[3], "index")
+    narrow = {HAND: lacking.features[HAND][:, :36]}
+    lacking = replace(lacking, features=narrow)
+    fitted = FittedMethod.fit(
+        method, gather_training_samples([*recordings[:3], lacking]), {0, 1, 2, 3}, 0
+    )
+    assert (fitted.scores(lacking).decide(lacking, lacking.labels).hand.states == UNKNOWN).all()
+    known = fitted.scores(recordings[0]).decide(recordings[0], recordings[0].labels).hand
+    assert (known.states == STABLE).any()
+
+
+def without(recording, finger):
+    def rest(each):
+        return {name: value for name, value in each.items() if name != finger}
+
+    return replace(
+        recording,
+        times=rest(recording.times),
+        amplitude=rest(recording.amplitude),
+        labels=rest(recording.labels),
+        exact_labels=rest(recording.exact_labels),
+        at_rest=rest(recording.at_rest),
+        features=rest(recording.features),
+    )
+
+
+def test_one_class_gives_no_classifier_and_no_scores(corpus):
+    method = METHODS["logreg"]
+    recordings = corpus_features(method, corpus, Variation())
+    stable = {f: np.full(len(t), STABLE, dtype=np.int8) for f, t in recordings[0].times.items()}
+    one = replace(recordings[0], labels=stable)
+    fitted = FittedMethod.fit(method, gather_training_samples([one]), {0}, 0)
+    assert not fitted.classifiers
+    decided = fitted.scores(one).decide(one, one.labels)
+    assert (decided.hand.states == UNKNOWN).all()
+    assert all((finger.states == UNKNOWN).all() for finger in decided.fingers.values())

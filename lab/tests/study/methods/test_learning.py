@@ -1,0 +1,205 @@
+"""Learning methods from publications."""
+
+import numpy as np
+import pytest
+
+from holdfast.contact import ContactState
+from holdfast.errors import TrainingError
+from holdfast.features import Tare
+from holdfast.recordings import Label, Recording, Tactile
+from holdfast.sensors import Sensor
+from holdfast_lab.study.methods import HAND, METHODS, hand_signal
+from holdfast_lab.study.methods.learning import (
+    N_STEPS,
+    hand_motion,
+    last_second,
+    motion_features,
+    shear_statistics,
+    taxel_motion,
+)
+from training.build import tiny_module, tiny_recording
+
+from .patch_signals import pressed
+
+
+def test_shear_statistics_by_hand():
+    # Two taxels, windows of 2; the normal does not count.
+    # Samples: (1, 2) (0, -1); (3, 2) (0, 1); (3, -6) (0, 1). The deviation of two values is
+    # half their difference.
+    shear = np.array([[[1, 2], [0, -1]], [[3, 2], [0, 1]], [[3, -6], [0, 1]]], dtype=float)
+    found = shear_statistics(shear, window=2)
+    first = [3 - -1, 1 + 2 + 0 - 1 + 3 + 2 + 0 + 1, 1 + 0 + 0 + 1]
+    second = [3 - -6, abs(3 + 2 + 0 + 1 + 3 - 6 + 0 + 1), 0 + 4 + 0 + 0]
+    np.testing.assert_allclose(found, [[np.nan] * 3, first, second])
+
+
+def test_ten_samples_of_the_tared_shear():
+    readings = np.random.default_rng(0).normal(size=(40, 3, 3)) * 20
+    found = METHODS["anyskin"].features(pressed(readings))["index"]
+    assert np.isnan(found[:9]).all()
+    for k in range(9, 40):
+        window = readings[k - 9 : k + 1, :, :2]
+        wanted = [window.max() - window.min(), abs(window.sum()), window.std(axis=0).sum()]
+        np.testing.assert_allclose(found[k], wanted)
+
+
+PAIR = Sensor(
+    name="pair",
+    positions=np.zeros((2, 3)),
+    rotations=np.stack([np.eye(3)] * 2),
+    normal=np.array([0.0, 0.0, 1.0]),
+    rate=100.0,
+)
+
+
+def finger(times, readings):
+    end = float(times[-1]) + 0.01
+    label = Label(float(times[0]), end, ContactState.STABLE)
+    return Tactile(PAIR, np.array(times), np.array(readings, dtype=float), labels=(label,))
+
+
+def hand(tare="none", **fingers):
+    return hand_signal(Recording("tiny", fingers), Tare.parse(tare))
+
+
+THUMB = finger(
+    [0.0, 0.01, 0.02],
+    [
+        [[1, 2, 3], [4, 5, 6]],
+        [[1, 4, 3], [0, 5, 7]],
+        [[2, 4, 0], [0, 6, 9]],
+    ],
+)
+INDEX = finger([0.005, 0.013, 0.023], np.zeros((3, 2, 3)))
+
+
+def test_features_of_motions_by_hand():
+    """Two taxels move along x and y, by 3 and 4: the mean is (1.5, 2), of length 2.5."""
+    (row,) = motion_features(np.array([[[3.0, 0.0], [0.0, 4.0]]]))
+    mean_unit = np.hypot(0.5, 0.5)
+    assert row == pytest.approx([3.5, 0.5, 2.5, 0.6, 0.8, 1 - mean_unit, 3.0, 4.0])
+
+
+def test_opposite_motions_do_not_cancel():
+    """Their mean is 0, but their magnitudes and their spread remain."""
+    (row,) = motion_features(np.array([[[2.0, 0.0], [-2.0, 0.0]]]))
+    assert row == pytest.approx([2.0, 0.0, 0.0, 0.0, 0.0, 1.0, 2.0, 2.0])
+    (still,) = motion_features(np.zeros((1, 2, 2)))
+    assert still == pytest.approx([0, 0, 0, 0, 0, 1, 0, 0])
+
+
+def test_a_motion_is_the_change_of_the_shear_over_a_sixtieth_of_a_second():
+    """At 100 Hz these are 2 samples: of 0 and 0.02 s, (1, 2) to (2, 4) and (4, 5) to (0, 6)."""
+    rows = taxel_motion(hand(thumb=THUMB))["thumb"]
+    assert np.isnan(rows[:2]).all()
+    assert rows[2] == pytest.approx(motion_features(np.array([[[1.0, 2.0], [-4.0, 1.0]]]))[0])
+
+
+def test_motions_do_not_depend_on_the_tare():
+    one, two = (taxel_motion(hand(tare, thumb=THUMB))["thumb"] for tare in ("none", "first"))
+    assert np.array_equal(one, two, equal_nan=True)
+
+
+def test_no_motion_across_a_gap_or_a_lost_sample():
+    readings = np.arange(10.0)[:, None, None] * np.ones((10, 2, 3))
+    readings[2, 1, 0] = np.nan
+    times = [0.0, 0.01, 0.02, 0.03, 0.04, 0.05, 0.10, 0.11, 0.12, 0.13]
+    rows = taxel_motion(hand(thumb=finger(times, readings)))["thumb"]
+    assert np.flatnonzero(np.isfinite(rows).all(axis=1)).tolist() == [5, 8, 9]
+    assert rows[[5, 8, 9], 0] == pytest.approx(2 * np.sqrt(2))
+
+
+def test_a_finger_without_a_reading_has_the_same_width():
+    dead = finger([0.0, 0.01], np.full((2, 2, 3), np.nan))
+    rows = taxel_motion(hand(thumb=dead))["thumb"]
+    assert rows.shape == (2, 8)
+    assert np.isnan(rows).all()
+
+
+def test_motions_of_a_hand_are_at_the_times_of_the_first_finger():
+    """At 0.03 s the thumb has its own sample, the index that of 0.023 s."""
+    times, readings = np.arange(5) * 0.01, np.arange(5.0)[:, None, None] * np.ones((5, 2, 3))
+    thumb, index = finger(times, readings), finger(times + 0.003, 2 * readings)
+    found = hand_motion(hand(thumb=thumb, index=index))
+    assert list(found) == [HAND]
+    rows = found[HAND]
+    assert rows.shape == (5, 16)
+    assert np.isfinite(rows).all(axis=1).tolist() == [False, False, False, True, True]
+    assert rows[3, [0, 8]] == pytest.approx([2 * np.sqrt(2), 4 * np.sqrt(2)])
+
+
+def test_a_finger_without_new_samples_has_no_motion():
+    times = np.arange(10) * 0.01
+    readings = np.arange(10.0)[:, None, None] * np.ones((10, 2, 3))
+    thumb, index = finger(times, readings), finger(times[:5], readings[:5])
+    rows = hand_motion(hand(thumb=thumb, index=index))[HAND]
+    assert np.isfinite(rows[2:8]).all()
+    assert np.isfinite(rows[8:, :8]).all()
+    assert np.isnan(rows[8:, 8:]).all()
+
+
+@pytest.mark.parametrize("name", ["jl_global_logreg", "jl_global_svm"])
+def test_a_whole_hand_method_needs_two_fingers(name):
+    with pytest.raises(TrainingError) as raised:
+        METHODS[name].features(hand(index=INDEX))
+    assert str(raised.value) == (
+        "the global classifier of James & Lepora needs at least two fingers, 1 given (index)"
+    )
+
+
+def test_four_methods_of_james_and_lepora():
+    names = [f"jl_{scope}_{kind}" for scope in ("local", "global") for kind in ("logreg", "svm")]
+    for name in names:
+        method = METHODS[name]
+        assert (method.name, method.category) == (name, "learning")
+        assert method.whole_hand == ("global" in name)
+        assert method.recipe.name in name
+    assert len({METHODS[name].title for name in names}) == 4
+
+
+def second_windows(recording):
+    hand = hand_signal(recording, Tare.parse("none"))
+    name = next(iter(hand.fingers))
+    rows = last_second(hand)[name]
+    return rows.reshape(len(rows), N_STEPS, 3), hand.fingers[name].force
+
+
+def test_at_100_hz_a_window_is_the_last_100_samples():
+    rows, force = second_windows(tiny_recording(0))
+    assert rows.dtype == np.float32
+    assert np.isnan(rows[:99]).all()
+    for k in (99, 100, 250, 399):
+        assert rows[k] == pytest.approx(force[k - 99 : k + 1], rel=1e-6, abs=1e-3)
+
+
+def test_the_window_is_one_second_at_any_rate():
+    """A force that grows by 2 a second is interpolated between samples: 0.02 a step."""
+    module = tiny_module(0, n=400, rate=150.0)
+    ramp = np.zeros_like(module.readings)
+    ramp[:, 0, 2] = 2.0 * module.times
+    given = type(module)(module.sensor, module.times, ramp, labels=module.labels)
+    rows, _ = second_windows(Recording("ramp", {"index": given}))
+    assert rows.shape == (400, 100, 3)
+    first = int(np.flatnonzero(np.isfinite(rows).all(axis=(1, 2)))[0])
+    assert module.times[first] == pytest.approx(0.99, abs=1 / 150)
+    for k in (first + 1, 399):
+        steps = 2.0 * (module.times[k] - 0.01 * np.arange(99, -1, -1))
+        assert rows[k, :, 2] == pytest.approx(steps, abs=1e-5)
+        assert (rows[k, :, :2] == 0).all()
+
+
+@pytest.mark.parametrize("rate", [80.0, 100.0, 150.0])
+def test_the_last_second_is_causal(rate):
+    module = tiny_module(1, rate=rate)
+    whole, _ = second_windows(Recording("whole", {"index": module}))
+    for end in (10, 160, 301):
+        part, _ = second_windows(Recording("part", {"index": module.slice(0, end)}))
+        assert part == pytest.approx(whole[:end], rel=1e-6, nan_ok=True)
+
+
+def test_description_of_the_network():
+    method = METHODS["tcn"]
+    assert (method.name, method.category, method.recipe.name) == ("tcn", "learning", "tcn")
+    assert dict(method.reference) == {
+        "n_epochs": 200, "patience": 15, "learning_rate": 2e-3, "dropout": 0.2,
+    }  # fmt: skip

@@ -1,0 +1,131 @@
+"""Methods on the details of the Haar window."""
+
+import numpy as np
+import pytest
+
+from holdfast.features import FEATURE_NAMES, Tare, haar_features
+from holdfast_lab.study.methods import METHODS, PAPER_FAMILY, hand_signal
+from holdfast_lab.study.methods.wavelets import CUTS, detail_energy, detail_sigma, normal_energy
+from holdfast.synthetic import synthetic_recording
+from training.build import tiny_recording
+
+from .patch_signals import along_normal, pressed
+
+NAN = np.nan
+
+
+def test_energy_by_hand():
+    # Windows of 4: pairs (1, 3) (3, 2), (3, 3) (2, 6), (3, 2) (6, 6).
+    # E: (4 + 1) / 2, (0 + 16) / 2, (1 + 0) / 2.
+    hand = pressed(along_normal([1, 3, 3, 2, 6, 6]))
+    found = normal_energy(hand, window=4)["index"]
+    np.testing.assert_allclose(found[:, 0], [NAN, NAN, NAN, 2.5, 8.0, 0.5])
+
+
+def test_the_deployed_window_has_seven_pairs():
+    # 0, 2, 0, 2, ... : every detail is -sqrt(2) or sqrt(2), so E = 7 x 2.
+    hand = pressed(along_normal([0, 2] * 10))
+    found = METHODS["zhang"].features(hand)["index"][:, 0]
+    assert np.isnan(found[:13]).all()
+    np.testing.assert_allclose(found[13:], 14.0)
+
+
+def test_energy_does_not_depend_on_shear():
+    values = along_normal(np.arange(30.0) ** 2)
+    sheared = values + np.outer(np.arange(30) % 7, [1.0, -2.0, 0.0])
+    one, two = (METHODS["zhang"].features(pressed(v))["index"] for v in (values, sheared))
+    np.testing.assert_allclose(one, two)
+
+
+def test_energy_is_spread_and_mean_of_the_details():
+    """Of the same details, E = N_w sigma^2 + (sum d)^2 / (N_w / 2): sigma leaves the mean out."""
+    values = np.random.default_rng(0).normal(size=200).cumsum() + 100
+    sigma = haar_features(along_normal(values), 14)[:, 5]
+    steps = [(values[k - 13 : k + 1 : 2] - values[k - 12 : k + 1 : 2]) for k in range(13, 200)]
+    means = np.sum(steps, axis=1) / np.sqrt(2) / 7
+    np.testing.assert_allclose(detail_energy(values)[13:], 14 * sigma[13:] ** 2 + 7 * means**2)
+
+
+def test_an_odd_window_is_refused():
+    with pytest.raises(ValueError, match="an even window of at least 2 samples expected, 5 given"):
+        detail_energy(np.ones(9), window=5)
+
+
+def test_sigma_is_that_of_the_paper():
+    force = np.random.default_rng(0).normal(size=(60, 3))
+    sigma = haar_features(force, 14)[:, FEATURE_NAMES.index("sigma")]
+    assert detail_sigma(np.linalg.norm(force, axis=1)) == pytest.approx(sigma, nan_ok=True)
+
+
+def test_sigma_and_energy_differ_by_the_mean_of_the_details():
+    """A steady slope has energy and no sigma; else E = N_w sigma^2 + n (mean d)^2."""
+    slope = 3.0 * np.arange(20)
+    assert detail_sigma(slope)[13:] == pytest.approx(np.zeros(7))
+    assert detail_energy(slope)[13:] == pytest.approx(np.full(7, 7 * 9 / 2))
+    values = np.random.default_rng(1).normal(size=14)
+    details = (values[0::2] - values[1::2]) / np.sqrt(2)
+    expected = 14 * detail_sigma(values)[-1] ** 2 + 7 * details.mean() ** 2
+    assert detail_energy(values)[-1] == pytest.approx(expected)
+
+
+def test_each_cut_has_one_feature_of_every_finger():
+    hand = hand_signal(synthetic_recording("one", 0, ("thumb", "index")), Tare.parse("0.5"))
+    thumb = hand.fingers["thumb"]
+    for name, signal, measure in (
+        ("sigma_cut", thumb.amplitude, detail_sigma),
+        ("energy_cut", thumb.amplitude, detail_energy),
+        ("energy_x_cut", thumb.normal_force, detail_energy),
+    ):
+        features = CUTS[name].features(hand)
+        assert set(features) == {"thumb", "index"}
+        assert features["thumb"].shape == (len(thumb.times), 1)
+        last = features["thumb"][-200:, 0]
+        assert last == pytest.approx(np.log10(measure(signal)[-200:]))
+
+
+def test_trees_have_the_six_features_of_the_paper():
+    hand = hand_signal(tiny_recording(0), Tare.parse("0.5"))
+    found = METHODS["trees"].features(hand)
+    assert list(found) == ["thumb", "index"]
+    for name, rows in found.items():
+        force = hand.fingers[name].force
+        known = np.isfinite(force).all(axis=1)
+        assert rows.shape == (len(force), len(FEATURE_NAMES))
+        assert np.array_equal(rows[known], haar_features(force[known], 14), equal_nan=True)
+        assert np.isnan(rows[~known]).all()
+
+
+def test_description_of_the_trees():
+    method = METHODS["trees"]
+    assert (method.name, method.category, method.recipe.name) == ("trees", "learning", "trees")
+    assert not method.whole_hand
+
+
+def test_two_features_on_logarithmic_scales():
+    hand = hand_signal(tiny_recording(0), Tare.parse("0.5"))
+    for name, rows in METHODS["log_two"].features(hand).items():
+        force = hand.fingers[name].force
+        six = haar_features(force[np.isfinite(force).all(axis=1)], 14)[13:]
+        expected = np.log10(six[:, [FEATURE_NAMES.index("F_a"), FEATURE_NAMES.index("sigma")]])
+        assert rows[-len(six) :] == pytest.approx(expected)
+
+
+def test_the_energy_keeps_the_mean_of_the_details():
+    """A slope of 3 a sample: every detail is -3 / sqrt(2), so E = 7 x 9 / 2 and sigma = 0."""
+    hand = pressed(along_normal(100 + 3.0 * np.arange(30)))
+    energy = METHODS["energy"].features(hand)["index"][13:, 0]
+    assert energy == pytest.approx(np.full(17, np.log10(31.5)))
+    sigma = METHODS["log_two"].features(hand)["index"][13:, 1]
+    assert (sigma < -5).all()
+
+
+def test_the_classifiers_of_the_paper_with_and_without_class_weights():
+    for name in ("logreg", "svm"):
+        balanced, unweighted = METHODS[name], METHODS[f"{name}_unweighted"]
+        assert balanced.reference == {"C": 1.0, "class_weight": "balanced"}
+        assert unweighted.reference == {"C": 1.0, "class_weight": None}
+        assert balanced.features is unweighted.features
+        assert balanced.recipe is unweighted.recipe
+    assert PAPER_FAMILY == (
+        "logreg", "logreg_unweighted", "svm", "svm_unweighted", "log_two", "energy",
+    )  # fmt: skip

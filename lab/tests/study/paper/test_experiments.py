@@ -1,0 +1,47 @@
+from dataclasses import replace
+
+from holdfast.contact import ContactState
+from holdfast_lab.study.paper import experiments
+from holdfast_lab.study.plan import scan_corpus
+from holdfast.synthetic import synthetic_recording
+from study.example_recordings import recordings_of_cases, save_all, save_synthetic
+
+
+def test_recordings_are_chosen_by_case_and_name_in_test_data_first(tmp_path):
+    main = scan_corpus("main", save_all(tmp_path / "a", recordings_of_cases(["2", "failed", "1"])))
+    others = scan_corpus("others", save_all(tmp_path / "b", recordings_of_cases(["2", "2"], 5)))
+    shown = experiments.predict_examples({"others": others, "main": main}, "index", 0)
+    assert [(s.experiment, s.role, s.recording) for s in shown] == [
+        ("protocol", "main", "2-0"),
+        ("failed", "main", "failed-1"),
+        ("disturbed", "others", "2-5"),
+    ]
+    n = len(synthetic_recording("a", 0).modules["index"].times)
+    assert not shown[0].states
+    assert all(len(states) == n for s in shown[1:] for states in s.states.values())
+    assert all(set(s.states) == {"logreg", "svm"} for s in shown[1:])
+
+
+def test_a_recording_is_predicted_by_fits_without_it(tmp_path):
+    """What a recording is labelled makes no difference to what is predicted of it."""
+    found = []
+    for state in (ContactState.STABLE, ContactState.UNSTABLE):
+        first, *rest = recordings_of_cases(["2", "1", "1"])
+        labels = {
+            name: [replace(label, state=state) for label in module.labels]
+            for name, module in first.modules.items()
+        }
+        place = tmp_path / state.value
+        main = scan_corpus("main", save_all(place, [first.with_labels(labels), *rest]))
+        found.append(experiments.predict_examples({"main": main}, "index", 0)[1])
+    assert found[0].recording == "2-0"
+    assert found[0] == found[1]
+
+
+def test_without_cases_the_first_recording_is_shown(tmp_path):
+    main = scan_corpus("main", save_synthetic(tmp_path / "a", range(2)))
+    shown = experiments.predict_examples({"main": main}, "index", 0)
+    assert [(s.experiment, s.recording) for s in shown] == [
+        ("protocol", "grasp-0"),
+        ("any", "grasp-0"),
+    ]

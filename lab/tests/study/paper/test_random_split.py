@@ -1,0 +1,221 @@
+import msgspec
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from holdfast.classifiers import LinearClassifier, Samples
+from holdfast.classifiers.logreg import LogisticRegression
+from holdfast.classifiers.threshold import best_cut
+from holdfast.features import DEPLOYED_FEATURES
+from holdfast_lab.study.paper.pooled_samples import pool_samples
+from holdfast_lab.study.paper.random_split import (
+    CONFUSION_RATES,
+    FIT_RECIPES,
+    FRESH,
+    HELD_OUT,
+    OBJECTS,
+    OTHER_RECORDINGS,
+    TRAINING,
+    VALIDATED,
+    FitBudget,
+    VariantResult,
+    confusion_counts,
+    evaluate_variants,
+    rate_rows,
+)
+from holdfast_lab.study.plan import scan_corpus
+from study.example_recordings import save_synthetic
+
+BUDGET = FitBudget(trials=1, n_fit=100_000)
+"""One trial is the reference setting."""
+VARIANTS = (("logreg", DEPLOYED_FEATURES), ("svm", ("energy",)))
+
+
+@pytest.fixture(scope="module")
+def corpora(tmp_path_factory):
+    folder = tmp_path_factory.mktemp("protocol")
+    seeds = {"main": range(5), "fresh": range(10, 12), "others": range(20, 22)}
+    return {name: scan_corpus(name, save_synthetic(folder / name, s)) for name, s in seeds.items()}
+
+
+def evaluated(corpora, *, thorough=True, budget=BUDGET, seed=0):
+    return evaluate_variants(corpora, "index", 14, VARIANTS, budget, seed, thorough)
+
+
+@pytest.fixture(scope="module")
+def alone(corpora):
+    return evaluated({"main": corpora["main"]})
+
+
+def naive(corpora, on):
+    """ConfusionCounts of LogReg of the deployed features, fitted and counted sample by sample."""
+    main = pool_samples(corpora["main"], 150.0, "index", 14, seed=0)
+    data = main.select(DEPLOYED_FEATURES)
+    every = np.arange(len(main.parts))
+    train = every[main.parts >= 5]
+    folds = {
+        TRAINING: [(train, train)],
+        HELD_OUT: [(train, every[main.parts < 5])],
+        VALIDATED: [
+            (train[main.parts[train] % 5 != k], train[main.parts[train] % 5 == k]) for k in range(5)
+        ],
+        OTHER_RECORDINGS: [(every[data.groups != g], every[data.groups == g]) for g in range(5)],
+        OBJECTS: [
+            (every[data.groups % 3 != k], every[data.groups % 3 == k])  # by turns, as synthetic
+            for k in range(3)
+        ],
+    }[on]
+    counts = [[0, 0, 0, 0] for _ in range(5)]
+    how = FIT_RECIPES["logreg"]
+    for fitted, tested in folds:
+        rule = how.fit(Samples(*(part[fitted] for part in data)), how.reference, 0)
+        called = rule.probability(data.features[tested]) >= rule.threshold
+        for k, stable in zip(tested, called, strict=True):
+            counts[data.groups[k]][2 * int(data.stable[k]) + int(stable)] += 1
+    return counts
+
+
+@pytest.mark.parametrize("on", [TRAINING, VALIDATED, HELD_OUT, OTHER_RECORDINGS, OBJECTS])
+def test_counts_are_those_of_a_naive_fit(corpora, alone, on):
+    assert alone[0].counts[on] == naive(corpora, on)
+
+
+def test_kinds_of_test_data(corpora, alone):
+    together = [TRAINING, VALIDATED, HELD_OUT, OTHER_RECORDINGS, OBJECTS]
+    assert [list(cell.counts) for cell in alone] == [together] * 2
+    light = evaluated({"main": corpora["main"]}, thorough=False)
+    assert list(light[0].counts) == [HELD_OUT, OTHER_RECORDINGS]
+    assert light[0].counts[OTHER_RECORDINGS] == alone[0].counts[OTHER_RECORDINGS]
+    everything = evaluated(corpora)
+    assert list(everything[0].counts) == [TRAINING, VALIDATED, HELD_OUT, FRESH, OBJECTS]
+    assert list(evaluated(corpora, thorough=False)[0].counts) == [HELD_OUT, FRESH, OBJECTS]
+
+
+def test_fresh_recordings_are_all_of_them(corpora):
+    counts = evaluated(corpora, thorough=False)[0].counts
+    fresh = pool_samples(corpora["fresh"], 150.0, "index", 14, seed=0)
+    assert np.sum(counts[FRESH], axis=1).tolist() == np.bincount(fresh.samples.groups).tolist()
+    assert len(counts[OBJECTS]) == 2
+
+
+def test_the_split_is_reproducible_and_depends_on_the_seed(corpora, alone):
+    main = {"main": corpora["main"]}
+    assert evaluated(main) == alone
+    other = evaluated(main, seed=1)
+    assert other[0].counts[HELD_OUT] != alone[0].counts[HELD_OUT]
+    assert np.sum(other[0].counts[OTHER_RECORDINGS]) == np.sum(alone[0].counts[OTHER_RECORDINGS])
+
+
+def test_80_percent_are_used_for_training(alone):
+    counts = alone[0].counts
+    total = np.sum(counts[OTHER_RECORDINGS])
+    assert np.sum(counts[TRAINING]) == alone[0].n_fitted == pytest.approx(0.8 * total, rel=0.02)
+    assert np.sum(counts[TRAINING]) + np.sum(counts[HELD_OUT]) == total
+
+
+def test_a_fit_has_a_maximum_number_of_samples(corpora):
+    cell = evaluated({"main": corpora["main"]}, thorough=False, budget=FitBudget(1, 500))[0]
+    assert 400 < cell.n_fitted <= 500
+
+
+def test_a_search_tries_more_than_the_reference(corpora, alone):
+    reference = FIT_RECIPES["logreg"].reference
+    assert alone[0].parameters == reference
+    drawn = []
+    fit = LogisticRegression.fit
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(
+            LogisticRegression, "fit", lambda *given: drawn.append(given[2]) or fit(*given)
+        )
+        cell = evaluated({"main": corpora["main"]}, thorough=False, budget=FitBudget(4, 500))[0]
+    assert set(cell.parameters) == set(reference)
+    assert len({each["C"] for each in drawn}) == 4
+
+
+def test_class_weights_are_fixed_whatever_the_search_draws(corpora):
+    for name, weight in (("logreg", None), ("logreg_balanced", "balanced")):
+        kinds = [(name, DEPLOYED_FEATURES)]
+        main = {"main": corpora["main"]}
+        budget = FitBudget(4, 500)
+        (cell,) = evaluate_variants(main, "index", 14, kinds, budget, 0, thorough=False)
+        assert cell.parameters["class_weight"] == weight
+
+
+def test_a_threshold_has_nothing_to_search_and_calls_little_energy_stable(corpora):
+    kinds = [("threshold", ("energy",))]
+    main = {"main": corpora["main"]}
+    (cell,) = evaluate_variants(main, "index", 14, kinds, BUDGET, 0, thorough=False)
+    assert cell.parameters == {}
+    pool = pool_samples(corpora["main"], 150.0, "index", 14, seed=0)
+    train = pool.parts >= 5
+    energy = pool.select(["energy"]).features[:, 0]
+    cut = best_cut(energy[train], pool.samples.stable[train], "below").value
+    right = (energy <= cut) == pool.samples.stable
+    tn, _, _, tp = np.sum(cell.counts[HELD_OUT], axis=0)
+    assert tn + tp == right[~train].sum()
+
+
+def test_results_can_be_sent(alone):
+    data = msgspec.msgpack.encode(alone)
+    assert msgspec.msgpack.decode(data, type=list[VariantResult]) == alone
+
+
+RULE = LinearClassifier((0.0,), (1.0,), (1.0,), intercept=0.0, threshold=0.5)
+"""Stable where the feature is at least 0."""
+
+
+def count_one_by_one(features, stable, groups, n):
+    """[TN, FP, FN, TP] of each recording, sample by sample."""
+    found = [[0, 0, 0, 0] for _ in range(n)]
+    for value, truth, group in zip(features[:, 0], stable, groups, strict=True):
+        called = value >= 0
+        found[group][
+            ["TN", "FP", "FN", "TP"].index(
+                ("T" if called == truth else "F") + ("P" if called else "N")
+            )
+        ] += 1
+    return found
+
+
+@given(
+    st.lists(
+        st.tuples(st.sampled_from([-1.0, 0.0, 2.0]), st.booleans(), st.integers(0, 3)), max_size=60
+    )
+)
+@settings(max_examples=50, deadline=None)
+def test_confusions_are_those_of_a_loop(rows):
+    features = np.array([[row[0]] for row in rows]).reshape(-1, 1)
+    stable = np.array([row[1] for row in rows], dtype=bool)
+    groups = np.array([row[2] for row in rows], dtype=np.int64)
+    found = confusion_counts(RULE, Samples(features, stable, groups), 5)
+    assert found.tolist() == count_one_by_one(features, stable, groups, 5)
+
+
+def test_rates_by_hand():
+    counts = [[8, 2, 1, 9], [0, 0, 0, 0], [6, 4, 3, 7]]
+    found = dict(rate_rows(counts, CONFUSION_RATES, seed=0))
+    assert {name: row.ours for name, row in found.items()} == pytest.approx(
+        {
+            "TNR": 100 * 14 / 20,
+            "FPR": 100 * 6 / 20,
+            "FNR": 100 * 4 / 20,
+            "TPR": 100 * 16 / 20,
+            "FDR": 100 * 6 / 22,
+            "accuracy": 100 * 30 / 40,
+        }
+    )
+    assert {row.n for row in found.values()} == {2}
+    # two recordings: a resample holds both, or one of them twice
+    assert found["accuracy"].interval == pytest.approx((65.0, 85.0))
+
+
+def test_nothing_called_stable_has_no_fdr():
+    ((_, row),) = rate_rows([[5, 0, 5, 0]] * 3, ["FDR"], seed=0)
+    assert row.ours is None
+    assert row.interval is None
+
+
+def test_no_recordings():
+    ((_, row),) = rate_rows([[0, 0, 0, 0]], ["accuracy"], seed=0)
+    assert (row.ours, row.n, row.interval) == (None, 0, None)

@@ -1,0 +1,107 @@
+import math
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from holdfast.contact import NO_CONTACT, STABLE, UNKNOWN, UNSTABLE, Phase
+from holdfast.metrics import FingerDecisions
+from holdfast.recordings import Truth
+from holdfast_lab.study.paper import verdicts
+from holdfast_lab.study.paper.verdicts import find_disturbances, stable_after_lock
+from holdfast_lab.study.plan import StudyPlan, scan_corpus
+from study.example_recordings import recording_with_truth, save_all, truth_of
+
+TIMES = np.arange(1725) / 150
+TRUTH = truth_of(TIMES, ("thumb", "index"))
+"""Locked at 2.3 s, disturbed from 5.3 to 6.5 s, released at 9.5 s."""
+
+
+def states(*spans, state=UNSTABLE):
+    """Stable, but in those spans [s] another state."""
+    inside = np.any([(a - 1e-9 <= TIMES) & (b - 1e-9 > TIMES) for a, b in spans], axis=0)
+    return np.where(inside, state, STABLE).astype(np.int8)
+
+
+def hand(codes):
+    return FingerDecisions(TIMES, np.full(len(TIMES), STABLE), codes, np.full(len(TIMES), np.nan))
+
+
+class TestStableAfterLock:
+    def test_a_short_stable_estimate_is_first_but_does_not_last(self):
+        found = stable_after_lock(TIMES, states((0.0, 2.5), (2.6, 3.0)), TRUTH)
+        assert found == (pytest.approx(0.2, abs=0.01), pytest.approx(0.7, abs=0.01))
+
+    def test_stable_at_the_lock_already(self):
+        assert stable_after_lock(TIMES, states(), TRUTH) == (0.0, 0.0)
+
+    def test_never_stable_while_held(self):
+        assert stable_after_lock(TIMES, states((0.0, 9.5)), TRUTH) == (math.inf, math.inf)
+
+    def test_never_locked(self):
+        free = Truth(TIMES, {"phase": np.full(len(TIMES), str(Phase.FREE))}, {})
+        assert stable_after_lock(TIMES, states(), free) is None
+        assert stable_after_lock(TIMES, states(), None) is None
+
+
+class TestDisturbances:
+    def one(self, codes):
+        (found,) = find_disturbances(hand(codes), TRUTH)
+        assert (found.start, found.end) == pytest.approx((5.3, 6.5 - 1 / 150), abs=0.007)
+        return found
+
+    def test_an_alarm_inside_detects_it(self):
+        found = self.one(states((5.4, 5.6)))
+        assert found.was_stable and found.delay == pytest.approx(0.1, abs=0.007)
+
+    def test_without_an_alarm_it_is_missed_even_if_called_unstable_all_along(self):
+        found = self.one(states((5.0, 7.0)))
+        assert not found.was_stable and found.delay == math.inf
+
+    def test_alarms_before_and_after_do_not_count(self):
+        assert self.one(states((5.2, 5.25), (6.6, 6.8))).delay == math.inf
+
+    def test_an_alarm_after_a_false_one_counts(self):
+        found = self.one(states((5.2, 5.5), (6.0, 6.1)))
+        assert not found.was_stable and found.delay == pytest.approx(0.7, abs=0.007)
+
+    def test_an_unknown_state_is_no_alarm(self):
+        assert self.one(states((5.4, 5.6), state=UNKNOWN)).delay == math.inf
+
+    def test_a_lost_contact_is_an_alarm(self):
+        assert self.one(states((5.4, 5.6), state=NO_CONTACT)).delay < 0.2
+
+
+@pytest.fixture(scope="module")
+def plan(tmp_path_factory):
+    folder = tmp_path_factory.mktemp("verdicts")
+    corpora = {}
+    for role, seeds, case in (("main", range(4), "2"), ("vigorous", range(8, 10), "failed")):
+        made = []
+        for seed in seeds:
+            recording = recording_with_truth(f"grasp-{seed}", seed)
+            made.append(replace(recording, metadata={**recording.metadata, "case": case}))
+        corpora[role] = scan_corpus(role, save_all(folder / role, made))
+    return StudyPlan(corpora, quick=True)
+
+
+def test_the_tables(plan):
+    results = {task.name: task.function(*task.arguments) for task in verdicts.tasks(plan)}
+    one, two, single = verdicts.tables(plan, results)
+    failed = {(r.keys["on"], r.keys["figure"]): r.ours for r in one.rows}
+    assert failed["vigorous profile", "failed grasps"] == 2
+    assert {on for on, _ in failed} == {"vigorous profile"}
+    counts = np.sum(
+        [each.unstable for each in results["verdicts/logreg"] if each.case == "failed"], axis=0
+    )
+    logreg = next(
+        r for r in one.rows
+        if r.keys["figure"] == "of its unstable samples [%]"
+        and str(r.keys["method"]).startswith("LogReg")
+    )  # fmt: skip
+    assert logreg.ours == pytest.approx(100 * counts[1] / counts[0])
+    disturbances = [r.ours for r in two.rows if r.keys["figure"] == "disturbances"]
+    assert disturbances == [4, 4]
+    assert {r.keys["recording"] for r in single.rows} == {"grasp-0", "grasp-1", "grasp-2"}
+    detected = [r.ours for r in single.rows if str(r.keys["figure"]).endswith(": detected")]
+    assert len(detected) == 6 and set(detected) <= {0.0, 1.0}

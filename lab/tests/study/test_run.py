@@ -1,0 +1,157 @@
+import json
+import shutil
+import subprocess
+from dataclasses import replace
+from pathlib import Path
+
+import pytest
+
+from holdfast.contact import ContactState
+from holdfast.errors import OutputError
+from holdfast.parallel import Engine
+from holdfast_lab.study import run
+from holdfast_lab.study.comparison import all_methods, costs, jobs, sample_tables, sensitivity
+from holdfast_lab.study.methods import METHODS
+from holdfast_lab.study.paper import experiments, paper_tables
+from holdfast_lab.study.plan import StudyPlan, scan_corpus
+from holdfast_lab.study.run import run_study, whole_hand_note
+from holdfast.synthetic import synthetic_recording
+
+from .example_recordings import recordings_of_cases, save_all, save_synthetic
+
+ALL_PARTS = run.PARTS
+PAPER = ("confusion", "window", "ablation", "unseen", "fingers", "zhang")
+
+
+@pytest.fixture(scope="module")
+def few():
+    """A study of few tasks."""
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(paper_tables, "QUICK_WINDOWS", (14,))
+        patch.setattr(paper_tables, "ABLATION_WINDOWS", (14,))
+        patch.setattr(run, "PARTS", {"paper": paper_tables, "experiments": experiments})
+        yield
+
+
+@pytest.fixture(scope="module")
+def plan(tmp_path_factory):
+    folder = tmp_path_factory.mktemp("plan") / "main"
+    corpus = scan_corpus("main", save_all(folder, recordings_of_cases(["2", "1", "failed", "2"])))
+    return StudyPlan({"main": corpus}, quick=True)
+
+
+@pytest.fixture(scope="module")
+def done(few, plan, tmp_path_factory):
+    """The folder of a finished study, and its tables."""
+    out = tmp_path_factory.mktemp("done") / "out"
+    return out, run_study(plan, out, made_in=60.0, left_out=["the moon."])
+
+
+def summary(out):
+    return json.loads((out / "study.json").read_text())
+
+
+def test_all_tables_and_figures_are_there(done):
+    out, tables = done
+    assert {*PAPER, "discrepancies"} == {table.name for table in tables}
+    names = {"forces", "features", "experiment-1", "experiment-2", "window"}
+    assert {path.stem for path in (out / "figures").iterdir()} == names
+    written = summary(out)["tables"]
+    assert list(written) == [table.name for table in tables]
+    assert {"ours", "paper", "difference", "n", "interval"} < set(written["confusion"][0])
+
+
+def test_the_summary_describes_the_run(done, plan):
+    document = summary(done[0])
+    assert document["seed"] == 0 and document["quick"] is True
+    assert document["versions"]["numpy"] and "torch" in document["versions"]
+    one = synthetic_recording("a", 0).modules["index"]
+    assert document["data"]["main"] == {
+        "name": "main", "digest": plan.main.digest, "recordings": 4, "fingers": ["index", "thumb"],
+        "samples": 8 * len(one.times), "rate": pytest.approx(150.0), "tare": "0.5",
+    }  # fmt: skip
+    assert document["machine"]["cores"] >= 1
+    assert document["seconds"]["data"] == 60.0
+    assert "<li>Left out: the moon.</li>" in (done[0] / "report.html").read_text()
+
+
+def test_no_output_contains_the_path_of_the_data(done, plan):
+    texts = [path for path in done[0].rglob("*") if path.suffix in (".html", ".json", ".csv")]
+    home = str(Path(plan.main.folder).parent)
+    assert texts and not [path for path in texts if home in path.read_text()]
+
+
+def test_stored_results_are_not_computed_again(done, plan, tmp_path):
+    out = shutil.copytree(done[0], tmp_path / "out")
+    with pytest.raises(OutputError, match="already holds a study: choose another name, or give"):
+        run_study(plan, out)
+    kept = {path.name: path.read_bytes() for path in (out / "work").iterdir()}
+    (out / "data").mkdir()
+    messages = []
+    run_study(plan, out, notify=messages.append, force=True)
+    assert messages[0] == f"{len(kept)} of {len(kept)} tasks are already done"
+    assert {path.name: path.read_bytes() for path in (out / "work").iterdir()} == kept
+    assert (out / "data").is_dir()
+    assert summary(out)["tables"] == summary(done[0])["tables"]
+
+
+def test_other_processes_give_the_same_tables(done, plan, tmp_path):
+    assert run_study(plan, tmp_path / "out", Engine(2)) == done[1]
+
+
+def test_a_browser_shows_the_report(done):
+    browser = shutil.which("chromium") or shutil.which("chromium-browser")
+    if browser is None:
+        pytest.skip("no Chromium is installed")
+    page = (done[0] / "report.html").as_uri()
+    options = ("--headless", "--no-sandbox", "--disable-gpu", "--dump-dom")
+    shown = subprocess.run(
+        [browser, *options, page], capture_output=True, text=True, timeout=60, check=True
+    ).stdout
+    assert shown.count("<section") == 6  # the summary first
+    assert shown.count("<svg") + shown.count("<img") == 5
+
+
+class TestOneFinger:
+    def test_methods_of_whole_hands_are_left_out_and_named(self, tmp_path):
+        folder = save_synthetic(tmp_path / "main", range(2), fingers=("thumb",))
+        plan = StudyPlan({"main": scan_corpus("main", folder)}, quick=True)
+        assert not [n for n in jobs.method_titles(plan) if METHODS[n].whole_hand]
+        (note,) = whole_hand_note(plan)
+        assert "LogReg, global (James & Lepora)" in note
+        assert note.endswith("because only the thumb has labels of both classes.")
+
+    def test_two_fingers_have_them_all(self, plan):
+        assert whole_hand_note(plan) == []
+        assert "jl_global_logreg" in jobs.method_titles(plan)
+
+    def test_a_study_of_short_stable_stretches_has_every_table(self, tmp_path, monkeypatch):
+        """Nothing is stable for the half second that an event needs: no events, no failure."""
+        recordings = (_short(synthetic_recording(f"g-{k}", k, ("thumb",))) for k in range(4))
+        corpus = scan_corpus("main", save_all(tmp_path / "main", recordings))
+        few = {name: METHODS[name] for name in ("logreg", "zhang", "holdfast")}
+        for module in (jobs, sample_tables, all_methods, sensitivity):
+            monkeypatch.setattr(module, "METHODS", few)
+        monkeypatch.setattr(run, "PARTS", ALL_PARTS)
+        monkeypatch.setattr(costs, "N_UPDATES", 50)
+        monkeypatch.setattr(paper_tables, "QUICK_WINDOWS", (14,))
+        monkeypatch.setattr(paper_tables, "ABLATION_WINDOWS", (14,))
+        made = run_study(StudyPlan({"main": corpus}, quick=True), tmp_path / "out")
+        tables = {table.name: table for table in made}
+        missed = [
+            row for row in tables["events"].rows if row.keys["figure"] == "missed at 50 ms [%]"
+        ]
+        assert missed and all(row.ours is None and row.n == 0 for row in missed)
+        assert {"methods", "hands", "slips", *PAPER} <= set(tables)
+        report = (tmp_path / "out" / "report.html").read_text()
+        assert "only the thumb has labels of both classes" in report
+
+
+def _short(recording):
+    """The recording with stable labels of 0.4 s, and no label between them."""
+    labels = {
+        name: [replace(each, end=min(each.end, each.start + 0.4))
+               if each.state is ContactState.STABLE else each for each in module.labels]
+        for name, module in recording.modules.items()
+    }  # fmt: skip
+    return recording.with_labels(labels)

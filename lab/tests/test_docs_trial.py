@@ -1,0 +1,92 @@
+"""The figures in docs/grip-trials.md are those of the published run of `holdfast trial`."""
+
+import importlib.util
+import json
+import shutil
+from pathlib import Path
+
+import msgspec
+import pytest
+
+from trial.example_results import results_of
+from holdfast_lab.trial.document import document_of
+from holdfast_lab.trial.plan import TrialPlan
+
+ROOT = Path(__file__).parents[1]
+PUBLISHED = ROOT / "docs" / "grip"
+
+
+def load_script():
+    spec = importlib.util.spec_from_file_location(
+        "publish_trial", ROOT / "benchmarks" / "publish_trial.py"
+    )
+    module = importlib.util.module_from_spec(spec)
+    spec.loader.exec_module(module)
+    return module
+
+
+script = load_script()
+
+
+def test_the_page_is_what_the_template_gives():
+    assert (ROOT / "docs" / script.PAGE).read_text("utf-8") == script.render(PUBLISHED), (
+        "docs/grip-trials.md differs: run python benchmarks/publish_trial.py render"
+    )
+
+
+def test_the_readme_quotes_the_published_run():
+    laws = json.loads((PUBLISHED / "trial.json").read_text("utf-8"))["laws"]
+    ours, fixed = laws["holdfast"], laws["fixed"]
+    readme = (ROOT / "README.md").read_text("utf-8")
+    assert (
+        f"On {ours['n']} trials of the twin it dropped {ours['dropped']['value']:.1f} % of the "
+        f"objects, a grip of fixed force {fixed['dropped']['value']:.1f} %, with "
+        f"{ours['force_ratio_mean']['value']:.1f} times the least force"
+    ) in readme
+    rivals = [laws[name] for name in ("pr2", "wong-zhu", "friction-margin")]
+    force = ours["force_ratio_mean"]["value"]
+    assert all(one["force_ratio_mean"]["value"] > force for one in rivals)
+    assert sum(one["dropped"]["value"] < ours["dropped"]["value"] for one in rivals) == 2
+
+
+def test_the_links_of_the_page_exist():
+    for target in script.render(PUBLISHED).split("](")[1:]:
+        assert (ROOT / "docs" / target.split(")")[0].split("#")[0]).exists(), target
+
+
+@pytest.fixture
+def run(tmp_path):
+    """Folder of an invented run; docs with the template and files of an older run."""
+    document = document_of(TrialPlan(("fixed", "pr2", "holdfast"), 12), results_of(), 0)
+    document |= {"seconds": {"trials": 90.0}, "machine": {"cores": 2}, "versions": {}}
+    for name in ("run/tables", "run/figures", "docs/grip"):
+        (tmp_path / name).mkdir(parents=True)
+    (tmp_path / "run/trial.json").write_bytes(msgspec.json.encode(document))
+    (tmp_path / "run/trials.csv").write_text("a")
+    (tmp_path / "run/tables/laws.csv").write_text("b")
+    (tmp_path / "run/figures/film.webp").write_bytes(b"c")
+    (tmp_path / "docs/grip/old.csv").write_text("old")
+    shutil.copy(PUBLISHED / f"{script.PAGE}.j2", tmp_path / "docs/grip")
+    return tmp_path / "run"
+
+
+def test_a_run_is_published_in_place_of_the_old_one(run):
+    docs = run.parent / "docs"
+    script.publish(run, docs)
+    assert {path.name for path in (docs / "grip").iterdir()} == {
+        "trial.json", "trials.csv", "laws.csv", "film.webp", f"{script.PAGE}.j2",
+    }  # fmt: skip
+    assert "trials" not in json.loads((docs / "grip/trial.json").read_text())
+    script.write_page(docs)
+    page = (docs / script.PAGE).read_text()
+    assert "12 trials of the twin with each law, seed 0" in page
+    assert "| fixed | 63.6<br><sub>" in page
+    assert "holdfast dropped 0.0 (0.0 to 0.0) % of the objects" in page
+    assert "(grip/film.webp)" in page and "(grip/force.png)" not in page
+    assert "**Each law minus fixed, on the same trials**" in page
+
+
+def test_a_folder_without_a_run_changes_nothing(tmp_path, run):
+    with pytest.raises(FileNotFoundError):
+        script.publish(tmp_path / "none", run.parent / "docs")
+    assert (run.parent / "docs/grip/old.csv").exists()

@@ -1,0 +1,352 @@
+import contextlib
+import os
+import signal
+import subprocess
+import sys
+import time
+from pathlib import Path
+
+import msgspec
+import numba
+import numpy as np
+import pytest
+from threadpoolctl import threadpool_info
+
+from holdfast import cluster
+from holdfast_lab import tasks as work
+from holdfast.cli.terminal.progress import progress
+from holdfast.errors import EngineError, OutputError
+from holdfast.parallel import Engine
+from holdfast_lab.tasks import Task, TaskRunner, source_digest
+
+ENGINES = [Engine(1), Engine(2)]
+
+
+class Figure(msgspec.Struct, frozen=True):
+    value: float
+    parts: list[float]
+
+
+def figure(place, seed):
+    """What a task of the study may look like: random numbers by key, a Struct of NumPy numbers."""
+    parts = np.random.default_rng([place, seed]).normal(size=3)
+    return Figure(parts.sum(), parts)
+
+
+def n_threads():
+    """Of the compiled kernels, and of each library that has threads of its own."""
+    return [numba.get_num_threads(), *(info["num_threads"] for info in threadpool_info())]
+
+
+def noted(place, folder):
+    """Leaves one byte for each time that it is called."""
+    with (Path(folder) / str(place)).open("ab") as file:
+        file.write(b"x")
+    time.sleep(0.05)
+    return place
+
+
+def fail(place):
+    if place == 2:
+        raise ValueError("no good")
+    if place == 3:
+        raise OSError(28, "No space left on device")
+    return place
+
+
+def tasks(n=8):
+    return [Task(f"figure/{place}", figure, (place, 7), Figure) for place in range(n)]
+
+
+def noted_tasks(folder, n=12):
+    return [Task(f"noted/{place}", noted, (place, str(folder)), int) for place in range(n)]
+
+
+def calls(folder):
+    return {path.name: path.stat().st_size for path in folder.iterdir()}
+
+
+def kept(folder):
+    return sorted((folder / "work").glob("[!.]*.msgpack"))
+
+
+@pytest.fixture
+def log(tmp_path):
+    place = tmp_path / "log"
+    place.mkdir()
+    return place
+
+
+@pytest.fixture
+def expected():
+    return {f"figure/{place}": figure(place, 7) for place in range(8)}
+
+
+@pytest.mark.parametrize("engine", ENGINES)
+@pytest.mark.parametrize("order", [1, -1])
+def test_results_are_the_same_on_every_engine_in_every_order(tmp_path, engine, order, expected):
+    results = TaskRunner(tmp_path, engine).run(tasks()[::order])
+    assert list(results) == list(expected)[::order]
+    for name, result in results.items():
+        assert isinstance(result, Figure)
+        np.testing.assert_array_equal(result.parts, expected[name].parts)
+        assert result.value == expected[name].value
+
+
+def test_a_worker_of_a_cluster_that_is_killed_changes_no_result(tmp_path, log):
+    distributed = pytest.importorskip("distributed")
+    from dask import config
+
+    def follow(items, _, __, ___):
+        for place, item in enumerate(items):
+            if place == 10:
+                with distributed.Client(cluster.scheduler_address, set_as_default=False) as client:
+                    os.kill(client.run(os.getpid).popitem()[1], signal.SIGKILL)
+            yield item
+
+    with (
+        config.set({"distributed.comm.timeouts.connect": "1s"}),
+        distributed.LocalCluster(
+            n_workers=2,
+            threads_per_worker=1,
+            host="127.0.0.1",
+            dashboard_address="127.0.0.1:0",
+            silence_logs=50,
+        ) as cluster,
+    ):
+        engine = Engine.parse(f"dask:{cluster.scheduler_address}")
+        wanted = tasks() + noted_tasks(log, 32)
+        there = TaskRunner(tmp_path / "there", engine, follow).run(wanted)
+    assert there == TaskRunner(tmp_path / "here").run(wanted)
+    assert [path.name for path in kept(tmp_path / "there")] == [
+        path.name for path in kept(tmp_path / "here")
+    ]
+
+
+@pytest.mark.parametrize("engine", ENGINES, ids=str)
+def test_a_task_has_one_thread(tmp_path, engine):
+    before = n_threads()
+    results = TaskRunner(tmp_path, engine).run([Task("a", n_threads, (), list[int])])
+    assert len(results["a"]) > 1 and set(results["a"]) == {1}
+    assert n_threads()[0] == before[0]
+
+
+def test_stored_results_are_reused(tmp_path, log):
+    messages = []
+    first = TaskRunner(tmp_path).run(noted_tasks(log, 4))
+    again = TaskRunner(tmp_path, notify=messages.append).run(noted_tasks(log, 6))
+    assert set(calls(log).values()) == {1}
+    assert again == {f"noted/{place}": place for place in range(6)}
+    assert first.items() <= again.items()
+    assert messages == ["4 of 6 tasks are already done"]
+
+
+def test_a_killed_study_continues_with_the_missing_tasks(tmp_path, log):
+    code = f"""if True:
+        from pathlib import Path
+        from holdfast.parallel import Engine
+        from test_tasks import TaskRunner, noted_tasks
+        TaskRunner(Path({str(tmp_path)!r}), Engine(2)).run(noted_tasks({str(log)!r}))
+    """
+    tests = str(Path(__file__).parent)
+    with subprocess.Popen(
+        [sys.executable, "-c", code],
+        env=os.environ | {"PYTHONPATH": tests},
+        start_new_session=True,
+    ) as study:
+        while len(kept(tmp_path)) < 5 and study.poll() is None:
+            time.sleep(0.01)
+        os.killpg(study.pid, signal.SIGKILL)
+    n_kept = len(kept(tmp_path))
+    assert 5 <= n_kept < 12
+    done = calls(log)
+    results = TaskRunner(tmp_path).run(noted_tasks(log))
+    assert results == {f"noted/{place}": place for place in range(12)}
+    again = [place for place, n in calls(log).items() if n != done.get(place, 0)]
+    assert len(again) == 12 - n_kept
+    assert max(calls(log).values()) <= 2
+
+
+@pytest.mark.parametrize(
+    "damage",
+    [
+        pytest.param(lambda data: b"", id="empty"),
+        pytest.param(lambda data: data[:-1], id="cut"),
+        pytest.param(lambda data: data[:-1] + bytes([data[-1] ^ 1]), id="a bit flipped"),
+        pytest.param(lambda data: b"\xff" * len(data), id="something else"),
+    ],
+)
+def test_a_damaged_result_is_computed_again(tmp_path, log, damage):
+    first = TaskRunner(tmp_path).run(noted_tasks(log, 3))
+    path = kept(tmp_path)[1]
+    whole = path.read_bytes()
+    path.write_bytes(damage(whole))
+    assert TaskRunner(tmp_path).run(noted_tasks(log, 3)) == first
+    assert sorted(calls(log).values()) == [1, 1, 2]
+    assert path.read_bytes() == whole
+
+
+def test_no_flipped_bit_changes_a_result(tmp_path):
+    first = TaskRunner(tmp_path).run(tasks(1))
+    (path,) = kept(tmp_path)
+    whole = path.read_bytes()
+    for place in range(len(whole)):
+        path.write_bytes(whole[:place] + bytes([whole[place] ^ 4]) + whole[place + 1 :])
+        assert TaskRunner(tmp_path).run(tasks(1)) == first
+
+
+def test_other_arguments_or_another_function_are_another_result(tmp_path):
+    TaskRunner(tmp_path).run([Task("a", figure, (1, 7), Figure)])
+    TaskRunner(tmp_path).run([Task("a", figure, (1, 8), Figure)])
+    TaskRunner(tmp_path).run([Task("a", max, (1, 7), int)])
+    assert len(kept(tmp_path)) == 3
+
+
+def test_another_source_is_another_result(tmp_path, log, monkeypatch):
+    TaskRunner(tmp_path).run(noted_tasks(log, 2))
+    monkeypatch.setattr(work, "source_digest", lambda *_: "another")
+    TaskRunner(tmp_path).run(noted_tasks(log, 2))
+    assert set(calls(log).values()) == {2}
+
+
+def test_a_worker_with_another_source_is_rejected(tmp_path, monkeypatch):
+    monkeypatch.setattr(work, "source_digest", lambda *_: "another")
+    with pytest.raises(
+        EngineError, match=r"^figure/\d: the version of holdfast of its worker diff"
+    ):
+        TaskRunner(tmp_path, Engine(2)).run(tasks(2))
+
+
+@pytest.fixture
+def digest(tmp_path, monkeypatch):
+    """Function that writes files of a package, a__b for a/b, and returns their digest."""
+
+    def written(*unused, **files):
+        for name, text in files.items():
+            path = tmp_path / "package" / name.replace("__", "/")
+            path.parent.mkdir(parents=True, exist_ok=True)
+            path.write_text(text)
+        clear()
+        return source_digest(unused)
+
+    def clear():
+        work.source_digest.cache_clear()
+        cluster.file_digests.cache_clear()
+
+    monkeypatch.setattr(cluster, "__file__", str(tmp_path / "package" / "cluster.py"))
+    yield written
+    monkeypatch.undo()
+    clear()
+
+
+def test_the_source_digest_ignores_the_command_line_and_reports(digest):
+    first = digest(a="1", study__b="2")
+    assert digest(cli__c="3", report__d="4") == first
+    assert digest(study__b="3") != first
+
+
+def test_the_source_digest_ignores_files_that_are_not_used(digest):
+    first = digest("laws/b", "study", a="1", laws__b="2", laws__c="3")
+    assert digest("laws/b", "study", laws__b="4", study__d="5") == first
+    assert digest("laws/b", "study", laws__c="6") != first
+    assert digest("laws/b", "study", study_plan="7") != first
+
+
+def test_a_task_may_have_a_version_of_its_own(tmp_path, log, monkeypatch):
+    def run(version):
+        return TaskRunner(tmp_path).run([Task("a", noted, (1, str(log)), int, version=version)])
+
+    assert run("first") == {"a": 1}
+    monkeypatch.setattr(work, "source_digest", lambda *_: "another")
+    run("first")
+    assert calls(log) == {"1": 1}
+    run("second")
+    assert calls(log) == {"1": 2}
+
+
+def test_the_same_call_under_two_names_is_made_once(tmp_path, log):
+    twins = [Task(name, noted, (1, str(log)), int) for name in "ab"]
+    assert TaskRunner(tmp_path).run(twins) == {"a": 1, "b": 1}
+    assert calls(log) == {"1": 1}
+
+
+def test_two_tasks_of_one_name_are_rejected(tmp_path):
+    with pytest.raises(ValueError, match=r"^two tasks are called figure/0$"):
+        TaskRunner(tmp_path).run(tasks(2) + tasks(1))
+
+
+@pytest.mark.parametrize("engine", ENGINES)
+def test_a_failure_names_its_task_and_other_results_stay_stored(tmp_path, engine):
+    with pytest.raises(ValueError, match=r"^fail/2: no good$"):
+        TaskRunner(tmp_path, engine).run([Task(f"fail/{n}", fail, (n,), int) for n in (0, 1, 2)])
+    if engine.n_jobs == 1:
+        assert len(kept(tmp_path)) == 2
+
+
+@pytest.mark.parametrize("engine", ENGINES)
+def test_a_failure_of_several_arguments_has_a_note(tmp_path, engine):
+    with pytest.raises(OSError, match="No space left") as failure:
+        TaskRunner(tmp_path, engine).run([Task("fail/3", fail, (3,), int)])
+    assert "in the task fail/3" in failure.value.__notes__
+
+
+def test_a_result_of_another_type(tmp_path):
+    with pytest.raises(TypeError, match=r"^figure/0 returned no <class 'int'>: Expected `int`"):
+        TaskRunner(tmp_path).run([Task("figure/0", figure, (0, 7), int)])
+    assert kept(tmp_path) == []
+
+
+def test_a_result_that_cannot_be_stored(tmp_path):
+    with pytest.raises(TypeError, match=r"^odd: a [a-zA-Z]*Path cannot be stored"):
+        TaskRunner(tmp_path).run([Task("odd", Path, ("x",), str)])
+
+
+def test_tasks_of_high_cost_start_first(tmp_path):
+    seen = []
+
+    def follow(items, what, total, cost):
+        seen.append((what, total))
+        for item in items:
+            seen.append((item[0].name, cost(item)))
+            yield item
+
+    costs = {"short": 1.0, "long": 5.0, "middle": 2.0}
+    TaskRunner(tmp_path, progress=follow).run(
+        [Task(name, figure, (0, place), Figure, costs[name]) for place, name in enumerate(costs)]
+    )
+    assert seen == [("working", 8.0), ("long", 5.0), ("middle", 2.0), ("short", 1.0)]
+
+
+def test_the_progress_bar_of_the_command_line(tmp_path, expected):
+    assert TaskRunner(tmp_path, progress=progress).run(tasks()).keys() == expected.keys()
+
+
+def test_no_tasks(tmp_path):
+    assert TaskRunner(tmp_path).run([]) == {}
+
+
+def test_a_folder_that_cannot_be_made(tmp_path):
+    (tmp_path / "work").touch()
+    with pytest.raises(OutputError, match=r"^cannot write .*work: File exists$"):
+        TaskRunner(tmp_path).run(tasks(1))
+
+
+def test_a_result_is_stored_before_the_next_task_ends(tmp_path, log):
+    def follow(items, *_):
+        for item in items:
+            assert len(kept(tmp_path)) == len(calls(log))
+            yield item
+
+    TaskRunner(tmp_path, progress=follow).run(noted_tasks(log, 3))
+
+
+def test_an_interrupt_keeps_finished_results(tmp_path, log):
+    def follow(items, *_):
+        for place, item in enumerate(items):
+            if place == 2:
+                raise KeyboardInterrupt
+            yield item
+
+    with contextlib.suppress(KeyboardInterrupt):
+        TaskRunner(tmp_path, progress=follow).run(noted_tasks(log, 6))
+    assert len(kept(tmp_path)) == 3

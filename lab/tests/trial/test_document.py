@@ -1,0 +1,86 @@
+import csv
+import json
+import math
+
+import msgspec
+import pytest
+
+from holdfast_lab.trial.document import document_of, example_of, trials_csv
+from holdfast_lab.trial.plan import TrialPlan
+
+from .example_results import results_of
+
+LAWS = ("fixed", "pr2", "holdfast")
+
+
+@pytest.fixture(scope="module")
+def document():
+    return document_of(TrialPlan(LAWS, 12), results_of(), 0)
+
+
+def test_numbers_of_the_contract(document):
+    assert list(document["laws"]) == list(LAWS)
+    for row in document["laws"].values():
+        assert (row["n"], row["n_not_held"]) == (11, 1)
+        for name in (
+            "dropped", "slip_median", "reaction_median", "force_ratio_mean",
+            "false_reactions_per_minute",
+        ):  # fmt: skip
+            assert row[name].keys() == {"value", "interval"}
+    assert document["seed"] == 0
+    assert len(document["trials"]) == 36
+
+
+def test_parts_add_up_to_the_whole(document):
+    for law, row in document["laws"].items():
+        parts = [document["seen_objects"], document["unseen_objects"]]
+        for each in (parts, document["by_kind"].values(), document["by_fingers"].values()):
+            assert sum(part[law]["n"] for part in each) == row["n"]
+
+
+def test_each_law_is_compared_with_ours_and_with_fixed(document):
+    assert {name: list(by_law) for name, by_law in document["paired"].items()} == {
+        "fixed": ["pr2", "holdfast"],
+        "holdfast": ["fixed", "pr2"],
+    }
+    found = document["paired"]["fixed"]["holdfast"]
+    assert found["dropped"]["value"] == -document["laws"]["fixed"]["dropped"]["value"]
+
+
+def test_it_is_json_without_infinity(document):
+    text = msgspec.json.encode(document)
+    assert json.loads(text, parse_constant=pytest.fail)["trials"][0]["slip"] is None
+
+
+def test_a_model_file_is_named_without_its_folder(tmp_path):
+    from holdfast.model import Model
+
+    Model.load("builtin:noise-floor").save(tmp_path / "mine.json")
+    plan = TrialPlan(("fixed",), 1, model=str(tmp_path / "mine.json"))
+    assert document_of(plan, results_of(("fixed",), 1), None)["model"] == "mine.json"
+
+
+class TestExample:
+    def test_it_is_the_first_that_fixed_loses_and_ours_holds(self):
+        assert example_of(results_of()) == 0
+        results = results_of()
+        results["fixed"][0] = msgspec.structs.replace(results["fixed"][0], dropped=False)
+        results["holdfast"][1] = msgspec.structs.replace(results["holdfast"][1], dropped=True)
+        assert example_of(results) == 3
+
+    def test_a_trial_that_was_not_held_until_the_load_is_none(self):
+        results = results_of()
+        for each in results.values():
+            each[:4] = [msgspec.structs.replace(one, held=False) for one in each[:4]]
+        assert example_of(results) == 6  # 4 was not held either, and fixed holds 5
+
+    def test_without_both_laws_there_is_none(self):
+        assert example_of(results_of(("fixed", "pr2"))) is None
+        assert example_of(results_of(("holdfast",))) is None
+
+
+def test_csv_has_a_line_for_each_trial_with_each_law():
+    lines = list(csv.DictReader(trials_csv(results_of(("fixed",), 3)).splitlines()))
+    assert [line["number"] for line in lines] == ["0", "1", "2"]
+    assert lines[0]["slip"] == "inf" and math.isinf(float(lines[0]["reaction"]))
+    assert lines[2]["dropped"] == "False"

@@ -1,0 +1,108 @@
+import ast
+import subprocess
+import sys
+from pathlib import Path
+
+import msgspec
+import pytest
+
+import holdfast
+from holdfast.grip import laws
+from holdfast_lab.trial import plan as trial_plan
+from holdfast_lab.trial.plan import OF_FILMS, UNUSED, TrialPlan, run_numbered
+from holdfast.errors import ModelError
+from holdfast.model import Model
+
+PACKAGE = Path(holdfast.__file__).parent
+
+
+def version(law):
+    return TrialPlan((law,), 1).trial_task(0, law).version
+
+
+@pytest.fixture
+def fresh():
+    """Versions are computed again, before and after the test."""
+    trial_plan._version.cache_clear()
+    yield
+    trial_plan._version.cache_clear()
+
+
+@pytest.mark.parametrize(
+    ("given", "message"),
+    [
+        ({"laws": ("magic",)}, r"^unknown law 'magic'; there are fixed, "),
+        ({"laws": ("fixed", "fixed")}, r"^the law 'fixed' is given twice$"),
+        ({"n": 0}, r"^at least 1 trial expected, 0 given$"),
+        ({"seed": -1}, r"^a seed of at least 0 expected, -1 given$"),
+    ],
+)
+def test_a_plan_refuses_what_cannot_be_run(given, message):
+    with pytest.raises(ValueError, match=message):
+        TrialPlan(**given)
+
+
+def test_a_model_without_a_finger_is_refused(tmp_path):
+    model = Model.load("builtin:noise-floor")
+    one = model.fingers["*"]
+    lacking = msgspec.structs.replace(model, fingers={"thumb": one, "index": one, "middle": one})
+    lacking.save(tmp_path / "three.json")
+    message = r"the trials need thumb, index, middle, ring; the model has no ring, only thumb"
+    with pytest.raises(ModelError, match=message):
+        TrialPlan(model=str(tmp_path / "three.json"))
+
+
+def test_a_model_with_a_tare_of_a_recording_is_refused(tmp_path):
+    model = msgspec.structs.replace(Model.load("builtin:noise-floor"), tare="0:1")
+    model.save(tmp_path / "interval.json")
+    with pytest.raises(ModelError, match="where samples come one by one"):
+        TrialPlan(model=str(tmp_path / "interval.json"))
+
+
+def test_a_worker_with_another_model_is_refused():
+    with pytest.raises(ModelError, match=r"builtin:any has another content here: copy it to every"):
+        run_numbered(0, 0, "fixed", "builtin:any", "another")
+
+
+class TestVersion:
+    def test_it_depends_on_the_constants_of_the_law(self, fresh, monkeypatch):
+        before = {law: version(law) for law in ("pr2", "holdfast")}
+        trial_plan._version.cache_clear()
+        monkeypatch.setitem(laws.LAWS, "holdfast", lambda: laws.Stability(threshold=0.6))
+        assert version("holdfast") != before["holdfast"]
+        assert version("pr2") == before["pr2"]
+
+    def test_it_does_not_depend_on_files_of_other_laws(self, fresh, monkeypatch):
+        left_out = {}
+        monkeypatch.setattr(
+            trial_plan,
+            "source_digest",
+            lambda unused: left_out.setdefault(len(left_out), unused)[0],
+        )
+        version("pr2")
+        assert "control/laws/stability.py" in left_out[0]
+        assert "control/laws/pr2.py" not in left_out[0]
+        assert "control/laws/base.py" not in left_out[0]
+
+    def test_what_it_leaves_out_exists(self):
+        assert [name for name in (*UNUSED, *OF_FILMS) if not (PACKAGE / name).exists()] == []
+
+    def test_no_trial_imports_what_it_leaves_out(self):
+        code = "import sys, holdfast_lab.trial.run; print(*sys.modules)"
+        done = subprocess.run(
+            [sys.executable, "-c", code], capture_output=True, text=True, check=True
+        )
+        loaded = {name.replace(".", "/") for name in done.stdout.split()}
+        unused = {f"holdfast/{name.removesuffix('.py')}" for name in (*UNUSED, *OF_FILMS)}
+        assert loaded & unused == {"holdfast/control/laws/__init__"} & loaded
+
+    def test_no_law_imports_another(self):
+        modules = {type(law()).__module__ for law in laws.LAWS.values()}
+        for module in modules:
+            path = PACKAGE.parent / f"{module.replace('.', '/')}.py"
+            imported = {
+                node.module
+                for node in ast.walk(ast.parse(path.read_text("utf-8")))
+                if isinstance(node, ast.ImportFrom)
+            }
+            assert not imported & (modules - {module})

@@ -1,0 +1,97 @@
+import math
+
+import pytest
+
+from holdfast_lab.trial.run import TrialResult
+from holdfast_lab.trial.summary import compare, summarize
+
+
+def result(**given):
+    fields = {
+        "number": 0, "law": "fixed", "object": "can", "unseen": False, "kind": "pull",
+        "n_fingers": 4, "held": True, "dropped": False, "slip": 0.001, "slipped": True,
+        "reaction": 0.02, "force_ratio": 1.5, "peak_ratio": 1.2, "quiet_time": 3.0,
+    }  # fmt: skip
+    return TrialResult(**{**fields, **given})
+
+
+def test_numbers_are_over_all_trials_that_were_held():
+    lost = {"dropped": True, "slip": math.inf, "reaction": math.inf}
+    found = summarize(
+        [result(n_false=1), result(slip=0.003), result(**lost), result(held=False, **lost)]
+    )
+    assert (found["n"], found["n_not_held"]) == (3, 1)
+    assert found["dropped"]["value"] == pytest.approx(100 / 3)
+    assert found["slip_median"]["value"] == 0.003
+    assert found["reaction_median"]["value"] == 0.02
+    assert found["force_ratio_mean"]["value"] == 1.5
+    assert found["false_reactions_per_minute"]["value"] == pytest.approx(60 / 9)
+
+
+def test_an_infinite_number_is_null():
+    found = summarize([result(dropped=True, slip=math.inf, reaction=math.inf)] * 3)
+    assert found["slip_median"] == {"value": None, "interval": [None, None]}
+    assert found["dropped"] == {"value": 100.0, "interval": [100.0, 100.0]}
+
+
+def test_a_trial_without_slip_has_no_reaction_time():
+    found = summarize([result(slipped=False, reaction=math.nan, slip=0.0)] * 2)
+    assert found["reaction_median"] == {"value": None, "interval": None}
+    assert found["slip_median"]["value"] == 0.0
+
+
+def test_no_trials_give_no_numbers():
+    found = summarize([])
+    assert found["n"] == 0
+    assert found["dropped"] == {"value": None, "interval": None}
+
+
+def test_a_drop_counts_as_no_reaction_even_if_the_force_rose():
+    found = summarize([result(dropped=True, slip=math.inf, reaction=0.01)] * 3)
+    assert found["reaction_median"]["value"] is None
+    assert found["n_slipped"] == 3
+
+
+class TestCompare:
+    def test_differences_are_of_the_same_trials(self):
+        ours = [result(number=0), result(number=1, slip=0.002), result(number=2, held=False)]
+        lost = {"dropped": True, "slip": math.inf, "reaction": 0.01, "force_ratio": 1.0}
+        theirs = [result(number=2), result(number=1, **lost), result(number=0, n_false=1)]
+        found = compare(ours, theirs)
+        assert found["n"] == 2
+        assert found["dropped"]["value"] == -50.0
+        assert found["slid_less"]["value"] == 50.0
+        assert found["slid_more"]["value"] == 0.0
+        assert found["reacted_sooner"]["value"] == 50.0
+        assert found["force_ratio_mean"]["value"] == pytest.approx(0.25)
+        assert found["false_reactions_per_minute"]["value"] == pytest.approx(-10.0)
+
+    def test_two_infinite_values_are_equal(self):
+        lost = [result(number=k, dropped=True, slip=math.inf, reaction=math.inf) for k in range(3)]
+        found = compare(lost, lost)
+        assert found["slid_less"] == {"value": 0.0, "interval": [0.0, 0.0]}
+        assert found["reacted_later"] == {"value": 0.0, "interval": [0.0, 0.0]}
+
+    def test_the_other_way_round_is_the_negative(self):
+        a = [result(number=k, force_ratio=1 + k / 4, slip=k / 1e3) for k in range(4)]
+        b = [result(number=k, dropped=k > 1, slip=0.0015) for k in range(4)]
+        there, back = compare(a, b), compare(b, a)
+        for name in ("dropped", "force_ratio_mean"):
+            assert there[name]["value"] == -back[name]["value"]
+            assert there[name]["interval"] == [-end for end in back[name]["interval"][::-1]]
+        assert there["slid_less"] == back["slid_more"]
+
+    def test_trials_without_slip_have_no_reaction_to_compare(self):
+        quiet = [result(number=k, slipped=False, reaction=math.nan) for k in range(2)]
+        found = compare(quiet, [result(number=0), result(number=1)])
+        assert found["reacted_sooner"] == {"value": None, "interval": None}
+
+
+def test_rates_of_false_reactions_may_have_other_quiet_times():
+    ours = [result(number=k, n_false=1, quiet_time=3.0) for k in range(3)]
+    theirs = [result(number=k, n_false=1, quiet_time=1.5) for k in range(3)]
+    found = compare(ours, theirs)["false_reactions_per_minute"]
+    assert found["value"] == pytest.approx(-20.0)
+    assert found["interval"] == pytest.approx([-20.0, -20.0])
+    nothing = compare([], [])["false_reactions_per_minute"]
+    assert nothing == {"value": None, "interval": None}

@@ -1,0 +1,239 @@
+import json
+from dataclasses import replace
+
+import msgspec
+import pytest
+
+from holdfast import cluster
+from holdfast.cli import main
+from holdfast_lab.verbs import study as verb
+from holdfast.contact import ContactState
+from holdfast.io import save_recording
+from holdfast.recordings import Label
+from holdfast_lab.report.result_tables import ResultTable, Row
+from holdfast_lab.study import run as study_run
+from holdfast_lab.study.paper import experiments, paper_tables
+from holdfast.synthetic import synthetic_recording
+from holdfast.twin import simulation
+from holdfast.twin.profile import profile
+
+
+@pytest.fixture(autouse=True)
+def nowhere(monkeypatch, tmp_path):
+    """No real recordings, and few tasks."""
+    monkeypatch.setenv("HOLDFAST_DATA", str(tmp_path / "nothing"))
+    monkeypatch.setattr(study_run, "PARTS", {"paper": paper_tables, "experiments": experiments})
+    monkeypatch.setattr(paper_tables, "QUICK_WINDOWS", (14,))
+    monkeypatch.setattr(paper_tables, "ABLATION_WINDOWS", (14,))
+
+
+@pytest.fixture
+def data(tmp_path):
+    return written(tmp_path / "data", [synthetic_recording(f"grasp-{k}", k) for k in range(3)])
+
+
+def written(folder, recordings):
+    folder.mkdir()
+    for recording in recordings:
+        save_recording(recording, folder / f"{recording.name}.parquet")
+    return folder
+
+
+def run(capsys, *words):
+    code = main(["study", *map(str, words)])
+    printed, err = capsys.readouterr()
+    return code, printed, err
+
+
+def refusal(capsys, *words):
+    code, printed, err = run(capsys, *words)
+    assert (code, printed, err.count("\n")) == (2, "", 1)
+    return err.removeprefix("holdfast: ").rstrip("\n")
+
+
+def test_own_recordings(capsys, data, tmp_path):
+    out = tmp_path / "out"
+    code, printed, err = run(capsys, data, "--out", out, "--quick", "--jobs", 1)
+    assert code == 0, err
+    assert printed.startswith("The paper's Table I: confusion [%] (in parentheses: the paper)\n")
+    assert printed.endswith(f"{out / 'report.html'}: all 7 tables and the figures\n")
+    assert "making tables and figures\n" in err
+    assert {path.name for path in out.iterdir()} == {
+        "report.html", "study.json", "tables", "figures", "work",
+    }  # fmt: skip
+    summary = json.loads((out / "study.json").read_text())
+    assert summary["left_out"] == []
+    assert summary["data"]["real"] == summary["data"]["main"]
+    assert "already holds a study" in refusal(capsys, data, "--out", out, "--quick")
+    code, printed, _ = run(capsys, data, "--out", out, "--quick", "--force", "--json")
+    assert code == 0, err
+    assert json.loads(printed) == json.loads((out / "study.json").read_text())
+
+
+def test_recordings_of_the_twin_are_not_the_real_ones(data, tmp_path):
+    """Without HOLDFAST_DATA there are none; own recordings of a hand are real."""
+    settings = {"seed": 0, "tare": "0.5", "jobs": 1, "quick": True}
+    plan, left_out = verb._plan(data, tmp_path / "out", **settings)
+    assert (plan.real, left_out) == (plan.main, [])
+    recordings = [synthetic_recording(f"grasp-{k}", k) for k in range(2)]
+    twin = [replace(each, metadata={"source": "twin"}) for each in recordings]
+    plan, left_out = verb._plan(written(tmp_path / "twin", twin), tmp_path / "out", **settings)
+    assert plan.real is None
+    assert left_out[0].startswith(
+        "real recordings, because none were found. Download them from github.com/"
+    )
+
+
+def test_the_table_of_real_recordings_fits_a_terminal(capsys):
+    from holdfast_lab.study.comparison.real_counts import CALLED_STABLE, MEAN_AUC, MISSED
+
+    assert {MEAN_AUC, CALLED_STABLE} == set(verb.PRINTED_COLUMNS["real"])
+    keys = {"method": "FFT band energy (Fernandez 2014)", "trained on": "the others"}
+    rows = [Row({**keys, "figure": figure}, 0.5) for figure in (MEAN_AUC, CALLED_STABLE, MISSED)]
+    table = ResultTable("real", "Real", "", rows, ("method", "trained on"), digits_of={MEAN_AUC: 2})
+    verb._print_result_table(table)
+    printed = capsys.readouterr().out.splitlines()
+    assert [line.split()[-2:] for line in printed[2:3]] == [["0.50", "0.5"]]
+    assert max(map(len, printed)) <= 80
+
+
+def test_the_twin_simulates_the_recordings_first(capsys, monkeypatch, tmp_path):
+    brief = msgspec.structs.replace(profile("reference"), idle=(0.7, 0.8), hold=1.5)
+    monkeypatch.setattr(simulation, "profile", lambda name: brief)
+    monkeypatch.setattr(verb, "QUICK_CORPORA", {"main": verb.TwinCorpus()})
+    monkeypatch.setattr(verb, "QUICK_REPEATS", {"main": 1})
+    known = verb.plan_grasps
+    monkeypatch.setattr(verb, "plan_grasps", lambda _, *rest, **more: known("can", *rest, **more))
+    out = tmp_path / "out"
+    words = ("--twin", "--quick", "--jobs", 1, "--out", out, "--json")
+    code, printed, err = run(capsys, *words)
+    assert code == 0, err
+    assert "recordings of the twin, 1 of 1: main\n" in err
+    names = {path.stem for path in (out / "data/quick/main").iterdir()}
+    assert {"can-case1-1", "can-case2-1"} <= names
+    assert json.loads(printed)["data"]["main"]["recordings"] == len(names)
+    assert "What the twin cannot show" in (out / "report.html").read_text()
+    assert refusal_after(capsys, *words, "--force", "--seed", 3).endswith(
+        "can-case1-1.parquet has profile reference, seed 0, server False; profile "
+        "reference, seed 3, server False given: choose another OUT, or delete its data"
+    )
+
+
+def refusal_after(capsys, *words):
+    """Return the last line; the lines before report the progress."""
+    code, printed, err = run(capsys, *words)
+    assert (code, printed) == (2, "")
+    return err.splitlines()[-1].removeprefix("holdfast: ")
+
+
+def test_real_recordings_that_cannot_be_used_are_left_out(capsys, monkeypatch, tmp_path):
+    (tmp_path / "here" / verb.REAL_DATA).mkdir(parents=True)
+    monkeypatch.setenv("HOLDFAST_DATA", str(tmp_path / "here"))
+    corpus, left_out = verb.real_corpus(tmp_path / "real")
+    assert corpus is None
+    assert left_out[0].startswith(
+        "real recordings, because those in HOLDFAST_DATA cannot be used ("
+    )
+    assert "the real recordings are left out: " in capsys.readouterr().err
+
+
+def test_real_recordings_are_imported(data_folder, monkeypatch, tmp_path):
+    monkeypatch.setenv("HOLDFAST_DATA", str(data_folder))
+    corpus, left_out = verb.real_corpus(tmp_path / "real")
+    assert (len(corpus.recordings), corpus.tare, left_out) == (5, "first", [])
+    again, _ = verb.real_corpus(tmp_path / "real")
+    assert again == corpus
+
+
+class TestBadInput:
+    def test_recordings_or_twin(self, capsys, data, tmp_path):
+        message = "a folder of recordings or --twin expected, {} given"
+        assert refusal(capsys, "--out", tmp_path / "out") == message.format("neither")
+        assert refusal(capsys, data, "--twin") == message.format("both")
+        assert "there is no folder" in refusal(capsys, tmp_path / "no", "--out", tmp_path / "out")
+
+    def test_numbers(self, capsys, data):
+        message = "a seed of at least 0 and jobs other than 0 expected; "
+        assert refusal(capsys, data, "--seed", -1) == message + "-1 and -1 given"
+        assert refusal(capsys, data, "--jobs", 0) == message + "0 and 0 given"
+        assert "tare" in refusal(capsys, data, "--tare", "often")
+
+    def test_labels(self, capsys, tmp_path):
+        one = synthetic_recording("a", 0)
+        two = synthetic_recording("b", 1)
+        cases = {
+            "none": ([one.with_labels({}), two.with_labels({})], "has labels to train from"),
+            "class": ([stable(one), stable(two)], "a finger with both is needed"),
+            "single": ([one], "one recording with labels given (a); at least two are needed"),
+        }
+        for name, (recordings, message) in cases.items():
+            folder = written(tmp_path / name, recordings)
+            assert message in refusal(capsys, folder, "--out", tmp_path / "out")
+        assert not (tmp_path / "out").exists()
+
+    def test_engine(self, capsys, data, tmp_path, monkeypatch):
+        out = ("--out", tmp_path / "out")
+        assert refusal(capsys, data, *out, "--engine", "spark") == (
+            "unknown engine 'spark'; there are loky and dask:ADDRESS"
+        )
+        pytest.importorskip("distributed")
+        monkeypatch.setattr(cluster, "CONNECT_TIMEOUT", 0.3)
+        err = refusal(capsys, data, *out, "--engine", "dask:tcp://127.0.0.1:9")
+        assert err.startswith("no Dask scheduler answers at tcp://127.0.0.1:9: start one with")
+        assert not (tmp_path / "out").exists()
+
+    def test_out(self, capsys, data, tmp_path):
+        file = data / "grasp-0.parquet"
+        assert "is a file; a study is written to a folder" in refusal(capsys, data, "-o", file)
+        assert "holds other files" in refusal(capsys, data, "-o", data)
+        assert "does not exist" in refusal(capsys, data, "-o", tmp_path / "no" / "out")
+
+
+def stable(recording):
+    labels = {
+        finger: [Label(module.times[0], module.times[-1], ContactState.STABLE)]
+        for finger, module in recording.modules.items()
+    }
+    return recording.with_labels(labels)
+
+
+def test_only_one_split_and_few_columns_are_printed(capsys):
+    """The first split with the most methods is printed, with few columns."""
+    rows = [
+        Row({"on": on, "method": method, "figure": figure}, 1.0, 0.5 if method == "a" else None)
+        for on, methods in (("by object", "a"), ("by recording", "ab"), ("fresh", "ab"))
+        for method in methods
+        for figure in ("AUC", "accuracy [%]", "Brier")
+    ]
+    rows.append(Row({"on": "by recording", "method": "c", "figure": "AUC"}, None))
+    rows += [
+        Row({"on": "by recording", "method": "d", "threshold": "for 1/min", "figure": "AUC"}, 1.0)
+    ]
+    table = ResultTable("methods", "Methods", "", rows, ("on", "method"), digits_of={"AUC": 3})
+    verb._print_result_table(table)
+    assert capsys.readouterr().out.splitlines() == [
+        "Methods (in parentheses: the paper)",
+        "on            method  AUC            accuracy [%]",
+        "by recording  a       1.000 (0.500)  1.0 (0.5)",
+        "by recording  b       1.000          1.0",
+        "by recording  c       –              -",
+        "",
+    ]
+
+
+def test_corpora_of_three_rates_of_glitches():
+    rates = {
+        name: 60 * corpus.glitch_rate
+        for name, corpus in verb.TWIN_CORPORA.items()
+        if corpus.glitch_rate is not None
+    }
+    assert rates == {"glitch-0": 0, "glitch-1": 1, "glitch-7": pytest.approx(7)}
+    assert not set(rates) & set(verb.QUICK_CORPORA)
+
+
+def test_the_rate_of_glitches_reaches_the_grasps(monkeypatch, tmp_path):
+    given = []
+    monkeypatch.setattr(verb, "simulate_grasps", lambda grasps, *_, **__: given.extend(grasps))
+    verb._simulate(tmp_path / "one", verb.TWIN_CORPORA["glitch-1"], 5, 1, 1)
+    assert {grasp.glitch_rate for grasp in given} == {1 / 60}
+    assert {grasp.seed for grasp in given} == {7}

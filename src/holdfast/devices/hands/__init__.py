@@ -1,0 +1,47 @@
+"""Hands that take commands, by URI."""
+
+from holdfast.devices.hands.base import Hand
+from holdfast.devices.hands.claim import Claim
+
+SCHEMES = {
+    "twin": "the twin, with the source twin:...",
+    "ros2": "a hand on topics of ROS 2: ros2:plexus, ros2:v4, ros2:v5, ros2:v5-envelop, "
+    "ros2:gripper",
+    "ros1": "a hand on topics of ROS 1: ros1:positions, ros1:efforts, ros1:envelop, ros1:gripper",
+    "log": "a file, for dry runs: log:PATH",
+    "call": "a function of Python: call:MODULE:FUNCTION",
+}
+"""Schemes of the URIs of hands, with a description."""
+
+__all__ = ["SCHEMES", "Claim", "Hand", "open_hand"]
+
+
+def open_hand(uri: str, *, standby: bool = False) -> Hand:
+    """Return the hand of a URI; entering it connects.
+
+    Args:
+        uri: `ros2:KIND?...`, `ros1:KIND?...`, `log:PATH` or `call:MODULE:FUNCTION`. `twin:` is a
+            hand and a source at once, see `holdfast.devices.live_twin`.
+        standby: whether a watchdog opens it, beside the controller that commands the hand.
+
+    Raises:
+        ValueError: the URI names no hand, or a parameter is missing or not valid.
+        MissingExtra: the hand needs a package that is not installed.
+    """
+    scheme, _, rest = uri.partition(":")
+    if scheme == "log" and rest:
+        from holdfast.devices.hands.log_file import LogFile
+
+        return LogFile(uri, rest)
+    if scheme == "call" and rest:
+        from holdfast.devices.hands.scalar import ScalarGripper
+
+        return ScalarGripper.from_path(rest, uri)
+    if scheme in ("ros1", "ros2") and rest:
+        from holdfast.devices.hands.ros.kinds import ros_hand
+
+        return ros_hand(uri, standby=standby)
+    raise ValueError(
+        f"{uri!r} is no hand; there are twin:, log:PATH, call:MODULE:FUNCTION, ros2:KIND and "
+        "ros1:KIND"
+    )

@@ -1,0 +1,100 @@
+"""Connection to the topics of a hand by ROS 2, over DDS. ROS 2 need not be installed."""
+
+from collections.abc import Mapping
+from typing import Any
+
+from holdfast.devices.hands.ros.link import Link, StateReader
+from holdfast.errors import HandError, SourceError
+from holdfast.devices.ros import dds
+from holdfast.ros.cdr import MessageDecoder, MessageEncoder
+from holdfast.ros.hand_messages import JOINT_STATE, JointStates, hand_definition
+
+
+class Ros2Link(Link):
+    """Connection to a ROS domain.
+
+    Args:
+        domain: number of the domain as text; by default that of `ROS_DOMAIN_ID`.
+
+    Raises:
+        ValueError: there is no such domain.
+    """
+
+    def __init__(self, domain: str | None) -> None:
+        self._domain = dds.domain_number(domain)
+        self.where = f"in ROS domain {self._domain}"
+        self._joined: dds.Node | None = None
+
+    def open(self) -> None:
+        """Join the domain.
+
+        Raises:
+            HandError: DDS reports an error.
+        """
+        try:
+            self._joined = dds.Node(self._domain)
+        except SourceError as cause:
+            raise HandError(str(cause)) from cause
+
+    def publisher(self, topic: str, kind: str) -> "_Publisher":
+        """Return a publisher of messages of a type on a topic."""
+        definition = hand_definition(kind)
+        return _Publisher(self._node.writer(topic, definition), MessageEncoder(definition))
+
+    def joint_states(self, topic: str) -> StateReader:
+        """Subscribe to the joint states of a topic."""
+        return _StateReader(topic, self._node.reader(topic, hand_definition(JOINT_STATE)))
+
+    def n_other_publishers(self, topic: str) -> int:
+        """Return the number of publishers on a topic, other than those of this link."""
+        return self._node.n_other_writers(topic)
+
+    def subscribed_topics(self) -> list[str]:
+        """Return the names of all topics with a subscriber."""
+        return sorted(self._node.subscribed_topics())
+
+    def published_topics(self) -> list[str]:
+        """Return the names of all topics with a publisher."""
+        return sorted(self._node.published_topics())
+
+    def close(self) -> None:
+        """Leave the domain."""
+        self._joined = None
+
+    @property
+    def _node(self) -> dds.Node:
+        if self._joined is None:
+            raise HandError(f"the link {self.where} is not open")
+        return self._joined
+
+
+class _Publisher:
+    def __init__(self, write: dds.TopicWriter, encode: MessageEncoder) -> None:
+        self._write, self._encode = write, encode
+
+    def __call__(self, message: Mapping[str, Any]) -> None:
+        try:
+            self._write(self._encode(message))
+        except SourceError as cause:
+            raise HandError(str(cause)) from cause
+
+    def n_listeners(self) -> int:
+        return self._write.n_readers()
+
+
+class _StateReader:
+    def __init__(self, topic: str, reader: dds.TopicReader) -> None:
+        self._topic, self._reader = topic, reader
+        self._decode = MessageDecoder(hand_definition(JOINT_STATE), ros2=True)
+
+    def take(self) -> list[JointStates]:
+        waiting: list[bytes] = []
+        while found := self._reader.take(0.0):
+            waiting += found
+            if len(found) < dds.MAX_MESSAGES_PER_READ:
+                break
+        try:
+            messages = [self._decode(data) for data in waiting]
+        except ValueError as cause:
+            raise HandError(f"{self._topic} sends damaged joint states: {cause}") from cause
+        return [JointStates.of_message(m["name"], m["position"], m["effort"]) for m in messages]

@@ -1,0 +1,299 @@
+"""Source of a recording: at its own speed, faster, or as fast as it is read."""
+
+import heapq
+import math
+import time
+from abc import abstractmethod
+from collections.abc import Iterable, Iterator, Mapping
+from functools import reduce
+from itertools import chain
+from operator import attrgetter, itemgetter
+from pathlib import Path
+from typing import Any, NamedTuple
+
+import numpy as np
+import numpy.typing as npt
+
+from holdfast.errors import HoldfastError, RecordingError
+from holdfast.io import read_chunks
+from holdfast.recordings import Recording
+from holdfast.devices.sources.base import MARKER_PREFIX, Arrival, Source, notice_arrival
+
+CHUNK_SIZE = 1024
+"""Samples of a module to read at a time; it bounds the memory."""
+PAUSE = 1.0
+"""Time between the last sample of a recording and the first of the next [s]; a detector
+recognizes it as a gap."""
+
+
+class TimedSamples(NamedTuple):
+    """Content of a recording at one instant: samples or a marker.
+
+    Attributes:
+        time: time on the clock of the recording [s]; later than that of all earlier samples.
+        samples: (n_taxels, 3) by module; empty for a marker.
+        notice: text of the marker.
+        n_refused: number of samples left out before this, because they are out of order.
+    """
+
+    time: float
+    samples: Mapping[str, npt.NDArray[Any]]
+    notice: str = ""
+    n_refused: int = 0
+
+
+def timed_samples(chunks: Iterable[Recording]) -> Iterator[TimedSamples]:
+    """Yield the content of consecutive chunks in order of time, in bounded memory.
+
+    Samples with the same time form one item. A marker follows the samples of its time. A marker
+    before the first or after the last sample is moved to that sample.
+
+    Args:
+        chunks: parts of a recording, as from `read_chunks`.
+
+    Raises:
+        RecordingError: as `chunks` does, after all content before that.
+        OSError: as `chunks` does, after all content before that.
+    """
+    first, last = math.inf, -math.inf
+    markers: list[tuple[float, str]] = []
+    n_refused = 0
+    try:
+        for chunk in chunks:
+            instants, n_old = _instants(chunk, last)
+            n_refused += n_old
+            markers = sorted([*markers, *chunk.markers], key=itemgetter(0))
+            if instants:
+                first, last = min(first, instants[0].time), instants[-1].time
+                instants[0] = instants[0]._replace(n_refused=n_refused)
+                n_refused = 0
+                due = [_notice(max(at, first), text) for at, text in markers if at <= last]
+                markers = [marker for marker in markers if marker[0] > last]
+                yield from heapq.merge(instants, due, key=attrgetter("time"))
+    except (RecordingError, OSError):
+        yield from _rest(markers, last, n_refused)
+        raise
+    yield from _rest(markers, last, n_refused)
+
+
+def _instants(chunk: Recording, last: float) -> tuple[list[TimedSamples], int]:
+    """Return the samples of a chunk after `last` [s], in order of time, and how many are not."""
+    new = {name: module.times > last for name, module in chunk.modules.items()}
+    own_times = {name: module.times[new[name]] for name, module in chunk.modules.items()}
+    times = reduce(np.union1d, own_times.values(), np.empty(0))
+    samples: list[dict[str, npt.NDArray[Any]]] = [{} for _ in times]
+    for name, module in chunk.modules.items():
+        readings = module.readings[new[name]]
+        native = readings.astype(readings.dtype.newbyteorder("="), copy=False)
+        for k, sample in zip(np.searchsorted(times, own_times[name]).tolist(), native, strict=True):
+            samples[k][name] = sample
+    n_old = sum(int((~mask).sum()) for mask in new.values())
+    return list(map(TimedSamples, times.tolist(), samples)), n_old
+
+
+def _rest(
+    markers: Iterable[tuple[float, str]], last: float, n_refused: int
+) -> Iterator[TimedSamples]:
+    """Yield the markers after the last sample [s], and samples of the end that were left out."""
+    yield from (_notice(last, text) for _, text in markers)
+    if n_refused:
+        yield TimedSamples(last, {}, n_refused=n_refused)
+
+
+def _notice(time: float, text: str) -> TimedSamples:
+    return TimedSamples(time, {}, f"{MARKER_PREFIX}{' '.join(text.split())}")
+
+
+class Player(Source):
+    """Source that plays recordings, one after the other.
+
+    Time begins with the first `read`. Samples are due by the wall clock. A late reader gets
+    them at once, and none is lost. The times of the next recording follow after a pause.
+
+    Args:
+        name: path or URI of the source.
+        speed: 1 is real time, 2 is twice as fast, 0 is as fast as samples are read.
+        loop: play another recording at the end.
+
+    Raises:
+        ValueError: the speed is negative or not finite.
+    """
+
+    def __init__(self, name: str, *, speed: float = 1.0, loop: bool = False) -> None:
+        if not (math.isfinite(speed) and speed >= 0):
+            raise ValueError(f"a speed of at least 0 expected, {speed} given")
+        self.name = name
+        self.paced = speed > 0
+        self.speed = speed
+        self._loops = loop
+        self._content: Iterator[TimedSamples] = iter(())
+        self._notices: list[str] = []
+        self._reset()
+
+    def open(self) -> None:
+        """Read the beginning of the first recording.
+
+        Raises:
+            RecordingError: it cannot be read, or has no samples.
+        """
+        self.close()
+        try:
+            chunks = iter(self._chunks(0))
+            first = next(chunks, None)
+        except OSError as cause:
+            raise RecordingError(f"cannot read {self.name}: {cause.strerror or cause}") from cause
+        if first is None:
+            raise RecordingError(f"{self.name} has no samples; at least one expected")
+        self.sensors = {name: module.sensor for name, module in first.modules.items()}
+        self.metadata = self._metadata(first)
+        if not first.complete:
+            self._notices.append(f"{self.name} was cut off; what could be recovered is played")
+        self._content = timed_samples(chain([first], chunks))
+        self._continues = self._loops
+
+    @property
+    def ended(self) -> bool:
+        """Whether the last sample was read; never if it loops."""
+        return not self._continues and self._peek() is None
+
+    def read(self, timeout: float) -> Arrival | None:
+        """Return the next arrival, or None after `timeout` [s] or at the end."""
+        now = time.monotonic()
+        item = self._peek() or self._next_recording(timeout)
+        if item is None:
+            return None
+        due = self._due(item.time, now)
+        wait = min(due, now + timeout) - time.monotonic()
+        if wait > 0:
+            time.sleep(wait)
+        return None if due > now + timeout else self._arrival(item)
+
+    def restart(self) -> None:
+        """Play the current recording from its beginning again; time continues after a pause."""
+        if not math.isnan(self._last):  # else it is still at its beginning
+            self._begin(self._same_chunks())
+
+    def close(self) -> None:
+        """Release the recording."""
+        self._reset()
+
+    @abstractmethod
+    def _chunks(self, number: int) -> Iterable[Recording]:
+        """Return the chunks of recording `number`, from 0. May add to `_notices`."""
+
+    @abstractmethod
+    def _metadata(self, first: Recording) -> dict[str, object]:
+        """Return the metadata of the source, given the first chunk of the first recording."""
+
+    def _is_ready(self, number: int, timeout: float) -> bool:
+        """Return whether recording `number` can begin within `timeout` [s]."""
+        return True
+
+    def _reset(self) -> None:
+        self._content = iter(())
+        self._notices.clear()
+        self._next: TimedSamples | None = None
+        self._continues = False
+        self._number = 0
+        self._shift = 0.0
+        self._last = math.nan
+        self._start: tuple[float, float] | None = None
+
+    def _peek(self) -> TimedSamples | None:
+        """Return the next item of this recording."""
+        if self._next is None:
+            try:
+                self._next = next(self._content, None)
+            except (HoldfastError, OSError) as cause:  # only opening raises
+                self._continues = False
+                self._next = TimedSamples(
+                    self._last - self._shift, {}, f"the rest is lost: {cause}"
+                )
+        return self._next
+
+    def _next_recording(self, timeout: float) -> TimedSamples | None:
+        """Return the first item of the next recording, if it is ready within `timeout` [s]."""
+        if not (self._continues and self._is_ready(self._number + 1, timeout)):
+            return None
+        self._number += 1
+        return self._begin(self._late_chunks(self._number))
+
+    def _begin(self, chunks: Iterable[Recording]) -> TimedSamples | None:
+        """Continue with a recording from its beginning, after a pause. Return its first item."""
+        self._content = timed_samples(chunks)
+        self._next = None
+        self._shift = 0.0
+        first = self._peek()
+        if first is not None and first.samples:  # else it cannot be read
+            self._shift = self._last + PAUSE - first.time
+            # A recording that was not ready in time still plays at its own speed.
+            now = time.monotonic()
+            self._start = max(now, self._due(first.time, now)), self._last + PAUSE
+        return first
+
+    def _same_chunks(self) -> Iterator[Recording]:
+        """Yield the chunks of the current recording once more."""
+        yield from self._chunks(self._number)
+
+    def _late_chunks(self, number: int) -> Iterator[Recording]:
+        """Yield the chunks of a recording; errors occur at the first one, in `_peek`."""
+        yield from self._chunks(number)
+
+    def _due(self, at: float, now: float) -> float:
+        """Return when an item is due, on the host's clock; minus infinity for at once [s]."""
+        if not self.speed:
+            return -math.inf
+        if self._start is None:
+            self._start = now, at
+        began, start = self._start
+        return began + (at + self._shift - start) / self.speed
+
+    def _arrival(self, item: TimedSamples) -> Arrival:
+        received = time.monotonic()
+        if item.n_refused:
+            self._notices.append(f"{item.n_refused} samples are out of order and were left out")
+        if item.notice:
+            self._notices.append(item.notice)
+        notices = tuple(self._notices)
+        self._notices.clear()
+        self._next = None
+        if not item.samples:
+            return notice_arrival(received, *notices, n_refused=item.n_refused)
+        self._last = item.time + self._shift
+        return Arrival(
+            self._last, item.samples, received, n_refused=item.n_refused, notices=notices
+        )
+
+
+class Replay(Player):
+    """Source that plays one recording.
+
+    Its markers become notices. An incomplete recording plays as far as it can be recovered.
+
+    Args:
+        path: path of the recording.
+        speed: 1 is real time, 2 is twice as fast, 0 is as fast as samples are read.
+        loop: start again at the end; time continues.
+
+    Raises:
+        ValueError: the speed is negative or not finite.
+
+    Example:
+        >>> with Replay("grasp.parquet", speed=0) as source:  # doctest: +SKIP
+        ...     print(sum(len(arrival.samples) for arrival in source))
+    """
+
+    def __init__(self, path: str | Path, *, speed: float = 1.0, loop: bool = False) -> None:
+        super().__init__(str(path), speed=speed, loop=loop)
+
+    def _chunks(self, number: int) -> Iterable[Recording]:
+        chunks = read_chunks(self.name, CHUNK_SIZE, labels=False)
+        if number:
+            self._notices.append(f"{self.name} starts again")
+        return chunks
+
+    def _metadata(self, first: Recording) -> dict[str, object]:
+        """Return the metadata of the recording, with this source and the original one."""
+        own = dict(first.metadata)
+        recorded_from = {"recorded_from": own["source"]} if "source" in own else {}
+        return own | recorded_from | {"source": self.name}

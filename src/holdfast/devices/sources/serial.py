@@ -1,0 +1,217 @@
+"""Source of a sensor at a serial port: AnySkin and ReSkin boards."""
+
+import math
+import time
+from errno import EACCES, ENOENT
+from importlib.metadata import version
+
+from holdfast.errors import MissingExtra, SourceError
+from holdfast.sensors import Sensor, sensor
+from holdfast.devices.sources.anyskin import AnySkinDecoder, DecodedBytes
+from holdfast.devices.sources.assembler import Assembler, Device
+from holdfast.devices.sources.base import DeviceSource, Source
+from holdfast.devices.uri import Address
+
+try:
+    from serial import Serial
+    from serial.tools.list_ports import comports
+except ImportError as missing:
+    raise MissingExtra("pyserial", "serial") from missing
+
+OPEN_TIMEOUT = 3.0
+"""Longest wait for the first sample [s]; boards restart when their port is opened."""
+DEFAULT_BAUD = 115200
+MAX_READ_SIZE = 1 << 16
+"""Largest number of bytes to read at a time."""
+_BOARD = 1
+"""Number of the board as a device."""
+
+
+class SerialSource(DeviceSource):
+    """Source of a board of magnetometers at a serial port.
+
+    The board has no clock: the time of a sample is its time of arrival, on the host's monotonic
+    clock. Samples that arrive together are a period of the sensor apart, or less if they would
+    begin before the last sample.
+
+    Args:
+        address: `serial:///dev/ttyACM0?sensor=anyskin&fingers=1:index&baud=115200&mags=5`.
+
+    Raises:
+        ValueError: a parameter is not valid.
+    """
+
+    def __init__(self, address: Address) -> None:
+        super().__init__()
+        address.only("sensor", "fingers", "baud", "mags")
+        self.name = address.text
+        self._path = address.host + address.path
+        if not self._path:
+            raise ValueError(f"{address.text}: a port expected, as in serial:///dev/ttyACM0")
+        self._baud = _positive(address, "baud", DEFAULT_BAUD)
+        self._sensor = address.sensor() or sensor("anyskin")
+        self._n_mags = _positive(address, "mags", self._sensor.n_taxels)
+        modules = dict.fromkeys(_modules(address, self._n_mags, self._sensor), self._sensor)
+        self._board = Device(_BOARD, self._sensor.name, modules)
+        self._decoder = AnySkinDecoder(self._n_mags)
+        self._assembler = Assembler()
+        self._port: Serial | None = None
+
+    def open(self) -> None:
+        """Open the port, and wait for the first sample.
+
+        Raises:
+            SourceError: there is no such port, it cannot be opened, or no sample comes.
+        """
+        self.close()
+        self._assembler = Assembler()
+        self._assembler.devices = {_BOARD: self._board}
+        self._newest = -math.inf
+        try:
+            self._connect()
+            self._wait_for_sample()
+        except (OSError, ValueError) as cause:  # ValueError: the port does not support the speed
+            ports = ", ".join(sorted(port.device for port in comports())) or "none"
+            raise SourceError(f"{self.name}: {_reason(cause)}; serial ports: {ports}") from cause
+        self.sensors = self._board.modules
+        self.metadata = {
+            "source": self.name,
+            "sensor": self._sensor.name,
+            "n_mags": self._n_mags,
+            "pyserial": version("pyserial"),
+        }
+        self._start(time.monotonic())
+
+    def _connect(self) -> None:
+        self._decoder.reset()
+        self._port = Serial(self._path, self._baud, exclusive=True)
+
+    def _wait_for_sample(self) -> None:
+        deadline = time.monotonic() + OPEN_TIMEOUT
+        n_refused = 0
+        while (left := deadline - time.monotonic()) > 0:
+            decoded = self._read_port(left)
+            if decoded.samples:
+                return
+            if decoded.other_n_mags:
+                raise SourceError(f"{self.name}: {self._wrong_count(decoded)}")
+            n_refused += decoded.n_refused
+        came = f"{n_refused} invalid packets came" if n_refused else "nothing came"
+        raise SourceError(
+            f"{self.name}: {came} within {OPEN_TIMEOUT:g} s; packets of {self._n_mags} "
+            f"magnetometers at {self._baud} baud expected"
+        )
+
+    def _receive(self, timeout: float) -> bool:
+        try:
+            decoded = self._read_port(timeout)
+        except OSError as cause:
+            self._disconnect()
+            self._lose(_reason(cause))
+            return False
+        return bool(decoded.samples)
+
+    def _reconnect(self) -> bool:
+        try:
+            self._connect()
+        except OSError:
+            return False
+        return True
+
+    def _disconnect(self) -> None:
+        if self._port is not None:
+            self._port.close()
+            self._port = None
+
+    def _read_port(self, timeout: float) -> DecodedBytes:
+        """Queue the samples that come within `timeout` [s], and return them.
+
+        Raises:
+            OSError: the port was disconnected.
+        """
+        if self._port is None:
+            return DecodedBytes([], 0, 0)
+        self._port.timeout = timeout
+        data = self._port.read(1)
+        if data:
+            data += self._port.read(min(self._port.in_waiting, MAX_READ_SIZE))
+        decoded = self._decoder.feed(data)
+        self._assemble(decoded, time.monotonic())
+        return decoded
+
+    def _assemble(self, decoded: DecodedBytes, received: float) -> None:
+        if decoded.n_refused:
+            self._refuse(decoded, received)
+        n = len(decoded.samples)
+        period = 1 / self._sensor.rate
+        step = min(period, (received - self._newest) / max(n, 1))
+        for k, sample in enumerate(decoded.samples):
+            self._assembler.stamp(received - (n - 1 - k) * step, received)
+            self._assembler.add(_BOARD, sample)
+            arrivals = self._assembler.finish(received)
+            self._newest = arrivals[-1].time
+            self._queue(arrivals, received)
+
+    def _refuse(self, decoded: DecodedBytes, received: float) -> None:
+        """Report dropped packets, and a wrong number of magnetometers as a fault."""
+        self._assembler.n_refused += decoded.n_refused
+        if decoded.other_n_mags:
+            self._assembler.report_taxel_count(_BOARD, self._wrong_count(decoded), received)
+        else:
+            self._assembler.notify("packet", "invalid packets are dropped", received)
+        self._queue(self._assembler.finish(received), received)
+
+    def _wrong_count(self, decoded: DecodedBytes) -> str:
+        return (
+            f"packets of {decoded.other_n_mags} magnetometers come, {self._n_mags} expected "
+            f"({self._sensor.name}; mags= gives their number)"
+        )
+
+
+def source(address: Address) -> Source:
+    """Return the source of a URI; entering it opens the port.
+
+    Raises:
+        ValueError: a parameter is not valid.
+    """
+    return SerialSource(address)
+
+
+def _positive(address: Address, name: str, default: int) -> int:
+    text = address.parameters.get(name, str(default))
+    if not (text.isascii() and text.isdecimal() and int(text)):
+        raise ValueError(f"{address.text}: {name}={default}, at least 1, expected, {text!r} given")
+    return int(text)
+
+
+def _modules(address: Address, n_mags: int, kind: Sensor) -> tuple[str, ...]:
+    """Return the names of the modules of the magnetometers, in the order of the packet.
+
+    Raises:
+        ValueError: the magnetometers are no whole number of sensors, or a name does not fit.
+    """
+    n_modules, left = divmod(n_mags, kind.n_taxels)
+    if left:
+        raise ValueError(
+            f"{address.text}: mags={n_mags} given; {kind.name} has {kind.n_taxels} taxels, "
+            f"a multiple of that expected"
+        )
+    given = address.names()
+    if unknown := sorted(set(given) - set(range(1, n_modules + 1))):
+        raise ValueError(
+            f"{address.text}: a name for finger {unknown[0]} given; with {n_mags} magnetometers "
+            f"of {kind.name} there are {n_modules}"
+        )
+    names = tuple(given.get(k, f"finger{k}") for k in range(1, n_modules + 1))
+    if repeated := sorted({name for name in names if names.count(name) > 1}):
+        raise ValueError(f"{address.text}: two fingers would be called {repeated[0]}")
+    return names
+
+
+def _reason(cause: Exception) -> str:
+    """Return the reason why a port failed, in a few words if it is a common one."""
+    known = {
+        ENOENT: "there is no such port",
+        EACCES: "it may not be opened; is the user in the group dialout?",
+    }
+    return known.get(getattr(cause, "errno", None) or 0, str(cause))

@@ -1,0 +1,181 @@
+"""Source of the twin: simulates grasps, then plays them."""
+
+import json
+import subprocess
+from collections.abc import Iterable, Iterator
+from contextlib import suppress
+from dataclasses import asdict, replace
+from pathlib import Path
+from tempfile import TemporaryDirectory
+
+from holdfast.children import python_command
+from holdfast.files import file_stem
+from holdfast.io import read_chunks, save_recording
+from holdfast.recordings import Recording
+from holdfast.devices.sources.replay import Player
+from holdfast.devices.uri import Address
+from holdfast.twin.profile import ATTEMPTS, profile
+from holdfast.twin.simulation import CASES, Grasp, simulate
+
+SIMULATION_CODE = "from holdfast.devices.sources.twin import write; write(*sys.argv[1:])"
+"""Program of the process that simulates the next grasp."""
+
+
+class Twin(Player):
+    """Source that simulates a grasp of the twin and plays it.
+
+    Entering takes the seconds of the simulation. With `loop`, another process simulates the next
+    repeat of the grasp while this one plays.
+
+    Args:
+        address: `twin:?object=can&seed=0&case=2&repeat=1&profile=reference&server=false`;
+            missing parameters have these values.
+        speed: 1 is real time, 2 is twice as fast, 0 is as fast as samples are read.
+        loop: play the next repeat of the grasp at the end.
+
+    Raises:
+        ValueError: there is no such object, profile or case, or a parameter is not valid.
+    """
+
+    def __init__(self, address: Address, *, speed: float = 1.0, loop: bool = False) -> None:
+        self._simulator: _Simulator | None = None
+        self._grasp = grasp_of(address)
+        self._current: list[Recording] = []
+        super().__init__(address.text, speed=speed, loop=loop)
+
+    def close(self) -> None:
+        """Drop the grasp, and end the simulation of the next one."""
+        super().close()
+        if self._simulator is not None:
+            self._simulator.close()
+            self._simulator = None
+
+    def _chunks(self, number: int) -> Iterable[Recording]:
+        simulator = self._simulator
+        chunks = iter([simulated(self._grasp)]) if simulator is None else simulator.chunks()
+        self._current = list(chunks)
+        first = self._current[0]
+        n_failed = first.metadata["attempt"]
+        failed = f", after {n_failed} failed attempt{'s' * (n_failed > 1)}" if n_failed else ""
+        self._notices.append(f"the twin grasps: {first.name}{failed}")
+        if self._loops:
+            self._simulator = simulator = simulator or _Simulator()
+            simulator.start(replace(self._grasp, repeat=self._grasp.repeat + number + 1))
+        return self._current
+
+    def _same_chunks(self) -> Iterator[Recording]:
+        yield from self._current
+
+    def _metadata(self, first: Recording) -> dict[str, object]:
+        return {**first.metadata, "source": self.name}
+
+    def _is_ready(self, number: int, timeout: float) -> bool:
+        return self._simulator is None or self._simulator.is_ready(timeout)
+
+
+class _Simulator:
+    """Simulation of grasps in another process, one at a time."""
+
+    def __init__(self) -> None:
+        self._folder = TemporaryDirectory(prefix="holdfast-")
+        self._path = self._previous_path = Path(self._folder.name) / "none"
+        self._process: subprocess.Popen[bytes] | None = None
+
+    def start(self, grasp: Grasp) -> None:
+        """Begin to simulate a grasp. Delete the one before the last, which was played."""
+        self._previous_path.unlink(missing_ok=True)
+        self._previous_path = self._path
+        self._path = self._path.with_name(f"{file_stem(grasp.name)}.parquet")
+        self._grasp, self._process = grasp, None
+        with suppress(OSError):  # without a process, `chunks` simulates
+            self._process = self._run(json.dumps(asdict(grasp)))
+
+    def _run(self, grasp: str) -> subprocess.Popen[bytes]:
+        null = subprocess.DEVNULL
+        command = python_command(SIMULATION_CODE, grasp, str(self._path))
+        return subprocess.Popen(command, stdin=null, stdout=null, stderr=null)
+
+    def is_ready(self, timeout: float) -> bool:
+        """Return whether the simulation ends within `timeout` [s]."""
+        if self._process is None:
+            return True
+        with suppress(subprocess.TimeoutExpired):
+            self._process.wait(max(timeout, 0.0))
+        return self._process.poll() is not None
+
+    def chunks(self) -> Iterator[Recording]:
+        """Return the chunks of the grasp; simulate it here if the process failed."""
+        if self._path.exists():
+            return read_chunks(self._path, labels=False)
+        return iter([simulated(self._grasp)])
+
+    def close(self) -> None:
+        """End the process, and delete its files."""
+        if self._process is not None:
+            self._process.kill()
+            self._process.wait()
+        self._folder.cleanup()
+
+
+def grasp_of(address: Address) -> Grasp:
+    """Return the grasp of a URI.
+
+    Raises:
+        ValueError: there is no such object, profile or case, or a parameter is not valid.
+
+    Example:
+        >>> from holdfast.devices.uri import parse
+        >>> grasp_of(parse("twin:?object=ball&repeat=3")[1]).name
+        'ball-case2-3'
+    """
+    address.only("object", "seed", "case", "repeat", "profile", "server")
+    if address.host or address.path:
+        raise ValueError(f"{address.text}: twin:?object=can&seed=1 expected, without a path")
+    given = address.parameters
+    grasp = Grasp(
+        given.get("object", "can"),
+        _integer(address, "case", 2),
+        _integer(address, "repeat", 1),
+        given.get("profile", "reference"),
+        _integer(address, "seed", 0),
+        server=_boolean(address, "server"),
+    )
+    try:
+        profile(grasp.profile)
+        grasp.item  # noqa: B018 (refuses an unknown object)
+    except ValueError as cause:
+        raise ValueError(f"{address.text}: {cause}") from cause
+    if grasp.case not in CASES or grasp.repeat < 1:
+        raise ValueError(
+            f"{address.text}: case 1 or 2 and a repeat of at least 1 expected, "
+            f"{grasp.case} and {grasp.repeat} given"
+        )
+    return grasp
+
+
+def simulated(grasp: Grasp) -> Recording:
+    """Return the recording of a grasp; after a failure, try again more gently."""
+    for attempt in range(ATTEMPTS):
+        recording = simulate(replace(grasp, attempt=attempt))
+        if recording.metadata["case"] != "failed":
+            break
+    return recording
+
+
+def write(grasp: str, path: str) -> None:
+    """Simulate a grasp, given as JSON, and save it. It runs in another process."""
+    save_recording(simulated(Grasp(**json.loads(grasp))), path)
+
+
+def _integer(address: Address, name: str, default: int) -> int:
+    text = address.parameters.get(name, str(default))
+    if not (text.isascii() and text.isdecimal()):
+        raise ValueError(f"{address.text}: {name}=1, a whole number, expected, {text!r} given")
+    return int(text)
+
+
+def _boolean(address: Address, name: str) -> bool:
+    text = address.parameters.get(name, "false")
+    if text not in ("true", "false"):
+        raise ValueError(f"{address.text}: {name}=true or false expected, {text!r} given")
+    return text == "true"

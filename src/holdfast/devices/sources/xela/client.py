@@ -1,0 +1,200 @@
+"""Connection to XELA's server. This module owns the socket and the clock."""
+
+import logging
+import socket
+import time
+from collections.abc import Mapping
+from contextlib import suppress
+
+from websockets.exceptions import (
+    ConnectionClosed,
+    ConnectionClosedOK,
+    InvalidHandshake,
+    WebSocketException,
+)
+from websockets.sync.client import ClientConnection, connect
+
+from holdfast.errors import SourceError
+from holdfast.sensors import Sensor
+from holdfast.devices.sources.base import DeviceSource
+from holdfast.devices.sources.xela.decoder import XelaDecoder
+from holdfast.devices.sources.xela.packet import InvalidPacket
+from holdfast.devices.sources.xela.places import Place
+
+OPEN_TIMEOUT = 5.0
+"""Longest wait for the first packet with samples [s]."""
+CONNECT_TIMEOUT = 1.0
+"""Longest time of one attempt to connect [s]; a read may take longer than its timeout by this."""
+MIN_HANDSHAKE_TIME = 0.1
+"""Minimum time for the handshake, even if the connection took longer [s]."""
+SILENCE_TIMEOUT = 1.5
+"""A connected server without a new sample for this time is silent [s]; it may pause for 1 s."""
+PING_INTERVAL, PING_TIMEOUT = 10.0, 5.0
+"""Time between two pings of the server, and longest wait for the answer [s]."""
+MAX_PACKET_SIZE = 2**20
+"""A longer packet is refused and ends its connection [bytes]; a whole hand sends 20,000."""
+MAX_QUEUED_PACKETS = 4096
+"""Packets that wait in this process if the reader is busy: 80 MB and 27 s of a whole hand. More
+packets wait at the server, which may drop a client that does not read."""
+TRY_AUTO = "; xela_server binds the address of the network card: try xela://auto"
+"""Advice if only one address was tried."""
+
+_LOGGER = logging.getLogger("holdfast.devices.sources.xela")
+_LOGGER.addHandler(logging.NullHandler())
+
+
+class XelaSource(DeviceSource):
+    """Source of the sensors of one XELA server.
+
+    Args:
+        name: URI of the source.
+        places: network addresses to try, in order.
+        names: names of the sensors by the server's number.
+        calibrated: take readings in newtons.
+        sensor: layout of the separate sensors with this number of taxels.
+    """
+
+    silence_timeout = SILENCE_TIMEOUT
+
+    def __init__(
+        self,
+        name: str,
+        places: tuple[Place, ...],
+        names: Mapping[int, str] | None = None,
+        *,
+        calibrated: bool = False,
+        sensor: Sensor | None = None,
+    ) -> None:
+        super().__init__()
+        self.name = name
+        self._places = places
+        self._place = places[0]
+        self._options = (names, calibrated, sensor)
+        self._decoder = self._new_decoder()
+        self._connection: ClientConnection | None = None
+
+    def open(self) -> None:
+        """Connect, and wait until the modules are known.
+
+        Raises:
+            SourceError: no server listens, it sends nothing, or other data than expected.
+        """
+        self.close()
+        self._decoder = self._new_decoder()
+        self._connection = self._connected()
+        text, received = self._first_packet(self._connection)
+        self.sensors = self._decoder.sensors
+        self.metadata = {"source": self.name, **self._decoder.metadata}
+        self._start(received)
+        notices = [text for device in self._decoder.devices.values() for text in device.notices]
+        first, *others = self._decoder.decode(text, received)
+        first = first._replace(notices=(*notices, *first.notices))
+        self._queue([first, *others], received)
+        self._note_clock()
+
+    def _new_decoder(self) -> XelaDecoder:
+        names, calibrated, sensor = self._options
+        return XelaDecoder(names, calibrated=calibrated, sensor=sensor)
+
+    def _connected(self) -> ClientConnection:
+        """Connect to the first place with a server."""
+        failures: list[Exception] = []
+        for place in self._places:
+            try:
+                connection = _connect(place)
+            except (OSError, WebSocketException) as failure:
+                failures.append(failure)
+            else:
+                self._place = place
+                return connection
+        raise SourceError(self._unreachable(failures)) from failures[-1]
+
+    def _first_packet(self, connection: ClientConnection) -> tuple[bytes, float]:
+        """Return the first packet that defines the modules, and its time of arrival."""
+        deadline = time.monotonic() + OPEN_TIMEOUT
+        invalid: InvalidPacket | None = None
+        while (left := deadline - time.monotonic()) > 0:
+            try:
+                text = connection.recv(left, decode=False)
+                received = time.monotonic()
+                if self._decoder.identify(text):
+                    return text, received
+            except InvalidPacket as why:
+                invalid = why
+            except TimeoutError:
+                break
+            except ConnectionClosed as why:
+                raise SourceError(f"{self._place} closed the connection: {why}") from why
+        if invalid is not None:
+            raise SourceError(f"{self._place} sends invalid packets: {invalid}") from invalid
+        raise SourceError(
+            f"connected to {self._place}, but no samples came in {OPEN_TIMEOUT:g} s: is it a XELA "
+            "server, with its sensors plugged in?"
+        )
+
+    def _receive(self, timeout: float) -> bool:
+        if self._connection is None:
+            return False
+        try:
+            text = self._connection.recv(timeout, decode=False)
+            received = time.monotonic()
+        except TimeoutError:
+            return False
+        except ConnectionClosed as why:
+            self._disconnect()
+            self._lose("the server closed it" if isinstance(why, ConnectionClosedOK) else why)
+            return False
+        self._queue(self._decoder.decode(text, received), received)
+        return True
+
+    def _reconnect(self) -> bool:
+        try:
+            self._connection = self._connected()
+        except SourceError:
+            return False
+        self._decoder.reconnected()
+        return True
+
+    def _disconnect(self) -> None:
+        connection, self._connection = self._connection, None
+        if connection is None:
+            return
+        with suppress(OSError, WebSocketException):
+            connection.close()
+        keepalive = getattr(connection, "keepalive_thread", None)
+        if keepalive is not None:
+            keepalive.join(CONNECT_TIMEOUT)
+
+    def _unreachable(self, failures: list[Exception]) -> str:
+        where = " or ".join(map(str, self._places))
+        if all(isinstance(failure, ConnectionRefusedError) for failure in failures):
+            return (
+                f"no server listens at {where}{TRY_AUTO if len(self._places) == 1 else ''}; "
+                "without a hand, use `holdfast play`"
+            )
+        if any(isinstance(failure, WebSocketException) for failure in failures):
+            return f"the server at {where} is no XELA server: {failures[-1]}"
+        return f"{where} cannot be reached: {failures[-1]}"
+
+
+def _connect(place: Place) -> ClientConnection:
+    """Connect to a server. A redirect to another server is refused."""
+    deadline = time.monotonic() + CONNECT_TIMEOUT
+    address = socket.create_connection((place.host, place.port), CONNECT_TIMEOUT)
+    address.settimeout(None)
+    try:
+        return connect(
+            f"ws://{place}",
+            sock=address,  # websockets follows redirects only with sockets of its own
+            compression=None,
+            proxy=None,
+            open_timeout=max(deadline - time.monotonic(), MIN_HANDSHAKE_TIME),
+            ping_interval=PING_INTERVAL,
+            ping_timeout=PING_TIMEOUT,
+            close_timeout=CONNECT_TIMEOUT,
+            max_size=MAX_PACKET_SIZE,
+            max_queue=MAX_QUEUED_PACKETS,
+            logger=_LOGGER,
+        ).__enter__()
+    except (ValueError, AssertionError) as cause:  # it answered before it was asked
+        raise InvalidHandshake(str(cause) or "it answers no handshake") from cause

@@ -1,0 +1,101 @@
+"""Modules of the sensors of XELA's server, by their models."""
+
+from collections.abc import Mapping
+from dataclasses import replace
+
+import numpy as np
+
+from holdfast.errors import SourceError
+from holdfast.sensors import Hand, Sensor
+from holdfast.sensors.xela_models import is_known, module_sensors, whole_hand
+from holdfast.devices.sources.assembler import Device
+
+
+def xela_devices(
+    found: Mapping[int, tuple[str, int]],
+    names: Mapping[int, str],
+    given: Sensor | None = None,
+    *,
+    calibrated: bool = False,
+) -> dict[int, Device]:
+    """Return the sensors of a server by number, with their modules.
+
+    Args:
+        found: model and number of taxels, by the server's number.
+        names: names of separate sensors, by number; `finger1`, ... for the others.
+        given: layout of the separate sensors with this number of taxels, for any model.
+        calibrated: whether readings are in newtons.
+
+    Raises:
+        SourceError: a model has another number of taxels, `names` or `given` fits no sensor, or
+            two modules have the same name.
+    """
+    hands = {number: whole for number, (model, _) in found.items() if (whole := whole_hand(model))}
+    devices = {}
+    for number, (model, n_taxels) in found.items():
+        if number in hands:
+            prefix = f"hand{number}/" if len(hands) > 1 else ""
+            device = _hand(number, model, n_taxels, hands[number], prefix)
+        else:
+            name = names.get(number, f"finger{number}")
+            device = _separate(number, name, model, n_taxels, given)
+        devices[number] = _in_newtons(device) if calibrated else device
+    _check(devices, names, given)
+    return devices
+
+
+def _hand(number: int, model: str, n_taxels: int, whole: Hand, prefix: str) -> Device:
+    modules = _built_in(number, model, n_taxels)
+    order = np.concatenate([whole.modules[name].flat_indices for name in modules])
+    return Device(number, model, {prefix + name: one for name, one in modules.items()}, order)
+
+
+def _separate(number: int, name: str, model: str, n_taxels: int, given: Sensor | None) -> Device:
+    if given is not None and given.n_taxels == n_taxels:
+        return Device(number, model, {name: given})
+    (found,) = _built_in(number, model, n_taxels).values()
+    if is_known(model):
+        return Device(number, model, {name: found})
+    layout = "a flat grid" if found.name == (model.lower() or "unknown") else found.name
+    notice = (
+        f"{name}: the layout of a {model or 'sensor without a model'} with {n_taxels} taxels is "
+        f"not known; {layout} is assumed (sensor=FILE.json in the URI gives another)"
+    )
+    return Device(number, model, {name: found}, notices=(notice,))
+
+
+def _built_in(number: int, model: str, n_taxels: int) -> dict[str, Sensor]:
+    try:
+        return module_sensors(model, n_taxels)
+    except ValueError as cause:
+        raise SourceError(
+            f"sensor {number}: {cause}; sensor=FILE.json in the URI gives another layout"
+        ) from cause
+
+
+def _in_newtons(device: Device) -> Device:
+    modules = {
+        name: replace(module, unit="N", limits=None) for name, module in device.modules.items()
+    }
+    return replace(device, modules=modules)
+
+
+def _check(devices: Mapping[int, Device], names: Mapping[int, str], given: Sensor | None) -> None:
+    separate = [device for device in devices.values() if device.order is None]
+    present = ", ".join(f"{device.number} ({device.model})" for device in devices.values())
+    if unknown := sorted(set(names) - {device.number for device in separate}):
+        raise SourceError(
+            f"fingers= names {', '.join(map(str, unknown))}; separate sensors have names, "
+            f"the server has {present}"
+        )
+    if given is not None and all(given.n_taxels != device.n_taxels for device in separate):
+        sizes = (f"{device.number} ({device.n_taxels} taxels)" for device in devices.values())
+        raise SourceError(
+            f"sensor= has {given.n_taxels} taxels and fits no sensor of the server: "
+            + ", ".join(sizes)
+        )
+    modules = [name for device in devices.values() for name in device.modules]
+    if len(set(modules)) < len(modules):
+        raise SourceError(
+            f"two modules have the same name: {', '.join(modules)}; fingers= gives other names"
+        )

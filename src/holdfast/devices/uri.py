@@ -1,0 +1,178 @@
+"""Sources by name: the path of a recording, or a URI."""
+
+import re
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from importlib import import_module
+from pathlib import Path
+from urllib.parse import parse_qsl, urlsplit
+
+from holdfast.sensors import Sensor, built_in_sensors, sensor
+from holdfast.devices.sources.base import Source
+
+SCHEMES = {
+    "xela": "XELA's server: xela://HOST:PORT or xela://auto, ?values=counts|calibrated",
+    "twin": "the twin: twin:?object=can&seed=1&case=2&profile=reference",
+    "ros2": "a ROS 2 topic: ros2:///xServTopic",
+    "ros1": "a ROS 1 topic: ros1:///xServTopic",
+    "serial": "a serial sensor: serial:///dev/ttyACM0?sensor=anyskin",
+}
+"""URI schemes of the sources, with a description and an example of each."""
+DEVICE_MODULES = {"xela": "xela", "ros2": "ros.ros2", "ros1": "ros.ros1", "serial": "serial"}
+"""Modules of `holdfast.devices.sources` whose function `source(address)` makes a device's source."""
+VALUES = ("counts", "calibrated")
+"""Readings to take from a packet: uint16 counts, or newtons if the device sends them."""
+
+_SCHEME = re.compile(r"(?P<scheme>[a-z][a-z0-9+]+):")
+
+
+@dataclass(frozen=True)
+class Address:
+    """Parts of the URI of a source.
+
+    Attributes:
+        text: the whole URI.
+        host: host and port, as given: "127.0.0.1:5000".
+        path: part after the host.
+        parameters: values by name.
+    """
+
+    text: str
+    host: str
+    path: str
+    parameters: Mapping[str, str]
+
+    def only(self, *known: str) -> None:
+        """Check that all parameters are known.
+
+        Raises:
+            ValueError: a parameter is not among `known`.
+        """
+        if unknown := sorted(set(self.parameters) - set(known)):
+            raise ValueError(
+                f"{self.text}: unknown parameter {', '.join(unknown)}; there are {', '.join(known)}"
+            )
+
+    def names(self) -> dict[int, str]:
+        """Return the names of modules by their number, from `fingers=1:thumb,2:index`.
+
+        Raises:
+            ValueError: the parameter has another form, or a number or a name occurs twice.
+        """
+        given = self.parameters.get("fingers", "")
+        names: dict[int, str] = {}
+        for part in filter(None, given.split(",")):
+            number, _, name = part.partition(":")
+            if not (number.strip().isdecimal() and name.strip()):
+                raise ValueError(f"{self.text}: fingers=1:thumb,2:index expected, {given!r} given")
+            if int(number) in names or name.strip() in names.values():
+                raise ValueError(f"{self.text}: a name for each finger expected, {given!r} given")
+            names[int(number)] = name.strip()
+        return names
+
+    def calibrated(self) -> bool:
+        """Return whether readings are taken in newtons: `values=calibrated`, not `counts`.
+
+        Raises:
+            ValueError: `values` is neither.
+        """
+        values = self.parameters.get("values", VALUES[0])
+        if values not in VALUES:
+            raise ValueError(
+                f"{self.text}: values={' or '.join(VALUES)} expected, {values!r} given"
+            )
+        return values == "calibrated"
+
+    def sensor(self) -> Sensor | None:
+        """Return the sensor of `sensor=FILE.json` or `sensor=NAME`; None without the parameter.
+
+        Raises:
+            ValueError: there is no such file or built-in sensor, or the file is not valid.
+        """
+        given = self.parameters.get("sensor")
+        if given is None:
+            return None
+        if not given.endswith(".json") and given not in built_in_sensors():
+            raise ValueError(
+                f"{self.text}: sensor=FILE.json or one of {', '.join(built_in_sensors())} "
+                f"expected, {given!r} given"
+            )
+        try:
+            return Sensor.from_json(given) if given.endswith(".json") else sensor(given)
+        except OSError as cause:
+            raise ValueError(f"{self.text}: cannot read {given}: {cause.strerror}") from cause
+        except ValueError as cause:
+            raise ValueError(f"{self.text}: {cause}") from cause
+
+
+def parse(text: str) -> tuple[str, Address]:
+    """Return the scheme of a URI and its parts.
+
+    Raises:
+        ValueError: the scheme is not known, or a parameter occurs twice or has no value.
+
+    Example:
+        >>> parse("twin:?object=can")[1].parameters
+        {'object': 'can'}
+    """
+    match = _SCHEME.match(text)
+    scheme = match["scheme"] if match else ""
+    if scheme not in SCHEMES:
+        raise ValueError(
+            f"{text!r} is neither the path of a recording nor the URI of a source; there are "
+            + ", ".join(f"{name}:" for name in SCHEMES)
+        )
+    try:
+        parts = urlsplit(text)
+    except ValueError as cause:
+        raise ValueError(f"{text} is no URI: {cause}") from cause
+    if parts.fragment:
+        raise ValueError(f"{text}: nothing after # expected, {parts.fragment!r} given")
+    return scheme, Address(text, parts.netloc, parts.path, _parameters(text, parts.query))
+
+
+def _parameters(text: str, query: str) -> dict[str, str]:
+    for part in filter(None, query.split("&")):
+        if "=" not in part:
+            raise ValueError(f"{text}: name=value expected, {part!r} given")
+    pairs = parse_qsl(query, keep_blank_values=True)
+    if len(dict(pairs)) < len(pairs):
+        raise ValueError(f"{text}: a parameter is given twice")
+    return dict(pairs)
+
+
+def is_uri(text: str) -> bool:
+    """Return whether the text has the form of a URI and is not the name of a file."""
+    return bool(_SCHEME.match(text)) and not Path(text).exists()
+
+
+def open_source(text: str, *, speed: float = 1.0, loop: bool = False) -> Source:
+    """Return the source of a path or URI; entering it connects.
+
+    Args:
+        text: path of a recording, or URI with one of `SCHEMES`.
+        speed: speed of a recording or of the twin: 1 is real time, 0 is as fast as samples
+            are read. Devices ignore it.
+        loop: start a recording again at its end; the twin grasps again. Devices ignore it.
+
+    Raises:
+        ValueError: the text is neither, or a parameter is not valid.
+        MissingExtra: the source needs a package that is not installed.
+
+    Example:
+        >>> with open_source("twin:?object=can&seed=1", speed=0) as source:  # doctest: +SKIP
+        ...     print(list(source.sensors))
+        ['thumb', 'index', 'middle', 'ring']
+    """
+    if not is_uri(text):
+        from holdfast.devices.sources.replay import Replay
+
+        return Replay(text, speed=speed, loop=loop)
+    scheme, address = parse(text)
+    if scheme == "twin":
+        from holdfast.devices.sources.twin import Twin
+
+        return Twin(address, speed=speed, loop=loop)
+    module = import_module(f"holdfast.devices.sources.{DEVICE_MODULES[scheme]}")
+    make: Callable[[Address], Source] = module.source
+    return make(address)

@@ -1,0 +1,363 @@
+"""The grip controller: from the estimates of a hand to a command. No I/O and no clock."""
+
+import math
+from collections import defaultdict, deque
+from collections.abc import Mapping
+
+from holdfast.contact import ContactState, HandEstimate, Reason
+from holdfast.grip.command import FingerCommand, GripCommand, GripEvent, GripReason, LoopState
+from holdfast.grip.laws import Law, Touch, law_named
+from holdfast.grip.laws.base import Three
+from holdfast.grip.limits import Limits
+from holdfast.grip.repeats import RepeatMonitor
+from holdfast.sensors import Sensor
+from holdfast.sensors.types import Array
+
+MAX_EVENTS = 1000
+"""Number of events that a controller keeps until `events` is called; the oldest are dropped."""
+OVERLOAD = 1.5
+"""Multiple of `Limits.max_force` at which a measured force is a fault."""
+SETTLE_TIME = 0.2
+"""Time for which the hand has been STABLE when the grip begins [s]."""
+DEFAULT_RATE = 150.0
+"""Rate of the samples, if no sensor is given [Hz]."""
+MIN_FINGERS = 2
+"""Number of fingers in contact from which there is a grip; one, for a hand of one finger."""
+LASTING_FAULTS = (GripReason.LOST, GripReason.STOPPED)
+"""Faults that only a reset ends; they replace the reason of one that ends by itself."""
+KEEP = FingerCommand(1.0)
+
+_NONE, _UNKNOWN = GripReason.NONE, ContactState.UNKNOWN
+_HOLD, _REACT, _RELAX = LoopState.HOLD, LoopState.REACT, LoopState.RELAX
+
+
+class GripController:
+    """Controller of the grip force of one hand, estimate by estimate.
+
+    The grip begins when the hand has been STABLE for 0.2 s: forces and scales refer to this
+    moment, and the fingers in contact are the loaded fingers. The controller reads the raw
+    probability of every sample, not the debounced state. UNKNOWN never lowers a force, and no force
+    changes without a new sample. No input raises an exception or gives a command outside the
+    limits.
+
+    Args:
+        limits: limits of the commands.
+        law: name of a law, one of `LAWS`, or a law.
+        sensors: sensor of each finger, for its normal, rate and unit; without it, the normal is
+            x and the unit is that of counts.
+        newtons_per_unit: calibration, one factor or one for each axis of the fingertip frame;
+            None if the readings are in N, or for laws that need none.
+        thumb: finger opposite to all others, which balances them; None if there is none.
+
+    Raises:
+        ValueError: there is no such law, or it needs newtons and the readings are counts without
+            a calibration.
+
+    Example:
+        >>> from holdfast.contact import ContactEstimate
+        >>> controller = GripController(Limits(max_scale=2.0))
+        >>> finger = ContactEstimate(0.0, ContactState.NO_CONTACT, Reason.NONE, 0.1, 0.0, (0, 0, 0))
+        >>> hand = HandEstimate(0.0, ContactState.NO_CONTACT, {"thumb": finger})
+        >>> controller.update(hand, 0.0).state
+        <LoopState.IDLE: 'IDLE'>
+    """
+
+    def __init__(
+        self,
+        limits: Limits,
+        law: str | Law = "holdfast",
+        *,
+        sensors: Mapping[str, Sensor] | None = None,
+        newtons_per_unit: float | tuple[float, float, float] | None = None,
+        thumb: str | None = "thumb",
+    ) -> None:
+        self.limits = limits
+        self.law = law_named(law) if isinstance(law, str) else law
+        sensors = sensors or {}
+        _check_unit(self.law, sensors, newtons_per_unit)
+        given = 1.0 if newtons_per_unit is None else newtons_per_unit
+        self._factors: Three = given if isinstance(given, tuple) else (given, given, given)
+        self._normals = {name: _three(one.normal) for name, one in sensors.items()}
+        rates = [one.rate for one in sensors.values()]
+        self._max_age = 1 / min(rates, default=DEFAULT_RATE) + limits.stale_after
+        self._thumb = thumb
+        ceiling = math.inf if limits.max_force is None else limits.max_force
+        self._ceiling = OVERLOAD * ceiling
+        self._monitors: defaultdict[str, RepeatMonitor] = defaultdict(RepeatMonitor)
+        self.reset()
+
+    def reset(self) -> None:
+        """Return to IDLE: forget the grip and its faults."""
+        self.state = LoopState.IDLE
+        self._touches: list[Touch] = []
+        self._bad_since: list[float] = []
+        self._highest: list[float] = []
+        self._commands: dict[str, FingerCommand] = {}
+        self._latched = self._stopped = False
+        self._all_known = False
+        self._repeats: list[RepeatMonitor] = []
+        self._time = self._estimated_at = math.nan
+        self._shift = 0.0  # of the law's clock, which continues where that of the source jumped
+        self._clock_is_new = False
+        self._stable_since = math.nan
+        self._valid_since = math.nan
+        self._raised_at = -math.inf
+        self._fault = self._reported = GripReason.NONE
+        self._events: deque[GripEvent] = deque(maxlen=MAX_EVENTS)
+
+    def stop(self) -> None:
+        """Stop: from the next update on, in FAULT (stopped) until `resume` or `reset`."""
+        if not self._stopped:
+            self._stopped, self._fault = True, _NONE
+
+    def resume(self) -> None:
+        """End a stop or a fault, by the decision of a person. It has no effect elsewhere.
+
+        A grip that still touches the object goes on with its scales. After "open", or without
+        contact, the controller returns to IDLE, as by `reset`. The time of the next update may be
+        any: that is how a clock that has jumped is accepted.
+        """
+        self._clock_is_new = True
+        if not self._stopped and self._fault is _NONE:
+            return
+        touching = any(touch.touching for touch in self._touches)
+        if self.limits.on_fault == "open" or not touching:
+            self.reset()
+            return
+        self._latched = self._stopped = False
+        self._fault = _NONE
+        self._bad_since = [math.inf] * len(self._bad_since)
+        self._change(_HOLD, self._time)
+
+    @property
+    def loaded_fingers(self) -> tuple[str, ...]:
+        """Fingers of the grip; none while IDLE."""
+        return tuple(touch.finger for touch in self._touches)
+
+    @property
+    def highest_scales(self) -> dict[str, float]:
+        """Highest scale that each finger of the grip may get; none while IDLE."""
+        return dict(zip(self.loaded_fingers, self._highest, strict=False))
+
+    def events(self) -> list[GripEvent]:
+        """Return states and rises since the last call, at most `MAX_EVENTS`, oldest first."""
+        events = list(self._events)
+        self._events.clear()
+        return events
+
+    def report(self, fault: GripReason) -> None:
+        """Report a fault outside the estimates, as that of a silent hand, to the next update."""
+        self._reported = fault
+
+    def update(self, estimate: HandEstimate, time: float) -> GripCommand:
+        """Process an estimate, or the passing of time if the estimate is the last one again.
+
+        Args:
+            estimate: the newest estimate of the hand.
+            time: time now, on the clock of the source [s]; it exceeds the time of the estimate
+                where samples are late.
+
+        Returns:
+            The command. Its scales change only in the states REACT and RELAX, and only with a new
+            estimate: otherwise it is the last command again, with the time of that one.
+        """
+        is_new = self._is_new(estimate)
+        fault, self._reported = self._reported, _NONE
+        if self._clock_is_new and math.isfinite(time):
+            self._accept_clock(time)
+        dt = time - self._time
+        if self._stopped:
+            return self._in_stop(estimate, time, dt)
+        if self.state is LoopState.IDLE:
+            return self._idle(estimate, time)
+        problem = self._problem(estimate, time, dt)
+        if problem is not GripReason.CLOCK:
+            problem = fault or problem
+        if problem is not _NONE or self._fault is not _NONE:
+            return self._in_fault(problem, time)
+        if not is_new or any(monitor.repeating for monitor in self._repeats):
+            return GripCommand(self._time, self.state, self._commands.copy())
+        self._time = time
+        return self._control(time, min(dt, self.limits.stale_after))
+
+    def _is_new(self, estimate: HandEstimate) -> bool:
+        """Return whether an estimate is not the last one again; update the monitors if so."""
+        if estimate.time == self._estimated_at:
+            return False
+        self._estimated_at = estimate.time
+        for name, finger in estimate.fingers.items():
+            self._monitors[name].update(finger)
+        return True
+
+    def _accept_clock(self, time: float) -> None:
+        """Continue at another time; that of the law goes on as if none had passed."""
+        self._clock_is_new = False
+        if not math.isnan(self._time):
+            self._shift += self._time - time
+            self._time = time
+
+    def _idle(self, estimate: HandEstimate, time: float) -> GripCommand:
+        """Wait for a grip; begin it when the hand has been stable for long enough."""
+        commands = {name: self._commands.get(name, KEEP) for name in estimate.fingers}
+        self._commands = commands
+        if estimate.state is not ContactState.STABLE or not math.isfinite(time):
+            self._stable_since = math.nan
+        elif not self._stable_since <= time:
+            self._stable_since = time
+        elif time - self._stable_since >= SETTLE_TIME:
+            self._begin(estimate, time)
+        return GripCommand(time, self.state, dict(commands))
+
+    def _begin(self, estimate: HandEstimate, time: float) -> None:
+        held = (ContactState.STABLE, ContactState.UNSTABLE)
+        touches = [
+            Touch(name, self._normals.get(name, (1.0, 0.0, 0.0)), self._factors)
+            for name, finger in estimate.fingers.items()
+            if finger.state in held
+        ]
+        finite = all(touch.read(estimate.fingers[touch.finger]) for touch in touches)
+        if not finite or len(touches) < min(MIN_FINGERS, len(estimate.fingers)):
+            return
+        self._touches, self._time = touches, time
+        for touch in touches:
+            touch.start()
+        self._highest = [self.limits.highest_scale(touch.start_normal) for touch in touches]
+        self._bad_since = [math.inf] * (len(touches) + 1)  # of each finger, and of the grip
+        self._repeats = [self._monitors[touch.finger] for touch in touches]
+        names = self.loaded_fingers
+        opposed = self._thumb in names and len(names) > 1
+        self.law.start(touches, names.index(str(self._thumb)) if opposed else -1)
+        self._change(LoopState.HOLD, time)
+
+    def _problem(self, estimate: HandEstimate, time: float, dt: float) -> GripReason:
+        """Read the loaded fingers; return why this update is a fault, NONE if it is not."""
+        if not 0.0 <= dt < math.inf:
+            return GripReason.CLOCK
+        fingers, due = estimate.fingers, time - self._max_age
+        touching, known, problem = False, True, _NONE
+        for k, touch in enumerate(self._touches):
+            finger = fingers.get(touch.finger)
+            if finger is None or not finger.time >= due:
+                problem = GripReason.STALE
+            elif finger.state is _UNKNOWN:
+                touch.known = known = False
+                problem = self._unknown(k, finger.reason, time)
+            elif not touch.read(finger):
+                problem = GripReason.NOT_FINITE
+            elif touch.normal > self._ceiling:
+                problem = GripReason.OVERLOAD
+            elif self._repeats[k].frozen:
+                problem = GripReason.FROZEN
+            else:
+                self._bad_since[k] = math.inf
+            if problem is not _NONE:
+                return problem
+            touching = touching or touch.touching
+        self._all_known = known
+        if touching:
+            self._bad_since[-1] = math.inf
+            return _NONE
+        return GripReason.LOST if self._lasts(-1, time) else _NONE
+
+    def _unknown(self, k: int, reason: Reason, time: float) -> GripReason:
+        """Return the fault of a finger without an estimate; NONE as long as it is short."""
+        if not self._lasts(k, time):
+            return _NONE
+        return GripReason.STALE if reason is Reason.GAP else GripReason.FINGER_FAULT
+
+    def _lasts(self, k: int, time: float) -> bool:
+        """Return whether what is bad now has been bad for `fault_after`."""
+        self._bad_since[k] = min(self._bad_since[k], time)
+        return time - self._bad_since[k] >= self.limits.fault_after
+
+    def _in_stop(self, estimate: HandEstimate, time: float, dt: float) -> GripCommand:
+        """Hold or open, and follow the contacts of the grip, if there is one."""
+        if self._touches:
+            self._problem(estimate, time, dt)
+        return self._in_fault(GripReason.STOPPED, time)
+
+    def _in_fault(self, problem: GripReason, time: float) -> GripCommand:
+        """Hold or open; recover after enough valid data, where that is allowed."""
+        if problem is not GripReason.CLOCK:
+            self._time = time
+        if problem is not GripReason.NONE:
+            self._valid_since = math.nan
+            lasting = problem in LASTING_FAULTS
+            if self._fault is GripReason.NONE or (lasting and self._fault not in LASTING_FAULTS):
+                self._fault = problem
+                self._change(LoopState.FAULT, time, problem)
+            self._latched |= self.limits.on_fault == "open" or lasting
+        elif not self._valid_since <= time:
+            self._valid_since = time
+        if not self._latched and time - self._valid_since >= self.limits.recovery:
+            self._fault = GripReason.NONE
+            self._change(LoopState.HOLD, time)
+        released = self._fault is not GripReason.NONE and self.limits.on_fault == "open"
+        self._settle_commands()
+        return GripCommand(time, self.state, dict(self._commands), released, self._fault)
+
+    def _control(self, time: float, dt: float) -> GripCommand:
+        """Apply the law within the limits."""
+        limits, commands, highest = self.limits, self._commands, self._highest
+        clock = time + self._shift
+        wishes = self.law.wishes(self._touches, clock, dt)
+        may_fall = self._all_known and clock - self._raised_at >= limits.cooldown
+        rising = falling = False
+        for k, touch in enumerate(self._touches):
+            scale = touch.scale
+            wanted, reason = wishes[k]
+            wanted = min(max(wanted, limits.min_scale), highest[k])
+            if wanted > scale and reason is not _NONE:
+                self._set(touch, min(wanted, scale + limits.rise * dt), reason, time)
+                rising = True
+            elif wanted < scale and may_fall:
+                self._set(touch, max(wanted, scale - limits.fall * dt), GripReason.RELAX, time)
+                falling = True
+            elif commands[touch.finger].reason is not _NONE:
+                commands[touch.finger] = FingerCommand(scale)
+        if rising:
+            self._raised_at = clock
+        state = _REACT if rising else _RELAX if falling else _HOLD
+        if state is not self.state:
+            self._change(state, time)
+        return GripCommand(time, state, commands.copy())
+
+    def _set(self, touch: Touch, scale: float, reason: GripReason, time: float) -> None:
+        """Set a scale, and log the beginning of a rise."""
+        before = self._commands[touch.finger]
+        if scale > touch.scale and before.reason is not reason:
+            event = GripEvent(time, LoopState.REACT, touch.finger, touch.scale, reason)
+            self._events.append(event)
+        touch.scale = scale
+        self._commands[touch.finger] = FingerCommand(scale, reason)
+
+    def _settle_commands(self) -> None:
+        """Keep every scale; nothing rises or falls in a fault."""
+        self._commands = {
+            name: FingerCommand(command.scale) for name, command in self._commands.items()
+        }
+
+    def _change(self, state: LoopState, time: float, reason: GripReason = GripReason.NONE) -> None:
+        self.state = state
+        self._events.append(GripEvent(time, state, "", math.nan, reason))
+
+
+def _three(vector: Array) -> Three:
+    x, y, z = vector.tolist()
+    return x, y, z
+
+
+def _check_unit(
+    law: Law,
+    sensors: Mapping[str, Sensor],
+    newtons_per_unit: float | tuple[float, float, float] | None,
+) -> None:
+    in_newtons = bool(sensors) and all(one.unit == "N" for one in sensors.values())
+    if law.needs_newtons and not in_newtons and newtons_per_unit is None:
+        raise ValueError(
+            f"the law {type(law).__name__} needs forces in N and the readings are counts: give "
+            "newtons_per_unit, the calibration of the sensor"
+        )
+    given = newtons_per_unit if isinstance(newtons_per_unit, tuple) else (newtons_per_unit,)
+    if any(one is not None and not (math.isfinite(one) and one > 0) for one in given):
+        raise ValueError(f"newtons_per_unit: numbers above 0 expected, {newtons_per_unit} given")

@@ -1,0 +1,32 @@
+"""Laws of grip force, one file each, behind one interface."""
+
+from collections.abc import Callable
+
+from holdfast.grip.laws.base import Law, Touch, Wish
+from holdfast.grip.laws.fixed import Fixed
+from holdfast.grip.laws.friction_margin import FrictionMargin
+from holdfast.grip.laws.pr2 import Pr2
+from holdfast.grip.laws.stability import Stability
+from holdfast.grip.laws.wong_zhu import WongZhu
+
+LAWS: dict[str, Callable[[], Law]] = {
+    "fixed": Fixed,
+    "pr2": Pr2,
+    "wong-zhu": WongZhu,
+    "friction-margin": FrictionMargin,
+    "holdfast": Stability,
+}
+"""Laws by name, with the constants of their sources."""
+
+__all__ = ["LAWS", "Law", "Touch", "Wish", "law_named"]
+
+
+def law_named(name: str) -> Law:
+    """Return a new law.
+
+    Raises:
+        ValueError: there is no law of that name; the message lists the names.
+    """
+    if name not in LAWS:
+        raise ValueError(f"unknown law {name!r}; there are {', '.join(LAWS)}")
+    return LAWS[name]()

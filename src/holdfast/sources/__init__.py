@@ -1,6 +1,0 @@
-"""Sources of samples: recordings, the twin and devices, all with one contract."""
-
-from holdfast.sources.base import Arrival, Source
-from holdfast.sources.uri import SCHEMES, open_source
-
-__all__ = ["SCHEMES", "Arrival", "Source", "open_source"]

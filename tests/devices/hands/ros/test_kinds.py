@@ -1,0 +1,82 @@
+"""The URIs of hands on topics: every wrong parameter is one clear line."""
+
+import pytest
+
+pytest.importorskip("cyclonedds", reason="cyclonedds is not installed")
+
+from holdfast.grip import Limits
+from holdfast.devices.hands import open_hand
+
+SIXTEEN = ",".join(["0.1"] * 16)
+
+
+@pytest.mark.parametrize(
+    ("uri", "message"),
+    [
+        ("ros2:", "is no hand; there are twin:"),
+        (
+            "ros2:magic",
+            "there are the hands ros2:plexus, ros2:v4, ros2:v5, ros2:v5-envelop",
+        ),
+        ("ros2:///plexus", "there are the hands ros2:plexus"),
+        ("ros1:magic", "there are the hands ros1:positions, ros1:efforts, ros1:envelop, ros1:grip"),
+        ("ros2:v4-envelop", "the grasp action of V4 in ROS 2 takes its envelop effort as a goal"),
+        (
+            "ros2:v4?torque=1",
+            "unknown parameter torque; there are domain, shared, namespace",
+        ),
+        ("ros2:v4?domain=x", "a ROS domain from 0 to 232 expected, 'x' given"),
+        ("ros1:envelop?effort=1&max_effort=2&master=x", "a ROS master like http"),
+        (
+            "ros2:plexus?effort=1",
+            "max_effort: a number or 16 numbers, one for each joint, expected, nothing",
+        ),
+        ("ros2:plexus?max_effort=1", "effort: a number or 16 numbers, one for each joint, expecte"),
+        ("ros2:plexus?effort=1,2&max_effort=1", "one for each joint, expected, '1,2' given"),
+        ("ros2:plexus?effort=nan&max_effort=1", "one for each joint, expected, 'nan' given"),
+        ("ros2:plexus?effort=1&max_effort=0", "max_effort: numbers above 0 expected, 0 given"),
+        ("ros2:plexus?effort=1&max_effort=2&release=home", "home: 16 numbers, one for each joint,"),
+        ("ros2:v4?effort=0.1", "effort: 16 numbers, one for each joint, expected, '0.1' given"),
+        ("ros2:v4?release=limp", "release=home expected, 'limp' given"),
+        ("ros2:v4?namespace=hand", "namespace=/TOPIC expected, 'hand' given"),
+        ("ros2:v4?states=/a b", "states=/TOPIC expected, '/a b' given"),
+        ("ros2:v4?shared=yes", "shared=false or true expected, 'yes' given"),
+        ("ros2:v4?order=thumb,index", "order=thumb,index,middle,ring expected, in any order, 'thu"),
+        ("ros2:v5?max_effort=1", "stiffness: a number or 16 numbers"),
+        (
+            f"ros2:v5?max_effort=1&stiffness=-1&home={SIXTEEN}",
+            "stiffness: numbers above 0 exp",
+        ),
+        ("ros2:v4?lowest=2", "lowest below highest expected for each joint"),
+        ("ros2:v5-envelop?effort=1", "max_effort: a number expected, nothing given"),
+        ("ros2:v5-envelop?effort=-1&max_effort=1", "effort: a number above 0 expected, -1 given"),
+        ("ros2:gripper?effort=1&max_effort=1", "topic=/TOPIC expected, nothing given"),
+        ("ros2:gripper?topic=/a&effort=1&max_effort=1&type=Int", "type=Float64 or Float32 expecte"),
+        ("ros2:gripper?topic=/a&effort=x&max_effort=1", "effort: a number expected, 'x' given"),
+    ],
+)
+def test_a_wrong_uri_is_refused(uri, message):
+    with pytest.raises(ValueError) as failure:
+        open_hand(uri)
+    assert message in str(failure.value)
+
+
+@pytest.mark.parametrize(
+    ("uri", "message"),
+    [
+        (
+            "ros2:plexus?effort=0.2&max_effort=0.3",
+            "joint 0: at most 0.3 N m expected, 0.4 N m given at max_scale 2: lower one of them",
+        ),
+        (
+            "ros2:v5-envelop?effort=1&max_effort=1.5",
+            "an effort of at most 1.5 expected, 2 given at max_scale 2: lower one of them",
+        ),
+    ],
+)
+def test_given_efforts_are_checked_at_start_up(uri, message):
+    hand = open_hand(uri)
+    with pytest.raises(ValueError) as failure:
+        hand.check(Limits(max_scale=2.0), ["thumb"])
+    assert str(failure.value).endswith(message)
+    hand.check(Limits(max_scale=1.5), ["thumb"])

@@ -1,0 +1,252 @@
+"""Every source, ready to be opened, for the contract in `test_contract.py`."""
+
+import os
+from collections.abc import Callable
+from contextlib import contextmanager
+from dataclasses import dataclass
+from functools import cache
+from importlib.util import find_spec
+from socket import create_server
+from threading import Event, Thread
+
+import numpy as np
+import pytest
+
+import holdfast.devices.sources.serial
+import holdfast.devices.sources.twin
+from holdfast.io import save_recording
+from holdfast.live.publishers.xela_server import XelaServer
+from holdfast.recordings import Recording, Tactile
+from holdfast.ros.cdr import MessageEncoder
+from holdfast.ros.sensor_messages import known_definition
+from holdfast.sensors import sensor
+from holdfast.devices.sources import Source, open_source
+from holdfast.twin.simulation import simulate
+from devices.sources.board import Board, packet, some
+
+N_SOON = 40
+"""Number of samples of every source before it may become silent."""
+NEVER = 1e4
+"""A sample this much later is never due [s]."""
+
+
+@dataclass
+class Ready:
+    """A source that is not open yet.
+
+    Attributes:
+        source: to be tested.
+        hush: makes it silent after some samples.
+    """
+
+    source: Source
+    hush: Callable[[], None] = lambda: None
+
+
+def recording(n=N_SOON, last=NEVER):
+    """Three modules of two kinds at 100 and 50 Hz; a last sample is much later."""
+    times = np.append(np.arange(n) / 100, last)
+    rng = np.random.default_rng(0)
+    pads = {
+        name: Tactile(sensor("uskin-4x4"), times, rng.integers(0, 65536, (n + 1, 16, 3), "u2"))
+        for name in ("thumb", "index")
+    }
+    skin = Tactile(sensor("anyskin"), times[::2] + 1e-3, rng.normal(size=(len(times[::2]), 5, 3)))
+    return Recording("grasp", {**pads, "middle": skin}, {"hand": "allegro", "object": "can"})
+
+
+@cache
+def _simulated(grasp):
+    return simulate(grasp)
+
+
+@contextmanager
+def _replay(folder, suffix, speed):
+    save_recording(recording(), folder / f"grasp.{suffix}", force=True)
+    yield Ready(open_source(str(folder / f"grasp.{suffix}"), speed=speed))
+
+
+@contextmanager
+def parquet(folder, monkeypatch):
+    with _replay(folder, "parquet", 1.0) as ready:
+        yield ready
+
+
+@contextmanager
+def mcap(folder, monkeypatch):
+    with _replay(folder, "mcap", 1.0) as ready:
+        yield ready
+
+
+@contextmanager
+def parquet_at_once(folder, monkeypatch):
+    with _replay(folder, "parquet", 0.0) as ready:
+        yield ready
+
+
+@contextmanager
+def mcap_at_once(folder, monkeypatch):
+    with _replay(folder, "mcap", 0.0) as ready:
+        yield ready
+
+
+@contextmanager
+def _twin(monkeypatch, speed):
+    monkeypatch.setattr(holdfast.devices.sources.twin, "simulate", _simulated)
+    yield Ready(open_source("twin:?object=ball&case=1", speed=speed))
+
+
+@contextmanager
+def twin(folder, monkeypatch):
+    with _twin(monkeypatch, 1.0) as ready:
+        yield ready
+
+
+@contextmanager
+def twin_at_once(folder, monkeypatch):
+    with _twin(monkeypatch, 0.0) as ready:
+        yield ready
+
+
+@contextmanager
+def twin_slow(folder, monkeypatch):
+    """After the first sample, no sample comes for a long time."""
+    with _twin(monkeypatch, 1e-3) as ready:
+        yield ready
+
+
+@contextmanager
+def serial(folder, monkeypatch):
+    board = Board(folder)
+    board.keep_sending([b"\n", *map(packet, some(10_000))])
+    try:
+        yield Ready(open_source(f"serial://{board.path}?fingers=1:index"), board.hush)
+    finally:
+        board.unplug()
+
+
+@contextmanager
+def xela(folder, monkeypatch):
+    save_recording(recording(1000), folder / "played.parquet")
+    with open_source(str(folder / "played.parquet")) as played:
+        pads = _Pads(played)
+        with XelaServer(pads, port=0) as server:
+            yield Ready(open_source(server.uri), pads.hush)
+
+
+class _Pads(Source):
+    """Source without the module that a XELA server cannot have; `hush` makes it silent."""
+
+    def __init__(self, source):
+        self._source = source
+        self.sensors = {n: s for n, s in source.sensors.items() if s.name.startswith("uskin")}
+        self._hushed = Event()
+
+    def hush(self):
+        self._hushed.set()
+
+    def open(self):
+        pass
+
+    def close(self):
+        pass
+
+    @property
+    def ended(self):
+        return self._source.ended
+
+    def read(self, timeout):
+        arrival = self._source.read(timeout)
+        if arrival is None or self._hushed.wait(0):
+            return None
+        samples = {n: v for n, v in arrival.samples.items() if n in self.sensors}
+        return arrival._replace(samples=samples)
+
+
+@contextmanager
+def ros1(folder, monkeypatch):
+    pytest.skip("rospy comes with ROS 1 alone, and needs its master")
+    yield
+
+
+@contextmanager
+def ros2(folder, monkeypatch):
+    if find_spec("cyclonedds") is None:
+        pytest.skip("cyclonedds is not installed")
+    monkeypatch.setenv("ROS_LOCALHOST_ONLY", "1")
+    from holdfast.devices.ros import dds
+
+    domain = 201 + os.getpid() % 30  # tests of ROS 2 itself take those below
+    definition = known_definition("xela_server_ros2/SensStream", ros2=True)
+    node = dds.Node(domain)
+    write, encode = node.writer("/xServTopic", definition), MessageEncoder(definition)
+    quiet = Event()
+
+    def publish():
+        for k in range(10_000):
+            write(encode({"sensors": [_sensor_full(k, number) for number in (1, 2)]}))
+            if quiet.wait(0.01):
+                return
+
+    thread = Thread(target=publish)
+    thread.start()
+    try:
+        yield Ready(open_source(f"ros2:///xServTopic?domain={domain}&fingers=1:thumb"), quiet.set)
+    finally:
+        quiet.set()
+        thread.join()
+
+
+def _sensor_full(k, number):
+    """Sample `k` of a 4 x 4 patch, as XELA's server sends it in ROS 2."""
+    return {
+        "message": k,
+        "time": 1000.0 + k / 100,
+        "model": "uSPa44",
+        "sensor_pos": number,
+        "taxels": [{"x": k % 65536, "y": taxel, "z": 7} for taxel in range(16)],
+        "forces": [],
+    }
+
+
+EVERY = {
+    make.__name__: make
+    for make in (parquet, mcap, parquet_at_once, mcap_at_once, twin, twin_at_once, serial, xela)
+} | {"ros1": ros1, "ros2": ros2}
+ENDING = {make.__name__: make for make in (parquet_at_once, mcap_at_once, twin_at_once)}
+"""Sources that end."""
+LASTING = {make.__name__: make for make in (parquet, mcap, twin_slow, serial, xela, ros1, ros2)}
+"""Sources that become silent, and do not end."""
+
+
+@contextmanager
+def no_parquet(folder, monkeypatch):
+    yield open_source(str(folder / "none.parquet"))
+
+
+@contextmanager
+def no_twin(folder, monkeypatch):
+    def fail(grasp):
+        raise OSError(28, "No space left on device")
+
+    monkeypatch.setattr(holdfast.devices.sources.twin, "simulate", fail)
+    yield open_source("twin:")
+
+
+@contextmanager
+def no_serial(folder, monkeypatch):
+    monkeypatch.setattr(holdfast.devices.sources.serial, "OPEN_TIMEOUT", 0.1)
+    board = Board(folder)
+    yield open_source(f"serial://{board.path}")
+    board.unplug()
+
+
+@contextmanager
+def no_xela(folder, monkeypatch):
+    with create_server(("127.0.0.1", 0)) as free:
+        port = free.getsockname()[1]
+    yield open_source(f"xela://127.0.0.1:{port}")
+
+
+BROKEN = {make.__name__: make for make in (no_parquet, no_twin, no_serial, no_xela)}
+"""Sources that cannot be opened."""

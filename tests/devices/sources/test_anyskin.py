@@ -1,0 +1,205 @@
+import numpy as np
+import pytest
+from hypothesis import example, given, settings
+from hypothesis import strategies as st
+
+from holdfast.devices.sources.anyskin import AnySkinDecoder
+
+READING = st.floats(2**-9, 1e6, width=32) | st.floats(-1e6, -(2**-9), width=32) | st.just(0.0)
+CRLF_INSIDE = np.frombuffer(b"\x00\x0d\x0a\x42\x0d\x0a\x00\x42", "<f4")
+"""34.5 and 32.01: numbers of which CR LF are two bytes."""
+
+
+def packet(readings, temperature=25.0):
+    rows = [[temperature, *row] for row in readings]
+    return np.array(rows, dtype="<f4").tobytes() + b"\r\n"
+
+
+def line(readings, temperature=25.0):
+    return "\t".join(f"{x:.2f}\t{y:.2f}\t{z:.2f}\t{temperature}" for x, y, z in readings).encode()
+
+
+def some(n, n_mags=5, seed=0):
+    rng = np.random.default_rng(seed)
+    return rng.normal(0, 300, (n, n_mags, 3)).astype(np.float32)
+
+
+def decoded(data, n_mags=5, piece=None, start=b"\r\n"):
+    decoder = AnySkinDecoder(n_mags)
+    data = start + data
+    step = piece or len(data)
+    parts = [decoder.feed(data[k : k + step]) for k in range(0, len(data), step)]
+    samples = [sample for part in parts for sample in part.samples]
+    return samples, sum(part.n_refused for part in parts), parts[-1].other_n_mags
+
+
+@pytest.mark.parametrize("n_mags", [1, 2, 5, 16])
+def test_packets_are_decoded_exactly(n_mags):
+    given = some(4, n_mags)
+    samples, n_refused, other = decoded(b"".join(map(packet, given)), n_mags)
+    np.testing.assert_array_equal(samples, given)
+    assert (n_refused, other) == (0, 0)
+    assert all(sample.dtype == np.float32 and sample.dtype.isnative for sample in samples)
+
+
+def test_five_magnetometers_are_82_bytes():
+    data = packet(some(1)[0])
+    assert len(data) == 82
+    decoder = AnySkinDecoder(5)
+    assert decoder.feed(b"\n" + data[:-1]).samples == []
+    assert len(decoder.feed(data[-1:]).samples) == 1
+
+
+@settings(deadline=None)
+@given(
+    st.lists(st.lists(READING, min_size=6, max_size=6), min_size=1, max_size=5),
+    st.integers(1, 80),
+    st.floats(-40, 125, width=32),
+)
+@example([[CRLF_INSIDE[0], CRLF_INSIDE[1]] * 3] * 4, 1, CRLF_INSIDE[0])
+def test_pieces_of_any_size_give_the_same(rows, piece, temperature):
+    given = np.array(rows, dtype=np.float32).reshape(-1, 2, 3)
+    data = b"".join(packet(sample, temperature) for sample in given)
+    samples, n_refused, _ = decoded(data, 2, piece)
+    np.testing.assert_array_equal(samples, given)
+    assert n_refused == 0
+
+
+@settings(deadline=None)
+@given(
+    st.lists(
+        st.one_of(
+            st.integers(0, 3).map(lambda seed: packet(some(1, 2, seed)[0])),
+            st.integers(0, 3).map(lambda seed: line(some(1, 2, seed)[0]) + b"\t\r\n"),
+            st.binary(max_size=90),
+            st.sampled_from([b"\r\n", b"\n", b"1 2 3 4\n", b"12 13", b"1.0\t" * 40]),
+        ),
+        max_size=8,
+    ),
+    st.integers(1, 60),
+)
+def test_garbage_gives_the_same_in_pieces_of_any_size(parts, piece):
+    data = b"".join(parts)
+    tail = b"".join(map(packet, some(30, 2)))  # long enough to resynchronise
+    whole = decoded(data + tail, 2)
+    pieces = decoded(data + tail, 2, piece)
+    np.testing.assert_array_equal(whole[0], pieces[0])
+    assert whole[1] == pieces[1]
+    np.testing.assert_array_equal(whole[0][-28:], some(30, 2)[-28:])
+
+
+@settings(deadline=None)
+@given(st.binary(min_size=1, max_size=300))
+def test_garbage_loses_only_the_packet_that_it_joins(garbage):
+    given = some(6)
+    before, after = b"".join(map(packet, given[:3])), b"".join(map(packet, given[3:]))
+    samples, n_refused, _ = decoded(before + garbage + after)
+    np.testing.assert_array_equal(samples[:3], given[:3])
+    np.testing.assert_array_equal(samples[-2:], given[-2:])
+    assert 1 <= n_refused <= 2 + len(garbage) // 8
+
+
+def test_garbage_that_ends_like_a_packet_loses_none():
+    given = some(4)
+    before, after = b"".join(map(packet, given[:2])), b"".join(map(packet, given[2:]))
+    samples, n_refused, _ = decoded(before + b"x" * 200 + b"\r\n" + after)
+    np.testing.assert_array_equal(samples, given)
+    assert n_refused == 3
+
+
+def test_a_stream_from_the_middle_refuses_nothing():
+    given = some(5)
+    data = b"".join(map(packet, given))
+    for start in range(1, 83):
+        samples, n_refused, _ = decoded(data[start:], start=b"")
+        np.testing.assert_array_equal(samples, given[1:] if start < 82 else given[2:])
+        assert n_refused == 0
+
+
+def test_a_packet_without_a_byte_loses_one_sample():
+    given = some(3)
+    packets = [packet(sample) for sample in given]
+    samples, n_refused, _ = decoded(packets[0] + packets[1][:40] + packets[1][41:] + packets[2])
+    np.testing.assert_array_equal(samples, given[[0, 2]])
+    assert n_refused == 1
+
+
+@pytest.mark.parametrize("bad", [np.nan, np.inf, 2e6, 1e-5])
+def test_impossible_numbers_are_refused(bad):
+    given = some(4)
+    wrong = given[2].copy()
+    wrong[3, 1] = bad
+    samples, n_refused, _ = decoded(b"".join(map(packet, [*given[:2], wrong, given[3]])))
+    np.testing.assert_array_equal(samples, given[[0, 1, 3]])
+    assert n_refused == 1
+
+
+@pytest.mark.parametrize("bad", [b"nan", b"ovf", b"1.2.3", b"1e30", b""])
+def test_impossible_lines_are_refused(bad):
+    lines = [line(sample) + b"\t\r\n" for sample in some(4)]
+    words = lines[2].split(b"\t")
+    lines[2] = b"\t".join([*words[:9], bad, *words[10:]])
+    samples, n_refused, _ = decoded(b"".join(lines))
+    np.testing.assert_allclose(samples, some(4)[[0, 1, 3]], atol=0.006)
+    assert n_refused >= 1
+
+
+@pytest.mark.parametrize("temperature", [-201.0, 201.0, np.nan])
+def test_an_impossible_temperature_is_refused(temperature):
+    given = some(3)
+    packets = [packet(given[0]), packet(given[1], temperature), packet(given[2])]
+    samples, n_refused, _ = decoded(b"".join(packets))
+    np.testing.assert_array_equal(samples, given[[0, 2]])
+    assert n_refused == 1
+
+
+@pytest.mark.parametrize("end", [b"\r\n", b"\n", b"\t\r\n", b" \n"])
+@pytest.mark.parametrize("piece", [1, 7, None])
+def test_lines_of_text_are_taken_from_the_second_on(end, piece):
+    given = some(4)
+    data = b"".join(line(sample) + end for sample in given)
+    samples, n_refused, _ = decoded(data[20:], 5, piece, start=b"")
+    np.testing.assert_allclose(samples, given[1:], atol=0.006)
+    assert n_refused <= 1  # half a line may be longer than a packet
+
+
+@pytest.mark.parametrize("n_mags", [1, 3, 4, 6, 10])
+@pytest.mark.parametrize("piece", [16, 82, None])
+def test_another_number_of_magnetometers_is_recognized(n_mags, piece):
+    samples, n_refused, other = decoded(b"".join(map(packet, some(30, n_mags))), 5, piece)
+    assert samples == []
+    assert n_refused > 0
+    assert other == n_mags
+
+
+def test_another_number_in_a_line_is_recognized():
+    data = b"".join(line(sample) + b"\r\n" for sample in some(5, 4))
+    samples, n_refused, other = decoded(data)
+    assert samples == []
+    assert n_refused >= 4
+    assert other == 4
+
+
+def test_an_expected_packet_clears_another_number():
+    decoder = AnySkinDecoder(5)
+    assert decoder.feed(b"\n" + b"".join(map(packet, some(9, 4)))).other_n_mags == 4
+    assert decoder.feed(b"".join(map(packet, some(9, 5)))).other_n_mags == 0
+
+
+def test_a_reset_drops_half_a_packet():
+    first, second = some(2)
+    decoder = AnySkinDecoder(5)
+    decoder.feed(packet(first)[:50])
+    decoder.reset()
+    got = decoder.feed(b"\r\n" + packet(second))
+    np.testing.assert_array_equal(got.samples, [second])
+    assert got.n_refused == 0
+
+
+def test_endless_garbage_needs_bounded_memory():
+    decoder = AnySkinDecoder(5)
+    rng = np.random.default_rng(0)
+    for piece in (rng.bytes(10_000), b"1.0\t" * 5000, b"\n" * 20_000, b"\r\n" * 9000):
+        decoder.feed(piece)
+        assert len(decoder._buffer) < 5000
+        assert len(decoder._recent) < 5000

@@ -1,0 +1,343 @@
+import itertools
+import time
+
+import numpy as np
+import pytest
+
+from holdfast.detector import Detector, detect
+from holdfast.errors import RecordingError
+from holdfast.io import load_recording, save_recording
+from holdfast.model import Model
+from holdfast.recordings import Recording, Tactile
+from holdfast.sensors import sensor
+from holdfast.devices.sources import open_source
+from holdfast.devices.sources import replay as module
+from holdfast.devices.sources.replay import Replay
+from holdfast.synthetic import synthetic_recording
+
+SUFFIXES = ("parquet", "mcap")
+
+
+class Clock:
+    """A clock that only sleep and `pass_by` move."""
+
+    def __init__(self):
+        self.now = 100.0
+        self.slept = []
+
+    def monotonic(self):
+        return self.now
+
+    def sleep(self, seconds):
+        assert seconds > 0
+        self.slept.append(seconds)
+        self.now += seconds
+
+
+@pytest.fixture
+def clock(monkeypatch):
+    clock = Clock()
+    monkeypatch.setattr(module, "time", clock)
+    return clock
+
+
+def hand(n=50, **fields):
+    times = 3.0 + np.arange(n) / 100
+    rng = np.random.default_rng(0)
+    modules = {
+        "thumb": Tactile(sensor("uskin-4x4"), times, rng.integers(0, 999, (n, 16, 3)).astype("u2")),
+        "index": Tactile(sensor("anyskin"), times[::2] + 0.003, rng.normal(size=(n // 2, 5, 3))),
+    }
+    return Recording(**({"name": "grasp", "modules": modules} | fields))
+
+
+@pytest.fixture
+def path(tmp_path):
+    save_recording(hand(), tmp_path / "grasp.parquet")
+    return str(tmp_path / "grasp.parquet")
+
+
+def put_together(arrivals):
+    """Times and readings of each module."""
+    found = {}
+    for arrival in arrivals:
+        for name, sample in arrival.samples.items():
+            found.setdefault(name, []).append((arrival.time, sample))
+    return {
+        name: (np.array([t for t, _ in rows]), np.array([r for _, r in rows]))
+        for name, rows in found.items()
+    }
+
+
+@pytest.mark.parametrize("suffix", SUFFIXES)
+def test_it_gives_exactly_the_content_of_the_file(tmp_path, suffix):
+    recording = hand(3000)
+    save_recording(recording, tmp_path / f"a.{suffix}")
+    with open_source(str(tmp_path / f"a.{suffix}"), speed=0) as source:
+        assert isinstance(source, Replay)
+        assert source.sensors == {name: m.sensor for name, m in recording.modules.items()}
+        found = put_together(source)
+    for name, module_ in recording.modules.items():
+        times, readings = found[name]
+        np.testing.assert_array_equal(times, module_.times)
+        np.testing.assert_array_equal(readings, module_.readings)
+        assert readings.dtype == module_.readings.dtype
+
+
+@pytest.mark.parametrize("suffix", SUFFIXES)
+def test_a_detector_fed_with_it_equals_detect(tmp_path, suffix):
+    """Offline detection is the detector fed with the recording."""
+    whole = synthetic_recording("grasp", 0, ("thumb", "index", "middle"))
+    thumb, index, middle = whole.modules.values()
+    own = Tactile(middle.sensor, middle.times[:-9] + 0.0021, middle.readings[:-9])
+    modules = {"thumb": thumb, "index": index.slice(5, 900), "middle": own}
+    recording = Recording("grasp", modules)
+    save_recording(recording, tmp_path / f"grasp.{suffix}")
+    model = Model.load("builtin:noise-floor")
+    expected = detect(model, recording)
+    detector = Detector.for_recording(model, recording)
+    n_seen = dict.fromkeys(modules, 0)
+    with Replay(tmp_path / f"grasp.{suffix}", speed=0) as source:
+        for k, arrival in enumerate(source):
+            estimate = detector.update(arrival.samples, arrival.time)
+            assert arrival.time == expected.times[k]
+            assert estimate.state.code == expected.hand[k]
+            for name in arrival.samples:
+                want = expected.fingers[name].estimate(n_seen[name])
+                assert repr(estimate.fingers[name]) == repr(want)  # NaN is NaN
+                n_seen[name] += 1
+    assert n_seen == {name: len(trace) for name, trace in expected.fingers.items()}
+    assert k + 1 == len(expected.times)
+    assert len({tuple(trace.state) for trace in expected.fingers.values()}) > 1
+
+
+@pytest.mark.parametrize("speed", [0.5, 1.0, 20.0])
+def test_it_plays_at_its_speed(path, clock, speed):
+    with Replay(path, speed=speed) as source:
+        assert source.paced
+        clock.now += 7.0  # time begins with the first read
+        arrivals = list(source)
+    began = arrivals[0].received
+    assert began == 107.0
+    for arrival in arrivals:
+        assert arrival.received - began == pytest.approx((arrival.time - 3.0) / speed, abs=1e-9)
+
+
+def test_speed_0_never_sleeps(path, clock):
+    with Replay(path, speed=0) as source:
+        assert not source.paced
+        assert len(list(source)) == 75
+    assert clock.slept == []
+
+
+def test_a_slow_reader_gets_all_at_once(path, clock):
+    with Replay(path) as source:
+        first = source.read(1.0)
+        clock.now += 0.2
+        missed = [source.read(0.0) for _ in range(30)]
+        assert [arrival.received for arrival in missed] == [clock.now] * 30
+        assert source.read(0.0) is None
+        after = source.read(1.0)
+        assert after.received - first.received == pytest.approx(after.time - first.time)
+        rest = list(source)
+    assert len([first, *missed, after, *rest]) == 75
+
+
+def test_a_timeout_that_is_too_short_gives_none_and_loses_nothing(path, clock):
+    with Replay(path, speed=0.1) as source:
+        got = [source.read(0.007) for _ in range(1200)]
+        assert None in got
+        assert source.ended
+    arrivals = [arrival for arrival in got if arrival is not None]
+    assert len(arrivals) == 75
+    assert max(clock.slept) <= 0.0071
+
+
+def test_time_does_not_drift(path, clock, monkeypatch):
+    """Each sample is due by the beginning, not by the one before."""
+    clock.sleep = lambda seconds: setattr(clock, "now", clock.now + seconds + 1e-3)
+    with Replay(path) as source:
+        arrivals = list(source)
+    late = [a.received - 100.0 - (a.time - 3.0) for a in arrivals]
+    assert max(late) < 2e-3
+
+
+def test_it_ends(path):
+    with Replay(path, speed=0) as source:
+        for _ in range(75):
+            assert not source.ended
+            assert source.read(0.0) is not None
+        assert source.ended
+        assert source.read(10.0) is None
+
+
+def test_markers_become_notices(tmp_path):
+    markers = ((3.1, "closed"), (99.0, "over"))
+    save_recording(hand(markers=markers), tmp_path / "a.mcap")
+    with Replay(tmp_path / "a.mcap", speed=0) as source:
+        arrivals = list(source)
+    marked = [(k, a.notices) for k, a in enumerate(arrivals) if a.notices]
+    assert [notices for _, notices in marked] == [("marker: closed",), ("marker: over",)]
+    (k, _), (last, _) = marked
+    assert np.isnan(arrivals[k].time)
+    assert arrivals[k].samples == {}
+    assert arrivals[k - 1].time <= 3.1 < arrivals[k + 1].time
+    assert last == len(arrivals) - 1
+
+
+@pytest.mark.parametrize("speed", [0.0, 10.0])
+def test_time_continues_in_a_loop(path, clock, speed):
+    with Replay(path, speed=speed, loop=True) as source:
+        got = list(itertools.islice(source, 75 * 3 + 5))
+        assert not source.ended
+    times = np.array([arrival.time for arrival in got]).ravel()
+    assert (np.diff(times) > 0).all()
+    passes = times[:225].reshape(3, 75)
+    np.testing.assert_allclose(passes - passes[:, :1], [passes[0] - 3.0] * 3, atol=1e-12)
+    np.testing.assert_allclose(passes[1:, 0] - passes[:-1, -1], 1.0)
+    noticed = [k for k, arrival in enumerate(got) if arrival.notices]
+    assert noticed == [75, 150, 225]
+    assert got[75].notices == (f"{path} starts again",)
+    if speed:
+        waited = got[224].received - got[0].received
+        assert waited == pytest.approx((got[224].time - got[0].time) / speed)
+
+
+def test_the_next_pass_after_a_slow_reader_is_not_faster(path, clock):
+    with Replay(path, loop=True) as source:
+        list(itertools.islice(source, 75))
+        clock.now += 60.0
+        first, second = itertools.islice(source, 2)
+    assert second.received - first.received == pytest.approx(second.time - first.time)
+
+
+def test_metadata_are_those_of_the_recording_and_the_source(tmp_path):
+    save_recording(hand(metadata={"object": "can", "source": "twin"}), tmp_path / "a.parquet")
+    with Replay(tmp_path / "a.parquet") as source:
+        assert source.metadata == {
+            "object": "can",
+            "recorded_from": "twin",
+            "source": str(tmp_path / "a.parquet"),
+        }
+
+
+def test_metadata_without_a_source(path):
+    with Replay(path) as source:
+        assert source.metadata == {"source": path}
+
+
+def test_an_incomplete_recording_is_played_as_far_as_it_goes(tmp_path):
+    file = tmp_path / "a.mcap"
+    save_recording(hand(900), file)
+    file.write_bytes(file.read_bytes()[:-30_000])
+    left = load_recording(file).modules
+    assert left["thumb"].n_samples < 900
+    with Replay(file, speed=0) as source:
+        arrivals = list(source)
+    assert arrivals[0].notices == (f"{file} was cut off; what could be recovered is played",)
+    assert not any(arrival.notices for arrival in arrivals[1:])
+    found = put_together(arrivals)
+    assert {name: len(times) for name, (times, _) in found.items()} == {
+        name: one.n_samples for name, one in left.items()
+    }
+
+
+def test_damage_in_its_middle_ends_it_with_a_notice(tmp_path, monkeypatch):
+    def damaged(path, n_samples, labels):
+        yield hand()
+        raise RecordingError("a.parquet is damaged: so it is")
+
+    monkeypatch.setattr("holdfast.devices.sources.replay.read_chunks", damaged)
+    with Replay("a.parquet", speed=0, loop=True) as source:
+        arrivals = list(source)
+        assert source.ended
+    assert sum(len(arrival.samples) for arrival in arrivals) == 75
+    assert arrivals[-1].notices == ("the rest is lost: a.parquet is damaged: so it is",)
+    assert not any(arrival.notices for arrival in arrivals[:-1])
+
+
+def test_a_deleted_file_ends_a_loop_with_a_notice(tmp_path):
+    save_recording(hand(), tmp_path / "a.parquet")
+    with Replay(tmp_path / "a.parquet", speed=0, loop=True) as source:
+        got = list(itertools.islice(source, 75))
+        (tmp_path / "a.parquet").unlink()
+        got += list(source)
+        assert source.ended
+    assert got[-1].notices == (
+        f"the rest is lost: {tmp_path}/a.parquet does not exist; a recording's file expected",
+    )
+    assert len(got) == 76
+
+
+def test_samples_out_of_order_are_reported(monkeypatch):
+    early, late = hand(600), hand(600)
+    monkeypatch.setattr("holdfast.devices.sources.replay.read_chunks", lambda *_, **__: iter([early, late]))
+    with Replay("a.parquet", speed=0) as source:
+        (refused,) = [arrival for arrival in source if arrival.n_refused]
+    assert refused.notices == (f"{refused.n_refused} samples are out of order and were left out",)
+
+
+@pytest.mark.parametrize("speed", [-1.0, np.nan, np.inf])
+def test_an_invalid_speed(speed):
+    with pytest.raises(ValueError) as error:
+        Replay("grasp.parquet", speed=speed)
+    assert str(error.value) == f"a speed of at least 0 expected, {speed} given"
+
+
+@pytest.mark.parametrize(
+    ("name", "content", "message"),
+    [
+        ("none.parquet", None, "none.parquet does not exist; a recording's file expected"),
+        ("a.csv", b"", "a.csv: .csv given, .parquet or .mcap expected"),
+        ("a.parquet", b"", "a.parquet is empty (0 bytes); a Parquet recording expected"),
+        ("a.mcap", b"", "a.mcap is empty (0 bytes); an MCAP recording expected"),
+        ("a.parquet", b"PAR1" + bytes(99), "a.parquet is cut or damaged"),
+    ],
+)
+def test_only_opening_finds_that_it_cannot_be_read(tmp_path, name, content, message):
+    if content is not None:
+        (tmp_path / name).write_bytes(content)
+    source = open_source(str(tmp_path / name))
+    with pytest.raises(RecordingError) as error:
+        source.open()
+    assert message in str(error.value)
+
+
+def test_a_file_without_permission(path, monkeypatch):
+    def refuse(*args, **options):
+        raise PermissionError(13, "Permission denied")
+
+    monkeypatch.setattr("holdfast.devices.sources.replay.read_chunks", refuse)
+    with pytest.raises(RecordingError) as error:
+        Replay(path).open()
+    assert str(error.value) == f"cannot read {path}: Permission denied"
+
+
+def test_a_recording_without_pieces(path, monkeypatch):
+    monkeypatch.setattr("holdfast.devices.sources.replay.read_chunks", lambda *_, **__: iter(()))
+    with pytest.raises(RecordingError) as error:
+        Replay(path).open()
+    assert str(error.value) == f"{path} has no samples; at least one expected"
+
+
+def test_the_wall_clock_is_what_counts(path):
+    """Without a clock of the test's own: all of half a second, and no sooner."""
+    began = time.monotonic()
+    with Replay(path) as source:
+        arrivals = list(source)
+    assert time.monotonic() - began >= 0.49
+    assert all(one.received <= two.received for one, two in itertools.pairwise(arrivals))
+
+
+@pytest.mark.parametrize("loop", [False, True])
+def test_it_starts_again_from_the_beginning(path, clock, loop):
+    with Replay(path, loop=loop) as source:
+        source.restart()  # at its beginning, it has no effect
+        before = [source.read(60.0) for _ in range(20)]
+        source.restart()
+        after = [source.read(60.0) for _ in range(20)]
+    assert after[0].time == pytest.approx(before[-1].time + module.PAUSE)
+    for one, again in zip(before, after, strict=True):
+        assert again.time - one.time == pytest.approx(after[0].time - before[0].time)
+        for name, sample in one.samples.items():
+            np.testing.assert_array_equal(again.samples[name], sample)

@@ -1,0 +1,380 @@
+import importlib
+import itertools
+import sys
+import threading
+import time
+from contextlib import contextmanager
+
+import msgspec
+import numpy as np
+import pytest
+
+import holdfast.devices.sources.serial as module
+from holdfast.contact import Fault
+from holdfast.errors import MissingExtra, SourceError
+from holdfast.sensors import sensor
+from holdfast.devices.sources import base, open_source
+from devices.sources.board import Board, packet, some
+
+LIMIT = 20.0
+"""A test that hangs fails after this [s]."""
+
+
+@pytest.fixture
+def board(tmp_path):
+    board = Board(tmp_path)
+    yield board
+    if board.path.exists():
+        board.unplug()
+
+
+@pytest.fixture
+def impatient(monkeypatch):
+    monkeypatch.setattr(module, "OPEN_TIMEOUT", 0.3)
+    monkeypatch.setattr(base, "MIN_RETRY_DELAY", 0.02)
+    monkeypatch.setattr(base, "MAX_RETRY_DELAY", 0.05)
+
+
+@contextmanager
+def started(board, text="", n_mags=5):
+    """An open source; what the board sent while it opened is taken."""
+    board.keep_sending([b"\n"] + [packet(some(1, n_mags, 99)[0])] * 10_000, 0.002)
+    try:
+        source = open_source(f"serial://{board.path}{text}").__enter__()
+    finally:
+        board.hush()
+    try:
+        while source.read(0.1) is not None:
+            pass
+        yield source
+    finally:
+        source.close()
+
+
+def samples_of(source, n):
+    got = []
+    end = time.monotonic() + LIMIT
+    while len(got) < n and time.monotonic() < end:
+        arrival = source.read(0.1)
+        if arrival is not None and arrival.samples:
+            got.append(arrival)
+    assert len(got) == n
+    return got
+
+
+def wait_for(source, wanted):
+    """Arrivals up to the first that is wanted."""
+    got = []
+    end = time.monotonic() + LIMIT
+    while time.monotonic() < end:
+        arrival = source.read(0.1)
+        if arrival is not None:
+            got.append(arrival)
+            if wanted(arrival):
+                return got
+    pytest.fail(f"not among {got}")
+
+
+def test_values_are_exact(board):
+    given = some(20)
+    with started(board) as source:
+        board.send(*map(packet, given))
+        arrivals = samples_of(source, 20)
+    np.testing.assert_array_equal([arrival.samples["finger1"] for arrival in arrivals], given)
+    times = [arrival.time for arrival in arrivals]
+    assert (np.diff(times) > 0).all()
+    assert all(arrival.time <= arrival.received <= time.monotonic() for arrival in arrivals)
+    assert not any(arrival.notices or arrival.n_refused for arrival in arrivals)
+
+
+def test_samples_that_come_together_are_a_period_apart(board):
+    with started(board) as source:
+        time.sleep(0.2)
+        board.send(b"".join(map(packet, some(10))))
+        arrivals = samples_of(source, 10)
+    assert len({arrival.received for arrival in arrivals}) == 1
+    assert np.diff([arrival.time for arrival in arrivals]) == pytest.approx(0.01)
+    assert arrivals[-1].time == arrivals[-1].received
+
+
+def test_samples_that_waited_are_late(board):
+    with started(board) as source:
+        time.sleep(0.5)
+        board.send(b"".join(map(packet, some(30))))
+        arrivals = samples_of(source, 30)
+    assert arrivals[0].faults == {"finger1": (Fault.LATE,)}
+    assert arrivals[-1].faults == {}
+
+
+def test_the_module_is_named(board):
+    with started(board, "?fingers=1:index&baud=9600") as source:
+        assert source.sensors == {"index": sensor("anyskin")}
+        board.send(packet(some(1)[0]))
+        assert list(samples_of(source, 1)[0].samples) == ["index"]
+        assert source.metadata["source"] == source.name
+        assert source.metadata["sensor"] == "anyskin"
+        msgspec.json.encode(source.metadata)
+
+
+def test_a_board_may_carry_several_sensors(board):
+    given = some(1, 10)
+    with started(board, "?mags=10&fingers=2:thumb", n_mags=10) as source:
+        board.send(packet(given[0]))
+        (arrival,) = samples_of(source, 1)
+    np.testing.assert_array_equal(arrival.samples["finger1"], given[0, :5])
+    np.testing.assert_array_equal(arrival.samples["thumb"], given[0, 5:])
+
+
+def test_a_sensor_from_a_file(board, tmp_path):
+    path = tmp_path / "mine.json"
+    mine = sensor("papillarray").to_dict() | {"name": "mine", "unit": "count"}
+    path.write_bytes(msgspec.json.encode(mine))
+    given = some(1, 9)
+    with started(board, f"?sensor={path}", n_mags=9) as source:
+        board.send(packet(given[0]))
+        np.testing.assert_array_equal(samples_of(source, 1)[0].samples["finger1"], given[0])
+        assert source.sensors["finger1"].name == "mine"
+
+
+def test_garbage_is_counted_and_reported(board):
+    given = some(4)
+    with started(board) as source:
+        board.send(*map(packet, given[:2]), b"\xff" * 200 + b"\r\n", *map(packet, given[2:]))
+        arrivals = wait_for(
+            source, lambda a: a.samples and (a.samples["finger1"] == given[3]).all()
+        )
+    samples = [arrival.samples["finger1"] for arrival in arrivals if arrival.samples]
+    np.testing.assert_array_equal(samples, given)
+    assert sum(arrival.n_refused for arrival in arrivals) == 3
+    notices = [notice for arrival in arrivals for notice in arrival.notices]
+    assert notices == ["invalid packets are dropped"]
+
+
+def test_a_notice_is_given_once_a_second(board, monkeypatch):
+    with started(board) as source:
+        clock = [1000.0]
+        monkeypatch.setattr(module, "time", _Clock(clock))
+        notices = []
+        for _ in range(8):
+            clock[0] += 0.3
+            board.send(b"\xff" * 100 + b"\r\n")
+            arrivals = wait_for(source, lambda a: a.n_refused)
+            notices.append(sum(len(arrival.notices) for arrival in arrivals))
+    assert notices == [1, 0, 0, 0, 1, 0, 0, 0]
+
+
+def test_wrong_numbers_of_magnetometers_that_alternate_give_one_notice(board, monkeypatch):
+    with started(board) as source:
+        monkeypatch.setattr(module, "time", _Clock([1000.0]))
+        notices = []
+        for k in range(6):
+            board.send(b"1.5 2.5 3.5 25.0 " * (3 + k % 2) + b"\r\n")
+            arrivals = wait_for(source, lambda a: a.n_refused)
+            assert arrivals[-1].faults == {"finger1": (Fault.TAXEL_COUNT,)}
+            notices += [notice for arrival in arrivals for notice in arrival.notices]
+    assert notices == [
+        "packets of 3 magnetometers come, 5 expected (anyskin; mags= gives their number)"
+    ]
+
+
+class _Clock:
+    def __init__(self, now):
+        self._now = now
+
+    def monotonic(self):
+        return self._now[0]
+
+
+def test_another_number_of_magnetometers_gives_a_fault_and_no_sample(board):
+    given = some(1)
+    with started(board) as source:
+        board.send(*map(packet, some(9, 4)))
+        arrivals = wait_for(source, lambda a: a.faults)
+        assert not any(arrival.samples for arrival in arrivals)
+        assert arrivals[-1].faults == {"finger1": (Fault.TAXEL_COUNT,)}
+        assert np.isnan(arrivals[-1].time)
+        notices = [notice for arrival in arrivals for notice in arrival.notices]
+        assert notices[-1] == (
+            "packets of 4 magnetometers come, 5 expected (anyskin; mags= gives their number)"
+        )
+        board.send(packet(given[0]))
+        (arrival,) = samples_of(source, 1)
+    np.testing.assert_array_equal(arrival.samples["finger1"], given[0])
+    assert arrival.faults == {}
+
+
+def test_lines_of_text_are_samples(board):
+    given = np.round(some(3), 2)
+    text = ["\t".join(f"{x:.2f}\t{y:.2f}\t{z:.2f}\t25.13" for x, y, z in s) for s in given]
+    with started(board) as source:
+        board.send(*(f"{line}\t\r\n".encode() for line in text))
+        arrivals = samples_of(source, 3)
+    np.testing.assert_allclose([a.samples["finger1"] for a in arrivals], given, atol=1e-3)
+
+
+def test_an_unplugged_board_is_connected_again(board, impatient):
+    given = some(3)
+    with started(board) as source:
+        before = time.monotonic()
+        board.unplug()
+        arrivals = wait_for(source, lambda a: a.notices)
+        assert not arrivals[-1].samples
+        assert arrivals[-1].notices[0].startswith("connection lost (")
+        assert source.read(0.2) is None
+        assert not source.ended
+        board.plug()
+        arrivals = wait_for(source, lambda a: a.notices)
+        assert arrivals[-1].notices[0].startswith("connected again after 0.")
+        board.send(b"half a packet\r\n", *map(packet, given))
+        after = samples_of(source, 3)
+    np.testing.assert_array_equal([arrival.samples["finger1"] for arrival in after], given)
+    assert after[0].time > before
+
+
+def test_attempts_become_less_frequent(board, monkeypatch):
+    slept = []
+    with started(board) as source:
+        board.unplug()
+        wait_for(source, lambda a: a.notices)
+        clock = [time.monotonic()]
+        fake = _Clock(clock)
+        fake.sleep = lambda seconds: (
+            slept.append(seconds),
+            clock.__setitem__(0, clock[0] + seconds),
+        )
+        monkeypatch.setattr(base, "time", fake)
+        assert source.read(10.0) is None
+    assert slept[:5] == pytest.approx([0.5, 1.0, 2.0, 2.0, 2.0], abs=0.05)
+    assert sum(slept) == pytest.approx(10.0, abs=0.05)
+
+
+def test_a_port_that_is_missing_is_an_error(tmp_path, monkeypatch):
+    monkeypatch.setattr(module, "comports", lambda: [_Port("/dev/ttyS1"), _Port("/dev/ttyACM7")])
+    source = open_source(f"serial://{tmp_path}/none")
+    with pytest.raises(SourceError) as error:
+        source.open()
+    assert str(error.value) == (
+        f"serial://{tmp_path}/none: there is no such port; serial ports: /dev/ttyACM7, /dev/ttyS1"
+    )
+
+
+class _Port:
+    def __init__(self, device):
+        self.device = device
+
+
+def test_a_port_without_permission_is_an_error(board, monkeypatch):
+    def refuse(*args, **others):
+        raise PermissionError(13, "Permission denied")
+
+    monkeypatch.setattr(module, "Serial", refuse)
+    monkeypatch.setattr(module, "comports", list)
+    with pytest.raises(SourceError) as error:
+        open_source(f"serial://{board.path}").open()
+    assert str(error.value) == (
+        f"serial://{board.path}: it may not be opened; is the user in the group dialout?; "
+        "serial ports: none"
+    )
+
+
+def test_a_file_that_is_no_port_is_an_error(tmp_path):
+    (tmp_path / "file").write_text("")
+    with pytest.raises(SourceError, match="Could not configure port"):
+        open_source(f"serial://{tmp_path}/file").open()
+
+
+def test_a_port_can_be_opened_once(board):
+    with started(board), pytest.raises(SourceError, match="lock"):
+        open_source(f"serial://{board.path}").open()
+
+
+def test_silence_after_opening_is_an_error(board, impatient):
+    source = open_source(f"serial://{board.path}")
+    with pytest.raises(SourceError) as error, source:
+        pass
+    assert str(error.value) == (
+        f"{source.name}: nothing came within 0.3 s; packets of 5 magnetometers at 115200 baud "
+        "expected"
+    )
+    with started(board):  # it was closed
+        pass
+
+
+def test_garbage_after_opening_is_an_error(board, impatient):
+    source = open_source(f"serial://{board.path}")
+    board.keep_sending([b"\xff" * 82] * 10_000)
+    try:
+        with pytest.raises(SourceError, match=r"\d invalid packets came within 0.3 s"):
+            source.__enter__()
+    finally:
+        board.hush()
+
+
+def test_another_number_of_magnetometers_after_opening_is_an_error(board):
+    source = open_source(f"serial://{board.path}")
+    board.keep_sending([packet(some(1, 4)[0])] * 10_000)
+    try:
+        with pytest.raises(SourceError) as error:
+            source.__enter__()
+    finally:
+        board.hush()
+    assert str(error.value) == (
+        f"{source.name}: packets of 4 magnetometers come, 5 expected "
+        "(anyskin; mags= gives their number)"
+    )
+
+
+def test_unplugged_while_opening_is_an_error(board):
+    source = open_source(f"serial://{board.path}")
+    unplug = threading.Timer(0.2, board.unplug)
+    unplug.start()
+    with pytest.raises(SourceError, match="serial ports"):
+        source.__enter__()
+    unplug.join()
+
+
+@pytest.mark.parametrize(
+    ("text", "message"),
+    [
+        ("serial:", "serial:: a port expected, as in serial:///dev/ttyACM0"),
+        ("serial:COM3?speed=1", "unknown parameter speed; there are sensor, fingers, baud, mags"),
+        ("serial:COM3?baud=fast", "baud=115200, at least 1, expected, 'fast' given"),
+        ("serial:COM3?baud=0", "baud=115200, at least 1, expected, '0' given"),
+        ("serial:COM3?mags=-5", "mags=5, at least 1, expected, '-5' given"),
+        (
+            "serial:COM3?sensor=skin",
+            "serial:COM3?sensor=skin: sensor=FILE.json or one of uskin-curved, ",
+        ),
+        ("serial:COM3?sensor=none.json", "cannot read none.json: No such file or directory"),
+        (
+            "serial:COM3?mags=7",
+            "serial:COM3?mags=7: mags=7 given; anyskin has 5 taxels, a multiple of that expected",
+        ),
+        (
+            "serial:COM3?fingers=1:index,3:thumb",
+            "a name for finger 3 given; with 5 magnetometers of anyskin there are 1",
+        ),
+        (
+            "serial:COM3?mags=10&fingers=1:finger2",
+            "two fingers would be called finger2",
+        ),
+    ],
+)
+def test_invalid_parameters(text, message):
+    with pytest.raises(ValueError) as error:
+        open_source(text)
+    assert message in str(error.value)
+
+
+def test_a_port_of_windows():
+    assert open_source("serial:COM3")._path == "COM3"
+
+
+def test_without_pyserial_the_extra_is_named(monkeypatch):
+    monkeypatch.delitem(sys.modules, "holdfast.devices.sources.serial")
+    for name in list(itertools.chain(sys.modules)):
+        if name.split(".")[0] == "serial":
+            monkeypatch.delitem(sys.modules, name)
+    monkeypatch.setitem(sys.modules, "serial", None)
+    with pytest.raises(MissingExtra, match=r"pyserial, which is not installed: .*serial"):
+        importlib.import_module("holdfast.devices.sources.serial")

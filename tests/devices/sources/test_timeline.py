@@ -1,0 +1,196 @@
+import math
+import re
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from holdfast.contact import Fault
+from holdfast.devices.sources.timeline import Timeline, TransportDelay, clock_notice
+
+PERIOD = 1 / 150
+
+
+def stamps(pairs):
+    timeline = Timeline()
+    return [timeline.stamp(t, received) for t, received in pairs]
+
+
+def steady(n, *, start=1000.0, received=50.0):
+    return [(start + k * PERIOD, received + k * PERIOD) for k in range(n)]
+
+
+def test_steady_stamps_stay_as_they_are():
+    pairs = steady(300)
+    assert [s.time for s in stamps(pairs)] == [t for t, _ in pairs]
+    assert not any(s.faults for s in stamps(pairs))
+
+
+@given(
+    st.lists(
+        st.tuples(st.floats(-1e9, 1e9), st.floats(0.0, 10.0, allow_subnormal=False)),
+        min_size=2,
+        max_size=50,
+    )
+)
+def test_times_increase_for_any_stamps(given):
+    received, last = 0.0, -math.inf
+    timeline = Timeline()
+    for device_time, passed in given:
+        received += passed
+        time = timeline.stamp(device_time, received).time
+        assert time > last
+        last = time
+
+
+@pytest.mark.parametrize("jump", [-3600.0, -1.0, 1.0, 3600.0])
+def test_time_goes_on_as_on_the_host_where_the_clock_jumps(jump):
+    before, after = steady(100), steady(200)[100:]
+    given = before + [(t + jump, received) for t, received in after]
+    stamped = stamps(given)
+    assert [s.time for s in stamped] == pytest.approx([t for t, _ in before + after], abs=1e-6)
+    assert stamped[100].faults == (Fault.CLOCK_JUMP,)
+    assert not any(s.faults for k, s in enumerate(stamped) if k != 100)
+
+
+def test_a_burst_after_a_stall_is_late_and_no_jump():
+    pairs = steady(400)
+    stalled = [(t, 52.0 if 51.0 < received < 52.0 else received) for t, received in pairs]
+    stamped = stamps(stalled)
+    assert [s.time for s in stamped] == [t for t, _ in pairs]
+    late = [s.time for s in stamped if s.faults == (Fault.LATE,)]
+    assert late == [t for t, _ in pairs if 1001.0 < t < 1001.9 - 1e-3]
+    assert all(s.faults in ((), (Fault.LATE,)) for s in stamped)
+
+
+def test_a_gap_after_a_stall_is_no_jump():
+    """The reader stalls for 9 s; buffered samples arrive first, then new ones."""
+    pairs = steady(150)
+    buffered = [(1001.0 + k * PERIOD, 60.0) for k in range(1, 100)]
+    new = [(1010.0 + k * PERIOD, 60.0 + k * PERIOD) for k in range(1, 100)]
+    stamped = stamps(pairs + buffered + new)
+    assert [s.time for s in stamped] == [t for t, _ in pairs + buffered + new]
+    assert not any(Fault.CLOCK_JUMP in s.faults for s in stamped)
+    assert all(s.faults == (Fault.LATE,) for s in stamped[150:249])
+    assert not any(s.faults for s in stamped[249:])
+
+
+def test_clocks_that_drifted_over_a_long_pause_did_not_jump():
+    stamped = stamps([*steady(10), (11_000.0 + 0.9, 10_050.0)])
+    assert stamped[-1] == (11_000.9, ())
+
+
+def test_a_jump_after_a_late_sample_leaves_nothing_late():
+    """Sample 100 comes 0.3 s late; those up to 145 are missing, then the clock has jumped."""
+    pairs = steady(300)
+    t, received = pairs[100]
+    after = [(t + 3600.0, received) for t, received in pairs[146:]]
+    stamped = stamps([*pairs[:100], (t, received + 0.3), *after])
+    assert stamped[100].faults == (Fault.LATE,)
+    assert stamped[101].faults == (Fault.CLOCK_JUMP,)
+    assert not any(s.faults for s in stamped[102:])
+
+
+def test_a_small_step_back_is_just_after_the_last():
+    first, second, third = stamps([(10.0, 0.0), (9.96, 0.01), (10.02, 0.02)])
+    assert first.time < second.time == math.nextafter(10.0, math.inf)
+    assert third == (10.02, ())
+    assert second.faults == ()
+
+
+def test_clocks_that_drift_are_not_late():
+    stamped = stamps([(1000.0 + k, 50.0 + k * (1 + 5e-5)) for k in range(10_000)])
+    assert not any(s.faults for s in stamped)
+
+
+def share_of_faults(pairs):
+    """Share of the samples after the first second that have a fault."""
+    stamped = stamps(pairs)[150:]
+    return sum(bool(one.faults) for one in stamped) / len(stamped)
+
+
+@pytest.mark.parametrize("speed", [1.2, 1.5, 3.0])
+def test_a_clock_that_is_too_fast_is_a_fault_within_a_second(speed):
+    assert share_of_faults([(1000.0 + speed * k * PERIOD, k * PERIOD) for k in range(900)]) == 1
+
+
+def test_a_recording_that_is_played_fast_is_no_fault():
+    timeline = Timeline()
+    for k in range(900):
+        assert timeline.stamp(1000.0 + 8 * k * PERIOD, k * PERIOD).faults == ()
+    assert timeline.clock.pace == pytest.approx(8.0, rel=0.01)
+
+
+def test_a_clock_that_is_a_little_too_fast_is_none():
+    assert share_of_faults([(1000.0 + 1.05 * k * PERIOD, k * PERIOD) for k in range(900)]) == 0
+
+
+@pytest.mark.parametrize("step", [-PERIOD, -0.3 * PERIOD, -0.04, -1.0, 0.0])
+def test_a_clock_that_goes_backwards_or_stands_still_is_a_fault_within_a_second(step):
+    assert share_of_faults([(1000.0 + step * k, k * PERIOD) for k in range(900)]) == 1
+
+
+def test_a_clock_that_jumps_again_and_again_is_a_fault():
+    assert share_of_faults([(1000.0 + 60.0 * (k % 2), k * PERIOD) for k in range(900)]) == 1
+
+
+def test_a_burst_at_the_start_makes_no_clock_fast():
+    """Two seconds of samples come at once; the last of them was the quickest."""
+    burst = [(1000.0 + k * PERIOD, 50.0) for k in range(300)]
+    after = [(1000.0 + k * PERIOD, 50.0 + (k - 300) * PERIOD) for k in range(300, 900)]
+    assert not any(one.faults for one in stamps([*burst, *after]))
+
+
+def test_an_unsteady_clock_recovers_within_a_second():
+    fast = [(1000.0 + 1.5 * k * PERIOD, 50.0 + k * PERIOD) for k in range(300)]
+    after = [(1000.0 + (k + 150) * PERIOD, 50.0 + k * PERIOD) for k in range(300, 900)]
+    stamped = stamps([*fast, *after])
+    assert stamped[299].faults == (Fault.CLOCK_JUMP,)
+    assert not any(one.faults for one in stamped[450:])
+
+
+def test_a_clock_that_runs_away_is_late():
+    stamped = stamps([(1000.0 + k, 50.0 + k * 1.01) for k in range(100)])
+    assert [s.faults for s in stamped[:9]] == [()] * 9
+    assert all(s.faults == (Fault.LATE,) for s in stamped[12:])
+
+
+@pytest.mark.parametrize("wrong", [math.nan, math.inf, -math.inf, 1e300, -1e300, 1e11])
+def test_a_stamp_that_is_not_finite_is_refused(wrong):
+    with pytest.raises(ValueError, match=re.escape(f"a time in seconds expected, {wrong} given")):
+        Timeline().stamp(wrong, 0.0)
+
+
+def test_the_offset_is_what_jumps_add():
+    timeline = Timeline()
+    timeline.stamp(100.0, 0.0)
+    assert timeline.offset == 0.0
+    timeline.stamp(40.0, 1.0)
+    assert timeline.offset == 61.0
+
+
+def test_a_delay_after_a_reset():
+    delay = TransportDelay()
+    assert delay.update(0.0, 1.0) == 0.0
+    assert delay.update(1.0, 3.0) == pytest.approx(1.0, abs=1e-3)
+    delay.reset()
+    assert delay.update(2.0, 5.0) == 0.0
+    assert delay.lead(3.0, 5.5) == pytest.approx(0.5, abs=1e-3)
+
+
+@pytest.mark.parametrize(
+    ("stamp", "text"),
+    [
+        (1.7e9, None),
+        (1.7e9 - 59, None),
+        (3000.0, None),
+        (-5.0, None),
+        (1.7e9 - 90, "are 2 min behind the clock of this machine: old data?"),
+        (1.7e9 - 7201, "are 2 h behind the clock of this machine: old data?"),
+        (1.5e9, "are 2315 d behind the clock of this machine: old data?"),
+        (1.8e9, "are 1157 d ahead of the clock of this machine: is its clock set?"),
+    ],
+)
+def test_stamps_of_another_time(stamp, text):
+    expected = None if text is None else f"the stamps of the device {text}"
+    assert clock_notice(stamp, 1.7e9) == expected

@@ -1,0 +1,234 @@
+import itertools
+import json
+import subprocess
+import time
+from dataclasses import asdict, replace
+from functools import cache
+from pathlib import Path
+
+import msgspec
+import numpy as np
+import pytest
+
+from holdfast.cli import simulate as verb
+from holdfast.io import load_recording
+from holdfast.recordings import Recording, Tactile
+from holdfast.sensors import sensor
+from holdfast.devices.sources import open_source
+from holdfast.devices.sources import twin as module
+from holdfast.devices.sources.twin import ATTEMPTS, Twin, grasp_of, write
+from holdfast.devices.uri import parse
+from holdfast.twin.simulation import Grasp, simulate
+
+RUN = module._Simulator._run
+BALL = "twin:?object=ball&case=1&seed=3"
+
+
+@cache
+def ball():
+    return simulate(Grasp("ball", 1, 1, seed=3))
+
+
+@pytest.fixture
+def quick(monkeypatch):
+    """Grasps that take no time: a recording of their number; some fail."""
+
+    def make(grasp, failing=()):
+        times = np.arange(10) / 100
+        readings = np.full((10, 16, 3), 10 * grasp.repeat + grasp.attempt, "u2")
+        failed = (grasp.repeat, grasp.attempt) in failing
+        name = grasp.failed_name if failed else grasp.name
+        metadata = {"attempt": grasp.attempt, "case": "failed" if failed else str(grasp.case)}
+        return Recording(name, {"thumb": Tactile(sensor("uskin-4x4"), times, readings)}, metadata)
+
+    class Here(module._Simulator):
+        """As it is, but for the process."""
+
+        def _run(self, grasp):
+            write(grasp, str(self._path))
+            return subprocess.Popen(["true"])
+
+    def install(failing=()):
+        monkeypatch.setattr(module, "simulate", lambda grasp: make(grasp, failing))
+        monkeypatch.setattr(module, "_Simulator", Here)
+
+    install()
+    return install
+
+
+@pytest.mark.parametrize("server", [False, True])
+def test_samples_are_those_of_the_simulation(server):
+    grasp = Grasp("ball", 1, 1, seed=3, server=server)
+    recording = simulate(grasp)
+    with open_source(f"{BALL}&server={str(server).lower()}", speed=0) as source:
+        assert isinstance(source, Twin)
+        assert source.sensors == {name: m.sensor for name, m in recording.modules.items()}
+        arrivals = list(source)
+    for name, one in recording.modules.items():
+        mine = [arrival for arrival in arrivals if name in arrival.samples]
+        np.testing.assert_array_equal([arrival.time for arrival in mine], one.times)
+        readings = np.array([arrival.samples[name] for arrival in mine])
+        np.testing.assert_array_equal(readings, one.readings)
+        assert readings.dtype == one.readings.dtype
+
+
+def test_metadata_are_those_of_the_recording_and_the_uri(monkeypatch):
+    monkeypatch.setattr(module, "simulate", lambda _: ball())
+    with open_source(BALL) as source:
+        assert source.metadata == {**ball().metadata, "source": BALL}
+        assert source.name == BALL
+
+
+def test_missing_parameters_have_defaults():
+    assert grasp_of(parse("twin:")[1]) == Grasp("can", 2, 1, "reference", 0)
+    text = "twin:?object=ball&case=1&repeat=7&profile=gentle&seed=9&server=true"
+    assert grasp_of(parse(text)[1]) == Grasp("ball", 1, 7, "gentle", 9, server=True)
+
+
+def test_a_grasp_that_fails_is_tried_again(quick):
+    quick(failing={(1, 0), (1, 1)})
+    with open_source("twin:", speed=0) as source:
+        arrivals = list(source)
+    assert arrivals[0].notices == ("the twin grasps: can-case2-1, after 2 failed attempts",)
+    assert {int(a.samples["thumb"][0, 0]) for a in arrivals} == {12}
+
+
+def test_a_grasp_that_always_fails_is_played(quick):
+    quick(failing={(1, attempt) for attempt in range(ATTEMPTS)})
+    with open_source("twin:", speed=0) as source:
+        arrivals = list(source)
+    assert arrivals[0].notices == ("the twin grasps: can-case2-1-failed4, after 3 failed attempts",)
+
+
+def test_it_makes_as_many_attempts_as_simulate():
+    assert ATTEMPTS == verb.ATTEMPTS
+
+
+def test_the_next_repeats_follow(quick):
+    with open_source("twin:?repeat=4", speed=0, loop=True) as source:
+        arrivals = list(itertools.islice(source, 35))
+        assert not source.ended
+        folder = Path(source._simulator._folder.name)
+        assert len(list(folder.iterdir())) == 2  # what is played and what comes next
+    assert not folder.exists()
+    assert [int(a.samples["thumb"][0, 0]) for a in arrivals[::10]] == [40, 50, 60, 70]
+    notices = [arrival.notices for arrival in arrivals if arrival.notices]
+    assert notices == [(f"the twin grasps: can-case2-{k}",) for k in (4, 5, 6, 7)]
+    times = np.array([arrival.time for arrival in arrivals[:30]]).reshape(3, 10)
+    np.testing.assert_allclose(times[1:, 0] - times[:-1, -1], 1.0)
+
+
+def test_it_starts_the_current_grasp_again(quick):
+    with open_source("twin:?repeat=4", speed=0, loop=True) as source:
+        list(itertools.islice(source, 13))  # three samples of the second grasp
+        source.restart()
+        arrivals = list(itertools.islice(source, 20))
+    assert [int(a.samples["thumb"][0, 0]) for a in arrivals] == [50] * 10 + [60] * 10
+
+
+def test_the_next_grasp_is_simulated_by_another_process(monkeypatch):
+    monkeypatch.setattr(module, "simulate", lambda _: short(ball()))
+    with open_source(BALL, speed=0, loop=True) as source:
+        first = list(itertools.islice(source, 100))
+        second = next(iter(source))
+    want = simulate(Grasp("ball", 1, 2, seed=3))  # the process has the real one
+    assert second.notices == ("the twin grasps: ball-case1-2",)
+    assert second.time == pytest.approx(first[-1].time + 1.0)
+    for name, one in want.modules.items():
+        np.testing.assert_array_equal(second.samples[name], one.readings[0])
+
+
+def short(recording):
+    modules = {name: replace(m.slice(0, 100), labels=()) for name, m in recording.modules.items()}
+    return replace(recording, modules=modules, truth=None)
+
+
+def test_it_waits_for_the_next_grasp(quick, monkeypatch):
+    with open_source("twin:", speed=0, loop=True) as source:
+        list(itertools.islice(source, 10))
+        source._simulator._process.wait()
+        source._simulator._process = subprocess.Popen(["sleep", "60"])
+        began = time.monotonic()
+        assert source.read(0.05) is None
+        assert source.read(0.0) is None
+        assert time.monotonic() - began >= 0.05
+        assert not source.ended
+        process = source._simulator._process
+    assert process.returncode is not None  # closing ended it
+
+
+def test_a_failed_process_is_replaced(quick):
+    with open_source("twin:", speed=0, loop=True) as source:
+        list(itertools.islice(source, 10))
+        source._simulator._process.wait()
+        source._simulator._path.unlink()
+        arrivals = list(itertools.islice(source, 10))
+    assert {int(a.samples["thumb"][0, 0]) for a in arrivals} == {20}
+
+
+def test_without_another_process_it_is_simulated_here(quick, monkeypatch):
+    monkeypatch.setattr(module.sys, "executable", "/nowhere/python")
+    monkeypatch.setattr(module._Simulator, "_run", RUN)
+    with open_source("twin:", speed=0, loop=True) as source:
+        arrivals = list(itertools.islice(source, 20))
+    assert [int(a.samples["thumb"][0, 0]) for a in arrivals[::10]] == [10, 20]
+
+
+def test_a_process_is_ended_with_the_source(monkeypatch):
+    monkeypatch.setattr(module, "simulate", lambda _: ball())
+    with open_source(BALL, loop=True) as source:
+        process = source._simulator._process
+    assert process.returncode is not None
+
+
+def test_the_program_of_the_process(tmp_path, monkeypatch):
+    monkeypatch.setattr(module, "simulate", lambda _: ball())
+    write(json.dumps(asdict(Grasp("ball", 1, 1, seed=3))), str(tmp_path / "a.parquet"))
+    assert load_recording(tmp_path / "a.parquet").digest == ball().digest
+
+
+def test_metadata_are_plain(monkeypatch):
+    monkeypatch.setattr(module, "simulate", lambda _: ball())
+    with open_source(BALL) as source:
+        assert msgspec.json.decode(msgspec.json.encode(source.metadata)) == source.metadata
+
+
+@pytest.mark.parametrize(
+    ("text", "message"),
+    [
+        ("twin:?object=brick", "twin:?object=brick: no object 'brick'; there are ball, "),
+        (
+            "twin:?profile=wild",
+            "twin:?profile=wild: unknown profile 'wild'; there are finger-gentle, "
+            "finger-reference, finger-vigorous, gentle, reference, vigorous",
+        ),
+        (
+            "twin:?case=3",
+            "twin:?case=3: case 1 or 2 and a repeat of at least 1 expected, 3 and 1 given",
+        ),
+        (
+            "twin:?repeat=0",
+            "twin:?repeat=0: case 1 or 2 and a repeat of at least 1 expected, 2 and 0 given",
+        ),
+        ("twin:?seed=-1", "twin:?seed=-1: seed=1, a whole number, expected, '-1' given"),
+        ("twin:?seed=", "twin:?seed=: seed=1, a whole number, expected, '' given"),
+        ("twin:?server=yes", "twin:?server=yes: server=true or false expected, 'yes' given"),
+        (
+            "twin:?attempt=2",
+            "twin:?attempt=2: unknown parameter attempt; there are object, seed, case, repeat, "
+            "profile, server",
+        ),
+        ("twin:can", "twin:can: twin:?object=can&seed=1 expected, without a path"),
+        ("twin://can", "twin://can: twin:?object=can&seed=1 expected, without a path"),
+    ],
+)
+def test_invalid_parameters(text, message):
+    with pytest.raises(ValueError) as error:
+        open_source(text)
+    assert str(error.value).startswith(message)
+
+
+@pytest.mark.parametrize("speed", [-1.0, np.nan])
+def test_an_invalid_speed(speed):
+    with pytest.raises(ValueError, match="a speed of at least 0 expected"):
+        open_source("twin:", speed=speed)

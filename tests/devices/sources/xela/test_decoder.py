@@ -1,0 +1,452 @@
+import json
+import math
+import random
+import tracemalloc
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from holdfast.contact import Fault
+from holdfast.errors import SourceError
+from holdfast.sensors import hand
+from holdfast.devices.sources.xela.decoder import XelaDecoder
+from holdfast.devices.sources.xela.packet import InvalidPacket
+
+from .build import NEW, OLD, PERIOD, START, WELCOME, counts, patch, sensor, text
+
+
+def taught(first, **options):
+    decoder = XelaDecoder(**options)
+    assert decoder.identify(first)
+    return decoder
+
+
+def fed(decoder, packets, received=100.0):
+    """What comes of packets that arrive every 10 ms."""
+    return [a for k, p in enumerate(packets) for a in decoder.decode(p, received + k * PERIOD)]
+
+
+def own(k, lag=0.0, **fields):
+    """A sensor of version 1.8, whose own stamp lags behind its packet's."""
+    return sensor(counts(16, k), time=START + k * PERIOD - lag, **fields)
+
+
+class TestSamples:
+    def test_one_arrival_a_packet(self):
+        packets = [patch(k) for k in range(50)]
+        arrivals = fed(taught(packets[0]), packets)
+        assert [a.time for a in arrivals] == [START + k * PERIOD for k in range(50)]
+        for k, arrival in enumerate(arrivals):
+            np.testing.assert_array_equal(arrival.samples["finger1"], counts(16, k))
+            assert arrival.received == 100.0 + k * PERIOD
+            assert (arrival.faults, arrival.n_lost, arrival.n_refused) == ({}, 0, 0)
+            assert arrival.notices == ()
+
+    @pytest.mark.parametrize("first", [OLD, NEW])
+    def test_both_versions(self, first):
+        (arrival,) = taught(first).decode(first, 5.0)
+        fields = json.loads(first)
+        assert arrival.time == fields["1"].get("time", fields["time"])
+        assert arrival.received == 5.0
+
+    def test_real_packets(self, real_packets):
+        for whole in real_packets.values():
+            decoder = taught(whole)
+            arrivals = decoder.decode(whole, 0.0)
+            fields = json.loads(whole)
+            n_values = sum(len(fields[str(n)]["integer"]) for n in decoder.devices)
+            assert sum(s.size for a in arrivals for s in a.samples.values()) == n_values
+            samples = {name: s for a in arrivals for name, s in a.samples.items()}
+            assert samples.keys() == decoder.sensors.keys()
+            for number, skin in decoder.devices.items():
+                flat = np.array(fields[str(number)]["integer"]).reshape(-1, 3)
+                for name, expected in skin.split(flat).items():
+                    np.testing.assert_array_equal(samples[name], expected)
+
+    def test_real_newtons(self, real_packets):
+        decoder = taught(real_packets["uSPa46"], calibrated=True)
+        arrivals = decoder.decode(real_packets["uSPa46"], 0.0)
+        fields = json.loads(real_packets["uSPa46"])
+        samples = {name: s for a in arrivals for name, s in a.samples.items()}
+        for number in (1, 2):
+            expected = np.reshape(fields[str(number)]["calibrated"], (24, 3))
+            np.testing.assert_array_equal(samples[f"finger{number}"], expected)
+
+    def test_a_whole_hand(self):
+        allegro, readings = hand("allegro-uskin"), counts(368)
+        packet = text(1, [sensor(readings, "XR23AHRCPP")])
+        decoder = taught(packet)
+        (arrival,) = decoder.decode(packet, 0.0)
+        for name, expected in allegro.split(readings).items():
+            np.testing.assert_array_equal(arrival.samples[name], expected)
+        assert decoder.metadata == {"models": {"1": "XR23AHRCPP"}, "hand": "allegro-uskin"}
+
+    def test_samples_are_fresh(self):
+        packet = text(1, [sensor(counts(368), "XR23AHRCPP")])
+        decoder = taught(packet)
+        (first,) = decoder.decode(packet, 0.0)
+        (second,) = decoder.decode(text(2, [sensor(counts(368), "XR23AHRCPP")]), 0.0)
+        for name in first.samples:
+            assert not np.shares_memory(first.samples[name], second.samples[name])
+
+    def test_newtons(self):
+        newtons = [[0.5, -0.25, 1.0]]
+        packet = text(1, [sensor([[1, 2, 3]], "odd", calibrated=newtons[0])])
+        decoder = taught(packet, calibrated=True)
+        (arrival,) = decoder.decode(packet, 0.0)
+        assert arrival.samples["finger1"].tolist() == newtons
+        assert decoder.sensors["finger1"].unit == "N"
+
+
+class TestLearning:
+    @pytest.mark.parametrize("packet", [WELCOME, '{"message": "error", "data": []}'])
+    def test_a_packet_without_samples_identifies_nothing(self, packet):
+        decoder = XelaDecoder()
+        assert not decoder.identify(packet)
+        assert decoder.sensors == {}
+
+    def test_metadata_of_the_server(self):
+        decoder = taught(NEW, names={1: "thumb"})
+        assert list(decoder.sensors) == ["thumb"]
+        assert decoder.metadata == {
+            "models": {"1": "uSPa11"},
+            "server_version": "1.8.0b_200801",
+        }
+
+    @pytest.mark.parametrize(
+        ("packet", "message"),
+        [
+            ("?", "malformed"),
+            (text(1, []), "it has no sensors"),
+            (text(1, [{"model": "uSPa44"}]), "sensor 1: it has no readings"),
+            (text(1, [sensor(counts(16), taxels=15)]), "announces 15 taxels and sends 16"),
+            (text(1, [sensor(counts(16)), sensor(counts(16), data="?")]), "sensor 2: "),
+        ],
+    )
+    def test_invalid_packets(self, packet, message):
+        with pytest.raises(InvalidPacket, match=message):
+            XelaDecoder().identify(packet)
+
+    def test_damaged_packets_are_refused_or_do_not_fit(self):
+        dice = random.Random(0)
+        good = text(1, [own(1), sensor(counts(16))]).encode()
+        n_learnt = 0
+        for _ in range(2000):
+            try:
+                n_learnt += XelaDecoder().identify(mutated(good, dice))
+            except (InvalidPacket, SourceError) as why:
+                assert len(str(why)) < 300
+        assert 100 < n_learnt < 1900
+
+    @pytest.mark.parametrize("calibrated", [None, []])
+    def test_without_newtons(self, calibrated):
+        packet = text(1, {3: sensor(counts(16), calibrated=calibrated)})
+        with pytest.raises(SourceError) as refusal:
+            XelaDecoder(calibrated=True).identify(packet)
+        assert str(refusal.value) == (
+            "sensor 3 (uSPa44) has no calibrated values: set calibration=on for it in xServ.ini "
+            "and restart xela_server, or use ?values=counts"
+        )
+
+
+class TestRepeats:
+    def test_a_repeated_packet_is_no_sample(self):
+        packets = [patch(k // 3) for k in range(30)]
+        arrivals = fed(taught(packets[0]), packets)
+        assert [a.time for a in arrivals] == [START + k * PERIOD for k in range(10)]
+
+    def test_the_same_readings_with_a_new_stamp_are_a_sample(self):
+        packets = [text(k, [sensor(counts(16))]) for k in range(5)]
+        assert len(fed(taught(packets[0]), packets)) == 5
+
+    def test_a_new_counter_with_the_same_stamp_is_a_sample(self):
+        packets = [patch(k, time=START) for k in range(3)]
+        times = [a.time for a in fed(taught(packets[0]), packets)]
+        assert times[0] == START
+        assert times[0] < times[1] < times[2] < START + 1e-5
+
+    def test_a_sensor_whose_own_stamp_stays_has_no_new_sample(self):
+        """The second sensor is read half as often."""
+        packets = [text(k, [own(k), own(k // 2 * 2)]) for k in range(20)]
+        arrivals = fed(taught(packets[0]), packets)
+        seen = {name: [a for a in arrivals if name in a.samples] for name in ("finger1", "finger2")}
+        assert len(seen["finger1"]) == 20
+        assert [a.time for a in seen["finger2"]] == [START + k * PERIOD for k in range(0, 20, 2)]
+        assert len(arrivals) == 20
+
+
+class TestCounter:
+    def test_missing_packets_are_counted(self):
+        packets = [patch(k) for k in (0, 1, 4, 5, 6, 16)]
+        assert [a.n_lost for a in fed(taught(packets[0]), packets)] == [0, 0, 2, 0, 0, 9]
+
+    def test_the_counter_wraps(self):
+        numbers = [2**32 - 2, 2**32 - 1, 0, 2]
+        packets = [patch(k, message=n) for k, n in enumerate(numbers)]
+        assert [a.n_lost for a in fed(taught(packets[0]), packets)] == [0, 0, 0, 1]
+
+    @pytest.mark.parametrize("reported", [True, False])
+    def test_a_restart_loses_nothing(self, reported):
+        decoder = taught(patch(5000))
+        fed(decoder, [patch(5000)])
+        if reported:
+            decoder.reconnected()
+        arrivals = fed(decoder, [patch(5001, message=0), patch(5002, message=1)], 100.01)
+        assert [a.n_lost for a in arrivals] == [0, 0]
+
+    def test_a_counter_that_continued_while_disconnected_loses_nothing(self):
+        decoder = taught(patch(1))
+        fed(decoder, [patch(1)])
+        decoder.reconnected()
+        assert [a.n_lost for a in fed(decoder, [patch(500)], 105.0)] == [0]
+
+    def test_losses_wait_for_a_sample(self):
+        decoder = taught(patch(0))
+        broken = text(3, [sensor(counts(16), data="?")])
+        fed(decoder, [patch(0), broken])
+        again = text(4, [sensor(counts(16), data="?")])
+        arrivals = fed(decoder, [again, text(6, [sensor(counts(16))])], 100.02)
+        assert [a.n_lost for a in arrivals] == [1]
+
+
+class TestTimes:
+    def test_sensors_with_stamps_of_their_own_arrive_at_instants_of_their_own(self):
+        packets = [text(k, [own(k), own(k, lag=0.004)]) for k in range(10)]
+        arrivals = fed(taught(packets[0]), packets)
+        assert [list(a.samples) for a in arrivals] == [["finger2"], ["finger1"]] * 10
+        expected = [START + k * PERIOD - lag for k in range(10) for lag in (0.004, 0.0)]
+        assert [a.time for a in arrivals] == expected
+        assert {a.received for a in arrivals[:2]} == {100.0}
+        assert not any(a.faults for a in arrivals)
+
+    def test_equal_stamps_are_one_instant(self):
+        packet = text(1, [own(1), own(1)])
+        (arrival,) = taught(packet).decode(packet, 0.0)
+        assert list(arrival.samples) == ["finger1", "finger2"]
+
+    def test_a_sensor_that_lags_is_timed_after_the_others(self):
+        packets = [text(k, [own(k), own(k, lag=0.3)]) for k in range(50)]
+        arrivals = fed(taught(packets[0]), packets)
+        times = [a.time for a in arrivals]
+        assert all(np.diff(times) > 0)
+        assert not any(a.faults for a in arrivals)
+        late = [a.time for a in arrivals if "finger2" in a.samples]
+        np.testing.assert_allclose(np.diff(late)[1:], PERIOD, atol=1e-5)
+        first = [a.time for a in arrivals if "finger1" in a.samples]
+        assert first == [START + k * PERIOD for k in range(50)]
+
+    def test_a_sensor_that_begins_to_lag_is_late(self):
+        packets = [text(k, [own(k), own(k, lag=0.2 if k >= 5 else 0.0)]) for k in range(10)]
+        arrivals = fed(taught(packets[0]), packets)
+        late = [a.faults for a in arrivals if a.faults]
+        assert late == [{"finger2": (Fault.LATE,)}] * 5
+
+    @pytest.mark.parametrize("jump", [-3600.0, -0.2, 3600.0])
+    @pytest.mark.parametrize("has_own", [False, True])
+    def test_time_goes_on_where_the_clock_jumps(self, jump, has_own):
+        def packet(k):
+            moved = jump if k >= 10 else 0.0
+            one = sensor(counts(16, k), time=START + k * PERIOD + moved if has_own else None)
+            return text(k, [one], time=START + k * PERIOD + moved)
+
+        arrivals = fed(taught(packet(0)), [packet(k) for k in range(20)])
+        times = np.array([a.time for a in arrivals])
+        np.testing.assert_allclose(times, START + np.arange(20) * PERIOD, atol=1e-5)
+        assert [a.faults for a in arrivals[:10] + arrivals[11:]] == [{}] * 19
+        assert arrivals[10].faults == {"finger1": (Fault.CLOCK_JUMP,)}
+
+    def test_a_jump_after_a_late_sample_leaves_nothing_late(self):
+        """Packet 10 comes 0.3 s late; those up to 40 are missing, then the clock has jumped."""
+
+        def packet(k, jump=0.0):
+            return text(k, [own(k, lag=-jump)], time=START + k * PERIOD + jump)
+
+        decoder = taught(packet(0))
+        fed(decoder, [packet(k) for k in range(10)])
+        (late,) = decoder.decode(packet(10), 100.4)
+        assert late.faults == {"finger1": (Fault.LATE,)}
+        after = fed(decoder, [packet(k, 3600.0) for k in range(41, 100)], 100.41)
+        assert after[0].faults == {"finger1": (Fault.CLOCK_JUMP,)}
+        assert not any(a.faults for a in after[1:])
+
+    def test_a_stamp_from_before_the_jump_does_not_lead_into_the_future(self):
+        """The clock goes back an hour; the sensor's stamp is still of the old time."""
+        before = [text(k, [own(k)]) for k in range(10)]
+        jumped = text(10, [own(10)], time=START + 0.1 - 3600)
+        after = [text(k, [own(k, lag=3600)], time=START - 3600 + k * PERIOD) for k in range(11, 20)]
+        times = [a.time for a in fed(taught(before[0]), [*before, jumped, *after])]
+        np.testing.assert_allclose(times, START + np.arange(20) * PERIOD, atol=1e-5)
+
+    def test_a_burst_after_a_stall_is_late(self):
+        decoder = taught(patch(0))
+        fed(decoder, [patch(k) for k in range(10)])
+        stalled = [a for k in range(10, 40) for a in decoder.decode(patch(k), 100.4)]
+        assert [a.time for a in stalled] == [START + k * PERIOD for k in range(10, 40)]
+        assert stalled[0].faults == {"finger1": (Fault.LATE,)}
+        assert stalled[-1].faults == {}
+
+    def test_time_goes_on_over_a_restart(self):
+        decoder = taught(patch(0))
+        fed(decoder, [patch(k) for k in range(10)])
+        decoder.reconnected()
+        later = fed(decoder, [patch(k, message=k - 500) for k in range(500, 510)], 105.0)
+        assert [a.time for a in later] == [START + k * PERIOD for k in range(500, 510)]
+        assert not any(a.faults for a in later)
+
+
+class TestRefusals:
+    def test_an_invalid_sensor_does_not_affect_the_others(self):
+        good = [sensor(counts(16, k)) for k in (1, 2)]
+        decoder = taught(text(1, good))
+        (arrival,) = decoder.decode(text(2, [good[0], sensor(counts(16), data="ZZ")]), 0.0)
+        assert list(arrival.samples) == ["finger1"]
+        assert arrival.n_refused == 1
+        assert arrival.notices == (
+            "sensor 2 is invalid: four hexadecimal digits a number expected in data, with "
+            "commas between",
+        )
+
+    def test_garbage_is_counted_and_reported_once_a_second(self):
+        decoder = taught(patch(0))
+        arrivals = fed(decoder, ["garbage"] * 250)
+        assert len(arrivals) == 3
+        assert all(a.notices[0].startswith("invalid packet: ") for a in arrivals)
+        assert all(math.isnan(a.time) and not a.samples for a in arrivals)
+        (good,) = decoder.decode(patch(1), 103.0)
+        assert sum(a.n_refused for a in arrivals) + good.n_refused == 250
+        assert good.notices == ()
+
+    def test_a_packet_with_two_bad_sensors_is_refused_once(self):
+        decoder = taught(text(0, [sensor(counts(16)), sensor(counts(16))]))
+        (arrival,) = decoder.decode(text(1, [{"data": "?"}, {"data": "?"}]), 0.0)
+        assert arrival.n_refused == 1
+        assert len(arrival.notices) == 2
+
+    def test_data_and_integer_that_differ(self):
+        decoder = taught(patch(0))
+        wrong = counts(16)
+        integer = [*wrong.ravel().tolist()[:-1], 5]
+        (arrival,) = decoder.decode(text(1, [sensor(wrong, integer=integer)]), 0.0)
+        assert arrival.notices == ("sensor 1 is invalid: data and integer differ",)
+        assert arrival.samples == {}
+
+    def test_newtons_that_are_gone(self):
+        packet = text(1, [sensor([[1, 2, 3]], "odd", calibrated=[1, 2, 3])])
+        decoder = taught(packet, calibrated=True)
+        (arrival,) = decoder.decode(text(2, [sensor([[1, 2, 3]], "odd", calibrated=None)]), 0.0)
+        assert arrival.notices == ("sensor 1 is invalid: it has no readings",)
+        assert (arrival.n_refused, arrival.samples) == (1, {})
+
+    def test_another_number_of_taxels(self):
+        decoder = taught(text(0, [sensor(counts(16)), sensor(counts(16))]))
+        changed = [sensor(counts(16)), sensor(counts(15), taxels=15)]
+        first, second = (decoder.decode(text(k, changed), k * PERIOD)[0] for k in (1, 2))
+        for arrival in (first, second):
+            assert list(arrival.samples) == ["finger1"]
+            assert arrival.faults == {"finger2": (Fault.TAXEL_COUNT,)}
+            assert arrival.n_refused == 0
+        assert first.notices == ("sensor 2 sends 15 taxels, 16 expected",)
+        assert second.notices == ()
+
+    def test_another_number_of_taxels_of_a_whole_hand(self):
+        decoder = taught(text(0, [sensor(counts(368), "XR23AHRCPP")]))
+        (arrival,) = decoder.decode(text(1, [sensor(counts(240), "XR23AHRCPP", taxels=240)]), 0.0)
+        assert arrival.faults == dict.fromkeys(hand("allegro-uskin").modules, (Fault.TAXEL_COUNT,))
+
+    def test_a_sensor_that_comes_later_is_left_out(self):
+        decoder = taught(patch(0))
+        later = [text(k, [sensor(counts(16)), sensor(counts(16))]) for k in range(1, 10)]
+        arrivals = fed(decoder, later)
+        assert all(list(a.samples) == ["finger1"] for a in arrivals)
+        notices = [notice for a in arrivals for notice in a.notices]
+        assert notices == [
+            "sensor 2 was not there when the source was opened: open the source again"
+        ]
+
+    def test_each_sensor_that_comes_later_is_reported(self):
+        decoder = taught(patch(0))
+        (arrival,) = decoder.decode(text(1, [sensor(counts(16))] * 3), 0.0)
+        assert [notice.split(" was")[0] for notice in arrival.notices] == ["sensor 2", "sensor 3"]
+
+    def test_a_fault_is_reported_also_after_another_notice(self):
+        """Notices about one sensor once delayed the fault of a wrong number of taxels."""
+        decoder = taught(patch(0))
+        decoder.decode(text(1, [sensor(counts(16), data="?")]), 0.0)
+        wrong = [text(k, [sensor(counts(15), taxels=15)]) for k in (2, 3)]
+        arrivals = [arrival for packet in wrong for arrival in decoder.decode(packet, 0.1)]
+        assert [a.faults for a in arrivals] == [{"finger1": (Fault.TAXEL_COUNT,)}] * 2
+        assert [len(a.notices) for a in arrivals] == [1, 0]
+
+    def test_a_sensor_that_ends_is_missing(self):
+        decoder = taught(text(0, [sensor(counts(16)), sensor(counts(16))]))
+        (arrival,) = decoder.decode(patch(1), 0.0)
+        assert list(arrival.samples) == ["finger1"]
+
+    @given(st.binary(max_size=200))
+    def test_any_bytes(self, garbage):
+        decoder = taught(NEW)
+        for arrival in decoder.decode(garbage, 0.0):
+            assert arrival.n_refused == 1
+
+
+TOKENS = [
+    b"null", b"true", b"-1", b"1e308", b"NaN", b"[]", b"{}", b'""', b'"1"', b"[[[[", b"0.5",
+    b'"FFFF"', b"99999999999999999999999999", b'"\\ud800"', b"\xff\xfe",
+]  # fmt: skip
+
+
+def mutated(packet, dice):
+    """A packet that was damaged in one to four places."""
+    given = bytearray(packet)
+    for _ in range(dice.randint(1, 4)):
+        a, b = sorted(dice.randrange(len(given) + 1) for _ in range(2))
+        match dice.randrange(6):
+            case 0 if given:
+                given[a % len(given)] ^= 1 << dice.randrange(8)
+            case 1:
+                del given[a : min(b, a + 20)]
+            case 2:
+                del given[a:]
+            case 3:
+                given[a:a] = given[a : min(b, a + 50)]
+            case 4:
+                given[a : a + dice.randrange(12)] = dice.choice(TOKENS)
+            case _:
+                place = given.find(b":", a) + 1
+                end = min(given.find(mark, place) % (len(given) + 1) for mark in (b",", b"}"))
+                given[place:end] = dice.choice(TOKENS)
+    return bytes(given)
+
+
+@pytest.mark.parametrize("seed", range(4))
+def test_damaged_packets_do_no_harm(seed):
+    """10,000 of them, among good ones."""
+    dice = random.Random(seed)
+    good = [text(k, [own(k), sensor(counts(16, k + 1))]).encode() for k in range(40)]
+    decoder = taught(good[0])
+    last, n_refused, n_taken, kept = -math.inf, 0, 0, 0
+    tracemalloc.start()
+    try:
+        for k in range(2500):
+            for arrival in decoder.decode(mutated(dice.choice(good), dice), k * PERIOD):
+                n_refused += arrival.n_refused
+                n_taken += bool(arrival.samples)
+                if arrival.samples:
+                    assert arrival.time > last
+                    last = arrival.time
+            if k == 500:
+                kept = tracemalloc.get_traced_memory()[0]
+        assert tracemalloc.get_traced_memory()[0] - kept < 100_000
+    finally:
+        tracemalloc.stop()
+    assert n_refused > 500
+    assert n_taken > 100
+    for k in (5000, 5001):
+        fresh = text(k, [own(k), sensor(counts(16, k + 1))])
+        arrivals = decoder.decode(fresh, k * PERIOD)
+        samples = {name: s for a in arrivals for name, s in a.samples.items()}
+        np.testing.assert_array_equal(samples["finger1"], counts(16, k))
+        np.testing.assert_array_equal(samples["finger2"], counts(16, k + 1))
+        assert arrivals[0].time > last

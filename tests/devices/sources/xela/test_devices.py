@@ -1,0 +1,160 @@
+import numpy as np
+import pytest
+
+from holdfast.errors import SourceError
+from holdfast.sensors import hand, sensor
+from holdfast.sensors.xela_models import flat_grid
+from holdfast.devices.sources.xela.devices import xela_devices
+
+TIP = ("uSCuAH", 30)
+
+
+@pytest.mark.parametrize("model", ["XR23AHLCPP", "XR23AHRCPP", "xr23ahrcpp"])
+def test_a_whole_hand_becomes_its_modules(model):
+    allegro = hand("allegro-uskin")
+    device = xela_devices({1: (model, 368)}, {})[1]
+    assert device.n_taxels == 368
+    assert device.modules == {name: module.sensor for name, module in allegro.modules.items()}
+    readings = np.arange(368 * 3).reshape(368, 3)
+    parts, expected = device.split(readings), allegro.split(readings)
+    assert parts.keys() == expected.keys()
+    for name, part in parts.items():
+        np.testing.assert_array_equal(part, expected[name])
+    assert device.notices == ()
+
+
+@pytest.mark.parametrize(
+    ("model", "name"),
+    [
+        ("uSCuAH", "uskin-curved"),
+        ("USCUAH", "uskin-curved"),
+        ("XR1944", "uskin-4x4"),
+        ("XR1844", "uskin-4x4"),
+        ("uSPa44", "uskin-4x4"),
+        ("uSFtAH", "uskin-4x4"),
+        ("uSPa46", "uskin-4x6"),
+        ("xr1946", "uskin-4x6"),
+    ],
+)
+def test_separate_sensors_that_are_built_in(model, name):
+    built_in = sensor(name)
+    device = xela_devices({1: (model, built_in.n_taxels)}, {})[1]
+    assert device.modules == {"finger1": built_in}
+    assert device.notices == ()
+    readings = np.zeros((built_in.n_taxels, 3))
+    assert device.split(readings)["finger1"] is readings
+
+
+def test_names():
+    found = {1: TIP, 2: TIP, 5: TIP}
+    names = [
+        list(device.modules) for device in xela_devices(found, {2: "index", 1: "thumb"}).values()
+    ]
+    assert names == [["thumb"], ["index"], ["finger5"]]
+
+
+@pytest.mark.parametrize("model", ["uSPa35", "uspr-dsf", "not in the table"])
+def test_a_model_without_a_layout_is_flat_and_gives_a_notice(model):
+    device = xela_devices({1: (model, 15)}, {})[1]
+    (flat,) = device.modules.values()
+    assert (flat.name, flat.n_taxels, flat.limits) == (model.lower(), 15, (0.0, 65535.0))
+    assert device.notices == (
+        f"finger1: the layout of a {model} with 15 taxels is not known; a flat grid is assumed "
+        "(sensor=FILE.json in the URI gives another)",
+    )
+
+
+def test_a_model_without_a_layout_with_the_taxels_of_a_built_in_sensor():
+    (flat,) = xela_devices({1: ("uspr-dsf", 30)}, {})[1].modules.values()
+    assert (flat.name, flat.n_taxels) == ("uspr-dsf", 30)
+
+
+def test_without_a_model():
+    device = xela_devices({1: ("", 2)}, {})[1]
+    assert device.modules["finger1"].name == "unknown"
+    assert "a sensor without a model" in device.notices[0]
+
+
+@pytest.mark.parametrize("name", ["uskin-4x4", "uskin-4x6", "uskin-curved"])
+def test_without_a_model_but_with_the_taxels_of_a_built_in_sensor(name):
+    device = xela_devices({1: ("", sensor(name).n_taxels)}, {})[1]
+    assert device.modules == {"finger1": sensor(name)}
+    assert device.notices == (
+        f"finger1: the layout of a sensor without a model with {sensor(name).n_taxels} taxels is "
+        f"not known; {name} is assumed (sensor=FILE.json in the URI gives another)",
+    )
+
+
+def test_a_given_sensor_is_taken_where_it_fits():
+    given = flat_grid("mine", 15)
+    found = {1: TIP, 2: ("uSPa35", 15)}
+    made = xela_devices(found, {}, given)
+    assert made[1].modules == {"finger1": sensor("uskin-curved")}
+    assert made[2].modules == {"finger2": given}
+    assert made[2].notices == ()
+    other = flat_grid("mine", 24)  # another layout of a known model
+    assert xela_devices({1: ("uSCuAH", 24)}, {}, other)[1].modules == {"finger1": other}
+
+
+@pytest.mark.parametrize("found", [{1: TIP}, {1: ("XR23AHRCPP", 368)}, {1: ("odd", 3)}])
+def test_calibrated_readings_are_newtons(found):
+    modules = xela_devices(found, {}, calibrated=True)[1].modules
+    assert {(module.unit, module.limits) for module in modules.values()} == {("N", None)}
+
+
+def test_two_hands_have_names_of_their_own():
+    made = xela_devices({1: ("XR23AHLCPP", 368), 2: ("XR23AHRCPP", 368)}, {})
+    assert [next(iter(device.modules)) for device in made.values()] == [
+        "hand1/thumb",
+        "hand2/thumb",
+    ]
+    assert made[2].split(np.zeros((368, 3))).keys() == made[2].modules.keys()
+
+
+@pytest.mark.parametrize(
+    ("found", "names", "given", "text"),
+    [
+        (
+            {1: ("uSCuAH", 24)},
+            {},
+            None,
+            "sensor 1: 24 taxels given, 30 expected (uSCuAH: uskin-curved); sensor=FILE.json in "
+            "the URI gives another layout",
+        ),
+        (
+            {3: ("XR23AHRCPP", 240)},
+            {},
+            None,
+            "sensor 3: 240 taxels given, 368 expected (XR23AHRCPP: allegro-uskin); "
+            "sensor=FILE.json in the URI gives another layout",
+        ),
+        (
+            {1: TIP},
+            {2: "index"},
+            None,
+            "fingers= names 2; separate sensors have names, the server has 1 (uSCuAH)",
+        ),
+        (
+            {1: ("XR23AHRCPP", 368)},
+            {1: "thumb"},
+            None,
+            "fingers= names 1; separate sensors have names, the server has 1 (XR23AHRCPP)",
+        ),
+        (
+            {1: TIP},
+            {},
+            flat_grid("mine", 15),
+            "sensor= has 15 taxels and fits no sensor of the server: 1 (30 taxels)",
+        ),
+        (
+            {1: TIP, 2: TIP},
+            {1: "finger2"},
+            None,
+            "two modules have the same name: finger2, finger2; fingers= gives other names",
+        ),
+    ],
+)
+def test_what_does_not_fit(found, names, given, text):
+    with pytest.raises(SourceError) as refusal:
+        xela_devices(found, names, given)
+    assert str(refusal.value) == text

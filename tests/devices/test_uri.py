@@ -1,0 +1,149 @@
+import sys
+from pathlib import Path
+
+import pytest
+
+from holdfast.devices.sources import SCHEMES, open_source
+from holdfast.devices.sources.replay import Replay
+from holdfast.devices.uri import is_uri, parse
+
+KNOWN = "there are xela:, twin:, ros2:, ros1:, serial:"
+
+
+def test_the_parts_of_a_uri():
+    scheme, address = parse("xela://10.0.0.2:5000/hand?values=counts&fingers=1:thumb,2:index")
+    assert scheme == "xela"
+    assert (address.host, address.path) == ("10.0.0.2:5000", "/hand")
+    assert address.parameters == {"values": "counts", "fingers": "1:thumb,2:index"}
+    assert address.text == "xela://10.0.0.2:5000/hand?values=counts&fingers=1:thumb,2:index"
+
+
+def test_what_is_encoded_is_decoded():
+    assert parse("twin:?object=a%20b+c&seed=")[1].parameters == {"object": "a b c", "seed": ""}
+
+
+@pytest.mark.parametrize(
+    ("text", "host", "path"),
+    [
+        ("serial:///dev/ttyACM0", "", "/dev/ttyACM0"),
+        ("serial:/dev/ttyACM0", "", "/dev/ttyACM0"),
+        ("serial:COM3", "", "COM3"),
+        ("ros2:///xServTopic", "", "/xServTopic"),
+        ("xela://auto", "auto", ""),
+        ("twin:", "", ""),
+    ],
+)
+def test_host_and_path(text, host, path):
+    _, address = parse(text)
+    assert (address.host, address.path) == (host, path)
+
+
+@pytest.mark.parametrize("text", ["grasp.csv:", "udp://host", "http://host/a", "can", "", ":"])
+def test_unknown_schemes(text):
+    with pytest.raises(ValueError) as error:
+        parse(text)
+    assert str(error.value) == (
+        f"{text!r} is neither the path of a recording nor the URI of a source; {KNOWN}"
+    )
+
+
+def test_another_scheme_opens_nothing():
+    with pytest.raises(ValueError, match=r"^'udp://host' is neither the path of a recording nor"):
+        open_source("udp://host")
+
+
+def test_a_parameter_that_is_given_twice():
+    with pytest.raises(ValueError) as error:
+        parse("twin:?seed=1&seed=2")
+    assert str(error.value) == "twin:?seed=1&seed=2: a parameter is given twice"
+
+
+def test_an_invalid_uri():
+    with pytest.raises(ValueError) as error:
+        open_source("xela://[1:2")
+    assert str(error.value) == "xela://[1:2 is no URI: Invalid IPv6 URL"
+
+
+def test_a_parameter_without_a_value():
+    with pytest.raises(ValueError) as error:
+        parse("twin:?object=can&loop")
+    assert str(error.value) == "twin:?object=can&loop: name=value expected, 'loop' given"
+
+
+def test_what_comes_after_a_hash_is_refused():
+    with pytest.raises(ValueError) as error:
+        parse("twin:?object=can#1")
+    assert str(error.value) == "twin:?object=can#1: nothing after # expected, '1' given"
+
+
+def test_unknown_parameters():
+    address = parse("twin:?objekt=can&seed=1&sede=2")[1]
+    address.only("objekt", "seed", "sede")
+    with pytest.raises(ValueError) as error:
+        address.only("object", "seed")
+    assert str(error.value) == (
+        "twin:?objekt=can&seed=1&sede=2: unknown parameter objekt, sede; there are object, seed"
+    )
+
+
+def test_names_of_fingers():
+    assert parse("xela:?fingers=1:thumb,%202%20:%20palm/1")[1].names() == {1: "thumb", 2: "palm/1"}
+    assert parse("xela:?fingers=")[1].names() == {}
+    assert parse("xela:")[1].names() == {}
+
+
+@pytest.mark.parametrize(
+    "given", ["thumb", "1:", ":thumb", "one:thumb", "-1:thumb", "1=thumb", "²:t"]
+)
+def test_invalid_names(given):
+    with pytest.raises(ValueError) as error:
+        parse(f"xela:?fingers={given}")[1].names()
+    assert str(error.value) == (
+        f"xela:?fingers={given}: fingers=1:thumb,2:index expected, {given!r} given"
+    )
+
+
+@pytest.mark.parametrize("given", ["1:thumb,2:thumb", "1:thumb,1:index"])
+def test_repeated_names(given):
+    with pytest.raises(ValueError) as error:
+        parse(f"xela:?fingers={given}")[1].names()
+    assert str(error.value) == (
+        f"xela:?fingers={given}: a name for each finger expected, {given!r} given"
+    )
+
+
+def test_an_existing_file_is_no_uri(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    assert is_uri("twin:a.parquet")
+    Path("twin:a.parquet").touch()
+    assert not is_uri("twin:a.parquet")
+    assert isinstance(open_source("twin:a.parquet"), Replay)
+
+
+@pytest.mark.parametrize("text", ["a.parquet", "/a/b.mcap", r"C:\a.parquet", "C:/a.mcap", "TWIN:"])
+def test_everything_else_is_a_file(text):
+    assert not is_uri(text)
+    assert isinstance(open_source(text), Replay)
+
+
+def test_speed_and_loop_are_for_the_replay_and_the_twin(tmp_path):
+    for text in ("a.parquet", "twin:"):
+        source = open_source(text, speed=0, loop=True)
+        assert (source.paced, source._loops) == (False, True)
+        assert source.name == text
+
+
+def test_every_scheme_is_described():
+    for scheme, text in SCHEMES.items():
+        assert f"{scheme}:" in text
+
+
+def test_nothing_is_imported_for_other_schemes():
+    import subprocess
+
+    code = (
+        "import sys; from holdfast.devices.sources import open_source; open_source('a.parquet'); "
+        "print([n for n in ('serial', 'websockets', 'cyclonedds', 'mujoco') if n in sys.modules])"
+    )
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
+    assert done.stdout == "[]\n"
