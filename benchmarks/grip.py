@@ -10,8 +10,8 @@ import time
 
 import numpy as np
 
-from holdfast.grip import LAWS, GripController, Limits
 from holdfast.detector import Detector
+from holdfast.grip import LAWS, GripController, Limits
 from holdfast.model import Model
 from holdfast.sensors import sensor
 

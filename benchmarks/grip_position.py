@@ -16,17 +16,17 @@ from dataclasses import replace
 
 import numpy as np
 
-from holdfast.grip import FingerCommand, GripCommand, LoopState
 from holdfast.devices.hands.ros.kinds import KINDS
 from holdfast.devices.hands.ros.link import Link
 from holdfast.devices.hands.ros.parameters import Parameters
-from holdfast_lab.trial.trials import Trial, draw_trial
-from holdfast.ros.hand_messages import JointStates
 from holdfast.devices.uri import parse
+from holdfast.grip import FingerCommand, GripCommand, LoopState
+from holdfast.ros.hand_messages import JointStates
 from holdfast.twin.contact import LOAD
 from holdfast.twin.control import PROPORTIONAL
 from holdfast.twin.hand import FINGERS, N_JOINTS
 from holdfast.twin.simulation import Simulation
+from holdfast_lab.trial.trials import Trial, draw_trial
 
 STIFFNESS = ",".join(map(str, PROPORTIONAL.tolist()))
 URI = f"ros1:positions?stiffness={STIFFNESS}&max_effort=9&shared=true"

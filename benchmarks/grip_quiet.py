@@ -11,9 +11,9 @@ import argparse
 from dataclasses import replace
 
 from holdfast.grip import LAWS
+from holdfast.parallel import map_ordered
 from holdfast_lab.trial.run import run_trial
 from holdfast_lab.trial.trials import Trial, draw_trials
-from holdfast.parallel import map_ordered
 
 
 def quiet(trial: Trial, hold: float, glitch_rate: float | None) -> Trial:

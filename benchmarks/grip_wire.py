@@ -24,16 +24,16 @@ import numpy as np
 
 from holdfast.contact import CONTACT_FORCE, SLIP_SPEED
 from holdfast.devices.hands.ros.driven_twin import DrivenTwin
-from holdfast_lab.trial.run import RISE
-from holdfast_lab.trial.trials import KINDS, Trial, draw_trials
-from holdfast.live.publishers.xela_server import XelaServer
 from holdfast.devices.ros import dds
+from holdfast.live.publishers.xela_server import XelaServer
 from holdfast.ros.cdr import MessageDecoder, MessageEncoder
 from holdfast.ros.hand_messages import FLOATS, JOINT_STATE, hand_definition, joint_message
 from holdfast.twin.contact import LOAD, SLIP
 from holdfast.twin.hand import RATE
 from holdfast.twin.loads import LoadKind
 from holdfast.twin.simulation import Simulation
+from holdfast_lab.trial.run import RISE
+from holdfast_lab.trial.trials import KINDS, Trial, draw_trials
 
 EFFORT = 0.1
 PLEXUS = f"ros2:plexus?effort={EFFORT}&max_effort=1"

@@ -22,12 +22,12 @@ from pathlib import Path
 import numpy as np
 
 from holdfast.cli import main as holdfast
+from holdfast.devices.sources import Arrival
 from holdfast.errors import RecordingError
 from holdfast.io import load_recording
 from holdfast.live.recorder import Recorder
 from holdfast.recordings import Recording
 from holdfast.sensors import hand
-from holdfast.devices.sources import Arrival
 
 RATE = 150.0
 MAX_LOST_TIME = 0.5

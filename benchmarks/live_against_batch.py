@@ -18,10 +18,10 @@ import numpy as np
 import numpy.typing as npt
 
 from holdfast.detector import detect
+from holdfast.devices.sources import Arrival
 from holdfast.live.arrival_detector import ArrivalDetector
 from holdfast.model import Model
 from holdfast.recordings import Recording
-from holdfast.devices.sources import Arrival
 from holdfast.synthetic import synthetic_recording
 
 MODELS = ("builtin:any", "builtin:twin", "builtin:noise-floor")

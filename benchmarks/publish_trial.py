@@ -19,9 +19,9 @@ from typing import Any
 
 from jinja2 import Environment, FileSystemLoader, StrictUndefined
 
+from holdfast_lab.report.table_layouts import to_markdown
 from holdfast_lab.trial.report import summary_text
 from holdfast_lab.trial.tables import all_tables
-from holdfast_lab.report.table_layouts import to_markdown
 
 DOCS = Path(__file__).parents[1] / "docs"
 PAGE = "grip-trials.md"

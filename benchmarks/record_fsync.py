@@ -13,9 +13,9 @@ from tempfile import TemporaryDirectory
 
 import numpy as np
 
+from holdfast.devices.sources import Arrival
 from holdfast.live.recorder import Recorder
 from holdfast.sensors import sensor
-from holdfast.devices.sources import Arrival
 
 RATE = 150.0
 SENSORS = {f"finger{k}": sensor("uskin-curved") for k in range(12)}

@@ -23,15 +23,15 @@ from tempfile import TemporaryDirectory
 import numpy as np
 from aiohttp import ClientSession
 
+from holdfast.devices.sources.base import DeviceSource
+from holdfast.devices.sources.xela.decoder import XelaDecoder
+from holdfast.devices.sources.xela.encoder import XelaEncoder
 from holdfast.live.recorder import Recorder
 from holdfast.live.session import Session
 from holdfast.live.stream_detector import StreamDetector, StreamUpdate
 from holdfast.live.web.service import LiveService
 from holdfast.model import Model
 from holdfast.sensors import hand
-from holdfast.devices.sources.base import DeviceSource
-from holdfast.devices.sources.xela.decoder import XelaDecoder
-from holdfast.devices.sources.xela.encoder import XelaEncoder
 from holdfast.synthetic import synthetic_recording
 from holdfast.web.guard import Guard
 from holdfast.web.server import listening

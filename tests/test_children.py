@@ -10,8 +10,8 @@ from threading import Barrier
 import pytest
 
 from holdfast.children import SAFE_PATH_VARIABLE, python_command, safe_path
-from holdfast.live.loop.watchdog import N_SAFE_COMMANDS
 from holdfast.io import save_recording
+from holdfast.live.loop.watchdog import N_SAFE_COMMANDS
 from holdfast.parallel import map_ordered
 from holdfast.synthetic import synthetic_recording
 

@@ -15,8 +15,8 @@ from tempfile import TemporaryDirectory, TemporaryFile
 from typing import IO
 
 from attack.result import Result
-from holdfast.io import save_recording
 from holdfast.devices.sources import Source, open_source
+from holdfast.io import save_recording
 from holdfast.synthetic import synthetic_recording
 
 TOKEN = "a-secret-of-the-attack"

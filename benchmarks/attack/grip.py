@@ -15,13 +15,13 @@ import msgspec
 
 from attack.result import Result
 from holdfast.contact import ContactEstimate, ContactState, HandEstimate, Reason
-from holdfast.grip import GripCommand, GripController, GripReason, Limits, LoopState
 from holdfast.devices.hands import Hand, open_hand
+from holdfast.errors import HandError
+from holdfast.grip import GripCommand, GripController, GripReason, Limits, LoopState
+from holdfast.live.arrival_detector import StreamEstimate
 from holdfast.live.loop.grip_loop import GripLoop
 from holdfast.live.loop.runner import LoopRunner
 from holdfast.live.loop.watchdog import Watchdog
-from holdfast.errors import HandError
-from holdfast.live.arrival_detector import StreamEstimate
 from holdfast.live.stream_detector import StreamUpdate
 
 BENCHMARKS = Path(__file__).parents[1]

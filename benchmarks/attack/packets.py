@@ -9,16 +9,16 @@ import numpy as np
 
 from attack.result import Result
 from holdfast.contact import ContactState
+from holdfast.devices.sources.anyskin import AnySkinDecoder
+from holdfast.devices.sources.ros.message_assembler import MessageAssembler
+from holdfast.devices.sources.xela.decoder import XelaDecoder
+from holdfast.devices.sources.xela.encoder import XelaEncoder
 from holdfast.live.stream_detector import ArrivalDetector
 from holdfast.model import Model
 from holdfast.recordings import Recording
 from holdfast.ros.cdr import MessageDecoder, MessageEncoder
 from holdfast.ros.sensor_messages import SampleDecoder, known_definition
 from holdfast.sensors import hand, sensor
-from holdfast.devices.sources.anyskin import AnySkinDecoder
-from holdfast.devices.sources.ros.message_assembler import MessageAssembler
-from holdfast.devices.sources.xela.decoder import XelaDecoder
-from holdfast.devices.sources.xela.encoder import XelaEncoder
 from holdfast.synthetic import synthetic_recording
 
 EPOCH = 1.7e9

@@ -12,9 +12,9 @@ from contextlib import contextmanager, suppress
 from threading import Event, Thread
 
 from attack.result import Result
-from holdfast.errors import HoldfastError
 from holdfast.devices.sources import open_source
 from holdfast.devices.sources.xela import client
+from holdfast.errors import HoldfastError
 
 MAGIC = b"258EAFA5-E914-47DA-95CA-C5AB0DC85B11"
 READ_TIME = 0.1

@@ -2,22 +2,20 @@
 
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
-from functools import lru_cache
 from hashlib import sha256
 from pathlib import Path
 from typing import Any, NamedTuple, Protocol, TypeVar
 
 from msgspec import UNSET, MsgspecError, Raw, Struct, UnsetType, msgpack
 
-from holdfast.cluster import file_digests, one_thread
+from holdfast.cluster import one_thread
 from holdfast.errors import EngineError, OutputError
 from holdfast.files import write_whole
 from holdfast.parallel import Engine
+from holdfast_lab.source_digest import source_digest
 
 T = TypeVar("T")
 Notify = Callable[[str], None]
-NEVER_USED = ("cli", "report")
-"""Folders of the package on which no result depends."""
 
 
 class Task(NamedTuple):
@@ -29,7 +27,8 @@ class Task(NamedTuple):
         arguments: values that msgspec can encode: Structs, numbers, text, None, lists of them.
         result: type of the result, for decoding by msgspec.
         cost: expected duration, in a unit that is the same for all tasks.
-        version: digest of what else the result depends on; empty for the source of the package.
+        version: digest of what else the result depends on; empty for the modules that the module
+            of the function imports.
     """
 
     name: str
@@ -61,7 +60,7 @@ class ShowProgress(Protocol):
 class TaskRunner:
     """Runs tasks and stores the result of each in its own file.
 
-    The name of the file is a digest of what the result depends on: the source of the package or
+    The name of the file is a digest of what the result depends on: the modules that make it or
     the version of the task, the function and the arguments. A stored result is therefore never
     outdated, and a command that is stopped loses only the tasks that were running.
 
@@ -133,22 +132,6 @@ class TaskRunner:
             return UNSET
 
 
-@lru_cache
-def source_digest(unused: tuple[str, ...] = ()) -> str:
-    """Return a digest of the files of the package that a result depends on.
-
-    Args:
-        unused: files and folders that are left out, beside those of the command line and of
-            reports: `control/laws/pr2.py`, `labelling`.
-    """
-    left_out = (*NEVER_USED, *unused)
-    digest = sha256()
-    for name, content in file_digests().items():
-        if not any(name.is_relative_to(each) for each in left_out):
-            digest.update(f"{name.as_posix()} {content}\n".encode())
-    return digest.hexdigest()
-
-
 class StoredResult(Struct, frozen=True):
     """A result on disk, with a digest of its bytes."""
 
@@ -169,7 +152,8 @@ def _keys(tasks: Sequence[Task]) -> dict[str, str]:
 
 def _key(task: Task) -> str:
     function = f"{task.function.__module__}.{task.function.__qualname__}"
-    given = (task.version or source_digest(), function, task.arguments)
+    version = task.version or source_digest((task.function.__module__,))
+    given = (version, function, task.arguments)
     return sha256(msgpack.encode(given, order="deterministic")).hexdigest()
 
 

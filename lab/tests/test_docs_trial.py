@@ -8,11 +8,11 @@ from pathlib import Path
 import msgspec
 import pytest
 
-from trial.example_results import results_of
 from holdfast_lab.trial.document import document_of
 from holdfast_lab.trial.plan import TrialPlan
+from trial.example_results import results_of
 
-ROOT = Path(__file__).parents[1]
+ROOT = Path(__file__).parents[2]
 PUBLISHED = ROOT / "docs" / "grip"
 
 

@@ -12,12 +12,11 @@ import numpy as np
 import pytest
 from threadpoolctl import threadpool_info
 
-from holdfast import cluster
-from holdfast_lab import tasks as work
 from holdfast.cli.terminal.progress import progress
 from holdfast.errors import EngineError, OutputError
 from holdfast.parallel import Engine
-from holdfast_lab.tasks import Task, TaskRunner, source_digest
+from holdfast_lab import tasks as work
+from holdfast_lab.tasks import Task, TaskRunner
 
 ENGINES = [Engine(1), Engine(2)]
 
@@ -215,41 +214,6 @@ def test_a_worker_with_another_source_is_rejected(tmp_path, monkeypatch):
         EngineError, match=r"^figure/\d: the version of holdfast of its worker diff"
     ):
         TaskRunner(tmp_path, Engine(2)).run(tasks(2))
-
-
-@pytest.fixture
-def digest(tmp_path, monkeypatch):
-    """Function that writes files of a package, a__b for a/b, and returns their digest."""
-
-    def written(*unused, **files):
-        for name, text in files.items():
-            path = tmp_path / "package" / name.replace("__", "/")
-            path.parent.mkdir(parents=True, exist_ok=True)
-            path.write_text(text)
-        clear()
-        return source_digest(unused)
-
-    def clear():
-        work.source_digest.cache_clear()
-        cluster.file_digests.cache_clear()
-
-    monkeypatch.setattr(cluster, "__file__", str(tmp_path / "package" / "cluster.py"))
-    yield written
-    monkeypatch.undo()
-    clear()
-
-
-def test_the_source_digest_ignores_the_command_line_and_reports(digest):
-    first = digest(a="1", study__b="2")
-    assert digest(cli__c="3", report__d="4") == first
-    assert digest(study__b="3") != first
-
-
-def test_the_source_digest_ignores_files_that_are_not_used(digest):
-    first = digest("laws/b", "study", a="1", laws__b="2", laws__c="3")
-    assert digest("laws/b", "study", laws__b="4", study__d="5") == first
-    assert digest("laws/b", "study", laws__c="6") != first
-    assert digest("laws/b", "study", study_plan="7") != first
 
 
 def test_a_task_may_have_a_version_of_its_own(tmp_path, log, monkeypatch):

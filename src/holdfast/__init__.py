@@ -20,10 +20,11 @@ if TYPE_CHECKING:
     from holdfast.contact import Fault as Fault
     from holdfast.contact import HandEstimate as HandEstimate
     from holdfast.contact import Reason as Reason
-    from holdfast.grip import GripCommand as GripCommand
-    from holdfast.grip import GripController as GripController
     from holdfast.detector import Detector as Detector
     from holdfast.detector import detect as detect
+    from holdfast.devices.sources import Arrival as Arrival
+    from holdfast.devices.sources import Source as Source
+    from holdfast.devices.sources import open_source as open_source
     from holdfast.errors import HoldfastError as HoldfastError
     from holdfast.errors import MissingExtra as MissingExtra
     from holdfast.errors import ModelError as ModelError
@@ -35,6 +36,8 @@ if TYPE_CHECKING:
     from holdfast.features import FEATURE_NAMES as FEATURE_NAMES
     from holdfast.features import fingertip_force as fingertip_force
     from holdfast.features import haar_features as haar_features
+    from holdfast.grip import GripCommand as GripCommand
+    from holdfast.grip import GripController as GripController
     from holdfast.io import load_dataset as load_dataset
     from holdfast.io import load_recording as load_recording
     from holdfast.io import save_recording as save_recording
@@ -49,9 +52,6 @@ if TYPE_CHECKING:
     from holdfast.sensors import Hand as Hand
     from holdfast.sensors import Sensor as Sensor
     from holdfast.sensors import sensor as sensor
-    from holdfast.devices.sources import Arrival as Arrival
-    from holdfast.devices.sources import Source as Source
-    from holdfast.devices.sources import open_source as open_source
     from holdfast.training import StabilityClassifier as StabilityClassifier
     from holdfast.training import evaluate as evaluate
     from holdfast.training import train as train
@@ -80,12 +80,12 @@ _HOMES = {
     "Fault": "contact",
     "HandEstimate": "contact",
     "Reason": "contact",
-    "GripCommand": "control",
-    "GripController": "control",
+    "GripCommand": "grip",
+    "GripController": "grip",
     "StreamDetector": "live.stream_detector",
-    "Arrival": "sources",
-    "Source": "sources",
-    "open_source": "sources",
+    "Arrival": "devices.sources",
+    "Source": "devices.sources",
+    "open_source": "devices.sources",
     "StabilityClassifier": "training",
     "evaluate": "training",
     "train": "training",

@@ -14,16 +14,16 @@ from holdfast.cli import main
 from holdfast.cli.detect import CHUNK_SIZE
 from holdfast.contact import UNSTABLE, Fault
 from holdfast.detector import detect
+from holdfast.devices.sources import open_source
 from holdfast.features import FeatureSpec
 from holdfast.io import load_recording, save_recording
 from holdfast.io.mcap_writer import RecordingWriter
 from holdfast.live.arrival_detector import ArrivalDetector
-from holdfast.live.stream_detector import StreamDetector
 from holdfast.live.publishers.xela_server import XelaServer
+from holdfast.live.stream_detector import StreamDetector
 from holdfast.model import Debounce, FingerModel, Model
 from holdfast.recordings import Recording, Tactile
 from holdfast.sensors import sensor
-from holdfast.devices.sources import open_source
 from holdfast.synthetic import synthetic_recording
 
 FIELDS = [

@@ -8,8 +8,8 @@ import pytest
 from holdfast.cli import doctor as verb
 from holdfast.cli import main
 from holdfast.cli.doctor import EXTRA_PURPOSES
-from holdfast.errors import install_command
 from holdfast.devices.sources.xela import places
+from holdfast.errors import install_command
 
 
 def report(capsys):

@@ -10,12 +10,12 @@ from holdfast.cli import main
 from holdfast.cli.grip_options import GripSettings
 from holdfast.cli.hold import hold
 from holdfast.cli.serve import serve
-from holdfast.grip import GripCommand, Limits
-from holdfast.live.loop import watchdog
 from holdfast.devices.hands.ros import ros_hand
-from holdfast_lab.trial.run import LIMITS
+from holdfast.grip import GripCommand, Limits
 from holdfast.io import load_recording, save_recording
+from holdfast.live.loop import watchdog
 from holdfast.synthetic import synthetic_recording
+from holdfast_lab.trial.run import LIMITS
 
 DOCS = Path(__file__).parents[2] / "docs"
 TWIN = "twin:?object=ball&case=1&profile=finger-vigorous"

@@ -14,12 +14,12 @@ from holdfast.cli import main
 from holdfast.cli import play as verb
 from holdfast.contact import Fault
 from holdfast.detector import Detector, detect
+from holdfast.devices.sources import open_source
 from holdfast.errors import SourceError
 from holdfast.io import save_recording
 from holdfast.model import Model
 from holdfast.recordings import Recording, Tactile
 from holdfast.sensors import sensor
-from holdfast.devices.sources import open_source
 from holdfast.synthetic import synthetic_recording
 
 PATIENCE = 30.0
@@ -89,7 +89,9 @@ def refusal(capsys, *words):
 )
 def test_a_client_decides_as_on_the_recording(capsys, path, recording, options, monkeypatch):
     """Compare sample by sample, over a socket, at eight times real time."""
-    monkeypatch.setattr("holdfast.devices.sources.timeline.MAX_FAULTY_PACE", 1.0)  # a busy machine is slow
+    monkeypatch.setattr(
+        "holdfast.devices.sources.timeline.MAX_FAULTY_PACE", 1.0
+    )  # a busy machine is slow
     port = free_port()
     names = "?fingers=1:thumb,2:index,3:middle,4:ring" if "--separate" in options else ""
     n = recording.modules["thumb"].n_samples

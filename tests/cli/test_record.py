@@ -14,16 +14,16 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from holdfast.devices import sources
 from holdfast.cli import main
 from holdfast.cli import record as verb
 from holdfast.contact import Fault
+from holdfast.devices import sources
+from holdfast.devices.sources import Arrival
+from holdfast.devices.sources.base import Source, notice_arrival
 from holdfast.errors import SourceError
 from holdfast.io import load_recording, save_recording
 from holdfast.live.recorder import Recorder
 from holdfast.sensors import sensor
-from holdfast.devices.sources import Arrival
-from holdfast.devices.sources.base import Source, notice_arrival
 from holdfast.synthetic import synthetic_recording
 
 ANYSKIN = sensor("anyskin")

@@ -12,11 +12,11 @@ import pytest
 from holdfast.cli import main
 from holdfast.cli import serve as verb
 from holdfast.cli.serve import open_browser
-from holdfast.live.loop import watchdog
 from holdfast.devices.hands import Claim
 from holdfast.devices.hands.log_file import LogFile
 from holdfast.errors import HandError
 from holdfast.io import load_recording, save_recording
+from holdfast.live.loop import watchdog
 from holdfast.model import Model
 from holdfast.synthetic import synthetic_recording
 

@@ -1,10 +1,10 @@
 import numpy as np
 import pytest
 
-from holdfast.grip import FingerCommand, GripCommand, LoopState
 from holdfast.devices.live_twin import LiveTwin
-from holdfast.errors import HandError
 from holdfast.devices.sources.replay import PAUSE
+from holdfast.errors import HandError
+from holdfast.grip import FingerCommand, GripCommand, LoopState
 from holdfast.twin.hand import FINGERS
 from holdfast.twin.simulation import Grasp, simulate
 

@@ -9,10 +9,10 @@ from holdfast.cli import demo
 from holdfast.cli import simulate as simulate_verb
 from holdfast.io import save_recording
 from holdfast.recordings import Tactile
-from holdfast_lab.study.summary import STRONGEST
 from holdfast.synthetic import synthetic_recording
 from holdfast.twin import simulation
 from holdfast.twin.profile import profile
+from holdfast_lab.study.summary import STRONGEST
 
 from . import blocks
 

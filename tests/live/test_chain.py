@@ -14,8 +14,8 @@ import msgspec
 import pytest
 
 from holdfast.detector import detect
-from holdfast.live.stream_detector import StreamDetector
 from holdfast.devices.sources import open_source
+from holdfast.live.stream_detector import StreamDetector
 
 from . import build
 

@@ -6,14 +6,14 @@ import random
 import numpy as np
 import pytest
 
+from devices.sources.xela.servers import HANG_UP, free_port, server
 from holdfast.contact import ContactState, Fault
 from holdfast.detector import detect
+from holdfast.devices.sources import open_source
+from holdfast.devices.sources.xela.encoder import XelaEncoder
 from holdfast.live.session import Session
 from holdfast.live.stream_detector import StreamDetector
 from holdfast.sensors import sensor
-from holdfast.devices.sources import open_source
-from holdfast.devices.sources.xela.encoder import XelaEncoder
-from devices.sources.xela.servers import HANG_UP, free_port, server
 
 from . import build
 from .test_session import wait_for

@@ -4,11 +4,11 @@ import numpy as np
 import pytest
 
 from holdfast import Model
+from holdfast.devices.sources import Arrival
 from holdfast.live.arrival_detector import ArrivalDetector
 from holdfast.live.readings_monitor import MISSING_AXES, PULLED, STILL, ReadingsMonitor
 from holdfast.recordings import Recording, Tactile
 from holdfast.sensors import sensor
-from holdfast.devices.sources import Arrival
 from holdfast.synthetic import synthetic_recording
 
 PATCH = sensor("uskin-4x4")

@@ -13,14 +13,14 @@ import numpy as np
 import pytest
 
 from holdfast.contact import Fault
+from holdfast.devices.sources import Arrival, open_source
+from holdfast.devices.sources.base import notice_arrival
 from holdfast.errors import OutputError, RecordingError
 from holdfast.io import load_recording
 from holdfast.io.mcap_writer import RecordingWriter
 from holdfast.live import recorder as module
 from holdfast.live.recorder import Recorder
 from holdfast.sensors import sensor
-from holdfast.devices.sources import Arrival, open_source
-from holdfast.devices.sources.base import notice_arrival
 
 ANYSKIN = sensor("anyskin")
 TWO = {"thumb": ANYSKIN, "index": ANYSKIN}

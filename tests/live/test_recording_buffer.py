@@ -6,12 +6,12 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from holdfast.contact import Fault
+from holdfast.devices.sources import Arrival
+from holdfast.devices.sources.base import notice_arrival
 from holdfast.live import recording_buffer as module
 from holdfast.live.recording_buffer import ModuleBuffer, RecordingBuffer, marker_text
 from holdfast.recordings import Tactile
 from holdfast.sensors import sensor
-from holdfast.devices.sources import Arrival
-from holdfast.devices.sources.base import notice_arrival
 
 ANYSKIN = sensor("anyskin")
 TIMES = st.lists(st.floats(-1e9, 1e9) | st.sampled_from([math.nan, math.inf, -math.inf]))

@@ -8,7 +8,6 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.ticker import FuncFormatter, NullLocator
 
-from holdfast_lab.figures.dots import IntervalEstimate
 from holdfast.plots.style import (
     COLOURS,
     FAINT,
@@ -24,6 +23,7 @@ from holdfast.plots.style import (
     series_styles,
 )
 from holdfast.sensors.types import Array
+from holdfast_lab.figures.dots import IntervalEstimate
 
 
 class Distribution(NamedTuple):

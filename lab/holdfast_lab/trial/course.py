@@ -7,12 +7,12 @@ import msgspec
 import numpy as np
 
 from holdfast.contact import CONTACT_FORCE
-from holdfast_lab.trial.run import RunningTrial, least_force_at
-from holdfast_lab.trial.trials import Trial
 from holdfast.sensors.types import Array
 from holdfast.twin.contact import LOAD, SLIP
 from holdfast.twin.hand import RATE
 from holdfast.twin.world import World
+from holdfast_lab.trial.run import RunningTrial, least_force_at
+from holdfast_lab.trial.trials import Trial
 
 LEAD_TIME = 0.5
 """Time before the load with which a course begins [s]."""

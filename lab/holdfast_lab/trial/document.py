@@ -6,12 +6,12 @@ from typing import Any
 
 import msgspec
 
+from holdfast.csv_cells import csv_text
+from holdfast.twin.loads import LoadKind
 from holdfast_lab.trial.plan import TrialPlan
 from holdfast_lab.trial.run import LIMITS, TrialResult
 from holdfast_lab.trial.summary import Summary, compare, summarize
 from holdfast_lab.trial.trials import GRIP_MULTIPLE
-from holdfast.csv_cells import csv_text
-from holdfast.twin.loads import LoadKind
 
 OWN, BASELINE = "holdfast", "fixed"
 """The law of holdfast, and the hand without control; each other law is compared with both."""

@@ -5,6 +5,11 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
+from holdfast.errors import OutputError
+from holdfast.parallel import Engine
+from holdfast_lab.report.environment import fact_texts, machine, versions
+from holdfast_lab.report.folder import ReportKind, check_output_folder, write_report
+from holdfast_lab.tasks import Notify, ShowProgress, TaskRunner
 from holdfast_lab.trial.course import TrialCourse
 from holdfast_lab.trial.document import (
     BASELINE,
@@ -17,11 +22,6 @@ from holdfast_lab.trial.document import (
 from holdfast_lab.trial.plan import TrialPlan
 from holdfast_lab.trial.report import Example, report_sections
 from holdfast_lab.trial.trials import draw_trial
-from holdfast.errors import OutputError
-from holdfast.parallel import Engine
-from holdfast_lab.report.environment import fact_texts, machine, versions
-from holdfast_lab.report.folder import ReportKind, check_output_folder, write_report
-from holdfast_lab.tasks import Notify, ShowProgress, TaskRunner
 
 COMPARISON = ReportKind("comparison of grip laws", "trial.json", ("trials.csv",))
 """What the folder of a comparison holds."""

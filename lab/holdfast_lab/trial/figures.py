@@ -5,10 +5,7 @@ from typing import Any
 
 import numpy as np
 
-from holdfast_lab.trial.course import TrialCourse
-from holdfast_lab.trial.document import GOALS, Results
-from holdfast_lab.trial.run import TrialResult
-from holdfast_lab.trial.summary import Summary, reaction_time
+from holdfast.sensors.types import Array
 from holdfast_lab.figures.dots import IntervalEstimate, draw_groups
 from holdfast_lab.figures.trials import (
     Distribution,
@@ -19,7 +16,10 @@ from holdfast_lab.figures.trials import (
     draw_trade_offs,
 )
 from holdfast_lab.report.html_report import ReportFigure
-from holdfast.sensors.types import Array
+from holdfast_lab.trial.course import TrialCourse
+from holdfast_lab.trial.document import GOALS, Results
+from holdfast_lab.trial.run import TrialResult
+from holdfast_lab.trial.summary import Summary, reaction_time
 
 
 def distribution_figure(results: Results) -> ReportFigure:

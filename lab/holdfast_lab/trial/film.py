@@ -9,10 +9,10 @@ import numpy as np
 from PIL import Image, ImageDraw, ImageFont
 
 from holdfast.contact import SLIP_SPEED
-from holdfast_lab.trial.course import Instant, follow
-from holdfast_lab.trial.trials import Trial
 from holdfast.twin.hand import RATE
 from holdfast.twin.render import SAMPLES_PER_PICTURE, Picture, Renderer, save_video
+from holdfast_lab.trial.course import Instant, follow
+from holdfast_lab.trial.trials import Trial
 
 WIDTH, HEIGHT = 360, 270
 """Size of the picture of one law [pixels]."""

@@ -6,28 +6,24 @@ from hashlib import sha256
 
 import msgspec
 
+from holdfast.detector import Detector
+from holdfast.errors import ModelError
+from holdfast.grip import laws
 from holdfast.grip.laws import LAWS, law_named
+from holdfast.model import Model
+from holdfast.sensors import sensor
+from holdfast.twin.hand import FINGERS
+from holdfast_lab.source_digest import source_digest
+from holdfast_lab.tasks import Task
 from holdfast_lab.trial.course import TrialCourse, follow
 from holdfast_lab.trial.film import film
 from holdfast_lab.trial.run import TrialResult, run_trial
 from holdfast_lab.trial.trials import draw_trial
-from holdfast.detector import Detector
-from holdfast.errors import ModelError
-from holdfast.model import Model
-from holdfast.sensors import sensor
-from holdfast_lab.tasks import Task, source_digest
-from holdfast.twin.hand import FINGERS
 
-UNUSED = (
-    *("io", "labelling", "live", "plots", "ros", "sources", "study", "training", "web"),
-    *("control/hands", "control/guard.py", "control/live_twin.py", "control/loop.py"),
-    *("control/watchdog.py", "control/laws/__init__.py"),
-    *(f"control/trial/{name}.py" for name in ("document", "experiment", "figures", "report")),
-    *("control/trial/summary.py", "control/trial/tables.py"),
-)
-"""Files and folders of the package on which no trial depends."""
-OF_FILMS = ("control/trial/course.py", "control/trial/film.py", "twin/render.py")
-"""Files on which courses and films depend, and the result of a trial does not."""
+SIMULATION = ("holdfast_lab.trial.run", "holdfast_lab.trial.trials")
+"""Modules that draw and run a trial."""
+COURSE = (*SIMULATION, "holdfast_lab.trial.course")
+FILM = (*COURSE, "holdfast_lab.trial.film")
 
 
 @dataclass(frozen=True)
@@ -69,20 +65,21 @@ class TrialPlan:
 
     def trial_task(self, number: int, law: str) -> Task:
         """Return the task of one trial with one law."""
-        version = _version(law, (*UNUSED, *OF_FILMS))
+        version = _version(law, SIMULATION)
         arguments = (self.seed, number, law, self.model, self.model_digest)
         return Task(f"trial/{number}/{law}", run_numbered, arguments, TrialResult, version=version)
 
     def course_task(self, number: int, law: str) -> Task:
         """Return the task of the course of one trial with one law."""
         arguments = (self.seed, number, law, self.model, self.model_digest)
-        version = _version(law)
+        version = _version(law, COURSE)
         return Task(f"course/{number}/{law}", course_of, arguments, TrialCourse, version=version)
 
     def film_task(self, number: int, laws: tuple[str, str]) -> Task:
         """Return the task of the film of one trial with two laws."""
         arguments = (self.seed, number, laws, self.model, self.model_digest)
-        version = sha256("".join(map(_version, laws)).encode()).hexdigest()
+        versions = (_version(law, FILM) for law in laws)
+        version = sha256("".join(versions).encode()).hexdigest()
         return Task(f"film/{number}", film_of, arguments, bytes, version=version)
 
 
@@ -137,18 +134,18 @@ def _check_model(model: Model) -> None:
 
 
 @cache
-def _version(law: str, unused: tuple[str, ...] = UNUSED) -> str:
+def _version(law: str, modules: tuple[str, ...]) -> str:
     """Return a digest of what a trial depends on: the source, and the constants of its law.
 
     The files of other laws are left out, so that a new law leaves the results of the others.
 
     Args:
         law: name of the law.
-        unused: files and folders that are left out.
+        modules: that make the result.
     """
-    others = {type(LAWS[name]()).__module__ for name in LAWS} - {type(LAWS[law]()).__module__}
-    files = [f"{module.removeprefix('holdfast.').replace('.', '/')}.py" for module in others]
-    source = source_digest((*unused, *sorted(files)))
+    law_modules = {type(factory()).__module__ for factory in LAWS.values()}
+    own = type(LAWS[law]()).__module__
+    source = source_digest((*modules, own), (*sorted(law_modules - {own}), laws.__name__))
     constants = msgspec.json.encode(_contents(LAWS[law]()), order="deterministic")
     return sha256(source.encode() + constants).hexdigest()
 

@@ -3,6 +3,8 @@
 from collections.abc import Iterator, Mapping, Sequence
 from typing import Any, NamedTuple
 
+from holdfast_lab.report.html_report import SUMMARY, ReportFilm, Section
+from holdfast_lab.report.result_tables import number_text
 from holdfast_lab.trial.course import TrialCourse
 from holdfast_lab.trial.document import BASELINE, GOALS, OWN, Results
 from holdfast_lab.trial.figures import (
@@ -21,8 +23,6 @@ from holdfast_lab.trial.tables import (
     objects_table,
     paired_table,
 )
-from holdfast_lab.report.html_report import SUMMARY, ReportFilm, Section
-from holdfast_lab.report.result_tables import number_text
 
 WHAT = """Each law of grip force runs on the same trials of the twin. In a trial the hand grips an
 object lightly, the operator lets go, and after 2.5 to 3.5 s a load comes: added weight, a pull in

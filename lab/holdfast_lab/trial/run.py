@@ -8,11 +8,10 @@ import numpy as np
 import numpy.typing as npt
 
 from holdfast.contact import CONTACT_FORCE, SLIP_SPEED
+from holdfast.detector import Detector
 from holdfast.grip.command import GripCommand, LoopState
 from holdfast.grip.controller import GripController
 from holdfast.grip.limits import Limits
-from holdfast_lab.trial.trials import Trial
-from holdfast.detector import Detector
 from holdfast.model import Model
 from holdfast.sensors.types import Array
 from holdfast.twin.contact import LOAD, SLIP
@@ -20,6 +19,7 @@ from holdfast.twin.grasp import GRASP_DIRECTION
 from holdfast.twin.hand import FINGERS, GRAVITY, RATE
 from holdfast.twin.loads import load_state
 from holdfast.twin.simulation import Simulation
+from holdfast_lab.trial.trials import Trial
 
 LIMITS = Limits()
 """Limits of all laws: those that `holdfast hold` has by default. The lowest scale is 1.6 times the

@@ -11,10 +11,10 @@ from typing import Any
 
 import numpy as np
 
-from holdfast_lab.trial.run import TrialResult
 from holdfast.metrics.intervals import bootstrap_interval, quantile_of, ratio_of_sums
 from holdfast.metrics.statistics import finite_or_none, quantile
 from holdfast.sensors.types import Array
+from holdfast_lab.trial.run import TrialResult
 
 Summary = dict[str, Any]
 

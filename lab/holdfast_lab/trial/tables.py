@@ -4,8 +4,8 @@ import math
 from collections.abc import Iterator, Mapping
 from typing import Any, NamedTuple
 
-from holdfast_lab.trial.summary import Summary
 from holdfast_lab.report.result_tables import Key, ResultTable, Row
+from holdfast_lab.trial.summary import Summary
 
 By = Mapping[str, Summary]
 """Summaries or comparisons by law."""

@@ -49,9 +49,9 @@ def trial(
       holdfast trial --out trials --engine dask:tcp://10.0.0.1:8786
     """
     from holdfast.grip.laws import LAWS
+    from holdfast_lab.report.folder import check_output_folder
     from holdfast_lab.trial.experiment import COMPARISON, run_trials
     from holdfast_lab.trial.plan import TrialPlan
-    from holdfast_lab.report.folder import check_output_folder
 
     names = tuple(name.strip() for name in laws.split(",")) if laws else tuple(LAWS)
     number = n if n is not None else N_QUICK_TRIALS if quick else N_TRIALS

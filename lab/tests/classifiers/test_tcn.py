@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 
 from holdfast.classifiers import Samples
+from holdfast.errors import MissingExtra, TrainingError, install_command
 from holdfast_lab.classifiers.tcn import (
     EarlyStopping,
     Network,
@@ -15,7 +16,6 @@ from holdfast_lab.classifiers.tcn import (
     validation_rows,
     weight_shapes,
 )
-from holdfast.errors import MissingExtra, TrainingError, install_command
 
 RECIPE = TemporalConvolution()
 SHORT = {**RECIPE.reference, "n_epochs": 2}

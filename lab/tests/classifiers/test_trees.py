@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 
 from holdfast.classifiers import Samples
-from holdfast_lab.classifiers.trees import GradientBoosting
 from holdfast.errors import TrainingError
+from holdfast_lab.classifiers.trees import GradientBoosting
 
 RECIPE = GradientBoosting()
 

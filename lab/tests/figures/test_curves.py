@@ -2,8 +2,8 @@ import io
 
 import numpy as np
 
-from holdfast_lab.figures.curves import Curve, draw_alarms, draw_lines, draw_reliability
 from holdfast.plots.style import PAPER
+from holdfast_lab.figures.curves import Curve, draw_alarms, draw_lines, draw_reliability
 
 X = np.array([4.0, 8.0, 14.0])
 

@@ -5,13 +5,13 @@ import pytest
 from matplotlib.colors import to_hex
 
 from holdfast.contact import NO_CONTACT, STABLE, UNKNOWN, UNSTABLE, Phase
-from holdfast_lab.figures.experiment import draw_experiment, draw_features, draw_forces
 from holdfast.plots.style import (
     COMPONENT_COLOURS,
     PHASE_COLOURS,
     STATE_COLOURS,
 )
 from holdfast.plots.time_series import FingerSeries
+from holdfast_lab.figures.experiment import draw_experiment, draw_features, draw_forces
 
 
 def series(n=200, seed=0, **options):

@@ -6,8 +6,8 @@ import pytest
 from holdfast.contact import ContactState
 from holdfast.errors import RecordingError, TrainingError
 from holdfast.recordings import Label
-from holdfast_lab.study.plan import Corpus, StudyPlan, content_digest, scan_corpus
 from holdfast.synthetic import synthetic_recording
+from holdfast_lab.study.plan import Corpus, StudyPlan, content_digest, scan_corpus
 
 from .example_recordings import save_all, save_synthetic
 

@@ -9,13 +9,13 @@ import pytest
 from holdfast.contact import ContactState
 from holdfast.errors import OutputError
 from holdfast.parallel import Engine
+from holdfast.synthetic import synthetic_recording
 from holdfast_lab.study import run
 from holdfast_lab.study.comparison import all_methods, costs, jobs, sample_tables, sensitivity
 from holdfast_lab.study.methods import METHODS
 from holdfast_lab.study.paper import experiments, paper_tables
 from holdfast_lab.study.plan import StudyPlan, scan_corpus
 from holdfast_lab.study.run import run_study, whole_hand_note
-from holdfast.synthetic import synthetic_recording
 
 from .example_recordings import recordings_of_cases, save_all, save_synthetic
 

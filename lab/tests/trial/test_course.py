@@ -1,13 +1,13 @@
 import numpy as np
 import pytest
 
+from holdfast.errors import OutputError
+from holdfast.twin.loads import Load, LoadKind
+from holdfast.twin.simulation import Grasp
 from holdfast_lab.trial.course import FALL_TIME, LEAD_TIME, TrialCourse, follow
 from holdfast_lab.trial.film import GAP, HEIGHT, WIDTH, captions, film
 from holdfast_lab.trial.run import run_trial
 from holdfast_lab.trial.trials import Trial
-from holdfast.errors import OutputError
-from holdfast.twin.loads import Load, LoadKind
-from holdfast.twin.simulation import Grasp
 
 CAN = Trial(0, Grasp("can", 1, 1, seed=0), 4, Load(LoadKind.WEIGHT, 1.0, 0.0, 0.4), 0.03)
 

@@ -11,14 +11,14 @@ from pathlib import Path
 
 import pytest
 
+from holdfast.errors import OutputError
+from holdfast.parallel import Engine
+from holdfast_lab.report.html_report import Section
 from holdfast_lab.trial import experiment
 from holdfast_lab.trial import plan as trial_plan
 from holdfast_lab.trial.course import TrialCourse
 from holdfast_lab.trial.experiment import run_trials
 from holdfast_lab.trial.plan import TrialPlan
-from holdfast.errors import OutputError
-from holdfast.parallel import Engine
-from holdfast_lab.report.html_report import Section
 
 from .example_results import invented
 

@@ -1,5 +1,7 @@
 import pytest
 
+from holdfast_lab.report.result_tables import pivot, to_csv
+from holdfast_lab.report.table_layouts import to_markdown
 from holdfast_lab.trial.document import document_of
 from holdfast_lab.trial.plan import TrialPlan
 from holdfast_lab.trial.tables import (
@@ -9,8 +11,6 @@ from holdfast_lab.trial.tables import (
     objects_table,
     paired_table,
 )
-from holdfast_lab.report.result_tables import pivot, to_csv
-from holdfast_lab.report.table_layouts import to_markdown
 
 from .example_results import results_of
 

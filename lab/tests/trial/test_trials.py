@@ -1,8 +1,8 @@
 import numpy as np
 import pytest
 
-from holdfast_lab.trial.trials import GRIP_MULTIPLE, draw_trials, least_force
 from holdfast.twin.loads import LoadKind
+from holdfast_lab.trial.trials import GRIP_MULTIPLE, draw_trials, least_force
 
 
 def test_the_same_seed_draws_the_same_trials():

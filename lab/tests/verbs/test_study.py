@@ -6,16 +6,16 @@ import pytest
 
 from holdfast import cluster
 from holdfast.cli import main
-from holdfast_lab.verbs import study as verb
 from holdfast.contact import ContactState
 from holdfast.io import save_recording
 from holdfast.recordings import Label
-from holdfast_lab.report.result_tables import ResultTable, Row
-from holdfast_lab.study import run as study_run
-from holdfast_lab.study.paper import experiments, paper_tables
 from holdfast.synthetic import synthetic_recording
 from holdfast.twin import simulation
 from holdfast.twin.profile import profile
+from holdfast_lab.report.result_tables import ResultTable, Row
+from holdfast_lab.study import run as study_run
+from holdfast_lab.study.paper import experiments, paper_tables
+from holdfast_lab.verbs import study as verb
 
 
 @pytest.fixture(autouse=True)

@@ -3,12 +3,12 @@ import json
 import msgspec
 import pytest
 
-from trial.example_results import invented
 from holdfast.cli import main
-from holdfast_lab.trial import experiment, plan
-from holdfast_lab.trial.course import TrialCourse
 from holdfast.model import Model
 from holdfast_lab.report.html_report import Section
+from holdfast_lab.trial import experiment, plan
+from holdfast_lab.trial.course import TrialCourse
+from trial.example_results import invented
 
 
 @pytest.fixture

@@ -42,6 +42,11 @@ VERBS = {
 }
 """All verbs in the order of the help, with the first line of their docstrings."""
 
+LAB_VERBS = ("trial", "study")
+"""Verbs of the laboratory, the package `holdfast_lab`."""
+ENTRY_POINTS = "holdfast.verbs"
+"""Group of the entry points of verbs of other packages."""
+
 CONFIGURED_VERBS = ("detect", "serve", "record", "hold")
 """Verbs that read the configuration file of `cli/config.py`."""
 
@@ -133,10 +138,29 @@ def _version(value: bool) -> None:
 
 
 def load_verb(name: str) -> Callable[..., None]:
-    """Import the function of a verb."""
+    """Import the function of a verb.
+
+    Raises:
+        HoldfastError: the verb is one of the laboratory, which is not installed.
+    """
+    if name in LAB_VERBS:
+        return _load_entry_point(name)
     module = f"{name}_" if keyword.iskeyword(name) else name
     verb: Callable[..., None] = getattr(import_module(f"holdfast.cli.{module}"), module)
     return verb
+
+
+def _load_entry_point(name: str) -> Callable[..., None]:
+    """Import the function of a verb of another package."""
+    from importlib.metadata import entry_points
+
+    for entry_point in entry_points(group=ENTRY_POINTS, name=name):
+        verb: Callable[..., None] = entry_point.load()
+        return verb
+    raise HoldfastError(
+        f"{name} needs the laboratory: clone the repository of holdfast, and run `uv run holdfast "
+        f"{name}` there, or `pip install ./lab`"
+    )
 
 
 def _root(

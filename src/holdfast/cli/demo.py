@@ -145,9 +145,9 @@ def _replay(model: "Model", recording: "Recording", out: Path, speed: float, *, 
 def _replay_on_page(model: "Model", path: Path, out: Path, speed: float) -> None:
     """Replay on a web page; at a terminal the page stays open until Ctrl-C."""
     from holdfast.cli.serve import open_browser, run_page
+    from holdfast.devices.sources import open_source
     from holdfast.live.session import Session
     from holdfast.live.stream_detector import StreamDetector
-    from holdfast.devices.sources import open_source
 
     stay = sys.stdin.isatty()
     with (

@@ -12,10 +12,10 @@ if TYPE_CHECKING:
     from rich.table import Table
 
     from holdfast.contact import ContactEstimate, ContactEvent, HandEstimate
+    from holdfast.devices.sources import Source
     from holdfast.metrics import InstabilityEvent
     from holdfast.model import Model
     from holdfast.recordings import Recording
-    from holdfast.devices.sources import Source
 
 MIN_DURATION = 0.15
 """Minimum time that a new state must last to be printed [s]."""

@@ -200,8 +200,8 @@ def _detect_live(
 ) -> Iterator["EstimateChunk"]:
     """Yield the estimates of each arrival, until a signal or for `seconds`."""
     from holdfast.cli.detect_output import chunk_from_stream
-    from holdfast.live.stream_detector import compile_kernels
     from holdfast.devices.sources import open_source
+    from holdfast.live.stream_detector import compile_kernels
 
     compile_kernels()
     with handle_stop_signals() as stop, open_source(uri) as source:

@@ -193,8 +193,8 @@ def check_sources() -> dict[str, str]:
 
 
 def _xela() -> str:
-    from holdfast.devices.uri import parse
     from holdfast.devices.sources.xela.places import places
+    from holdfast.devices.uri import parse
 
     addresses = places(parse("xela://auto")[1])
     for address in addresses:
@@ -204,8 +204,8 @@ def _xela() -> str:
 
 
 def _ros1() -> str:
-    from holdfast.errors import HoldfastError
     from holdfast.devices.ros.rospy_node import check_master, master_uri, rospy_module
+    from holdfast.errors import HoldfastError
 
     try:
         rospy_module()

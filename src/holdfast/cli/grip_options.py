@@ -11,12 +11,12 @@ import typer
 from holdfast.cli.terminal.console import print_message
 
 if TYPE_CHECKING:
-    from holdfast.grip import Limits
     from holdfast.devices.hands import Hand
+    from holdfast.devices.sources import Source
+    from holdfast.grip import Limits
     from holdfast.live.loop.grip_loop import GripLoop, Log
     from holdfast.live.loop.watchdog import Watchdog
     from holdfast.live.stream_detector import StreamDetector
-    from holdfast.devices.sources import Source
 
 
 class FaultAction(StrEnum):

@@ -39,13 +39,13 @@ from holdfast.cli.terminal.console import print_line, print_message
 from holdfast.cli.terminal.stopping import StopRequest, handle_stop_signals
 
 if TYPE_CHECKING:
+    from holdfast.devices.sources import Source
     from holdfast.grip import GripCommand
     from holdfast.live.loop.grip_loop import GripLoop
     from holdfast.live.loop.runner import LoopRunner
     from holdfast.live.recorder import Recorder
     from holdfast.live.session import Session
     from holdfast.live.stream_detector import StreamDetector, StreamUpdate
-    from holdfast.devices.sources import Source
 
 
 def hold(

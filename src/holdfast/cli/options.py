@@ -14,11 +14,11 @@ from holdfast.cli.terminal.console import print_message
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
+    from holdfast.devices.sources import Source
     from holdfast.live.stream_detector import StreamDetector
     from holdfast.model import Model
     from holdfast.parallel import Engine
     from holdfast.sensors import Sensor
-    from holdfast.devices.sources import Source
 
 TOKEN_VARIABLE = "HOLDFAST_TOKEN"
 """Environment variable with the token of the pages."""
@@ -214,8 +214,8 @@ def load_model(
     """
     from msgspec.structs import replace
 
-    from holdfast.model import Debounce, Model
     from holdfast.devices.uri import is_uri
+    from holdfast.model import Debounce, Model
 
     is_source = is_uri(name) and not name.startswith("builtin:")
     if is_source or name.endswith((".parquet", ".mcap")):

@@ -12,8 +12,8 @@ from holdfast.cli.terminal.console import print_json, print_message
 from holdfast.cli.terminal.stopping import handle_stop_signals
 
 if TYPE_CHECKING:
-    from holdfast.live.publishers.xela_server import XelaServer
     from holdfast.devices.sources import Source
+    from holdfast.live.publishers.xela_server import XelaServer
 
 POLL_INTERVAL = 0.2
 """Time between two checks whether the server has ended [s]."""
@@ -71,8 +71,8 @@ def play(
       holdfast play twin:?object=can --hand "ros2:plexus?effort=0.1&max_effort=0.3"
       holdfast detect builtin:any xela://127.0.0.1:5000
     """
-    from holdfast.live.publishers.xela_server import XelaServer
     from holdfast.devices.sources.xela.encoder import is_part_of_hand
+    from holdfast.live.publishers.xela_server import XelaServer
 
     check_speed(source, speed)
     if not speed:

@@ -14,8 +14,8 @@ from holdfast.cli.terminal.console import print_json, print_line, print_message
 from holdfast.cli.terminal.stopping import StopRequest, handle_stop_signals
 
 if TYPE_CHECKING:
-    from holdfast.live.recorder import Recorder, RecorderStatus
     from holdfast.devices.sources import Arrival, Source
+    from holdfast.live.recorder import Recorder, RecorderStatus
 
 READ_TIMEOUT = 0.1
 """Time to wait for the source before keys and signals are checked [s]."""
@@ -167,8 +167,8 @@ def _output_path(source: str, out: Path, object_name: str, *, force: bool) -> Pa
 
 def _recording_name(source: str, object_name: str) -> str:
     """Return the name of the source recording, or the object or device with the time."""
-    from holdfast.files import file_stem
     from holdfast.devices.uri import is_uri
+    from holdfast.files import file_stem
 
     if not is_uri(source):
         return file_stem(Path(source).stem)

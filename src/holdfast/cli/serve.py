@@ -51,14 +51,14 @@ from holdfast.cli.terminal.console import print_json, print_message
 
 if TYPE_CHECKING:
     from holdfast.devices.hands import Hand
+    from holdfast.devices.sources import Source
+    from holdfast.live.loop.documents import Grip
     from holdfast.live.loop.live_grip import LiveGrip
     from holdfast.live.loop.watchdog import Watchdog
-    from holdfast.live.loop.documents import Grip
     from holdfast.live.publishers.ros_publisher import RosPublisher
     from holdfast.live.session import Session
     from holdfast.live.stream_detector import StreamDetector
     from holdfast.model import Model
-    from holdfast.devices.sources import Source
     from holdfast.web.guard import Guard
 
 DEFAULT_HOST, DEFAULT_PORT = "127.0.0.1", 8080

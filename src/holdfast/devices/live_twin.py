@@ -6,14 +6,14 @@ from typing import Any
 
 import numpy as np
 
-from holdfast.grip.command import GripCommand
 from holdfast.devices.hands import Hand
-from holdfast.errors import HandError
-from holdfast.sensors import Sensor
 from holdfast.devices.sources import Arrival, Source
 from holdfast.devices.sources.replay import PAUSE
 from holdfast.devices.sources.twin import grasp_of
 from holdfast.devices.uri import parse
+from holdfast.errors import HandError
+from holdfast.grip.command import GripCommand
+from holdfast.sensors import Sensor
 from holdfast.twin.hand import FINGERS, RATE
 from holdfast.twin.simulation import Simulation
 

@@ -7,8 +7,8 @@ from importlib import import_module
 from pathlib import Path
 from urllib.parse import parse_qsl, urlsplit
 
-from holdfast.sensors import Sensor, built_in_sensors, sensor
 from holdfast.devices.sources.base import Source
+from holdfast.sensors import Sensor, built_in_sensors, sensor
 
 SCHEMES = {
     "xela": "XELA's server: xela://HOST:PORT or xela://auto, ?values=counts|calibrated",
@@ -19,7 +19,7 @@ SCHEMES = {
 }
 """URI schemes of the sources, with a description and an example of each."""
 DEVICE_MODULES = {"xela": "xela", "ros2": "ros.ros2", "ros1": "ros.ros1", "serial": "serial"}
-"""Modules of `holdfast.devices.sources` whose function `source(address)` makes a device's source."""
+"""Modules of `holdfast.devices.sources` whose function `source(address)` makes a source."""
 VALUES = ("counts", "calibrated")
 """Readings to take from a packet: uint16 counts, or newtons if the device sends them."""
 

@@ -10,6 +10,7 @@ import numpy.typing as npt
 
 from holdfast.contact import ContactState, Fault, HandEstimate, Reason, with_faults
 from holdfast.detector import Detector
+from holdfast.devices.sources import Arrival
 from holdfast.errors import ModelError, StreamError
 from holdfast.features import Tare
 from holdfast.live.adjustable_detector import AdjustableDetector, check_thresholds
@@ -19,7 +20,6 @@ from holdfast.model import Model
 from holdfast.recordings import GAP_PERIODS
 from holdfast.resampling import Resampler
 from holdfast.sensors import Sensor
-from holdfast.devices.sources import Arrival
 
 RATE_MEASUREMENT_TIME = 0.5
 """Length of the first part of a stream, from which its rate is measured [s]."""

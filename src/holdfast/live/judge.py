@@ -4,10 +4,10 @@ import warnings
 from collections.abc import Mapping
 from typing import Any
 
+from holdfast.devices.sources import Arrival
 from holdfast.live.arrival_detector import ArrivalDetector, StreamEstimate
 from holdfast.model import Model
 from holdfast.sensors import Sensor
-from holdfast.devices.sources import Arrival
 
 
 class Judge(ArrivalDetector):

@@ -4,8 +4,8 @@ from collections.abc import Iterable, Mapping
 
 import numpy as np
 
-from holdfast.recordings import GAP_PERIODS
 from holdfast.devices.sources import Arrival
+from holdfast.recordings import GAP_PERIODS
 
 RATE_TOLERANCE = 0.2
 """A rate that differs by more than this from that at the start has changed."""

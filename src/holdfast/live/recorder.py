@@ -11,11 +11,11 @@ from types import TracebackType
 from typing import TYPE_CHECKING, Any, NamedTuple, Self
 
 from holdfast.contact import Fault
+from holdfast.devices.sources import Arrival
 from holdfast.errors import OutputError
 from holdfast.io.mcap_writer import RecordingWriter
 from holdfast.live.recording_buffer import RecordingBuffer
 from holdfast.sensors import Sensor
-from holdfast.devices.sources import Arrival
 
 if TYPE_CHECKING:
     from holdfast.live.session import Session

@@ -9,12 +9,12 @@ import numpy as np
 import numpy.typing as npt
 
 from holdfast.contact import Fault
+from holdfast.devices.sources import Arrival
+from holdfast.devices.sources.base import MARKER_PREFIX
 from holdfast.io.header import NUMBER_TYPES
 from holdfast.recordings import GAP_PERIODS
 from holdfast.sensors import Sensor
 from holdfast.sensors.types import Array
-from holdfast.devices.sources import Arrival
-from holdfast.devices.sources.base import MARKER_PREFIX
 
 NOTICE_REPEAT_INTERVAL = 1.0
 """Minimum time between two markers of the same notice [s]."""

@@ -12,9 +12,9 @@ from typing import NamedTuple, Self
 
 import numpy as np
 
+from holdfast.devices.sources import Arrival
 from holdfast.errors import SourceError, StreamError
 from holdfast.live.stream_detector import StreamDetector, StreamUpdate
-from holdfast.devices.sources import Arrival
 
 MAX_LATENCIES = 8192
 """Number of newest latencies from which the percentiles are computed."""

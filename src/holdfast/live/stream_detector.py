@@ -10,12 +10,12 @@ import numpy.typing as npt
 
 from holdfast.contact import ContactEvent, ContactState, HandEstimate, StateChanges
 from holdfast.detector import HAND, Detector
+from holdfast.devices.sources import Arrival, Source
+from holdfast.devices.sources.base import DeviceSource
 from holdfast.live.arrival_detector import ArrivalDetector, Samples, StreamEstimate
 from holdfast.live.lasting_changes import DEFAULT_DURATION, LastingChanges
 from holdfast.model import Model
 from holdfast.sensors import sensor
-from holdfast.devices.sources import Arrival, Source
-from holdfast.devices.sources.base import DeviceSource
 
 
 def compile_kernels() -> None:

@@ -1,1 +1,1 @@
-"""ROS without an installation of ROS: messages, their codec, and transports of ROS 1 and 2."""
+"""ROS without an installation of ROS: messages and their codec."""

@@ -8,9 +8,9 @@ from contextlib import contextmanager
 import msgspec
 import pytest
 
-from holdfast.grip import GripCommand
 from holdfast.devices.hands import open_hand
 from holdfast.devices.live_twin import LiveTwin
+from holdfast.grip import GripCommand
 
 from .ros.drivers import ROS1, ROS2, Ros2Driver
 

@@ -5,10 +5,10 @@ import math
 import msgspec
 import pytest
 
-from holdfast.grip import FingerCommand, GripCommand, Limits, LoopState
 from holdfast.devices.hands import open_hand
 from holdfast.devices.hands.ros import ros_hand
 from holdfast.errors import HandError
+from holdfast.grip import FingerCommand, GripCommand, Limits, LoopState
 
 from .rigs import LOCAL, NAMES, WITH_STATES, Rigs
 from .ros.drivers import POSITIONS

@@ -5,10 +5,10 @@ import builtins
 import msgspec
 import pytest
 
-from holdfast.grip import FingerCommand, GripCommand, LoopState
 from holdfast.devices.hands import Claim, open_hand
 from holdfast.devices.hands.scalar import ScalarGripper
 from holdfast.errors import HandError
+from holdfast.grip import FingerCommand, GripCommand, LoopState
 
 COMMAND = GripCommand(
     1.0, LoopState.REACT, {"thumb": FingerCommand(1.3), "index": FingerCommand(1.1)}

@@ -6,7 +6,6 @@ from xmlrpc.server import SimpleXMLRPCRequestHandler, SimpleXMLRPCServer
 
 import pytest
 
-from holdfast.errors import SourceError
 from holdfast.devices.ros import rospy_node
 from holdfast.devices.ros.rospy_node import (
     check_master,
@@ -17,6 +16,7 @@ from holdfast.devices.ros.rospy_node import (
     start_node,
     subscribed_topics,
 )
+from holdfast.errors import SourceError
 
 
 class _Silent(SimpleXMLRPCRequestHandler):

@@ -12,8 +12,8 @@ from pathlib import Path
 
 import pytest
 
-from holdfast.errors import SourceError
 from holdfast.devices.ros import rospy_node
+from holdfast.errors import SourceError
 
 PEER = Path(__file__).parent / "ros1_peer.py"
 
@@ -45,7 +45,7 @@ class Master:
             "ROS_MASTER_URI": self.uri,
             "ROS_IP": "127.0.0.1",
             "ROS_HOME": str(folder),
-            "PYTHONPATH": str(PEER.parents[1]),
+            "PYTHONPATH": str(PEER.parents[2]),
         }
         self._children = []
         self._master = None

@@ -59,9 +59,9 @@ def chatter():
 
 def source(uri, until, patience=5.0):
     """Ends soon after a notice, or after 60 s."""
-    from holdfast.errors import HoldfastError
     from holdfast.devices.sources import open_source
     from holdfast.devices.sources.ros import topic
+    from holdfast.errors import HoldfastError
 
     topic.OPEN_TIMEOUT = float(patience)
     result = {"numbers": [], "times": [], "n_lost": 0, "notices": []}

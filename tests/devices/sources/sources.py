@@ -14,15 +14,15 @@ import pytest
 
 import holdfast.devices.sources.serial
 import holdfast.devices.sources.twin
+from devices.sources.board import Board, packet, some
+from holdfast.devices.sources import Source, open_source
 from holdfast.io import save_recording
 from holdfast.live.publishers.xela_server import XelaServer
 from holdfast.recordings import Recording, Tactile
 from holdfast.ros.cdr import MessageEncoder
 from holdfast.ros.sensor_messages import known_definition
 from holdfast.sensors import sensor
-from holdfast.devices.sources import Source, open_source
 from holdfast.twin.simulation import simulate
-from devices.sources.board import Board, packet, some
 
 N_SOON = 40
 """Number of samples of every source before it may become silent."""

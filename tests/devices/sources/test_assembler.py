@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 
 from holdfast.contact import Fault
-from holdfast.sensors import hand, sensor
 from holdfast.devices.sources.assembler import Assembler, Device, n_missing
+from holdfast.sensors import hand, sensor
 
 START, PERIOD = 1000.0, 0.01
 

@@ -7,11 +7,11 @@ import msgspec
 import numpy as np
 import pytest
 
+from devices.sources.sources import BROKEN, ENDING, EVERY, LASTING, N_SOON
 from holdfast.detector import Detector
 from holdfast.errors import HoldfastError
 from holdfast.model import Model
 from holdfast.sensors import Sensor
-from devices.sources.sources import BROKEN, ENDING, EVERY, LASTING, N_SOON
 
 LIMIT = 20.0
 """A test that hangs fails after this [s]."""

@@ -5,14 +5,14 @@ import numpy as np
 import pytest
 
 from holdfast.detector import Detector, detect
+from holdfast.devices.sources import open_source
+from holdfast.devices.sources import replay as module
+from holdfast.devices.sources.replay import Replay
 from holdfast.errors import RecordingError
 from holdfast.io import load_recording, save_recording
 from holdfast.model import Model
 from holdfast.recordings import Recording, Tactile
 from holdfast.sensors import sensor
-from holdfast.devices.sources import open_source
-from holdfast.devices.sources import replay as module
-from holdfast.devices.sources.replay import Replay
 from holdfast.synthetic import synthetic_recording
 
 SUFFIXES = ("parquet", "mcap")
@@ -271,7 +271,9 @@ def test_a_deleted_file_ends_a_loop_with_a_notice(tmp_path):
 
 def test_samples_out_of_order_are_reported(monkeypatch):
     early, late = hand(600), hand(600)
-    monkeypatch.setattr("holdfast.devices.sources.replay.read_chunks", lambda *_, **__: iter([early, late]))
+    monkeypatch.setattr(
+        "holdfast.devices.sources.replay.read_chunks", lambda *_, **__: iter([early, late])
+    )
     with Replay("a.parquet", speed=0) as source:
         (refused,) = [arrival for arrival in source if arrival.n_refused]
     assert refused.notices == (f"{refused.n_refused} samples are out of order and were left out",)

@@ -10,11 +10,11 @@ import numpy as np
 import pytest
 
 import holdfast.devices.sources.serial as module
+from devices.sources.board import Board, packet, some
 from holdfast.contact import Fault
+from holdfast.devices.sources import base, open_source
 from holdfast.errors import MissingExtra, SourceError
 from holdfast.sensors import sensor
-from holdfast.devices.sources import base, open_source
-from devices.sources.board import Board, packet, some
 
 LIMIT = 20.0
 """A test that hangs fails after this [s]."""

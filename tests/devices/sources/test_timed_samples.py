@@ -5,10 +5,10 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from holdfast.devices.sources.replay import timed_samples
 from holdfast.io import read_chunks, save_recording
 from holdfast.recordings import Recording, Tactile
 from holdfast.sensors import Sensor
-from holdfast.devices.sources.replay import timed_samples
 
 TINY = Sensor("tiny", np.eye(3)[:2], np.tile(np.eye(3), (2, 1, 1)), np.array([0, 0, 1.0]), 100.0)
 

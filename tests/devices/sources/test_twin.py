@@ -11,13 +11,13 @@ import numpy as np
 import pytest
 
 from holdfast.cli import simulate as verb
-from holdfast.io import load_recording
-from holdfast.recordings import Recording, Tactile
-from holdfast.sensors import sensor
 from holdfast.devices.sources import open_source
 from holdfast.devices.sources import twin as module
 from holdfast.devices.sources.twin import ATTEMPTS, Twin, grasp_of, write
 from holdfast.devices.uri import parse
+from holdfast.io import load_recording
+from holdfast.recordings import Recording, Tactile
+from holdfast.sensors import sensor
 from holdfast.twin.simulation import Grasp, simulate
 
 RUN = module._Simulator._run

@@ -5,13 +5,13 @@ import numpy as np
 import pytest
 
 from holdfast.cli import main
+from holdfast.devices.sources.ros.message_assembler import MessageAssembler
+from holdfast.devices.sources.xela.decoder import XelaDecoder
 from holdfast.errors import MissingExtra, RecordingError, install_command
 from holdfast.io import import_recordings, load_recording, save_recording
 from holdfast.io.recording_files import is_recording
 from holdfast.ros.sensor_messages import DeviceSample
 from holdfast.sensors import hand
-from holdfast.devices.sources.ros.message_assembler import MessageAssembler
-from holdfast.devices.sources.xela.decoder import XelaDecoder
 from holdfast.synthetic import synthetic_recording
 
 pytest.importorskip("rosbags", reason="rosbags is not installed")

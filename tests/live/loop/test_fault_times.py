@@ -7,15 +7,13 @@ import pytest
 
 from grip.build import RATE, hand, holding
 from holdfast.contact import ContactState
-from holdfast.grip import Limits, LoopState
-from holdfast.live.loop import grip_loop as loop
-from holdfast.grip import repeats
-from holdfast.live.loop import runner
-from holdfast.live.loop import watchdog
-from holdfast.grip.controller import OVERLOAD
 from holdfast.devices.hands.ros import ros_hand
-from holdfast.features.faults import STUCK_SECONDS
 from holdfast.devices.sources.timeline import MIN_LATE_DELAY
+from holdfast.features.faults import STUCK_SECONDS
+from holdfast.grip import Limits, LoopState, repeats
+from holdfast.grip.controller import OVERLOAD
+from holdfast.live.loop import grip_loop as loop
+from holdfast.live.loop import runner, watchdog
 
 LIMITS = Limits()
 

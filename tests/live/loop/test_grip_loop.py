@@ -4,6 +4,8 @@ import pytest
 
 from grip.build import FINGERS, RATE, hand, holding, scales
 from holdfast.contact import ContactState, HandEstimate
+from holdfast.devices.hands.base import Hand
+from holdfast.errors import HandError
 from holdfast.grip import (
     FingerCommand,
     GripCommand,
@@ -12,9 +14,7 @@ from holdfast.grip import (
     Limits,
     LoopState,
 )
-from holdfast.devices.hands.base import Hand
 from holdfast.live.loop.grip_loop import GripLoop
-from holdfast.errors import HandError
 
 SLIPPING = {"probability": 0.0, "state": ContactState.UNSTABLE}
 

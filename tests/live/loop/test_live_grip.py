@@ -5,12 +5,12 @@ import msgspec
 import pytest
 
 from grip.build import FINGERS, RATE, hand, holding
+from holdfast.errors import HandError
+from holdfast.grip import GripReason
+from holdfast.live.loop.grip_loop import GripLoop
+from holdfast.live.loop.live_grip import N_ENTRIES, EventLog, LiveGrip
 from live.loop.test_grip_loop import LateBeats, Tape
 from live.loop.test_runner import update
-from holdfast.grip import GripReason
-from holdfast.live.loop.live_grip import N_ENTRIES, EventLog, LiveGrip
-from holdfast.live.loop.grip_loop import GripLoop
-from holdfast.errors import HandError
 
 PATIENCE = 60.0
 

@@ -6,16 +6,16 @@ from types import SimpleNamespace
 import pytest
 
 from grip.build import FINGERS, RATE, hand, holding
-from live.loop.test_grip_loop import SLIPPING, Beats, Tape
 from holdfast.contact import ContactState
+from holdfast.devices.sources import Arrival
+from holdfast.errors import HandError
 from holdfast.grip import GripController, GripReason, Limits, LoopState
+from holdfast.live.arrival_detector import StreamEstimate
 from holdfast.live.loop import runner as module
 from holdfast.live.loop.grip_loop import GripLoop
 from holdfast.live.loop.runner import LoopRunner
-from holdfast.errors import HandError
-from holdfast.live.arrival_detector import StreamEstimate
 from holdfast.live.stream_detector import StreamUpdate
-from holdfast.devices.sources import Arrival
+from live.loop.test_grip_loop import SLIPPING, Beats, Tape
 
 
 def update(*estimates):

@@ -11,11 +11,10 @@ from types import SimpleNamespace
 import msgspec
 import pytest
 
+from holdfast.errors import HandError
 from holdfast.grip import FingerCommand, GripCommand, GripReason, LoopState
-
 from holdfast.live.loop import watchdog
 from holdfast.live.loop.watchdog import N_SAFE_COMMANDS, Watchdog
-from holdfast.errors import HandError
 
 PATIENCE = 120.0
 TESTS = str(Path(__file__).parents[1])

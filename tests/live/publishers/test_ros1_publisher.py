@@ -2,11 +2,10 @@ from socket import create_server
 
 import pytest
 
+from devices.sources.ros1_master import lines, running_master
 from holdfast.errors import SourceError
 from holdfast.live.publishers.ros1_publisher import Ros1Publisher
-from devices.sources.ros1_master import lines, running_master
-
-from .estimates import UNITS, check_received
+from live.estimates import UNITS, check_received
 
 
 def test_another_program_reads_what_is_published(tmp_path):

@@ -14,10 +14,9 @@ from rosbags.typesys import Stores, get_typestore
 
 from holdfast.live.publishers.ros2_publisher import DEFINITIONS, Ros2Publisher
 from holdfast.ros.definitions import parse_definition
+from live.estimates import UNITS, FakeGrip, check_received, estimate
 
-from .estimates import UNITS, FakeGrip, check_received, estimate
-
-PEER = Path(__file__).parents[1] / "sources" / "ros2_peer.py"
+PEER = Path(__file__).parents[2] / "devices" / "sources" / "ros2_peer.py"
 
 
 @pytest.fixture

@@ -4,12 +4,18 @@ import time
 import pytest
 
 from holdfast.contact import ContactState, Fault, Reason
-from holdfast.live.publishers import ros_publisher
 from holdfast.live.arrival_detector import StreamEstimate
-from holdfast.live.publishers.ros_publisher import ERROR, OK, WARN, RosPublisher, diagnostics_of, topic_names
+from holdfast.live.publishers import ros_publisher
+from holdfast.live.publishers.ros_publisher import (
+    ERROR,
+    OK,
+    WARN,
+    RosPublisher,
+    diagnostics_of,
+    topic_names,
+)
 from holdfast.live.stream_detector import StreamUpdate
-
-from .estimates import UNITS, FakeGrip, estimate, finger
+from live.estimates import UNITS, FakeGrip, estimate, finger
 
 
 class FakePublisher(RosPublisher):

@@ -9,12 +9,12 @@ import numpy as np
 import pytest
 from websockets.sync.client import connect
 
+from holdfast.devices.sources import Arrival, Source, base, open_source
+from holdfast.devices.sources.base import notice_arrival
 from holdfast.errors import OutputError
 from holdfast.live.publishers import xela_server as module
 from holdfast.live.publishers.xela_server import XelaServer
 from holdfast.sensors import hand, sensor
-from holdfast.devices.sources import Arrival, Source, base, open_source
-from holdfast.devices.sources.base import notice_arrival
 from holdfast.web.connections import ConnectionLimit
 
 TIPS = dict.fromkeys(("thumb", "index", "middle", "ring"), sensor("uskin-curved"))

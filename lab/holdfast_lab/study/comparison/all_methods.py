@@ -5,12 +5,18 @@ from collections.abc import Mapping, Sequence
 import numpy as np
 
 from holdfast.metrics.events import POST_DURATIONS
+from holdfast.sensors.types import Array
 from holdfast_lab.figures.curves import Curve, draw_alarms, draw_reliability
 from holdfast_lab.figures.dots import IntervalEstimate, draw_dots, draw_groups
 from holdfast_lab.report.html_report import ReportFigure
 from holdfast_lab.report.result_tables import ResultTable, Row
-from holdfast.sensors.types import Array
-from holdfast_lab.study.comparison import costs, error_tables, event_tables, sample_tables, strongest
+from holdfast_lab.study.comparison import (
+    costs,
+    error_tables,
+    event_tables,
+    sample_tables,
+    strongest,
+)
 from holdfast_lab.study.comparison.jobs import (
     DEFAULT_SECONDS,
     METHOD_SECONDS,

@@ -6,8 +6,8 @@ from itertools import chain
 import numpy as np
 
 from holdfast.contact import CONTACT_FORCE, Phase
-from holdfast_lab.report.result_tables import Key, ResultTable, Row
 from holdfast.sensors.types import Array
+from holdfast_lab.report.result_tables import Key, ResultTable, Row
 from holdfast_lab.study.comparison.jobs import SPLIT_TITLES, Results, method_results, method_titles
 from holdfast_lab.study.comparison.rows import ratio_row
 from holdfast_lab.study.evaluation.error_breakdown import (

@@ -13,8 +13,8 @@ from holdfast.metrics.events import TIME_TOLERANCE
 from holdfast.metrics.intervals import auc_of
 from holdfast.metrics.masks import Mask
 from holdfast.metrics.statistics import mann_whitney_u
-from holdfast_lab.report.result_tables import Row
 from holdfast.sensors.types import Array
+from holdfast_lab.report.result_tables import Row
 from holdfast_lab.study.comparison.real_estimates import (
     RecordingEstimates,
     RecordingLabels,

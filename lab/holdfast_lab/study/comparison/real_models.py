@@ -16,6 +16,8 @@ from holdfast.metrics.events import TIME_TOLERANCE
 from holdfast.model import Model
 from holdfast.recordings import Recording, Tactile
 from holdfast.sensors.types import Array
+from holdfast.training import Setting, compute_decisions, train
+from holdfast.training.setting import Split
 from holdfast_lab.study.comparison.real_estimates import (
     MAX_FOLDS,
     Column,
@@ -26,8 +28,6 @@ from holdfast_lab.study.comparison.real_estimates import (
 )
 from holdfast_lab.study.evaluation.evaluate_method import held_out_folds
 from holdfast_lab.study.plan import Corpus
-from holdfast.training import Setting, compute_decisions, train
-from holdfast.training.setting import Split
 
 SHIPPED = "builtin:any"
 """The model that ships, which was never trained on a real hand."""

@@ -11,6 +11,7 @@ import numpy as np
 
 from holdfast.contact import UNSTABLE_MARGIN
 from holdfast.metrics.events import POST_DURATIONS
+from holdfast.twin.profile import profile, profiles
 from holdfast_lab.figures.curves import Curve, draw_lines
 from holdfast_lab.report.html_report import ReportFigure
 from holdfast_lab.report.result_tables import Key, ResultTable, Row
@@ -23,13 +24,16 @@ from holdfast_lab.study.comparison.jobs import (
     method_job,
 )
 from holdfast_lab.study.comparison.rows import DIGITS, difference_row, ratio_row, sample_rows
-from holdfast_lab.study.evaluation.evaluate_method import COMPARED_RATE, EvaluationJob, MethodEvaluation
+from holdfast_lab.study.evaluation.evaluate_method import (
+    COMPARED_RATE,
+    EvaluationJob,
+    MethodEvaluation,
+)
 from holdfast_lab.study.evaluation.variation import Variation
 from holdfast_lab.study.methods import METHODS
 from holdfast_lab.study.methods.wavelets import CUTS
 from holdfast_lab.study.plan import StudyPlan
 from holdfast_lab.tasks import Task
-from holdfast.twin.profile import profile, profiles
 
 VARIED_METHODS = ("logreg", "zhang", "holdfast")
 QUICK_VARIED_METHODS = ("logreg", "holdfast")

@@ -16,6 +16,7 @@ import numpy.typing as npt
 from holdfast.contact import STABLE, UNKNOWN
 from holdfast.metrics import Decisions, FingerDecisions, Metrics, summarise
 from holdfast.metrics.masks import Mask
+from holdfast.training.splits import RANDOM_FOLDS
 from holdfast_lab.study.evaluation.alarm_statistics import (
     AlarmStatistics,
     alarm_statistics,
@@ -42,7 +43,6 @@ from holdfast_lab.study.evaluation.thresholds import FalseAlarmRanges, threshold
 from holdfast_lab.study.evaluation.variation import Variation
 from holdfast_lab.study.methods import HAND, Method
 from holdfast_lab.study.plan import Corpus
-from holdfast.training.splits import RANDOM_FOLDS
 
 FALSE_ALARM_RATES = (0.5, 1.0, 2.0, 5.0, 10.0, 20.0, 50.0)
 """Rates of false alarms that thresholds are chosen for, per minute of stable label [1/min]."""

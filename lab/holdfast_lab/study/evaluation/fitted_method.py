@@ -9,9 +9,6 @@ import numpy.typing as npt
 
 from holdfast.classifiers import Classifier, Samples
 from holdfast.sensors.types import Array
-from holdfast_lab.study.evaluation.recording_features import RecordingFeatures
-from holdfast_lab.study.evaluation.scores import RecordingScores
-from holdfast_lab.study.methods import Method
 from holdfast.training.training_samples import (
     concatenate,
     contact_threshold,
@@ -19,6 +16,9 @@ from holdfast.training.training_samples import (
     thinning_step,
     usable_rows,
 )
+from holdfast_lab.study.evaluation.recording_features import RecordingFeatures
+from holdfast_lab.study.evaluation.scores import RecordingScores
+from holdfast_lab.study.methods import Method
 
 MAX_SAMPLES = 20_000
 """Maximum samples of a unit that train a classifier. All samples are evaluated."""

@@ -15,10 +15,10 @@ from holdfast.metrics.masks import Mask
 from holdfast.metrics.truth_labels import LabelRule, relabel
 from holdfast.recordings import Recording, Truth, label_states
 from holdfast.sensors.types import Array
+from holdfast.training.training_samples import rest_moments
 from holdfast_lab.study.evaluation.variation import Variation
 from holdfast_lab.study.methods import HAND, HandSignal, Method, hand_signal
 from holdfast_lab.study.plan import Corpus
-from holdfast.training.training_samples import rest_moments
 
 
 @dataclass(frozen=True, eq=False)

@@ -6,10 +6,10 @@ import numpy as np
 import numpy.typing as npt
 
 from holdfast.classifiers import recipe
-from holdfast_lab.classifiers.tcn import TemporalConvolution
 from holdfast.errors import TrainingError
 from holdfast.features.kernel import GAP_LIMIT_PERIODS
 from holdfast.sensors.types import Array
+from holdfast_lab.classifiers.tcn import TemporalConvolution
 from holdfast_lab.study.methods.method import (
     HAND,
     FingerSignal,

@@ -10,9 +10,10 @@ import numpy as np
 from holdfast.features import DEFAULT_WINDOW, DEPLOYED_FEATURES
 from holdfast.metrics import bootstrap_interval
 from holdfast.metrics.intervals import Statistic
+from holdfast.sensors.types import Array
+from holdfast.twin.uskin_parameters import UskinParameters
 from holdfast_lab.report.html_report import ReportFigure
 from holdfast_lab.report.result_tables import Key, ResultTable, Row
-from holdfast.sensors.types import Array
 from holdfast_lab.study.paper import published
 from holdfast_lab.study.paper.label_sources import has_truth
 from holdfast_lab.study.paper.paper_tables import TITLES, first_finger
@@ -28,7 +29,6 @@ from holdfast_lab.study.paper.random_split import (
 )
 from holdfast_lab.study.plan import Corpus, StudyPlan
 from holdfast_lab.tasks import Task
-from holdfast.twin.uskin_parameters import UskinParameters
 
 N_FIT = 40_000
 """Maximum number of samples of a fit."""

@@ -19,9 +19,9 @@ from holdfast.metrics.intervals import Statistic
 from holdfast.metrics.masks import Mask
 from holdfast.metrics.truth_labels import LabelRule, glitches
 from holdfast.recordings import Truth
+from holdfast.sensors.types import Array
 from holdfast_lab.report.html_report import ReportFigure
 from holdfast_lab.report.result_tables import Key, ResultTable, Row
-from holdfast.sensors.types import Array
 from holdfast_lab.study.methods import FingerSignal, hand_signal
 from holdfast_lab.study.methods.wavelets import detail_energy
 from holdfast_lab.study.paper.label_sources import has_truth

@@ -11,8 +11,8 @@ import numpy as np
 
 from holdfast.errors import TrainingError
 from holdfast.features import Tare
-from holdfast_lab.figures.experiment import draw_experiment, draw_features, draw_forces
 from holdfast.plots.time_series import Codes, FingerSeries, finger_series
+from holdfast_lab.figures.experiment import draw_experiment, draw_features, draw_forces
 from holdfast_lab.report.html_report import ReportFigure
 from holdfast_lab.report.result_tables import ResultTable
 from holdfast_lab.study.evaluation.fitted_method import (

@@ -6,8 +6,8 @@ from typing import Any
 import numpy as np
 
 from holdfast.features import DEFAULT_WINDOW, DEPLOYED_FEATURES, FEATURE_NAMES
-from holdfast_lab.figures.curves import Curve, draw_lines
 from holdfast.plots.style import PAPER
+from holdfast_lab.figures.curves import Curve, draw_lines
 from holdfast_lab.report.html_report import ReportFigure
 from holdfast_lab.report.result_tables import Key, ResultTable, Row
 from holdfast_lab.study.paper import published

@@ -17,17 +17,17 @@ from holdfast.classifiers import Samples
 from holdfast.features import FEATURE_NAMES, Tare, haar_features
 from holdfast.recordings import Recording
 from holdfast.sensors.types import Array
-from holdfast_lab.study.evaluation.variation import Variation
-from holdfast_lab.study.methods import FingerSignal, hand_signal
-from holdfast_lab.study.methods.wavelets import detail_energy
-from holdfast_lab.study.paper.label_sources import LabelSource, relabelled
-from holdfast_lab.study.plan import Corpus
 from holdfast.training.training_samples import (
     concatenate,
     labelled_samples,
     resample_if_needed,
     usable_rows,
 )
+from holdfast_lab.study.evaluation.variation import Variation
+from holdfast_lab.study.methods import FingerSignal, hand_signal
+from holdfast_lab.study.methods.wavelets import detail_energy
+from holdfast_lab.study.paper.label_sources import LabelSource, relabelled
+from holdfast_lab.study.plan import Corpus
 
 N_PARTS = 25
 

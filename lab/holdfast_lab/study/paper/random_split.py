@@ -16,6 +16,10 @@ from holdfast.classifiers import RECIPES, Classifier, Parameters, Recipe, Sample
 from holdfast.metrics import bootstrap_interval, ratio_of_sums
 from holdfast.metrics.intervals import Interval
 from holdfast.metrics.statistics import percent
+from holdfast.training.setting import SEARCH_SAMPLES
+from holdfast.training.splits import inner_folds
+from holdfast.training.training_samples import thin, thinning_step
+from holdfast.training.tuning import search
 from holdfast_lab.report.result_tables import Row
 from holdfast_lab.study.paper.pooled_samples import (
     UNTREATED,
@@ -25,10 +29,6 @@ from holdfast_lab.study.paper.pooled_samples import (
     pool_samples,
 )
 from holdfast_lab.study.plan import Corpus
-from holdfast.training.setting import SEARCH_SAMPLES
-from holdfast.training.splits import inner_folds
-from holdfast.training.training_samples import thin, thinning_step
-from holdfast.training.tuning import search
 
 if TYPE_CHECKING:
     from optuna import Trial

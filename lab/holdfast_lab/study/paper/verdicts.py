@@ -13,9 +13,9 @@ from holdfast.metrics.decisions import Codes
 from holdfast.metrics.events import MIN_STABLE_DURATION, TIME_TOLERANCE
 from holdfast.metrics.masks import join_runs, runs
 from holdfast.recordings import Truth
+from holdfast.sensors.types import Array
 from holdfast_lab.report.html_report import ReportFigure
 from holdfast_lab.report.result_tables import Key, ResultTable, Row
-from holdfast.sensors.types import Array
 from holdfast_lab.study.comparison.rows import count_row, quantile_row, ratio_row
 from holdfast_lab.study.evaluation.evaluate_method import held_out_folds
 from holdfast_lab.study.evaluation.fitted_method import FittedMethod, gather_training_samples

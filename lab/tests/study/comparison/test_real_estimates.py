@@ -6,6 +6,7 @@ import pytest
 
 from holdfast.contact import STABLE, UNKNOWN, UNSTABLE, Cause, ContactState
 from holdfast.recordings import Label
+from holdfast.synthetic import synthetic_recording
 from holdfast_lab.study.comparison.real_estimates import (
     MAX_FOLDS,
     load_fingers,
@@ -15,7 +16,6 @@ from holdfast_lab.study.comparison.real_estimates import (
 )
 from holdfast_lab.study.evaluation.evaluate_method import EvaluationJob, score_splits
 from holdfast_lab.study.plan import scan_corpus
-from holdfast.synthetic import synthetic_recording
 from study.example_recordings import save_all
 
 FINGERS = ("finger1", "finger2")

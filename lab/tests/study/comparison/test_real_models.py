@@ -8,13 +8,13 @@ from holdfast.errors import TrainingError
 from holdfast.metrics import FingerDecisions
 from holdfast.model import Model
 from holdfast.recordings import Label
+from holdfast.synthetic import synthetic_recording
+from holdfast.training import Setting, compute_decisions, train
 from holdfast_lab.study.comparison import real_models
 from holdfast_lab.study.comparison.real_estimates import method_estimates
 from holdfast_lab.study.comparison.real_models import SHIPPED, model_estimates
 from holdfast_lab.study.comparison.real_recordings import MODELS
 from holdfast_lab.study.plan import scan_corpus
-from holdfast.synthetic import synthetic_recording
-from holdfast.training import Setting, compute_decisions, train
 from study.example_recordings import save_all
 
 FINGERS = ("finger1", "finger2")

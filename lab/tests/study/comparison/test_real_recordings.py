@@ -6,12 +6,12 @@ import pytest
 
 from holdfast.contact import ContactState
 from holdfast.recordings import Label
+from holdfast.synthetic import synthetic_recording
 from holdfast_lab.report.result_tables import pivot
 from holdfast_lab.report.table_layouts import to_html
 from holdfast_lab.study.comparison import jobs, real_recordings
 from holdfast_lab.study.methods import METHODS
 from holdfast_lab.study.plan import StudyPlan, scan_corpus
-from holdfast.synthetic import synthetic_recording
 from study.example_recordings import save_all
 
 DISTURBED = [

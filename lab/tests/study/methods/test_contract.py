@@ -10,8 +10,8 @@ from holdfast.contact import ContactState
 from holdfast.errors import MissingExtra
 from holdfast.features import Tare
 from holdfast.recordings import Recording
-from holdfast_lab.study.methods import HAND, METHODS, hand_signal
 from holdfast.synthetic import synthetic_recording
+from holdfast_lab.study.methods import HAND, METHODS, hand_signal
 
 TARE = Tare.parse(0.5)
 N_TARE = 75

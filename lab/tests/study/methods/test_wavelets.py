@@ -4,9 +4,9 @@ import numpy as np
 import pytest
 
 from holdfast.features import FEATURE_NAMES, Tare, haar_features
+from holdfast.synthetic import synthetic_recording
 from holdfast_lab.study.methods import METHODS, PAPER_FAMILY, hand_signal
 from holdfast_lab.study.methods.wavelets import CUTS, detail_energy, detail_sigma, normal_energy
-from holdfast.synthetic import synthetic_recording
 from training.build import tiny_recording
 
 from .patch_signals import along_normal, pressed

@@ -1,6 +1,7 @@
 import numpy as np
 import pytest
 
+from holdfast.twin.uskin_parameters import UskinParameters
 from holdfast_lab.study.paper import attribution
 from holdfast_lab.study.paper.attribution import (
     DOUBLE_NOISE,
@@ -10,7 +11,6 @@ from holdfast_lab.study.paper.attribution import (
 )
 from holdfast_lab.study.paper.pooled_samples import Treatment, pool_samples
 from holdfast_lab.study.plan import StudyPlan, scan_corpus
-from holdfast.twin.uskin_parameters import UskinParameters
 from study.example_recordings import recording_with_truth, save_all
 
 

@@ -1,9 +1,9 @@
 from dataclasses import replace
 
 from holdfast.contact import ContactState
+from holdfast.synthetic import synthetic_recording
 from holdfast_lab.study.paper import experiments
 from holdfast_lab.study.plan import scan_corpus
-from holdfast.synthetic import synthetic_recording
 from study.example_recordings import recordings_of_cases, save_all, save_synthetic
 
 

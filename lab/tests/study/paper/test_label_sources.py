@@ -1,8 +1,8 @@
 import numpy as np
 
 from holdfast.contact import NO_CONTACT, STABLE, UNSTABLE
-from holdfast_lab.study.paper.label_sources import has_truth, relabelled
 from holdfast.synthetic import synthetic_recording
+from holdfast_lab.study.paper.label_sources import has_truth, relabelled
 from study.example_recordings import recording_with_truth
 
 RECORDING = recording_with_truth("grasp", 3)

@@ -5,6 +5,7 @@ import pytest
 
 from holdfast.contact import Cause, ContactState
 from holdfast.recordings import Label
+from holdfast.synthetic import synthetic_recording
 from holdfast_lab.study.paper import label_tables
 from holdfast_lab.study.paper.label_tables import ALL_SAMPLES, CEILING, HELD, HIDDEN, ceiling_rows
 from holdfast_lab.study.paper.visible_changes import (
@@ -15,7 +16,6 @@ from holdfast_lab.study.paper.visible_changes import (
     window_changes,
 )
 from holdfast_lab.study.plan import StudyPlan, scan_corpus
-from holdfast.synthetic import synthetic_recording
 from study.example_recordings import recording_with_truth, save_all, save_synthetic
 
 

@@ -5,9 +5,9 @@ import pytest
 
 from holdfast.contact import STABLE, UNKNOWN
 from holdfast.features import fingertip_force, haar_features
+from holdfast.synthetic import synthetic_recording
 from holdfast_lab.study.paper.pooled_samples import COLUMNS, pool_samples
 from holdfast_lab.study.plan import scan_corpus
-from holdfast.synthetic import synthetic_recording
 from study.example_recordings import save_all, save_synthetic
 
 

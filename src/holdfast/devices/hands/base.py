@@ -5,9 +5,9 @@ import time
 from abc import abstractmethod
 from collections.abc import Iterable
 
+from holdfast.errors import HandError
 from holdfast.grip.command import GripCommand, LoopState
 from holdfast.grip.limits import Limits
-from holdfast.errors import HandError
 from holdfast.openable import Openable
 
 

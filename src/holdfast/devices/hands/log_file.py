@@ -7,9 +7,9 @@ from typing import BinaryIO
 import msgspec
 from msgspec import structs
 
-from holdfast.grip.command import GripCommand
 from holdfast.devices.hands.base import Hand
 from holdfast.errors import HandError
+from holdfast.grip.command import GripCommand
 
 
 class LogFile(Hand):

@@ -9,9 +9,9 @@ from importlib import import_module
 from pathlib import Path
 from types import ModuleType
 
-from holdfast.grip.command import GripCommand
 from holdfast.devices.hands.base import Hand
 from holdfast.errors import HandError
+from holdfast.grip.command import GripCommand
 
 
 class ScalarGripper(Hand):

@@ -9,10 +9,10 @@ from typing import Any, NamedTuple
 import numpy.typing as npt
 
 from holdfast.contact import Fault
-from holdfast.sensors import Sensor
-from holdfast.sensors.xela_models import whole_hand
 from holdfast.devices.sources.base import Arrival, notice_arrival
 from holdfast.devices.sources.timeline import Stamp, Timeline, TransportDelay
+from holdfast.sensors import Sensor
+from holdfast.sensors.xela_models import whole_hand
 
 SEQUENCE_PERIOD = 2**32
 """Sequence counters continue at 0 after this many packets."""

@@ -11,9 +11,9 @@ import numpy as np
 import numpy.typing as npt
 
 from holdfast.contact import Fault
+from holdfast.devices.sources.timeline import clock_notice
 from holdfast.openable import Openable
 from holdfast.sensors import Sensor
-from holdfast.devices.sources.timeline import clock_notice
 
 MARKER_PREFIX = "marker: "
 """Begin of a notice that repeats a marker of a recording."""

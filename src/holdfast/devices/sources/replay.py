@@ -14,10 +14,10 @@ from typing import Any, NamedTuple
 import numpy as np
 import numpy.typing as npt
 
+from holdfast.devices.sources.base import MARKER_PREFIX, Arrival, Source, notice_arrival
 from holdfast.errors import HoldfastError, RecordingError
 from holdfast.io import read_chunks
 from holdfast.recordings import Recording
-from holdfast.devices.sources.base import MARKER_PREFIX, Arrival, Source, notice_arrival
 
 CHUNK_SIZE = 1024
 """Samples of a module to read at a time; it bounds the memory."""

@@ -5,12 +5,12 @@ import time
 from errno import EACCES, ENOENT
 from importlib.metadata import version
 
-from holdfast.errors import MissingExtra, SourceError
-from holdfast.sensors import Sensor, sensor
 from holdfast.devices.sources.anyskin import AnySkinDecoder, DecodedBytes
 from holdfast.devices.sources.assembler import Assembler, Device
 from holdfast.devices.sources.base import DeviceSource, Source
 from holdfast.devices.uri import Address
+from holdfast.errors import MissingExtra, SourceError
+from holdfast.sensors import Sensor, sensor
 
 try:
     from serial import Serial

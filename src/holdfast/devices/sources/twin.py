@@ -9,11 +9,11 @@ from pathlib import Path
 from tempfile import TemporaryDirectory
 
 from holdfast.children import python_command
+from holdfast.devices.sources.replay import Player
+from holdfast.devices.uri import Address
 from holdfast.files import file_stem
 from holdfast.io import read_chunks, save_recording
 from holdfast.recordings import Recording
-from holdfast.devices.sources.replay import Player
-from holdfast.devices.uri import Address
 from holdfast.twin.profile import ATTEMPTS, profile
 from holdfast.twin.simulation import CASES, Grasp, simulate
 

@@ -9,12 +9,12 @@ from typing import Self
 from msgspec import structs
 
 from holdfast.contact import HandEstimate
+from holdfast.devices.hands import Hand
+from holdfast.errors import HandError
 from holdfast.grip.command import GripCommand, GripReason, LoopState
 from holdfast.grip.controller import GripController
 from holdfast.grip.guard import CommandGuard, safe_command
-from holdfast.devices.hands import Hand
 from holdfast.live.loop.watchdog import Watchdog
-from holdfast.errors import HandError
 
 MAX_CLOCK_STEP = 0.5
 """Time by which the clock of a source may go ahead from one step to the next [s]. The loop is

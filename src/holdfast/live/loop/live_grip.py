@@ -8,10 +8,8 @@ from typing import Self
 
 import msgspec
 
-from holdfast.grip.command import GripCommand, LoopState
-from holdfast.live.loop.grip_loop import GripLoop
-from holdfast.live.loop.runner import LoopRunner
 from holdfast.errors import HandError
+from holdfast.grip.command import GripCommand, LoopState
 from holdfast.live.loop.documents import (
     GripDocument,
     GripEntry,
@@ -21,6 +19,8 @@ from holdfast.live.loop.documents import (
     GripListener,
 )
 from holdfast.live.loop.grip_faults import explain_fault
+from holdfast.live.loop.grip_loop import GripLoop
+from holdfast.live.loop.runner import LoopRunner
 from holdfast.live.session import Session
 
 N_ENTRIES = 20

@@ -21,11 +21,11 @@ from typing import IO, Self
 import msgspec
 
 from holdfast.children import python_command
+from holdfast.devices.hands import Hand, open_hand
+from holdfast.errors import HandError, HoldfastError
 from holdfast.grip.command import GripCommand, GripReason, LoopState
 from holdfast.grip.guard import safe_command
-from holdfast.devices.hands import Hand, open_hand
 from holdfast.grip.limits import FaultAction
-from holdfast.errors import HandError, HoldfastError
 
 TIMEOUT = 0.1
 """Time without a heartbeat after which the watchdog takes over [s]."""

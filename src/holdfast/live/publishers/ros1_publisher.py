@@ -3,9 +3,15 @@
 from collections.abc import Iterable, Mapping
 from typing import Any
 
-from holdfast.live.loop.documents import Grip
-from holdfast.live.publishers.ros_publisher import DIAGNOSTICS, VECTOR, WRENCH, DiagnosticStatus, RosPublisher
 from holdfast.devices.ros import rospy_node
+from holdfast.live.loop.documents import Grip
+from holdfast.live.publishers.ros_publisher import (
+    DIAGNOSTICS,
+    VECTOR,
+    WRENCH,
+    DiagnosticStatus,
+    RosPublisher,
+)
 from holdfast.sensors.types import Unit
 
 QUEUE_SIZE = 10

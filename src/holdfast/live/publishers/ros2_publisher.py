@@ -3,6 +3,7 @@
 from collections.abc import Callable, Iterable, Mapping
 from typing import Any
 
+from holdfast.devices.ros import dds
 from holdfast.live.loop.documents import Grip
 from holdfast.live.publishers.ros_publisher import (
     DIAGNOSTICS,
@@ -13,7 +14,6 @@ from holdfast.live.publishers.ros_publisher import (
     DiagnosticStatus,
     RosPublisher,
 )
-from holdfast.devices.ros import dds
 from holdfast.ros.cdr import MessageEncoder
 from holdfast.ros.definitions import parse_definition
 from holdfast.sensors.types import Unit

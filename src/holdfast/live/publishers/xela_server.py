@@ -14,7 +14,6 @@ from websockets.asyncio.server import ServerConnection, broadcast, serve
 from websockets.exceptions import ConnectionClosed
 from websockets.http11 import Request, Response
 
-from holdfast.errors import listen_error
 from holdfast.devices.sources import Source
 from holdfast.devices.sources.xela.encoder import (
     NEW_VERSION,
@@ -22,6 +21,7 @@ from holdfast.devices.sources.xela.encoder import (
     SampleBatcher,
     XelaEncoder,
 )
+from holdfast.errors import listen_error
 from holdfast.web.connections import (
     BACKLOG,
     HEADER_TIMEOUT,

@@ -9,9 +9,9 @@ from contextlib import contextmanager
 from pathlib import Path
 
 from devices.hands.rigs import RosRig, with_parameter
+from devices.sources.ros1_master import Master, needs_ros1
 from holdfast import errors
 from holdfast.devices.hands import open_hand
-from devices.sources.ros1_master import Master, needs_ros1
 
 from .drivers import PATIENCE, ROS1
 

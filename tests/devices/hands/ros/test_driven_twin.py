@@ -6,11 +6,11 @@ import pytest
 pytest.importorskip("cyclonedds", reason="cyclonedds is not installed")
 
 from devices.hands.rigs import new_domain
-from holdfast.grip import FingerCommand, GripCommand, LoopState
 from holdfast.devices.hands import open_hand
 from holdfast.devices.hands.ros import ros_hand
 from holdfast.devices.hands.ros.driven_twin import DrivenTwin
 from holdfast.devices.ros import dds
+from holdfast.grip import FingerCommand, GripCommand, LoopState
 from holdfast.ros.cdr import MessageEncoder
 from holdfast.ros.hand_messages import FLOATS, array_message, hand_definition
 

@@ -4,8 +4,8 @@ import pytest
 
 pytest.importorskip("cyclonedds", reason="cyclonedds is not installed")
 
-from holdfast.grip import Limits
 from holdfast.devices.hands import open_hand
+from holdfast.grip import Limits
 
 SIXTEEN = ",".join(["0.1"] * 16)
 

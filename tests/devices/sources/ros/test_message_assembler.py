@@ -2,10 +2,10 @@ import numpy as np
 import pytest
 
 from holdfast.contact import Fault
+from holdfast.devices.sources.ros.message_assembler import MessageAssembler
 from holdfast.errors import SourceError
 from holdfast.ros.sensor_messages import DeviceSample
 from holdfast.sensors import hand, sensor
-from holdfast.devices.sources.ros.message_assembler import MessageAssembler
 
 EPOCH = 1_619_157_045.0
 

@@ -3,10 +3,10 @@ import time
 import numpy as np
 import pytest
 
+from devices.sources.ros1_master import lines, running_master
 from holdfast.devices.ros.rospy_node import published_topics
 from holdfast.devices.sources import open_source
 from holdfast.devices.sources.ros import ros1
-from devices.sources.ros1_master import lines, running_master
 
 N = 300
 LOST, AGAIN = "connection lost (the topic has no publisher)", "connected again after"

@@ -13,14 +13,14 @@ import pytest
 pytest.importorskip("cyclonedds", reason="cyclonedds is not installed")
 pytest.importorskip("rosbags", reason="rosbags is not installed")
 
-from holdfast.errors import MissingExtra, SourceError, install_command
+from devices.sources.ros_build import PILLARS, sensor_state, store
 from holdfast.devices.ros import dds
+from holdfast.devices.sources import open_source
+from holdfast.devices.sources.ros import topic
+from holdfast.errors import MissingExtra, SourceError, install_command
 from holdfast.ros.definitions import parse_definition
 from holdfast.ros.sensor_messages import known_definition
 from holdfast.sensors import sensor
-from holdfast.devices.sources import open_source
-from holdfast.devices.sources.ros import topic
-from devices.sources.ros_build import PILLARS, sensor_state, store
 
 PEER = Path(__file__).parents[1] / "ros2_peer.py"
 N = 300

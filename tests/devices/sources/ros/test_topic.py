@@ -4,9 +4,6 @@ from collections import deque
 import numpy as np
 import pytest
 
-from holdfast.errors import SourceError
-from holdfast.ros.sensor_messages import DeviceSample
-from holdfast.sensors import sensor
 from holdfast.devices.sources import base
 from holdfast.devices.sources.ros import topic
 from holdfast.devices.sources.ros.topic import (
@@ -17,6 +14,9 @@ from holdfast.devices.sources.ros.topic import (
     topic_of,
 )
 from holdfast.devices.uri import parse
+from holdfast.errors import SourceError
+from holdfast.ros.sensor_messages import DeviceSample
+from holdfast.sensors import sensor
 
 SILENCE_TIMEOUT = 0.1
 

@@ -7,9 +7,9 @@ import numpy as np
 import pytest
 
 from holdfast.contact import Fault
-from holdfast.errors import SourceError
 from holdfast.devices.sources import base, open_source
 from holdfast.devices.sources.xela import client as module
+from holdfast.errors import SourceError
 
 from .build import NEW, PERIOD, START, WELCOME, counts, patch, sensor, text
 from .servers import HANG_UP, free_port, server

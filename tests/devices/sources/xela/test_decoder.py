@@ -9,10 +9,10 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from holdfast.contact import Fault
-from holdfast.errors import SourceError
-from holdfast.sensors import hand
 from holdfast.devices.sources.xela.decoder import XelaDecoder
 from holdfast.devices.sources.xela.packet import InvalidPacket
+from holdfast.errors import SourceError
+from holdfast.sensors import hand
 
 from .build import NEW, OLD, PERIOD, START, WELCOME, counts, patch, sensor, text
 

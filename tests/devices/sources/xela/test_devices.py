@@ -1,10 +1,10 @@
 import numpy as np
 import pytest
 
+from holdfast.devices.sources.xela.devices import xela_devices
 from holdfast.errors import SourceError
 from holdfast.sensors import hand, sensor
 from holdfast.sensors.xela_models import flat_grid
-from holdfast.devices.sources.xela.devices import xela_devices
 
 TIP = ("uSCuAH", 30)
 

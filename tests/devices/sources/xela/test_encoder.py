@@ -7,8 +7,6 @@ from hypothesis import given
 from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 
-from holdfast.sensors import Sensor, hand, sensor
-from holdfast.sensors.xela_models import flat_grid
 from holdfast.devices.sources.xela.decoder import XelaDecoder
 from holdfast.devices.sources.xela.encoder import (
     MAX_MODULE_WAIT,
@@ -18,6 +16,8 @@ from holdfast.devices.sources.xela.encoder import (
     XelaEncoder,
     is_part_of_hand,
 )
+from holdfast.sensors import Sensor, hand, sensor
+from holdfast.sensors.xela_models import flat_grid
 
 from .build import START, counts
 

@@ -2,9 +2,9 @@ import socket
 
 import pytest
 
-from holdfast.devices.uri import parse
 from holdfast.devices.sources.xela import places as module
 from holdfast.devices.sources.xela.places import Place, places
+from holdfast.devices.uri import parse
 
 
 def found(text):

@@ -2,9 +2,9 @@ import json
 
 import pytest
 
-from holdfast.sensors import sensor
 from holdfast.devices.sources import open_source
 from holdfast.devices.sources.xela.client import XelaSource
+from holdfast.sensors import sensor
 
 
 def test_a_uri_makes_a_source_and_does_not_connect():

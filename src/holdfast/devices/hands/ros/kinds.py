@@ -18,9 +18,9 @@ from holdfast.devices.hands.ros.joints import (
 from holdfast.devices.hands.ros.link import Link
 from holdfast.devices.hands.ros.parameters import Parameters
 from holdfast.devices.hands.ros.scalar_hand import ScalarHand, ScalarSetup
+from holdfast.devices.uri import Address, parse
 from holdfast.ros.hand_messages import FLOAT32, FLOAT64, FLOATS, JOINT_STATE
 from holdfast.sensors.types import Array
-from holdfast.devices.uri import Address, parse
 
 COMMON = ("shared",)
 """Parameters of every kind, besides `domain` (ROS 2) or `master` (ROS 1)."""

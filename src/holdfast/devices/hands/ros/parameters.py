@@ -7,8 +7,8 @@ from collections.abc import Sequence
 import numpy as np
 
 from holdfast.devices.hands.ros.joints import N_JOINTS, THUMB_FIRST
-from holdfast.sensors.types import Array
 from holdfast.devices.uri import Address
+from holdfast.sensors.types import Array
 
 _TOPIC = re.compile(r"(/[A-Za-z][A-Za-z0-9_]*)+")
 

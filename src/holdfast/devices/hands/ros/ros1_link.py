@@ -5,8 +5,8 @@ from collections.abc import Mapping
 from typing import Any
 
 from holdfast.devices.hands.ros.link import Link, StateReader
-from holdfast.errors import HandError, SourceError
 from holdfast.devices.ros import rospy_node
+from holdfast.errors import HandError, SourceError
 from holdfast.ros.hand_messages import JOINT_STATE, JointStates
 
 QUEUE_SIZE = 10

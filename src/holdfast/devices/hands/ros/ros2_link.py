@@ -4,8 +4,8 @@ from collections.abc import Mapping
 from typing import Any
 
 from holdfast.devices.hands.ros.link import Link, StateReader
-from holdfast.errors import HandError, SourceError
 from holdfast.devices.ros import dds
+from holdfast.errors import HandError, SourceError
 from holdfast.ros.cdr import MessageDecoder, MessageEncoder
 from holdfast.ros.hand_messages import JOINT_STATE, JointStates, hand_definition
 

@@ -7,10 +7,10 @@ from collections.abc import Callable, Mapping
 from functools import partial
 from typing import Any
 
-from holdfast.grip.command import GripCommand
 from holdfast.devices.hands.base import Hand
 from holdfast.devices.hands.ros.link import Link, Publisher, StateReader
 from holdfast.errors import HandError
+from holdfast.grip.command import GripCommand
 from holdfast.ros.hand_messages import JointStates
 
 OPEN_TIMEOUT = 5.0

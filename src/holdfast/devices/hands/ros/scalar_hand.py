@@ -3,12 +3,12 @@
 from collections.abc import Iterable
 from dataclasses import dataclass
 
-from holdfast.grip.command import GripCommand
 from holdfast.devices.hands.ros.link import Link
 from holdfast.devices.hands.ros.ros_hand import RosHand
 from holdfast.devices.hands.scalar import largest_scale
-from holdfast.grip.limits import Limits
 from holdfast.errors import HandError
+from holdfast.grip.command import GripCommand
+from holdfast.grip.limits import Limits
 from holdfast.ros.hand_messages import STRING, number_message
 
 SLACK = 1e-9

@@ -3,15 +3,15 @@
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from typing import Any
 
-from holdfast.errors import SourceError
-from holdfast.ros.sensor_messages import PAPILLARRAY, DeviceSample, readings_of
-from holdfast.sensors import Sensor, sensor
-from holdfast.sensors.types import Unit
 from holdfast.devices.sources.assembler import Assembler, Device
 from holdfast.devices.sources.base import Arrival
 from holdfast.devices.sources.timeline import is_plausible
 from holdfast.devices.sources.xela.decoder import no_calibration
 from holdfast.devices.sources.xela.devices import xela_devices
+from holdfast.errors import SourceError
+from holdfast.ros.sensor_messages import PAPILLARRAY, DeviceSample, readings_of
+from holdfast.sensors import Sensor, sensor
+from holdfast.sensors.types import Unit
 
 _STAMPS: tuple[Callable[[DeviceSample], float | None], ...] = (
     lambda sample: _plausible(sample.time),

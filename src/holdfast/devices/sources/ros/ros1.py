@@ -7,10 +7,7 @@ from threading import Condition
 from types import ModuleType
 from typing import Any
 
-from holdfast.errors import SourceError
 from holdfast.devices.ros import rospy_node
-from holdfast.ros.definitions import parse_definition
-from holdfast.ros.sensor_messages import SUPPORTED_MESSAGES, DeviceSample, SampleDecoder
 from holdfast.devices.sources.base import Source
 from holdfast.devices.sources.ros.topic import (
     ReceivedMessage,
@@ -20,6 +17,9 @@ from holdfast.devices.sources.ros.topic import (
     topic_of,
 )
 from holdfast.devices.uri import Address
+from holdfast.errors import SourceError
+from holdfast.ros.definitions import parse_definition
+from holdfast.ros.sensor_messages import SUPPORTED_MESSAGES, DeviceSample, SampleDecoder
 
 MAX_QUEUED_MESSAGES = 256
 """Messages that wait for a busy reader; after that, the oldest ones are dropped."""

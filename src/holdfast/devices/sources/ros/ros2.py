@@ -4,12 +4,12 @@ import time
 from collections import deque
 from collections.abc import Mapping
 
-from holdfast.errors import SourceError
 from holdfast.devices.ros import dds
-from holdfast.ros.sensor_messages import SampleDecoder, known_definition
 from holdfast.devices.sources.base import Source
 from holdfast.devices.sources.ros.topic import ReceivedMessage, Subscription, TopicSource, topic_of
 from holdfast.devices.uri import Address
+from holdfast.errors import SourceError
+from holdfast.ros.sensor_messages import SampleDecoder, known_definition
 
 DISCOVERY_INTERVAL = 0.05
 """Time between two checks for the first publisher [s]."""

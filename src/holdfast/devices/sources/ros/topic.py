@@ -5,12 +5,12 @@ from abc import ABC, abstractmethod
 from collections.abc import Callable, Mapping
 from typing import NamedTuple
 
-from holdfast.errors import SourceError
-from holdfast.ros.sensor_messages import DeviceSample
-from holdfast.sensors.types import Unit
 from holdfast.devices.sources.base import DeviceSource
 from holdfast.devices.sources.ros.message_assembler import MessageAssembler, has_taxels
 from holdfast.devices.uri import Address
+from holdfast.errors import SourceError
+from holdfast.ros.sensor_messages import DeviceSample
+from holdfast.sensors.types import Unit
 
 OPEN_TIMEOUT = 5.0
 """Longest wait for the first message with samples [s]."""

@@ -14,12 +14,12 @@ from websockets.exceptions import (
 )
 from websockets.sync.client import ClientConnection, connect
 
-from holdfast.errors import SourceError
-from holdfast.sensors import Sensor
 from holdfast.devices.sources.base import DeviceSource
 from holdfast.devices.sources.xela.decoder import XelaDecoder
 from holdfast.devices.sources.xela.packet import InvalidPacket
 from holdfast.devices.sources.xela.places import Place
+from holdfast.errors import SourceError
+from holdfast.sensors import Sensor
 
 OPEN_TIMEOUT = 5.0
 """Longest wait for the first packet with samples [s]."""

@@ -6,12 +6,12 @@ from typing import Any
 import msgspec
 import numpy.typing as npt
 
-from holdfast.errors import SourceError
-from holdfast.sensors import Sensor
 from holdfast.devices.sources.assembler import Assembler, Device
 from holdfast.devices.sources.base import Arrival
 from holdfast.devices.sources.xela.devices import xela_devices
 from holdfast.devices.sources.xela.packet import InvalidPacket, Packet, read_packet, read_sensor
+from holdfast.errors import SourceError
+from holdfast.sensors import Sensor
 
 
 class XelaDecoder:

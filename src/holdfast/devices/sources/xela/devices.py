@@ -5,10 +5,10 @@ from dataclasses import replace
 
 import numpy as np
 
+from holdfast.devices.sources.assembler import Device
 from holdfast.errors import SourceError
 from holdfast.sensors import Hand, Sensor
 from holdfast.sensors.xela_models import is_known, module_sensors, whole_hand
-from holdfast.devices.sources.assembler import Device
 
 
 def xela_devices(

@@ -7,8 +7,8 @@ import msgspec
 import numpy as np
 import numpy.typing as npt
 
-from holdfast.sensors import Hand, Sensor, hand
 from holdfast.devices.sources.assembler import SEQUENCE_PERIOD
+from holdfast.sensors import Hand, Sensor, hand
 
 REST_READING = np.array([32768, 32768, 36000])
 """Reading of a taxel without contact [count]."""

@@ -14,23 +14,22 @@ import pytest
 from msgspec.structs import replace
 
 import holdfast
-from trial.example_results import invented
+from cli.terminal.test_status_line import WELL, Still
 from holdfast.cli import main
 from holdfast.cli.terminal import progress
 from holdfast.cli.terminal.console import print_line, print_message
 from holdfast.cli.terminal.progress import ProgressBar
 from holdfast.cli.terminal.status_line import StatusLine
-from holdfast_lab.trial import experiment, plan
-from holdfast_lab.trial.course import TrialCourse
 from holdfast.io import save_recording
-from holdfast_lab.report.html_report import Section
-from holdfast_lab.study import run as study_run
-from holdfast_lab.study.paper import experiments, paper_tables
 from holdfast.synthetic import synthetic_recording
 from holdfast.twin import simulation
 from holdfast.twin.profile import profile
-
-from .test_status_line import WELL, Still
+from holdfast_lab.report.html_report import Section
+from holdfast_lab.study import run as study_run
+from holdfast_lab.study.paper import experiments, paper_tables
+from holdfast_lab.trial import experiment, plan
+from holdfast_lab.trial.course import TrialCourse
+from trial.example_results import invented
 
 FINGERS = ("thumb", "index")
 FORCED_BAR = """

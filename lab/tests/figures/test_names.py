@@ -7,19 +7,18 @@ import numpy as np
 import pytest
 from matplotlib.text import Text
 
+from figures.test_experiment import series
 from holdfast.metrics import summarise
-from holdfast_lab.figures.curves import draw_reliability
-from holdfast_lab.figures.dots import IntervalEstimate, draw_dots, draw_groups
 from holdfast.plots.evaluation import draw_evaluation
-from holdfast_lab.figures.experiment import draw_experiment, draw_forces
 from holdfast.plots.recording import plot_recording
 from holdfast.plots.sensors import plot_hand, plot_sensor
-from holdfast_lab.figures.trials import ForceCourse, draw_courses
 from holdfast.sensors import Hand, hand, sensor
 from holdfast.synthetic import synthetic_recording
-
-from .test_evaluation import example_decisions
-from .test_experiment import series
+from holdfast_lab.figures.curves import draw_reliability
+from holdfast_lab.figures.dots import IntervalEstimate, draw_dots, draw_groups
+from holdfast_lab.figures.experiment import draw_experiment, draw_forces
+from holdfast_lab.figures.trials import ForceCourse, draw_courses
+from plots.test_evaluation import example_decisions
 
 NAME = r"$\bad{$"
 """As a formula, it is an error."""

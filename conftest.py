@@ -34,7 +34,7 @@ BROWSER = (
 @pytest.fixture(scope="session")
 def data_folder():
     """Where the real recordings are: HOLDFAST_DATA, or the folder shared beside the project."""
-    beside = Path(__file__).parents[2] / "shared" / "data"
+    beside = Path(__file__).parents[1] / "shared" / "data"
     folder = Path(os.environ.get("HOLDFAST_DATA", beside))
     if not folder.is_dir():
         pytest.skip("no real recordings here: set HOLDFAST_DATA to their folder")
@@ -93,7 +93,7 @@ def pytest_sessionstart(session):
     """
     if hasattr(session.config, "workerinput"):
         return
-    package = Path(__file__).parents[1] / "src" / "holdfast"
+    package = Path(__file__).parent / "src" / "holdfast"
     for folder in package.rglob("__pycache__"):
         for cache in folder.glob("*.nb[ci]"):
             source = folder.parent / f"{cache.name.split('.')[0]}.py"
@@ -124,6 +124,6 @@ def imported(path):
         elif isinstance(node, ast.ImportFrom):
             module = node.module or ""
             names += [module, *(f"{module}.{alias.name}" for alias in node.names)]
-    source = Path(__file__).parents[1] / "src"
+    source = Path(__file__).parent / "src"
     places = [source.joinpath(*name.split(".")) for name in names if name.startswith("holdfast")]
     return [file for place in places for file in (place.with_suffix(".py"), place / "__init__.py")]

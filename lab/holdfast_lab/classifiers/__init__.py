@@ -1,0 +1,1 @@
+"""Classifiers of the study that the product does not use."""

@@ -1,0 +1,1 @@
+"""Figures of the study and of the trials, with matplotlib."""

@@ -1,0 +1,1 @@
+"""The verbs `study` and `trial`, which the command line finds by entry points."""

@@ -1,0 +1,1 @@
+"""The grip loop on a hand: from estimates to commands, with watchdog and log."""
