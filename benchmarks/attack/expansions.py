@@ -25,6 +25,8 @@ from holdfast.io.importers.csv_columns import Columns  # noqa: F401 (imported be
 
 MAX_MEMORY = 3 << 30
 """Address space of the process that reads a file [bytes]."""
+MAX_RESIDENT = 3 << 29
+"""Memory that the process may use, with that of the program and of copies [bytes]."""
 MAX_SECONDS = 30
 """Time of the processor that a file may take, 20 times what was measured [s]."""
 HUGE = 10 * 10**12
@@ -59,6 +61,7 @@ def _attack(name: str, path: Path, verb: str, folder: Path) -> CpuResult:
     result.n_accepted, result.n_refused = int(code == 0), int(code == 2)
     is_one_line = text.startswith("holdfast: ") and text.count("\n") == 1
     result.n_foreign = int(code not in (0, 2) or (code == 2 and not is_one_line))
+    result.n_wrong = int(memory > MAX_RESIDENT or "does not fit into memory" in text)
     result.n_slow = int(seconds > MAX_SECONDS)
     result.note = f"{memory / 1e6:.0f} MB; exit code {code}: {' '.join(text.split())[-200:]}"
     return result

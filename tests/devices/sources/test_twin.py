@@ -167,7 +167,7 @@ def test_a_failed_process_is_replaced(quick):
 
 
 def test_without_another_process_it_is_simulated_here(quick, monkeypatch):
-    monkeypatch.setattr(module.sys, "executable", "/nowhere/python")
+    monkeypatch.setattr("sys.executable", "/nowhere/python")
     monkeypatch.setattr(module._Simulator, "_run", RUN)
     with open_source("twin:", speed=0, loop=True) as source:
         arrivals = list(itertools.islice(source, 20))
