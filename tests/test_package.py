@@ -47,8 +47,8 @@ def test_version_is_that_of_the_distribution():
 
 
 def test_other_names_are_refused():
-    with pytest.raises(AttributeError, match=r"^module 'holdfast' has no attribute 'grip'$"):
-        _ = holdfast.grip
+    with pytest.raises(AttributeError, match=r"^module 'holdfast' has no attribute 'grasp'$"):
+        _ = holdfast.grasp
 
 
 def test_type_checkers_know_every_name():
