@@ -177,5 +177,5 @@ def open_source(text: str, *, speed: float = 1.0, loop: bool = False) -> "Source
 
         return Twin(address, speed=speed, loop=loop)
     module = import_module(f"holdfast.devices.sources.{DEVICE_MODULES[scheme]}")
-    make: Callable[[Address], "Source"] = module.source
+    make: Callable[[Address], Source] = module.source
     return make(address)
