@@ -9,7 +9,7 @@ from holdfast.live.loop.grip_faults import ENDED, GRIP_FAULTS, explain_fault
 
 RISES = {"", "unstable", "slip", "load", "margin", "balance", "relax"}
 """Reasons of a change of force, which are no faults."""
-GUIDE = Path(__file__).parents[2] / "docs" / "grip.md"
+GUIDE = Path(__file__).parents[3] / "docs" / "grip.md"
 
 
 def limits(**fields):
