@@ -10,7 +10,7 @@ from holdfast.twin.hand import FINGERS, GRAVITY, N_JOINTS, SUBSTEPS, TIMESTEP, H
 from holdfast.twin.loads import LoadState
 from holdfast.twin.mujoco_import import mujoco
 from holdfast.twin.objects import GraspObject
-from holdfast.twin.physics import Action, Steps, Wrenches, advance_sample, engine_of
+from holdfast.twin.physics import Action, Steps, Wrenches, advance_of
 from holdfast.twin.protocol import OPEN_GAP, Command, Plan
 from holdfast.twin.shapes import MU_KINETIC, MU_STATIC
 from holdfast.twin.surface import curved_fingertip
@@ -51,7 +51,7 @@ class World:
         self.bodies = np.zeros((len(FINGERS) + 1, 18))
         self.outside = np.zeros(6)
         self.set_point_error = 0.0
-        self._engine = engine_of(hand)
+        self._advance = advance_of(hand)
         self._steps = Steps(SUBSTEPS, TIMESTEP, STEPS_PER_CONTROL)
         self._wrenches = Wrenches(self.outside, np.zeros(6))
         self._pull = np.zeros(3)
@@ -97,8 +97,8 @@ class World:
         target = self.path.targets(command.depths)
         if displacement is not None:
             target = target + displacement
-        self.set_point_error = advance_sample(
-            self._engine, self._steps, self.hand.arrays, self.contact, self.constants,
+        self.set_point_error = self._advance(
+            self._steps, self.hand.arrays, self.contact, self.constants,
             self.controller, self._tick, target, self._action(command, plan, anchor),
             self.bodies, self._wrenches,
         )  # fmt: skip
