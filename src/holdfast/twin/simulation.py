@@ -24,9 +24,9 @@ from holdfast.twin.profile import Profile, profile
 from holdfast.twin.protocol import CONTACT_LOAD, THUMB_SHARE, Command, Plan, Protocol
 from holdfast.twin.surface import curved_fingertip
 from holdfast.twin.truth_log import TruthLog
-from holdfast.twin.uskin import Uskin, with_server_effects
-from holdfast.twin.uskin_parameters import UskinParameters
-from holdfast.twin.uskin_readout import Counts, Readout
+from holdfast.twin.uskin.fingertip import Uskin, with_server_effects
+from holdfast.twin.uskin.parameters import UskinParameters
+from holdfast.twin.uskin.readout import Counts, Readout
 from holdfast.twin.world import World
 
 RETRY_DEPTH_FACTOR = 0.75
