@@ -510,7 +510,9 @@ def test_the_page_loads_nothing_from_other_servers():
     assert "https://" not in text
 
 
-@pytest.mark.parametrize("path", ["/page/main.js", "/page/uplot/uPlot.esm.js", "/web/base.css"])
+@pytest.mark.parametrize(
+    "path", ["/page/main.js", "/page/uplot/uPlot.iife.min.js", "/web/base.css"]
+)
 def test_the_files_of_the_page(path):
     async def work():
         async with served(patient(10)) as (client, _), client.get(path) as answer:
