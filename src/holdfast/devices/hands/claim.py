@@ -22,7 +22,7 @@ class Claim:
     The claim of a process that died ends with it.
 
     Args:
-        name: `Hand.resource` of the hand.
+        name: `HandDevice.resource` of the hand.
     """
 
     def __init__(self, name: str) -> None:
