@@ -50,7 +50,7 @@ from holdfast.cli.options import (
 from holdfast.cli.terminal.console import print_json, print_message
 
 if TYPE_CHECKING:
-    from holdfast.devices.hands import Hand
+    from holdfast.devices.hands import HandDevice
     from holdfast.devices.sources import Source
     from holdfast.live.loop.documents import Grip
     from holdfast.live.loop.live_grip import LiveGrip
@@ -160,7 +160,9 @@ def serve(
         _report_unpublished(publishers)
 
 
-def _find(source: str, hand: str, *, speed: float, loop: bool) -> "tuple[Source, Hand | None]":
+def _find(
+    source: str, hand: str, *, speed: float, loop: bool
+) -> "tuple[Source, HandDevice | None]":
     """Return the source, and the hand if one is given; neither is open yet."""
     from holdfast.devices.sources import open_source
 
@@ -171,7 +173,7 @@ def _find(source: str, hand: str, *, speed: float, loop: bool) -> "tuple[Source,
 
 @contextmanager
 def _live_grip(
-    settings: GripSettings, hand: "Hand", session: "Session", watchdog: "Watchdog | None"
+    settings: GripSettings, hand: "HandDevice", session: "Session", watchdog: "Watchdog | None"
 ) -> "Iterator[LiveGrip]":
     """Yield the loop of a hand, which runs in a thread. Without `--armed` nothing is sent."""
     from holdfast.live.loop.live_grip import EventLog, LiveGrip
