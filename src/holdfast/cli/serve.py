@@ -52,7 +52,6 @@ from holdfast.cli.terminal.console import print_json, print_message
 if TYPE_CHECKING:
     from holdfast.devices.hands import HandDevice
     from holdfast.devices.sources import Source
-    from holdfast.live.loop.documents import Grip
     from holdfast.live.loop.live_grip import LiveGrip
     from holdfast.live.loop.watchdog import Watchdog
     from holdfast.live.publishers.ros_publisher import RosPublisher
@@ -197,7 +196,7 @@ def _report_unpublished(publishers: "Sequence[RosPublisher]") -> None:
 
 
 def _create_publishers(
-    stream: "StreamDetector", *, grip: "Grip | None", ros2: bool, ros1: bool
+    stream: "StreamDetector", *, grip: "LiveGrip | None", ros2: bool, ros1: bool
 ) -> "Iterator[RosPublisher]":
     units = {name: sensor.unit for name, sensor in stream.fingers.items()}
     if ros2:
@@ -219,7 +218,7 @@ def run_page(
     port: int = DEFAULT_PORT,
     guard: "Guard | None" = None,
     folder: Path | None = None,
-    grip: "Grip | None" = None,
+    grip: "LiveGrip | None" = None,
     stay: bool = True,
 ) -> None:
     """Run the live page of a session until Ctrl-C, or until the source ends if not `stay`.

@@ -11,8 +11,9 @@ from aiohttp import ClientSession, WSServerHandshakeError, web
 from holdfast.contact import Fault
 from holdfast.detector import detect
 from holdfast.io import load_recording
+from holdfast.live.documents import finger_document
 from holdfast.live.session import Session
-from holdfast.live.status import finger_document, operating_points
+from holdfast.live.status import operating_points
 from holdfast.live.stream_detector import StreamDetector, compile_kernels
 from holdfast.live.web import schema
 from holdfast.live.web.service import LiveService
