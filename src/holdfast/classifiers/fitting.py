@@ -150,6 +150,11 @@ def undo_balancing(
     return probability / (probability + class_ratio * (1.0 - probability))
 
 
+def logistic(value: float) -> float:
+    """Return 1 / (1 + exp(-value)), by the exponential of the C library; at least 1e-308."""
+    return 1.0 / (1.0 + math.exp(min(-value, 709.0)))
+
+
 def sigmoid(values: npt.NDArray[np.float64], stable: npt.NDArray[np.bool_]) -> tuple[float, float]:
     """Fit a logistic function of the values to the classes; return its slope and offset.
 
