@@ -25,15 +25,15 @@ hypothesis.settings.register_profile("quick", max_examples=5)
 if os.environ.get("CI"):
     hypothesis.settings.load_profile("checks")
 
+SLOW_FOLDERS = ("tests/attack", "tests/cli/label", "tests/docs", "tests/examples")
+"""Folders without quick tests."""
 SLOW_FILE = re.compile(
-    r"""
-    ^\s*(?:import|from)\ (?:asyncio|concurrent|cyclonedds|distributed|http|multiprocessing|playwright
-        |serial|signal|socket|subprocess|threading|torch|urllib)\b
-    | ^pytestmark\ =.*\bslow\b
-    """,
-    re.MULTILINE | re.VERBOSE,
+    r"^\s*(?:import|from) (?:asyncio|concurrent|cyclonedds|distributed|http|multiprocessing"
+    r"|playwright|serial|signal|socket|subprocess|threading|torch|urllib)\b"
+    r"|^pytestmark = .*\bslow\b",
+    re.MULTILINE,
 )
-"""Text of a test file whose tests are not quick: what it imports, or its mark."""
+"""Text of a test file without quick tests: an import of processes, threads or servers; a mark."""
 SLOW_FIXTURES = {"browser", "data_folder"}
 """Fixtures whose tests are not quick."""
 
@@ -137,8 +137,11 @@ def pytest_collection_modifyitems(items):
 @functools.cache
 def is_slow(path):
     """Return whether no test of a file is quick. A doctest is always quick."""
-    is_test = path.name.startswith("test_") and path.suffix == ".py"
-    return is_test and SLOW_FILE.search(path.read_text("utf-8")) is not None
+    if not (path.name.startswith("test_") and path.suffix == ".py"):
+        return False
+    folder = path.parent.relative_to(Path(__file__).parent)
+    is_in_slow_folder = any(folder.is_relative_to(slow) for slow in SLOW_FOLDERS)
+    return is_in_slow_folder or SLOW_FILE.search(path.read_text("utf-8")) is not None
 
 
 def pytest_sessionstart(session):

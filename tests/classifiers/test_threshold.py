@@ -9,6 +9,8 @@ from holdfast.classifiers import Samples, Threshold
 from holdfast.classifiers.threshold import best_cut
 from holdfast.errors import TrainingError
 
+pytestmark = pytest.mark.slow
+
 
 def samples(features, stable):
     features = np.asarray(features, dtype=float)

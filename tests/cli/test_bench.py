@@ -9,6 +9,8 @@ from holdfast.cli.bench import _pywt_loop, _scipy, _tsflex, benchmark
 from holdfast.cli.terminal.console import print_json
 from holdfast.features import DEFAULT_WINDOW, haar_features
 
+pytestmark = pytest.mark.slow
+
 
 def test_json(capsys):
     pytest.importorskip("pywt")

@@ -12,6 +12,8 @@ from holdfast.synthetic import synthetic_recording
 from holdfast.twin import simulation
 from holdfast.twin.profile import profile
 
+pytestmark = pytest.mark.slow
+
 SHORT = msgspec.structs.replace(profile("reference"), idle=(0.2, 0.3), hold=1.0)
 HEADER = "# sensor: anyskin\ntime," + ",".join(f"t{n:02d}_{a}" for n in range(1, 6) for a in "xyz")
 VERBS = {

@@ -13,6 +13,8 @@ from holdfast.twin import simulation
 from holdfast.twin.profile import profile
 from holdfast.twin.simulation import Grasp, simulate
 
+pytestmark = pytest.mark.slow
+
 FINGERS = ("thumb", "index")
 SAMPLE = {"n", "accuracy", "fdr", "fpr", "fnr", "auc", "auc_contact", "confusion"}
 EVENT = {

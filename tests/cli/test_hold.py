@@ -17,6 +17,8 @@ from holdfast.live.loop import watchdog
 from holdfast.synthetic import synthetic_recording
 from holdfast_lab.trial.run import LIMITS
 
+pytestmark = pytest.mark.slow
+
 DOCS = Path(__file__).parents[2] / "docs"
 TWIN = "twin:?object=ball&case=1&profile=finger-vigorous"
 PLEXUS = "ros2:plexus?effort=0.06&max_effort=0.1"

@@ -11,6 +11,8 @@ from holdfast.recordings import Recording, Tactile, Truth
 from holdfast.sensors import sensor
 from holdfast.synthetic import synthetic_recording
 
+pytestmark = pytest.mark.slow
+
 
 @pytest.fixture(scope="module")
 def grasp():

@@ -10,6 +10,8 @@ from holdfast.cli.sensors import _ranges
 from holdfast.plots.sensors import plot_hand, plot_sensor
 from holdfast.sensors import Sensor, built_in_hands, built_in_sensors, hand, sensor
 
+pytestmark = pytest.mark.slow
+
 URDF = """<robot name="finger"><link name="tip"/>
 <joint name="taxel_1" type="fixed"><parent link="tip"/><child link="t"/></joint></robot>"""
 

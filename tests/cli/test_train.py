@@ -18,6 +18,8 @@ from holdfast.recordings import Recording
 from holdfast.synthetic import synthetic_recording
 from holdfast.training import Setting, train
 
+pytestmark = pytest.mark.slow
+
 SAMPLE = {"n", "accuracy", "fdr", "fpr", "fnr", "auc", "auc_contact", "confusion"}
 EVENT = {
     "n_events", "stable_minutes", "missed", "delay_median", "delay_p95", "false_alarms_per_minute"

@@ -8,6 +8,8 @@ from holdfast.model import Model
 from holdfast.synthetic import synthetic_recording
 from holdfast.training import Setting, train
 
+pytestmark = pytest.mark.slow
+
 FINGERS = ("thumb", "index")
 
 

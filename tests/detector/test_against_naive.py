@@ -8,6 +8,8 @@ from holdfast.model import ANY_FINGER, Debounce, Model
 from . import naive
 from .build import RATE, RICH, finger_model, model, sensor, tactile
 
+pytestmark = pytest.mark.slow
+
 
 def eventful(seed, which, n=420):
     """Samples that go missing, repeat, stick, saturate, break, pull, and come in at odd times."""

@@ -478,6 +478,7 @@ def ailing(draw, n=700):
     return which, values[kept], np.flatnonzero(kept) / RATE, {"finger1": sorted(ignore)}
 
 
+@pytest.mark.slow
 @given(
     sick=ailing(),
     tare=st.sampled_from(["0.2", "first", "none"]),

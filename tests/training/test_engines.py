@@ -15,6 +15,8 @@ from holdfast.training.training_samples import gather_samples
 
 from .build import tiny_recording
 
+pytestmark = pytest.mark.slow
+
 QUICK = Setting(trials=0)
 
 

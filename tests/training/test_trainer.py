@@ -19,6 +19,8 @@ from holdfast.training.splits import split_data
 
 from .build import TINY, tiny_module, tiny_recording
 
+pytestmark = pytest.mark.slow
+
 SETTING = Setting(window=6, features=parse_features("F_a,F_x,sigma", 6), trials=0)
 QUICK = replace(SETTING, trials=3)
 ONE_CLASS = (ContactState.NO_CONTACT, None, ContactState.UNSTABLE, None)

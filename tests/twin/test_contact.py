@@ -17,6 +17,8 @@ from holdfast.twin.surface import Surface, curved_fingertip
 from .grip import GRAVITY, Grip
 from .naive_contact import NaiveFinger
 
+pytestmark = pytest.mark.slow
+
 NAMES = sorted(load_objects())
 SAMPLE = 1 / 150  # [s]
 BOX = object_named("box")

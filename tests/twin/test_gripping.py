@@ -11,6 +11,8 @@ from holdfast.twin.profile import profile
 from holdfast.twin.protocol import THUMB_SHARE, Plan
 from holdfast.twin.simulation import Grasp, Simulation, simulate
 
+pytestmark = pytest.mark.slow
+
 CALM = msgspec.structs.replace(profile("reference"), hold=1.5, glitch_rate=0.0)
 DEPTHS = np.array([-0.012, -0.01, -0.008, -0.009])
 

@@ -15,6 +15,8 @@ from holdfast.twin.protocol import CONTACT_LOAD
 from holdfast.twin.simulation import Grasp, simulate
 from holdfast.twin.uskin.parameters import UskinParameters
 
+pytestmark = pytest.mark.slow
+
 FINGERS = ("thumb", "index", "middle", "ring")
 SHORT = msgspec.structs.replace(profile("finger-reference"), idle=(0.7, 0.8), hold=6.0)
 MOVED = msgspec.structs.replace(profile("reference"), idle=(0.7, 0.8), hold=9.0, move_share=1.0)

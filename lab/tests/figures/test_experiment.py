@@ -13,6 +13,8 @@ from holdfast.plots.style import (
 from holdfast.plots.time_series import FingerSeries
 from holdfast_lab.figures.experiment import draw_experiment, draw_features, draw_forces
 
+pytestmark = pytest.mark.slow
+
 
 def series(n=200, seed=0, **options):
     rng = np.random.default_rng(seed)

@@ -20,6 +20,8 @@ from holdfast_lab.figures.experiment import draw_experiment, draw_forces
 from holdfast_lab.figures.trials import ForceCourse, draw_courses
 from plots.test_evaluation import example_decisions
 
+pytestmark = pytest.mark.slow
+
 NAME = r"$\bad{$"
 """As a formula, it is an error."""
 ESTIMATES = {NAME: IntervalEstimate(1.0, 0.5, 1.5), "other": IntervalEstimate(2.0)}

@@ -8,6 +8,8 @@ from holdfast_lab.report.html_report import ReportFigure, Section
 
 from .test_html_report import drawn, sections
 
+pytestmark = pytest.mark.slow
+
 STUDY = ReportKind("study", "study.json", ("extra.bin",))
 
 

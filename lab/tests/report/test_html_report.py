@@ -9,6 +9,8 @@ from holdfast_lab.report import images
 from holdfast_lab.report.html_report import ReportFigure, Section, html_report
 from holdfast_lab.report.result_tables import ResultTable, Row
 
+pytestmark = pytest.mark.slow
+
 VOID = {"meta", "br", "img", "link", "hr", "input"}
 
 

@@ -9,6 +9,8 @@ from holdfast_lab.trial.film import GAP, HEIGHT, WIDTH, captions, film
 from holdfast_lab.trial.run import run_trial
 from holdfast_lab.trial.trials import Trial
 
+pytestmark = pytest.mark.slow
+
 CAN = Trial(0, Grasp("can", 1, 1, seed=0), 4, Load(LoadKind.WEIGHT, 1.0, 0.0, 0.4), 0.03)
 
 

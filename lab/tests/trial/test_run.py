@@ -8,6 +8,8 @@ from holdfast.twin.simulation import Grasp
 from holdfast_lab.trial.run import least_force_at, run_trial
 from holdfast_lab.trial.trials import Trial, draw_trials, least_force
 
+pytestmark = pytest.mark.slow
+
 CAN = Trial(0, Grasp("can", 1, 1, seed=0), 4, Load(LoadKind.WEIGHT, 1.5, 0.0, 0.4), 0.03)
 
 

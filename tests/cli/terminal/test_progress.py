@@ -8,6 +8,11 @@ from holdfast.cli.terminal.progress import ProgressBar, progress
 
 
 @pytest.fixture
+def no_progress_messages():
+    """Keep the messages, which are tested here."""
+
+
+@pytest.fixture
 def clock(monkeypatch):
     """Replace the clock; return a function that advances it."""
     now = [1000.0]

@@ -13,6 +13,8 @@ from holdfast.grip import FingerCommand, GripCommand, Limits, LoopState
 from .rigs import LOCAL, NAMES, WITH_STATES, Rigs
 from .ros.drivers import POSITIONS
 
+pytestmark = pytest.mark.slow
+
 SCALES = {"thumb": 1.4, "index": 1.1, "middle": 1.2, "ring": 1.3}
 COMMAND = GripCommand(1.0, LoopState.REACT, {f: FingerCommand(s) for f, s in SCALES.items()})
 RELEASE = msgspec.structs.replace(COMMAND, release=True, state=LoopState.FAULT)

@@ -8,6 +8,8 @@ from holdfast.twin.randomized.drawing import SENSOR_KINDS, draw_object, draw_sen
 from holdfast.twin.randomized.scenario import KINDS, draw_events
 from holdfast.twin.randomized.simulation import RandomHold, simulate_random
 
+pytestmark = pytest.mark.slow
+
 
 @pytest.fixture(scope="module")
 def hands():

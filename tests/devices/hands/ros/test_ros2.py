@@ -20,6 +20,8 @@ from holdfast.live.loop.watchdog import Watchdog
 
 from .drivers import AH_NAMES, EFFORTS, FLOATS, PLEXUS, POSITIONS, ROS2, V4, Ros2Driver, home
 
+pytestmark = pytest.mark.slow
+
 COMMAND = GripCommand(1.0, LoopState.HOLD, {"thumb": FingerCommand(1.2)})
 RELEASE = GripCommand(1.0, LoopState.FAULT, {}, release=True)
 

@@ -10,6 +10,8 @@ from holdfast.devices.ros.rospy_node import published_topics
 from holdfast.devices.sources import open_source
 from holdfast.devices.sources.ros import ros1
 
+pytestmark = pytest.mark.slow
+
 N = 300
 LOST, AGAIN = "connection lost (the topic has no publisher)", "connected again after"
 
