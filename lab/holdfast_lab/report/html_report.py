@@ -159,6 +159,15 @@ def _numbered(sections: Sequence[Section]) -> list[NumberedSection]:
     ]
 
 
+def join_lines(text: str) -> str:
+    """Join the lines of each paragraph and of each item of a list."""
+    return "\n\n".join(_join_paragraph(part.splitlines()) for part in text.split("\n\n"))
+
+
+def _join_paragraph(lines: Iterable[str]) -> str:
+    return "".join(f"\n{line}" if line.startswith("- ") else f" {line}" for line in lines).strip()
+
+
 def _paragraph(text: str) -> Paragraph:
     lines = [line.strip() for line in text.strip().splitlines()]
     if all(line.startswith("- ") for line in lines):

@@ -1,11 +1,11 @@
 """Sections of the report in reading order, each with a text on how to read it."""
 
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from typing import NamedTuple, TypeVar
 
 import msgspec
 
-from holdfast_lab.report.html_report import SUMMARY, ReportFigure, Section
+from holdfast_lab.report.html_report import SUMMARY, ReportFigure, Section, join_lines
 from holdfast_lab.report.result_tables import ResultTable
 from holdfast_lab.study.summary import summary_text
 
@@ -211,9 +211,9 @@ def report_sections(
         if tables or figures:
             if twin:
                 tables = [_with_twin_note(table, outline) for table in tables]
-            sections.append(Section(outline.title, _join_lines(outline.text), tables, figures))
+            sections.append(Section(outline.title, join_lines(outline.text), tables, figures))
     if twin:
-        sections.append(Section("What the twin cannot show", _join_lines(LIMITS)))
+        sections.append(Section("What the twin cannot show", join_lines(LIMITS)))
     return sections
 
 
@@ -232,12 +232,3 @@ def _with_twin_note(table: ResultTable, outline: SectionOutline) -> ResultTable:
     if outline.part == "real" or not any(row.n for row in table.rows):
         return table
     return msgspec.structs.replace(table, note=f"{table.note} {TWIN_NOTE}".strip())
-
-
-def _join_lines(text: str) -> str:
-    """Join the lines of each paragraph and of each item of a list."""
-    return "\n\n".join(_join_paragraph(part.splitlines()) for part in text.split("\n\n"))
-
-
-def _join_paragraph(lines: Iterable[str]) -> str:
-    return "".join(f"\n{line}" if line.startswith("- ") else f" {line}" for line in lines).strip()

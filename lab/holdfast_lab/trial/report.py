@@ -1,9 +1,9 @@
 """Report of a comparison of laws: its sections, and its main results in sentences."""
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping
 from typing import Any, NamedTuple
 
-from holdfast_lab.report.html_report import SUMMARY, ReportFilm, Section
+from holdfast_lab.report.html_report import SUMMARY, ReportFilm, Section, join_lines
 from holdfast_lab.report.result_tables import number_text
 from holdfast_lab.trial.course import TrialCourse
 from holdfast_lab.trial.document import BASELINE, GOALS, OWN, Results
@@ -89,7 +89,7 @@ def report_sections(
         example: the trial of the film, if there is one.
     """
     paired = [paired_table(document, other) for other in document["paired"]]
-    text = _joined(WHAT.format(grip=document["first_grip"]))
+    text = join_lines(WHAT.format(grip=document["first_grip"]))
     return [
         Section(SUMMARY, summary_text(document)),
         Section("One trial, lost and saved", *_example(example)),
@@ -102,8 +102,8 @@ def report_sections(
             [kinds_table(document), objects_table(document), fingers_table(document)],
             [kinds_figure(document)],
         ),
-        Section("What the numbers mean", _joined(MEANINGS)),
-        Section("What the twin cannot show", _joined(LIMITS_OF_TWIN)),
+        Section("What the numbers mean", join_lines(MEANINGS)),
+        Section("What the twin cannot show", join_lines(LIMITS_OF_TWIN)),
     ]
 
 
@@ -177,12 +177,3 @@ def _example(example: Example | None) -> tuple[str, list[Any], list[Any]]:
         "Arrows: forces of the fingertips on the object."
     )
     return f"{example.what} {rule}", [], [ReportFilm("film", caption, example.film), *figures]
-
-
-def _joined(text: str) -> str:
-    """Join the lines of each paragraph and of each item of a list."""
-    return "\n\n".join(_paragraph(part.splitlines()) for part in text.split("\n\n"))
-
-
-def _paragraph(lines: Sequence[str]) -> str:
-    return "".join(f"\n{line}" if line.startswith("- ") else f" {line}" for line in lines).strip()
