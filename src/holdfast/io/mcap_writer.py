@@ -2,8 +2,7 @@
 
 from collections.abc import Mapping, Sequence
 from pathlib import Path
-from types import TracebackType
-from typing import IO, Any, Self, cast
+from typing import IO, Any, cast
 
 import msgspec
 import numpy as np
@@ -23,6 +22,7 @@ from holdfast.io.mcap_messages import (
 )
 from holdfast.io.output_stream import UnbufferedStream, open_alone
 from holdfast.io.timed_arrays import TACTILE, time_spans
+from holdfast.openable import Closable
 from holdfast.sensors import Sensor
 from holdfast.sensors.types import Array, Unit
 
@@ -41,7 +41,7 @@ LIBRARY = "holdfast"
 _MAX_NANOSECONDS = (1 << 63) - 1
 
 
-class RecordingWriter:
+class RecordingWriter(Closable):
     """Writer of a recording while it is made; a crash loses at most half a second.
 
     Samples are written in messages of at most 0.1 s and chunks of at most 0.3 s, by the times
@@ -178,17 +178,6 @@ class RecordingWriter:
                 self._write_all()
         finally:
             self._log.close()
-
-    def __enter__(self) -> Self:
-        return self
-
-    def __exit__(
-        self,
-        kind: type[BaseException] | None,
-        error: BaseException | None,
-        trace: TracebackType | None,
-    ) -> None:
-        self.close()
 
     def _check(self, module: str, times: Array, values: npt.NDArray[Any]) -> None:
         if module not in self._sensors:
