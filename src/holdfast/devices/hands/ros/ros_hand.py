@@ -76,7 +76,8 @@ class RosHand(HandDevice):
     @property
     def silent(self) -> bool:
         """Whether there have been no joint states for 0.1 s, or for three of their periods."""
-        if self._take_states is None or not self._poll():
+        self._poll()
+        if self._take_states is None or not self._states:
             return False
         times = [at for at, _ in self._states]
         if len(times) < 2:  # their period is not known
