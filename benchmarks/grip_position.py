@@ -16,7 +16,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from holdfast.devices.hands.ros.kinds import KINDS
+from holdfast.devices.hands.ros.kinds import HAND_KINDS
 from holdfast.devices.hands.ros.link import Link, Publisher, TakeStates
 from holdfast.devices.hands.ros.parameters import Parameters
 from holdfast.devices.uri import parse
@@ -89,7 +89,9 @@ def forces(trial: Trial, scale: float) -> tuple[np.ndarray, np.ndarray] | None:
         advance(command, plan, anchor, moved)
 
     world.advance = follow
-    hand = KINDS["ros1"]["positions"].make("twin", link, Parameters(parse(URI)[1]), standby=False)
+    hand = HAND_KINDS["ros1"]["positions"].make(
+        "twin", link, Parameters(parse(URI)[1]), standby=False
+    )
     fingers = {name: FingerCommand(scale) for name in FINGERS}
     while simulation.held_for < QUIET and not simulation.is_over:
         simulation.step()

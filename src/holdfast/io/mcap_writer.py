@@ -30,7 +30,7 @@ MESSAGE_SECONDS = 0.1
 """Maximum duration of the samples in a message [s]."""
 CHUNK_SECONDS = 0.3
 """Maximum duration of a chunk of the file [s]."""
-MAX_CHUNK_SIZE = 1 << 24
+WRITTEN_CHUNK_SIZE = 1 << 24
 """Number of bytes above which a chunk ends early."""
 
 HEADER_TOPIC = "/holdfast/header"
@@ -254,7 +254,7 @@ class MessageLog:
             self._stream = UnbufferedStream(self._file)
             self._writer = Writer(
                 cast("IO[bytes]", self._stream),
-                MAX_CHUNK_SIZE,
+                WRITTEN_CHUNK_SIZE,
                 CompressionType.ZSTD,
                 enable_data_crcs=True,
             )

@@ -8,7 +8,7 @@ from holdfast.recordings import Truth
 from holdfast.sensors.types import Array
 from holdfast.twin.contact import SLIP, SLIPPING_SHARE
 from holdfast.twin.hand import FINGERS, N_JOINTS
-from holdfast.twin.protocol import CONTACT_LOAD, Command
+from holdfast.twin.protocol import MIN_TOUCH_LOAD, Command
 from holdfast.twin.world import World
 
 
@@ -50,7 +50,7 @@ class TruthLog:
         }
         hand = {name: np.array(rows) for name, rows in self._rows.items()}
         push = np.linalg.norm(hand["outside_force"], axis=1)  # the only other contact then
-        phase = phases_from_touch(np.array(self._phase, dtype=str), push, CONTACT_LOAD)
+        phase = phases_from_touch(np.array(self._phase, dtype=str), push, MIN_TOUCH_LOAD)
         return Truth(times, {"phase": phase, **hand}, fingers)
 
 
