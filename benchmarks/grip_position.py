@@ -16,8 +16,8 @@ from dataclasses import replace
 
 import numpy as np
 
-from holdfast.devices.hands.ros.kinds import KINDS
-from holdfast.devices.hands.ros.link import Link
+from holdfast.devices.hands.ros.kinds import HAND_KINDS
+from holdfast.devices.hands.ros.link import Link, Publisher, TakeStates
 from holdfast.devices.hands.ros.parameters import Parameters
 from holdfast.devices.uri import parse
 from holdfast.grip import FingerCommand, GripCommand, LoopState
@@ -55,20 +55,14 @@ class TwinLink(Link):
     def close(self) -> None:
         pass
 
-    def publisher(self, topic: str, kind: str) -> "TwinLink":
-        return self
+    def publisher(self, topic: str, kind: str) -> Publisher:
+        return Publisher(self.follow, lambda: 1)
 
-    def joint_states(self, topic: str) -> "TwinLink":
-        return self
+    def joint_states(self, topic: str) -> TakeStates:
+        return lambda: [self.state]
 
-    def __call__(self, message) -> None:
+    def follow(self, message) -> None:
         self.set_points = np.array(message["position"])
-
-    def take(self) -> list[JointStates]:
-        return [self.state]
-
-    def n_listeners(self) -> int:
-        return 1
 
     def n_other_publishers(self, topic: str) -> int:
         return 0
@@ -95,7 +89,9 @@ def forces(trial: Trial, scale: float) -> tuple[np.ndarray, np.ndarray] | None:
         advance(command, plan, anchor, moved)
 
     world.advance = follow
-    hand = KINDS["ros1"]["positions"].make("twin", link, Parameters(parse(URI)[1]), standby=False)
+    hand = HAND_KINDS["ros1"]["positions"].make(
+        "twin", link, Parameters(parse(URI)[1]), standby=False
+    )
     fingers = {name: FingerCommand(scale) for name in FINGERS}
     while simulation.held_for < QUIET and not simulation.is_over:
         simulation.step()

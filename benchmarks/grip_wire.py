@@ -33,7 +33,7 @@ from holdfast.twin.hand import RATE
 from holdfast.twin.loads import LoadKind
 from holdfast.twin.simulation import Simulation
 from holdfast_lab.trial.run import RISE
-from holdfast_lab.trial.trials import KINDS, Trial, draw_trials
+from holdfast_lab.trial.trials import LOAD_KINDS, Trial, draw_trials
 
 EFFORT = 0.1
 PLEXUS = f"ros2:plexus?effort={EFFORT}&max_effort=1"
@@ -208,8 +208,8 @@ def show(name: str, seconds: np.ndarray) -> None:
 def main(n_trials: int, seed: int, kind: str, output) -> None:
     os.environ["ROS_LOCALHOST_ONLY"], os.environ["ROS_DOMAIN_ID"] = "1", str(DOMAIN)
     sys.setswitchinterval(5e-4)  # the threads of this process shall not delay each other
-    kinds = [LoadKind(kind)] if kind else KINDS
-    drawn = draw_trials(n_trials * len(KINDS) // len(kinds), seed)
+    kinds = [LoadKind(kind)] if kind else LOAD_KINDS
+    drawn = draw_trials(n_trials * len(LOAD_KINDS) // len(kinds), seed)
     trials = [trial for trial in drawn if trial.load.kind in kinds]
     delays = [sample_to_command(trial, output) for trial in trials[:N_STAMPED]]
     show("sample to command", np.concatenate(delays))

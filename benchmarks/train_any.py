@@ -33,7 +33,7 @@ MAX_RATE = 20.0
 """Samples per second that are kept of each recording [Hz]; neighbours are nearly copies."""
 C = 1e-3
 """Weight of the samples against the penalty on the weights."""
-CONTACT_LOAD = 10.0
+LOAD_TO_NOISE_OF_CONTACT = 10.0
 """Threshold of contact, in multiples of the noise of the force: 6 standard deviations."""
 HOLD = 0.1
 N_FOLDS = 5
@@ -188,7 +188,10 @@ def out_of_fold(hands, folds, shown) -> Iterator[tuple[np.ndarray, np.ndarray, n
 
 def model_of(classifier, training: Training | None = None, causes=None) -> Model:
     finger = FingerModel(
-        features=FEATURES, classifier=classifier, contact_load=CONTACT_LOAD, causes=causes
+        features=FEATURES,
+        classifier=classifier,
+        contact_load=LOAD_TO_NOISE_OF_CONTACT,
+        causes=causes,
     )
     return Model(
         fingers={"*": finger},

@@ -1,11 +1,30 @@
-"""Context manager of what is opened and closed: sources, hands, publishers."""
+"""Context managers of what is closed, and of what is opened and closed."""
 
 from abc import ABC, abstractmethod
 from types import TracebackType
 from typing import Self
 
 
-class Openable(ABC):
+class Closable(ABC):
+    """Base class of what is open from the start, as a writer of a file. Leaving it closes."""
+
+    @abstractmethod
+    def close(self) -> None:
+        """Close. It has no effect on what is closed."""
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(
+        self,
+        kind: type[BaseException] | None,
+        error: BaseException | None,
+        trace: TracebackType | None,
+    ) -> None:
+        self.close()
+
+
+class Openable(Closable):
     """Base class of what has a connection. Entering it opens, leaving it closes.
 
     If opening fails, it is closed, so that nothing stays half open.
@@ -26,10 +45,6 @@ class Openable(ABC):
     def open(self) -> None:
         """Connect."""
 
-    @abstractmethod
-    def close(self) -> None:
-        """Disconnect. It has no effect on what is closed."""
-
     def __enter__(self) -> Self:
         try:
             self.open()
@@ -37,11 +52,3 @@ class Openable(ABC):
             self.close()
             raise
         return self
-
-    def __exit__(
-        self,
-        kind: type[BaseException] | None,
-        error: BaseException | None,
-        trace: TracebackType | None,
-    ) -> None:
-        self.close()

@@ -1,3 +1,4 @@
+import subprocess
 import sys
 from pathlib import Path
 
@@ -147,3 +148,8 @@ def test_nothing_is_imported_for_other_schemes():
     )
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
     assert done.stdout == "[]\n"
+
+
+@pytest.mark.parametrize("module", ["uri", "sources", "hands.ros.kinds", "live_twin"])
+def test_a_module_can_be_imported_first(module):
+    subprocess.run([sys.executable, "-c", f"import holdfast.devices.{module}"], check=True)

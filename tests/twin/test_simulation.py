@@ -11,7 +11,7 @@ from holdfast.io import load_recording, save_recording
 from holdfast.twin import control, hand, simulation, world
 from holdfast.twin.objects import OTHER_OBJECTS, load_objects, object_named
 from holdfast.twin.profile import profile
-from holdfast.twin.protocol import CONTACT_LOAD
+from holdfast.twin.protocol import MIN_TOUCH_LOAD
 from holdfast.twin.simulation import Grasp, simulate
 from holdfast.twin.uskin.parameters import UskinParameters
 
@@ -223,7 +223,7 @@ class TestTruth:
         assert force[disturbed].max() > 0.5
         since = pushed.truth.times - pushed.metadata["locked_at"]
         alone = (phase == Phase.LOCKED) & (since > 0.3) & (since < 7.9)
-        assert force[alone].max() < CONTACT_LOAD
+        assert force[alone].max() < MIN_TOUCH_LOAD
 
     def test_a_disturbance_lasts_from_its_first_touch_to_its_last(self, pushed):
         phase = pushed.truth.hand["phase"]
@@ -232,10 +232,10 @@ class TestTruth:
         edges = np.diff(np.concatenate([[0], disturbed, [0]]))
         starts, ends = np.flatnonzero(edges > 0), np.flatnonzero(edges < 0)
         assert len(starts) >= 2
-        assert (force[starts] > CONTACT_LOAD).all()
-        assert (force[ends - 1] > CONTACT_LOAD).all()
-        assert (force[starts - 1] <= CONTACT_LOAD).all()
-        assert (force[ends] <= CONTACT_LOAD).all()
+        assert (force[starts] > MIN_TOUCH_LOAD).all()
+        assert (force[ends - 1] > MIN_TOUCH_LOAD).all()
+        assert (force[starts - 1] <= MIN_TOUCH_LOAD).all()
+        assert (force[ends] <= MIN_TOUCH_LOAD).all()
 
 
 class TestRecording:

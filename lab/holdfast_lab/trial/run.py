@@ -14,6 +14,7 @@ from holdfast.grip.controller import GripController
 from holdfast.grip.limits import Limits
 from holdfast.model import Model
 from holdfast.sensors.types import Array
+from holdfast.sensors.xela_models import NEWTONS_PER_NORMAL_COUNT, NEWTONS_PER_SHEAR_COUNT
 from holdfast.twin.contact import LOAD, SLIP
 from holdfast.twin.grasp import GRASP_DIRECTION
 from holdfast.twin.hand import FINGERS, GRAVITY, RATE
@@ -24,7 +25,11 @@ from holdfast_lab.trial.trials import Trial
 LIMITS = Limits()
 """Limits of all laws: those that `holdfast hold` has by default. The lowest scale is 1.6 times the
 least force of an unloaded object."""
-NEWTONS_PER_COUNT = (0.000729, 0.000628, 0.000628)
+NEWTONS_PER_FINGERTIP_COUNT = (
+    NEWTONS_PER_NORMAL_COUNT,
+    NEWTONS_PER_SHEAR_COUNT,
+    NEWTONS_PER_SHEAR_COUNT,
+)
 """Calibration for the laws that need newtons, from the data sheet of the flat sensor: normal and
 tangential axes of the fingertip frame [N/count]."""
 RISE = 1.02
@@ -120,7 +125,7 @@ class RunningTrial:
         sensors = {finger: uskin.sensor for finger, uskin in self.simulation.uskins.items()}
         self._detector = Detector(_model(model), sensors)
         self._controller = GripController(
-            LIMITS, law, sensors=sensors, newtons_per_unit=NEWTONS_PER_COUNT
+            LIMITS, law, sensors=sensors, newtons_per_unit=NEWTONS_PER_FINGERTIP_COUNT
         )
         self.scales = np.ones(len(FINGERS))
 

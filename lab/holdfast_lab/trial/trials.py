@@ -44,7 +44,7 @@ CLOSING_SPEED = (0.012, 0.03)
 PROFILE = "reference"
 """Profile of the tremor of the operator and the glitches of the hand's controller."""
 DIRECTIONS = [(s * x, s * y, s * z) for x, y, z in np.eye(3).tolist() for s in (1.0, -1.0)]
-KINDS = tuple(LoadKind)
+LOAD_KINDS = tuple(LoadKind)
 
 
 @dataclass(frozen=True)
@@ -117,7 +117,7 @@ def draw_trial(number: int, seed: int = 0) -> Trial:
     """
     objects = _objects()
     name, item, table = objects[number % len(objects)]
-    kind = KINDS[(number + number // len(objects)) % len(KINDS)]
+    kind = LOAD_KINDS[(number + number // len(objects)) % len(LOAD_KINDS)]
     generator = np.random.default_rng([seed, number])
     grasp = Grasp(name, 1, 1 + number, PROFILE, seed, table=table)
     load = _draw_load(generator, kind, item.mass)

@@ -17,9 +17,9 @@ MAX_EVENTS = 1000
 """Number of events that a controller keeps until `events` is called; the oldest are dropped."""
 OVERLOAD = 1.5
 """Multiple of `Limits.max_force` at which a measured force is a fault."""
-SETTLE_TIME = 0.2
+STABLE_TIME_BEFORE_GRIP = 0.2
 """Time for which the hand has been STABLE when the grip begins [s]."""
-DEFAULT_RATE = 150.0
+DETECTOR_RATE = 150.0
 """Rate of the samples, if no sensor is given [Hz]."""
 MIN_FINGERS = 2
 """Number of fingers in contact from which there is a grip; one, for a hand of one finger."""
@@ -79,7 +79,7 @@ class GripController:
         self._factors: Three = given if isinstance(given, tuple) else (given, given, given)
         self._normals = {name: _three(one.normal) for name, one in sensors.items()}
         rates = [one.rate for one in sensors.values()]
-        self._max_age = 1 / min(rates, default=DEFAULT_RATE) + limits.stale_after
+        self._max_age = 1 / min(rates, default=DETECTOR_RATE) + limits.stale_after
         self._thumb = thumb
         ceiling = math.inf if limits.max_force is None else limits.max_force
         self._ceiling = OVERLOAD * ceiling
@@ -204,7 +204,7 @@ class GripController:
             self._stable_since = math.nan
         elif not self._stable_since <= time:
             self._stable_since = time
-        elif time - self._stable_since >= SETTLE_TIME:
+        elif time - self._stable_since >= STABLE_TIME_BEFORE_GRIP:
             self._begin(estimate, time)
         return GripCommand(time, self.state, dict(commands))
 

@@ -31,7 +31,7 @@ MAGICS = {
     ".mcap": re.compile(rb"\x89MCAP0\r\n\x01.{8}\x04\x00\x00\x00ros2", re.DOTALL),
 }
 """First bytes of the files of bags, by suffix. MCAP has the profile of ROS 2."""
-MAX_MESSAGE_SIZE = 1 << 22
+MAX_BAG_MESSAGE_SIZE = 1 << 22
 """Maximum size of a message that is decoded [bytes]; one of 368 taxels has some 10 kB."""
 
 
@@ -79,10 +79,10 @@ class Bag:
         if not by_number:
             return
         for number, nanoseconds, data in self._storage.messages(list(by_number)):
-            if len(data) > MAX_MESSAGE_SIZE:
+            if len(data) > MAX_BAG_MESSAGE_SIZE:
                 raise ValueError(
                     f"a message of {len(data)} bytes on {by_number[number].name}; at most "
-                    f"{MAX_MESSAGE_SIZE} expected"
+                    f"{MAX_BAG_MESSAGE_SIZE} expected"
                 )
             self._budget.step()
             self._budget.unpack(len(data))

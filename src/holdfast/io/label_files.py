@@ -17,7 +17,7 @@ from holdfast.io.header import LabelData, label_data, label_of
 from holdfast.recordings import Label, Recording
 
 SUFFIX = ".labels.json"
-MAX_FILE_SIZE = 1 << 28
+MAX_LABEL_FILE_SIZE = 1 << 28
 """Maximum size of a file of labels [bytes]."""
 CSV_COLUMNS = ("finger", "start", "end", "state", "cause")
 
@@ -111,7 +111,7 @@ def load_labels(path: str | Path) -> LabelFile:
         RecordingError: it cannot be read, is not a label file, or does not match its digest.
     """
     try:
-        file = msgspec.json.decode(read_input(path, MAX_FILE_SIZE), type=LabelFile)
+        file = msgspec.json.decode(read_input(path, MAX_LABEL_FILE_SIZE), type=LabelFile)
     except OSError as cause:
         raise RecordingError(f"cannot read {path}: {cause.strerror}") from cause
     except (msgspec.DecodeError, UnicodeError, RecursionError) as cause:
@@ -180,7 +180,7 @@ def labels_from_csv(path: str | Path, *, author: str = "") -> dict[str, tuple[La
         RecordingError: a column is missing, or a row is not a label.
     """
     try:
-        text = read_input(path, MAX_FILE_SIZE).decode("utf-8-sig")
+        text = read_input(path, MAX_LABEL_FILE_SIZE).decode("utf-8-sig")
         labels: dict[str, list[Label]] = {}
         for number, row in enumerate(csv.DictReader(StringIO(text)), start=2):
             finger, label = _from_row(row, f"{path}, row {number}", author)

@@ -2,8 +2,7 @@
 
 from collections.abc import Mapping, Sequence
 from pathlib import Path
-from types import TracebackType
-from typing import IO, Any, Self, cast
+from typing import IO, Any, cast
 
 import msgspec
 import numpy as np
@@ -23,6 +22,7 @@ from holdfast.io.mcap_messages import (
 )
 from holdfast.io.output_stream import UnbufferedStream, open_alone
 from holdfast.io.timed_arrays import TACTILE, time_spans
+from holdfast.openable import Closable
 from holdfast.sensors import Sensor
 from holdfast.sensors.types import Array, Unit
 
@@ -30,7 +30,7 @@ MESSAGE_SECONDS = 0.1
 """Maximum duration of the samples in a message [s]."""
 CHUNK_SECONDS = 0.3
 """Maximum duration of a chunk of the file [s]."""
-MAX_CHUNK_SIZE = 1 << 24
+WRITTEN_CHUNK_SIZE = 1 << 24
 """Number of bytes above which a chunk ends early."""
 
 HEADER_TOPIC = "/holdfast/header"
@@ -41,7 +41,7 @@ LIBRARY = "holdfast"
 _MAX_NANOSECONDS = (1 << 63) - 1
 
 
-class RecordingWriter:
+class RecordingWriter(Closable):
     """Writer of a recording while it is made; a crash loses at most half a second.
 
     Samples are written in messages of at most 0.1 s and chunks of at most 0.3 s, by the times
@@ -179,17 +179,6 @@ class RecordingWriter:
         finally:
             self._log.close()
 
-    def __enter__(self) -> Self:
-        return self
-
-    def __exit__(
-        self,
-        kind: type[BaseException] | None,
-        error: BaseException | None,
-        trace: TracebackType | None,
-    ) -> None:
-        self.close()
-
     def _check(self, module: str, times: Array, values: npt.NDArray[Any]) -> None:
         if module not in self._sensors:
             raise RecordingError(
@@ -265,7 +254,7 @@ class MessageLog:
             self._stream = UnbufferedStream(self._file)
             self._writer = Writer(
                 cast("IO[bytes]", self._stream),
-                MAX_CHUNK_SIZE,
+                WRITTEN_CHUNK_SIZE,
                 CompressionType.ZSTD,
                 enable_data_crcs=True,
             )

@@ -44,7 +44,7 @@ CHECKSUM_KEY = "holdfast.seal"
 """Keys of the header and of the checksum in the metadata of the file."""
 BLANK_CHECKSUM = "0" * 64
 """Text in place of the checksum while the checksum is computed; it has the same length."""
-MAGIC = b"PAR1"
+PARQUET_MAGIC = b"PAR1"
 FOOTER_END_SIZE = 8
 """A Parquet file ends with the length of its footer (4 bytes) and the magic (4 bytes)."""
 MAX_FOOTER_SIZE = 1 << 30
@@ -131,7 +131,7 @@ def is_foreign(path: Path) -> bool:
     """Return whether a file is Parquet, but not a recording."""
     _, footer = _read_footer(path)
     keys = (HEADER_KEY, CHECKSUM_KEY)
-    return footer.endswith(MAGIC) and not any(key.encode() in footer for key in keys)
+    return footer.endswith(PARQUET_MAGIC) and not any(key.encode() in footer for key in keys)
 
 
 def write_checksum(path: Path) -> None:
@@ -168,12 +168,12 @@ def _check_ends(path: Path) -> None:
     if size == 0:
         raise RecordingError(f"{path} is empty (0 bytes); a Parquet recording expected")
     with path.open("rb") as file:
-        head = file.read(len(MAGIC))
-        file.seek(max(0, size - len(MAGIC)))
+        head = file.read(len(PARQUET_MAGIC))
+        file.seek(max(0, size - len(PARQUET_MAGIC)))
         tail = file.read()
-    if head != MAGIC:
+    if head != PARQUET_MAGIC:
         raise RecordingError(f"{path} is no Parquet file, or its first bytes are damaged")
-    if tail != MAGIC or size < 3 * len(MAGIC):
+    if tail != PARQUET_MAGIC or size < 3 * len(PARQUET_MAGIC):
         raise RecordingError(
             f"{path} is cut or damaged: {size} bytes without the end of a Parquet file, "
             "from which nothing can be recovered"

@@ -7,14 +7,14 @@ from collections import deque
 from collections.abc import Mapping
 from pathlib import Path
 from threading import Event, Lock, Thread
-from types import TracebackType
-from typing import TYPE_CHECKING, Any, NamedTuple, Self
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 from holdfast.contact import Fault
 from holdfast.devices.sources import Arrival
 from holdfast.errors import OutputError
 from holdfast.io.mcap_writer import RecordingWriter
 from holdfast.live.recording_buffer import RecordingBuffer
+from holdfast.openable import Closable
 from holdfast.sensors import Sensor
 
 if TYPE_CHECKING:
@@ -80,7 +80,7 @@ class _QueuedMarker(NamedTuple):
     text: str
 
 
-class Recorder:
+class Recorder(Closable):
     """Record the arrivals of a source to MCAP; a killed process loses at most half a second.
 
     `put` and `add_marker` return at once: a thread writes to disk and flushes every 0.2 s, also
@@ -221,17 +221,6 @@ class Recorder:
         self._n_bytes = self._writer.n_bytes
         if self._failure:
             raise self._failure
-
-    def __enter__(self) -> Self:
-        return self
-
-    def __exit__(
-        self,
-        kind: type[BaseException] | None,
-        error: BaseException | None,
-        trace: TracebackType | None,
-    ) -> None:
-        self.close()
 
     def _run(self) -> None:
         """Write until the recorder closes; `close` raises the error, if there is one."""

@@ -18,7 +18,7 @@ Unit = Literal["count", "N"]
 
 MAX_RATE = 1e6
 """Maximum sample rate of a sensor [Hz]."""
-MAX_FILE_SIZE = 1 << 26
+MAX_SENSOR_FILE_SIZE = 1 << 26
 """Maximum size of the file of a sensor [bytes]."""
 
 ROTATION_TOLERANCE = 1e-5
@@ -158,7 +158,7 @@ class Sensor:
             OSError: the file cannot be read.
         """
         try:
-            text = read_input(path, MAX_FILE_SIZE)
+            text = read_input(path, MAX_SENSOR_FILE_SIZE)
             check_keys(text)
             data = msgspec.json.decode(text, type=dict[str, Any])
         except (ValueError, RecursionError) as cause:  # msgspec's too

@@ -10,7 +10,7 @@ from scipy.spatial.transform import Rotation
 
 from holdfast.files import read_input
 
-MAX_FILE_SIZE = 1 << 26
+MAX_URDF_SIZE = 1 << 26
 """Maximum size of a URDF file [bytes]."""
 
 Array = npt.NDArray[np.float64]
@@ -58,7 +58,7 @@ class _Joint:
 
 def _joints(path: Path) -> list[_Joint]:
     try:
-        text = read_input(path, MAX_FILE_SIZE).decode()
+        text = read_input(path, MAX_URDF_SIZE).decode()
     except UnicodeError as cause:
         raise ValueError(f"{path} is not a URDF file: {cause}") from cause
     if "<!DOCTYPE" in text or "<!ENTITY" in text:

@@ -25,6 +25,9 @@ SENSOR_BY_N_TAXELS = {16: "uskin-4x4", 24: "uskin-4x6", 30: "uskin-curved"}
 """Built-in sensor of a device that sends no model, as old servers do."""
 DEFAULT_PITCH = 4.7e-3
 """Distance between the taxels of an unknown model [m]; nominal."""
+NEWTONS_PER_SHEAR_COUNT, NEWTONS_PER_NORMAL_COUNT = 0.000628, 0.000729
+"""Resolution of the tangential axes and of the normal of a uSkin taxel, by the data sheet of the
+uSPa46 [N/count]."""
 DEFAULT_RATE = 100.0
 """Rate of an unknown model [Hz]; nominal."""
 

@@ -19,7 +19,7 @@ MAX_SAMPLES = 200_000
 
 Of larger data it uses every n-th sample. Neighbouring samples are nearly equal, so a linear rule
 loses little."""
-CONTACT_LOAD = 10.0
+LOAD_TO_NOISE_OF_CONTACT = 10.0
 """Threshold of contact on the load for relative features, in multiples of its noise."""
 DEFAULT_HOLD, DEFAULT_HYSTERESIS = 0.1, 0.1
 """Hold [s] and hysteresis of the models that `holdfast train` writes, see decision 12."""
@@ -164,7 +164,7 @@ class Setting:
         """
         if self.init is not None:
             return self.init.finger(finger).contact_load
-        return CONTACT_LOAD if self.relative else None
+        return LOAD_TO_NOISE_OF_CONTACT if self.relative else None
 
     @property
     def search_objective(self) -> Objective:

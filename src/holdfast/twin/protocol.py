@@ -34,7 +34,7 @@ LOST_DISTANCE = 0.04
 """Distance from its place at the lock beyond which the object is lost [m]."""
 LOST_CONTACT_TIME = 0.1
 """Time of contact with fewer than two fingertips after which the object is lost [s]."""
-CONTACT_LOAD = 0.05
+MIN_TOUCH_LOAD = 0.05
 """Minimum load of a fingertip in contact [N]."""
 SLIPPING_SPEED = 0.001
 """Minimum slip speed of a fingertip at which the object slips in a disturbance [m/s]."""
@@ -152,7 +152,7 @@ class Protocol:
             self._all_stopped_at = min(self._all_stopped_at, time)
         if self._released_at < np.inf:  # closing has timed out
             return self._new_command(1.0, Phase.CLOSING)
-        gripped = ((loads > CONTACT_LOAD) | (self.plan.grips <= 0)).all()
+        gripped = ((loads > MIN_TOUCH_LOAD) | (self.plan.grips <= 0)).all()
         if gripped and time - self._all_stopped_at >= SETTLE_TIME:
             self.locked_at = time
             self._locked_place = body[:3].copy()
@@ -179,11 +179,11 @@ class Protocol:
 
     def _release(self, time: float, loads: Array) -> Command:
         self._depths = np.minimum(self._depths + OPENING_SPEED * self._period, OPEN_GAP)
-        phase = Phase.RELEASED if (loads > CONTACT_LOAD).any() else Phase.FREE
+        phase = Phase.RELEASED if (loads > MIN_TOUCH_LOAD).any() else Phase.FREE
         return self._new_command(1.0 if self.lost_at is None else 0.0, phase)
 
     def _is_lost(self, loads: Array, body: Array) -> bool:
-        n_touching = sum(load > CONTACT_LOAD for load in loads.tolist())
+        n_touching = sum(load > MIN_TOUCH_LOAD for load in loads.tolist())
         self._untouched_for = self._untouched_for + self._period if n_touching < 2 else 0.0
         away = body[:3] - self._locked_place
         return math.sqrt(away.dot(away)) > LOST_DISTANCE or self._untouched_for >= LOST_CONTACT_TIME

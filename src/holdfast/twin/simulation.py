@@ -21,7 +21,7 @@ from holdfast.twin.loads import Load, load_state
 from holdfast.twin.objects import GraspObject, object_named
 from holdfast.twin.operator import draw_disturbances, draw_tremor
 from holdfast.twin.profile import Profile, profile
-from holdfast.twin.protocol import CONTACT_LOAD, THUMB_SHARE, Command, Plan, Protocol
+from holdfast.twin.protocol import MIN_TOUCH_LOAD, THUMB_SHARE, Command, Plan, Protocol
 from holdfast.twin.surface import curved_fingertip
 from holdfast.twin.truth_log import TruthLog
 from holdfast.twin.uskin.fingertip import Uskin, with_server_effects
@@ -232,7 +232,7 @@ class Simulation:
         """Return the truth of all samples, in which disturbances last from touch to touch."""
         truth, bodies = self._truth_log.truth(times), np.array(self._bodies)
         push = np.linalg.norm(truth.hand["outside_force"], axis=1)  # the only other contact then
-        phase = phases_from_touch(truth.hand["phase"], push, CONTACT_LOAD)
+        phase = phases_from_touch(truth.hand["phase"], push, MIN_TOUCH_LOAD)
         fingers = {
             finger: {**truth.fingers[finger], "tip_pose": _poses(bodies[:, place])}
             for place, finger in enumerate(FINGERS)

@@ -6,7 +6,7 @@ import pytest
 from holdfast.contact import Cause
 from holdfast.grip import LAWS, GripReason
 from holdfast.grip.laws import Touch, law_named
-from holdfast.grip.laws.friction_margin import MARGIN
+from holdfast.grip.laws.friction_margin import FORCE_MARGIN
 
 DT = 1 / 150
 
@@ -88,7 +88,7 @@ class TestFrictionMargin:
     def test_the_target_is_the_margin_times_the_least_force(self):
         touches = [touch(normal=2.0, tangential=1.2)]
         (wish,) = wanted(started("friction-margin", touches), touches, DT, DT)
-        assert wish.scale == pytest.approx(MARGIN * 1.2 / 0.6 / 2.0)  # 0.6 holds: it is known
+        assert wish.scale == pytest.approx(FORCE_MARGIN * 1.2 / 0.6 / 2.0)  # 0.6 holds: it is known
         assert wish.reason is GripReason.MARGIN
 
     def test_a_slip_lowers_the_friction(self):
@@ -97,7 +97,7 @@ class TestFrictionMargin:
         wanted(law, touches, DT, DT)
         touches[0].probability, touches[0].tangential = 0.1, 1.2
         (wish,) = wanted(law, touches, 2 * DT, DT)
-        assert wish.scale == pytest.approx(MARGIN * 1.2 / (0.9 * 0.6) / 2.0)
+        assert wish.scale == pytest.approx(FORCE_MARGIN * 1.2 / (0.9 * 0.6) / 2.0)
 
     def test_it_falls_by_5_percent_at_most(self):
         touches = [touch(tangential=0.01)]

@@ -20,12 +20,10 @@ from holdfast.features.kernel import GAP_LIMIT_PERIODS
 from holdfast.recordings import Recording, Tactile
 from holdfast.sensors import Sensor
 from holdfast.sensors.types import Array
+from holdfast.sensors.xela_models import NEWTONS_PER_NORMAL_COUNT
 
 HAND = "hand"
 """Key of the features of a whole-hand method."""
-
-NEWTONS_PER_COUNT = 0.000729
-"""Of a uSkin taxel along its normal, by the data sheet of the uSPa46 [N/count]."""
 
 Category = Literal["paper", "friction", "vibration", "differentiation", "learning", "holdfast"]
 
@@ -78,7 +76,7 @@ class FingerSignal:
         Counts are converted as counts of a uSkin, whatever the sensor: for most other sensors
         nothing is published.
         """
-        return 1.0 if self.sensor.unit == "N" else 1.0 / NEWTONS_PER_COUNT
+        return 1.0 if self.sensor.unit == "N" else 1.0 / NEWTONS_PER_NORMAL_COUNT
 
     @cached_property
     def stretches(self) -> tuple[slice, ...]:

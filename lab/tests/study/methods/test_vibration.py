@@ -3,9 +3,9 @@
 import numpy as np
 import pytest
 
+from holdfast.sensors.xela_models import NEWTONS_PER_NORMAL_COUNT
 from holdfast.twin.uskin.parameters import UskinParameters
 from holdfast_lab.study.methods import METHODS
-from holdfast_lab.study.methods.method import NEWTONS_PER_COUNT
 from holdfast_lab.study.methods.vibration import BANDS, band_energy, band_pass, high_pass
 
 from .patch_signals import along_normal, pressed
@@ -70,7 +70,7 @@ def test_counts_are_nominal_newtons():
 
 
 def test_a_nominal_newton_is_that_of_the_twin():
-    assert UskinParameters().counts_per_newton[2] == pytest.approx(1 / NEWTONS_PER_COUNT)
+    assert UskinParameters().counts_per_newton[2] == pytest.approx(1 / NEWTONS_PER_NORMAL_COUNT)
 
 
 def sine(frequency, amplitude, n=100, rate=150.0):

@@ -3,7 +3,7 @@
 from holdfast.devices.hands.base import HandDevice
 from holdfast.devices.hands.claim import Claim
 
-SCHEMES = {
+HAND_SCHEMES = {
     "twin": "the twin, with the source twin:...",
     "ros2": "a hand on topics of ROS 2: ros2:plexus, ros2:v4, ros2:v5, ros2:v5-envelop, "
     "ros2:gripper",
@@ -13,7 +13,7 @@ SCHEMES = {
 }
 """Schemes of the URIs of hands, with a description."""
 
-__all__ = ["SCHEMES", "Claim", "HandDevice", "open_hand"]
+__all__ = ["HAND_SCHEMES", "Claim", "HandDevice", "open_hand"]
 
 
 def open_hand(uri: str, *, standby: bool = False) -> HandDevice:

@@ -4,11 +4,10 @@ import hashlib
 import os
 from contextlib import ExitStack, suppress
 from pathlib import Path
-from types import TracebackType
-from typing import Self
 
 from holdfast.errors import HandError
 from holdfast.files import lock
+from holdfast.openable import Openable
 
 FOLDER = Path(".local", "state", "holdfast", "claims")
 """Folder of the claims, in the home of the user."""
@@ -17,7 +16,7 @@ FOLDER_OF_NO_HOME = "/tmp/holdfast-claims-{}"
 _FOLDER_MODE, _FILE_MODE, _FOREIGN_BITS = 0o700, 0o600, 0o077
 
 
-class Claim:
+class Claim(Openable):
     """Claim on a hand: a locked file in a folder that only this user can use.
 
     The claim of a process that died ends with it.
@@ -31,9 +30,14 @@ class Claim:
         self._file_name = f"{hashlib.sha256(os.fsencode(name)).hexdigest()[:32]}.lock"
         self._stack = ExitStack()
 
-    def __enter__(self) -> Self:
+    def open(self) -> None:
+        """Claim the hand.
+
+        Raises:
+            HandError: another process has claimed it, or the folder of the claims is not usable.
+        """
         if os.name != "posix":
-            return self
+            return
         path = claims_folder()
         with ExitStack() as stack:
             try:
@@ -50,14 +54,9 @@ class Claim:
                     f"cannot claim {self._name} in {path}: {cause.strerror or cause}"
                 ) from cause
             self._stack = stack.pop_all()
-        return self
 
-    def __exit__(
-        self,
-        kind: type[BaseException] | None,
-        error: BaseException | None,
-        trace: TracebackType | None,
-    ) -> None:
+    def close(self) -> None:
+        """Release the hand. It has no effect on one that is not claimed."""
         self._stack.close()
 
 

@@ -24,7 +24,6 @@ MAX_STAMP_LEAD = 0.05
 """A device's stamp that is ahead of its packet's by more than this is from before a jump of the
 clock [s]."""
 
-Samples = dict[str, npt.NDArray[Any]]
 Faults = tuple[Fault, ...]
 
 
@@ -56,7 +55,7 @@ class Device:
             self, "_parts", tuple(zip(self.modules, map(slice, [0, *ends], ends), strict=False))
         )
 
-    def split(self, readings: npt.NDArray[Any]) -> Samples:
+    def split(self, readings: npt.NDArray[Any]) -> dict[str, npt.NDArray[Any]]:
         """Return the readings of each module, given (n_taxels, 3) in the order of the packet."""
         ordered = readings if self.order is None else readings.take(self.order, axis=0)
         if len(self.modules) == 1:
@@ -249,7 +248,7 @@ class Assembler:
 class _Instant(NamedTuple):
     """Samples of one time, and the faults of each module."""
 
-    samples: Samples
+    samples: dict[str, npt.NDArray[Any]]
     faults: dict[str, Faults]
 
 

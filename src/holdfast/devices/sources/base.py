@@ -23,6 +23,9 @@ MIN_RETRY_DELAY, MAX_RETRY_DELAY = 0.5, 2.0
 """Time from the loss of a connection to the first attempt to reconnect, and the longest time
 between two attempts [s]; the delay doubles after each attempt."""
 
+ModuleSamples = Mapping[str, npt.NDArray[Any]]
+"""Samples of one instant: (n_taxels, 3) by module."""
+
 
 class Arrival(NamedTuple):
     """Samples of one instant from a source, or a notice of a fault, or both.
@@ -41,7 +44,7 @@ class Arrival(NamedTuple):
     """
 
     time: float
-    samples: Mapping[str, npt.NDArray[Any]]
+    samples: ModuleSamples
     received: float
     faults: Mapping[str, tuple[Fault, ...]] = {}
     n_lost: int = 0

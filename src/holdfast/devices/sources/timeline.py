@@ -31,7 +31,7 @@ MIN_REPEATED_JUMPS = 2
 """A clock that jumps as often as this in two intervals is unsteady."""
 MIN_EPOCH_TIME = 1e8
 """A stamp above this counts from 1970, and not from the start of a device [s]."""
-MAX_CLOCK_DIFFERENCE = 60.0
+NOTICED_CLOCK_DIFFERENCE = 60.0
 """A difference between two clocks that is larger than this is worth a notice [s]."""
 
 
@@ -218,7 +218,7 @@ def clock_notice(stamp: float, now: float) -> str | None:
         'the stamps of the device are 2 h behind the clock of this machine: old data?'
     """
     behind = now - stamp
-    if stamp < MIN_EPOCH_TIME or abs(behind) <= MAX_CLOCK_DIFFERENCE:
+    if stamp < MIN_EPOCH_TIME or abs(behind) <= NOTICED_CLOCK_DIFFERENCE:
         return None
     where = "behind" if behind > 0 else "ahead of"
     advice = "old data?" if behind > 0 else "is its clock set?"

@@ -13,7 +13,7 @@ from collections.abc import Sequence
 from holdfast.grip.command import GripReason
 from holdfast.grip.laws.base import Law, Touch, Wish
 
-MARGIN = 1.15
+FORCE_MARGIN = 1.15
 """Factor of the least normal force."""
 FIRST_FRICTION = 0.5
 """Friction coefficient before anything is known."""
@@ -23,7 +23,7 @@ FALL_SHARE = 0.95
 """Factor of the force in a step in which it falls."""
 SLIP_SHARE = 0.9
 """Factor of the ratio at which a finger slipped, for the new friction coefficient."""
-STABLE = 0.5
+STABLE_PROBABILITY = 0.5
 """Probability of stability from which a ratio counts as held."""
 
 
@@ -37,7 +37,9 @@ class FrictionMargin(Law):
 
     needs_newtons = True
 
-    def __init__(self, margin: float = MARGIN, first_friction: float = FIRST_FRICTION) -> None:
+    def __init__(
+        self, margin: float = FORCE_MARGIN, first_friction: float = FIRST_FRICTION
+    ) -> None:
         self.margin, self.first_friction = margin, first_friction
 
     def start(self, touches: Sequence[Touch], thumb: int) -> None:
@@ -52,7 +54,7 @@ class FrictionMargin(Law):
         if not (touch.known and touch.normal > LOWEST_FORCE and touch.start_normal > 0):
             return (touch.scale, GripReason.NONE)
         ratio = touch.tangential / touch.normal
-        if touch.probability >= STABLE:
+        if touch.probability >= STABLE_PROBABILITY:
             self._friction[k] = max(self._friction[k], ratio)
         elif ratio < self._friction[k]:
             self._friction[k] = max(self.first_friction, SLIP_SHARE * ratio)

@@ -11,7 +11,7 @@ from collections.abc import Sequence
 from holdfast.grip.command import GripReason
 from holdfast.grip.laws.base import Law, Touch, Wish
 
-THRESHOLD = 0.05
+SLIP_CHANGE = 0.05
 """Relative change of the tangential force in one sample that counts as a slip."""
 FLOOR = 0.1
 """eps, as a share of the normal force of the start."""
@@ -27,7 +27,7 @@ class WongZhu(Law):
         gain: factor of the force of a finger that slips.
     """
 
-    def __init__(self, threshold: float = THRESHOLD, gain: float = GAIN) -> None:
+    def __init__(self, threshold: float = SLIP_CHANGE, gain: float = GAIN) -> None:
         self.threshold, self.gain = threshold, gain
 
     def start(self, touches: Sequence[Touch], thumb: int) -> None:

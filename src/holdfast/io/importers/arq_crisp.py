@@ -23,12 +23,12 @@ from holdfast.recordings import Label, Recording, Tactile, labels_from_samples
 from holdfast.sensors import Sensor, sensor
 from holdfast.sensors.types import Array
 
-SUFFIXES = (".h5", ".hdf5")
-MAGIC = b"\x89HDF\r\n\x1a\n"
+HDF5_SUFFIXES = (".h5", ".hdf5")
+HDF5_MAGIC = b"\x89HDF\r\n\x1a\n"
 SOURCE = "ARQ-CRISP"
 DATA, TIMES, LABELS = "tactile_data_raw", "tactile_timestamps", "tactile_slips_label"
 MILLISECOND = 1e-3
-MAX_DEPTH = 16
+MAX_GROUP_DEPTH = 16
 """Maximum depth of groups inside groups; the data sets have four."""
 MAX_DEFLATE = 1032
 """Largest number of bytes that one byte of a deflated chunk can become."""
@@ -56,7 +56,7 @@ def can_read(path: Path) -> bool:
 
     A pointer of Git LFS under the name of such a file counts: `read` says how to get the data.
     """
-    return any(file.suffix in SUFFIXES or _is_hdf5(file) for file in _files(path))
+    return any(file.suffix in HDF5_SUFFIXES or _is_hdf5(file) for file in _files(path))
 
 
 def parts(path: Path) -> list[Path]:
@@ -67,7 +67,7 @@ def parts(path: Path) -> list[Path]:
     """
     files = _files(path)
     if not files:
-        raise RecordingError(f"no HDF5 file in {path}; {' or '.join(SUFFIXES)} expected")
+        raise RecordingError(f"no HDF5 file in {path}; {' or '.join(HDF5_SUFFIXES)} expected")
     return files
 
 
@@ -94,12 +94,12 @@ def _import_h5py() -> ModuleType:
 def _files(path: Path) -> list[Path]:
     if path.is_file():
         return [path]
-    return sorted((p for p in path.glob("*") if p.suffix in SUFFIXES), key=natural_order)
+    return sorted((p for p in path.glob("*") if p.suffix in HDF5_SUFFIXES), key=natural_order)
 
 
 def _is_hdf5(path: Path) -> bool:
     with path.open("rb") as file:
-        return file.read(len(MAGIC)) == MAGIC
+        return file.read(len(HDF5_MAGIC)) == HDF5_MAGIC
 
 
 def _recordings(path: Path, h5py: ModuleType) -> Iterator[Recording]:
@@ -140,9 +140,9 @@ def _names_of_recordings(file: Any, h5py: ModuleType, budget: ReadBudget) -> lis
         if address in seen:
             continue
         seen.add(address)
-        if name.count("/") >= MAX_DEPTH:
+        if name.count("/") >= MAX_GROUP_DEPTH:
             raise RecordingError(
-                f"{budget.path}: groups are nested more than {MAX_DEPTH} deep; 4 expected"
+                f"{budget.path}: groups are nested more than {MAX_GROUP_DEPTH} deep; 4 expected"
             )
         if name and DATA in group:
             names.append(name)

@@ -29,7 +29,7 @@ from holdfast.sensors.types import Array
 
 CLOCKS = ("device", "header", "bag")
 """Clocks that the times of a recording can come from, best first."""
-MAX_CLOCK_DIFFERENCE = 1.0
+ONE_CLOCK_DIFFERENCE = 1.0
 """Topics whose clocks differ by more, compared with the bag's clock, have two clocks [s]."""
 
 
@@ -204,7 +204,7 @@ class _BagImport:
         tracks = [track for track in self._tracks.values() if track.readings]
         for clock in CLOCKS[:-1]:
             offsets = [track.offset(clock) for track in tracks]
-            if np.ptp(offsets) <= MAX_CLOCK_DIFFERENCE:  # False if an offset is NaN
+            if np.ptp(offsets) <= ONE_CLOCK_DIFFERENCE:  # False if an offset is NaN
                 return clock
         return CLOCKS[-1]
 

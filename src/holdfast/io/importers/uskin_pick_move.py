@@ -23,7 +23,7 @@ from holdfast.sensors import sensor
 from holdfast.sensors.types import Array
 
 FILES = {"finger1": "xela_sensor1.csv", "finger2": "xela_sensor2.csv"}
-N_JOINTS = 7
+N_ARM_JOINTS = 7
 MAX_METADATA_SIZE = 1 << 20
 """Maximum size of the file of metadata [bytes]."""
 LOST_MARKER_VALUE = 10.0
@@ -141,9 +141,9 @@ def _robot(table: Table) -> Mapping[str, npt.NDArray[Any]]:
     places = [(row, column) for row in range(4) for column in range(4)]
     pose = table.columns([f"ee_T_{row}{column}" for row, column in places])
     return {
-        "robot_joints": table.columns([f"position_joint{k + 1}" for k in range(N_JOINTS)]),
+        "robot_joints": table.columns([f"position_joint{k + 1}" for k in range(N_ARM_JOINTS)]),
         "robot_joint_velocities": table.columns(
-            [f"velocity_joint{k + 1}" for k in range(N_JOINTS)]
+            [f"velocity_joint{k + 1}" for k in range(N_ARM_JOINTS)]
         ),
         "robot_ee_pose": pose.reshape(-1, 4, 4),
         "robot_velocity": table.columns(["v_x", "v_y"]),

@@ -10,7 +10,7 @@ from holdfast.io.importers.table import csv_files, header_line, read_table, with
 from holdfast.recordings import Recording, Tactile
 from holdfast.sensors import hand
 
-HAND = "allegro-uskin"
+WHOLE_HAND = "allegro-uskin"
 N_COLUMNS = 368 * 3
 
 
@@ -41,13 +41,13 @@ def read(path: Path) -> Iterator[Recording]:
 
 
 def _recording(path: Path) -> Recording:
-    allegro = hand(HAND)
+    allegro = hand(WHOLE_HAND)
     table, _ = read_table(path)
     n_given = len(table.names) - 1
     if n_given != allegro.n_taxels * 3:
         raise RecordingError(
             f"{path}: a time column and {n_given} others given; {allegro.n_taxels * 3} expected "
-            f"({allegro.n_taxels} taxels x 3 axes of {HAND})"
+            f"({allegro.n_taxels} taxels x 3 axes of {WHOLE_HAND})"
         )
     place = _time_column(table.names)
     times = table.values[:, place]
@@ -58,7 +58,7 @@ def _recording(path: Path) -> Recording:
             name: Tactile(allegro.modules[name].sensor, times, part, unit)  # type: ignore[arg-type]
             for name, part in allegro.split(readings.reshape(-1, allegro.n_taxels, 3)).items()
         }
-        return Recording(path.stem, modules, {"hand": HAND, "source": path.name})
+        return Recording(path.stem, modules, {"hand": WHOLE_HAND, "source": path.name})
     except RecordingError as cause:
         raise RecordingError(f"{path}: {cause}") from cause
 

@@ -17,7 +17,7 @@ import msgspec
 from holdfast.contact import LABEL_STATES, Cause, ContactState
 from holdfast.errors import RecordingError
 from holdfast.files import read_input
-from holdfast.io.label_files import MAX_FILE_SIZE
+from holdfast.io.label_files import MAX_LABEL_FILE_SIZE
 from holdfast.recordings import Label, Recording
 
 Labels = dict[str, tuple[Label, ...]]
@@ -182,7 +182,7 @@ def labels_from_label_studio(
 
 def _tasks(path: Path) -> list[_Task]:
     try:
-        document = msgspec.json.decode(read_input(path, MAX_FILE_SIZE))
+        document = msgspec.json.decode(read_input(path, MAX_LABEL_FILE_SIZE))
         tasks = document if isinstance(document, list) else [document]
         return msgspec.convert(tasks, list[_Task])
     except OSError as cause:

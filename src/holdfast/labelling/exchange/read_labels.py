@@ -5,7 +5,7 @@ from pathlib import Path
 from holdfast.errors import RecordingError
 from holdfast.files import file_stem, read_input
 from holdfast.io.header import label_of
-from holdfast.io.label_files import MAX_FILE_SIZE, SUFFIX, labels_from_csv, load_labels
+from holdfast.io.label_files import MAX_LABEL_FILE_SIZE, SUFFIX, labels_from_csv, load_labels
 from holdfast.io.recording_files import SUFFIXES, load_recording
 from holdfast.labelling.exchange.label_studio import is_label_studio, labels_from_label_studio
 from holdfast.recordings import Label, Recording
@@ -83,7 +83,7 @@ def _check_digest(file: Path, digest: str, name: str, recording: Recording) -> N
 
 def _is_label_studio(file: Path) -> bool:
     try:
-        return is_label_studio(read_input(file, MAX_FILE_SIZE))
+        return is_label_studio(read_input(file, MAX_LABEL_FILE_SIZE))
     except OSError as cause:
         raise RecordingError(f"cannot read {file}: {cause.strerror}") from cause
 

@@ -10,7 +10,7 @@ from hypothesis.extra.numpy import arrays
 from holdfast.devices.sources.xela.decoder import XelaDecoder
 from holdfast.devices.sources.xela.encoder import (
     MAX_MODULE_WAIT,
-    NEWTONS_PER_COUNT,
+    NEWTONS_PER_TAXEL_COUNT,
     REST_READING,
     SampleBatcher,
     XelaEncoder,
@@ -232,7 +232,7 @@ class TestReadings:
         np.testing.assert_array_equal(arrival.samples["a"], force)
         (counted,) = decoded(encoder, [packet])
         known = np.isfinite(force)
-        errors = counted.samples["a"] - (REST_READING + force / NEWTONS_PER_COUNT)
+        errors = counted.samples["a"] - (REST_READING + force / NEWTONS_PER_TAXEL_COUNT)
         assert np.abs(errors[known]).max() <= 0.5
         assert counted.samples["a"][2, 1] == REST_READING[1]
 

@@ -167,7 +167,7 @@ class GripperKind:
 
 Kind = JointKind | EnvelopKind | GripperKind
 
-KINDS: dict[str, dict[str, Kind]] = {
+HAND_KINDS: dict[str, dict[str, Kind]] = {
     "ros2": {
         "plexus": JointKind(
             JointOutput.LARGEST, "/allegro_hand_position_effort_controller", "efforts", FLOATS,
@@ -216,7 +216,7 @@ def ros_hand(uri: str, *, standby: bool) -> HandDevice:
         MissingExtra: DDS is not installed.
     """
     scheme, address = parse(uri)
-    kinds = KINDS[scheme]
+    kinds = HAND_KINDS[scheme]
     if (scheme, address.path) == ("ros2", "v4-envelop"):
         raise ValueError(f"{uri}: {NO_ACTION}")
     kind = None if address.host else kinds.get(address.path)

@@ -1,15 +1,25 @@
 """Connection to the topics of a hand: what ROS 1 and ROS 2 share."""
 
 from abc import abstractmethod
-from collections.abc import Mapping
-from typing import Any, Protocol
+from collections.abc import Callable, Iterator, Mapping
+from contextlib import contextmanager
+from typing import Any, NamedTuple
 
+from holdfast.errors import HandError, SourceError
 from holdfast.openable import Openable
 from holdfast.ros.hand_messages import JointStates
 
 
-class Publisher(Protocol):
-    """Function that publishes a message, given by its fields, and returns at once."""
+class Publisher(NamedTuple):
+    """Publisher of messages on a topic.
+
+    Attributes:
+        publish: publishes a message, given by its fields, and returns at once.
+        n_listeners: returns the number of subscribers.
+    """
+
+    publish: Callable[[Mapping[str, Any]], None]
+    n_listeners: Callable[[], int]
 
     def __call__(self, message: Mapping[str, Any]) -> None:
         """Publish a message.
@@ -17,20 +27,13 @@ class Publisher(Protocol):
         Raises:
             HandError: ROS refuses it.
         """
+        with hand_errors():
+            self.publish(message)
 
-    def n_listeners(self) -> int:
-        """Return the number of subscribers."""
 
-
-class StateReader(Protocol):
-    """Subscription to the joint states of a hand."""
-
-    def take(self) -> list[JointStates]:
-        """Return the states since the last call, the oldest first.
-
-        Raises:
-            HandError: the message is damaged.
-        """
+TakeStates = Callable[[], list[JointStates]]
+"""Function that returns the joint states of a hand since its last call, the oldest first. It
+raises a `HandError` if a message is damaged."""
 
 
 class Link(Openable):
@@ -60,7 +63,7 @@ class Link(Openable):
         """Return a publisher of messages of a type on a topic."""
 
     @abstractmethod
-    def joint_states(self, topic: str) -> StateReader:
+    def joint_states(self, topic: str) -> TakeStates:
         """Subscribe to the joint states of a topic."""
 
     @abstractmethod
@@ -74,3 +77,16 @@ class Link(Openable):
     @abstractmethod
     def published_topics(self) -> list[str]:
         """Return the names of all topics with a publisher."""
+
+
+@contextmanager
+def hand_errors() -> Iterator[None]:
+    """Turn an error of ROS into one of the hand.
+
+    Raises:
+        HandError: the block raised a `SourceError`.
+    """
+    try:
+        yield
+    except SourceError as cause:
+        raise HandError(str(cause)) from cause

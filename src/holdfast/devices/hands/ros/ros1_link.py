@@ -2,11 +2,12 @@
 
 from collections import deque
 from collections.abc import Mapping
+from functools import partial
 from typing import Any
 
-from holdfast.devices.hands.ros.link import Link, StateReader
+from holdfast.devices.hands.ros.link import Link, Publisher, TakeStates, hand_errors
 from holdfast.devices.ros import rospy_node
-from holdfast.errors import HandError, SourceError
+from holdfast.errors import HandError
 from holdfast.ros.hand_messages import JOINT_STATE, JointStates
 
 QUEUE_SIZE = 10
@@ -42,26 +43,24 @@ class Ros1Link(Link):
         Raises:
             HandError: rospy is not installed, or the master does not answer.
         """
-        try:
+        with hand_errors():
             self._rospy = rospy_node.start_node(self._master)
-        except SourceError as cause:
-            raise HandError(str(cause)) from cause
 
-    def publisher(self, topic: str, kind: str) -> "_Publisher":
+    def publisher(self, topic: str, kind: str) -> Publisher:
         """Return a publisher of messages of a type on a topic."""
         made = self._rospy.Publisher(
             topic, self._type(kind), queue_size=QUEUE_SIZE, tcp_nodelay=True
         )
         self._registered.append(made)
-        return _Publisher(topic, made, self._rospy)
+        return Publisher(partial(self._publish, topic, made), made.get_num_connections)
 
-    def joint_states(self, topic: str) -> StateReader:
+    def joint_states(self, topic: str) -> TakeStates:
         """Subscribe to the joint states of a topic."""
         waiting: deque[Any] = deque(maxlen=STATE_QUEUE_SIZE)
         kind = self._type(JOINT_STATE)
         made = self._rospy.Subscriber(topic, kind, waiting.append, tcp_nodelay=True)
         self._registered.append(made)
-        return _StateReader(waiting)
+        return partial(_take, waiting)
 
     def n_other_publishers(self, topic: str) -> int:
         """Return the number of publishers on a topic, other than those of this process."""
@@ -82,25 +81,8 @@ class Ros1Link(Link):
         for one in registered:
             one.unregister()
 
-    def _type(self, kind: str) -> type[Any]:
-        try:
-            return rospy_node.message_type(kind)
-        except SourceError as cause:
-            raise HandError(str(cause)) from cause
-
-    def _ask(self, function: Any, *given: str) -> Any:  # noqa: ANN401 (any answer)
-        try:
-            return function(self._master, *given)
-        except SourceError as cause:
-            raise HandError(str(cause)) from cause
-
-
-class _Publisher:
-    def __init__(self, topic: str, publisher: Any, rospy: Any) -> None:  # noqa: ANN401
-        self._topic, self._publisher, self._rospy = topic, publisher, rospy
-
-    def __call__(self, message: Mapping[str, Any]) -> None:
-        made = self._publisher.data_class()
+    def _publish(self, topic: str, publisher: Any, message: Mapping[str, Any]) -> None:  # noqa: ANN401
+        made = publisher.data_class()
         for name, value in message.items():
             if name == "header":
                 stamp = value["stamp"]
@@ -108,19 +90,19 @@ class _Publisher:
             else:
                 setattr(made, name, value)
         try:
-            self._publisher.publish(made)
+            publisher.publish(made)
         except self._rospy.ROSException as cause:
-            raise HandError(f"{self._topic}: ROS refuses a message ({cause})") from cause
+            raise HandError(f"{topic}: ROS refuses a message ({cause})") from cause
 
-    def n_listeners(self) -> int:
-        found: int = self._publisher.get_num_connections()
-        return found
+    def _type(self, kind: str) -> type[Any]:
+        with hand_errors():
+            return rospy_node.message_type(kind)
+
+    def _ask(self, function: Any, *given: str) -> Any:  # noqa: ANN401 (any answer)
+        with hand_errors():
+            return function(self._master, *given)
 
 
-class _StateReader:
-    def __init__(self, waiting: deque[Any]) -> None:
-        self._waiting = waiting
-
-    def take(self) -> list[JointStates]:
-        messages = [self._waiting.popleft() for _ in range(len(self._waiting))]
-        return [JointStates.of_message(m.name, m.position, m.effort) for m in messages]
+def _take(waiting: deque[Any]) -> list[JointStates]:
+    messages = [waiting.popleft() for _ in range(len(waiting))]
+    return [JointStates.of_message(m.name, m.position, m.effort) for m in messages]

@@ -1,11 +1,10 @@
 """Connection to the topics of a hand by ROS 2, over DDS. ROS 2 need not be installed."""
 
-from collections.abc import Mapping
-from typing import Any
+from functools import partial
 
-from holdfast.devices.hands.ros.link import Link, StateReader
+from holdfast.devices.hands.ros.link import Link, Publisher, TakeStates, hand_errors
 from holdfast.devices.ros import dds
-from holdfast.errors import HandError, SourceError
+from holdfast.errors import HandError
 from holdfast.ros.cdr import MessageDecoder, MessageEncoder
 from holdfast.ros.hand_messages import JOINT_STATE, JointStates, hand_definition
 
@@ -31,19 +30,20 @@ class Ros2Link(Link):
         Raises:
             HandError: DDS reports an error.
         """
-        try:
+        with hand_errors():
             self._joined = dds.Node(self._domain)
-        except SourceError as cause:
-            raise HandError(str(cause)) from cause
 
-    def publisher(self, topic: str, kind: str) -> "_Publisher":
+    def publisher(self, topic: str, kind: str) -> Publisher:
         """Return a publisher of messages of a type on a topic."""
         definition = hand_definition(kind)
-        return _Publisher(self._node.writer(topic, definition), MessageEncoder(definition))
+        write, encode = self._node.writer(topic, definition), MessageEncoder(definition)
+        return Publisher(lambda message: write(encode(message)), write.n_readers)
 
-    def joint_states(self, topic: str) -> StateReader:
+    def joint_states(self, topic: str) -> TakeStates:
         """Subscribe to the joint states of a topic."""
-        return _StateReader(topic, self._node.reader(topic, hand_definition(JOINT_STATE)))
+        definition = hand_definition(JOINT_STATE)
+        decode = MessageDecoder(definition, ros2=True)
+        return partial(_take, topic, self._node.reader(topic, definition), decode)
 
     def n_other_publishers(self, topic: str) -> int:
         """Return the number of publishers on a topic, other than those of this link."""
@@ -68,33 +68,14 @@ class Ros2Link(Link):
         return self._joined
 
 
-class _Publisher:
-    def __init__(self, write: dds.TopicWriter, encode: MessageEncoder) -> None:
-        self._write, self._encode = write, encode
-
-    def __call__(self, message: Mapping[str, Any]) -> None:
-        try:
-            self._write(self._encode(message))
-        except SourceError as cause:
-            raise HandError(str(cause)) from cause
-
-    def n_listeners(self) -> int:
-        return self._write.n_readers()
-
-
-class _StateReader:
-    def __init__(self, topic: str, reader: dds.TopicReader) -> None:
-        self._topic, self._reader = topic, reader
-        self._decode = MessageDecoder(hand_definition(JOINT_STATE), ros2=True)
-
-    def take(self) -> list[JointStates]:
-        waiting: list[bytes] = []
-        while found := self._reader.take(0.0):
-            waiting += found
-            if len(found) < dds.MAX_MESSAGES_PER_READ:
-                break
-        try:
-            messages = [self._decode(data) for data in waiting]
-        except ValueError as cause:
-            raise HandError(f"{self._topic} sends damaged joint states: {cause}") from cause
-        return [JointStates.of_message(m["name"], m["position"], m["effort"]) for m in messages]
+def _take(topic: str, reader: dds.TopicReader, decode: MessageDecoder) -> list[JointStates]:
+    waiting: list[bytes] = []
+    while found := reader.take(0.0):
+        waiting += found
+        if len(found) < dds.MAX_MESSAGES_PER_READ:
+            break
+    try:
+        messages = [decode(data) for data in waiting]
+    except ValueError as cause:
+        raise HandError(f"{topic} sends damaged joint states: {cause}") from cause
+    return [JointStates.of_message(m["name"], m["position"], m["effort"]) for m in messages]

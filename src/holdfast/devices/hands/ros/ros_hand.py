@@ -8,7 +8,7 @@ from functools import partial
 from typing import Any
 
 from holdfast.devices.hands.base import HandDevice
-from holdfast.devices.hands.ros.link import Link, Publisher, StateReader
+from holdfast.devices.hands.ros.link import Link, Publisher, TakeStates
 from holdfast.errors import HandError
 from holdfast.grip.command import GripCommand
 from holdfast.ros.hand_messages import JointStates
@@ -64,7 +64,7 @@ class RosHand(HandDevice):
         self._states_topic = None if standby else states
         self._shared, self._standby = shared or standby, standby
         self._publishers: dict[str, Publisher] = {}
-        self._reader: StateReader | None = None
+        self._take_states: TakeStates | None = None
         self._states: deque[tuple[float, JointStates]] = deque()
         self._refusal = ""
 
@@ -77,7 +77,7 @@ class RosHand(HandDevice):
     def silent(self) -> bool:
         """Whether there have been no joint states for 0.1 s, or for three of their periods."""
         self._poll()
-        if self._reader is None or not self._states:
+        if self._take_states is None or not self._states:
             return False
         times = [at for at, _ in self._states]
         if len(times) < 2:  # their period is not known
@@ -98,10 +98,10 @@ class RosHand(HandDevice):
             topic: self._link.publisher(topic, kind) for topic, kind in self._topics.items()
         }
         if self._states_topic is not None:
-            self._reader = self._link.joint_states(self._states_topic)
+            self._take_states = self._link.joint_states(self._states_topic)
         for topic, publish in self._publishers.items():
             self._wait(publish.n_listeners, begun_at, partial(self._not_heard, topic))
-        if self._reader is not None:
+        if self._take_states is not None:
             self._wait(self._poll, begun_at, self._no_states)
         if not self._shared:
             self._refuse_others(begun_at + DISCOVERY_TIME)
@@ -110,7 +110,7 @@ class RosHand(HandDevice):
         """Disconnect. It has no effect on a hand that is closed."""
         self.forget()
         self._publishers.clear()
-        self._reader = None
+        self._take_states = None
         self._states.clear()
         self._refusal = ""
         self._link.close()
@@ -150,7 +150,7 @@ class RosHand(HandDevice):
     def _poll(self) -> bool:
         """Read the new joint states; return whether there are enough for a grip to begin."""
         now = time.monotonic()
-        for found in () if self._reader is None else self._reader.take():
+        for found in () if self._take_states is None else self._take_states():
             try:
                 self._states.append((now, self._checked(found)))
             except ValueError as cause:
@@ -167,7 +167,7 @@ class RosHand(HandDevice):
                     f"{self.name}: nothing listens on {topic} any more; the hand keeps its last "
                     "command"
                 )
-        if self._reader is None:
+        if self._take_states is None:
             return
         silence = time.monotonic() - self._states[-1][0]
         if silence > STATE_TIMEOUT:

@@ -8,16 +8,20 @@ import numpy as np
 import numpy.typing as npt
 
 from holdfast.devices.sources.assembler import SEQUENCE_PERIOD
+from holdfast.devices.sources.base import ModuleSamples
 from holdfast.sensors import Hand, Sensor, hand
+from holdfast.sensors.xela_models import NEWTONS_PER_NORMAL_COUNT, NEWTONS_PER_SHEAR_COUNT
 
 REST_READING = np.array([32768, 32768, 36000])
 """Reading of a taxel without contact [count]."""
-NEWTONS_PER_COUNT = np.array([0.000628, 0.000628, 0.000729])
-"""Resolution of the uSPa46 by its data sheet [N/count]; converts newtons to counts."""
+NEWTONS_PER_TAXEL_COUNT = np.array(
+    [NEWTONS_PER_SHEAR_COUNT, NEWTONS_PER_SHEAR_COUNT, NEWTONS_PER_NORMAL_COUNT]
+)
+"""Resolution of the axes of a taxel frame [N/count]; converts newtons to counts."""
 OLD_VERSION, NEW_VERSION = VERSIONS = ("1.7", "1.8")
 """Server versions that can be encoded."""
 WHOLE_HAND_MODEL = "XR23AHRCPP"
-MODELS = {"uskin-curved": "uSCuAH", "uskin-4x4": "uSPa44", "uskin-4x6": "uSPa46"}
+XELA_MODELS = {"uskin-curved": "uSCuAH", "uskin-4x4": "uSPa44", "uskin-4x6": "uSPa46"}
 """XELA's model of each built-in sensor; any other sensor keeps its own name."""
 VERSION_TEXT = "1.8.0b_holdfast"
 TEMPERATURE = 303.1
@@ -26,8 +30,6 @@ REST_NOISE, REST_SPREAD, N_REST_SAMPLES = 2, 250, 64
 """Taxels without a recording: largest deviation between samples and between taxels [count]."""
 MAX_MODULE_WAIT = 1.0
 """Longest wait for the first sample of a module, by the times of the source [s]."""
-
-Samples = Mapping[str, npt.NDArray[Any]]
 
 
 class XelaEncoder:
@@ -103,7 +105,7 @@ class XelaEncoder:
 
     def packet(
         self,
-        samples: Samples,
+        samples: ModuleSamples,
         time: float,
         sent: float,
         times: Mapping[str, float] | None = None,
@@ -174,7 +176,7 @@ class SampleBatch(NamedTuple):
         times: time of each module's sample [s].
     """
 
-    samples: Samples
+    samples: ModuleSamples
     time: float
     times: Mapping[str, float]
 
@@ -206,7 +208,7 @@ class SampleBatcher:
         self._new: set[str] = set()
         self._first_time: float | None = None
 
-    def add(self, samples: Samples, time: float) -> Iterator[SampleBatch]:
+    def add(self, samples: ModuleSamples, time: float) -> Iterator[SampleBatch]:
         """Add the samples of one instant [s]; yield the batches that are complete, in order."""
         if self._first_time is None:
             self._first_time = time
@@ -241,12 +243,12 @@ class _Module:
 
     def __init__(self, name: str, sensor: Sensor) -> None:
         self.names = (name,)
-        self.model = MODELS.get(sensor.name, sensor.name)
+        self.model = XELA_MODELS.get(sensor.name, sensor.name)
         self.n_taxels = sensor.n_taxels
         self.rate = sensor.rate
         self._sensor = sensor
 
-    def readings(self, samples: Samples) -> _Readings | None:
+    def readings(self, samples: ModuleSamples) -> _Readings | None:
         """Return the readings, or None without a sample."""
         (name,) = self.names
         return _readings(name, self._sensor, samples[name]) if name in samples else None
@@ -269,7 +271,7 @@ class _WholeHand:
         self._calibrated = all(sensor.unit == "N" for sensor in sensors.values())
         self._n_packets = 0
 
-    def readings(self, samples: Samples) -> _Readings | None:
+    def readings(self, samples: ModuleSamples) -> _Readings | None:
         """Return the readings, or None without a sample."""
         found = {name: sample for name, sample in samples.items() if name in self._indices}
         read = {name: _readings(name, self._sensors[name], one) for name, one in found.items()}
@@ -289,7 +291,9 @@ def _readings(name: str, sensor: Sensor, given: npt.NDArray[Any]) -> _Readings |
     if given.shape != (sensor.n_taxels, 3):
         raise ValueError(f"{name}: {(sensor.n_taxels, 3)} readings expected, {given.shape} given")
     if sensor.unit == "N":
-        counts = np.nan_to_num(REST_READING + given / NEWTONS_PER_COUNT, nan=float(REST_READING[0]))
+        counts = np.nan_to_num(
+            REST_READING + given / NEWTONS_PER_TAXEL_COUNT, nan=float(REST_READING[0])
+        )
         return np.rint(np.clip(counts, 0, 65535)).astype(np.uint16), given.astype(np.float64)
     if given.dtype == np.uint16:
         return given.astype(np.uint16), None
