@@ -8,7 +8,7 @@ from typing import Any, NamedTuple
 import numpy as np
 import numpy.typing as npt
 
-from holdfast.contact import ContactState, Fault, HandEstimate, Reason, with_faults
+from holdfast.contact import ContactState, Fault, HandEstimate, Reason, StateChanges, with_faults
 from holdfast.detector import Detector
 from holdfast.devices.sources import Arrival
 from holdfast.errors import ModelError, StreamError
@@ -107,6 +107,7 @@ class ArrivalDetector:
         self._faults: dict[str, tuple[Fault, ...]] = {}
         self._silent_fingers: set[str] = set()
         self._last: HandEstimate | None = None
+        self._changes = StateChanges(tuple(self.fingers))
 
     @property
     def silence_timeout(self) -> float:
@@ -241,13 +242,19 @@ class ArrivalDetector:
             self._watch(self._monitor, found, arrival.time)
         self.notices += self._readings.update(found, arrival.time)
         for instant, samples in self._at_model_rate(arrival.time, found):
-            before, self._last = self._last, detector.update(samples, instant)
-            lost = _lost_fingers(before, self._last) - samples.keys() if before else ()
+            self._last = detector.update(samples, instant)
+            lost = [name for name in self._lost_fingers(self._last) if name not in samples]
             yield StreamEstimate(self._with_stream_faults(self._last), (*samples, *lost))
         if not found and self._last is not None:
             faulty = tuple(name for name in self.fingers if name in arrival.faults)
             if faulty:
                 yield StreamEstimate(self._with_stream_faults(self._last), faulty)
+
+    def _lost_fingers(self, estimate: HandEstimate) -> list[str]:
+        """Return the fingers whose state has become UNKNOWN."""
+        states = [finger.state for finger in estimate.fingers.values()]
+        changes = self._changes.update(states, estimate.time)
+        return [change.finger for change in changes if change.state is ContactState.UNKNOWN]
 
     def _watch(self, monitor: RateMonitor, samples: Samples, instant: float) -> None:
         """Report a change of the rate of fingers as a fault and a notice."""
@@ -279,13 +286,3 @@ class ArrivalDetector:
         for when in sorted(resampled):
             last = max(when, math.nextafter(last, math.inf))
             yield last, resampled[when]
-
-
-def _lost_fingers(before: HandEstimate, now: HandEstimate) -> set[str]:
-    """Return the fingers whose state has become UNKNOWN."""
-    unknown = ContactState.UNKNOWN
-    return {
-        name
-        for name, finger in now.fingers.items()
-        if finger.state is unknown and before.fingers[name].state is not unknown
-    }

@@ -8,12 +8,17 @@ from typing import NamedTuple
 import numpy as np
 import numpy.typing as npt
 
-from holdfast.contact import ContactEvent, ContactState, HandEstimate, StateChanges
+from holdfast.contact import (
+    LASTING_DURATION,
+    ContactEvent,
+    ContactState,
+    HandEstimate,
+    StateChanges,
+)
 from holdfast.detector import HAND, Detector
 from holdfast.devices.sources import Arrival, Source
 from holdfast.devices.sources.base import DeviceSource
 from holdfast.live.arrival_detector import ArrivalDetector, Samples, StreamEstimate
-from holdfast.live.lasting_changes import DEFAULT_DURATION, LastingChanges
 from holdfast.model import Model
 from holdfast.sensors import sensor
 
@@ -115,7 +120,7 @@ class StreamDetector:
         for one in self.finish().estimates:
             yield one.estimate
 
-    def changes(self, min_duration: float = DEFAULT_DURATION) -> Iterator[ContactEvent]:
+    def changes(self, min_duration: float = LASTING_DURATION) -> Iterator[ContactEvent]:
         """Yield the changes of each finger and of the hand that lasted, until the source ends.
 
         A change is yielded when the new state has lasted, with the time at which it began. For
@@ -127,7 +132,7 @@ class StreamDetector:
         Raises:
             ValueError: the duration is negative or not finite.
         """
-        lasting = LastingChanges((*self.fingers, HAND), min_duration)
+        lasting = StateChanges((*self.fingers, HAND), min_duration)
         for estimate in self:
             yield from lasting.update(_states(estimate), estimate.time)
 
