@@ -128,7 +128,7 @@ class ArrivalDetector:
         if self._detector is not None:
             return list(self._detect(self._detector, arrival))
         self._append_to_buffer(arrival)
-        buffered = [one for one in self._buffer if one.samples]
+        buffered = [earlier for earlier in self._buffer if earlier.samples]
         if not arrival.samples or arrival.time - buffered[0].time < RATE_MEASUREMENT_TIME:
             return []
         rate = measure_rate(buffered, self.fingers)
@@ -140,7 +140,7 @@ class ArrivalDetector:
 
     def finish(self) -> list[StreamEstimate]:
         """Return the estimates of a source that ended before its rate was known."""
-        buffered = [one for one in self._buffer if one.samples]
+        buffered = [arrival for arrival in self._buffer if arrival.samples]
         if self._detector is not None or not buffered:
             return []
         nominal = next(iter(self.fingers.values())).rate
@@ -229,7 +229,7 @@ class ArrivalDetector:
         self._detector = detector
         buffered = list(self._buffer)
         self._buffer.clear()
-        return [one for arrival in buffered for one in self._detect(detector, arrival)]
+        return [result for arrival in buffered for result in self._detect(detector, arrival)]
 
     def _detect(self, detector: Detector, arrival: Arrival) -> Iterator[StreamEstimate]:
         if self._faults or self._silent_fingers:
@@ -237,15 +237,15 @@ class ArrivalDetector:
                 self._faults.pop(name, None)
                 self._silent_fingers.discard(name)
         self._faults.update(arrival.faults)
-        found = {name: arrival.samples[name] for name in self.fingers if name in arrival.samples}
+        used = {name: arrival.samples[name] for name in self.fingers if name in arrival.samples}
         if self._monitor is not None:
-            self._watch(self._monitor, found, arrival.time)
-        self.notices += self._readings.update(found, arrival.time)
-        for instant, samples in self._at_model_rate(arrival.time, found):
+            self._watch(self._monitor, used, arrival.time)
+        self.notices += self._readings.update(used, arrival.time)
+        for instant, samples in self._at_model_rate(arrival.time, used):
             self._last = detector.update(samples, instant)
             lost = [name for name in self._lost_fingers(self._last) if name not in samples]
             yield StreamEstimate(self._with_stream_faults(self._last), (*samples, *lost))
-        if not found and self._last is not None:
+        if not used and self._last is not None:
             faulty = tuple(name for name in self.fingers if name in arrival.faults)
             if faulty:
                 yield StreamEstimate(self._with_stream_faults(self._last), faulty)

@@ -115,10 +115,10 @@ class StreamDetector:
     def __iter__(self) -> Iterator[HandEstimate]:
         """Yield the estimates until the source ends."""
         while not self.source.ended:
-            for one in self.read().estimates:
-                yield one.estimate
-        for one in self.finish().estimates:
-            yield one.estimate
+            for estimate, _ in self.read().estimates:
+                yield estimate
+        for estimate, _ in self.finish().estimates:
+            yield estimate
 
     def changes(self, min_duration: float = LASTING_DURATION) -> Iterator[ContactEvent]:
         """Yield the changes of each finger and of the hand that lasted, until the source ends.
@@ -211,7 +211,7 @@ class StreamDetector:
     def _update(self, arrival: Arrival | None, estimates: list[StreamEstimate]) -> StreamUpdate:
         if estimates and math.isnan(self.start):
             self.start = estimates[0].estimate.time
-        events = [event for one in estimates for event in self._events(one.estimate)]
+        events = [event for estimate, _ in estimates for event in self._events(estimate)]
         return StreamUpdate(arrival, estimates, events)
 
     def _events(self, estimate: HandEstimate) -> list[ContactEvent]:
