@@ -1,4 +1,5 @@
 import itertools
+import math
 
 import msgspec
 import numpy as np
@@ -176,17 +177,18 @@ class TestWithFaults:
 @given(
     st.lists(st.lists(st.sampled_from(list(ContactState)), min_size=2, max_size=2), max_size=20),
     st.integers(0, 20),
+    st.sampled_from([0.0, 0.1, 0.25]),
 )
-def test_changes_of_state_are_the_same_by_sample_and_in_chunks(states, cut):
+def test_changes_of_state_are_the_same_by_sample_and_in_chunks(states, cut, min_duration):
     times = 0.1 * np.arange(len(states))
     codes = np.array([[one.code for one in row] for row in states], dtype=np.int8).reshape(-1, 2)
-    by_sample = StateChanges(("a", "hand"))
+    by_sample = StateChanges(("a", "hand"), min_duration)
     expected = [
         event
         for time, row in zip(times.tolist(), states, strict=True)
         for event in by_sample.update(row, time)
     ]
-    in_chunks = StateChanges(("a", "hand"))
+    in_chunks = StateChanges(("a", "hand"), min_duration)
     found = in_chunks.update_chunk(times[:cut], codes[:cut])
     found += in_chunks.update_chunk(times[cut:], codes[cut:])
     assert found == expected
@@ -195,3 +197,49 @@ def test_changes_of_state_are_the_same_by_sample_and_in_chunks(states, cut):
         assert event.previous is previous[event.finger]
         assert event.state is not event.previous
         previous[event.finger] = event.state
+
+
+STATES_OF_A_FINGER = st.lists(st.sampled_from(list(ContactState)), min_size=1, max_size=60)
+PERIOD = 0.01
+
+
+def reported(states, min_duration):
+    changes = StateChanges(["thumb"], min_duration)
+    return [e for k, state in enumerate(states) for e in changes.update([state], k * PERIOD)]
+
+
+@given(STATES_OF_A_FINGER)
+def test_a_duration_below_the_tolerance_reports_every_change(states):
+    every = StateChanges(["thumb"])
+    expected = [e for k, state in enumerate(states) for e in every.update([state], k * PERIOD)]
+    assert reported(states, 1e-9) == expected
+
+
+@given(STATES_OF_A_FINGER, st.integers(1, 10))
+def test_a_reported_state_lasted_and_the_chain_has_no_gap(states, n):
+    previous = ContactState.UNKNOWN
+    for change in reported(states, n * PERIOD):
+        begin = round(change.time / PERIOD)
+        assert set(states[begin : begin + n + 1]) == {change.state}
+        assert len(states) > begin + n
+        assert change.previous is previous is not change.state
+        previous = change.state
+
+
+def test_a_flicker_is_no_change():
+    s, u = ContactState.STABLE, ContactState.UNSTABLE
+    (change,) = reported([s] * 20 + [u] * 3 + [s] * 20 + [u] * 3, 0.05)
+    assert (change.state, change.time) == (s, 0.0)
+
+
+def test_each_name_has_its_own_states():
+    s, u = ContactState.STABLE, ContactState.UNSTABLE
+    changes = StateChanges(["thumb", "hand"], 1e-9)
+    assert [e.finger for e in changes.update([s, u], 0.0)] == ["thumb", "hand"]
+    assert [e.finger for e in changes.update([s, s], 0.1)] == ["hand"]
+
+
+@pytest.mark.parametrize("duration", [-0.1, math.nan, math.inf])
+def test_a_wrong_duration(duration):
+    with pytest.raises(ValueError, match=f"at least 0 s expected, {duration} given"):
+        StateChanges(["thumb"], duration)

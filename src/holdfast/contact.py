@@ -171,16 +171,29 @@ class ContactEvent(NamedTuple):
     time: float
 
 
+TIME_TOLERANCE = 1e-6
+"""Times that differ by less are equal [s]; covers rounding errors of float64."""
+LASTING_DURATION = 0.1
+"""Time that a state must last to be shown as a change to a person [s]."""
+
+
 class StateChanges:
     """Memory of several contact states that finds their changes, by sample or in chunks.
 
-    All states begin as UNKNOWN.
+    With a minimum duration, it finds only changes that lasted, without flicker: a change is
+    found when the new state has lasted so long, with the time at which it began. A state that
+    returns earlier is no change. This is for people: for control it comes too late. All states
+    begin as UNKNOWN.
 
     Args:
         names: of the fingers, in the order of the states.
+        min_duration: minimum time that a new state must last [s].
 
     Attributes:
-        states: the latest state of each name.
+        states: the latest state of each name; the latest that lasted, with a minimum duration.
+
+    Raises:
+        ValueError: the duration is negative or not finite.
 
     Example:
         >>> changes = StateChanges(["thumb"])
@@ -191,33 +204,50 @@ class StateChanges:
         ('thumb', 'STABLE', 'UNKNOWN', 0.1)
         >>> len(changes.update_chunk(np.array([0.2, 0.3]), np.array([[STABLE], [UNSTABLE]])))
         1
+
+        Only a change that lasted:
+
+        >>> lasting = StateChanges(["thumb"], min_duration=0.2)
+        >>> [len(lasting.update([ContactState.STABLE], time)) for time in (0.0, 0.1, 0.2)]
+        [0, 0, 1]
     """
 
-    def __init__(self, names: Sequence[str]) -> None:
+    def __init__(self, names: Sequence[str], min_duration: float = 0.0) -> None:
+        if not (math.isfinite(min_duration) and min_duration >= 0):
+            raise ValueError(f"a duration of at least 0 s expected, {min_duration} given")
         self._names = tuple(names)
+        self._min_duration = min_duration
         self.states = [ContactState.UNKNOWN] * len(self._names)
+        self._newest = [(ContactState.UNKNOWN, -math.inf)] * len(self._names)
 
     def update(self, states: Sequence[ContactState], time: float) -> list[ContactEvent]:
         """Return the changes from the previous states to `states` at one sample.
 
         Args:
             states: one for each name.
-            time: of the sample [s].
+            time: of the sample, not before that of the previous one [s].
         """
+        if self._min_duration:
+            return self._update_lasting(states, time)
         return [
-            self.change(index, new, time)
+            self._change(index, new, time)
             for index, (new, old) in enumerate(zip(states, self.states, strict=True))
             if new is not old
         ]
 
-    def change(self, index: int, state: ContactState, time: float) -> ContactEvent:
-        """Set one state to another, and return the change.
+    def _update_lasting(self, states: Sequence[ContactState], time: float) -> list[ContactEvent]:
+        """Return the changes that have lasted long enough at one sample."""
+        shortest, events = self._min_duration - TIME_TOLERANCE, []
+        for index, (state, lasting) in enumerate(zip(states, self.states, strict=True)):
+            if state is not self._newest[index][0]:
+                self._newest[index] = state, time
+            begin = self._newest[index][1]
+            if state is not lasting and time - begin >= shortest:
+                events.append(self._change(index, state, begin))
+        return events
 
-        Args:
-            index: of the state among the names.
-            state: that begins.
-            time: of the sample [s].
-        """
+    def _change(self, index: int, state: ContactState, time: float) -> ContactEvent:
+        """Set one state to another, and return the change."""
         event = ContactEvent(self._names[index], state, self.states[index], time)
         self.states[index] = state
         return event
@@ -231,6 +261,12 @@ class StateChanges:
             times: (n,) of the samples [s].
             codes: (n, n_names) codes of the states.
         """
+        if self._min_duration:
+            return [
+                event
+                for time, row in zip(times.tolist(), codes.tolist(), strict=True)
+                for event in self._update_lasting([_STATES[code] for code in row], time)
+            ]
         if not len(times):
             return []
         codes = np.vstack([[state.code for state in self.states], codes])

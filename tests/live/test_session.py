@@ -1,4 +1,6 @@
+import gc
 import itertools
+import sys
 import threading
 import time
 
@@ -7,7 +9,7 @@ import pytest
 from holdfast.contact import ContactState, Fault
 from holdfast.detector import detect
 from holdfast.errors import ModelError, SourceError, StreamError
-from holdfast.live.session import Session
+from holdfast.live.session import SWITCH_INTERVAL, InterpreterSettings, Session
 from holdfast.live.stream_detector import StreamDetector
 
 from . import build
@@ -200,3 +202,47 @@ def test_a_removed_listener_is_not_called(start):
     source.steps.extend(build.arrivals_of(recording)[100:200])
     wait_for(lambda: session.n_packets == 200)
     assert len(updates) == n_updates
+
+
+@pytest.fixture
+def own_settings():
+    """Set a switch interval of the program itself, and restore the real one."""
+    before = sys.getswitchinterval()
+    sys.setswitchinterval(0.002)
+    yield 0.002
+    sys.setswitchinterval(before)
+
+
+def test_the_settings_of_python_are_those_of_before_when_the_last_session_stops(own_settings):
+    n_frozen = gc.get_freeze_count()
+    first, second = (session_of(build.Script.of(build.grasp(), [], patient=True)) for _ in "ab")
+    first.start()
+    second.start()
+    assert sys.getswitchinterval() == pytest.approx(SWITCH_INTERVAL)
+    assert gc.get_freeze_count() > n_frozen
+    first.stop()
+    first.stop()  # counts once
+    assert sys.getswitchinterval() == pytest.approx(SWITCH_INTERVAL)
+    assert gc.get_freeze_count() > n_frozen
+    second.stop()
+    assert sys.getswitchinterval() == pytest.approx(own_settings)
+    assert gc.get_freeze_count() <= n_frozen
+
+
+def test_a_session_that_was_not_started_changes_nothing(own_settings):
+    session = session_of(build.Script.of(build.grasp(), []))
+    session.stop()
+    assert sys.getswitchinterval() == pytest.approx(own_settings)
+
+
+def test_settings_of_the_program_meanwhile_stay(own_settings):
+    settings = InterpreterSettings()
+    gc.freeze()
+    try:
+        settings.begin()
+        sys.setswitchinterval(0.003)
+        settings.end()
+        assert sys.getswitchinterval() == pytest.approx(0.003)
+        assert gc.get_freeze_count() > 0
+    finally:
+        gc.unfreeze()

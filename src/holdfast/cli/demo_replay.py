@@ -116,12 +116,12 @@ def print_changes(
     model: "Model", source: "Source", true_events: TrueEvents, write: Callable[[str], None]
 ) -> "Iterator[HandEstimate]":
     """Yield the estimates of a source, and write a line for each change that lasted."""
+    from holdfast.contact import StateChanges
     from holdfast.detector import HAND
-    from holdfast.live.lasting_changes import LastingChanges
     from holdfast.live.stream_detector import StreamDetector
 
     write(f"     {'time':>8}   {'hand':10}  what happens, by the truth of the simulation")
-    changes = LastingChanges([HAND], MIN_DURATION)
+    changes = StateChanges([HAND], MIN_DURATION)
     for estimate in StreamDetector(model, source):
         for change in changes.update([estimate.state], estimate.time):
             words = true_events.words(change)

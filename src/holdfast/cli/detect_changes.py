@@ -4,10 +4,16 @@ from collections.abc import Iterator, Sequence
 from math import isnan, nan
 
 from holdfast.cli.detect_output import EstimateChunk
-from holdfast.contact import ContactEstimate, ContactEvent, ContactState, Reason
+from holdfast.contact import (
+    LASTING_DURATION,
+    ContactEstimate,
+    ContactEvent,
+    ContactState,
+    Reason,
+    StateChanges,
+)
 from holdfast.detector import HAND
 from holdfast.live.fault_notices import FAULT_TEXTS
-from holdfast.live.lasting_changes import LastingChanges
 from holdfast.recordings import shown_origin
 
 HEADER = f"{'time':>9}    {'finger':8}  {'from':10}    {'to':10}  why"
@@ -35,7 +41,7 @@ class ChangeLines:
     def __init__(self, *, from_first: bool) -> None:
         self.origin = nan
         self._from_first = from_first
-        self._changes: dict[str, LastingChanges] = {}
+        self._changes: dict[str, StateChanges] = {}
         self._why: dict[str, tuple[ContactState, str]] = {}
 
     def add(self, chunk: EstimateChunk) -> list[str]:
@@ -60,7 +66,7 @@ class ChangeLines:
                 yield event, self._why[finger][1]
 
     def _lasting(self, name: str, state: ContactState, time: float) -> list[ContactEvent]:
-        changes = self._changes.setdefault(name, LastingChanges([name]))
+        changes = self._changes.setdefault(name, StateChanges([name], LASTING_DURATION))
         return changes.update([state], time)
 
     def _line(self, event: ContactEvent, reason: str) -> str:

@@ -8,7 +8,7 @@ from typing import Any, NamedTuple
 import numpy as np
 import numpy.typing as npt
 
-from holdfast.contact import ContactState, Fault, HandEstimate, Reason, with_faults
+from holdfast.contact import ContactState, Fault, HandEstimate, Reason, StateChanges, with_faults
 from holdfast.detector import Detector
 from holdfast.detector.detector import check_thresholds
 from holdfast.devices.sources import Arrival
@@ -107,6 +107,7 @@ class ArrivalDetector:
         self._faults: dict[str, tuple[Fault, ...]] = {}
         self._silent_fingers: set[str] = set()
         self._last: HandEstimate | None = None
+        self._changes = StateChanges(tuple(self.fingers))
 
     @property
     def silence_timeout(self) -> float:
@@ -127,7 +128,7 @@ class ArrivalDetector:
         if self._detector is not None:
             return list(self._detect(self._detector, arrival))
         self._append_to_buffer(arrival)
-        buffered = [one for one in self._buffer if one.samples]
+        buffered = [earlier for earlier in self._buffer if earlier.samples]
         if not arrival.samples or arrival.time - buffered[0].time < RATE_MEASUREMENT_TIME:
             return []
         rate = measure_rate(buffered, self.fingers)
@@ -139,7 +140,7 @@ class ArrivalDetector:
 
     def finish(self) -> list[StreamEstimate]:
         """Return the estimates of a source that ended before its rate was known."""
-        buffered = [one for one in self._buffer if one.samples]
+        buffered = [arrival for arrival in self._buffer if arrival.samples]
         if self._detector is not None or not buffered:
             return []
         nominal = next(iter(self.fingers.values())).rate
@@ -228,7 +229,7 @@ class ArrivalDetector:
         self._detector = detector
         buffered = list(self._buffer)
         self._buffer.clear()
-        return [one for arrival in buffered for one in self._detect(detector, arrival)]
+        return [result for arrival in buffered for result in self._detect(detector, arrival)]
 
     def _detect(self, detector: Detector, arrival: Arrival) -> Iterator[StreamEstimate]:
         if self._faults or self._silent_fingers:
@@ -236,18 +237,24 @@ class ArrivalDetector:
                 self._faults.pop(name, None)
                 self._silent_fingers.discard(name)
         self._faults.update(arrival.faults)
-        found = {name: arrival.samples[name] for name in self.fingers if name in arrival.samples}
+        used = {name: arrival.samples[name] for name in self.fingers if name in arrival.samples}
         if self._monitor is not None:
-            self._watch(self._monitor, found, arrival.time)
-        self.notices += self._readings.update(found, arrival.time)
-        for instant, samples in self._at_model_rate(arrival.time, found):
-            before, self._last = self._last, detector.update(samples, instant)
-            lost = _lost_fingers(before, self._last) - samples.keys() if before else ()
+            self._watch(self._monitor, used, arrival.time)
+        self.notices += self._readings.update(used, arrival.time)
+        for instant, samples in self._at_model_rate(arrival.time, used):
+            self._last = detector.update(samples, instant)
+            lost = [name for name in self._lost_fingers(self._last) if name not in samples]
             yield StreamEstimate(self._with_stream_faults(self._last), (*samples, *lost))
-        if not found and self._last is not None:
+        if not used and self._last is not None:
             faulty = tuple(name for name in self.fingers if name in arrival.faults)
             if faulty:
                 yield StreamEstimate(self._with_stream_faults(self._last), faulty)
+
+    def _lost_fingers(self, estimate: HandEstimate) -> list[str]:
+        """Return the fingers whose state has become UNKNOWN."""
+        states = [finger.state for finger in estimate.fingers.values()]
+        changes = self._changes.update(states, estimate.time)
+        return [change.finger for change in changes if change.state is ContactState.UNKNOWN]
 
     def _watch(self, monitor: RateMonitor, samples: Samples, instant: float) -> None:
         """Report a change of the rate of fingers as a fault and a notice."""
@@ -279,13 +286,3 @@ class ArrivalDetector:
         for when in sorted(resampled):
             last = max(when, math.nextafter(last, math.inf))
             yield last, resampled[when]
-
-
-def _lost_fingers(before: HandEstimate, now: HandEstimate) -> set[str]:
-    """Return the fingers whose state has become UNKNOWN."""
-    unknown = ContactState.UNKNOWN
-    return {
-        name
-        for name, finger in now.fingers.items()
-        if finger.state is unknown and before.fingers[name].state is not unknown
-    }

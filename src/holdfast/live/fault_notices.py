@@ -116,9 +116,11 @@ class FaultWatch:
     def update(self, estimate: HandEstimate) -> list[Problem]:
         """Return the problems that have begun to last."""
         now = estimate.time
-        found = [(fault, name) for name, one in estimate.fingers.items() for fault in one.faults]
-        self._since = {key: min(now, self._since.get(key, now)) for key in found}
-        lasting = [key for key in found if now - self._since[key] >= MIN_FAULT_DURATION]
+        faults = [
+            (fault, name) for name, finger in estimate.fingers.items() for fault in finger.faults
+        ]
+        self._since = {key: min(now, self._since.get(key, now)) for key in faults}
+        lasting = [key for key in faults if now - self._since[key] >= MIN_FAULT_DURATION]
         new = [key for key in lasting if not self._is_recent(key, now)]
         self._reported.update(dict.fromkeys(lasting, now))
         self.current = _problems(lasting)
@@ -129,10 +131,10 @@ class FaultWatch:
         return key in self._reported and now - self._reported[key] < REPEAT_INTERVAL
 
 
-def _problems(found: list[tuple[Fault, str]]) -> list[Problem]:
+def _problems(faults: list[tuple[Fault, str]]) -> list[Problem]:
     """Return one problem for each fault, in the order of `Fault`."""
     return [
-        Problem(fault, tuple(name for one, name in found if one is fault))
+        Problem(fault, tuple(name for other, name in faults if other is fault))
         for fault in Fault
-        if any(one is fault for one, _ in found)
+        if any(other is fault for other, _ in faults)
     ]

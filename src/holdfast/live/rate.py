@@ -7,9 +7,9 @@ import numpy as np
 from holdfast.devices.sources import Arrival
 from holdfast.recordings import GAP_PERIODS
 
-RATE_TOLERANCE = 0.2
+MAX_RATE_CHANGE = 0.2
 """A rate that differs by more than this from that at the start has changed."""
-CHECK_INTERVAL = 0.3
+RATE_CHECK_INTERVAL = 0.3
 """Time over which the rate is measured again [s]; longer for rates below 33 Hz."""
 MIN_STEPS = 10
 """Number of steps that this time has at the rate of the start."""
@@ -42,7 +42,7 @@ class RateMonitor:
 
     def __init__(self, rate: float, fingers: Iterable[str]) -> None:
         self._rate = rate
-        self._interval = max(CHECK_INTERVAL, MIN_STEPS / rate)
+        self._interval = max(RATE_CHECK_INTERVAL, MIN_STEPS / rate)
         self._longest_step = PAUSE_PERIODS / rate
         self._windows = {name: _Window() for name in fingers}
         self.changed: set[str] = set()
@@ -57,7 +57,7 @@ class RateMonitor:
         return notices
 
     def _compare(self, name: str, rate: float) -> list[str]:
-        if abs(rate / self._rate - 1) <= RATE_TOLERANCE:
+        if abs(rate / self._rate - 1) <= MAX_RATE_CHANGE:
             self.changed.discard(name)
             return []
         before = bool(self.changed)

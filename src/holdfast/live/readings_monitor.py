@@ -14,9 +14,9 @@ import numpy.typing as npt
 from holdfast.recordings import Recording
 from holdfast.sensors import Sensor
 
-CHECK_INTERVAL = 0.05
+SAMPLE_CHECK_INTERVAL = 0.05
 """Time between the samples that are looked at [s]; more would cost time and show nothing else."""
-REST_SECONDS = 0.5
+START_NOISE_SECONDS = 0.5
 """Time from the start in which the noise is measured [s]."""
 STILL_SECONDS = 10.0
 """Time without any change from the start on after which a finger is reported [s]."""
@@ -72,7 +72,7 @@ class ReadingsMonitor:
         notices: list[str] = []
         for name in self._fingers.keys() & part.modules.keys():
             module = part.modules[name]
-            stride = max(1, int(CHECK_INTERVAL * module.rate)) if module.n_samples > 1 else 1
+            stride = max(1, int(SAMPLE_CHECK_INTERVAL * module.rate)) if module.n_samples > 1 else 1
             for k in range(0, module.n_samples, stride):
                 notices += self.update({name: module.readings[k]}, float(module.times[k]))
         return notices
@@ -96,7 +96,7 @@ class _FingerReadings:
 
     def update(self, readings: npt.NDArray[Any], time: float) -> list[str]:
         """Look at the readings (n_taxels, 3) of a time [s], and return new notices."""
-        if time - self._last < CHECK_INTERVAL or not np.isfinite(readings).all():
+        if time - self._last < SAMPLE_CHECK_INTERVAL or not np.isfinite(readings).all():
             return []
         self._last = time
         if self._first is None or time < self._start:
@@ -115,7 +115,7 @@ class _FingerReadings:
         """Return what has not changed for too long."""
         if not self._n_moved:
             return [STILL] if time - self._start >= STILL_SECONDS else []
-        if self._moved.all() or self._n_moved * CHECK_INTERVAL < MOVED_SECONDS:
+        if self._moved.all() or self._n_moved * SAMPLE_CHECK_INTERVAL < MOVED_SECONDS:
             return []
         axes = [axis for axis, moved in zip("xyz", self._moved, strict=True) if not moved]
         return [MISSING_AXES.format(" and ".join(axes))]
@@ -123,7 +123,7 @@ class _FingerReadings:
     def _pull(self, normal: float, time: float) -> list[str]:
         """Return a notice if the normal force is far below its first value."""
         self._largest = max(self._largest, abs(normal))
-        if time - self._start <= REST_SECONDS:
+        if time - self._start <= START_NOISE_SECONDS:
             self._rest.append(normal)
             self._noise = float(np.std(self._rest))
         limit = max(PULL_OF_NOISE * self._noise, PULL_OF_LARGEST * self._largest)

@@ -16,12 +16,12 @@ from holdfast.recordings import GAP_PERIODS
 from holdfast.sensors import Sensor
 from holdfast.sensors.types import Array
 
-NOTICE_REPEAT_INTERVAL = 1.0
+MARKER_REPEAT_INTERVAL = 1.0
 """Minimum time between two markers of the same notice [s]."""
 RECENT_FAULT_AGE = 1.0
 """Maximum age of a fault that counts as recent [s]."""
 MAX_NOTICES = 100
-"""Maximum number of different notices that become markers within `NOTICE_REPEAT_INTERVAL`."""
+"""Maximum number of different notices that become markers within `MARKER_REPEAT_INTERVAL`."""
 MAX_PENDING_MARKERS = 2048
 """Maximum number of markers that wait for the first sample, or to be written."""
 MAX_MARKER_LENGTH = 200
@@ -154,12 +154,12 @@ class RecordingBuffer:
             text: of the marker.
             received: when the notice arrived, by `time.monotonic` [s].
         """
-        if received - self._notice_times.get(text, -math.inf) < NOTICE_REPEAT_INTERVAL:
+        if received - self._notice_times.get(text, -math.inf) < MARKER_REPEAT_INTERVAL:
             return
         self._notice_times = {
             one: when
             for one, when in self._notice_times.items()
-            if received - when < NOTICE_REPEAT_INTERVAL
+            if received - when < MARKER_REPEAT_INTERVAL
         }
         if len(self._notice_times) < MAX_NOTICES:
             self._notice_times[text] = received

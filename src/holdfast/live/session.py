@@ -4,7 +4,8 @@ import gc
 import sys
 import time
 from collections.abc import Callable
-from threading import Event, Thread
+from math import isclose
+from threading import Event, Lock, Thread
 from types import TracebackType
 from typing import NamedTuple, Self
 
@@ -20,8 +21,51 @@ MAX_LATENCIES = 8192
 SWITCH_INTERVAL = 5e-4
 """Python's thread switch interval while a session runs [s]; a tenth of the default, so that
 other busy threads delay the detector less."""
+MAX_FROZEN_BY_PYTHON = 1000
+"""Number of objects up to which Python itself froze them, at its start: 375 in Python 3.12. A
+program that calls `gc.freeze` freezes many thousands."""
 REQUEST_TIMEOUT = 2.0
 """Maximum time that a request waits for the detector's thread [s]."""
+
+
+class InterpreterSettings:
+    """Settings of Python that delay a detector less. They last while any session runs.
+
+    Sessions share the settings: the first one that begins changes them, the last one that ends
+    sets them back. A setting that the program has changed meanwhile stays as it is. Objects that
+    the program itself had frozen are not thawed: nothing is frozen then.
+    """
+
+    def __init__(self) -> None:
+        self._lock = Lock()
+        self._n_users = 0
+        self._before = 0.0
+        self._freezes = False
+
+    def begin(self) -> None:
+        """Change the settings, for one more session."""
+        with self._lock:
+            if not self._n_users:
+                self._before = sys.getswitchinterval()
+                self._freezes = gc.get_freeze_count() <= MAX_FROZEN_BY_PYTHON
+                sys.setswitchinterval(SWITCH_INTERVAL)
+            self._n_users += 1
+            if self._freezes:
+                gc.freeze()  # collections do not scan the objects that exist now
+
+    def end(self) -> None:
+        """Set the settings back after the last session."""
+        with self._lock:
+            self._n_users -= 1
+            if self._n_users:
+                return
+            if isclose(sys.getswitchinterval(), SWITCH_INTERVAL):
+                sys.setswitchinterval(self._before)
+            if self._freezes:
+                gc.unfreeze()
+
+
+_SETTINGS = InterpreterSettings()
 
 
 class Latency(NamedTuple):
@@ -66,6 +110,7 @@ class Session:
         self._n_samples = dict.fromkeys(self.source.sensors, 0)
         self._listeners: list[Listener] = []
         self._requests = RequestQueue()
+        self._started = False
         self._stopping = Event()
         self._thread = Thread(target=self._run, name="holdfast-detector", daemon=True)
         self._latencies = np.full(MAX_LATENCIES, np.nan)
@@ -77,19 +122,22 @@ class Session:
 
     def remove_listener(self, listener: Listener) -> None:
         """Stop calling `listener`."""
-        self._listeners = [one for one in self._listeners if one != listener]
+        self._listeners = [other for other in self._listeners if other != listener]
 
     def start(self) -> None:
         """Start to read the source."""
-        sys.setswitchinterval(SWITCH_INTERVAL)
-        gc.freeze()  # collections do not scan the objects that exist now
         self._thread.start()
+        _SETTINGS.begin()
+        self._started = True
 
     def stop(self) -> None:
         """Stop the thread and close the source; a second call does nothing."""
         self._stopping.set()
         if self._thread.is_alive():
             self._thread.join()
+        if self._started:
+            self._started = False
+            _SETTINGS.end()
         self.source.close()
 
     def __enter__(self) -> Self:

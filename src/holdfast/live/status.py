@@ -66,7 +66,7 @@ class StatusPublisher:
     def live_document(self, recorder: Recorder | None) -> schema.LiveDocument:
         """Return everything since the last call as one document."""
         updates = [self._updates.popleft() for _ in range(len(self._updates))]
-        estimates = [one for _, update in updates for one in update.estimates]
+        estimates = [estimate for _, update in updates for estimate in update.estimates]
         self._watch_faults(estimates)
         own = [self._own_notices.popleft() for _ in range(len(self._own_notices))]
         if estimates:
@@ -96,8 +96,8 @@ class StatusPublisher:
         )
 
     def _watch_faults(self, estimates: list[StreamEstimate]) -> None:
-        for one in estimates:
-            for problem in self._faults.update(one.estimate):
+        for estimate, _ in estimates:
+            for problem in self._faults.update(estimate):
                 self.add_notice(problem.text)
 
     def _update_taxels(self, updates: list[StreamUpdate]) -> None:
@@ -206,7 +206,7 @@ def _finger_info(model: Model, name: str, sensor: Sensor) -> schema.FingerInfo:
 
 def _hand_series(estimates: list[StreamEstimate], fingers: list[str]) -> schema.HandSeries:
     return schema.HandSeries(
-        times=[one.estimate.time for one in estimates],
+        times=[estimate.time for estimate, _ in estimates],
         fingers={name: _finger_series(estimates, name) for name in fingers},
     )
 

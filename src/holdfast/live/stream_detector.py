@@ -8,12 +8,17 @@ from typing import NamedTuple
 import numpy as np
 import numpy.typing as npt
 
-from holdfast.contact import ContactEvent, ContactState, HandEstimate, StateChanges
+from holdfast.contact import (
+    LASTING_DURATION,
+    ContactEvent,
+    ContactState,
+    HandEstimate,
+    StateChanges,
+)
 from holdfast.detector import HAND, Detector
 from holdfast.devices.sources import Arrival, Source
 from holdfast.devices.sources.base import DeviceSource
 from holdfast.live.arrival_detector import ArrivalDetector, Samples, StreamEstimate
-from holdfast.live.lasting_changes import DEFAULT_DURATION, LastingChanges
 from holdfast.model import Model
 from holdfast.sensors import sensor
 
@@ -110,12 +115,12 @@ class StreamDetector:
     def __iter__(self) -> Iterator[HandEstimate]:
         """Yield the estimates until the source ends."""
         while not self.source.ended:
-            for one in self.read().estimates:
-                yield one.estimate
-        for one in self.finish().estimates:
-            yield one.estimate
+            for estimate, _ in self.read().estimates:
+                yield estimate
+        for estimate, _ in self.finish().estimates:
+            yield estimate
 
-    def changes(self, min_duration: float = DEFAULT_DURATION) -> Iterator[ContactEvent]:
+    def changes(self, min_duration: float = LASTING_DURATION) -> Iterator[ContactEvent]:
         """Yield the changes of each finger and of the hand that lasted, until the source ends.
 
         A change is yielded when the new state has lasted, with the time at which it began. For
@@ -127,7 +132,7 @@ class StreamDetector:
         Raises:
             ValueError: the duration is negative or not finite.
         """
-        lasting = LastingChanges((*self.fingers, HAND), min_duration)
+        lasting = StateChanges((*self.fingers, HAND), min_duration)
         for estimate in self:
             yield from lasting.update(_states(estimate), estimate.time)
 
@@ -206,7 +211,7 @@ class StreamDetector:
     def _update(self, arrival: Arrival | None, estimates: list[StreamEstimate]) -> StreamUpdate:
         if estimates and math.isnan(self.start):
             self.start = estimates[0].estimate.time
-        events = [event for one in estimates for event in self._events(one.estimate)]
+        events = [event for estimate, _ in estimates for event in self._events(estimate)]
         return StreamUpdate(arrival, estimates, events)
 
     def _events(self, estimate: HandEstimate) -> list[ContactEvent]:

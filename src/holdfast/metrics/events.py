@@ -14,7 +14,7 @@ import msgspec
 import numpy as np
 import numpy.typing as npt
 
-from holdfast.contact import NO_CONTACT, STABLE, UNSTABLE, ContactState
+from holdfast.contact import NO_CONTACT, STABLE, TIME_TOLERANCE, UNSTABLE, ContactState
 from holdfast.metrics.decisions import Codes, FingerDecisions, check_lengths, check_times
 from holdfast.metrics.masks import runs
 from holdfast.metrics.statistics import finite_or_none, percent, quantile
@@ -37,9 +37,6 @@ LATE_TOLERANCE = 0.25
 
 POST_DURATIONS = (0.05, 0.1, 0.2)
 """Values of `post` [s]: an event is missed at `post` without an alarm until onset + post."""
-
-TIME_TOLERANCE = 1e-6
-"""Times that differ by less are equal [s]; covers rounding errors of float64."""
 
 Onsets = Literal["truth", "labels", "mixed"]
 """Where the onsets of events come from: the truth, the labels, or one in each recording."""

@@ -177,7 +177,7 @@ class TestInOneProcess:
             started.beat(COMMAND)
 
     def test_a_watchdog_that_is_stopped_is_a_fault_and_ends(self, started, clock, monkeypatch):
-        monkeypatch.setattr(watchdog, "END_TIMEOUT", 0.1, raising=False)
+        monkeypatch.setattr(watchdog, "WATCHDOG_END_TIMEOUT", 0.1, raising=False)
         started.beat(COMMAND)
         os.kill(started._process.pid, signal.SIGSTOP)
         os.waitid(os.P_PID, started._process.pid, os.WSTOPPED | os.WNOWAIT)
@@ -189,7 +189,7 @@ class TestInOneProcess:
         started.abandon()
 
     def test_a_full_pipe_blocks_no_heartbeat(self, started, clock, monkeypatch):
-        monkeypatch.setattr(watchdog, "END_TIMEOUT", 0.1, raising=False)
+        monkeypatch.setattr(watchdog, "WATCHDOG_END_TIMEOUT", 0.1, raising=False)
         os.kill(started._process.pid, signal.SIGSTOP)
         with pytest.raises(HandError, match="does not read its heartbeats any more"):
             for _ in range(100_000):  # no time passes

@@ -482,7 +482,7 @@ def test_the_token_is_needed_and_accepted_in_both_forms():
 
 
 def test_too_many_websockets_are_refused(monkeypatch):
-    monkeypatch.setattr("holdfast.live.web.service.MAX_CLIENTS", 2)
+    monkeypatch.setattr("holdfast.live.web.service.MAX_WEBSOCKETS", 2)
 
     async def work():
         async with served(patient(10)) as (client, _):

@@ -6,10 +6,9 @@ from typing import NamedTuple
 import numpy as np
 from msgspec.structs import replace
 
-from holdfast.contact import STABLE, UNKNOWN, ContactState
+from holdfast.contact import STABLE, TIME_TOLERANCE, UNKNOWN, ContactState
 from holdfast.metrics import bootstrap_interval, match_alarms
 from holdfast.metrics.decisions import Codes
-from holdfast.metrics.events import TIME_TOLERANCE
 from holdfast.metrics.intervals import auc_of
 from holdfast.metrics.masks import Mask
 from holdfast.metrics.statistics import mann_whitney_u

@@ -9,10 +9,9 @@ from typing import Literal
 
 import numpy as np
 
-from holdfast.contact import STABLE, UNKNOWN, UNSTABLE, enough_contacts
+from holdfast.contact import STABLE, TIME_TOLERANCE, UNKNOWN, UNSTABLE, enough_contacts
 from holdfast.errors import ModelError, TrainingError
 from holdfast.metrics import FingerDecisions, hand_decisions
-from holdfast.metrics.events import TIME_TOLERANCE
 from holdfast.model import Model
 from holdfast.recordings import Recording, Tactile
 from holdfast.sensors.types import Array

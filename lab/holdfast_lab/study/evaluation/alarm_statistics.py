@@ -6,9 +6,9 @@ from collections.abc import Sequence
 import msgspec
 import numpy as np
 
-from holdfast.contact import NO_CONTACT, STABLE, UNKNOWN, UNSTABLE
+from holdfast.contact import NO_CONTACT, STABLE, TIME_TOLERANCE, UNKNOWN, UNSTABLE
 from holdfast.metrics import FingerDecisions, match_alarms
-from holdfast.metrics.events import EARLY_TOLERANCE, LATE_TOLERANCE, TIME_TOLERANCE, alarm_places
+from holdfast.metrics.events import EARLY_TOLERANCE, LATE_TOLERANCE, alarm_places
 from holdfast.metrics.masks import Mask, runs
 from holdfast.sensors.types import Array
 from holdfast_lab.study.evaluation.slips import Slip, sample_durations

@@ -6,9 +6,8 @@ import msgspec
 import numpy as np
 import numpy.typing as npt
 
-from holdfast.contact import HELD_PHASES, STABLE, UNKNOWN, Phase
+from holdfast.contact import HELD_PHASES, STABLE, TIME_TOLERANCE, UNKNOWN, Phase
 from holdfast.metrics import Decisions, FingerDecisions, calibration_sums
-from holdfast.metrics.events import TIME_TOLERANCE
 from holdfast.metrics.masks import Mask, runs
 from holdfast.recordings import Truth
 from holdfast.sensors.types import Array

@@ -5,8 +5,8 @@ from typing import NamedTuple
 import msgspec
 import numpy as np
 
-from holdfast.contact import CONTACT_FORCE, HELD_PHASES, SLIP_SPEED
-from holdfast.metrics.events import MIN_GAP_DURATION, MIN_STABLE_DURATION, TIME_TOLERANCE
+from holdfast.contact import CONTACT_FORCE, HELD_PHASES, SLIP_SPEED, TIME_TOLERANCE
+from holdfast.metrics.events import MIN_GAP_DURATION, MIN_STABLE_DURATION
 from holdfast.metrics.masks import Mask, join_runs, runs
 from holdfast.metrics.truth_labels import LabelRule, glitches
 from holdfast.recordings import Truth

@@ -10,10 +10,10 @@ from typing import NamedTuple, Self
 
 import numpy as np
 
-from holdfast.contact import STABLE
+from holdfast.contact import STABLE, TIME_TOLERANCE
 from holdfast.metrics import match_alarms
 from holdfast.metrics.decisions import Codes
-from holdfast.metrics.events import EARLY_TOLERANCE, LATE_TOLERANCE, TIME_TOLERANCE
+from holdfast.metrics.events import EARLY_TOLERANCE, LATE_TOLERANCE
 from holdfast.metrics.masks import Mask
 from holdfast.sensors.types import Array
 from holdfast_lab.study.evaluation.scores import HandScores

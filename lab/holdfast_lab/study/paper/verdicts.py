@@ -7,10 +7,19 @@ from typing import Any
 import msgspec
 import numpy as np
 
-from holdfast.contact import HELD_PHASES, MERGE_GAP, NO_CONTACT, STABLE, UNKNOWN, UNSTABLE, Phase
+from holdfast.contact import (
+    HELD_PHASES,
+    MERGE_GAP,
+    NO_CONTACT,
+    STABLE,
+    TIME_TOLERANCE,
+    UNKNOWN,
+    UNSTABLE,
+    Phase,
+)
 from holdfast.metrics import Decisions, FingerDecisions
 from holdfast.metrics.decisions import Codes
-from holdfast.metrics.events import MIN_STABLE_DURATION, TIME_TOLERANCE
+from holdfast.metrics.events import MIN_STABLE_DURATION
 from holdfast.metrics.masks import join_runs, runs
 from holdfast.recordings import Truth
 from holdfast.sensors.types import Array

@@ -105,13 +105,13 @@ class LoopRunner:
         """Step the loop of a paced source once, with the newest estimate."""
         now = time.monotonic()
         behind = self._stepped_at is not None and now - self._stepped_at > MAX_PAUSE
-        estimates = [one.estimate for update, _ in arrived for one in update.estimates]
+        estimates = _estimates(arrived)
         for estimate in estimates[:-1]:
             self.loop.follow(estimate, estimate.time)
         if estimates:
             newest = estimates[-1]
             if self._estimate is None or newest.time != self._estimate.time:
-                self._received = max(one.received for one in arrived if one.update.estimates)
+                self._received = max(received for update, received in arrived if update.estimates)
             self._estimate = newest
         if self._estimate is None:
             self._step_without_samples()
@@ -128,7 +128,7 @@ class LoopRunner:
 
     def _step_each(self, arrived: Sequence[_Arrived]) -> None:
         """Step the loop of a source that is not paced, with each estimate."""
-        estimates = [one.estimate for update, _ in arrived for one in update.estimates]
+        estimates = _estimates(arrived)
         for estimate in estimates:
             self._estimate = estimate
             self._on_command(self.loop.step(estimate, estimate.time))
@@ -146,6 +146,11 @@ class LoopRunner:
         result = self._requests.append(work, cancellable=False)
         self._wake.set()
         return result
+
+
+def _estimates(arrived: Sequence[_Arrived]) -> list[HandEstimate]:
+    """Return all estimates of updates, oldest first."""
+    return [estimate for update, _ in arrived for estimate, _ in update.estimates]
 
 
 def _arrived(update: StreamUpdate) -> _Arrived:

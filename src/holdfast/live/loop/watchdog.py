@@ -35,7 +35,7 @@ UNREAD_TIMEOUT = 0.5
 """Time without reading its heartbeats after which the watchdog counts as hanging [s]."""
 WRITE_TIMEOUT = 0.02
 """Longest wait for a pipe that is full [s]."""
-END_TIMEOUT = 5.0
+WATCHDOG_END_TIMEOUT = 5.0
 """Time in which the process must end after its pipe was closed [s]; then it is killed."""
 N_SAFE_COMMANDS, SAFE_COMMAND_PERIOD = 5, 0.02
 """Number of times that the safe command is sent, in case one is lost, and the time between [s]."""
@@ -202,7 +202,7 @@ class Watchdog:
         self._close(process.stdin)
         self._close(process.stdout)
         try:
-            process.wait(END_TIMEOUT)
+            process.wait(WATCHDOG_END_TIMEOUT)
         except subprocess.TimeoutExpired:  # it hangs
             process.kill()
             process.wait()

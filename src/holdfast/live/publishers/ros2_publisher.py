@@ -110,7 +110,7 @@ class Ros2Publisher(RosPublisher):
         self._writers[topic](message)
 
     def _publish_diagnostics(self, stamp: float, statuses: Iterable[DiagnosticStatus]) -> None:
-        found = [
+        messages = [
             {
                 "level": status.level,
                 "name": f"holdfast: {status.name}",
@@ -120,7 +120,7 @@ class Ros2Publisher(RosPublisher):
             }
             for status in statuses
         ]
-        self._writers["/diagnostics"]({"header": _header(stamp, ""), "status": found})
+        self._writers["/diagnostics"]({"header": _header(stamp, ""), "status": messages})
 
 
 def _writer(node: dds.Node, topic: str, kind: str) -> Callable[[Mapping[str, Any]], None]:

@@ -139,8 +139,8 @@ class RosPublisher(Openable):
 
     def put(self, update: "StreamUpdate") -> None:
         """Publish the estimates of an update; a listener of a session."""
-        for one in update.estimates:
-            self.publish(one.estimate, one.updated_fingers)
+        for estimate, updated_fingers in update.estimates:
+            self.publish(estimate, updated_fingers)
 
     def publish(self, estimate: HandEstimate, fingers: Iterable[str] | None = None) -> None:
         """Append an estimate to the queue.
@@ -237,7 +237,7 @@ class RosPublisher(Openable):
         statuses = diagnostics_of(self._newest, now)
         if grip is not None:
             statuses.append(diagnostic_of_grip(grip))
-        levels = tuple(hash((one.level, one.message)) for one in statuses)
+        levels = tuple(hash((status.level, status.message)) for status in statuses)
         if levels == self._levels and time.monotonic() < self._diagnostics_due:
             return
         self._levels = levels

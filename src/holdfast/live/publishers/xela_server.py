@@ -31,7 +31,7 @@ from holdfast.web.connections import (
 from holdfast.web.origin import is_local, refusal
 
 HOST, PORT = "127.0.0.1", 5000
-READ_TIMEOUT = 0.2
+STOP_CHECK_INTERVAL = 0.2
 """Maximum time to wait for the source before the stop flag is checked [s]."""
 MAX_BACKLOG = 32 * 2**20
 """Maximum unsent data of a client [bytes]; a client with more is disconnected."""
@@ -160,7 +160,7 @@ class XelaServer:
             if self._restarts:
                 self._encode_one()
             while not self._stopping.is_set() and not self._source.ended:
-                arrival = self._source.read(READ_TIMEOUT) if self._may_read() else None
+                arrival = self._source.read(STOP_CHECK_INTERVAL) if self._may_read() else None
                 if arrival is not None and arrival.samples:
                     self._queue_packets(self._batcher.add(arrival.samples, arrival.time))
             self._queue_packets(self._batcher.flush())
@@ -173,7 +173,7 @@ class XelaServer:
 
     def _encode_one(self) -> None:
         """Encode the first samples, so that readings of another kind fail before a client comes."""
-        arrival = self._source.read(READ_TIMEOUT)
+        arrival = self._source.read(STOP_CHECK_INTERVAL)
         if arrival is not None and arrival.samples:
             for batch in self._batcher.add(arrival.samples, arrival.time):
                 self._packet(batch)
@@ -181,12 +181,12 @@ class XelaServer:
     def _may_read(self) -> bool:
         """Return whether to read the source now, after a wait for clients if necessary."""
         if not self._restarts:
-            return self._client_seen.wait(READ_TIMEOUT)
+            return self._client_seen.wait(STOP_CHECK_INTERVAL)
         if self._joined.is_set():
             self._joined.clear()
             self._restart_source()
         elif not self.n_clients:
-            self._joined.wait(READ_TIMEOUT)
+            self._joined.wait(STOP_CHECK_INTERVAL)
             return False
         return True
 

@@ -1,4 +1,7 @@
-"""Documents of the web service, schema `holdfast.live/1`."""
+"""Documents of the web service, schema `holdfast.live/1`.
+
+New fields may be added under this name; existing ones do not change.
+"""
 
 from typing import Literal
 
@@ -7,9 +10,6 @@ from msgspec import Struct
 from holdfast.contact import ContactState, Fault
 from holdfast.live.documents import FingerDocument, Number, Vector
 from holdfast.live.loop.documents import GripDocument
-
-SCHEMA = "holdfast.live/1"
-"""Name of the schema. New fields may be added under this name; existing ones do not change."""
 
 
 class FingerInfo(Struct, frozen=True, kw_only=True):

@@ -32,9 +32,9 @@ MAX_QUEUED_DOCUMENTS = {"live": 32, "estimates": 1024}
 dropped first."""
 HEARTBEAT_INTERVAL = 6.0
 """Time between two pings; a client that does not answer within half of it is disconnected [s]."""
-MAX_CLIENTS = 64
+MAX_WEBSOCKETS = 64
 """Maximum number of WebSockets at a time."""
-MAX_REQUEST_BYTES = 1 << 16
+MAX_BODY_BYTES = 1 << 16
 """Largest body of a request: a name or the text of a marker [bytes]."""
 
 PAGE_FOLDER = Path(str(resources.files("holdfast.live.web") / "page"))
@@ -114,7 +114,7 @@ class LiveService:
         self._started = time.time()
         self._clients: dict[str, set[WebSocketClient]] = {"live": set(), "estimates": set()}
         self._newest_document = b"{}"
-        self._bodies = BodyReader(MAX_REQUEST_BYTES, MAX_CLIENTS * MAX_REQUEST_BYTES)
+        self._bodies = BodyReader(MAX_BODY_BYTES, MAX_WEBSOCKETS * MAX_BODY_BYTES)
         self.app = web.Application(middlewares=[guard.middleware])
         self.app.add_routes(self._routes())
         self.app.cleanup_ctx.append(self._publish)
@@ -200,8 +200,8 @@ class LiveService:
         return await self._serve_socket(request, "estimates")
 
     async def _serve_socket(self, request: web.Request, kind: str) -> web.WebSocketResponse:
-        if sum(map(len, self._clients.values())) >= MAX_CLIENTS:
-            text = f"{MAX_CLIENTS} WebSockets are open; close one of them"
+        if sum(map(len, self._clients.values())) >= MAX_WEBSOCKETS:
+            text = f"{MAX_WEBSOCKETS} WebSockets are open; close one of them"
             raise json_error(web.HTTPServiceUnavailable, text)
         socket = web.WebSocketResponse(
             heartbeat=HEARTBEAT_INTERVAL, compress=False, max_msg_size=1024
