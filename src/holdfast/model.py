@@ -1,7 +1,7 @@
 """Models: features, classifiers and decision rule of a hand, as plain validated data."""
 
 import math
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from hashlib import sha256
 from importlib import resources
 from pathlib import Path
@@ -11,12 +11,13 @@ import msgspec
 import numpy as np
 import numpy.typing as npt
 
-from holdfast.classifiers import LinearClassifier
+from holdfast.classifiers import LinearClassifier, ModelClassifier, OnnxClassifier
 from holdfast.classifiers.cause import CauseClassifier
+from holdfast.classifiers.onnx_classifier import MAX_ONNX_SIZE
 from holdfast.errors import ModelError, OutputError
 from holdfast.features import DEFAULT_WINDOW, FeatureSpec, Tare
 from holdfast.features.stream import StreamPlan, extract
-from holdfast.files import check_keys, read_input, write_whole
+from holdfast.files import check_keys, read_input, whole_file, write_whole
 from holdfast.recordings import Recording
 from holdfast.sensors import Sensor
 from holdfast.sensors.types import MAX_RATE, ROTATION_TOLERANCE
@@ -61,7 +62,7 @@ class FingerModel(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_on
     """
 
     features: tuple[FeatureSpec, ...]
-    classifier: LinearClassifier
+    classifier: ModelClassifier
     sensor: str | None = None
     contact_threshold: float | None = None
     contact_noise: float | None = None
@@ -239,7 +240,8 @@ class Model(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=Tru
 
         Raises:
             ModelError: the file or name does not exist; the file is not JSON; it has an unknown
-                field, another shape, a number that is not finite, or another schema.
+                field, another shape, a number that is not finite, or another schema; an ONNX
+                file that it names is missing, too large or another.
         """
         if str(path).startswith("builtin:"):
             return cls(**msgspec.structs.asdict(built_in(str(path))))
@@ -250,25 +252,39 @@ class Model(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=Tru
         try:
             check_keys(data)
             _check_sensors(data)
-            return msgspec.json.decode(data, type=cls, dec_hook=_decode)
+            model = msgspec.json.decode(data, type=cls, dec_hook=_decode)
+            return model._with_contents(Path(path).parent)
         except (ModelError, TypeError, ValueError, ArithmeticError, RecursionError) as cause:
             raise ModelError(f"{path} is not a model of {SCHEMA}: {cause}") from cause
 
     def save(self, path: str | Path, *, force: bool = False) -> None:
-        """Write the model as JSON, whole or not at all.
+        """Write the model as JSON, and its ONNX files beside it: all of them or none.
 
         Raises:
             OutputError: the file exists and `force` is not given, or it cannot be written.
         """
         if str(path).startswith("builtin:"):
             raise OutputError(f"{path} is the name of a built-in model; a file expected")
-        data = msgspec.json.encode(self, enc_hook=_encode)
-        write_whole(path, msgspec.json.format(data, indent=1) + b"\n", force=force)
+        written: list[Path] = []
+        try:
+            with whole_file(path, force=force) as part:
+                part.write_bytes(msgspec.json.format(self._encoded(), indent=1) + b"\n")
+                for classifier in self._onnx_classifiers():
+                    file = Path(path).with_name(classifier.file)
+                    is_new = not file.exists()
+                    if is_new or file.read_bytes() != classifier.content:
+                        write_whole(file, classifier.content, force=force)
+                    if is_new:
+                        written.append(file)
+        except BaseException:
+            for file in written:
+                file.unlink(missing_ok=True)
+            raise
 
     @property
     def digest(self) -> str:
         """Digest of the content, for results that depend on the model."""
-        return sha256(msgspec.json.encode(self, enc_hook=_encode)).hexdigest()
+        return sha256(self._encoded()).hexdigest()
 
     def finger(self, name: str) -> FingerModel:
         """Return the model of a finger.
@@ -353,6 +369,38 @@ class Model(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=Tru
             name: self.finger(name).classifier.probability(found[name].features) for name in present
         }
 
+    def _onnx_classifiers(self) -> list[OnnxClassifier]:
+        classifiers = (finger.classifier for finger in self.fingers.values())
+        return [each for each in classifiers if isinstance(each, OnnxClassifier)]
+
+    def _encoded(self) -> bytes:
+        """Return the JSON, without the contents of ONNX files; their digests are in it."""
+        return msgspec.json.encode(self._map_contents(lambda _: b""), enc_hook=_encode)
+
+    def _with_contents(self, folder: Path) -> Self:
+        """Return the model with the contents of its ONNX files, which are in a folder.
+
+        Raises:
+            ModelError: the model file holds a content, or a file is missing, or not that file.
+        """
+        if any(classifier.content for classifier in self._onnx_classifiers()):
+            raise ModelError("a model file names its ONNX file; it does not hold the content")
+        return self._map_contents(lambda classifier: _read_onnx(folder / classifier.file))
+
+    def _map_contents(self, content_of: Callable[[OnnxClassifier], bytes]) -> Self:
+        if not self._onnx_classifiers():
+            return self
+        replace = msgspec.structs.replace
+        fingers = {
+            name: replace(
+                finger, classifier=replace(finger.classifier, content=content_of(finger.classifier))
+            )
+            if isinstance(finger.classifier, OnnxClassifier)
+            else finger
+            for name, finger in self.fingers.items()
+        }
+        return replace(self, fingers=fingers)
+
     def _any_fingers(self, modules: Mapping[str, Sensor]) -> dict[str, Sensor]:
         wanted = self.fingers[ANY_FINGER].sensor
         tips = {name: sensor for name, sensor in modules.items() if "/" not in name} or modules
@@ -387,6 +435,16 @@ class Model(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=Tru
                 f"{name}: the taxels of {sensor.name} have other rotations than those of the "
                 "training"
             )
+
+
+def _read_onnx(path: Path) -> bytes:
+    try:
+        content = read_input(path, MAX_ONNX_SIZE)
+    except OSError as cause:
+        raise ModelError(f"cannot read {path.name} beside it: {cause.strerror}") from cause
+    if not content:
+        raise ModelError(f"{path.name} beside it is empty")
+    return content
 
 
 def _other_sensor(text: str) -> ModelError:

@@ -8,8 +8,8 @@ import pytest
 from scipy.optimize import approx_fprime
 from sklearn.linear_model import LogisticRegression
 
-from holdfast.classifiers import Adapted, LinearClassifier
-from holdfast.classifiers.adapted import CALIBRATION, NONE, WEIGHTS, log_odds
+from holdfast.classifiers import Adapted, LinearClassifier, OnnxClassifier
+from holdfast.classifiers.adapted import CALIBRATION, NONE, WEIGHTS, linear_prior, log_odds
 from holdfast.errors import TrainingError
 
 from .test_recipes import samples
@@ -207,3 +207,12 @@ def test_the_search_covers_the_reference():
             return low
 
     assert Adapted(PRIOR).suggest(Trial()) == {"change": "weights", "C": 1e-6}
+
+
+def test_a_classifier_that_is_not_linear_is_refused():
+    assert linear_prior(PRIOR) is PRIOR
+    with pytest.raises(TrainingError) as raised:
+        linear_prior(OnnxClassifier.of(b"any", 3, 0.5))
+    assert str(raised.value) == (
+        "a model with linear classifiers expected to adapt, an ONNX file given"
+    )

@@ -3,24 +3,28 @@
 from holdfast.classifiers.adapted import Adapted
 from holdfast.classifiers.fitting import (
     Classifier,
-    LinearRecipe,
+    ModelClassifier,
+    ModelRecipe,
     Parameters,
     Recipe,
     Samples,
 )
 from holdfast.classifiers.linear import LinearClassifier
 from holdfast.classifiers.logreg import LogisticRegression
+from holdfast.classifiers.onnx_classifier import OnnxClassifier
 from holdfast.classifiers.svm import LinearSVM
 from holdfast.classifiers.threshold import Threshold
 
-RECIPES: dict[str, LinearRecipe] = {"logreg": LogisticRegression(), "svm": LinearSVM()}
+RECIPES: dict[str, ModelRecipe] = {"logreg": LogisticRegression(), "svm": LinearSVM()}
 
 __all__ = [
     "RECIPES",
     "Adapted",
     "Classifier",
     "LinearClassifier",
-    "LinearRecipe",
+    "ModelClassifier",
+    "ModelRecipe",
+    "OnnxClassifier",
     "Parameters",
     "Recipe",
     "Samples",
@@ -29,7 +33,7 @@ __all__ = [
 ]
 
 
-def recipe(name: str) -> LinearRecipe:
+def recipe(name: str) -> ModelRecipe:
     """Return the recipe with a name.
 
     Raises:

@@ -6,9 +6,16 @@ from typing import TYPE_CHECKING
 import numpy as np
 from msgspec.structs import replace
 
-from holdfast.classifiers.fitting import MIN_SLOPE, Parameters, Samples, check_classes
+from holdfast.classifiers.fitting import (
+    MIN_SLOPE,
+    ModelClassifier,
+    Parameters,
+    Samples,
+    check_classes,
+)
 from holdfast.classifiers.linear import LinearClassifier
 from holdfast.classifiers.newton import Solution, fit_logistic
+from holdfast.errors import TrainingError
 
 if TYPE_CHECKING:
     from optuna import Trial
@@ -98,6 +105,17 @@ def _reweighted(prior: LinearClassifier, samples: Samples, c: float) -> LinearCl
     return replace(
         prior, intercept=intercept, coefficients=tuple(weights.tolist()), slope=1.0, offset=0.0
     )
+
+
+def linear_prior(classifier: ModelClassifier) -> LinearClassifier:
+    """Return the classifier, which must be linear to be adapted.
+
+    Raises:
+        TrainingError: it is an ONNX file.
+    """
+    if not isinstance(classifier, LinearClassifier):
+        raise TrainingError("a model with linear classifiers expected to adapt, an ONNX file given")
+    return classifier
 
 
 def log_odds(prior: LinearClassifier) -> Solution:

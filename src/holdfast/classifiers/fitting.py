@@ -8,6 +8,7 @@ import numpy as np
 import numpy.typing as npt
 
 from holdfast.classifiers.linear import LinearClassifier
+from holdfast.classifiers.onnx_classifier import OnnxClassifier
 from holdfast.compiled import compiled
 from holdfast.errors import TrainingError
 
@@ -15,6 +16,8 @@ if TYPE_CHECKING:
     from optuna import Trial
 
 Parameters = Mapping[str, Any]
+ModelClassifier = LinearClassifier | OnnxClassifier
+"""Classifiers that a model file can store."""
 
 MIN_SLOPE = 1e-6
 """Minimum slope of a sigmoid: its probability rises, but is nearly the base rate."""
@@ -83,10 +86,10 @@ class Recipe(Protocol):
         ...
 
 
-class LinearRecipe(Recipe, Protocol):
+class ModelRecipe(Recipe, Protocol):
     """Way of fitting a classifier that a model file can store."""
 
-    def fit(self, samples: Samples, parameters: Parameters, seed: int) -> LinearClassifier:
+    def fit(self, samples: Samples, parameters: Parameters, seed: int) -> ModelClassifier:
         """Fit a classifier with a calibrated probability to the samples."""
         ...
 

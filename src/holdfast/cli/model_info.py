@@ -55,11 +55,12 @@ def model_document(model: "Model") -> dict[str, Any]:
 def _finger(model: "Model", part: "FingerModel") -> dict[str, Any]:
     sensor = None if part.sensor is None else model.sensors[part.sensor]
     n = part.classifier.n_features
+    kind = part.classifier.__struct_config__.tag
     return {
         "sensor": part.sensor,
         "unit": None if sensor is None else sensor.unit,
         "features": [str(spec) for spec in part.features],
-        "classifier": f"linear, {n} feature{'s' * (n > 1)}",
+        "classifier": f"{kind}, {n} feature{'s' * (n > 1)}",
         "threshold": part.classifier.threshold,
         "contact_threshold": part.contact_threshold,
         "contact_noise": part.contact_noise,

@@ -9,7 +9,7 @@ import numpy.typing as npt
 
 from holdfast import contact
 from holdfast.classifiers.cause import CAUSES, add_scores
-from holdfast.classifiers.linear import linear_probability
+from holdfast.classifiers.linear import LinearClassifier, linear_probability
 from holdfast.compiled import compiled_step, inlined
 from holdfast.detector.contact_rule import (
     CONTACT_LOAD,
@@ -123,7 +123,8 @@ def rule_of(model: Model, plan: StreamPlan) -> DecisionRule:
     width = max(part.classifier.n_features for part in parts) + 1
     weights = np.zeros((len(parts), width))
     for row, part in zip(weights, parts, strict=True):
-        row[: part.classifier.n_features + 1] = part.classifier.weights()
+        if isinstance(part.classifier, LinearClassifier):
+            row[: part.classifier.n_features + 1] = part.classifier.weights()
     limits = [
         (
             part.classifier.threshold,
@@ -136,7 +137,7 @@ def rule_of(model: Model, plan: StreamPlan) -> DecisionRule:
     any_finger = ANY_FINGER in model.fingers
     return DecisionRule(
         weights=weights,
-        n_weights=np.array([part.classifier.n_features + 1 for part in parts]),
+        n_weights=np.array([_n_weights(part) for part in parts]),
         causes=_cause_weights(parts, width),
         limits=np.array(limits, dtype=np.float64),  # None becomes NaN
         hysteresis=float(model.debounce.hysteresis),
@@ -144,6 +145,12 @@ def rule_of(model: Model, plan: StreamPlan) -> DecisionRule:
         hold=float(model.debounce.hold),
         n_model_fingers=len(plan.fingers) if any_finger else len(model.fingers),
     )
+
+
+def _n_weights(part: FingerModel) -> int:
+    """Return the number of weights; of a classifier that is not linear, the offset alone."""
+    is_linear = isinstance(part.classifier, LinearClassifier)
+    return part.classifier.n_features + 1 if is_linear else 1
 
 
 def _cause_weights(parts: Sequence[FingerModel], width: int) -> Array:

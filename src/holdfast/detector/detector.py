@@ -15,6 +15,7 @@ import numpy as np
 import numpy.typing as npt
 from numpy import ndarray
 
+from holdfast.classifiers import LinearClassifier
 from holdfast.contact import (
     ContactEstimate,
     ContactEvent,
@@ -39,8 +40,9 @@ from holdfast.detector.fast_step import (
     StepArrays,
     compiled_fast_step,
 )
+from holdfast.detector.probabilities import ProbabilityFeeder
 from holdfast.errors import ModelError, StreamError
-from holdfast.features.arrays import TAXELS, Array
+from holdfast.features.arrays import TAXELS, Array, Flags
 from holdfast.features.stream import FeatureStream, StreamPlan
 from holdfast.model import Model
 from holdfast.recordings import Recording
@@ -122,6 +124,7 @@ class Detector:
 
     def _start(self, model: Model, stream: FeatureStream) -> None:
         self._rule = rule_of(model, stream.plan)
+        self._parts = [model.finger(name) for name in stream.plan.fingers]
         n_fingers = len(stream.plan.fingers)
         self._names = (*stream.plan.fingers, HAND)
         self._readings = np.zeros((len(stream.layout.rotations), 3))
@@ -141,6 +144,11 @@ class Detector:
     def _use(self, stream: FeatureStream) -> None:
         """Set a new feature stream, and an empty decision memory."""
         self._stream = stream
+        self._feeder = None
+        self._n_together = len(self._slots)
+        if not all(isinstance(part.classifier, LinearClassifier) for part in self._parts):
+            self._feeder = ProbabilityFeeder(self._parts, stream, self._rule)
+            self._n_together = -1  # `update` takes the plain way
         self._decision = new_decision_memory(*self._rule.causes.shape[:2])
         arrays = StepArrays(
             stream.layout, stream.memory, stream.output, self._rule, self._decision,
@@ -212,7 +220,7 @@ class Detector:
         if not self._last_time < time < inf:
             self._refuse_time(time)
         code = UNREADABLE
-        if len(samples) == len(self._slots):
+        if len(samples) == self._n_together:
             try:
                 arrays = self._take(samples)
                 code = self._step(self._table, time, id(arrays))
@@ -220,6 +228,8 @@ class Detector:
                 pass  # another finger, which is refused below
         if code == UNREADABLE:
             self._store(samples)
+            if self._feeder is not None:
+                self._feeder.update(self._readings, self._present, time)
             code = self._step(self._table, time, 0)
         self._last_time = time
         return self._estimate(time, code)
@@ -250,16 +260,27 @@ class Detector:
         stream, chunks = self._stream, []
         for times, present, readings in stream.samples_of(recording):
             rows = TraceRows.empty(len(times), present.shape[1])
-            run(
-                stream.layout, stream.memory, stream.output, self._rule, self._decision,
-                readings, present, times, rows,
-            )  # fmt: skip
+            self._run_chunk(readings, present, times, rows)
             codes = np.column_stack([rows.state, rows.hand])
             self._events += self._changes.update_chunk(times, codes)
             self._last_time = float(times[-1])
             chunks.append((times, present, rows))
         self._states = tuple(self._changes.states)
         return detection_of(recording.name, stream.plan.fingers, chunks)
+
+    def _run_chunk(self, readings: Array, present: Flags, times: Array, rows: TraceRows) -> None:
+        """Fill the rows of a chunk; sample by sample, if a classifier is not compiled."""
+        stream = self._stream
+        step = len(times) if self._feeder is None else 1
+        for k in range(0, len(times), step):
+            part = slice(k, k + step)
+            if self._feeder is not None:
+                self._feeder.update(readings[k], present[k], float(times[k]))
+            run(
+                stream.layout, stream.memory, stream.output, self._rule, self._decision,
+                readings[part], present[part], times[part],
+                TraceRows._make(array[part] for array in rows),
+            )  # fmt: skip
 
     def _refuse_time(self, time: float) -> None:
         after = "" if self._last_time == -inf else f" after {self._last_time:.15g} s"

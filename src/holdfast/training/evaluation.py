@@ -5,6 +5,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from holdfast.classifiers.folds import Integers
 from holdfast.contact import SIGNAL_FAULTS, UNKNOWN, Fault
 from holdfast.detector import detect
 from holdfast.metrics import (
@@ -23,7 +24,6 @@ from holdfast.parallel import Engine
 from holdfast.recordings import Recording, label_states
 from holdfast.training.dataset_scan import OneRecording
 from holdfast.training.progress import Progress, show_nothing
-from holdfast.training.splits import Integers
 from holdfast.training.verdict import LoadedTares, verdict
 
 TARE_LOADED = 1 << SIGNAL_FAULTS.index(Fault.TARE_LOADED)

@@ -4,7 +4,8 @@ import math
 from dataclasses import dataclass, field
 from typing import Any, Literal, Self
 
-from holdfast.classifiers import Adapted, LinearRecipe, recipe
+from holdfast.classifiers import Adapted, ModelRecipe, recipe
+from holdfast.classifiers.adapted import linear_prior
 from holdfast.errors import ModelError
 from holdfast.features import DEFAULT_WINDOW, DEPLOYED_FEATURES, FeatureSpec, Tare, parse_features
 from holdfast.features.haar import check_window
@@ -127,14 +128,14 @@ class Setting:
         own |= {"hold": init.debounce.hold, "hysteresis": init.debounce.hysteresis}
         return cls(**{**own, **chosen}, init=init)
 
-    def recipe_of(self, finger: str) -> LinearRecipe:
+    def recipe_of(self, finger: str) -> ModelRecipe:
         """Return the way of fitting the classifier of a finger.
 
         Raises:
             ModelError: the model to adapt lacks the finger.
         """
         if self.init is not None:
-            return Adapted(self.init.finger(finger).classifier)
+            return Adapted(linear_prior(self.init.finger(finger).classifier))
         return recipe(self.classifier)
 
     @property

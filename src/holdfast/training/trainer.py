@@ -7,6 +7,7 @@ from pathlib import Path
 import msgspec
 
 from holdfast.classifiers import Parameters, Samples
+from holdfast.classifiers.adapted import linear_prior
 from holdfast.metrics import (
     Decisions,
     Metrics,
@@ -222,7 +223,7 @@ class _Trainer:
         """Choose how far every finger is adapted; report it if nothing is held out."""
         found: dict[str, Parameters] = {}
         for finger, own in self.fingers.items():
-            adaptation = choose_adaptation(own, init.finger(finger).classifier, held)
+            adaptation = choose_adaptation(own, linear_prior(init.finger(finger).classifier), held)
             found[finger] = adaptation.parameters
             if not held:
                 self.warn(adaptation.describe(init.name or "the model to adapt", finger))

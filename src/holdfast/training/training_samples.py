@@ -9,6 +9,7 @@ import numpy as np
 import numpy.typing as npt
 
 from holdfast.classifiers import Samples
+from holdfast.classifiers.folds import Integers
 from holdfast.contact import NO_CONTACT, STABLE, UNKNOWN
 from holdfast.errors import TrainingError
 from holdfast.features import FeatureSpec, Tare
@@ -22,7 +23,7 @@ from holdfast.sensors import Sensor
 from holdfast.training.dataset_scan import DatasetScan, OneRecording
 from holdfast.training.progress import Progress, show_nothing
 from holdfast.training.setting import Setting
-from holdfast.training.splits import DataSplit, Integers
+from holdfast.training.splits import DataSplit
 
 CONTACT_DEVIATIONS = 5.0
 """Contact threshold: number of standard deviations of F_a at rest above its mean."""
