@@ -6,10 +6,24 @@ that is released and relaxes.
 
 import math
 
-from holdfast import contact
 from holdfast.compiled import compiled_step, inlined
+from holdfast.contact import STABLE, UNSTABLE
+from holdfast.detector.arrays import (
+    AMPLITUDE_LIMIT,
+    AMPLITUDE_TO_NOISE_LIMIT,
+    DRIFT,
+    EXCESS,
+    NO_EXCESS,
+    PEAK,
+    REST,
+    RESTLESS_AT,
+    SHAKEN_AT,
+    SMOOTHED,
+    TOUCH,
+)
 from holdfast.features.arrays import (
     AMPLITUDE,
+    LOAD,
     MEAN,
     MOVED_AT,
     NOISE_NOW,
@@ -18,27 +32,7 @@ from holdfast.features.arrays import (
     Array,
     Integers,
 )
-from holdfast.features.arrays import LOAD as MOTION_LOAD
 from holdfast.features.motion import LOAD_DECAY_SECONDS, RELEASED_SHARE
-
-UNSTABLE, STABLE = contact.UNSTABLE, contact.STABLE
-
-# Columns of DecisionRule.limits.
-THRESHOLD = 0  # of the probability
-CONTACT, CONTACT_NOISE = 1, 2  # of F_a: absolute, and as a multiple of the noise; NaN for none
-CONTACT_LOAD = 3  # of the load, as a multiple of its noise; NaN for none
-LIMITS_WIDTH = 4
-
-# Columns of DecisionMemory.codes.
-LOAD = 2  # how the load came over the threshold of contact: one of the next three
-NO_LOAD, TOUCH, DRIFT = range(3)
-
-# Columns of DecisionMemory.values.
-SMOOTHED = 3  # F_a, smoothed over DRIFT_SECONDS [unit of the readings]
-RESTLESS_AT = 4  # when the finger was last not calm [s]
-REST = 5  # F_tip without contact, beyond the tare, in three components [unit of the readings]
-PEAK = 8  # largest load so far, slowly forgotten [unit of the readings]
-SHAKEN_AT = 9  # when sigma was last much larger than that of noise [s]
 
 DRIFT_SECONDS = 1.0
 """A touch brings F_a over the threshold of contact in less time than this; a drift does not [s]."""
@@ -57,9 +51,9 @@ CALM_RATIO = 3.0
 @compiled_step
 def contact_threshold(noise: float, limits: Array) -> float:
     """Return the threshold of contact of F_a; NaN, which no value is under, if there is none."""
-    if math.isnan(limits[CONTACT]):
-        return float(limits[CONTACT_NOISE] * noise)
-    return float(limits[CONTACT])
+    if math.isnan(limits[AMPLITUDE_LIMIT]):
+        return float(limits[AMPLITUDE_TO_NOISE_LIMIT] * noise)
+    return float(limits[AMPLITUDE_LIMIT])
 
 
 @compiled_step
@@ -74,7 +68,7 @@ def is_at_rest(motion: Array, limit: float, latest: int, time: float) -> bool:
     """
     at_rest = time - motion[MOVED_AT] > REST_SECONDS
     threshold = limit * motion[NOISE_NOW]
-    return bool(at_rest and _is_unloaded(motion[MOTION_LOAD], motion[PEAK_LOAD], threshold, latest))
+    return bool(at_rest and _is_unloaded(motion[LOAD], motion[PEAK_LOAD], threshold, latest))
 
 
 @inlined
@@ -178,10 +172,10 @@ def has_drifted(
     if not calm:
         decided[RESTLESS_AT] = time
     if load < threshold:
-        codes[LOAD] = NO_LOAD
+        codes[EXCESS] = NO_EXCESS
     elif not calm:
-        codes[LOAD] = TOUCH
-    elif codes[LOAD] == NO_LOAD:
+        codes[EXCESS] = TOUCH
+    elif codes[EXCESS] == NO_EXCESS:
         long = time - decided[RESTLESS_AT] + 0.5 * period >= DRIFT_SECONDS
-        codes[LOAD] = DRIFT if long and not jumped else TOUCH
-    return bool(codes[LOAD] == DRIFT)
+        codes[EXCESS] = DRIFT if long and not jumped else TOUCH
+    return bool(codes[EXCESS] == DRIFT)

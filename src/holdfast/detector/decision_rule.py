@@ -7,16 +7,28 @@ from typing import NamedTuple, Self
 import numpy as np
 import numpy.typing as npt
 
-from holdfast import contact
 from holdfast.classifiers.cause import CAUSES, add_scores
 from holdfast.classifiers.linear import linear_probability
 from holdfast.compiled import compiled_step, inlined
-from holdfast.detector.contact_rule import (
-    CONTACT_LOAD,
+from holdfast.contact import NO_CONTACT, STABLE, UNKNOWN, UNSTABLE, hand_state, is_held
+from holdfast.detector.arrays import (
+    CANDIDATE,
+    CANDIDATE_SINCE,
+    CAUSE,
+    CODES_WIDTH,
+    DECIDED_WIDTH,
+    LAST_UNSTABLE,
+    LOAD_LIMIT,
     PEAK,
+    PROBABILITY,
     REST,
     SHAKEN_AT,
+    STATE,
     THRESHOLD,
+    DecisionMemory,
+    DecisionRule,
+)
+from holdfast.detector.contact_rule import (
     contact_threshold,
     follow,
     has_drifted,
@@ -46,47 +58,8 @@ from holdfast.features.faults import TARE_DRIFT
 from holdfast.features.stream import StreamPlan
 from holdfast.model import ANY_FINGER, FingerModel, Model
 
-UNKNOWN, NO_CONTACT, UNSTABLE, STABLE = (
-    contact.UNKNOWN,
-    contact.NO_CONTACT,
-    contact.UNSTABLE,
-    contact.STABLE,
-)
-_hand_state = compiled_step(contact.hand_state)
-_is_held = compiled_step(contact.is_held)
-
-# Columns of DecisionMemory.codes; LOAD is one of holdfast.detector.contact_rule.
-STATE = 0  # the state that is reported, as a code of holdfast.contact
-CANDIDATE = 1  # the state of the last sample, which may not have lasted long enough yet
-CAUSE = 3  # code of the cause while unstable; 0 for none
-CODES_WIDTH = 4
-
-# Columns of DecisionMemory.values; those from SMOOTHED on are of holdfast.detector.contact_rule.
-PROBABILITY = 0
-CANDIDATE_SINCE = 1  # when the candidate began [s]
-LAST_UNSTABLE = 2  # time of the last sample that was unstable before the hold time [s]
-DECIDED_WIDTH = 10
-
-
-class DecisionRule(NamedTuple):
-    """Constants of the decision rule, for every finger of a stream."""
-
-    weights: Array  # (n_fingers, n_features + 1)
-    n_weights: Integers  # (n_fingers,)
-    causes: Array  # (n_fingers, n_causes, n_features + 1); n_causes is 0 without them
-    limits: Array  # (n_fingers, LIMITS_WIDTH)
-    hysteresis: float
-    min_duration: float
-    hold: float
-    n_model_fingers: int
-
-
-class DecisionMemory(NamedTuple):
-    """Memory of the decision rule, for every finger of a stream."""
-
-    codes: Integers  # (n_fingers, CODES_WIDTH)
-    values: Array  # (n_fingers, DECIDED_WIDTH)
-    scores: Array  # (n_fingers, n_causes) sums since the contact became unstable
+_hand_state = compiled_step(hand_state)
+_is_held = compiled_step(is_held)
 
 
 class TraceRows(NamedTuple):
@@ -222,8 +195,8 @@ def _find_contact(
 ) -> bool:
     """Return whether a finger with features is without contact. Report a drift of its tare."""
     codes, decided, limits = decision.codes[f], decision.values[f], rule.limits[f]
-    if not math.isnan(limits[CONTACT_LOAD]):
-        return is_at_rest(memory.motion[f], limits[CONTACT_LOAD], codes[CANDIDATE], time)
+    if not math.isnan(limits[LOAD_LIMIT]):
+        return is_at_rest(memory.motion[f], limits[LOAD_LIMIT], codes[CANDIDATE], time)
     noise, values = memory.levels[f, NOISE], output.values[f]
     threshold = contact_threshold(noise, limits)
     quiet = kernel.noise_sigma(noise, layout.windows[f, SIGMA_WINDOW])
@@ -272,7 +245,7 @@ def _decide(
 ) -> None:
     """Decide the state of a finger from its features, and report it when it has lasted."""
     codes, decided, limits = decision.codes[f], decision.values[f], rule.limits[f]
-    by_load = not math.isnan(limits[CONTACT_LOAD])
+    by_load = not math.isnan(limits[LOAD_LIMIT])
     state = NO_CONTACT
     decided[PROBABILITY] = 0.0
     if by_load or not unloaded:

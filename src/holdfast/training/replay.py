@@ -9,10 +9,8 @@ import numpy.typing as npt
 
 from holdfast.compiled import compiled
 from holdfast.contact import NO_CONTACT, STABLE, UNKNOWN
+from holdfast.detector.arrays import CANDIDATE, LAST_UNSTABLE, STATE
 from holdfast.detector.decision_rule import (
-    CANDIDATE,
-    LAST_UNSTABLE,
-    STATE,
     classify_contact,
     debounce,
     hold_unstable,
