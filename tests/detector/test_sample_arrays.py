@@ -8,7 +8,7 @@ from holdfast.detector.sample_arrays import (
     has_known_layout,
     readable_types,
 )
-from holdfast.features.arrays import Integers
+from holdfast.sensors.types import Integers
 
 OFFSETS: Integers = np.array([0, 4, 9])
 

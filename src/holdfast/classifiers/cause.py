@@ -5,10 +5,10 @@ import math
 import msgspec
 import numpy as np
 
-from holdfast.classifiers.linear import Array
 from holdfast.compiled import compiled_step
 from holdfast.contact import Cause
 from holdfast.errors import ModelError
+from holdfast.sensors.types import Array
 
 CAUSES = tuple(Cause)
 """Causes in the order of their codes, which begin at 1; 0 is no cause."""

@@ -19,7 +19,8 @@ from numba.extending import intrinsic
 from numba.np.numpy_support import carray
 
 from holdfast.compiled import compiled_view, inlined
-from holdfast.features.arrays import ArrayKind, Integers
+from holdfast.features.arrays import ArrayKind
+from holdfast.sensors.types import Integers
 
 Function = TypeVar("Function")
 Arrays = list[npt.NDArray[Any]]

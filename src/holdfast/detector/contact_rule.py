@@ -29,10 +29,9 @@ from holdfast.features.arrays import (
     NOISE_NOW,
     PEAK_LOAD,
     SIGMA,
-    Array,
-    Integers,
 )
 from holdfast.features.motion import LOAD_DECAY_SECONDS, RELEASED_SHARE
+from holdfast.sensors.types import Array, Integers
 
 DRIFT_SECONDS = 1.0
 """A touch brings F_a over the threshold of contact in less time than this; a drift does not [s]."""
@@ -51,6 +50,7 @@ CALM_RATIO = 3.0
 @compiled_step
 def contact_threshold(noise: float, limits: Array) -> float:
     """Return the threshold of contact of F_a; NaN, which no value is under, if there is none."""
+    # F_a without contact: an absolute value, or a multiple of the noise of a component.
     if math.isnan(limits[AMPLITUDE_LIMIT]):
         return float(limits[AMPLITUDE_TO_NOISE_LIMIT] * noise)
     return float(limits[AMPLITUDE_LIMIT])
@@ -66,6 +66,7 @@ def is_at_rest(motion: Array, limit: float, latest: int, time: float) -> bool:
         latest: the state of the last sample, before debouncing.
         time: of the sample [s].
     """
+    # No contact: 0.2 s without motion, and load < limit noise, or a small share of the peak.
     at_rest = time - motion[MOVED_AT] > REST_SECONDS
     threshold = limit * motion[NOISE_NOW]
     return bool(at_rest and _is_unloaded(motion[LOAD], motion[PEAK_LOAD], threshold, latest))
@@ -86,6 +87,7 @@ def is_empty(load: float, decided: Array, threshold: float, latest: int, time: f
     """
     if not threshold > 0.0:
         return False
+    # The share of the peak counts only after 0.2 s in which sigma was that of noise.
     at_rest = time - decided[SHAKEN_AT] > REST_SECONDS
     peak = decided[PEAK] if at_rest else 0.0
     return bool(_is_unloaded(load, peak, threshold, latest))
@@ -101,6 +103,7 @@ def _is_unloaded(load: float, peak: float, threshold: float, latest: int) -> boo
         threshold: that a touch exceeds.
         latest: the state of the last sample, before debouncing.
     """
+    # In contact: load < max(0.7 threshold, 0.08 peak); else load < max(threshold, 0.12 peak).
     if latest in (STABLE, UNSTABLE):
         return bool(load < max(CONTACT_RELEASE_RATIO * threshold, RELEASED_SHARE * peak))
     return bool(load < max(threshold, TOUCH_SHARE * peak))
@@ -117,6 +120,7 @@ def update_load(values: Array, decided: Array, quiet: float, time: float, period
         time: of the sample [s].
         period: of the samples [s].
     """
+    # load = |F_tip - rest|, peak(k) = max(load(k), (1 - T / tau) peak(k-1)).
     x, y, z = (
         values[0] - decided[REST],
         values[1] - decided[REST + 1],
@@ -124,6 +128,7 @@ def update_load(values: Array, decided: Array, quiet: float, time: float, period
     )
     load = math.sqrt(x * x + y * y + z * z)
     decided[PEAK] = max(load, (1.0 - min(1.0, period / LOAD_DECAY_SECONDS)) * decided[PEAK])
+    # Shaken: sigma > 3 sigma_n, the sigma of noise alone.
     if not (quiet > 0.0 and values[SIGMA] <= CALM_RATIO * quiet):
         decided[SHAKEN_AT] = time
     return load
@@ -132,6 +137,7 @@ def update_load(values: Array, decided: Array, quiet: float, time: float, period
 @compiled_step
 def follow(values: Array, decided: Array, period: float) -> None:
     """Let the force without contact follow slowly."""
+    # rest(k) = rest(k-1) + (T / tau) (F_tip(k) - rest(k-1)).
     share = min(1.0, period / FOLLOW_SECONDS)
     for axis in range(3):
         decided[REST + axis] += share * (values[axis] - decided[REST + axis])
@@ -162,6 +168,8 @@ def has_drifted(
         time: of the sample [s].
         period: of the samples [s].
     """
+    # mean = sqrt(2) m is the mean of F_a over the window (equation 1); s(k) = s(k-1) +
+    # (T / tau) (F_a(k) - s(k-1)). Calm: sigma <= 3 sigma_n and |mean - s| <= threshold / 2.
     amplitude, mean = values[AMPLITUDE], math.sqrt(2.0) * values[MEAN]
     if math.isnan(decided[SMOOTHED]):
         decided[SMOOTHED], decided[RESTLESS_AT] = amplitude, time
@@ -171,6 +179,7 @@ def has_drifted(
     calm = quiet > 0.0 and values[SIGMA] <= CALM_RATIO * quiet and away <= 0.5 * threshold
     if not calm:
         decided[RESTLESS_AT] = time
+    # A drift comes over the threshold after 1 s of calm and without a jump; a touch does not.
     if load < threshold:
         codes[EXCESS] = NO_EXCESS
     elif not calm:

@@ -47,9 +47,6 @@ from holdfast.features.arrays import (
     SIGMA_WINDOW,
     TAXELS,
     VALUES_WIDTH,
-    Array,
-    Flags,
-    Integers,
     Layout,
     Memory,
     Output,
@@ -57,6 +54,7 @@ from holdfast.features.arrays import (
 from holdfast.features.faults import TARE_DRIFT
 from holdfast.features.stream import StreamPlan
 from holdfast.model import ANY_FINGER, FingerModel, Model
+from holdfast.sensors.types import Array, Flags, Integers
 
 _hand_state = compiled_step(hand_state)
 _is_held = compiled_step(is_held)
@@ -196,7 +194,9 @@ def _find_contact(
     """Return whether a finger with features is without contact. Report a drift of its tare."""
     codes, decided, limits = decision.codes[f], decision.values[f], rule.limits[f]
     if not math.isnan(limits[LOAD_LIMIT]):
+        # By the load of relative features: load < limit noise, at rest.
         return is_at_rest(memory.motion[f], limits[LOAD_LIMIT], codes[CANDIDATE], time)
+    # By F_a: load < threshold; a drift of the tare is a fault.
     noise, values = memory.levels[f, NOISE], output.values[f]
     threshold = contact_threshold(noise, limits)
     quiet = kernel.noise_sigma(noise, layout.windows[f, SIGMA_WINDOW])
@@ -249,6 +249,7 @@ def _decide(
     state = NO_CONTACT
     decided[PROBABILITY] = 0.0
     if by_load or not unloaded:
+        # p = 1 / (1 + exp(-(w . Phi + w_0))), by the weights of the model.
         weights = rule.weights[f, : rule.n_weights[f]]
         decided[PROBABILITY] = linear_probability(output.features[f], weights)
     if not unloaded:
@@ -256,6 +257,7 @@ def _decide(
             decided[PROBABILITY], limits[THRESHOLD], rule.hysteresis, codes[STATE]
         )
         if state == UNSTABLE and rule.causes.shape[1] > 0:
+            # cause = argmax over c of sum_k (w_c . Phi(k) + w_c0) since it became unstable.
             codes[CAUSE] = add_scores(output.features[f], rule.causes[f], decision.scores[f])
         state = hold_unstable(state, decided, rule.hold, time, period)
     elif not by_load:
@@ -317,6 +319,7 @@ def run(
 @compiled_step
 def classify_contact(probability: float, threshold: float, hysteresis: float, reported: int) -> int:
     """Return STABLE from the threshold on. Hysteresis moves it away from the reported state."""
+    # STABLE: p >= threshold - h if STABLE was reported, + h if another state, h the hysteresis.
     if reported == STABLE:
         threshold -= hysteresis
     elif reported != UNKNOWN:
@@ -327,6 +330,7 @@ def classify_contact(probability: float, threshold: float, hysteresis: float, re
 @compiled_step
 def hold_unstable(state: int, decided: Array, hold: float, time: float, period: float) -> int:
     """Return UNSTABLE while it is held, else the state."""
+    # UNSTABLE until t - t_unstable reaches the hold time.
     if state == UNSTABLE:
         decided[LAST_UNSTABLE] = time
     elif _is_held(time, decided[LAST_UNSTABLE], hold, period):
@@ -339,6 +343,7 @@ def debounce(
     codes: Integers, decided: Array, state: int, min_duration: float, time: float, period: float
 ) -> None:
     """Report the state if it has lasted long enough, or if the reported state is UNKNOWN."""
+    # Reported once t - t_since + T / 2 >= min_duration: half a period allows for rounding.
     if state != codes[CANDIDATE]:
         codes[CANDIDATE] = state
         decided[CANDIDATE_SINCE] = time

@@ -41,12 +41,13 @@ from holdfast.detector.fast_step import (
 )
 from holdfast.detector.sample_arrays import KNOWN_TYPES
 from holdfast.errors import ModelError, StreamError
-from holdfast.features.arrays import TAXELS, Array
+from holdfast.features.arrays import TAXELS
 from holdfast.features.stream import FeatureStream, StreamPlan
 from holdfast.model import Model
 from holdfast.recordings import Recording
 from holdfast.resampling import resample
 from holdfast.sensors import Sensor
+from holdfast.sensors.types import Array
 
 IgnoredTaxels = Mapping[str, Sequence[int]]
 States = tuple[ContactState, ...]

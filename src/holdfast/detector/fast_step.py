@@ -28,12 +28,12 @@ from holdfast.features.arrays import (
     SIGMA,
     Flags1,
     Floats2,
-    Integers,
     Integers1,
     Layout,
     Memory,
     Output,
 )
+from holdfast.sensors.types import Integers
 
 CHANGED = 4
 """Is added to the state of the hand if any state has changed."""

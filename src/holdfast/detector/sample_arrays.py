@@ -18,7 +18,7 @@ from numba.np.numpy_support import carray
 
 from holdfast.compiled import compiled_step, compiled_view
 from holdfast.detector.address_table import pointer
-from holdfast.features.arrays import Array, Integers
+from holdfast.sensors.types import Array, Integers
 
 WORD = 8
 """Length of a field [bytes]."""

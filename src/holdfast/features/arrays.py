@@ -10,9 +10,7 @@ from typing import Annotated, Any, NamedTuple
 import numpy as np
 import numpy.typing as npt
 
-Array = npt.NDArray[np.float64]
-Integers = npt.NDArray[np.int64]
-Flags = npt.NDArray[np.bool_]
+from holdfast.sensors.types import Array, Flags, Integers
 
 
 class ArrayKind(NamedTuple):

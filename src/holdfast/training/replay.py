@@ -16,11 +16,11 @@ from holdfast.detector.decision_rule import (
     hold_unstable,
     new_decision_memory,
 )
-from holdfast.features.arrays import Array, Integers
 from holdfast.metrics import AlarmMatch, Decisions, FingerDecisions, hand_decisions
 from holdfast.metrics.events import match_decisions
 from holdfast.model import Debounce, Model
 from holdfast.recordings import Recording
+from holdfast.sensors.types import Array, Integers
 from holdfast.training.evaluation import compute_decisions
 
 Codes = npt.NDArray[np.int8]
