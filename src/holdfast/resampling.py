@@ -8,9 +8,8 @@ import numpy.typing as npt
 
 from holdfast.errors import StreamError
 from holdfast.recordings import GAP_PERIODS, Recording, Tactile
-from holdfast.sensors.types import Array
+from holdfast.sensors.types import Array, Integers
 
-Integers = npt.NDArray[np.int64]
 TOLERANCE_PERIODS = 1e-3
 """Tolerance of times in periods of the new rate. The rounding of times, 1e-7 s since 1970, then
 moves no sample."""

@@ -10,7 +10,9 @@ import pytest
 
 from holdfast.contact import ContactEvent, ContactState, Fault, Reason
 from holdfast.detector import HAND, Detector, detect
+from holdfast.detector import detector as detector_module
 from holdfast.detector.detector import MAX_EVENTS
+from holdfast.detector.sample_arrays import KNOWN_TYPES
 from holdfast.errors import ModelError, StreamError
 from holdfast.features import FeatureSpec
 from holdfast.features.arrays import NOISE
@@ -512,3 +514,16 @@ class TestThresholds:
         with pytest.raises(ValueError) as raised:
             Detector(model()).set_thresholds({"thumb": 0.5, "ring": 0.5})
         assert str(raised.value) == "threshold of ring given; the detector has thumb, index"
+
+
+def test_the_plain_way_gives_the_same_estimates(monkeypatch):
+    values = lively()
+    fast = feed(Detector(model(("thumb",))), values)
+    monkeypatch.setattr(detector_module, "KNOWN_TYPES", np.zeros_like(KNOWN_TYPES))
+    plain = Detector(model(("thumb",)))
+    stored = []
+    monkeypatch.setattr(
+        plain, "_store", lambda samples: (stored.append(1), Detector._store(plain, samples))
+    )
+    assert [repr(estimate) for estimate in feed(plain, values)] == [repr(e) for e in fast]
+    assert len(stored) == len(values)

@@ -1,8 +1,14 @@
 import numpy as np
 import pytest
 
-from holdfast.detector.sample_arrays import KNOWN_TYPES, copy_samples
-from holdfast.features.arrays import Integers
+from holdfast.detector import sample_arrays
+from holdfast.detector.sample_arrays import (
+    KNOWN_TYPES,
+    copy_samples,
+    has_known_layout,
+    readable_types,
+)
+from holdfast.sensors.types import Integers
 
 OFFSETS: Integers = np.array([0, 4, 9])
 
@@ -18,7 +24,7 @@ def hand(kind=np.uint16):
 
 def copied(arrays):
     readings = np.full((9, 3), -1.0)
-    done = copy_samples(id(arrays), OFFSETS, KNOWN_TYPES, readings.ctypes.data)
+    done = copy_samples(id(arrays), OFFSETS, KNOWN_TYPES, readings)
     assert done or (readings == -1).all()
     return readings if done else None
 
@@ -62,3 +68,26 @@ def test_copies_nothing_that_it_cannot_read(how):
 @pytest.mark.parametrize("other", [None, [*hand()], hand()[0], "text"])
 def test_reads_tuples_only(other):
     assert copied(other) is None
+
+
+def test_this_interpreter_is_readable():
+    assert has_known_layout()
+    assert KNOWN_TYPES.all()
+
+
+@pytest.mark.parametrize("name", ["TYPE", "FIRST_ITEM", "DATA", "N_AXES", "STRIDES", "DTYPE"])
+def test_another_layout_is_found_at_start_up(monkeypatch, name):
+    monkeypatch.setattr(sample_arrays, name, getattr(sample_arrays, name) - 1)
+    assert not has_known_layout()
+    assert not readable_types().any()
+
+
+def test_another_interpreter_is_not_read(monkeypatch):
+    monkeypatch.setattr(sample_arrays.sys.implementation, "name", "other")
+    assert not has_known_layout()
+
+
+def test_nothing_is_copied_where_no_type_is_known():
+    readings = np.full((9, 3), -1.0)
+    assert not copy_samples(id(hand()), OFFSETS, np.zeros_like(KNOWN_TYPES), readings)
+    assert (readings == -1).all()

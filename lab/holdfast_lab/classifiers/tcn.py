@@ -20,8 +20,9 @@ from holdfast.classifiers.fitting import (
     undo_balancing,
 )
 from holdfast.classifiers.folds import shuffled
-from holdfast.classifiers.linear import Array, feature_rows
+from holdfast.classifiers.linear import feature_rows
 from holdfast.errors import MissingExtra
+from holdfast.sensors.types import Array
 
 if TYPE_CHECKING:
     from optuna import Trial

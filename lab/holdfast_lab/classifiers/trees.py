@@ -14,7 +14,8 @@ from holdfast.classifiers.fitting import (
     class_ratio,
     undo_balancing,
 )
-from holdfast.classifiers.linear import Array, feature_rows
+from holdfast.classifiers.linear import feature_rows
+from holdfast.sensors.types import Array
 
 if TYPE_CHECKING:
     from optuna import Trial

@@ -7,11 +7,11 @@ import numpy as np
 import numpy.typing as npt
 
 from holdfast.classifiers.fitting import standardise
-from holdfast.classifiers.linear import Array
 from holdfast.classifiers.newton import fit_multinomial
 from holdfast.compiled import compiled_step
 from holdfast.contact import Cause
 from holdfast.errors import ModelError
+from holdfast.sensors.types import Array
 
 CAUSES = tuple(Cause)
 """Causes in the order of their codes, which begin at 1; 0 is no cause."""

@@ -8,8 +8,7 @@ import numpy.typing as npt
 
 from holdfast.compiled import compiled_step
 from holdfast.errors import ModelError
-
-Array = npt.NDArray[np.float64]
+from holdfast.sensors.types import Array
 
 
 class LinearClassifier(msgspec.Struct, frozen=True, forbid_unknown_fields=True, tag="linear"):

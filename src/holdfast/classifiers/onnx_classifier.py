@@ -10,9 +10,10 @@ import msgspec
 import numpy as np
 import numpy.typing as npt
 
-from holdfast.classifiers.linear import Array, feature_rows
+from holdfast.classifiers.linear import feature_rows
 from holdfast.errors import MissingExtra, ModelError
 from holdfast.files import file_stem
+from holdfast.sensors.types import Array
 
 MAX_ONNX_SIZE = 1 << 24
 """Maximum size of an ONNX file [bytes]."""

@@ -6,39 +6,32 @@ that is released and relaxes.
 
 import math
 
-from holdfast import contact
 from holdfast.compiled import compiled_step, inlined
+from holdfast.contact import STABLE, UNSTABLE
+from holdfast.detector.arrays import (
+    AMPLITUDE_LIMIT,
+    AMPLITUDE_TO_NOISE_LIMIT,
+    DRIFT,
+    EXCESS,
+    NO_EXCESS,
+    PEAK,
+    REST,
+    RESTLESS_AT,
+    SHAKEN_AT,
+    SMOOTHED,
+    TOUCH,
+)
 from holdfast.features.arrays import (
     AMPLITUDE,
+    LOAD,
     MEAN,
     MOVED_AT,
     NOISE_NOW,
     PEAK_LOAD,
     SIGMA,
-    Array,
-    Integers,
 )
-from holdfast.features.arrays import LOAD as MOTION_LOAD
 from holdfast.features.motion import LOAD_DECAY_SECONDS, RELEASED_SHARE
-
-UNSTABLE, STABLE = contact.UNSTABLE, contact.STABLE
-
-# Columns of DecisionRule.limits.
-THRESHOLD = 0  # of the probability
-CONTACT, CONTACT_NOISE = 1, 2  # of F_a: absolute, and as a multiple of the noise; NaN for none
-CONTACT_LOAD = 3  # of the load, as a multiple of its noise; NaN for none
-LIMITS_WIDTH = 4
-
-# Columns of DecisionMemory.codes.
-LOAD = 2  # how the load came over the threshold of contact: one of the next three
-NO_LOAD, TOUCH, DRIFT = range(3)
-
-# Columns of DecisionMemory.values.
-SMOOTHED = 3  # F_a, smoothed over DRIFT_SECONDS [unit of the readings]
-RESTLESS_AT = 4  # when the finger was last not calm [s]
-REST = 5  # F_tip without contact, beyond the tare, in three components [unit of the readings]
-PEAK = 8  # largest load so far, slowly forgotten [unit of the readings]
-SHAKEN_AT = 9  # when sigma was last much larger than that of noise [s]
+from holdfast.sensors.types import Array, Integers
 
 DRIFT_SECONDS = 1.0
 """A touch brings F_a over the threshold of contact in less time than this; a drift does not [s]."""
@@ -57,9 +50,10 @@ CALM_RATIO = 3.0
 @compiled_step
 def contact_threshold(noise: float, limits: Array) -> float:
     """Return the threshold of contact of F_a; NaN, which no value is under, if there is none."""
-    if math.isnan(limits[CONTACT]):
-        return float(limits[CONTACT_NOISE] * noise)
-    return float(limits[CONTACT])
+    # F_a without contact: an absolute value, or a multiple of the noise of a component.
+    if math.isnan(limits[AMPLITUDE_LIMIT]):
+        return float(limits[AMPLITUDE_TO_NOISE_LIMIT] * noise)
+    return float(limits[AMPLITUDE_LIMIT])
 
 
 @compiled_step
@@ -72,9 +66,10 @@ def is_at_rest(motion: Array, limit: float, latest: int, time: float) -> bool:
         latest: the state of the last sample, before debouncing.
         time: of the sample [s].
     """
+    # No contact: 0.2 s without motion, and load < limit noise, or a small share of the peak.
     at_rest = time - motion[MOVED_AT] > REST_SECONDS
     threshold = limit * motion[NOISE_NOW]
-    return bool(at_rest and _is_unloaded(motion[MOTION_LOAD], motion[PEAK_LOAD], threshold, latest))
+    return bool(at_rest and _is_unloaded(motion[LOAD], motion[PEAK_LOAD], threshold, latest))
 
 
 @inlined
@@ -92,6 +87,7 @@ def is_empty(load: float, decided: Array, threshold: float, latest: int, time: f
     """
     if not threshold > 0.0:
         return False
+    # The share of the peak counts only after 0.2 s in which sigma was that of noise.
     at_rest = time - decided[SHAKEN_AT] > REST_SECONDS
     peak = decided[PEAK] if at_rest else 0.0
     return bool(_is_unloaded(load, peak, threshold, latest))
@@ -107,6 +103,7 @@ def _is_unloaded(load: float, peak: float, threshold: float, latest: int) -> boo
         threshold: that a touch exceeds.
         latest: the state of the last sample, before debouncing.
     """
+    # In contact: load < max(0.7 threshold, 0.08 peak); else load < max(threshold, 0.12 peak).
     if latest in (STABLE, UNSTABLE):
         return bool(load < max(CONTACT_RELEASE_RATIO * threshold, RELEASED_SHARE * peak))
     return bool(load < max(threshold, TOUCH_SHARE * peak))
@@ -123,6 +120,7 @@ def update_load(values: Array, decided: Array, quiet: float, time: float, period
         time: of the sample [s].
         period: of the samples [s].
     """
+    # load = |F_tip - rest|, peak(k) = max(load(k), (1 - T / tau) peak(k-1)).
     x, y, z = (
         values[0] - decided[REST],
         values[1] - decided[REST + 1],
@@ -130,6 +128,7 @@ def update_load(values: Array, decided: Array, quiet: float, time: float, period
     )
     load = math.sqrt(x * x + y * y + z * z)
     decided[PEAK] = max(load, (1.0 - min(1.0, period / LOAD_DECAY_SECONDS)) * decided[PEAK])
+    # Shaken: sigma > 3 sigma_n, the sigma of noise alone.
     if not (quiet > 0.0 and values[SIGMA] <= CALM_RATIO * quiet):
         decided[SHAKEN_AT] = time
     return load
@@ -138,6 +137,7 @@ def update_load(values: Array, decided: Array, quiet: float, time: float, period
 @compiled_step
 def follow(values: Array, decided: Array, period: float) -> None:
     """Let the force without contact follow slowly."""
+    # rest(k) = rest(k-1) + (T / tau) (F_tip(k) - rest(k-1)).
     share = min(1.0, period / FOLLOW_SECONDS)
     for axis in range(3):
         decided[REST + axis] += share * (values[axis] - decided[REST + axis])
@@ -168,6 +168,8 @@ def has_drifted(
         time: of the sample [s].
         period: of the samples [s].
     """
+    # mean = sqrt(2) m is the mean of F_a over the window (equation 1); s(k) = s(k-1) +
+    # (T / tau) (F_a(k) - s(k-1)). Calm: sigma <= 3 sigma_n and |mean - s| <= threshold / 2.
     amplitude, mean = values[AMPLITUDE], math.sqrt(2.0) * values[MEAN]
     if math.isnan(decided[SMOOTHED]):
         decided[SMOOTHED], decided[RESTLESS_AT] = amplitude, time
@@ -177,11 +179,12 @@ def has_drifted(
     calm = quiet > 0.0 and values[SIGMA] <= CALM_RATIO * quiet and away <= 0.5 * threshold
     if not calm:
         decided[RESTLESS_AT] = time
+    # A drift comes over the threshold after 1 s of calm and without a jump; a touch does not.
     if load < threshold:
-        codes[LOAD] = NO_LOAD
+        codes[EXCESS] = NO_EXCESS
     elif not calm:
-        codes[LOAD] = TOUCH
-    elif codes[LOAD] == NO_LOAD:
+        codes[EXCESS] = TOUCH
+    elif codes[EXCESS] == NO_EXCESS:
         long = time - decided[RESTLESS_AT] + 0.5 * period >= DRIFT_SECONDS
-        codes[LOAD] = DRIFT if long and not jumped else TOUCH
-    return bool(codes[LOAD] == DRIFT)
+        codes[EXCESS] = DRIFT if long and not jumped else TOUCH
+    return bool(codes[EXCESS] == DRIFT)

@@ -7,16 +7,28 @@ from typing import NamedTuple, Self
 import numpy as np
 import numpy.typing as npt
 
-from holdfast import contact
 from holdfast.classifiers.cause import CAUSES, add_scores
 from holdfast.classifiers.linear import LinearClassifier, linear_probability
 from holdfast.compiled import compiled_step, inlined
-from holdfast.detector.contact_rule import (
-    CONTACT_LOAD,
+from holdfast.contact import NO_CONTACT, STABLE, UNKNOWN, UNSTABLE, hand_state, is_held
+from holdfast.detector.arrays import (
+    CANDIDATE,
+    CANDIDATE_SINCE,
+    CAUSE,
+    CODES_WIDTH,
+    DECIDED_WIDTH,
+    LAST_UNSTABLE,
+    LOAD_LIMIT,
     PEAK,
+    PROBABILITY,
     REST,
     SHAKEN_AT,
+    STATE,
     THRESHOLD,
+    DecisionMemory,
+    DecisionRule,
+)
+from holdfast.detector.contact_rule import (
     contact_threshold,
     follow,
     has_drifted,
@@ -35,9 +47,6 @@ from holdfast.features.arrays import (
     SIGMA_WINDOW,
     TAXELS,
     VALUES_WIDTH,
-    Array,
-    Flags,
-    Integers,
     Layout,
     Memory,
     Output,
@@ -45,48 +54,10 @@ from holdfast.features.arrays import (
 from holdfast.features.faults import TARE_DRIFT
 from holdfast.features.stream import StreamPlan
 from holdfast.model import ANY_FINGER, FingerModel, Model
+from holdfast.sensors.types import Array, Flags, Integers
 
-UNKNOWN, NO_CONTACT, UNSTABLE, STABLE = (
-    contact.UNKNOWN,
-    contact.NO_CONTACT,
-    contact.UNSTABLE,
-    contact.STABLE,
-)
-_hand_state = compiled_step(contact.hand_state)
-_is_held = compiled_step(contact.is_held)
-
-# Columns of DecisionMemory.codes; LOAD is one of holdfast.detector.contact_rule.
-STATE = 0  # the state that is reported, as a code of holdfast.contact
-CANDIDATE = 1  # the state of the last sample, which may not have lasted long enough yet
-CAUSE = 3  # code of the cause while unstable; 0 for none
-CODES_WIDTH = 4
-
-# Columns of DecisionMemory.values; those from SMOOTHED on are of holdfast.detector.contact_rule.
-PROBABILITY = 0
-CANDIDATE_SINCE = 1  # when the candidate began [s]
-LAST_UNSTABLE = 2  # time of the last sample that was unstable before the hold time [s]
-DECIDED_WIDTH = 10
-
-
-class DecisionRule(NamedTuple):
-    """Constants of the decision rule, for every finger of a stream."""
-
-    weights: Array  # (n_fingers, n_features + 1)
-    n_weights: Integers  # (n_fingers,)
-    causes: Array  # (n_fingers, n_causes, n_features + 1); n_causes is 0 without them
-    limits: Array  # (n_fingers, LIMITS_WIDTH)
-    hysteresis: float
-    min_duration: float
-    hold: float
-    n_model_fingers: int
-
-
-class DecisionMemory(NamedTuple):
-    """Memory of the decision rule, for every finger of a stream."""
-
-    codes: Integers  # (n_fingers, CODES_WIDTH)
-    values: Array  # (n_fingers, DECIDED_WIDTH)
-    scores: Array  # (n_fingers, n_causes) sums since the contact became unstable
+_hand_state = compiled_step(hand_state)
+_is_held = compiled_step(is_held)
 
 
 class TraceRows(NamedTuple):
@@ -229,8 +200,10 @@ def _find_contact(
 ) -> bool:
     """Return whether a finger with features is without contact. Report a drift of its tare."""
     codes, decided, limits = decision.codes[f], decision.values[f], rule.limits[f]
-    if not math.isnan(limits[CONTACT_LOAD]):
-        return is_at_rest(memory.motion[f], limits[CONTACT_LOAD], codes[CANDIDATE], time)
+    if not math.isnan(limits[LOAD_LIMIT]):
+        # By the load of relative features: load < limit noise, at rest.
+        return is_at_rest(memory.motion[f], limits[LOAD_LIMIT], codes[CANDIDATE], time)
+    # By F_a: load < threshold; a drift of the tare is a fault.
     noise, values = memory.levels[f, NOISE], output.values[f]
     threshold = contact_threshold(noise, limits)
     quiet = kernel.noise_sigma(noise, layout.windows[f, SIGMA_WINDOW])
@@ -279,10 +252,11 @@ def _decide(
 ) -> None:
     """Decide the state of a finger from its features, and report it when it has lasted."""
     codes, decided, limits = decision.codes[f], decision.values[f], rule.limits[f]
-    by_load = not math.isnan(limits[CONTACT_LOAD])
+    by_load = not math.isnan(limits[LOAD_LIMIT])
     state = NO_CONTACT
     decided[PROBABILITY] = 0.0
     if by_load or not unloaded:
+        # p = 1 / (1 + exp(-(w . Phi + w_0))), by the weights of the model.
         weights = rule.weights[f, : rule.n_weights[f]]
         decided[PROBABILITY] = linear_probability(output.features[f], weights)
     if not unloaded:
@@ -290,6 +264,7 @@ def _decide(
             decided[PROBABILITY], limits[THRESHOLD], rule.hysteresis, codes[STATE]
         )
         if state == UNSTABLE and rule.causes.shape[1] > 0:
+            # cause = argmax over c of sum_k (w_c . Phi(k) + w_c0) since it became unstable.
             codes[CAUSE] = add_scores(output.features[f], rule.causes[f], decision.scores[f])
         state = hold_unstable(state, decided, rule.hold, time, period)
     elif not by_load:
@@ -351,6 +326,7 @@ def run(
 @compiled_step
 def classify_contact(probability: float, threshold: float, hysteresis: float, reported: int) -> int:
     """Return STABLE from the threshold on. Hysteresis moves it away from the reported state."""
+    # STABLE: p >= threshold - h if STABLE was reported, + h if another state, h the hysteresis.
     if reported == STABLE:
         threshold -= hysteresis
     elif reported != UNKNOWN:
@@ -361,6 +337,7 @@ def classify_contact(probability: float, threshold: float, hysteresis: float, re
 @compiled_step
 def hold_unstable(state: int, decided: Array, hold: float, time: float, period: float) -> int:
     """Return UNSTABLE while it is held, else the state."""
+    # UNSTABLE until t - t_unstable reaches the hold time.
     if state == UNSTABLE:
         decided[LAST_UNSTABLE] = time
     elif _is_held(time, decided[LAST_UNSTABLE], hold, period):
@@ -373,6 +350,7 @@ def debounce(
     codes: Integers, decided: Array, state: int, min_duration: float, time: float, period: float
 ) -> None:
     """Report the state if it has lasted long enough, or if the reported state is UNKNOWN."""
+    # Reported once t - t_since + T / 2 >= min_duration: half a period allows for rounding.
     if state != codes[CANDIDATE]:
         codes[CANDIDATE] = state
         decided[CANDIDATE_SINCE] = time

@@ -19,7 +19,8 @@ from holdfast.contact import (
 )
 from holdfast.detector.decision_rule import TraceRows
 from holdfast.detector.fast_step import split_code
-from holdfast.features.arrays import SIGMA, Array
+from holdfast.features.arrays import SIGMA
+from holdfast.sensors.types import Array
 
 STATES = tuple(ContactState)
 REASONS = tuple(Reason)

@@ -24,7 +24,8 @@ from holdfast.contact import (
     StateChanges,
     taxels_of,
 )
-from holdfast.detector.contact_rule import THRESHOLD
+from holdfast.detector.address_table import table_of
+from holdfast.detector.arrays import REPORT_WIDTH, THRESHOLD
 from holdfast.detector.decision_rule import TraceRows, new_decision_memory, rule_of, run
 from holdfast.detector.detection import (
     STATES,
@@ -35,19 +36,20 @@ from holdfast.detector.detection import (
 )
 from holdfast.detector.fast_step import (
     CHANGED,
-    REPORT_WIDTH,
     UNREADABLE,
     StepArrays,
     compiled_fast_step,
 )
 from holdfast.detector.probabilities import ProbabilityFeeder
+from holdfast.detector.sample_arrays import KNOWN_TYPES
 from holdfast.errors import ModelError, StreamError
-from holdfast.features.arrays import TAXELS, Array, Flags
+from holdfast.features.arrays import TAXELS
 from holdfast.features.stream import FeatureStream, StreamPlan
 from holdfast.model import Model
 from holdfast.recordings import Recording
 from holdfast.resampling import resample
 from holdfast.sensors import Sensor
+from holdfast.sensors.types import Array, Flags
 
 IgnoredTaxels = Mapping[str, Sequence[int]]
 States = tuple[ContactState, ...]
@@ -152,9 +154,9 @@ class Detector:
         self._decision = new_decision_memory(*self._rule.causes.shape[:2])
         arrays = StepArrays(
             stream.layout, stream.memory, stream.output, self._rule, self._decision,
-            self._readings, self._present, self._report,
+            self._readings, self._present, self._report, KNOWN_TYPES,
         )  # fmt: skip
-        self._table, self._arrays = arrays.table()
+        self._table, self._arrays = table_of(arrays)
         self._status = stream.output.status
         self._changes = StateChanges(self._names)
         self._states: States = tuple(self._changes.states)

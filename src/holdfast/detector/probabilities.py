@@ -5,11 +5,12 @@ from collections.abc import Sequence
 import numpy as np
 
 from holdfast.classifiers import LinearClassifier
-from holdfast.detector.decision_rule import DecisionRule
+from holdfast.detector.arrays import DecisionRule
 from holdfast.features import kernel
-from holdfast.features.arrays import READY, REASON, Array, Flags
+from holdfast.features.arrays import READY, REASON
 from holdfast.features.stream import FeatureStream
 from holdfast.model import FingerModel
+from holdfast.sensors.types import Array, Flags
 
 
 class ProbabilityFeeder:

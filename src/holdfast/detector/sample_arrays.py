@@ -4,20 +4,21 @@ To unpack an array, NumPy and numba need 50 to 250 ns, more than the copy itself
 step receives the address of a tuple of arrays, and reads the fields of these objects where
 CPython and NumPy's C interface have them. It accepts exactly what it can read: a tuple, arrays
 of NumPy's own class, two axes of the right length, uint16 or float64, contiguous. For anything
-else it returns False before it has copied anything, also where an interpreter lays out its
-objects in another way, because their types are then not where they are expected.
+else it returns False before it has copied anything, and the detector copies by NumPy instead.
+`has_known_layout` compares the places of the fields with a known array when this is imported;
+where they differ, nothing is readable. docs/decisions/0014-one-table-of-addresses.md has figures.
 """
 
-from typing import Any
+import ctypes
+import sys
 
 import numpy as np
 import numpy.typing as npt
-from numba import types
-from numba.extending import intrinsic
 from numba.np.numpy_support import carray
 
 from holdfast.compiled import compiled_step, compiled_view
-from holdfast.features.arrays import Array, Integers
+from holdfast.detector.address_table import pointer
+from holdfast.sensors.types import Array, Integers
 
 WORD = 8
 """Length of a field [bytes]."""
@@ -28,22 +29,39 @@ FIRST_ITEM = tuple.__basicsize__ // WORD
 DATA, N_AXES, SHAPE, STRIDES, DTYPE = (HEADER + place for place in (0, 1, 2, 3, 5))  # of an array
 OBJECT_WORDS = HEADER + 6
 
-KNOWN_TYPES = np.array(
-    [id(tuple), id(np.ndarray), id(np.dtype(np.uint16)), id(np.dtype(np.float64))]
-)
-"""Addresses of the types that can be read; they live as long as the interpreter."""
 TUPLE, ARRAY, COUNTS, FLOATS = range(4)
 
 
-def _cast(_typing: Any, address: Any) -> Any:  # noqa: ANN401 (numba's own objects)
-    def generate(context: Any, builder: Any, signature: Any, args: Any) -> Any:  # noqa: ANN401
-        return builder.inttoptr(args[0], context.get_value_type(signature.return_type))
+def has_known_layout() -> bool:
+    """Return whether this interpreter has the fields of its objects where they are expected."""
+    if sys.implementation.name != "cpython" or np.ndarray.__basicsize__ < WORD * OBJECT_WORDS:
+        return False
+    array = np.zeros((2, 3), dtype=np.uint16)
+    arrays = (array,)
+    fields = _memory_of(id(array), OBJECT_WORDS)
+    expected = {TYPE: id(np.ndarray), DATA: array.ctypes.data, DTYPE: id(array.dtype)}
+    return (
+        _memory_of(id(arrays), FIRST_ITEM + 1)[FIRST_ITEM] == id(array)
+        and all(fields[place] == value for place, value in expected.items())
+        and fields[N_AXES] & 0xFFFFFFFF == array.ndim
+        and fields[STRIDES] == fields[SHAPE] + WORD * array.ndim  # one block of memory
+        and _memory_of(fields[SHAPE], 4) == [*array.shape, *array.strides]
+    )
 
-    return types.voidptr(address), generate
+
+def _memory_of(address: int, n_words: int) -> list[int]:
+    return list((ctypes.c_int64 * n_words).from_address(address))
 
 
-pointer: Any = intrinsic(_cast)
-"""Pointer to an address."""
+def readable_types() -> Integers:
+    """Return the addresses of the types that can be read; zeros, which no type has, for none."""
+    readable = (tuple, np.ndarray, np.dtype(np.uint16), np.dtype(np.float64))
+    known = has_known_layout()
+    return np.array([id(kind) if known else 0 for kind in readable])
+
+
+KNOWN_TYPES = readable_types()
+"""Addresses of the types that can be read; they live as long as the interpreter."""
 
 
 @compiled_view
@@ -62,14 +80,14 @@ def _floats(address: int, n: int) -> npt.NDArray[np.float64]:
 
 
 @compiled_step
-def copy_samples(samples: int, offsets: Integers, known: Integers, readings: int) -> bool:
+def copy_samples(samples: int, offsets: Integers, known: Integers, readings: Array) -> bool:
     """Copy the readings of all fingers, if all of them are in a form that can be read.
 
     Args:
         samples: address of a tuple with one array for each finger.
         offsets: (n_fingers + 1,) first taxel of each finger.
         known: `KNOWN_TYPES`.
-        readings: address of an array (n_taxels, 3) of all fingers, float64; it is filled.
+        readings: (n_taxels, 3) of all fingers; is filled.
 
     Returns:
         Whether they were copied.
@@ -83,7 +101,9 @@ def copy_samples(samples: int, offsets: Integers, known: Integers, readings: int
             return False
     for f in range(n_fingers):
         first, n = 3 * offsets[f], 3 * (offsets[f + 1] - offsets[f])
-        _copy(_words(arrays[f], OBJECT_WORDS), known, _floats(readings + WORD * first, n))
+        _copy(
+            _words(arrays[f], OBJECT_WORDS), known, _floats(readings.ctypes.data + WORD * first, n)
+        )
     return True
 
 

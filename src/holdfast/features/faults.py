@@ -33,12 +33,10 @@ from holdfast.features.arrays import (
     ROUNDING_NOISE,
     SECOND_POWER,
     TAXEL_FAULTS,
-    Array,
-    Flags,
-    Integers,
     Layout,
     Memory,
 )
+from holdfast.sensors.types import Array, Flags, Integers
 
 # Bits of holdfast.contact.Fault.
 NOT_FINITE, STUCK, SATURATED, TARE_LOADED = 1, 2, 4, 8
@@ -96,6 +94,7 @@ def scan_readings(
         sum_x += x
         sum_y += y
         sum_z += z
+        # min and max over i and the axes of f_i.
         low, high = (x, y) if x < y else (y, x)  # takes half as long as min and max
         low = z if z < low else low
         high = z if z > high else high
@@ -123,6 +122,7 @@ def taxels_outside(
     found = 0
     for i in range(first, last):
         for axis in range(3):
+            # Bit i: some axis of f_i <= low or >= high.
             if not low < readings[i, axis] < high and not ignored[i]:
                 found |= bit_of(i - first)
     return found
@@ -155,6 +155,8 @@ def is_stuck(counts: Integers, f: int, period: float) -> bool:
     A sensor with a dead band, or with less noise than a step of its readings, rests while nothing
     moves it.
     """
+    # Stuck: more than half of the steps before the rest changed a reading, 0.5 s of changes at
+    # least, and the rest lasts max(0.5 s, 10 times the longest rest before).
     n_steps = counts[f, N_SEEN] - 1 - counts[f, N_UNCHANGED]
     changed_often = 2 * counts[f, N_CHANGES] > n_steps
     long = STUCK_SECONDS / period
@@ -167,6 +169,7 @@ def is_stuck(counts: Integers, f: int, period: float) -> bool:
 def _update_rest(counts: Integers, f: int, period: float) -> None:
     """Note that a finger rested, if its readings did not change for long."""
     n = counts[f, N_UNCHANGED]
+    # longest = max(longest, n), of rests of 0.5 s or more.
     if n >= STUCK_SECONDS / period and n > counts[f, LONGEST_REST]:
         counts[f, LONGEST_REST] = n
 
@@ -182,6 +185,7 @@ def is_pulled(counts: Integers, levels: Array, f: int, normal: float, period: fl
         normal: sum of its normal readings [unit of the readings].
         period: of the samples [s].
     """
+    # Pulled: sum_i z_i < -max(20 noise, 0.1 max F_a), for 0.25 s.
     limit = max(20.0 * levels[f, NOISE], 0.1 * levels[f, MAX_AMPLITUDE])
     counts[f, N_PULLED] = counts[f, N_PULLED] + 1 if normal < -limit else 0
     return bool(counts[f, N_PULLED] * period >= LOADED_SECONDS)
@@ -204,6 +208,7 @@ def _find_taxel_faults(
     first, last, period = layout.offsets[f], layout.offsets[f + 1], layout.period
     taxels, constants, counts = memory.taxels, layout.constants, memory.counts
     n_changes, long = counts[f, N_CHANGES], STUCK_SECONDS / period
+    # s = T / tau: the weight of a sample in a first order mean.
     share = min(1.0, period / NOISE_SMOOTHING)
     any_still, alone, loudest = _update_taxels(
         readings, memory.previous, taxels, first, last, n_changes, counts[f, N_SEEN], long, share
@@ -219,6 +224,7 @@ def _find_taxel_faults(
         )
     if alone and constants[f, N_USED] >= MIN_TAXELS:
         quiet = constants[f, ROUNDING_NOISE]
+        # Noise of a reading: noise of F / sqrt(n_used), where the step is not known.
         if math.isnan(quiet):  # its share in the noise of the finger
             quiet = memory.levels[f, NOISE] / math.sqrt(constants[f, N_USED])
         if _is_noisy(taxels, loudest, quiet):
@@ -259,6 +265,8 @@ def _update_taxels(
     total = largest = 0.0
     loudest = first
     for i in range(np.uint64(first), np.uint64(last)):
+        # D1 = f_i(k) - f_i(k-1), D2 = D1 - D1 of the last change:
+        # P1 = (1 - s) P1 + s |D1|^2, P2 = (1 - s) P2 + s |D2|^2. Without a change D1 = D2 = 0.
         x = readings[i, 0] - previous[i, 0]
         y = readings[i, 1] - previous[i, 1]
         z = readings[i, 2] - previous[i, 2]
@@ -289,6 +297,7 @@ def _update_taxels(
             taxels[i, N_CHANGED] += 1.0
             taxels[i, CHANGED_AT] = n_changes
         elif n_changes - taxels[i, CHANGED_AT] >= long:
+            # still: n_changes - n(last change) >= 0.5 s of changes.
             any_still = True
         taxels[i, FIRST_POWER], taxels[i, SECOND_POWER] = power, power_2
         total += power_2
@@ -300,6 +309,7 @@ def _update_taxels(
 @compiled_step
 def _update_longest(taxels: Array, i: int, still: float, long: float) -> None:
     """Update the longest time without a change, unless it was by a fault."""
+    # longest = still, unless still >= max(0.5 s, 10 (longest + 1)): that was a fault.
     few = taxels[i, N_CHANGED] < MIN_CHANGES
     if few or still < max(long, STILL_RATIO * (taxels[i, LONGEST_STILL] + 1.0)):
         taxels[i, LONGEST_STILL] = still
@@ -333,6 +343,8 @@ def _is_noisy(taxels: Array, i: int, quiet: float) -> bool:
         i: the taxel.
         quiet: least noise of a reading [unit of the readings]; NaN while unknown.
     """
+    # Noisy: P2 > 2.5 P1 (white noise has 3 P1), and P2 > 6 (100 noise)^2: D2 of white noise
+    # of a reading has the variance 6 noise^2.
     white = taxels[i, SECOND_POWER] > WHITE_RATIO * taxels[i, FIRST_POWER]
     return bool(white and taxels[i, SECOND_POWER] > 6.0 * (LOUD_RATIO * quiet) ** 2)
 
@@ -370,6 +382,7 @@ def _still_taxels(
             continue
         if not _has_reading(readings, i):
             continue  # zeros: nothing touches a sensor with a dead band
+        # Too few changes of its own: compared with the others, still >= 10 (others + 1).
         if changed < MIN_CHANGES and still < STILL_RATIO * (others + 1.0):
             continue
         bit = bit_of(i - first)
@@ -404,16 +417,19 @@ def _longest_still_of_moving(
         if ignored[i] or silent or _is_still(taxels, i, n_changes, period):
             continue
         n_live += 1
+        # Moving: changed in the last 0.25 s and in more than half of the samples.
         often = 2.0 * (n_changes - changed_at) < long and 2.0 * changed > changed_at
         if often and taxels[i, LONGEST_STILL] < long:
             n_moving += 1
             longest = max(longest, taxels[i, LONGEST_STILL])
+    # At least 80 % of the live taxels move.
     return longest if n_moving > 0 and n_moving >= MOVING_SHARE * n_live else -1.0
 
 
 @compiled_step
 def _is_still(taxels: Array, i: int, n_changes: int, period: float) -> bool:
     """Return whether a taxel does not change for far longer than ever before."""
+    # Still: 2 s at first; later max(0.5 s, 10 (longest + 1 sample)).
     still = n_changes - taxels[i, CHANGED_AT]
     if taxels[i, N_CHANGED] < MIN_CHANGES:
         return bool(still >= DEAD_SECONDS / period)

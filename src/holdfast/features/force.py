@@ -9,10 +9,10 @@ import numpy.typing as npt
 
 from holdfast.compiled import compiled_parallel, compiled_step
 from holdfast.errors import RecordingError
-from holdfast.features.arrays import Array
 from holdfast.features.tare import Tare, TareArgument, baseline_of, offline_tare
 from holdfast.recordings import Tactile
 from holdfast.sensors import Sensor
+from holdfast.sensors.types import Array
 
 BLOCK_SAMPLES = 16_384
 """Samples that are converted to float64 at a time: bounds the memory of offline work."""
@@ -145,6 +145,7 @@ def sum_taxels(
     readings: Array, baseline: Array, rotations: Array, first: int, last: int
 ) -> tuple[float, float, float, float]:
     """Return F_tip = sum_i R_i (f_i - baseline_i), and the sum of the normal readings."""
+    # F_tip = sum_i R_i (f_i - b_i), with the tare b_i (DESIGN, section 1); normal = sum_i z_i.
     fx = fy = fz = normal = 0.0
     for i in range(np.uint64(first), np.uint64(last)):
         x = readings[i, 0] - baseline[i, 0]
@@ -184,6 +185,7 @@ def _fill_forces_alone(values: Array, baseline: Array, rotations: Array, force: 
 
 @compiled_step
 def _fill_force(values: Array, baseline: Array, rotations: Array, force: Array) -> None:
+    # F_tip(k); the row stays NaN where a reading is not finite.
     x, y, z, _ = sum_taxels(values, baseline, rotations, 0, len(baseline))
     if math.isfinite(x + y + z):
         force[0], force[1], force[2] = x, y, z

@@ -18,8 +18,7 @@ import numpy as np
 import numpy.typing as npt
 
 from holdfast.compiled import compiled_parallel, compiled_step
-
-Array = npt.NDArray[np.float64]
+from holdfast.sensors.types import Array
 
 DEFAULT_WINDOW = 14
 """N_w, the number of samples in the window, as in most of the paper."""
@@ -107,11 +106,13 @@ def haar_windows(x: Array, window: int, m: Array, sigma: Array, scratch: Array) 
     p, d, s = scratch[0], scratch[1], scratch[2]
     next_p, next_d, next_s = scratch[3], scratch[4], scratch[5]
     own_d = scratch[6, :n]
+    # One pair: P = x_0 + x_1, D = x_0 - x_1, S = 0.
     _add(x, x[1:], p[:length])
     _subtract(x, x[1:], d[:length])
     s[:] = 0.0
     taken, size = 0, 1
     while True:
+        # N_w / 2 in binary: each of its ones is a block of so many pairs, the newest first.
         if n_pairs & size:
             start = 2 * (n_pairs - taken - size)
             if taken == 0:
@@ -126,13 +127,16 @@ def haar_windows(x: Array, window: int, m: Array, sigma: Array, scratch: Array) 
             break
         step = 2 * size
         length -= step
+        # Two equal halves: P = P_a + P_b, D = D_a + D_b, S = S_a + S_b + (D_a - D_b)^2 / (2 n).
         _join_equal(d, d[step:], s, s[step:], size, next_s[:length])
         _add(d, d[step:], next_d[:length])
         _add(p, p[step:], next_p[:length])
         p, d, s, next_p, next_d, next_s = next_p, next_d, next_s, p, d, s
         size = step
+    # m = sum(a) / N_w = P / (sqrt(2) N_w) (equation 1).
     for k in range(n):
         m[k] *= _m_factor(window)
+    # sigma = sqrt(sum (d - mean d)^2 / N_w) = sqrt(S / (2 N_w)) (equation 2).
     for k in range(n):
         sigma[k] = math.sqrt(sigma[k] * _sigma_factor(window))
 
@@ -160,6 +164,7 @@ def _join(
     older_d: Array, older_s: Array, n_older: int, newer_d: Array, newer_s: Array, n_newer: int
 ) -> None:
     """Add D and S of older blocks to those of the newer pairs of each window."""
+    # S = S_a + S_b + (b D_a - a D_b)^2 / (a b (a + b)), D = D_a + D_b.
     factor = _join_factor(n_older, n_newer)
     for k in range(len(newer_s)):
         apart = n_newer * older_d[k] - n_older * newer_d[k]
@@ -172,6 +177,7 @@ def _join_equal(
     older_d: Array, newer_d: Array, older_s: Array, newer_s: Array, size: int, joined: Array
 ) -> None:
     """Compute S of blocks of two equal halves."""
+    # The same with a = b = n: (n D_a - n D_b)^2 / (2 n^3) = (D_a - D_b)^2 / (2 n).
     factor = 0.5 / size
     for k in range(len(joined)):
         apart = older_d[k] - newer_d[k]
@@ -180,16 +186,19 @@ def _join_equal(
 
 @compiled_step
 def _join_factor(n_older: int, n_newer: int) -> float:
+    # 1 / (a b (a + b)); 0 where there is nothing to join with.
     return 1.0 / (n_older * n_newer * (n_older + n_newer)) if n_newer else 0.0
 
 
 @compiled_step
 def _m_factor(window: int) -> float:
+    # m = P / (sqrt(2) N_w).
     return 1.0 / (math.sqrt(2.0) * window)
 
 
 @compiled_step
 def _sigma_factor(window: int) -> float:
+    # sigma^2 = S / (2 N_w).
     return 0.5 / window
 
 
@@ -211,10 +220,12 @@ def append_pair(older: float, newer: float, blocks: Array, row: int, first: int,
         first: first column of the value.
         n: number of sizes.
     """
+    # One pair: P = x_0 + x_1, D = x_0 - x_1, S = 0.
     blocks[row, first], blocks[row, first + 1] = older + newer, older - newer
     blocks[row, first + 2] = 0.0
     size = 1
     for column in range(first, first + N_SUMS * (n - 1), N_SUMS):
+        # Two equal halves: S = S_a + S_b + (D_a - D_b)^2 / (2 n), P = P_a + P_b, D = D_a + D_b.
         then = _row_before(row, 2 * size, len(blocks))
         apart = blocks[then, column + 1] - blocks[row, column + 1]
         both = blocks[then, column + 2] + blocks[row, column + 2]
@@ -246,6 +257,7 @@ def newest_variance(blocks: Array, row: int, first: int, window: int) -> tuple[f
     taken, size, column = 0, 1, first
     while taken < n_pairs:
         if n_pairs & size:
+            # S = S_a + S_b + (b D_a - a D_b)^2 / (a b (a + b)), P = P_a + P_b, D = D_a + D_b.
             then = _row_before(row, 2 * taken, len(blocks))
             older = blocks[then, column + 1]
             apart = taken * older - size * drift
@@ -268,6 +280,7 @@ def fill_features(force: Array, window: int, out: Array) -> None:
         amplitude = np.empty(stop - start + window - 1)
         m, sigma = np.empty(stop - start), np.empty(stop - start)
         scratch = np.empty((_SCRATCH_ROWS, len(amplitude)))
+        # F_a of the block and of the window before it; then equations 1 and 2.
         _fill_amplitude(force[start - window + 1 : stop], amplitude)
         haar_windows(amplitude, window, m, sigma, scratch)
         _fill_rows(force[start:stop], amplitude[window - 1 :], m, sigma, out[start:stop])
@@ -276,6 +289,7 @@ def fill_features(force: Array, window: int, out: Array) -> None:
 @compiled_step
 def _fill_amplitude(force: Array, amplitude: Array) -> None:
     for k in range(len(amplitude)):
+        # F_a = |F_tip|.
         x, y, z = force[k, 0], force[k, 1], force[k, 2]
         amplitude[k] = math.sqrt(x * x + y * y + z * z)
 

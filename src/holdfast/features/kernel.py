@@ -53,9 +53,6 @@ from holdfast.features.arrays import (
     VALUES_WIDTH,
     WARM_UP,
     WINDOW,
-    Array,
-    Flags,
-    Integers,
     Layout,
     Memory,
     Output,
@@ -78,6 +75,7 @@ from holdfast.features.force import sum_taxels
 from holdfast.features.haar import N_SUMS, append_pair, newest_moments, newest_variance
 from holdfast.features.motion import update_motion
 from holdfast.features.tare import update_baseline
+from holdfast.sensors.types import Array, Flags, Integers
 
 GAP_LIMIT_PERIODS = 3.0003
 """A step in time of more sample periods is a gap. The part over 3 allows for rounding."""
@@ -103,6 +101,7 @@ def advance(
     """
     counts, status = memory.counts, output.status
     for f in range(len(present)):
+        # A gap: t - t_last > 3 T, with the period T.
         # False while LAST_TIME is NaN.
         if time - memory.levels[f, LAST_TIME] > GAP_LIMIT_PERIODS * layout.period:
             counts[f, N_STRETCH] = counts[f, N_UNCHANGED] = counts[f, N_PULLED] = 0
@@ -122,6 +121,7 @@ def advance(
         if status[f, REASON] != READY:
             _clear(output.features, f)
         elif present[f]:
+            # Phi = [F_a, F_x, F_y, F_z, m, sigma], or what the model asks for.
             total = _fill_features(layout, memory, output, f)
             if math.isnan(total):  # the noise is not known yet
                 status[f, REASON] = TARE
@@ -149,6 +149,7 @@ def _process(
         counts[f, N_STRETCH] = 0
         bits = taxels_outside(readings, ignored, first, last, -math.inf, math.inf)
         return FAULT, NOT_FINITE, bits
+    # Valid: low <= every reading <= high.
     if least < low or most > high:
         counts[f, N_STRETCH] = 0
         low, high = np.nextafter(low, -math.inf), np.nextafter(high, math.inf)
@@ -159,6 +160,7 @@ def _process(
     if not _update_tare(layout, memory, readings, f, elapsed):
         return TARE, 0, 0
     faults, bits = counts[f, TAXEL_FAULTS], counts[f, FAULTY_TAXELS]
+    # Saturated: a reading at low or at high.
     if least <= low or most >= high:
         faults |= SATURATED
         bits |= taxels_outside(readings, ignored, first, last, low, high)
@@ -171,11 +173,13 @@ def _update_tare(layout: Layout, memory: Memory, readings: Array, f: int, elapse
     counts, kind, seconds = memory.counts, layout.tare_kind, layout.tare_seconds
     first, last = layout.offsets[f], layout.offsets[f + 1]
     if math.isnan(memory.levels[f, NOISE]):
+        # noise = sqrt(sum |F(k) - F(k-1)|^2 / (6 n)), over the first n steps.
         complete = elapsed >= (seconds if kind == TARE_SECONDS else NOISE_SECONDS)
         _measure_noise(layout, memory, readings, f, complete)
     copy_readings(readings, memory.previous, first, last)
     if counts[f, N_TARED] < 0:
         return True
+    # b_i = mean of f_i over the samples with t - t_first < tare_seconds.
     running = elapsed < seconds or counts[f, N_TARED] == 0  # one sample at least
     return bool(update_baseline(readings, memory.baseline, counts, f, first, last, kind, running))
 
@@ -188,10 +192,12 @@ def _measure_noise(layout: Layout, memory: Memory, readings: Array, f: int, comp
     """
     levels = memory.levels
     if complete:
+        # noise = max(sqrt(sum |step|^2 / (6 n)), noise of the rounding).
         measured = math.sqrt(levels[f, SQUARED_STEPS] / (6.0 * max(levels[f, N_STEPS], 1.0)))
         levels[f, NOISE] = max(measured, layout.constants[f, MIN_NOISE])
     elif memory.counts[f, N_SEEN] > 1:
         first, last = layout.offsets[f], layout.offsets[f + 1]
+        # step = sum_i R_i (f_i(k) - f_i(k-1)).
         x, y, z, _ = sum_taxels(readings, memory.previous, layout.rotations, first, last)
         levels[f, SQUARED_STEPS] += x * x + y * y + z * z
         levels[f, N_STEPS] += 1.0
@@ -204,6 +210,7 @@ def _process_force(
     """Compute the force of a sample, given its faults so far. Return the same as `_process`."""
     counts, levels, windows = memory.counts, memory.levels, layout.windows
     first, last = layout.offsets[f], layout.offsets[f + 1]
+    # F_tip = sum_i R_i (f_i - b_i).
     x, y, z, normal = sum_taxels(readings, memory.baseline, layout.rotations, first, last)
     _append(memory.history, counts, values, f, x, y, z)
     _append_blocks(memory.history, memory.blocks, counts, f, layout.n_levels)
@@ -214,7 +221,9 @@ def _process_force(
     if faults & SERIOUS:
         counts[f, N_STRETCH] = counts[f, N_PULLED] = 0
         return FAULT, faults, bits
+    # max over k of F_a(k).
     levels[f, MAX_AMPLITUDE] = max(levels[f, MAX_AMPLITUDE], values[f, AMPLITUDE])
+    # m and sigma over the reported window: equations 1 and 2 of the paper.
     if counts[f, N_STRETCH] >= windows[f, SIGMA_WINDOW]:
         found = _moments(memory.blocks, counts, f, 0, windows[f, SIGMA_WINDOW])
         values[f, MEAN], values[f, SIGMA] = found
@@ -233,6 +242,7 @@ def _append(
     history: Array, counts: Integers, values: Array, f: int, x: float, y: float, z: float
 ) -> None:
     """Append a force to the history of a finger, and write it to the output."""
+    # F_a = |F_tip|. A ring of `length` values, each written twice: every window is contiguous.
     amplitude = math.sqrt(x * x + y * y + z * z)
     length = history.shape[2] // 2
     place = counts[f, N_STRETCH] % length
@@ -251,6 +261,7 @@ def _append_blocks(history: Array, blocks: Array, counts: Integers, f: int, n_le
     """Append the blocks of pairs that end with the newest value, of each channel that needs it."""
     end, width = counts[f, HISTORY_END], N_SUMS * n_levels
     for channel in range(blocks.shape[2] // width):
+        # The pair (x_0, x_1) = (x(k-1), x(k)): P = x_0 + x_1, D = x_0 - x_1, S = 0 (haar.py).
         older, newer = history[f, channel, end - 2], history[f, channel, end - 1]
         append_pair(older, newer, blocks[f], end - 1 - blocks.shape[1], width * channel, n_levels)
 
@@ -272,6 +283,7 @@ def _compute_own(layout: Layout, memory: Memory, output: Output, f: int) -> None
             own[f, place] = math.nan
         else:
             if window == reported and kind < SIGMA_XYZ:
+                # m or sigma, which are computed already.
                 value = output.values[f, MEAN + kind - FIRST_WINDOWED]
             else:
                 value = _feature(kind, window, history, memory.blocks, counts, layout.n_levels, f)
@@ -291,6 +303,7 @@ def _fill_features(layout: Layout, memory: Memory, output: Output, f: int) -> fl
                 rival = own[other, place]
                 if not layout.alike:
                     rival = _feature_of_other(layout, memory, f, place, other)
+                # max over the fingers, of those that have the feature.
                 if rival > value or math.isnan(value):
                     value = rival
         output.features[f, place] = value
@@ -318,9 +331,13 @@ def _feature(
     kind: int, window: int, history: Array, blocks: Array, counts: Integers, n_levels: int, f: int
 ) -> float:
     if kind < FIRST_WINDOWED:
+        # F_a, F_x, F_y or F_z of the newest sample.
         return float(history[f, kind, counts[f, HISTORY_END] - 1])
     if kind < SIGMA_XYZ:
+        # m or sigma of F_a: equations 1 and 2.
         return _moments(blocks, counts, f, 0, window)[kind - FIRST_WINDOWED]
+    # change = |F_tip(k) - F_tip(k - N_w + 1)|.
+    # sigma_xyz = sqrt(sigma(F_x)^2 + sigma(F_y)^2 + sigma(F_z)^2).
     total, newest = 0.0, counts[f, HISTORY_END] - 1
     for axis in range(1, 4):
         if kind == CHANGE:
@@ -342,6 +359,8 @@ def _moments(
 
 @compiled_step
 def _transform(value: float, transform: int, window: int, noise: float, floor: float) -> float:
+    # none: v. log: log(sqrt(v^2 + floor^2)).
+    # noise: log(max(v, sigma_n / 1000) / sigma_n), with sigma_n = `noise_sigma`.
     if transform == 0:
         return float(value)
     if transform == 1:
@@ -353,6 +372,8 @@ def _transform(value: float, transform: int, window: int, noise: float, floor: f
 @compiled_step
 def noise_sigma(noise: float, window: int) -> float:
     """Return the sigma that noise of a standard deviation gives."""
+    # E[sigma^2] of white noise: d = (x_0 - x_1) / sqrt(2) has the variance noise^2, and
+    # sum (d - mean d)^2 over N_w / 2 pairs, divided by N_w, has (N_w / 2 - 1) / N_w of it.
     return noise * math.sqrt((window - 2.0) / (2.0 * window))
 
 

@@ -38,11 +38,10 @@ from holdfast.features.arrays import (
     TAXEL_NOISE_NOW,
     TRACK_MOMENT,
     TRACK_PRESSURE,
-    Array,
-    Integers,
     Layout,
     Memory,
 )
+from holdfast.sensors.types import Array, Integers
 
 LOAD_DECAY_SECONDS = 5.0
 """Time constant with which the largest load so far is forgotten [s]."""
@@ -104,6 +103,9 @@ def _append_sample(
     nx, ny, nz = layout.normals[f, 0], layout.normals[f, 1], layout.normals[f, 2]
     length = len(forces)
     before = (now - 1) % length
+    # g_i = R_i (f_i - b_i), F = sum g_i, h_i = g_i - g_i(reference), p_i = |h_i . n|:
+    # centre c = sum p_i r_i / sum p_i, moment = n . sum r_i x g_i, taxel load = sqrt(sum |h_i|^2),
+    # moved = sum |g_i(k) - g_i(k-1)|^2.
     fx, fy, fz, weight, squares, moved = 0.0, 0.0, 0.0, 0.0, 0.0, 0.0
     cx, cy, cz, moment = 0.0, 0.0, 0.0, 0.0
     for i in range(np.uint64(first), np.uint64(last)):
@@ -127,6 +129,7 @@ def _append_sample(
         cx, cy, cz = cx + pressed * px, cy + pressed * py, cz + pressed * pz
         moment += nx * (py * gz - pz * gy) + ny * (pz * gx - px * gz) + nz * (px * gy - py * gx)
     weight = max(weight, 1e-300)
+    # step = |F(k) - F(k-1)|^2.
     step = 0.0
     if has_previous:
         dx, dy, dz = fx - track[f, 0, before], fy - track[f, 1, before], fz - track[f, 2, before]
@@ -136,6 +139,7 @@ def _append_sample(
     track[f, TRACK_PRESSURE + 1, now] = cy / weight
     track[f, TRACK_PRESSURE + 2, now] = cz / weight
     track[f, TRACK_MOMENT, now] = moment
+    # Sums over the block: squares of steps of F and of all g_i. Repeated samples do not count.
     motion = memory.motion
     motion[f, TAXEL_LOAD] = math.sqrt(squares)
     if memory.counts[f, N_UNCHANGED] == 0 and has_previous:
@@ -157,6 +161,7 @@ def _update_load(layout: Layout, memory: Memory, f: int, now: int) -> None:
     track, motion = memory.track, memory.motion
     nx, ny, nz = layout.normals[f, 0], layout.normals[f, 1], layout.normals[f, 2]
     x, y, z = track[f, 0, now], track[f, 1, now], track[f, 2, now]
+    # The reference: F and g_i at the least F . n so far.
     normal = x * nx + y * ny + z * nz
     if normal < motion[f, LEAST_NORMAL]:
         motion[f, LEAST_NORMAL] = normal
@@ -170,6 +175,7 @@ def _update_load(layout: Layout, memory: Memory, f: int, now: int) -> None:
         y - motion[f, REFERENCE + 1],
         z - motion[f, REFERENCE + 2],
     )
+    # load = |F - F_ref|, peak(k) = max(load(k), exp(-T / tau) peak(k-1)); the same for taxels.
     keep = math.exp(-layout.period / LOAD_DECAY_SECONDS)
     motion[f, LOAD] = math.sqrt(x * x + y * y + z * z)
     motion[f, PEAK_LOAD] = max(motion[f, LOAD], keep * motion[f, PEAK_LOAD])
@@ -180,6 +186,7 @@ def _update_load(layout: Layout, memory: Memory, f: int, now: int) -> None:
 def _update_movement(layout: Layout, memory: Memory, f: int, now: int, time: float) -> None:
     """Note the time if the force moves: by much more than its noise, and more than an echo."""
     track, motion, length = memory.track, memory.motion, memory.track.shape[2]
+    # |F(k) - F(k - MOVE_SECONDS / T)| > max(5 noise, 0.08 peak): the force moves.
     back = min(round(MOVE_SECONDS / layout.period), memory.counts[f, N_STRETCH] - 1, length - 1)
     then = (now - back) % length
     x = track[f, 0, now] - track[f, 0, then]
@@ -195,15 +202,18 @@ def _update_noise(layout: Layout, motion: Array, counts: Integers, f: int, time:
     """Update the noise: the least mean square step over blocks, halved, and its root."""
     if math.isnan(motion[f, BLOCK_START]):
         motion[f, BLOCK_START] = time
+    # Three components, each with at least the noise of rounding.
     floor = math.sqrt(3.0) * layout.constants[f, MIN_NOISE]
     steps = motion[f, BLOCK_STEPS]
     if steps == 0.0:
         if math.isinf(motion[f, LEAST_NOISE]):
             motion[f, NOISE_NOW] = motion[f, TAXEL_NOISE_NOW] = floor
         return
+    # noise = sqrt(sum |F(k) - F(k-1)|^2 / (2 n)) over a block of n steps; the same for taxels.
     force = max(math.sqrt(motion[f, BLOCK_SQUARES] / (2.0 * steps)), floor)
     taxels = max(math.sqrt(motion[f, BLOCK_TAXEL_SQUARES] / (2.0 * steps)), floor)
     if time - motion[f, BLOCK_START] >= NOISE_BLOCK_SECONDS and steps >= MIN_BLOCK_STEPS:
+        # The least over the blocks that are complete.
         motion[f, LEAST_NOISE] = min(motion[f, LEAST_NOISE], force)
         motion[f, LEAST_TAXEL_NOISE] = min(motion[f, LEAST_TAXEL_NOISE], taxels)
         motion[f, BLOCK_SQUARES] = motion[f, BLOCK_TAXEL_SQUARES] = motion[f, BLOCK_STEPS] = 0.0
@@ -219,8 +229,10 @@ def _fill_lag(layout: Layout, memory: Memory, f: int, now: int, then: int, lag: 
     track, motion, out = memory.track, memory.motion, memory.relative
     nx, ny, nz = layout.normals[f, 0], layout.normals[f, 1], layout.normals[f, 2]
     noise, taxel_noise = motion[f, NOISE_NOW], motion[f, TAXEL_NOISE_NOW]
+    # L = peak + 100 noise.
     load = motion[f, PEAK_LOAD] + NOISE_WEIGHT * noise
     taxel_load = motion[f, PEAK_TAXEL_LOAD] + NOISE_WEIGHT * taxel_noise
+    # v = |dF| and |dF - (dF . n) n|, over L.
     x = track[f, 0, now] - track[f, 0, then]
     y = track[f, 1, now] - track[f, 1, then]
     z = track[f, 2, now] - track[f, 2, then]
@@ -229,18 +241,22 @@ def _fill_lag(layout: Layout, memory: Memory, f: int, now: int, then: int, lag: 
     out[f, FORCE_CHANGE, lag] = _relative(square, noise * noise, load)
     shear = square - across * across
     out[f, SHEAR_CHANGE, lag] = _relative(shear, TWO_AXES * noise * noise, load)
+    # v = sqrt(sum |dg_i - mean dg|^2), whole and across the normal, over the taxels' L.
     n_used = layout.constants[f, N_USED]
     moved, pressed = _residual(layout, memory, f, now, then, x / n_used, y / n_used, z / n_used)
     echo = taxel_noise * taxel_noise
     out[f, RESIDUAL, lag] = _relative(moved, echo, taxel_load)
     out[f, SHEAR_RESIDUAL, lag] = _relative(moved - pressed, TWO_AXES * echo, taxel_load)
+    # log(|dc| + PRESSURE_FLOOR).
     shift = 0.0
     for axis in range(3):
         delta = track[f, TRACK_PRESSURE + axis, now] - track[f, TRACK_PRESSURE + axis, then]
         shift += delta * delta
     out[f, PRESSURE_SHIFT, lag] = math.log(math.sqrt(shift) + PRESSURE_FLOOR)
+    # v = |d moment|, over L.
     turned = track[f, TRACK_MOMENT, now] - track[f, TRACK_MOMENT, then]
     out[f, MOMENT_CHANGE, lag] = _relative(turned * turned, ONE_AXIS * echo, load)
+    # log(L / noise).
     out[f, LOAD_TO_NOISE, lag] = math.log(load / noise)
 
 
@@ -251,6 +267,7 @@ def _residual(
     """Return the squared motion of the taxels against their mean, and its part along the normal."""
     forces = memory.taxel_forces
     nx, ny, nz = layout.normals[f, 0], layout.normals[f, 1], layout.normals[f, 2]
+    # sum |u_i|^2 and sum (u_i . n)^2, with u_i = dg_i - mean dg.
     moved, pressed = 0.0, 0.0
     for i in range(np.uint64(layout.offsets[f]), np.uint64(layout.offsets[f + 1])):
         if not layout.ignored[i]:
@@ -266,5 +283,6 @@ def _residual(
 @compiled_step
 def _relative(square: float, noise_square: float, load: float) -> float:
     """Return log(v / load) of a change v, given v^2 with noise; at least log(LEAST_CHANGE)."""
+    # log sqrt(max(v^2 - 4 noise^2, 0) / L^2 + LEAST_CHANGE^2).
     square = max(square - NOISE_SQUARES * noise_square, 0.0)
     return 0.5 * math.log(square / (load * load) + LEAST_CHANGE * LEAST_CHANGE)

@@ -7,6 +7,7 @@ import msgspec
 import numpy as np
 import numpy.typing as npt
 
+from holdfast.features.arrays import SPECS_WIDTH
 from holdfast.features.haar import DEFAULT_WINDOW, FEATURE_NAMES, check_window
 
 RELATIVE_KINDS = (
@@ -202,10 +203,10 @@ def spec_codes(
         lags: of all relative features of the stream, in seconds.
 
     Returns:
-        (width, 5) kind, window (or place of the lag), transform, scope, and the first feature
-        that is the same except for its scope; -1 is padding.
+        (width, SPECS_WIDTH) kind, window (or place of the lag), transform, scope, and the first
+        feature that is the same except for its scope; -1 is padding.
     """
-    codes = np.full((width, 5), -1, dtype=np.int64)
+    codes = np.full((width, SPECS_WIDTH), -1, dtype=np.int64)
     own = [(spec.kind, spec.window, spec.transform, spec.floor, spec.seconds) for spec in specs]
     for row, spec, alike in zip(codes, specs, own, strict=False):
         row[:] = (

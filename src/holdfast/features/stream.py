@@ -40,8 +40,6 @@ from holdfast.features.arrays import (
     TRACK_WIDTH,
     VALUES_WIDTH,
     WARM_UP,
-    Array,
-    Flags,
     Layout,
     Memory,
     Output,
@@ -51,6 +49,7 @@ from holdfast.features.specs import FeatureSpec, spec_codes
 from holdfast.features.tare import Tare, baseline_of
 from holdfast.recordings import Recording
 from holdfast.sensors import Sensor
+from holdfast.sensors.types import Array, Flags
 
 TARE_KINDS = {
     "seconds": TARE_SECONDS,

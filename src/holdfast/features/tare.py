@@ -12,8 +12,9 @@ import numpy as np
 import numpy.typing as npt
 
 from holdfast.compiled import compiled_step
-from holdfast.features.arrays import N_TARED, TARE_FIRST, TARE_SECONDS, Array, Integers
+from holdfast.features.arrays import N_TARED, TARE_FIRST, TARE_SECONDS
 from holdfast.recordings import Tactile
+from holdfast.sensors.types import Array, Integers
 
 TareArgument = float | str | tuple[float, float]
 """Seconds from the start, "first", "none", "START:END", or (start, end) in seconds."""
@@ -178,6 +179,7 @@ def update_baseline(
         kind: code of the tare.
         running: whether the sample lies in the time of the tare.
     """
+    # b_i = (1 / n) sum_k f_i(k) over the time of the tare; of the first sample alone: n = 1.
     taking = running and kind == TARE_SECONDS
     n_taken = max(counts[f, N_TARED], 1)
     for i in range(first, last):

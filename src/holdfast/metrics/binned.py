@@ -12,9 +12,7 @@ import numpy as np
 import numpy.typing as npt
 
 from holdfast.metrics.samples import ScoredSamples, pool_samples
-from holdfast.sensors.types import Array
-
-Integers = npt.NDArray[np.int64]
+from holdfast.sensors.types import Array, Integers
 
 MAX_LOG_ODDS = 40.0
 """Log odds at the first and the last bin; those of float64 end at 37."""

@@ -14,6 +14,8 @@ from holdfast.files import check_keys, read_input
 from holdfast.sensors.taxel_numbers import taxel_number
 
 Array = npt.NDArray[np.float64]
+Integers = npt.NDArray[np.int64]
+Flags = npt.NDArray[np.bool_]
 Unit = Literal["count", "N"]
 
 MAX_RATE = 1e6

@@ -5,15 +5,14 @@ from collections.abc import Mapping
 from pathlib import Path
 
 import numpy as np
-import numpy.typing as npt
 from scipy.spatial.transform import Rotation
 
 from holdfast.files import read_input
+from holdfast.sensors.types import Array
 
 MAX_URDF_SIZE = 1 << 26
 """Maximum size of a URDF file [bytes]."""
 
-Array = npt.NDArray[np.float64]
 Pose = tuple[Array, Array]
 """Position [m] and rotation matrix."""
 

@@ -9,20 +9,18 @@ import numpy.typing as npt
 
 from holdfast.compiled import compiled
 from holdfast.contact import NO_CONTACT, STABLE, UNKNOWN
+from holdfast.detector.arrays import CANDIDATE, LAST_UNSTABLE, STATE
 from holdfast.detector.decision_rule import (
-    CANDIDATE,
-    LAST_UNSTABLE,
-    STATE,
     classify_contact,
     debounce,
     hold_unstable,
     new_decision_memory,
 )
-from holdfast.features.arrays import Array, Integers
 from holdfast.metrics import AlarmMatch, Decisions, FingerDecisions, hand_decisions
 from holdfast.metrics.events import match_decisions
 from holdfast.model import Debounce, Model
 from holdfast.recordings import Recording
+from holdfast.sensors.types import Array, Integers
 from holdfast.training.evaluation import compute_decisions
 
 Codes = npt.NDArray[np.int8]
