@@ -1,11 +1,8 @@
 """Folds: which units, groups or samples are held out together."""
 
 import numpy as np
-import numpy.typing as npt
 
-Array = npt.NDArray[np.float64]
-Flags = npt.NDArray[np.bool_]
-Integers = npt.NDArray[np.int64]
+from holdfast.sensors.types import Array, Flags, Integers
 
 
 def shuffled(n_units: int, seed: int) -> Integers:

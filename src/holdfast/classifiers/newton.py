@@ -16,8 +16,8 @@ import numpy as np
 import numpy.typing as npt
 
 from holdfast.compiled import compiled
+from holdfast.sensors.types import Array
 
-Array = npt.NDArray[np.float64]
 Evaluate = Callable[[Array, Array, Array], float]
 """Return the objective at weights, and write its gradient and its Hessian."""
 

@@ -17,7 +17,7 @@ from holdfast.classifiers import Samples
 from holdfast.classifiers.folds import random_folds
 from holdfast.features import FEATURE_NAMES, Tare, haar_features
 from holdfast.recordings import Recording
-from holdfast.sensors.types import Array
+from holdfast.sensors.types import Array, Integers
 from holdfast.training.training_samples import (
     concatenate,
     labelled_samples,
@@ -35,8 +35,6 @@ N_PARTS = 25
 ENERGY = "energy"
 """Zhang's feature: the energy of the Haar details of F_x."""
 COLUMNS = (*FEATURE_NAMES, ENERGY)
-
-Integers = npt.NDArray[np.int64]
 
 
 @dataclass(frozen=True, eq=False)
