@@ -7,6 +7,8 @@ from holdfast.classifiers import Samples
 from holdfast.errors import TrainingError
 from holdfast_lab.classifiers.trees import GradientBoosting
 
+pytestmark = pytest.mark.slow
+
 RECIPE = GradientBoosting()
 
 
