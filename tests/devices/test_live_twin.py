@@ -8,6 +8,8 @@ from holdfast.grip import FingerCommand, GripCommand, LoopState
 from holdfast.twin.hand import FINGERS
 from holdfast.twin.simulation import Grasp, simulate
 
+pytestmark = pytest.mark.slow
+
 URI = "twin:?object=ball&case=1&profile=finger-vigorous"
 
 

@@ -14,6 +14,8 @@ from holdfast.recordings import Recording
 
 from . import build
 
+pytestmark = pytest.mark.slow
+
 DOCS = Path(__file__).parents[2] / "docs"
 MODELS = ("builtin:any", "builtin:twin", "builtin:noise-floor")
 

@@ -16,6 +16,8 @@ from holdfast.resampling import resample
 
 from . import build
 
+pytestmark = pytest.mark.slow
+
 
 def detected(recording, model=None, steps=None, **options):
     source = build.Script.of(recording, steps)

@@ -23,6 +23,7 @@ def fitted(given, seed=0):
     return RECIPE.fit(given, RECIPE.reference, seed)
 
 
+@pytest.mark.slow
 def test_they_learn_classes_that_no_line_separates():
     trees = fitted(square())
     assert trees.n_features == 2

@@ -11,6 +11,8 @@ from holdfast_lab.trial.report import Example, report_sections, summary_text
 
 from .example_results import results_of
 
+pytestmark = pytest.mark.slow
+
 COURSE = TrialCourse(times=[-0.5, 0.0, 0.5], force=[2.0, 2.0, 0.5], least=[1.0, 1.0, 2.0],
                      slip_speed=[0.0, 0.0, 0.1], lost_at=0.5)  # fmt: skip
 EXAMPLE = Example("Trial 0: can.", {"fixed": COURSE, "holdfast": COURSE}, b"RIFF")

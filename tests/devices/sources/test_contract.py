@@ -13,6 +13,8 @@ from holdfast.errors import HoldfastError
 from holdfast.model import Model
 from holdfast.sensors import Sensor
 
+pytestmark = pytest.mark.slow
+
 LIMIT = 20.0
 """A test that hangs fails after this [s]."""
 

@@ -64,7 +64,9 @@ def wait_for(path, n):
     end = time.monotonic() + PATIENCE
     while len(commands(path)) < n and time.monotonic() < end:
         time.sleep(0.01)
-    return commands(path)
+    found = commands(path)
+    assert len(found) >= n, f"{n} commands expected, {found} came"
+    return found
 
 
 @pytest.fixture

@@ -17,6 +17,8 @@ from holdfast_lab.study.comparison.real_recordings import MODELS
 from holdfast_lab.study.plan import scan_corpus
 from study.example_recordings import save_all
 
+pytestmark = pytest.mark.slow
+
 FINGERS = ("finger1", "finger2")
 
 

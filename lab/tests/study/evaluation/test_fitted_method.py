@@ -13,6 +13,8 @@ from holdfast_lab.study.methods import HAND, METHODS
 from holdfast_lab.study.plan import scan_corpus
 from study.example_recordings import save_synthetic
 
+pytestmark = pytest.mark.slow
+
 
 def recording_at(times):
     empty = {name: np.zeros(len(own), dtype=np.int8) for name, own in times.items()}

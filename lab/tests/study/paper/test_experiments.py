@@ -1,10 +1,14 @@
 from dataclasses import replace
 
+import pytest
+
 from holdfast.contact import ContactState
 from holdfast.synthetic import synthetic_recording
 from holdfast_lab.study.paper import experiments
 from holdfast_lab.study.plan import scan_corpus
 from study.example_recordings import recordings_of_cases, save_all, save_synthetic
+
+pytestmark = pytest.mark.slow
 
 
 def test_recordings_are_chosen_by_case_and_name_in_test_data_first(tmp_path):

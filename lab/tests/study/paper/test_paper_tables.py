@@ -8,6 +8,8 @@ from holdfast_lab.study.paper.random_split import FitBudget
 from holdfast_lab.study.plan import Corpus, StudyPlan, scan_corpus
 from study.example_recordings import save_synthetic
 
+pytestmark = pytest.mark.slow
+
 NAMES = ("confusion", "window", "ablation", "unseen", "fingers", "zhang", "discrepancies")
 
 

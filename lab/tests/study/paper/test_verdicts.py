@@ -12,6 +12,8 @@ from holdfast_lab.study.paper.verdicts import find_disturbances, stable_after_lo
 from holdfast_lab.study.plan import StudyPlan, scan_corpus
 from study.example_recordings import recording_with_truth, save_all, truth_of
 
+pytestmark = pytest.mark.slow
+
 TIMES = np.arange(1725) / 150
 TRUTH = truth_of(TIMES, ("thumb", "index"))
 """Locked at 2.3 s, disturbed from 5.3 to 6.5 s, released at 9.5 s."""
