@@ -7,7 +7,8 @@ import numpy as np
 
 from holdfast.classifiers import LinearClassifier, Parameters, Samples
 from holdfast.classifiers.adapted import CALIBRATION, NONE, WEIGHTS, Adapted
-from holdfast.classifiers.folds import Array, Flags, Integers, group_folds, time_folds
+from holdfast.classifiers.folds import group_folds, time_folds
+from holdfast.sensors.types import Array, Flags, Integers
 from holdfast.training.splits import TIME_FOLDS, TIME_GAP
 from holdfast.training.training_samples import FingerSamples, thinning_step
 from holdfast.training.tuning import log_losses

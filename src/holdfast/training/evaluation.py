@@ -5,7 +5,6 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from holdfast.classifiers.folds import Integers
 from holdfast.contact import SIGNAL_FAULTS, UNKNOWN, Fault
 from holdfast.detector import detect
 from holdfast.metrics import (
@@ -22,6 +21,7 @@ from holdfast.metrics.truth_labels import LabelRule, labels_by_truth
 from holdfast.model import Model
 from holdfast.parallel import Engine
 from holdfast.recordings import Recording, label_states
+from holdfast.sensors.types import Integers
 from holdfast.training.dataset_scan import OneRecording
 from holdfast.training.progress import Progress, show_nothing
 from holdfast.training.verdict import LoadedTares, verdict

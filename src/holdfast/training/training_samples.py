@@ -9,7 +9,6 @@ import numpy as np
 import numpy.typing as npt
 
 from holdfast.classifiers import Samples
-from holdfast.classifiers.folds import Integers
 from holdfast.contact import NO_CONTACT, STABLE, UNKNOWN
 from holdfast.errors import TrainingError
 from holdfast.features import FeatureSpec, Tare
@@ -20,6 +19,7 @@ from holdfast.parallel import Engine
 from holdfast.recordings import Recording, Tactile, label_states
 from holdfast.resampling import resample
 from holdfast.sensors import Sensor
+from holdfast.sensors.types import Integers
 from holdfast.training.dataset_scan import DatasetScan, OneRecording
 from holdfast.training.progress import Progress, show_nothing
 from holdfast.training.setting import Setting

@@ -16,18 +16,13 @@ from holdfast.classifiers import RECIPES, Classifier, Parameters, Recipe, Sample
 from holdfast.metrics import bootstrap_interval, ratio_of_sums
 from holdfast.metrics.intervals import Interval
 from holdfast.metrics.statistics import percent
+from holdfast.sensors.types import Integers
 from holdfast.training.setting import SEARCH_SAMPLES
 from holdfast.training.splits import inner_folds
 from holdfast.training.training_samples import thin, thinning_step
 from holdfast.training.tuning import search
 from holdfast_lab.report.result_tables import Row
-from holdfast_lab.study.paper.pooled_samples import (
-    UNTREATED,
-    Integers,
-    SamplePool,
-    Treatment,
-    pool_samples,
-)
+from holdfast_lab.study.paper.pooled_samples import UNTREATED, SamplePool, Treatment, pool_samples
 from holdfast_lab.study.plan import Corpus
 
 if TYPE_CHECKING:
