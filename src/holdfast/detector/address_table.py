@@ -152,7 +152,7 @@ def _names_of(definition: type) -> dict[str, Any]:
 
 def _run(source: str, name: str, names: dict[str, Any]) -> Any:  # noqa: ANN401 (a function)
     """Return the function that a source text defines; numba keeps it beside this file."""
-    scope = {"np": np, "carray": carray, "pointer": pointer, **names}
+    scope = {"__name__": __name__, "np": np, "carray": carray, "pointer": pointer, **names}
     exec(compile(source, __file__, "exec"), scope)
     return scope[name]
 
