@@ -1,0 +1,259 @@
+"""The recipes of CONTRIBUTING, followed in a temporary copy: only the files that they name."""
+
+import json
+import os
+import re
+import shutil
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+import holdfast
+from holdfast.contact import ContactState
+from holdfast.io import save_recording
+from holdfast.recordings import Label
+from holdfast.synthetic import synthetic_recording
+
+PACKAGE = Path(holdfast.__file__).parent
+CONTRIBUTING = Path(__file__).parent.parent / "CONTRIBUTING.md"
+
+
+VERB = ("-c", "import sys; from holdfast.cli import main; sys.exit(main())")
+
+
+class Copy:
+    """A copy of the package that a recipe changes.
+
+    Args:
+        folder: for the copy.
+        title: of the recipe in CONTRIBUTING.
+    """
+
+    def __init__(self, folder, title):
+        ignored = shutil.ignore_patterns("static", "page")
+        shutil.copytree(PACKAGE, folder / "holdfast", ignore=ignored)
+        section = CONTRIBUTING.read_text().split(f"### {title}\n")[1].split("\n### ")[0]
+        named = re.findall(r"`(?:src/)?(holdfast/[\w/<>.]+)`", section.replace("src/", ""))
+        self.folder, self._named = folder, set(named)
+
+    def add(self, name, kind, text):
+        """Write a new file, which the recipe calls after its kind: `<kind>.py`."""
+        self._check(str(Path(name).with_name(f"<{kind}>.py")))
+        assert not (self.folder / name).exists()
+        (self.folder / name).write_text(text)
+
+    def change(self, name, *changes):
+        """Replace texts of a file; each occurs once."""
+        self._check(name)
+        text = (self.folder / name).read_text()
+        for before, after in changes:
+            assert text.count(before) == 1, f"{before!r} in {name}"
+            text = text.replace(before, after)
+        (self.folder / name).write_text(text)
+
+    def run(self, *arguments):
+        """Run Python with the copy, and return its output."""
+        environment = {**os.environ, "PYTHONPATH": str(self.folder)}
+        command = [sys.executable, *map(str, arguments)]
+        ended = subprocess.run(
+            command, capture_output=True, text=True, env=environment, check=False, timeout=240
+        )
+        assert ended.returncode == 0, ended.stderr
+        return ended.stdout
+
+    def _check(self, name):
+        assert name in self._named, f"the recipe does not name {name}, but {self._named}"
+
+
+@pytest.fixture
+def copy_of(tmp_path):
+    return lambda title: Copy(tmp_path, title)
+
+
+SPHERE = '''
+"""Sphere about the mean of the stable samples: a classifier that is not linear."""
+
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from holdfast.classifiers.fitting import check_classes
+from holdfast.classifiers.onnx_classifier import OnnxClassifier
+
+
+@dataclass(frozen=True)
+class Sphere:
+    """The probability falls with the distance from the stable mean."""
+
+    name: str = "sphere"
+    reference: dict = field(default_factory=lambda: {"size": 2.0})
+
+    def suggest(self, trial):
+        """Draw the size."""
+        return {"size": trial.suggest_float("size", 0.5, 8.0, log=True)}
+
+    def fit(self, samples, parameters, seed):
+        """Fit the mean and the spread."""
+        import onnx
+
+        check_classes(samples)
+        mean, spread = samples.features[samples.stable].mean(0), samples.features.std(0)
+        axes = np.array([1])
+        constants = {"mean": mean, "spread": spread * parameters["size"] + 1e-9, "axes": axes}
+        helper, real = onnx.helper, onnx.TensorProto.DOUBLE
+        graph = helper.make_graph(
+            [
+                helper.make_node("Sub", ["x", "mean"], ["d"]),
+                helper.make_node("Div", ["d", "spread"], ["u"]),
+                helper.make_node("ReduceSumSquare", ["u", "axes"], ["s"]),
+                helper.make_node("Neg", ["s"], ["n"]),
+                helper.make_node("Exp", ["n"], ["p"]),
+            ],
+            "sphere",
+            [helper.make_tensor_value_info("x", real, ["n", len(mean)])],
+            [helper.make_tensor_value_info("p", real, ["n", 1])],
+            [onnx.numpy_helper.from_array(array, key) for key, array in constants.items()],
+        )
+        opset = [helper.make_opsetid("", 18)]
+        model = helper.make_model(graph, opset_imports=opset, ir_version=9)
+        return OnnxClassifier.of(model.SerializeToString(), len(mean), 0.5)
+'''
+
+MIDDLE = '''
+"""Cut of one feature in the middle between the means of the classes."""
+
+from dataclasses import dataclass, field
+
+from holdfast.classifiers.fitting import check_classes, sigmoid, standardise
+from holdfast.classifiers.linear import LinearClassifier
+
+
+@dataclass(frozen=True)
+class Middle:
+    """The direction is that of the difference of the means."""
+
+    name: str = "middle"
+    reference: dict = field(default_factory=dict)
+
+    def suggest(self, trial):
+        """Return no parameters."""
+        return {}
+
+    def fit(self, samples, parameters, seed):
+        """Fit the means."""
+        check_classes(samples)
+        mean, scale, rows = standardise(samples.features)
+        high, low = rows[samples.stable].mean(axis=0), rows[~samples.stable].mean(axis=0)
+        slope, offset = sigmoid(rows @ (high - low), samples.stable)
+        return LinearClassifier(
+            tuple(mean.tolist()), tuple(scale.tolist()), tuple((high - low).tolist()), 0.0,
+            slope, offset,
+        )
+'''
+
+
+def labelled_recordings(folder):
+    """Two recordings whose first half is stable."""
+    folder.mkdir()
+    for seed in (0, 1):
+        recording = synthetic_recording(f"grasp-{seed}", seed=seed)
+        start, end = recording.start, recording.end
+        middle = (start + end) / 2
+        labels = [
+            Label(start, middle, ContactState.STABLE),
+            Label(middle, end, ContactState.UNSTABLE),
+        ]
+        labelled = recording.with_labels(dict.fromkeys(recording.modules, labels))
+        save_recording(labelled, folder / f"grasp-{seed}.mcap")
+    return folder
+
+
+@pytest.mark.parametrize(
+    ("name", "kind", "text"), [("middle", "Middle", MIDDLE), ("sphere", "Sphere", SPHERE)]
+)
+def test_add_a_classifier(copy_of, tmp_path, name, kind, text):
+    if kind == "Sphere":
+        for package in ("onnx", "onnxruntime"):
+            pytest.importorskip(package, reason="a classifier in ONNX needs it")
+    copy = copy_of("Add a classifier")
+    copy.add(f"holdfast/classifiers/{name}.py", "name", text)
+    copy.change(
+        "holdfast/classifiers/__init__.py",
+        ("from holdfast.classifiers.svm", f"from holdfast.classifiers.{name} import {kind}\n"
+         "from holdfast.classifiers.svm"),
+        ('"svm": LinearSVM()}', f'"svm": LinearSVM(), "{name}": {kind}()}}'),
+    )  # fmt: skip
+    data, model = labelled_recordings(tmp_path / "data"), tmp_path / "model.json"
+    copy.run(
+        *VERB, "train", data, "-o", model, "--classifier", name, "--trials", "0",
+        "--shared", "--jobs", "1",
+    )  # fmt: skip
+    written = json.loads(model.read_text())["fingers"]["*"]["classifier"]
+    assert written["type"] == ("onnx" if kind == "Sphere" else "linear")
+    program = (
+        "import sys; from holdfast import Model, detect, load_recording\n"
+        "print(len(detect(Model.load(sys.argv[1]), load_recording(sys.argv[2])).times))"
+    )
+    assert int(copy.run("-c", program, model, data / "grasp-0.mcap")) > 100
+
+
+PAD = """def _pad() -> Sensor:
+    return flat_sensor("pad", 2, 3, 0.004)
+
+
+"""
+
+
+def test_add_a_sensor(copy_of):
+    copy = copy_of("Add a sensor")
+    copy.change(
+        "holdfast/sensors/built_in.py",
+        ('    "anyskin": _anyskin,\n', '    "anyskin": _anyskin,\n    "pad": _pad,\n'),
+        ("SENSORS = {", PAD + "SENSORS = {"),
+    )  # fmt: skip
+    shown = json.loads(copy.run(*VERB, "sensors", "pad", "--json"))
+    assert "pad" in json.dumps(shown)
+
+
+LAW = '''
+"""A law that wants twice the force from the start."""
+
+from holdfast.contact import Cause
+from holdfast.grip.command import GripReason
+from holdfast.grip.laws.base import Law
+
+
+class Double(Law):
+    """Law that doubles every force."""
+
+    def start(self, touches, thumb):
+        """Do nothing."""
+
+    def wishes(self, touches, time, dt):
+        """Return twice the force for each finger."""
+        return [(2.0, GripReason.NONE) for touch in touches]
+'''
+
+
+def test_add_a_grip_law(copy_of):
+    copy = copy_of("Add a grip law")
+    copy.add("holdfast/grip/laws/double.py", "name", LAW)
+    copy.change(
+        "holdfast/grip/laws/__init__.py",
+        ("from holdfast.grip.laws.fixed", "from holdfast.grip.laws.double import Double\n"
+         "from holdfast.grip.laws.fixed"),
+        ('    "fixed": Fixed,\n', '    "fixed": Fixed,\n    "double": Double,\n'),
+    )  # fmt: skip
+    program = (
+        "from holdfast.grip.laws import law_named, Touch\n"
+        "print(law_named('double').wishes([Touch('thumb')], 0.0, 0.01)[0][0])"
+    )
+    assert copy.run("-c", program) == "2.0\n"
+
+
+def test_a_file_that_the_recipe_does_not_name_is_noticed(copy_of):
+    copy = copy_of("Add a grip law")
+    with pytest.raises(AssertionError, match=r"does not name holdfast.grip.controller"):
+        copy.change("holdfast/grip/controller.py")
