@@ -15,6 +15,8 @@ from holdfast.training import Setting, compute_decisions, train, tune
 
 from .build import tiny_recording
 
+pytestmark = pytest.mark.slow
+
 HELD = (ContactState.NO_CONTACT, ContactState.STABLE, ContactState.UNSTABLE, ContactState.STABLE)
 
 

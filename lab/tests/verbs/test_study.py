@@ -17,6 +17,8 @@ from holdfast_lab.study import run as study_run
 from holdfast_lab.study.paper import experiments, paper_tables
 from holdfast_lab.verbs import study as verb
 
+pytestmark = pytest.mark.slow
+
 
 @pytest.fixture(autouse=True)
 def nowhere(monkeypatch, tmp_path):

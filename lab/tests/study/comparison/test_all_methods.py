@@ -23,6 +23,8 @@ from holdfast_lab.study.methods import METHODS
 from holdfast_lab.study.plan import StudyPlan, scan_corpus
 from study.example_recordings import recording_with_truth, save_all
 
+pytestmark = pytest.mark.slow
+
 FEW = ("logreg", "logreg_unweighted", "holdfast", "zhang", "jl_global_logreg")
 TABLES = (
     "strongest", "methods", "hands", "events", "slips", "glitches", "glitch_rates", "splits",

@@ -13,6 +13,8 @@ from holdfast.recordings import Recording
 from holdfast.synthetic import synthetic_recording
 from holdfast_lab.study.methods import HAND, METHODS, hand_signal
 
+pytestmark = pytest.mark.slow
+
 TARE = Tare.parse(0.5)
 N_TARE = 75
 """Samples in the tare interval."""

@@ -27,6 +27,8 @@ from holdfast_lab.study.paper.random_split import (
 from holdfast_lab.study.plan import scan_corpus
 from study.example_recordings import save_synthetic
 
+pytestmark = pytest.mark.slow
+
 BUDGET = FitBudget(trials=1, n_fit=100_000)
 """One trial is the reference setting."""
 VARIANTS = (("logreg", DEPLOYED_FEATURES), ("svm", ("energy",)))
