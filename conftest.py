@@ -21,8 +21,21 @@ for _signal, _handler in (
 
 # The checks of a submission try the same examples every time; at home they differ.
 hypothesis.settings.register_profile("checks", derandomize=True)
+hypothesis.settings.register_profile("quick", max_examples=5)
 if os.environ.get("CI"):
     hypothesis.settings.load_profile("checks")
+
+SLOW_FILE = re.compile(
+    r"""
+    ^\s*(?:import|from)\ (?:asyncio|concurrent|cyclonedds|distributed|http|multiprocessing|playwright
+        |serial|signal|socket|subprocess|threading|torch|urllib)\b
+    | ^pytestmark\ =.*\bslow\b
+    """,
+    re.MULTILINE | re.VERBOSE,
+)
+"""Text of a test file whose tests are not quick: what it imports, or its mark."""
+SLOW_FIXTURES = {"browser", "data_folder"}
+"""Fixtures whose tests are not quick."""
 
 
 BROWSER = (
@@ -39,6 +52,20 @@ def data_folder():
     if not folder.is_dir():
         pytest.skip("no real recordings here: set HOLDFAST_DATA to their folder")
     return folder
+
+
+@pytest.fixture
+def short_grasps(monkeypatch):
+    """Grasps of the twin that last a few seconds."""
+    import msgspec
+
+    from holdfast.twin import simulation
+
+    def short(name):
+        return msgspec.structs.replace(profile(name), idle=(0.7, 0.8), hold=2.5)
+
+    profile = simulation.profile
+    monkeypatch.setattr(simulation, "profile", short)
 
 
 # Of a module and no wider: while Playwright runs, its thread has an event loop, and asyncio.run
@@ -83,6 +110,35 @@ def visit(browser, noted):
     for context in contexts:
         context.close()
     assert complaints == []
+
+
+def pytest_configure(config):
+    config.addinivalue_line("markers", "slow: a test that `-m quick` leaves out")
+    config.addinivalue_line("markers", "quick: every test that is not slow; set by `conftest.py`")
+    if config.option.markexpr == "quick":
+        hypothesis.settings.load_profile("quick")
+
+
+def pytest_ignore_collect(collection_path, config):
+    """Leave out the files without quick tests, so that they are not even imported."""
+    if config.option.markexpr == "quick" and is_slow(collection_path):
+        return True
+    return None
+
+
+@pytest.hookimpl(tryfirst=True)  # before tests are selected by their marks
+def pytest_collection_modifyitems(items):
+    for item in items:
+        fixtures = SLOW_FIXTURES.intersection(getattr(item, "fixturenames", ()))
+        if not (fixtures or is_slow(item.path) or item.get_closest_marker("slow")):
+            item.add_marker(pytest.mark.quick)
+
+
+@functools.cache
+def is_slow(path):
+    """Return whether no test of a file is quick. A doctest is always quick."""
+    is_test = path.name.startswith("test_") and path.suffix == ".py"
+    return is_test and SLOW_FILE.search(path.read_text("utf-8")) is not None
 
 
 def pytest_sessionstart(session):

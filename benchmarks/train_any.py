@@ -17,10 +17,9 @@ from typing import NamedTuple
 import numpy as np
 from scipy.optimize import minimize
 from scipy.special import expit
-from sklearn.linear_model import LogisticRegression
 from sklearn.metrics import roc_auc_score
 
-from holdfast.classifiers.cause import CauseClassifier
+from holdfast.classifiers.cause import CauseClassifier, fit_causes
 from holdfast.classifiers.linear import LinearClassifier
 from holdfast.contact import NO_CONTACT, STABLE, UNKNOWN, Cause
 from holdfast.features import Tare, parse_features
@@ -129,30 +128,19 @@ def fit(hands: list[HandSamples], chosen: np.ndarray) -> LinearClassifier:
     return LinearClassifier(tuple(mean), tuple(scale), tuple(found.x[1:]), found.x[0])
 
 
-def fit_causes(hands: list[HandSamples], chosen: np.ndarray) -> CauseClassifier:
-    """Fit a multinomial logistic regression to unstable samples; the causes weigh alike."""
+def rule_of_causes(hands: list[HandSamples], chosen: np.ndarray) -> CauseClassifier:
+    """Fit the rule of causes to the unstable samples whose cause is known."""
     used = [hands[k] for k in np.flatnonzero(chosen)]
-    features = np.concatenate([hand.features for hand in used])
     causes = np.concatenate([hand.cause for hand in used])
     known = np.isin(causes, CAUSES)
-    mean, scale = features[known].mean(axis=0), features[known].std(axis=0)
-    fitted = LogisticRegression(C=C, class_weight="balanced", max_iter=500).fit(
-        (features[known] - mean) / scale, causes[known]
-    )
-    return CauseClassifier(
-        causes=tuple(map(Cause, fitted.classes_.tolist())),
-        mean=tuple(mean),
-        scale=tuple(scale),
-        coefficients=tuple(map(tuple, fitted.coef_.tolist())),
-        intercepts=tuple(fitted.intercept_.tolist()),
-    )
+    return fit_causes(np.concatenate([hand.features for hand in used])[known], causes[known], C)
 
 
 def report_causes(hands: list[HandSamples], folds: np.ndarray) -> None:
     """Print the confusion of causes on single samples of hands left out, in percent of a row."""
     counts = {cause: Counter[str]() for cause in CAUSES}
     for fold in sorted(set(folds)):
-        model = fit_causes(hands, folds != fold)
+        model = rule_of_causes(hands, folds != fold)
         weights = model.weights()[model.codes() - 1]
         for k in np.flatnonzero(folds == fold):
             scores = hands[k].features @ weights[:, 1:].T + weights[:, 0]
@@ -225,7 +213,7 @@ def save(
         figures=figures,
         versions={name: version(name) for name in ("holdfast", "numpy", "scikit-learn")},
     )
-    model_of(classifier, training, fit_causes(hands, np.ones(len(hands), dtype=bool))).save(
+    model_of(classifier, training, rule_of_causes(hands, np.ones(len(hands), dtype=bool))).save(
         out, force=True
     )
     print(f"{out} written")

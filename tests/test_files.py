@@ -1,5 +1,6 @@
 import errno
 import os
+from contextlib import contextmanager
 from pathlib import Path
 
 import pytest
@@ -10,8 +11,10 @@ from holdfast.errors import OutputError
 from holdfast.files import (
     check_regular,
     file_stem,
+    lock,
     read_input,
     refuse_overwrite,
+    sync,
     whole_file,
     write_whole,
 )
@@ -180,3 +183,38 @@ def test_a_large_input_is_refused(tmp_path):
     with pytest.raises(OSError, match="it has more than 10 bytes"):
         read_input(tmp_path / "a", 10)
     assert read_input(tmp_path / "a", 11) == b"12345678901"
+
+
+@contextmanager
+def opened(path):
+    handle = os.open(path, os.O_RDONLY)
+    try:
+        yield handle
+    finally:
+        os.close(handle)
+
+
+def test_a_lock_is_of_one_alone_and_ends_with_its_file(tmp_path):
+    with opened(tmp_path) as first, opened(tmp_path) as second:
+        lock(first)
+        with pytest.raises(BlockingIOError):
+            lock(second)
+    with opened(tmp_path) as third:
+        lock(third, wait=True)
+
+
+def test_sync_waits_for_files_and_folders_in_order(tmp_path, monkeypatch):
+    path = tmp_path / "a"
+    path.write_bytes(b"1")
+    synced, fsync = [], os.fsync
+
+    def record(handle):
+        synced.append(os.fstat(handle).st_ino)
+        fsync(handle)
+
+    monkeypatch.setattr(os, "fsync", record)
+    with opened(path) as handle:
+        sync(handle, tmp_path, path)
+    assert synced == [file.stat().st_ino for file in (path, tmp_path, path)]
+    with pytest.raises(FileNotFoundError):
+        sync(tmp_path / "none")

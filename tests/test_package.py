@@ -7,16 +7,19 @@ from pathlib import Path
 import pytest
 
 import holdfast
+import holdfast.sensors
+from holdfast.openable import Openable
 
 PUBLIC = [
     *("FEATURE_NAMES", "fingertip_force", "haar_features"),
     *("Hand", "Sensor", "sensor", "Label", "Recording", "Tactile", "Truth"),
     *("load_dataset", "load_recording", "save_recording"),
-    *("Model", "Detector", "StreamDetector", "detect", "GripController", "GripCommand"),
+    *("Model", "Detector", "StreamDetector", "detect"),
+    *("GripController", "GripCommand", "GripLoop", "HandDevice", "Limits"),
     *("ContactEstimate", "ContactEvent", "ContactState", "HandEstimate"),
     *("Cause", "Fault", "Reason"),
-    *("StabilityClassifier", "train", "evaluate", "event_metrics", "sample_metrics"),
-    *("HoldfastError", "MissingExtra", "ModelError", "OutputError"),
+    *("Setting", "StabilityClassifier", "train", "evaluate", "event_metrics", "sample_metrics"),
+    *("EngineError", "HandError", "HoldfastError", "MissingExtra", "ModelError", "OutputError"),
     *("RecordingError", "SourceError", "StreamError", "TrainingError"),
     *("Arrival", "Source", "open_source"),
 ]
@@ -42,13 +45,19 @@ def test_the_order_of_fields_is_fixed():
     ]
 
 
+def test_a_hand_is_a_layout_and_a_hand_device_takes_commands():
+    assert isinstance(holdfast.sensors.hand("allegro-uskin"), holdfast.Hand)
+    assert issubclass(holdfast.HandDevice, Openable)
+    assert not issubclass(holdfast.HandDevice, holdfast.Hand)
+
+
 def test_version_is_that_of_the_distribution():
     assert holdfast.__version__ == metadata.version("holdfast")
 
 
 def test_other_names_are_refused():
-    with pytest.raises(AttributeError, match=r"^module 'holdfast' has no attribute 'grip'$"):
-        _ = holdfast.grip
+    with pytest.raises(AttributeError, match=r"^module 'holdfast' has no attribute 'grasp'$"):
+        _ = holdfast.grasp
 
 
 def test_type_checkers_know_every_name():

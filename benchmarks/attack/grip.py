@@ -15,7 +15,7 @@ import msgspec
 
 from attack.result import Result
 from holdfast.contact import ContactEstimate, ContactState, HandEstimate, Reason
-from holdfast.devices.hands import Hand, open_hand
+from holdfast.devices.hands import HandDevice, open_hand
 from holdfast.errors import HandError
 from holdfast.grip import GripCommand, GripController, GripReason, Limits, LoopState
 from holdfast.live.arrival_detector import StreamEstimate
@@ -38,7 +38,7 @@ PAUSES = (0.05, 0.4)
 """Shortest and longest pause of a process [s]."""
 
 
-class Tape(Hand):
+class Tape(HandDevice):
     """Hand that keeps its commands."""
 
     name = "tape:"
@@ -119,7 +119,7 @@ def _hand(at: float, *, slips: bool = False, force: float = 1000.0) -> HandEstim
     return HandEstimate(at, ContactState.STABLE, dict.fromkeys(FINGERS, estimate))
 
 
-def _held(hand: Hand, on_fault: str = "open", **parts: object) -> tuple[GripLoop, float]:
+def _held(hand: HandDevice, on_fault: str = "open", **parts: object) -> tuple[GripLoop, float]:
     """Return an armed loop that holds an object, and its time."""
     controller = GripController(Limits(on_fault=on_fault, recovery=0.1))  # type: ignore[arg-type]
     loop = GripLoop(controller, hand, armed=True, **parts)  # type: ignore[arg-type]
@@ -230,7 +230,7 @@ def _without_watchdog(result: Result) -> bool:
     return True
 
 
-def _run_loop(hand: Hand, watchdog: Watchdog, n_steps: int) -> None:
+def _run_loop(hand: HandDevice, watchdog: Watchdog, n_steps: int) -> None:
     """Step a loop at its rate; it leaves its grip to the next one."""
     loop, at = _held(hand, watchdog=watchdog)
     with loop:

@@ -22,9 +22,12 @@ if TYPE_CHECKING:
     from holdfast.contact import Reason as Reason
     from holdfast.detector import Detector as Detector
     from holdfast.detector import detect as detect
+    from holdfast.devices.hands import HandDevice as HandDevice
     from holdfast.devices.sources import Arrival as Arrival
     from holdfast.devices.sources import Source as Source
     from holdfast.devices.sources import open_source as open_source
+    from holdfast.errors import EngineError as EngineError
+    from holdfast.errors import HandError as HandError
     from holdfast.errors import HoldfastError as HoldfastError
     from holdfast.errors import MissingExtra as MissingExtra
     from holdfast.errors import ModelError as ModelError
@@ -38,9 +41,11 @@ if TYPE_CHECKING:
     from holdfast.features import haar_features as haar_features
     from holdfast.grip import GripCommand as GripCommand
     from holdfast.grip import GripController as GripController
+    from holdfast.grip import Limits as Limits
     from holdfast.io import load_dataset as load_dataset
     from holdfast.io import load_recording as load_recording
     from holdfast.io import save_recording as save_recording
+    from holdfast.live.loop.grip_loop import GripLoop as GripLoop
     from holdfast.live.stream_detector import StreamDetector as StreamDetector
     from holdfast.metrics import event_metrics as event_metrics
     from holdfast.metrics import sample_metrics as sample_metrics
@@ -52,6 +57,7 @@ if TYPE_CHECKING:
     from holdfast.sensors import Hand as Hand
     from holdfast.sensors import Sensor as Sensor
     from holdfast.sensors import sensor as sensor
+    from holdfast.training import Setting as Setting
     from holdfast.training import StabilityClassifier as StabilityClassifier
     from holdfast.training import evaluate as evaluate
     from holdfast.training import train as train
@@ -82,15 +88,21 @@ _HOMES = {
     "Reason": "contact",
     "GripCommand": "grip",
     "GripController": "grip",
+    "Limits": "grip",
+    "GripLoop": "live.loop.grip_loop",
+    "HandDevice": "devices.hands",
     "StreamDetector": "live.stream_detector",
     "Arrival": "devices.sources",
     "Source": "devices.sources",
     "open_source": "devices.sources",
+    "Setting": "training",
     "StabilityClassifier": "training",
     "evaluate": "training",
     "train": "training",
     "event_metrics": "metrics",
     "sample_metrics": "metrics",
+    "EngineError": "errors",
+    "HandError": "errors",
     "HoldfastError": "errors",
     "MissingExtra": "errors",
     "ModelError": "errors",

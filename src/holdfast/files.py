@@ -1,4 +1,4 @@
-"""Files: outputs that are written whole or not at all, their names, and inputs that end."""
+"""Files: outputs written whole or not at all, names, locks, the disk, and inputs that end."""
 
 import errno
 import json
@@ -96,6 +96,47 @@ def refuse_overwrite(path: str | Path, *, force: bool = False) -> None:
         raise OutputError(f"{target} exists already: choose another name, or give --force")
     if not target.parent.is_dir():
         raise OutputError(f"cannot write {target}: the folder {target.parent} does not exist")
+
+
+def lock(handle: int, *, wait: bool = False) -> None:
+    """Lock an open file or folder until it is closed, where the system has locks.
+
+    The lock of a process that died ends with it.
+
+    Args:
+        handle: descriptor of the file or folder.
+        wait: wait until no other process has locked it.
+
+    Raises:
+        BlockingIOError: another process has locked it, and `wait` is not given.
+        OSError: the file system has no locks, as some on a network.
+    """
+    if os.name != "posix":
+        return
+    import fcntl
+
+    fcntl.flock(handle, fcntl.LOCK_EX if wait else fcntl.LOCK_EX | fcntl.LOCK_NB)
+
+
+def sync(*files: int | Path) -> None:
+    """Return when files are on the disk, where no power failure loses them.
+
+    Args:
+        files: descriptor of an open file, or path of a file or a folder (the entries of a folder
+            are lost like the content of a file). Paths have no effect on Windows.
+
+    Raises:
+        OSError: a path cannot be opened, or the disk reports an error.
+    """
+    for file in files:
+        if isinstance(file, int):
+            os.fsync(file)
+        elif os.name == "posix":
+            handle = os.open(file, os.O_RDONLY)
+            try:
+                os.fsync(handle)
+            finally:
+                os.close(handle)
 
 
 def check_regular(path: str | Path) -> None:

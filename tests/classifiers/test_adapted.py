@@ -9,7 +9,7 @@ from scipy.optimize import approx_fprime
 from sklearn.linear_model import LogisticRegression
 
 from holdfast.classifiers import Adapted, LinearClassifier
-from holdfast.classifiers.adapted import CALIBRATION, NONE, WEIGHTS, _hessian, _log_odds, _loss
+from holdfast.classifiers.adapted import CALIBRATION, NONE, WEIGHTS, log_odds
 from holdfast.errors import TrainingError
 
 from .test_recipes import samples
@@ -34,29 +34,47 @@ def decided(rule, given=GIVEN):
     return rule.probability(given.features) >= rule.threshold
 
 
+def odds_of(prior):
+    weights, intercept = log_odds(prior)
+    return np.array([intercept, *weights])
+
+
 def rule_of(rule):
     return np.array([rule.intercept, *rule.coefficients])
 
 
-def test_gradient_and_hessian_are_those_of_finite_differences():
-    rng = np.random.default_rng(1)
-    rows = np.column_stack([np.ones(50), rng.normal(size=(50, 3))])
-    stable = rng.random(50) < 0.3
-    known, at = rng.normal(size=(2, 4))
-    given = (rows, stable, known, 0.7)
-    expected = approx_fprime(at, lambda v: _loss(v, *given)[0], 1e-7)
-    assert _loss(at, *given)[1] == pytest.approx(expected, rel=1e-4, abs=1e-5)
-    bent = [approx_fprime(at, lambda v, j=j: _loss(v, *given)[1][j], 1e-7) for j in range(4)]
-    assert _hessian(at, *given) == pytest.approx(np.array(bent), rel=1e-4, abs=1e-5)
+def loss(v, rows, stable, known, C):
+    """The loss of the docstring, written out."""
+    signs = np.where(stable, 1.0, -1.0)
+    return ((v - known) ** 2).sum() / 2 + C * np.log1p(np.exp(-signs * (rows @ v))).sum()
 
 
-def test_the_loss_is_that_of_the_docstring():
-    rows, stable = np.array([[1.0, 2.0], [1.0, -1.0], [1.0, 0.5]]), np.array([True, False, True])
-    v, known = np.array([0.3, -0.2]), np.array([0.1, 0.4])
-    expected = ((v - known) ** 2).sum() / 2
-    for row, sign in zip(rows, (1, -1, 1), strict=True):
-        expected += 0.7 * np.log(1 + np.exp(-sign * (row @ v)))
-    assert _loss(v, rows, stable, known, 0.7)[0] == pytest.approx(expected)
+@pytest.mark.parametrize("C", [1e-4, 0.7, 100.0])
+@pytest.mark.parametrize("prior", [PRIOR, UNLIKE])
+def test_the_weights_have_the_least_loss_of_the_docstring(prior, C):
+    scaled = (GIVEN.features - np.array(prior.mean)) / np.array(prior.scale)
+    rows = np.column_stack([np.ones(len(scaled)), scaled])
+    known = prior.slope * np.array([prior.intercept, *prior.coefficients])
+    known[0] += prior.offset
+    given = (rows, GIVEN.stable, known, C)
+    found = rule_of(adapted(C, prior=prior))
+    slope = approx_fprime(found, lambda v: loss(v, *given), 1e-6)
+    assert slope == pytest.approx(np.zeros(4), abs=2e-3 * (1 + C))
+    for step in 1e-3 * np.vstack([np.eye(4), -np.eye(4)]):
+        assert loss(found + step, *given) > loss(found, *given)
+
+
+@pytest.mark.parametrize("C", [1e-4, 0.7, 100.0])
+def test_the_calibration_has_the_least_loss_of_the_docstring(C):
+    odds = UNLIKE.slope * UNLIKE.decision(GIVEN.features) + UNLIKE.offset
+    rows, known = np.column_stack([np.ones(len(odds)), odds]), np.array([0.0, 1.0])
+    rule = adapted(C, prior=UNLIKE, change=CALIBRATION)
+    stretch = rule.slope / UNLIKE.slope
+    found = np.array([rule.offset - stretch * UNLIKE.offset, stretch])
+    for step in 1e-3 * np.vstack([np.eye(2), -np.eye(2)]):
+        assert loss(found + step, rows, GIVEN.stable, known, C) > loss(
+            found, rows, GIVEN.stable, known, C
+        )
 
 
 @pytest.mark.parametrize("prior", [PRIOR, UNLIKE])
@@ -96,7 +114,7 @@ def test_a_prior_that_is_upside_down_loses_its_slope():
 
 def test_the_log_odds_of_a_prior_are_those_of_its_probability():
     scaled = (GIVEN.features - np.array(UNLIKE.mean)) / np.array(UNLIKE.scale)
-    odds = np.column_stack([np.ones(len(scaled)), scaled]) @ _log_odds(UNLIKE)
+    odds = np.column_stack([np.ones(len(scaled)), scaled]) @ odds_of(UNLIKE)
     p = UNLIKE.probability(GIVEN.features)
     assert odds == pytest.approx(np.log(p / (1 - p)), abs=1e-6)
 
@@ -113,7 +131,7 @@ def test_with_a_large_c_it_equals_scikit_learn(prior):
 
 
 def test_a_larger_c_moves_away_from_the_prior():
-    far = [np.linalg.norm(rule_of(adapted(C)) - _log_odds(PRIOR)) for C in 10.0 ** np.arange(-7, 3)]
+    far = [np.linalg.norm(rule_of(adapted(C)) - odds_of(PRIOR)) for C in 10.0 ** np.arange(-7, 3)]
     assert far[0] < 1e-3
     assert far[-1] > 1.0
     assert (np.diff(far) > 0).all()

@@ -2,8 +2,9 @@
 
 import numpy as np
 import pytest
+from sklearn.linear_model import LogisticRegression
 
-from holdfast.classifiers.cause import CAUSES, CauseClassifier, add_scores
+from holdfast.classifiers.cause import CAUSES, CauseClassifier, add_scores, fit_causes
 from holdfast.contact import UNSTABLE, Cause
 from holdfast.detector import Detector, detect
 from holdfast.errors import ModelError
@@ -17,6 +18,20 @@ FIELDS = {
     "coefficients": ((1.0, -1.0), (0.5, 3.0)),
     "intercepts": (0.25, -0.5),
 }
+
+
+def test_the_fit_is_that_of_scikit_learn_with_balanced_classes():
+    draw = np.random.default_rng(0)
+    place = draw.choice(3, p=[0.7, 0.2, 0.1], size=900)
+    features = draw.normal(size=(900, 4)) + np.eye(3, 4)[place] + [1e3, 0.0, -5.0, 0.1]
+    names = np.array([Cause.SLIP, Cause.GLITCH, Cause.CLOSING])[place].astype(str)
+    found = fit_causes(features, names, 0.5)
+    standardised = (features - features.mean(axis=0)) / features.std(axis=0)
+    peer = LogisticRegression(C=0.5, class_weight="balanced", tol=1e-12, max_iter=10_000)
+    peer.fit(standardised, names)
+    assert [str(cause) for cause in found.causes] == peer.classes_.tolist()
+    np.testing.assert_allclose(found.coefficients, peer.coef_, atol=1e-6)
+    np.testing.assert_allclose(found.intercepts, peer.intercept_, atol=1e-6)
 
 
 def test_the_largest_sum_of_scores_wins():

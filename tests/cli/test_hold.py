@@ -29,6 +29,7 @@ def grasp(tmp_path_factory):
     return path
 
 
+@pytest.mark.usefixtures("short_grasps")
 def test_the_twin_is_source_and_hand(tmp_path, capsys):
     out = tmp_path / "held.mcap"
     words = ["hold", "builtin:twin", TWIN, "--hand", "twin:", "--armed", "--speed", "0"]

@@ -476,3 +476,39 @@ class TestBaselines:
 
     def test_fingers_of_the_model_count(self):
         assert Detector(model()).n_fingers == 2
+
+
+class TestThresholds:
+    def test_a_changed_threshold_acts_as_that_of_another_model(self):
+        changed, forces = Detector(by_force(), {"f": FLAT}), np.linspace(20.0, 200.0, 60)
+        changed.set_thresholds({"f": 0.95})
+        states = pushes(changed, forces, "f")
+        assert states == pushes(Detector(by_force(0.95), {"f": FLAT}), forces, "f")
+        assert states != pushes(Detector(by_force(), {"f": FLAT}), forces, "f")
+        changed.reset()  # keeps the thresholds
+        assert states == pushes(changed, forces, "f")
+
+    def test_a_change_acts_from_the_next_sample_on(self):
+        detector, values = Detector(by_force(), {"f": FLAT}), [110.0] * 10
+        assert pushes(detector, values, "f")[-1] is STABLE
+        detector.set_thresholds({"f": 0.95})
+        assert pushes(detector, values, "f", start=1.0)[-1] is UNSTABLE
+
+    def test_another_finger_keeps_its_threshold(self):
+        detector = Detector(by_force(), {"f": FLAT, "g": FLAT})
+        detector.set_thresholds({"f": 0.95})
+        for k in range(10):
+            sample = np.array([[110.0, 0.0, 0.0]])
+            estimate = detector.update({"f": sample, "g": sample}, k / RATE)
+        assert estimate.fingers["f"].state is UNSTABLE
+        assert estimate.fingers["g"].state is STABLE
+
+    @pytest.mark.parametrize("value", [-0.1, 1.1, float("nan")])
+    def test_thresholds_outside_of_0_to_1_are_refused(self, value):
+        with pytest.raises(ValueError, match=r"^a threshold from 0 to 1 expected, "):
+            Detector(model()).set_thresholds({"thumb": value, "index": value})
+
+    def test_an_unknown_finger_is_refused(self):
+        with pytest.raises(ValueError) as raised:
+            Detector(model()).set_thresholds({"thumb": 0.5, "ring": 0.5})
+        assert str(raised.value) == "threshold of ring given; the detector has thumb, index"

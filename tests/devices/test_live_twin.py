@@ -21,6 +21,7 @@ def read_until(twin, held_for):
         twin.read(0.0)
 
 
+@pytest.mark.usefixtures("short_grasps")
 def test_without_commands_it_sends_the_recording_of_the_grasp():
     expected = simulate(Grasp("ball", 1, 1, profile="finger-vigorous"))
     with LiveTwin(URI, speed=0) as twin:
@@ -32,6 +33,7 @@ def test_without_commands_it_sends_the_recording_of_the_grasp():
         np.testing.assert_array_equal([one.time for one in arrivals], module.times)
 
 
+@pytest.mark.usefixtures("short_grasps")
 def test_a_command_changes_the_force_and_release_opens_the_hand():
     with LiveTwin(URI, speed=0) as twin:
         read_until(twin, 0.8)

@@ -6,7 +6,8 @@ from concurrent.futures import Future
 import msgspec
 
 from holdfast.contact import ContactEstimate, ContactState, Fault, HandEstimate, Reason
-from holdfast.live.loop.documents import GripDocument, GripEntry, GripFinger, GripLimits
+from holdfast.grip import Limits
+from holdfast.live.loop.documents import GripDocument, GripEntry, GripFinger
 
 UNITS = {"thumb": "N", "index/1": "count"}
 
@@ -36,7 +37,7 @@ class FakeGrip:
         self.error, self.answers = None, True
 
     def document(self):
-        limits = GripLimits(
+        limits = Limits(
             min_scale=1.0, max_scale=2.0, rise=30.0, fall=0.3, cooldown=0.5, max_force=None,
             stale_after=0.05, fault_after=0.03, recovery=math.inf, on_fault="hold",
             max_rate=400.0,

@@ -10,7 +10,6 @@ from holdfast.contact import ContactState, Fault, Reason
 from holdfast.detector import Detector, detect
 from holdfast.errors import ModelError, StreamError
 from holdfast.live.arrival_detector import MAX_BUFFERED_ARRIVALS, ArrivalDetector
-from holdfast.live.judge import Judge
 from holdfast.live.stream_detector import StreamDetector
 from holdfast.recordings import Recording
 from holdfast.resampling import resample
@@ -365,13 +364,3 @@ def test_changes_that_lasted_are_fewer_than_changes():
     }
     with pytest.raises(ValueError, match="at least 0 s expected"):
         next(StreamDetector(build.model(), build.Script.of(build.grasp())).changes(-1.0))
-
-
-def test_the_old_name_works_and_warns():
-    recording = build.grasp()
-    sensors = build.Script.of(recording).sensors
-    with pytest.warns(DeprecationWarning, match=r"^holdfast\.live\.judge\.Judge is deprec"):
-        judge = Judge(build.model(), sensors, strict=True)
-    estimates = [one for each in build.arrivals_of(recording)[:80] for one in judge.take(each)]
-    assert len(estimates) == 80
-    assert estimates[0].estimate.state is ContactState.UNKNOWN

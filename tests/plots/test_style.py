@@ -13,7 +13,7 @@ def test_eighteen_styles_are_different():
 def test_pyplot_is_not_imported():
     """pyplot keeps every figure that it makes until it is closed."""
     program = (
-        "import sys; from holdfast.plots import curves, dots, experiment\n"
+        "import sys; from holdfast_lab.figures import curves, dots, experiment\n"
         "curves.draw_lines({}, 'x'); dots.draw_dots({})\n"
         "assert 'matplotlib.pyplot' not in sys.modules"
     )

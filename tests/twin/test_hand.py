@@ -1,6 +1,5 @@
 """The hand: geometry and masses of the vendor's tables, mirror, motion, forces, gravity."""
 
-import mujoco
 import numpy as np
 import pytest
 
@@ -16,6 +15,7 @@ from holdfast.twin.hand import (
     HandModel,
     hand_xml,
 )
+from holdfast.twin.mujoco_import import mujoco
 from holdfast.twin.objects import load_objects, object_named
 
 VENDOR_TIPS = {

@@ -1,13 +1,14 @@
 """Seven steps in compiled code against the same steps called from Python, bit by bit."""
 
-import mujoco
 import numpy as np
 import pytest
 
+from holdfast.twin import physics
 from holdfast.twin.contact import touch
 from holdfast.twin.control import STEPS_PER_CONTROL, control, draw_controller
 from holdfast.twin.grasp import closing_path
 from holdfast.twin.hand import GRAVITY, SUBSTEPS, TIMESTEP, HandModel
+from holdfast.twin.mujoco_import import mujoco
 from holdfast.twin.objects import object_named
 from holdfast.twin.operator import (
     JERK,
@@ -18,7 +19,15 @@ from holdfast.twin.operator import (
     move_wrench,
     push_wrench,
 )
-from holdfast.twin.physics import Action, Steps, advance_sample, engine_of
+from holdfast.twin.physics import (
+    Action,
+    Steps,
+    addresses_work,
+    advance_of,
+    advance_sample,
+    advance_sample_by_calls,
+    engine_of,
+)
 from holdfast.twin.world import World
 
 ITEM = object_named("can")
@@ -84,7 +93,7 @@ ACTIONS = {
 @pytest.mark.parametrize("words", ACTIONS.values(), ids=ACTIONS)
 def test_a_sample_is_its_steps_called_from_python(words):
     compiled, plain = made_world(), made_world()
-    engine = engine_of(compiled.hand)
+    engine = engine_of(compiled.hand.model, compiled.hand.data)
     worst, loads = [], 0.0
     for sample in range(60):
         target = PATH.targets(np.full(4, 0.003 - 6e-4 * sample))  # closes until it presses
@@ -114,8 +123,88 @@ def test_worlds_beside_each_other_do_not_share_anything():
     target = PATH.targets(np.full(4, 0.01))
     for one in (first, second, second, first):
         advance_sample(
-            engine_of(one.hand), STEPS, one.hand.arrays, one.contact, one.constants, one.controller,
-            0, target, action(one), one.bodies, one._wrenches,
+            engine_of(one.hand.model, one.hand.data), STEPS, one.hand.arrays, one.contact,
+            one.constants, one.controller, 0, target, action(one), one.bodies, one._wrenches,
         )  # fmt: skip
     np.testing.assert_array_equal(first.hand.data.qpos, second.hand.data.qpos)
     assert first.hand.data.qpos is not second.hand.data.qpos
+
+
+@pytest.fixture
+def unchecked():
+    """The check runs again, in the test and after it."""
+    addresses_work.cache_clear()
+    yield
+    addresses_work.cache_clear()
+
+
+def stepped(world, n_samples=60):
+    """The state after some samples in which the fingers close on the pushed object."""
+    pushed = {"style": PUSH, "hold": 0.0, "elapsed": 0.2}
+    worst = 0.0
+    for sample in range(n_samples):
+        target = PATH.targets(np.full(4, 0.003 - 6e-4 * sample))
+        error = world._advance(
+            STEPS, world.hand.arrays, world.contact, world.constants, world.controller,
+            sample * SUBSTEPS, target, action(world, **pushed), world.bodies, world._wrenches,
+        )  # fmt: skip
+        worst = max(worst, error)
+    data = world.hand.data
+    state = [data.qpos, data.qvel, data.xfrc_applied, data.qfrc_applied, world.bodies]
+    return [array.tobytes() for array in (*state, *world.contact, *world._wrenches)], worst
+
+
+def test_the_addresses_work_here(unchecked):
+    assert addresses_work()
+    assert advance_of(HandModel.build(ITEM)).func is advance_sample
+
+
+class NoAddress:
+    """A stand-in of `mujoco` whose functions are all there, but not its addresses."""
+
+    def __getattr__(self, name):
+        if name == "_functions":
+            raise AttributeError(name)
+        return getattr(mujoco, name)
+
+
+class OtherVersion:
+    """A stand-in of MuJoCo's library that is of another version."""
+
+    def __init__(self, library):
+        self.mj_step1, self.mj_step2 = library.mj_step1, library.mj_step2
+
+    def mj_version(self):
+        return 1
+
+
+def no_addresses(patch):
+    physics._library.cache_clear()
+    patch.setattr(physics, "mujoco", NoAddress())
+
+
+def other_version(patch):
+    other = OtherVersion(physics._library())
+    patch.setattr(physics, "_library", lambda: other)
+
+
+def no_number(patch):
+    real = physics.engine_of
+    patch.setattr(
+        physics, "engine_of", lambda model, data: real(model, data)._replace(model=data._address)
+    )
+
+
+@pytest.mark.parametrize("break_it", [no_addresses, other_version, no_number])
+def test_without_addresses_the_public_functions_give_the_same_bytes(
+    break_it, unchecked, monkeypatch
+):
+    by_address = stepped(made_world())
+    addresses_work.cache_clear()
+    with monkeypatch.context() as patch:
+        break_it(patch)
+        world = made_world()
+        assert not addresses_work()
+    assert world._advance.func is advance_sample_by_calls
+    assert stepped(world) == by_address
+    assert by_address[1] > 0

@@ -6,7 +6,6 @@ import stat
 import subprocess
 import sys
 
-import mujoco
 import numpy as np
 import pytest
 from PIL import Image, ImageSequence
@@ -15,6 +14,7 @@ from holdfast.errors import OutputError
 from holdfast.twin import render as module
 from holdfast.twin.grasp import closing_path, object_pose
 from holdfast.twin.hand import N_JOINTS, HandModel
+from holdfast.twin.mujoco_import import mujoco
 from holdfast.twin.objects import load_objects, object_named
 from holdfast.twin.render import Camera, Renderer, check_film, render, save_picture, save_video
 
@@ -192,3 +192,23 @@ except OutputError as refusal:
         assert run.stdout.startswith("cannot render: MuJoCo's back end 'osmesa' does not start (")
         assert run.stdout.endswith("or choose one with MUJOCO_GL=egl, osmesa or glfw\n")
         assert run.stdout.count("\n") == 1
+
+    def test_of_a_back_end_that_is_off_is_an_error_of_one_line(self):
+        environment = os.environ | {"MUJOCO_GL": "disable"}
+        command = [sys.executable, "-c", self.CODE]
+        run = subprocess.run(command, env=environment, capture_output=True, text=True, check=True)
+        assert run.stdout.startswith("cannot render: MuJoCo's back end 'disable' does not start (")
+        assert run.stdout.count("\n") == 1
+
+
+@pytest.mark.parametrize("chosen", [{}, {"MUJOCO_GL": "glfw"}], ids=["default", "chosen"])
+def test_the_choice_of_a_back_end_leaves_the_environment_as_it_was(chosen):
+    code = (
+        "import os; before = dict(os.environ)\n"
+        "import holdfast.twin.render\n"
+        "print(before == dict(os.environ))"
+    )
+    environment = {key: value for key, value in os.environ.items() if "GL" not in key} | chosen
+    command = [sys.executable, "-c", code]
+    run = subprocess.run(command, env=environment, capture_output=True, text=True, check=True)
+    assert run.stdout == "True\n"

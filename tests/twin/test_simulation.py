@@ -13,7 +13,7 @@ from holdfast.twin.objects import OTHER_OBJECTS, load_objects, object_named
 from holdfast.twin.profile import profile
 from holdfast.twin.protocol import CONTACT_LOAD
 from holdfast.twin.simulation import Grasp, simulate
-from holdfast.twin.uskin_parameters import UskinParameters
+from holdfast.twin.uskin.parameters import UskinParameters
 
 FINGERS = ("thumb", "index", "middle", "ring")
 SHORT = msgspec.structs.replace(profile("finger-reference"), idle=(0.7, 0.8), hold=6.0)

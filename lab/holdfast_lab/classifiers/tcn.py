@@ -19,6 +19,7 @@ from holdfast.classifiers.fitting import (
     class_ratio,
     undo_balancing,
 )
+from holdfast.classifiers.folds import shuffled
 from holdfast.classifiers.linear import Array, feature_rows
 from holdfast.errors import MissingExtra
 
@@ -257,7 +258,8 @@ def validation_rows(samples: Samples, seed: int) -> npt.NDArray[np.bool_]:
     They are those of a fifth of the groups, drawn at random. No sample is held out if there is
     no such choice that leaves both classes on both sides.
     """
-    groups = np.random.default_rng(seed).permutation(np.unique(samples.groups))
+    names = np.unique(samples.groups)
+    groups = names[shuffled(len(names), seed)]
     n_held = max(1, round(VALIDATION_SHARE * len(groups)))
     for start in range(len(groups) if len(groups) > n_held else 0):
         held = np.isin(samples.groups, np.roll(groups, -start)[:n_held])

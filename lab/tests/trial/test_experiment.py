@@ -121,7 +121,7 @@ def test_a_killed_comparison_continues(tmp_path, calls, undrawn):
         plan.run_trial = slow
         run_trials(plan.TrialPlan({LAWS!r}, 40), {str(out)!r})
     """
-    tests = str(Path(__file__).parents[2])
+    tests = str(Path(__file__).parents[1])
     with subprocess.Popen(
         [sys.executable, "-c", code], env=os.environ | {"PYTHONPATH": tests}
     ) as running:

@@ -4,17 +4,14 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import numpy as np
-import numpy.typing as npt
 from msgspec.structs import replace
 
 from holdfast.classifiers.fitting import MIN_SLOPE, Parameters, Samples, check_classes
 from holdfast.classifiers.linear import LinearClassifier
+from holdfast.classifiers.newton import Solution, fit_logistic
 
 if TYPE_CHECKING:
     from optuna import Trial
-
-Array = npt.NDArray[np.float64]
-Flags = npt.NDArray[np.bool_]
 
 NONE, CALIBRATION, WEIGHTS = "none", "calibration", "weights"
 CHANGES = (NONE, CALIBRATION, WEIGHTS)
@@ -89,58 +86,21 @@ class Adapted:
 
 def _calibrated(prior: LinearClassifier, samples: Samples, c: float) -> LinearClassifier:
     odds = prior.slope * prior.decision(samples.features) + prior.offset
-    rows = np.column_stack([np.ones(len(odds)), odds])
-    shift, stretch = _fit_towards(np.array([0.0, 1.0]), rows, samples.stable, c).tolist()
-    stretch = max(stretch, MIN_SLOPE)
+    identity = Solution(np.array([1.0]), 0.0)
+    (slope,), shift = fit_logistic(odds[:, None], samples.stable, (1.0, 1.0), c, identity)
+    stretch = max(float(slope), MIN_SLOPE)
     return replace(prior, slope=stretch * prior.slope, offset=stretch * prior.offset + shift)
 
 
 def _reweighted(prior: LinearClassifier, samples: Samples, c: float) -> LinearClassifier:
-    rows = (samples.features - np.array(prior.mean)) / np.array(prior.scale)
-    rows = np.column_stack([np.ones(len(rows)), rows])
-    weights = _fit_towards(_log_odds(prior), rows, samples.stable, c).tolist()
+    standardised = (samples.features - np.array(prior.mean)) / np.array(prior.scale)
+    weights, intercept = fit_logistic(standardised, samples.stable, (1.0, 1.0), c, log_odds(prior))
     return replace(
-        prior, intercept=weights[0], coefficients=tuple(weights[1:]), slope=1.0, offset=0.0
+        prior, intercept=intercept, coefficients=tuple(weights.tolist()), slope=1.0, offset=0.0
     )
 
 
-def _log_odds(prior: LinearClassifier) -> Array:
-    """Return intercept and coefficients of the prior's log odds."""
-    found: Array = prior.slope * np.array([prior.intercept, *prior.coefficients])
-    found[0] += prior.offset
-    return found
-
-
-def _fit_towards(initial: Array, rows: Array, stable: Flags, c: float) -> Array:
-    """Return the weights with the least regularised loss."""
-    from scipy.optimize import minimize
-
-    found = minimize(
-        _loss,
-        initial,
-        args=(rows, stable, initial, c),
-        jac=True,
-        hess=_hessian,
-        method="trust-exact",
-        options={"gtol": 1e-8 * (1.0 + c * len(rows))},
-    )
-    return np.asarray(found.x)
-
-
-def _loss(v: Array, rows: Array, stable: Flags, initial: Array, c: float) -> tuple[float, Array]:
-    """Return the regularised loss and its gradient."""
-    sign = np.where(stable, 1.0, -1.0)
-    margin = sign * (rows @ v)
-    difference = v - initial
-    loss = 0.5 * difference @ difference + c * np.logaddexp(0.0, -margin).sum()
-    slope = -c * sign * np.exp(-np.logaddexp(0.0, margin))
-    return float(loss), difference + rows.T @ slope
-
-
-def _hessian(v: Array, rows: Array, stable: Flags, initial: Array, c: float) -> Array:
-    """Return the Hessian of the loss."""
-    del stable, initial
-    probability = np.exp(-np.logaddexp(0.0, -(rows @ v)))
-    weight = c * probability * (1.0 - probability)
-    found: Array = np.eye(len(v)) + (rows * weight[:, None]).T @ rows
-    return found
+def log_odds(prior: LinearClassifier) -> Solution:
+    """Return weights and intercept of the log odds of a classifier, of standardised features."""
+    weights = prior.slope * np.array(prior.coefficients)
+    return Solution(weights, prior.slope * prior.intercept + prior.offset)

@@ -4,8 +4,11 @@ import math
 
 import msgspec
 import numpy as np
+import numpy.typing as npt
 
+from holdfast.classifiers.fitting import standardise
 from holdfast.classifiers.linear import Array
+from holdfast.classifiers.newton import fit_multinomial
 from holdfast.compiled import compiled_step
 from holdfast.contact import Cause
 from holdfast.errors import ModelError
@@ -73,6 +76,27 @@ class CauseClassifier(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
         found[rows, 0] = np.array(self.intercepts) - folded @ np.array(self.mean)
         found[rows, 1:] = folded
         return found
+
+
+def fit_causes(features: Array, causes: npt.NDArray[np.str_], c: float) -> CauseClassifier:
+    """Fit a classifier of causes to unstable samples; all causes weigh alike.
+
+    Args:
+        features: (n, n_features) finite.
+        causes: (n,) name of the cause of each sample.
+        c: inverse strength of the L2 penalty on the weights of standardised features.
+    """
+    names, classes, counts = np.unique(causes, return_inverse=True, return_counts=True)
+    mean, scale, standardised = standardise(features)
+    balanced = len(causes) / (len(names) * counts)
+    solution = fit_multinomial(standardised, classes, balanced, c)
+    return CauseClassifier(
+        causes=tuple(map(Cause, names.tolist())),
+        mean=tuple(mean.tolist()),
+        scale=tuple(scale.tolist()),
+        coefficients=tuple(map(tuple, solution.weights.tolist())),
+        intercepts=tuple(solution.intercepts.tolist()),
+    )
 
 
 @compiled_step

@@ -14,7 +14,7 @@ from holdfast.classifiers.fitting import (
     standardise,
 )
 from holdfast.classifiers.linear import LinearClassifier
-from holdfast.classifiers.newton import fit_weights
+from holdfast.classifiers.newton import fit_logistic
 
 if TYPE_CHECKING:
     from optuna import Trial
@@ -48,7 +48,7 @@ class LogisticRegression:
         check_classes(samples)
         mean, scale, features = standardise(samples.features)
         balanced = parameters["class_weight"] == "balanced"
-        solution = fit_weights(
+        solution = fit_logistic(
             features,
             samples.stable,
             _balanced_weights(samples.stable) if balanced else (1.0, 1.0),

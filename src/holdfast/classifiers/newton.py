@@ -1,12 +1,15 @@
 """Newton's method for logistic regression, compiled: a few passes over the samples.
 
-The objective is that of scikit-learn: sum_i s_i log(1 + exp(-t_i z_i)) + |w|^2 / (2 C), with
-z = w x + b, t = 1 for stable and -1 for other samples, and s the weight of a sample's class. It
-is strictly convex in w, so the method ends at the same weights; it goes on until no gradient is
-left, where scikit-learn stops at 1e-4.
+The objective of two classes is that of scikit-learn: sum_i s_i log(1 + exp(-t_i z_i)) +
+|w|^2 / (2 C), with z = w x + b, t = 1 for stable and -1 for other samples, and s the weight of a
+sample's class. With a prior (w_0, b_0) the penalty is (|w - w_0|^2 + (b - b_0)^2) / (2 C). The
+objective of more classes is sum_i s_i (log sum_k exp(z_ik) - z_i,class) + sum_k |w_k|^2 / (2 C).
+All are strictly convex in w, so the method ends at the same weights; it goes on until no gradient
+is left, where scikit-learn stops at 1e-4.
 """
 
 import math
+from collections.abc import Callable
 from typing import NamedTuple
 
 import numpy as np
@@ -15,6 +18,8 @@ import numpy.typing as npt
 from holdfast.compiled import compiled
 
 Array = npt.NDArray[np.float64]
+Evaluate = Callable[[Array, Array, Array], float]
+"""Return the objective at weights, and write its gradient and its Hessian."""
 
 MAX_ITERATIONS = 100
 LAST_STEP = 1e-6
@@ -34,38 +39,90 @@ class Solution(NamedTuple):
     intercept: float
 
 
-def fit_weights(
-    features: Array, stable: npt.NDArray[np.bool_], class_weights: tuple[float, float], c: float
+class MultinomialSolution(NamedTuple):
+    """Weights (n_classes, n_features) of the features, and intercepts (n_classes,)."""
+
+    weights: Array
+    intercepts: Array
+
+
+def fit_logistic(
+    features: Array,
+    stable: npt.NDArray[np.bool_],
+    class_weights: tuple[float, float],
+    c: float,
+    prior: Solution | None = None,
 ) -> Solution:
-    """Fit weights and intercept.
+    """Fit weights and intercept of two classes.
 
     Args:
         features: (n, n_features), standardised.
         stable: (n,) class.
         class_weights: weight of a sample that is not stable, and of one that is.
-        c: inverse strength of the L2 penalty; the intercept has none.
+        c: inverse strength of the L2 penalty.
+        prior: towards which weights and intercept are drawn, and where the search begins; without
+            it the weights are drawn towards zero, and the intercept has no penalty.
     """
-    n_weights = features.shape[1] + 1
     total = float(np.where(stable, class_weights[1], class_weights[0]).sum())
-    penalty = np.full(n_weights, 1.0 / (c * total))
-    penalty[-1] = 0.0
-    given = (features, stable, (class_weights[0] / total, class_weights[1] / total), penalty)
-    weights, gradient = np.zeros(n_weights), np.empty(n_weights)
-    hessian = np.empty((n_weights, n_weights))
-    objective: float = _evaluate(*given, weights, gradient, hessian)
+    penalty = np.full(features.shape[1] + 1, 1.0 / (c * total))
+    if prior is None:
+        penalty[-1] = 0.0
+        start = np.zeros(len(penalty))
+    else:
+        start = np.append(prior.weights, prior.intercept)
+    shares = (class_weights[0] / total, class_weights[1] / total)
+
+    def evaluate(weights: Array, gradient: Array, hessian: Array) -> float:
+        samples = (features, stable, shares)
+        return _evaluate(*samples, penalty, start, weights, gradient, hessian)
+
+    weights = _minimise(evaluate, start)
+    return Solution(weights[:-1], float(weights[-1]))
+
+
+def fit_multinomial(
+    features: Array, classes: npt.NDArray[np.int64], class_weights: Array, c: float
+) -> MultinomialSolution:
+    """Fit weights and intercepts of three or more classes.
+
+    Args:
+        features: (n, n_features), standardised.
+        classes: (n,) index of the class of each sample.
+        class_weights: (n_classes,) weight of a sample of each class.
+        c: inverse strength of the L2 penalty; the intercepts have none, and the sum 0.
+    """
+    total = float(class_weights[classes].sum())
+    n_classes, n_weights = len(class_weights), features.shape[1] + 1
+    penalty = np.full((n_classes, n_weights), 1.0 / (c * total))
+    penalty[:, -1] = 0.0
+    start = np.zeros(penalty.size)
+
+    def evaluate(weights: Array, gradient: Array, hessian: Array) -> float:
+        samples = (features, classes, class_weights / total)
+        return _evaluate_multinomial(*samples, penalty.ravel(), start, weights, gradient, hessian)
+
+    weights = _minimise(evaluate, start).reshape(n_classes, n_weights)
+    return MultinomialSolution(weights[:, :-1], weights[:, -1])
+
+
+def _minimise(evaluate: Evaluate, start: Array) -> Array:
+    """Return the weights with the least objective, from a start."""
+    weights, gradient = start.copy(), np.empty(len(start))
+    hessian = np.empty((len(start), len(start)))
+    objective = evaluate(weights, gradient, hessian)
     for _ in range(MAX_ITERATIONS):
         step = _step(hessian, gradient)
         last = bool(np.abs(step).max() < LAST_STEP)
         if not last:
             limit = objective + ROUNDING * abs(objective)
-            objective = _evaluate(*given, weights - step, gradient, hessian)
+            objective = evaluate(weights - step, gradient, hessian)
             while objective > limit and np.abs(step).max() > MIN_STEP:
                 step /= 2
-                objective = _evaluate(*given, weights - step, gradient, hessian)
+                objective = evaluate(weights - step, gradient, hessian)
         weights -= step
         if last:
             break
-    return Solution(weights[:-1], float(weights[-1]))
+    return weights
 
 
 def _step(hessian: Array, gradient: Array) -> Array:
@@ -82,6 +139,7 @@ def _evaluate(
     stable: npt.NDArray[np.bool_],
     class_weights: tuple[float, float],
     penalty: Array,
+    prior: Array,
     weights: Array,
     gradient: Array,
     hessian: Array,
@@ -118,9 +176,64 @@ def _evaluate(
     objective = 0.0
     for kind in range(2):
         objective += class_weights[kind] * (losses[kind] - math.log(products[kind]))
-    for a in range(d + 1):
-        objective += 0.5 * penalty[a] * weights[a] ** 2
-        gradient[a] += penalty[a] * weights[a]
+    return _add_penalty(objective, penalty, prior, weights, gradient, hessian)
+
+
+@compiled
+def _evaluate_multinomial(
+    features: Array,
+    classes: npt.NDArray[np.int64],
+    class_weights: Array,
+    penalty: Array,
+    prior: Array,
+    weights: Array,
+    gradient: Array,
+    hessian: Array,
+) -> float:
+    """Return the objective, and write its gradient and its Hessian (n_weights, n_weights).
+
+    The weights of a class are those of the features, then its intercept. Equal shifts of all
+    intercepts change no probability: the square of the sum of the intercepts is added, which is
+    0 at the minimum.
+    """
+    n, d = features.shape
+    n_classes, width = len(class_weights), d + 1
+    gradient[:] = 0.0
+    hessian[:] = 0.0
+    objective, row, p = 0.0, np.ones(width), np.empty(n_classes)
+    for i in range(n):
+        row[:d] = features[i]
+        for k in range(n_classes):  # z_k, then p_k = exp(z_k) / sum_l exp(z_l)
+            p[k] = (row * weights[k * width : (k + 1) * width]).sum()
+        top, own, share = p.max(), p[classes[i]], class_weights[classes[i]]
+        p[:] = np.exp(p - top)
+        total = p.sum()
+        p /= total
+        objective += share * (math.log(total) + top - own)
+        for k in range(n_classes):
+            slope = share * (p[k] - (1.0 if k == classes[i] else 0.0))
+            for a in range(width):
+                gradient[k * width + a] += slope * row[a]
+            for m in range(k + 1):
+                bend = share * p[k] * ((1.0 if k == m else 0.0) - p[m])
+                for a in range(width):
+                    for b in range(a + 1 if k == m else width):
+                        hessian[k * width + a, m * width + b] += bend * row[a] * row[b]
+    shift = weights[d::width].sum()
+    objective += 0.5 * shift**2
+    gradient[d::width] += shift
+    hessian[d::width, d::width] += 1.0
+    return _add_penalty(objective, penalty, prior, weights, gradient, hessian)
+
+
+@compiled
+def _add_penalty(
+    objective: float, penalty: Array, prior: Array, weights: Array, gradient: Array, hessian: Array
+) -> float:
+    """Add sum_a penalty_a (w_a - prior_a)^2 / 2, and mirror the Hessian's lower triangle."""
+    for a in range(len(weights)):
+        objective += 0.5 * penalty[a] * (weights[a] - prior[a]) ** 2
+        gradient[a] += penalty[a] * (weights[a] - prior[a])
         hessian[a, a] += penalty[a]
         for b in range(a):
             hessian[b, a] = hessian[a, b]

@@ -6,15 +6,16 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 import numpy.typing as npt
-from scipy.special import expit
 
 from holdfast.classifiers.fitting import (
     Parameters,
     Samples,
     check_classes,
+    logistic,
     sigmoid,
     standardise,
 )
+from holdfast.classifiers.folds import group_folds
 from holdfast.classifiers.linear import LinearClassifier
 
 N_FOLDS = 5
@@ -66,7 +67,7 @@ class LinearSVM:
             intercept=intercept,
             slope=slope,
             offset=offset,
-            threshold=float(expit(offset)),
+            threshold=logistic(offset),
         )
 
 
@@ -93,9 +94,8 @@ def _values_out_of_fold(
 ) -> npt.NDArray[np.float64] | None:
     """Compute decision values out of fold by group; None if a fold lacks a class."""
     features, stable, groups = samples
-    names = np.unique(groups)
-    held = [np.isin(groups, names[i::N_FOLDS]) for i in range(min(N_FOLDS, len(names)))]
-    if len(names) < 2 or any(samples.take(~rows).one_class for rows in held):
+    held = group_folds(groups, N_FOLDS)
+    if len(held) < 2 or any(samples.take(~rows).one_class for rows in held):
         return None
     values = np.empty(len(stable))
     for rows in held:

@@ -6,12 +6,10 @@ from itertools import chain
 from operator import attrgetter
 from typing import TYPE_CHECKING, Any, NamedTuple
 
-from msgspec import Struct
 from msgspec.json import Encoder
 
 from holdfast.cli.terminal.console import print_line, print_table, visible_json
 from holdfast.contact import (
-    Cause,
     ContactEstimate,
     ContactEvent,
     ContactState,
@@ -20,8 +18,8 @@ from holdfast.contact import (
     StateChanges,
 )
 from holdfast.detector import HAND
+from holdfast.live.documents import estimate_line
 from holdfast.recordings import shown_origin
-from holdfast.sensors import taxel_numbers
 
 if TYPE_CHECKING:
     from holdfast.detector import Detection
@@ -68,34 +66,13 @@ def chunk_from_stream(name: str, estimates: Iterable["StreamEstimate"]) -> Estim
     return EstimateChunk(name, fingers, hand)
 
 
-class EstimateLine(Struct, gc=False):
-    """One JSON line: the estimate of a finger at a sample; NaN becomes null.
-
-    Taxels are numbers, from 1.
-    """
-
-    time: float
-    finger: str
-    state: ContactState
-    reason: Reason
-    stable_probability: float
-    instability: float
-    force: tuple[float, float, float]
-    faults: tuple[Fault, ...]
-    faulty_taxels: tuple[int, ...]
-    cause: Cause | None
-
-
 def json_lines(chunk: EstimateChunk) -> Iterator[str]:
     """Yield blocks of JSON lines, sorted by time and then in the order of the fingers."""
     lines = [
-        EstimateLine(
-            one.time, finger, one.state, one.reason, one.stable_probability, one.instability,
-            one.force, one.faults, taxel_numbers(one.faulty_taxels), one.cause,
-        )
+        estimate_line(finger, estimate)
         for finger, estimates in chunk.fingers.items()
-        for one in estimates
-    ]  # fmt: skip
+        for estimate in estimates
+    ]
     lines.sort(key=attrgetter("time"))
     encoder = Encoder()
     for start in range(0, len(lines), LINES_PER_BLOCK):

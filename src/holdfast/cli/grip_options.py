@@ -12,7 +12,7 @@ from holdfast.cli.terminal.console import print_message
 from holdfast.errors import require_extras
 
 if TYPE_CHECKING:
-    from holdfast.devices.hands import Hand
+    from holdfast.devices.hands import HandDevice
     from holdfast.devices.sources import Source
     from holdfast.grip import Limits
     from holdfast.live.loop.grip_loop import GripLoop, Log
@@ -118,7 +118,7 @@ class GripSettings(NamedTuple):
 
 def find_source_and_hand(
     source: str, hand: str, *, speed: float, loop: bool = False
-) -> "tuple[Source, Hand]":
+) -> "tuple[Source, HandDevice]":
     """Return source and hand, which are not open yet: the same object if both are the twin.
 
     Raises:
@@ -154,7 +154,7 @@ def check_armed(settings: GripSettings) -> None:
         raise ValueError(f"--armed moves the hand: confirm it with --confirm {hand}")
 
 
-def connect_hand(stack: ExitStack, settings: GripSettings, hand: "Hand") -> "Watchdog | None":
+def connect_hand(stack: ExitStack, settings: GripSettings, hand: "HandDevice") -> "Watchdog | None":
     """Connect to the hand and start its watchdog, unless it is the twin or a dry run.
 
     It is done before the source is opened, so that no samples wait for it: the watchdog takes
@@ -179,7 +179,7 @@ def connect_hand(stack: ExitStack, settings: GripSettings, hand: "Hand") -> "Wat
 @contextmanager
 def open_loop(
     settings: GripSettings,
-    hand: "Hand",
+    hand: "HandDevice",
     stream: "StreamDetector",
     watchdog: "Watchdog | None",
     log: "Log",
@@ -208,7 +208,7 @@ def open_loop(
         print_message(f"{hand.n_refused} joint states of {hand.name} were refused")
 
 
-def _check_fingers(hand: "Hand", stream: "StreamDetector") -> None:
+def _check_fingers(hand: "HandDevice", stream: "StreamDetector") -> None:
     """Check that the fingers of the hand which the source has also have estimates."""
     missing = [
         finger

@@ -50,9 +50,8 @@ from holdfast.cli.options import (
 from holdfast.cli.terminal.console import print_json, print_message
 
 if TYPE_CHECKING:
-    from holdfast.devices.hands import Hand
+    from holdfast.devices.hands import HandDevice
     from holdfast.devices.sources import Source
-    from holdfast.live.loop.documents import Grip
     from holdfast.live.loop.live_grip import LiveGrip
     from holdfast.live.loop.watchdog import Watchdog
     from holdfast.live.publishers.ros_publisher import RosPublisher
@@ -160,7 +159,9 @@ def serve(
         _report_unpublished(publishers)
 
 
-def _find(source: str, hand: str, *, speed: float, loop: bool) -> "tuple[Source, Hand | None]":
+def _find(
+    source: str, hand: str, *, speed: float, loop: bool
+) -> "tuple[Source, HandDevice | None]":
     """Return the source, and the hand if one is given; neither is open yet."""
     from holdfast.devices.sources import open_source
 
@@ -171,7 +172,7 @@ def _find(source: str, hand: str, *, speed: float, loop: bool) -> "tuple[Source,
 
 @contextmanager
 def _live_grip(
-    settings: GripSettings, hand: "Hand", session: "Session", watchdog: "Watchdog | None"
+    settings: GripSettings, hand: "HandDevice", session: "Session", watchdog: "Watchdog | None"
 ) -> "Iterator[LiveGrip]":
     """Yield the loop of a hand, which runs in a thread. Without `--armed` nothing is sent."""
     from holdfast.live.loop.live_grip import EventLog, LiveGrip
@@ -195,7 +196,7 @@ def _report_unpublished(publishers: "Sequence[RosPublisher]") -> None:
 
 
 def _create_publishers(
-    stream: "StreamDetector", *, grip: "Grip | None", ros2: bool, ros1: bool
+    stream: "StreamDetector", *, grip: "LiveGrip | None", ros2: bool, ros1: bool
 ) -> "Iterator[RosPublisher]":
     units = {name: sensor.unit for name, sensor in stream.fingers.items()}
     if ros2:
@@ -217,7 +218,7 @@ def run_page(
     port: int = DEFAULT_PORT,
     guard: "Guard | None" = None,
     folder: Path | None = None,
-    grip: "Grip | None" = None,
+    grip: "LiveGrip | None" = None,
     stay: bool = True,
 ) -> None:
     """Run the live page of a session until Ctrl-C, or until the source ends if not `stay`.

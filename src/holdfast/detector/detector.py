@@ -23,6 +23,7 @@ from holdfast.contact import (
     StateChanges,
     taxels_of,
 )
+from holdfast.detector.contact_rule import THRESHOLD
 from holdfast.detector.decision_rule import TraceRows, new_decision_memory, rule_of, run
 from holdfast.detector.detection import (
     STATES,
@@ -169,6 +170,28 @@ class Detector:
     def reset(self) -> None:
         """Discard all samples, events and the tare."""
         self._use(FeatureStream(self._stream.plan))
+
+    def set_thresholds(self, thresholds: Mapping[str, float]) -> None:
+        """Change the probability from which a contact is stable, from the next sample on.
+
+        `reset` keeps the thresholds.
+
+        Args:
+            thresholds: from 0 to 1, by finger; other fingers keep theirs.
+
+        Raises:
+            ValueError: a threshold is not from 0 to 1, or a finger is unknown; nothing has
+                changed then.
+        """
+        check_thresholds(thresholds)
+        unknown = thresholds.keys() - self._slots.keys()
+        if unknown:
+            raise ValueError(
+                f"threshold of {', '.join(sorted(unknown))} given; "
+                f"the detector has {', '.join(self._slots)}"
+            )
+        for finger, threshold in thresholds.items():
+            self._rule.limits[self._slots[finger][0], THRESHOLD] = threshold
 
     def update(self, samples: Mapping[str, npt.ArrayLike], time: float) -> HandEstimate:
         """Process one sample of some or all fingers.
@@ -335,6 +358,13 @@ def detect(model: Model, recording: Recording) -> Detection:
     if model.rate is not None and not model.rate_fits(recording.rate):
         recording = resample(recording, model.rate)
     return Detector.for_recording(model, recording).run(recording)
+
+
+def check_thresholds(thresholds: Mapping[str, float]) -> None:
+    """Raise `ValueError` for a threshold that is not from 0 to 1."""
+    for threshold in thresholds.values():
+        if not 0 <= threshold <= 1:
+            raise ValueError(f"a threshold from 0 to 1 expected, {threshold} given")
 
 
 def _sensors_of(model: Model) -> dict[str, Sensor]:

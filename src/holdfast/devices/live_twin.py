@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 
-from holdfast.devices.hands import Hand
+from holdfast.devices.hands import HandDevice
 from holdfast.devices.sources import Arrival, Source
 from holdfast.devices.sources.replay import PAUSE
 from holdfast.devices.sources.twin import grasp_of
@@ -18,7 +18,7 @@ from holdfast.twin.hand import FINGERS, RATE
 from holdfast.twin.simulation import Simulation
 
 
-class LiveTwin(Source, Hand):
+class LiveTwin(Source, HandDevice):
     """Twin that simulates each sample when it is read, with the last command that it got.
 
     It is a source like any other, and a hand like any other. A grasp without commands gives the

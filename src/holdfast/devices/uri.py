@@ -5,11 +5,14 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from importlib import import_module
 from pathlib import Path
+from typing import TYPE_CHECKING
 from urllib.parse import parse_qsl, urlsplit
 
-from holdfast.devices.sources.base import Source
 from holdfast.errors import require_extras
 from holdfast.sensors import Sensor, built_in_sensors, sensor
+
+if TYPE_CHECKING:
+    from holdfast.devices.sources.base import Source
 
 SCHEMES = {
     "xela": "XELA's server: xela://HOST:PORT or xela://auto, ?values=counts|calibrated",
@@ -147,7 +150,7 @@ def is_uri(text: str) -> bool:
     return bool(_SCHEME.match(text)) and not Path(text).exists()
 
 
-def open_source(text: str, *, speed: float = 1.0, loop: bool = False) -> Source:
+def open_source(text: str, *, speed: float = 1.0, loop: bool = False) -> "Source":
     """Return the source of a path or URI; entering it connects.
 
     Args:

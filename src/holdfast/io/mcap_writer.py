@@ -1,6 +1,5 @@
 """MCAP files of recordings, written while recording: data on disk survives a crash."""
 
-import os
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 from types import TracebackType
@@ -12,7 +11,7 @@ import numpy.typing as npt
 from mcap.writer import CompressionType, Writer
 
 from holdfast.errors import OutputError, RecordingError
-from holdfast.files import refuse_overwrite
+from holdfast.files import refuse_overwrite, sync
 from holdfast.io.header import Header, ModuleData, encode_header, number_type
 from holdfast.io.mcap_messages import (
     TEXT_SCHEMA,
@@ -22,7 +21,7 @@ from holdfast.io.mcap_messages import (
     samples_schema,
     samples_type,
 )
-from holdfast.io.output_stream import UnbufferedStream, open_alone, sync_folder
+from holdfast.io.output_stream import UnbufferedStream, open_alone
 from holdfast.io.timed_arrays import TACTILE, time_spans
 from holdfast.sensors import Sensor
 from holdfast.sensors.types import Array, Unit
@@ -277,7 +276,7 @@ class MessageLog:
         if fsync:
             self.sync()
             with _disk_errors(path):
-                sync_folder(path.parent)
+                sync(path.parent)
 
     def write_samples(self, topic: str, times: Array, values: npt.NDArray[Any]) -> None:
         """Write one message of samples: times (n,) [s] and values (n, ...)."""
@@ -302,7 +301,7 @@ class MessageLog:
     def sync(self) -> None:
         """Return when all that was flushed is on the disk, where no power failure loses it."""
         with _disk_errors(self._path):
-            os.fsync(self._file.fileno())
+            sync(self._file.fileno())
 
     @property
     def n_bytes(self) -> int:
@@ -318,7 +317,7 @@ class MessageLog:
             self._writer.finish()  # type: ignore[no-untyped-call]
             self._writer.flush()  # type: ignore[no-untyped-call]
             if self._fsync:
-                os.fsync(self._file.fileno())
+                sync(self._file.fileno())
 
     def _limit_chunk(self, start: float, end: float) -> None:
         """End the chunk if a message from `start` to `end` [s] would make it too long."""

@@ -6,7 +6,7 @@ from io import FileIO
 from pathlib import Path
 
 from holdfast.errors import OutputError
-from holdfast.files import check_regular
+from holdfast.files import check_regular, lock
 
 
 def open_alone(path: Path, *, force: bool) -> FileIO:
@@ -31,29 +31,14 @@ def open_alone(path: Path, *, force: bool) -> FileIO:
 
 
 def _lock(file: FileIO, path: Path) -> None:
-    if os.name != "posix":
-        return
-    import fcntl
-
     try:
-        fcntl.flock(file, fcntl.LOCK_EX | fcntl.LOCK_NB)
+        lock(file.fileno())
     except BlockingIOError as cause:
         raise OutputError(
             f"{path} is being recorded by another program; choose another name"
         ) from cause
     except OSError:  # a network file system without locks
         return
-
-
-def sync_folder(folder: Path) -> None:
-    """Return when the entries of a folder are on the disk, where the system can do this."""
-    if os.name != "posix":
-        return
-    handle = os.open(folder, os.O_RDONLY)
-    try:
-        os.fsync(handle)
-    finally:
-        os.close(handle)
 
 
 class UnbufferedStream:

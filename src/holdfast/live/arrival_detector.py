@@ -10,10 +10,10 @@ import numpy.typing as npt
 
 from holdfast.contact import ContactState, Fault, HandEstimate, Reason, with_faults
 from holdfast.detector import Detector
+from holdfast.detector.detector import check_thresholds
 from holdfast.devices.sources import Arrival
 from holdfast.errors import ModelError, StreamError
 from holdfast.features import Tare
-from holdfast.live.adjustable_detector import AdjustableDetector, check_thresholds
 from holdfast.live.rate import RateMonitor, measure_rate
 from holdfast.live.readings_monitor import ReadingsMonitor
 from holdfast.model import Model
@@ -100,7 +100,7 @@ class ArrivalDetector:
         self._strict = strict
         self._ignore = ignore
         self._buffer: deque[Arrival] = deque(maxlen=MAX_BUFFERED_ARRIVALS)
-        self._detector: AdjustableDetector | None = None
+        self._detector: Detector | None = None
         Detector(model, self.fingers, 100.0, ignore=ignore)  # raises for wrong arguments
         self.thresholds = self._own_thresholds()
         self._resamplers: dict[str, Resampler] = {}
@@ -223,7 +223,7 @@ class ArrivalDetector:
             self.resampled = True
             self._resamplers = {name: Resampler(rate, model.rate) for name in self.fingers}
         self._monitor = RateMonitor(rate, self.fingers) if self._watch_rate else None
-        detector = AdjustableDetector(model, self.fingers, rate, ignore=self._ignore)
+        detector = Detector(model, self.fingers, rate, ignore=self._ignore)
         detector.set_thresholds(self.thresholds)
         self._detector = detector
         buffered = list(self._buffer)

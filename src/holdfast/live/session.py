@@ -3,9 +3,7 @@
 import gc
 import sys
 import time
-from collections import deque
 from collections.abc import Callable
-from concurrent.futures import Future
 from threading import Event, Thread
 from types import TracebackType
 from typing import NamedTuple, Self
@@ -14,6 +12,7 @@ import numpy as np
 
 from holdfast.devices.sources import Arrival
 from holdfast.errors import SourceError, StreamError
+from holdfast.live.requests import RequestQueue
 from holdfast.live.stream_detector import StreamDetector, StreamUpdate
 
 MAX_LATENCIES = 8192
@@ -66,7 +65,7 @@ class Session:
         self.lock = ""
         self._n_samples = dict.fromkeys(self.source.sensors, 0)
         self._listeners: list[Listener] = []
-        self._requests: deque[tuple[Callable[[], None], Future[None]]] = deque()
+        self._requests = RequestQueue()
         self._stopping = Event()
         self._thread = Thread(target=self._run, name="holdfast-detector", daemon=True)
         self._latencies = np.full(MAX_LATENCIES, np.nan)
@@ -154,8 +153,7 @@ class Session:
         self.ended = True
 
     def _step(self) -> None:
-        while self._requests:
-            _answer(*self._requests.popleft())
+        self._requests.carry_out()
         update = self.stream.read()
         if update.arrival is not None:
             self._count(update.arrival, has_estimates=bool(update.estimates))
@@ -180,8 +178,7 @@ class Session:
 
     def _request(self, work: Callable[[], None], consequence: str) -> None:
         """Run `work` in the detector's thread, and wait for its end."""
-        request: Future[None] = Future()
-        self._requests.append((work, request))
+        request = self._requests.append(work)
         try:
             request.result(REQUEST_TIMEOUT)
         except TimeoutError as cause:
@@ -191,14 +188,3 @@ class Session:
     def _notify(self, update: StreamUpdate) -> None:
         for listener in self._listeners:
             listener(update)
-
-
-def _answer(work: Callable[[], None], request: "Future[None]") -> None:
-    """Run `work` for a request, and pass on its failure."""
-    if not request.set_running_or_notify_cancel():
-        return  # the caller has timed out
-    try:
-        work()
-        request.set_result(None)
-    except Exception as failure:
-        request.set_exception(failure)

@@ -6,16 +6,17 @@ from collections.abc import Callable
 
 import numpy as np
 
-from holdfast.contact import ContactEstimate, ContactState, HandEstimate
+from holdfast.contact import ContactState, HandEstimate
 from holdfast.live.arrival_detector import StreamEstimate
+from holdfast.live.documents import Vector, finger_document
 from holdfast.live.fault_notices import FAULT_TEXTS, FaultWatch
-from holdfast.live.loop.documents import Grip
+from holdfast.live.loop.live_grip import LiveGrip
 from holdfast.live.recorder import Recorder
 from holdfast.live.session import Session
 from holdfast.live.stream_detector import StreamUpdate
 from holdfast.live.web import schema
 from holdfast.model import Model
-from holdfast.sensors import Sensor, taxel_numbers
+from holdfast.sensors import Sensor
 
 MAX_BUFFERED_UPDATES = 4096
 """Maximum number of updates between two documents; older ones are dropped."""
@@ -41,7 +42,7 @@ class StatusPublisher:
         self,
         session: Session,
         report: Callable[[str], None] = lambda _: None,
-        grip: Grip | None = None,
+        grip: LiveGrip | None = None,
     ) -> None:
         self._session = session
         self._grip = grip
@@ -50,7 +51,7 @@ class StatusPublisher:
         self._updates: deque[tuple[float, StreamUpdate]] = deque(maxlen=MAX_BUFFERED_UPDATES)
         self._own_notices: deque[schema.Notice] = deque(maxlen=MAX_BUFFERED_UPDATES)
         self._newest: HandEstimate | None = None
-        self._taxels: dict[str, list[schema.Vector]] = {}
+        self._taxels: dict[str, list[Vector]] = {}
         self._counts: deque[tuple[float, int]] = deque([(time.monotonic(), 0)])
 
     def put(self, update: StreamUpdate) -> None:
@@ -166,24 +167,6 @@ def operating_points(model: Model) -> list[schema.OperatingPoint]:
         )
         for point in model.tuning.points
     ]
-
-
-def finger_document(
-    estimate: ContactEstimate, taxels: list[schema.Vector] | None = None
-) -> schema.FingerDocument:
-    """Return the estimate of a finger as a document."""
-    return schema.FingerDocument(
-        time=estimate.time,
-        state=estimate.state,
-        reason=estimate.reason,
-        stable_probability=estimate.stable_probability,
-        instability=estimate.instability,
-        force=estimate.force,
-        faults=estimate.faults,
-        faulty_taxels=taxel_numbers(estimate.faulty_taxels),
-        cause=estimate.cause,
-        taxels=taxels,
-    )
 
 
 def recording_info(recorder: Recorder) -> schema.RecordingInfo:

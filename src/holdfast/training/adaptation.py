@@ -4,16 +4,13 @@ from collections.abc import Collection, Iterator, Sequence
 from typing import NamedTuple
 
 import numpy as np
-import numpy.typing as npt
 
 from holdfast.classifiers import LinearClassifier, Parameters, Samples
 from holdfast.classifiers.adapted import CALIBRATION, NONE, WEIGHTS, Adapted
-from holdfast.training.splits import TIME_FOLDS, TIME_GAP, Integers
+from holdfast.classifiers.folds import Array, Flags, Integers, group_folds, time_folds
+from holdfast.training.splits import TIME_FOLDS, TIME_GAP
 from holdfast.training.training_samples import FingerSamples, thinning_step
 from holdfast.training.tuning import log_losses
-
-Array = npt.NDArray[np.float64]
-Flags = npt.NDArray[np.bool_]
 
 MAX_ADAPTATION_SAMPLES = 10_000
 """Maximum number of samples by which the adaptation is chosen, at even steps."""
@@ -88,7 +85,7 @@ def choose_adaptation(
     rows = np.zeros(len(own.times), dtype=bool)
     rows[kept[::step]] = True
     samples, recordings, times = own.samples.take(rows), own.recordings[rows], own.times[rows]
-    blocks = _time_blocks(recordings, times)
+    blocks = time_folds(recordings, times, TIME_FOLDS)
     n_recordings = len(np.unique(recordings))
     many = n_recordings >= ENOUGH_RECORDINGS
     candidates = CAUTIOUS + BOLD if many else CAUTIOUS
@@ -131,27 +128,14 @@ class _Fold(NamedTuple):
 
 def _folds(recordings: Integers, blocks: Integers, times: Array) -> Iterator[_Fold]:
     """Yield folds that leave out recordings; of a single recording, blocks of time."""
-    names = np.unique(recordings)
-    if len(names) > 1:
-        for k in range(min(MAX_FOLDS, len(names))):
-            tested = np.isin(recordings, names[k::MAX_FOLDS])
-            yield _Fold(~tested, tested)
+    held_out = group_folds(recordings, MAX_FOLDS)
+    if len(held_out) > 1:
+        yield from (_Fold(~tested, tested) for tested in held_out)
         return
     for block in np.unique(blocks):
         tested = blocks == block
         low, high = times[tested].min() - TIME_GAP, times[tested].max() + TIME_GAP
         yield _Fold((times < low) | (times > high), tested)
-
-
-def _time_blocks(recordings: Integers, times: Array) -> Integers:
-    """Return the fifth of the labelled time of its recording in which each sample is."""
-    blocks = np.zeros(len(times), dtype=np.int64)
-    for place in np.unique(recordings):
-        chosen = recordings == place
-        first, last = times[chosen].min(), times[chosen].max()
-        share = (times[chosen] - first) / max(float(last - first), 1e-9)
-        blocks[chosen] = np.minimum(TIME_FOLDS * share, TIME_FOLDS - 1).astype(np.int64)
-    return blocks
 
 
 def _held_out_losses(

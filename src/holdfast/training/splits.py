@@ -7,11 +7,10 @@ import numpy as np
 import numpy.typing as npt
 
 from holdfast.classifiers import Samples
+from holdfast.classifiers.folds import Integers, block_folds, group_folds, random_folds
 from holdfast.errors import TrainingError
 from holdfast.training.dataset_scan import ScannedRecording
 from holdfast.training.setting import Split
-
-Integers = npt.NDArray[np.int64]
 
 RANDOM_FOLDS = 5
 """Number of folds of the random split: 80 % train, 20 % test, as in the paper."""
@@ -58,11 +57,10 @@ class DataSplit:
         if self.split == "time":
             longest = n_samples // (4 * len(self.units))
             gap = min(round(TIME_GAP * self.rates[place]), longest)
-            return _blocks(n_samples, len(self.units), gap)
+            return block_folds(n_samples, len(self.units), gap)
         if self.split == "random":
-            return np.random.default_rng([self.seed, place]).integers(
-                len(self.units), size=n_samples
-            )
+            generator = np.random.default_rng([self.seed, place])
+            return random_folds(n_samples, len(self.units), generator)
         return np.full(n_samples, self.group_of[place])
 
     def recordings_without(self, held: Collection[int]) -> list[int]:
@@ -106,19 +104,6 @@ def split_data(recordings: Sequence[ScannedRecording], split: Split, seed: int) 
     return DataSplit(split, tuple(groups), group_of, seed, rates)
 
 
-def _blocks(n_samples: int, n_blocks: int, gap: int) -> Integers:
-    """Return the block of each sample; -1 if it is nearer than the gap to another block.
-
-    Example:
-        >>> _blocks(10, 2, 1).tolist()
-        [0, 0, 0, 0, -1, -1, 1, 1, 1, 1]
-    """
-    block = np.arange(n_samples) * n_blocks // max(n_samples, 1)
-    for start in np.flatnonzero(np.diff(block)) + 1:
-        block[max(start - gap, 0) : start + gap] = -1
-    return block
-
-
 def inner_folds(samples: Samples, n_folds: int, seed: int) -> list[npt.NDArray[np.bool_]]:
     """Return which samples each fold of a search holds out.
 
@@ -132,6 +117,5 @@ def inner_folds(samples: Samples, n_folds: int, seed: int) -> list[npt.NDArray[n
     Returns:
         One mask per fold. Folds in which a class is missing are left out.
     """
-    groups = np.random.default_rng(seed).permutation(np.unique(samples.groups))
-    masks = [np.isin(samples.groups, groups[i::n_folds]) for i in range(min(n_folds, len(groups)))]
+    masks = group_folds(samples.groups, n_folds, seed)
     return [m for m in masks if not samples.take(m).one_class and not samples.take(~m).one_class]

@@ -31,9 +31,9 @@ from holdfast.twin.shapes import (
     distances,
 )
 
-BUILT_IN_OBJECTS = Path(__file__).with_name("objects.toml")
+BUILT_IN_OBJECTS = Path(__file__).with_name("tables") / "objects.toml"
 """Table of the built-in objects, on which models are trained."""
-OTHER_OBJECTS = Path(__file__).with_name("other_objects.toml")
+OTHER_OBJECTS = Path(__file__).with_name("tables") / "other_objects.toml"
 """Table of other objects, for tests with objects that no model has seen."""
 
 MAX_FILE_SIZE = 1 << 20

@@ -1,12 +1,14 @@
 """One sample of physics, compiled: seven steps of MuJoCo, contact, operator and controller.
 
 MuJoCo's half steps are called from compiled code by their addresses, because a call from Python
-with its arrays costs as much as the half step.
+with its arrays costs as much as the half step. The addresses are private parts of its package:
+where they do not work, the same steps are called from Python, with the same result.
 """
 
 import ctypes
 import sys
 from collections.abc import Callable, Sequence
+from functools import cache, partial
 from pathlib import Path
 from typing import NamedTuple, cast
 
@@ -22,6 +24,11 @@ from holdfast.twin.control import Controller, control
 from holdfast.twin.hand import HandArrays, HandModel, apply_forces, fill_bodies
 from holdfast.twin.mujoco_import import mujoco
 from holdfast.twin.operator import MOVE, hold_wrench, move_wrench, push_wrench
+
+FALLING_BODY = """<mujoco><worldbody>
+  <body><freejoint/><geom size=".01"/></body>
+</worldbody></mujoco>"""
+"""Model with which the addresses are checked."""
 
 
 class HalfSteps(NamedTuple):
@@ -99,17 +106,55 @@ class Wrenches(NamedTuple):
     total: Array
 
 
-def engine_of(hand: HandModel) -> HalfSteps:
+def advance_of(hand: HandModel) -> Callable[..., float]:
+    """Return `advance_sample` of a hand; without its addresses `advance_sample_by_calls`.
+
+    All arguments but the first remain.
+    """
+    if addresses_work():
+        return partial(advance_sample, engine_of(hand.model, hand.data))
+    return partial(advance_sample_by_calls, hand)
+
+
+def engine_of(model: mujoco.MjModel, data: mujoco.MjData) -> HalfSteps:
     """Return the addresses with which compiled code steps a model."""
+    library = _library()
+    return HalfSteps(
+        _address(library.mj_step1), _address(library.mj_step2), model._address, data._address
+    )
+
+
+@cache
+def addresses_work() -> bool:
+    """Return whether MuJoCo's half steps by their addresses do what its public functions do.
+
+    The library's version and the first number of the model are compared before anything is
+    called, and then a body that falls.
+    """
+    model = mujoco.MjModel.from_xml_string(FALLING_BODY)
+    by_address, by_call = mujoco.MjData(model), mujoco.MjData(model)
+    try:
+        engine = engine_of(model, by_address)
+        same_version = _library().mj_version() == mujoco.mj_version()
+    except (AttributeError, OSError, TypeError):
+        return False
+    if not same_version or ctypes.c_int32.from_address(engine.model).value != model.nq:
+        return False
+    pointers = ctypes.c_void_p(engine.model), ctypes.c_void_p(engine.data)
+    for _ in range(3):
+        _library().mj_step1(*pointers)
+        _library().mj_step2(*pointers)
+        mujoco.mj_step1(model, by_call)
+        mujoco.mj_step2(model, by_call)
+    same_time = by_address.time == by_call.time > 0
+    return bool(same_time and (by_address.qpos == by_call.qpos).all())
+
+
+@cache
+def _library() -> ctypes.CDLL:
     # The extension module finds the library that it was linked to, except on Windows.
     windows = Path(mujoco.__file__).with_name("mujoco.dll")
-    library = ctypes.CDLL(str(windows) if sys.platform == "win32" else mujoco._functions.__file__)
-    return HalfSteps(
-        _address(library.mj_step1),
-        _address(library.mj_step2),
-        hand.model._address,
-        hand.data._address,
-    )
+    return ctypes.CDLL(str(windows) if sys.platform == "win32" else mujoco._functions.__file__)
 
 
 def _address(function: object) -> int:
@@ -169,23 +214,80 @@ def advance_sample(
     Returns:
         The largest error of a set-point, in a glitch of the controller [rad].
     """
-    worst, time, dt = 0.0, action.time, steps.period
+    worst, time = 0.0, action.time
     for k in range(steps.n):
         _call(engine.first_half, engine.model, engine.data)
-        fill_bodies(arrays, bodies)
-        touch(contact, constants, bodies, dt)
-        _operate(action, bodies[-1], contact.wrench, time, action.elapsed + k * dt, wrenches)
-        apply_forces(arrays, contact.tips, wrenches.total, bodies)
-        if (tick + k) % steps.per_control == 0:
-            number = (tick + k) // steps.per_control
-            worst = max(worst, _glitch(controller, number))
-            control(
-                controller, number, arrays.qpos, arrays.qfrc_bias, target,
-                steps.per_control * dt, arrays.qfrc_applied,
-            )  # fmt: skip
+        error = _apply_all(
+            steps, arrays, contact, constants, controller, tick, k, target, action, time, bodies,
+            wrenches,
+        )  # fmt: skip
+        worst = max(worst, error)
         _call(engine.second_half, engine.model, engine.data)
-        time += dt  # as MuJoCo adds it
+        time += steps.period  # as MuJoCo adds it
     return worst
+
+
+def advance_sample_by_calls(
+    hand: HandModel,
+    steps: Steps,
+    arrays: HandArrays,
+    contact: Contact,
+    constants: Constants,
+    controller: Controller,
+    tick: int,
+    target: Array,
+    action: Action,
+    bodies: Array,
+    wrenches: Wrenches,
+) -> float:
+    """Advance the physics by one sample, as `advance_sample`, by MuJoCo's public functions."""
+    worst, time = 0.0, action.time
+    for k in range(steps.n):
+        mujoco.mj_step1(hand.model, hand.data)
+        error = _apply_all(
+            steps, arrays, contact, constants, controller, tick, k, target, action, time, bodies,
+            wrenches,
+        )  # fmt: skip
+        worst = max(worst, error)
+        mujoco.mj_step2(hand.model, hand.data)
+        time += steps.period  # as MuJoCo adds it
+    return worst
+
+
+@compiled
+def _apply_all(
+    steps: Steps,
+    arrays: HandArrays,
+    contact: Contact,
+    constants: Constants,
+    controller: Controller,
+    tick: int,
+    k: int,
+    target: Array,
+    action: Action,
+    time: float,
+    bodies: Array,
+    wrenches: Wrenches,
+) -> float:
+    """Apply all forces of step `k` of a sample, between MuJoCo's half steps.
+
+    Returns:
+        The largest error of a set-point, in a glitch of the controller [rad]; 0 between the
+        steps of the controller.
+    """
+    fill_bodies(arrays, bodies)
+    touch(contact, constants, bodies, steps.period)
+    elapsed = action.elapsed + k * steps.period
+    _operate(action, bodies[-1], contact.wrench, time, elapsed, wrenches)
+    apply_forces(arrays, contact.tips, wrenches.total, bodies)
+    if (tick + k) % steps.per_control != 0:
+        return 0.0
+    number = (tick + k) // steps.per_control
+    control(
+        controller, number, arrays.qpos, arrays.qfrc_bias, target,
+        steps.per_control * steps.period, arrays.qfrc_applied,
+    )  # fmt: skip
+    return _glitch(controller, number)
 
 
 @compiled

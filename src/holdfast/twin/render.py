@@ -2,14 +2,10 @@
 
 import shutil
 import subprocess
-import sys
 from collections.abc import Iterable
-from ctypes.util import find_library
-from importlib import import_module
 from itertools import chain
-from os import environ
 from pathlib import Path
-from typing import IO, NamedTuple, Protocol, cast
+from typing import IO, NamedTuple, cast
 
 import numpy as np
 import numpy.typing as npt
@@ -17,7 +13,7 @@ import numpy.typing as npt
 from holdfast.errors import OutputError
 from holdfast.sensors.types import Array
 from holdfast.twin.hand import RATE
-from holdfast.twin.mujoco_import import mujoco
+from holdfast.twin.mujoco_import import BACK_END, mujoco
 from holdfast.twin.protocol import Command
 from holdfast.twin.simulation import Grasp, simulate
 from holdfast.twin.world import World
@@ -35,6 +31,8 @@ ARROW_HALF_WIDTH = 0.002
 """Half width of an arrow [m]."""
 ARROW_COLOUR = (0.80, 0.10, 0.16, 1.0)
 """Colour of the arrows."""
+MAX_SHAPES = 1000
+"""Maximum number of shapes in a picture."""
 SAMPLES_PER_PICTURE = 12
 """Samples between two pictures of a film, which gives 12.5 pictures per second."""
 
@@ -53,14 +51,6 @@ class Camera(NamedTuple):
     distance: float = 0.32
     azimuth: float = 162.0
     elevation: float = -36.0
-
-
-class _Context(Protocol):
-    """Common interface of MuJoCo's back ends."""
-
-    def make_current(self) -> None: ...
-
-    def free(self) -> None: ...
 
 
 class Renderer:
@@ -85,14 +75,8 @@ class Renderer:
         camera: Camera | None = None,
     ) -> None:
         _check_size(model, width, height)
-        self._model = model
-        self._context = _context(width, height)
-        self._scene = mujoco.MjvScene(model, maxgeom=1000)
-        self._options = mujoco.MjvOption()
+        self._renderer = _start(model, width, height)
         self._camera = _aimed(camera or Camera())
-        self._rect = mujoco.MjrRect(0, 0, width, height)
-        self._canvas = mujoco.MjrContext(model, mujoco.mjtFontScale.mjFONTSCALE_150.value)
-        mujoco.mjr_setBuffer(mujoco.mjtFramebuffer.mjFB_OFFSCREEN.value, self._canvas)
 
     def __enter__(self) -> "Renderer":
         return self
@@ -102,9 +86,7 @@ class Renderer:
 
     def close(self) -> None:
         """Free the resources of the back end."""
-        self._context.make_current()
-        self._canvas.free()
-        self._context.free()
+        self._renderer.close()
 
     def picture(self, data: mujoco.MjData, forces: Array | None = None) -> Picture:
         """Render a picture of the current state.
@@ -114,17 +96,11 @@ class Renderer:
             forces: (n, 6) points [m] and forces [N] in the world, drawn as arrows that end at
                 the points.
         """
-        self._context.make_current()
-        mujoco.mjv_updateScene(
-            self._model, data, self._options, None, self._camera,
-            mujoco.mjtCatBit.mjCAT_ALL.value, self._scene,
-        )  # fmt: skip
+        self._renderer.update_scene(data, self._camera)
         for row in np.zeros((0, 6)) if forces is None else forces:
-            _draw_arrow(self._scene, row[:3], row[3:])
-        mujoco.mjr_render(self._rect, self._scene, self._canvas)
-        picture = np.empty((self._rect.height, self._rect.width, 3), dtype=np.uint8)
-        mujoco.mjr_readPixels(picture, None, self._rect, self._canvas)
-        return np.ascontiguousarray(picture[::-1])
+            _draw_arrow(self._renderer.scene, row[:3], row[3:])
+        picture: Picture = self._renderer.render()
+        return picture
 
 
 def render(
@@ -275,27 +251,15 @@ def _draw_arrow(scene: mujoco.MjvScene, point: Array, force: Array) -> None:
     scene.ngeom += 1
 
 
-def _context(width: int, height: int) -> "_Context":
-    name = environ.get("MUJOCO_GL", "").lower().strip() or _back_end()
+def _start(model: mujoco.MjModel, width: int, height: int) -> mujoco.Renderer:
     try:
-        context: _Context = import_module(f"mujoco.{name}").GLContext(width, height)
-        context.make_current()
+        return mujoco.Renderer(model, height, width, MAX_SHAPES)
     except Exception as cause:  # each back end raises its own exceptions
         reason = str(cause).strip().split("\n")[0] or type(cause).__name__
         raise OutputError(
-            f"cannot render: MuJoCo's back end {name!r} does not start ({reason}); install libegl1 "
-            "or libosmesa6, or choose one with MUJOCO_GL=egl, osmesa or glfw"
+            f"cannot render: MuJoCo's back end {BACK_END!r} does not start ({reason}); install "
+            "libegl1 or libosmesa6, or choose one with MUJOCO_GL=egl, osmesa or glfw"
         ) from cause
-    return context
-
-
-def _back_end() -> str:
-    """Return the name of MuJoCo's back end that most likely works without a display."""
-    if sys.platform == "darwin":
-        return "cgl"
-    if sys.platform == "win32":
-        return "glfw"
-    return "osmesa" if find_library("EGL") is None and find_library("OSMesa") else "egl"
 
 
 def _save_animation(frames: Iterable[Picture], path: Path, fps: float) -> None:

@@ -9,8 +9,8 @@ from pathlib import Path
 import msgspec
 import numpy as np
 
-from holdfast.metrics.truth_labels import LabelRule, labels_from_truth
-from holdfast.recordings import Recording, Tactile
+from holdfast.metrics.truth_labels import LabelRule, labels_from_truth, phases_from_touch
+from holdfast.recordings import Recording, Tactile, Truth
 from holdfast.sensors import sensor
 from holdfast.sensors.types import Array
 from holdfast.twin.control import STEPS_PER_CONTROL, draw_controller
@@ -21,12 +21,12 @@ from holdfast.twin.loads import Load, load_state
 from holdfast.twin.objects import GraspObject, object_named
 from holdfast.twin.operator import draw_disturbances, draw_tremor
 from holdfast.twin.profile import Profile, profile
-from holdfast.twin.protocol import THUMB_SHARE, Command, Plan, Protocol
+from holdfast.twin.protocol import CONTACT_LOAD, THUMB_SHARE, Command, Plan, Protocol
 from holdfast.twin.surface import curved_fingertip
 from holdfast.twin.truth_log import TruthLog
-from holdfast.twin.uskin import Uskin, with_server_effects
-from holdfast.twin.uskin_parameters import UskinParameters
-from holdfast.twin.uskin_readout import Counts, Readout
+from holdfast.twin.uskin.fingertip import Uskin, with_server_effects
+from holdfast.twin.uskin.parameters import UskinParameters
+from holdfast.twin.uskin.readout import Counts, Readout
 from holdfast.twin.world import World
 
 RETRY_DEPTH_FACTOR = 0.75
@@ -93,7 +93,7 @@ class Grasp:
         """Return the random number generator of one part, which is independent of other parts."""
         drawn_as = profile(self.profile).drawn_as or self.profile
         key = f"{self.object}/{self.case}/{self.repeat}/{drawn_as}/{self.attempt}/{part}"
-        return _generator(self.seed, key)
+        return generator_of(self.seed, key)
 
 
 SampleCallback = Callable[[World, Command], None]
@@ -144,7 +144,8 @@ class Simulation:
         self.command: Command | None = None
         self.n_samples = 0
         self._pressing: Pressing | None = None
-        self._truth_log = TruthLog()
+        self._truth_log = TruthLog(FINGERS)
+        self._bodies: list[Array] = []  # (4, 18) of each sample
         self._taxel_forces: list[Array] = []  # (4, n_taxels, 3) of each sample [N]
         self._readouts: dict[str, Readout] = {}
 
@@ -183,7 +184,15 @@ class Simulation:
         if scales is not None and self._pressing is not None and not released:
             moved = self._pressing.displacement(scales)
         world.advance(command, self.plan, protocol.anchor, moved)
-        self._truth_log.add(world, command)
+        self._truth_log.add(
+            command.phase,
+            world.contact,
+            outside_force=world.outside[:3],
+            object_pose=world.object_pose,
+            joints=world.hand.data.qpos[:N_JOINTS],
+            set_point_error=world.set_point_error,
+        )
+        self._bodies.append(world.bodies[:-1].copy())
         one = self.uskins[FINGERS[0]]  # all fingertips have the same nodes and taxels
         self._taxel_forces.append(one.taxel_forces(world.contact.node_forces))
         self.command = command
@@ -204,7 +213,7 @@ class Simulation:
     def recording(self) -> Recording:
         """Return the recording so far, with truth and labels."""
         grasp, times = self.grasp, np.arange(self.n_samples) / RATE
-        truth = self._truth_log.truth(times)
+        truth = self._truth(times)
         taxel_forces = np.array(self._taxel_forces)
         modules = {}
         for place, (finger, uskin) in enumerate(self.uskins.items()):
@@ -218,6 +227,17 @@ class Simulation:
             modules[finger] = Tactile(uskin.sensor, stamps, counts, labels=labels)
         name = grasp.failed_name if self.protocol.failed else grasp.name
         return Recording(name, modules, _metadata(grasp, self.protocol), truth)
+
+    def _truth(self, times: Array) -> Truth:
+        """Return the truth of all samples, in which disturbances last from touch to touch."""
+        truth, bodies = self._truth_log.truth(times), np.array(self._bodies)
+        push = np.linalg.norm(truth.hand["outside_force"], axis=1)  # the only other contact then
+        phase = phases_from_touch(truth.hand["phase"], push, CONTACT_LOAD)
+        fingers = {
+            finger: {**truth.fingers[finger], "tip_pose": _poses(bodies[:, place])}
+            for place, finger in enumerate(FINGERS)
+        }
+        return Truth(times, {**truth.hand, "phase": phase}, fingers)
 
 
 def simulate(
@@ -281,14 +301,22 @@ def _world(grasp: Grasp, glitch_rate: float) -> World:
     )
 
 
+def _poses(bodies: Array) -> Array:
+    """Return positions [m] and quaternions w, x, y, z, (n, 7)."""
+    from scipy.spatial.transform import Rotation
+
+    turns = Rotation.from_matrix(bodies[:, 3:12].reshape(-1, 3, 3)).as_quat()
+    return np.column_stack([bodies[:, :3], turns[:, 3], turns[:, :3]])
+
+
 @cache
 def _skin(seed: int, finger: str, parameters: UskinParameters) -> Uskin:
     """Return the skin of a finger: one seed is one hand, with the same gains in all its grasps."""
     nodes = curved_fingertip().nodes
-    return Uskin(parameters, sensor("uskin-curved"), nodes, _generator(seed, f"skin/{finger}"))
+    return Uskin(parameters, sensor("uskin-curved"), nodes, generator_of(seed, f"skin/{finger}"))
 
 
-def _generator(seed: int, key: str) -> np.random.Generator:
+def generator_of(seed: int, key: str) -> np.random.Generator:
     """Return a random number generator for a key, independent of other keys."""
     return np.random.default_rng([seed, zlib.crc32(key.encode())])
 

@@ -10,16 +10,69 @@ from holdfast.twin.hand import FINGERS, GRAVITY, N_JOINTS, SUBSTEPS, TIMESTEP, H
 from holdfast.twin.loads import LoadState
 from holdfast.twin.mujoco_import import mujoco
 from holdfast.twin.objects import GraspObject
-from holdfast.twin.physics import Action, Steps, Wrenches, advance_sample, engine_of
+from holdfast.twin.physics import Action, Steps, Wrenches, advance_of
 from holdfast.twin.protocol import OPEN_GAP, Command, Plan
 from holdfast.twin.shapes import MU_KINETIC, MU_STATIC
-from holdfast.twin.surface import curved_fingertip
+from holdfast.twin.skin import Skin
+from holdfast.twin.surface import Surface, curved_fingertip
 
 MIN_HEIGHT = -0.3
 """Height below which a lost object is out of the picture and is kept in place [m]."""
 
 
-class World:
+class ContactWorld:
+    """Physical state of fingertips and the object between them.
+
+    Args:
+        hand: model of the fingertips and the object.
+        item: the object.
+        surface: surface of every fingertip.
+        skin: material of the skin; by default `Skin()`.
+
+    Attributes:
+        hand: model of the fingertips and the object.
+        item: the object.
+        contact: state of the contact.
+        constants: skin and object.
+        bodies: (n_fingers + 1, 18) position, rotation, velocity and spin of the fingertip frames
+            and of the object.
+        outside: (6,) force [N] and torque [N m] of operator and loads on the object.
+        set_point_error: largest error of a set-point, in a glitch, during the last sample.
+    """
+
+    def __init__(
+        self, hand: HandModel, item: GraspObject, surface: Surface, skin: Skin | None = None
+    ) -> None:
+        self.hand, self.item = hand, item
+        self.contact = new_contact(surface, len(hand.tips))
+        self.constants = constants_of(surface, item, skin)
+        self.bodies = np.zeros((len(hand.tips) + 1, 18))
+        self.outside = np.zeros(6)
+        self.set_point_error = 0.0
+        self._frictions = self.constants.solid[MU_STATIC : MU_KINETIC + 1].copy()
+
+    @property
+    def loads(self) -> Array:
+        """Load of each fingertip, (n_fingers,) [N]."""
+        return self.contact.tips[:, LOAD]
+
+    @property
+    def slip(self) -> float:
+        """Largest slip speed of a fingertip in contact [m/s]."""
+        tips = zip(self.loads.tolist(), self.contact.slip_speed.tolist(), strict=True)
+        return max(speed if load > 0 else 0.0 for load, speed in tips)
+
+    @property
+    def object_pose(self) -> Array:
+        """Position [m] and quaternion w, x, y, z of the object, (7,)."""
+        return np.concatenate([self.bodies[-1, :3], self.hand.data.qpos[-4:]])
+
+    def scale_friction(self, factor: float) -> None:
+        """Set the friction of the object as a multiple of its own, until it is set again."""
+        self.constants.solid[MU_STATIC : MU_KINETIC + 1] = factor * self._frictions
+
+
+class World(ContactWorld):
     """Physical state of one grasp of one object.
 
     Args:
@@ -43,35 +96,17 @@ class World:
         start: Array,
         side: str = "right",
     ) -> None:
-        surface = curved_fingertip()
-        self.hand, self.item, self.path = hand, item, path
-        self.controller, self.tremors = controller, tremors
-        self.contact = new_contact(surface, len(FINGERS))
-        self.constants = constants_of(surface, item)
-        self.bodies = np.zeros((len(FINGERS) + 1, 18))
-        self.outside = np.zeros(6)
-        self.set_point_error = 0.0
-        self._engine = engine_of(hand)
+        super().__init__(hand, item, curved_fingertip())
+        self.path, self.controller, self.tremors = path, controller, tremors
+        self._advance = advance_of(hand)
         self._steps = Steps(SUBSTEPS, TIMESTEP, STEPS_PER_CONTROL)
         self._wrenches = Wrenches(self.outside, np.zeros(6))
         self._pull = np.zeros(3)
-        self._frictions = self.constants.solid[MU_STATIC : MU_KINETIC + 1].copy()
         self._parameters = np.zeros(9)
         self._origin = np.zeros(12)
         self._disturbance = -1
         self._tick = 0
         self._place(start, side)
-
-    @property
-    def loads(self) -> Array:
-        """Load of each fingertip, (4,) [N]."""
-        return self.contact.tips[:, LOAD]
-
-    @property
-    def slip(self) -> float:
-        """Largest slip speed of a fingertip in contact [m/s]."""
-        tips = zip(self.loads.tolist(), self.contact.slip_speed.tolist(), strict=True)
-        return max(speed if load > 0 else 0.0 for load, speed in tips)
 
     def set_load(self, load: LoadState) -> None:
         """Set force, friction and acceleration of the hand until they are set again.
@@ -80,8 +115,7 @@ class World:
         """
         self._pull[:] = load.force
         self.hand.model.opt.gravity[:] = [0.0, 0.0, -GRAVITY] - load.acceleration
-        frictions = self.constants.solid[MU_STATIC : MU_KINETIC + 1]
-        frictions[:] = load.friction * self._frictions
+        self.scale_friction(load.friction)
 
     def advance(
         self, command: Command, plan: Plan, anchor: Array, displacement: Array | None = None
@@ -97,8 +131,8 @@ class World:
         target = self.path.targets(command.depths)
         if displacement is not None:
             target = target + displacement
-        self.set_point_error = advance_sample(
-            self._engine, self._steps, self.hand.arrays, self.contact, self.constants,
+        self.set_point_error = self._advance(
+            self._steps, self.hand.arrays, self.contact, self.constants,
             self.controller, self._tick, target, self._action(command, plan, anchor),
             self.bodies, self._wrenches,
         )  # fmt: skip

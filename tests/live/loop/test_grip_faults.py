@@ -3,13 +3,12 @@ from pathlib import Path
 
 import pytest
 
-from holdfast.grip import GripReason
-from holdfast.live.loop.documents import GripLimits
+from holdfast.grip import GripReason, Limits
 from holdfast.live.loop.grip_faults import ENDED, GRIP_FAULTS, explain_fault
 
 RISES = {"", "unstable", "slip", "load", "margin", "balance", "relax"}
 """Reasons of a change of force, which are no faults."""
-GUIDE = Path(__file__).parents[2] / "docs" / "grip.md"
+GUIDE = Path(__file__).parents[3] / "docs" / "grip.md"
 
 
 def limits(**fields):
@@ -18,7 +17,7 @@ def limits(**fields):
         "max_force": None, "stale_after": 0.05, "fault_after": 0.03, "recovery": 0.5,
         "on_fault": "hold", "max_rate": 400.0,
     }  # fmt: skip
-    return GripLimits(**(defaults | fields))
+    return Limits(**(defaults | fields))
 
 
 def explained(reason, *, armed=True, released=False, failure="", **fields):
@@ -47,7 +46,7 @@ def test_some_faults_last_until_a_reset(reason):
 def test_others_end_by_themselves_if_the_hand_holds():
     ends = "Control continues by itself after 0.5 s of valid samples."
     assert explained("stale").continues.endswith(ends)
-    for fields in ({"on_fault": "open"}, {"recovery": None}, {"recovery": math.inf}):
+    for fields in ({"on_fault": "open"}, {"recovery": math.inf}):
         assert explained("stale", **fields).continues.endswith("until Reset.")
 
 

@@ -4,7 +4,7 @@ import pytest
 
 from grip.build import FINGERS, RATE, hand, holding, scales
 from holdfast.contact import ContactState, HandEstimate
-from holdfast.devices.hands.base import Hand
+from holdfast.devices.hands.base import HandDevice
 from holdfast.errors import HandError
 from holdfast.grip import (
     FingerCommand,
@@ -19,7 +19,7 @@ from holdfast.live.loop.grip_loop import GripLoop
 SLIPPING = {"probability": 0.0, "state": ContactState.UNSTABLE}
 
 
-class Tape(Hand):
+class Tape(HandDevice):
     """Hand that keeps its commands, and may fail. It asks for every command."""
 
     name = "tape:"

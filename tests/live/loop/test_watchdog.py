@@ -17,7 +17,7 @@ from holdfast.live.loop import watchdog
 from holdfast.live.loop.watchdog import N_SAFE_COMMANDS, Watchdog
 
 PATIENCE = 120.0
-TESTS = str(Path(__file__).parents[1])
+TESTS = str(Path(__file__).parents[2])
 COMMAND = GripCommand(1.0, LoopState.REACT, {"thumb": FingerCommand(1.3, GripReason.SLIP)})
 
 LOOP = """

@@ -11,8 +11,9 @@ from aiohttp import ClientSession, WSServerHandshakeError, web
 from holdfast.contact import Fault
 from holdfast.detector import detect
 from holdfast.io import load_recording
+from holdfast.live.documents import finger_document
 from holdfast.live.session import Session
-from holdfast.live.status import finger_document, operating_points
+from holdfast.live.status import operating_points
 from holdfast.live.stream_detector import StreamDetector, compile_kernels
 from holdfast.live.web import schema
 from holdfast.live.web.service import LiveService
@@ -510,7 +511,9 @@ def test_the_page_loads_nothing_from_other_servers():
     assert "https://" not in text
 
 
-@pytest.mark.parametrize("path", ["/page/main.js", "/page/uplot/uPlot.esm.js", "/web/base.css"])
+@pytest.mark.parametrize(
+    "path", ["/page/main.js", "/page/uplot/uPlot.iife.min.js", "/web/base.css"]
+)
 def test_the_files_of_the_page(path):
     async def work():
         async with served(patient(10)) as (client, _), client.get(path) as answer:

@@ -13,6 +13,7 @@ import msgspec
 import numpy as np
 import numpy.typing as npt
 
+from holdfast.classifiers.folds import deal_folds, random_folds, shuffled
 from holdfast.contact import STABLE, UNKNOWN
 from holdfast.metrics import Decisions, FingerDecisions, Metrics, summarise
 from holdfast.metrics.masks import Mask
@@ -244,11 +245,9 @@ def balanced_groups(
     objects: Sequence[str | None], n_groups: int, seed: int
 ) -> npt.NDArray[np.int64]:
     """Return (n_recordings,) groups of equal size, with each object spread over the groups."""
-    order = np.random.default_rng(seed).permutation(len(objects))
+    order = shuffled(len(objects), seed)
     order = order[np.argsort(np.array([str(objects[k]) for k in order]), kind="stable")]
-    groups = np.empty(len(objects), dtype=np.int64)
-    groups[order] = np.arange(len(objects)) % n_groups
-    return groups
+    return deal_folds(len(objects), n_groups, order)
 
 
 def _fit_fold(
@@ -389,7 +388,7 @@ def evaluate_pooled(job: EvaluationJob) -> list[list[int]]:
     generator = np.random.default_rng(job.seed)
     folds = [
         {
-            unit: generator.integers(RANDOM_FOLDS, size=len(rows))
+            unit: random_folds(len(rows), RANDOM_FOLDS, generator)
             for unit, rows in recording.features.items()
         }
         for recording in recordings

@@ -14,6 +14,7 @@ import numpy as np
 import numpy.typing as npt
 
 from holdfast.classifiers import Samples
+from holdfast.classifiers.folds import random_folds
 from holdfast.features import FEATURE_NAMES, Tare, haar_features
 from holdfast.recordings import Recording
 from holdfast.sensors.types import Array
@@ -105,7 +106,7 @@ def pool_samples(
         features = _columns(signal, window)
         rows = usable_rows(features, states)
         samples.append(labelled_samples(features, states, rows, number))
-        drawn = np.random.default_rng([seed, number]).integers(N_PARTS, size=len(states))
+        drawn = random_folds(len(states), N_PARTS, np.random.default_rng([seed, number]))
         parts.append(drawn[rows])
     objects = tuple(recording.object for recording in forces)
     return SamplePool(concatenate(samples), np.concatenate(parts), objects)

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from holdfast.twin.uskin_parameters import UskinParameters
+from holdfast.twin.uskin.parameters import UskinParameters
 from holdfast_lab.study.methods import METHODS
 from holdfast_lab.study.methods.method import NEWTONS_PER_COUNT
 from holdfast_lab.study.methods.vibration import BANDS, band_energy, band_pass, high_pass

@@ -1,6 +1,6 @@
 """Hands that take commands, by URI."""
 
-from holdfast.devices.hands.base import Hand
+from holdfast.devices.hands.base import HandDevice
 from holdfast.devices.hands.claim import Claim
 
 SCHEMES = {
@@ -13,10 +13,10 @@ SCHEMES = {
 }
 """Schemes of the URIs of hands, with a description."""
 
-__all__ = ["SCHEMES", "Claim", "Hand", "open_hand"]
+__all__ = ["SCHEMES", "Claim", "HandDevice", "open_hand"]
 
 
-def open_hand(uri: str, *, standby: bool = False) -> Hand:
+def open_hand(uri: str, *, standby: bool = False) -> HandDevice:
     """Return the hand of a URI; entering it connects.
 
     Args:

@@ -11,7 +11,7 @@ from holdfast.grip.limits import Limits
 from holdfast.openable import Openable
 
 
-class Hand(Openable):
+class HandDevice(Openable):
     """Hand that takes commands. A context manager: entering it connects.
 
     Only `open` waits for the hand. `send` returns at once. After `close`, the hand keeps the

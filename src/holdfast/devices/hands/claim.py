@@ -8,6 +8,7 @@ from types import TracebackType
 from typing import Self
 
 from holdfast.errors import HandError
+from holdfast.files import lock
 
 FOLDER = Path(".local", "state", "holdfast", "claims")
 """Folder of the claims, in the home of the user."""
@@ -22,7 +23,7 @@ class Claim:
     The claim of a process that died ends with it.
 
     Args:
-        name: `Hand.resource` of the hand.
+        name: `HandDevice.resource` of the hand.
     """
 
     def __init__(self, name: str) -> None:
@@ -103,13 +104,11 @@ def _lock(folder: int, name: str) -> int:
         BlockingIOError: another process has locked it.
         OSError: it cannot be opened or locked, or is a symbolic link.
     """
-    import fcntl
-
     flags = os.O_RDWR | os.O_CREAT | os.O_NOFOLLOW | os.O_CLOEXEC
     while True:
         file = os.open(name, flags, _FILE_MODE, dir_fd=folder)
         try:
-            fcntl.flock(file, fcntl.LOCK_EX | fcntl.LOCK_NB)
+            lock(file)
             if _is_at(folder, name, file):
                 return file
         except BaseException:

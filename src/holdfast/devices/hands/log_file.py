@@ -7,12 +7,12 @@ from typing import BinaryIO
 import msgspec
 from msgspec import structs
 
-from holdfast.devices.hands.base import Hand
+from holdfast.devices.hands.base import HandDevice
 from holdfast.errors import HandError
 from holdfast.grip.command import GripCommand
 
 
-class LogFile(Hand):
+class LogFile(HandDevice):
     """Hand that appends each command to a file, except one that differs in its time alone.
 
     Args:

@@ -9,21 +9,21 @@ from importlib import import_module
 from pathlib import Path
 from types import ModuleType
 
-from holdfast.devices.hands.base import Hand
+from holdfast.devices.hands.base import HandDevice
 from holdfast.errors import HandError
 from holdfast.grip.command import GripCommand
 
 
-class ScalarGripper(Hand):
+class ScalarGripper(HandDevice):
     """Gripper that takes one number: the force scale, or 0 to open.
 
     The function is called when the number changes, and not before the grip begins. Attributes of
-    the function can ask for more: `heartbeat` [s] and `needs_idle`, as of `Hand`.
+    the function can ask for more: `heartbeat` [s] and `needs_idle`, as of `HandDevice`.
 
     Args:
         function: is called with the scale at each command.
         name: URI of the hand.
-        resource: as of `Hand`; by default the name.
+        resource: as of `HandDevice`; by default the name.
 
     Raises:
         ValueError: the `heartbeat` of the function is no time.

@@ -1,19 +1,57 @@
 // Plots of all fingers, one below the other. Each layer has its own canvas, so that a movement of
 // the pointer redraws only the cursor: labels at the bottom, then signals, then the cursor.
 
-import { byId } from "../web/dom.js";
-import { colours, font } from "../web/theme.js";
+import { byId, make, setText } from "../web/dom.js";
+import { colours, fingerColour, font } from "../web/theme.js";
 import { drawLine, prepareCanvas } from "./canvas.js";
 import { drawBackground, drawLabels, drawProposals, drawReviewItems, drawSelection, drawTarget, shadeStates } from "./draw_labels.js";
 import { drawAxis, drawSeries, forceLines, forceScale, sigmaScale, valueRange } from "./draw_signals.js";
-import { niceStep, timeText } from "./format.js";
-import { Legend } from "./legend.js";
+import { niceStep, number, timeText, unitWord } from "./format.js";
 import { OVERVIEW_HEIGHT, drawOverview, drawTimeGrid } from "./overview.js";
 import { LEFT_MARGIN, RIGHT_MARGIN, rowLayout } from "./view.js";
 
 export const LAYERS = ["overview", "labels", "signals", "cursor"];
 
 const MIN_ROW_HEIGHT = 120; // [px], the rows scroll if they do not fit
+
+// Beside the plots of each finger: its name, the lines, and their values at the cursor.
+
+function swatch(colour) {
+  const mark = make("i", "swatch");
+  mark.style.background = colour;
+  return mark;
+}
+
+class Legend {
+  constructor(box) {
+    this.box = box;
+    this.values = new Map();
+  }
+
+  open(recording, force) {
+    this.values.clear();
+    this.box.replaceChildren(...recording.fingers.map((finger, index) => this.fingerLegend(finger, index, recording.unit[finger], force)));
+  }
+
+  fingerLegend(finger, index, unit, force) {
+    const name = make("h3", "", swatch(fingerColour(index)), make("span", "", finger));
+    name.title = finger;
+    const values = new Map();
+    const entry = (key, label, colour) => {
+      const value = make("span", "value", number(null));
+      values.set(key, value);
+      return make("div", "entry", swatch(colour), make("span", "label", label), value);
+    };
+    const entries = [...forceLines(force, index).map((each) => entry(each.key, each.name, each.colour)), entry("sigma", "σ", colours.muted)];
+    this.values.set(finger, values);
+    return make("section", "finger-legend", name, make("small", "unit", unitWord(unit)), ...entries);
+  }
+
+  /** Show the values of a finger; null shows dashes. */
+  show(finger, values) {
+    for (const [key, element] of this.values.get(finger) ?? []) setText(element, number(values?.[key]));
+  }
+}
 
 export class Plot {
   constructor(editor, view, signals) {

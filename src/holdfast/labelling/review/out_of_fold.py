@@ -17,6 +17,7 @@ from typing import overload
 
 import numpy as np
 
+from holdfast.classifiers.folds import deal_folds, shuffled
 from holdfast.contact import ContactState
 from holdfast.errors import TrainingError
 from holdfast.model import ANY_FINGER, Model
@@ -156,16 +157,18 @@ class _FoldModels:
             found, data_split, gather_samples(recordings, found, setting, data_split)
         )
         one_class = _one_class_fingers(data, recordings.fingers)
-        order = np.random.default_rng(setting.seed).permutation(len(data_split.units))
-        fold_of = (np.argsort(order) % n_folds)[data_split.group_of].tolist()
+        n_units = len(data_split.units)
+        unit_folds = deal_folds(n_units, n_folds, shuffled(n_units, setting.seed))
         parameters = {f: setting.recipe_of(f).reference for f in data.fingers}
         tasks = [
-            (data, setting, parameters, set(order[fold::n_folds].tolist()))
-            for fold in range(min(n_folds, len(order)))
+            (data, setting, parameters, set(np.flatnonzero(unit_folds == fold).tolist()))
+            for fold in range(min(n_folds, n_units))
         ]
         fingers = recordings.fingers - one_class.keys()
         models = list(map_ordered(fit_model, tasks, n_jobs))
-        return cls(fingers, {**constant, **one_class}, models, fold_of)
+        return cls(
+            fingers, {**constant, **one_class}, models, unit_folds[data_split.group_of].tolist()
+        )
 
     def predict(self, index: int, recording: Recording) -> Probabilities:
         """Return (n,) probabilities of class 1 for each finger; NaN if they are unknown."""

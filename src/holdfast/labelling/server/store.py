@@ -17,7 +17,7 @@ import msgspec
 
 from holdfast.contact import LABEL_STATES, Cause, ContactState
 from holdfast.errors import HoldfastError, OutputError, RecordingError
-from holdfast.files import write_whole
+from holdfast.files import lock, sync, write_whole
 from holdfast.io.header import label_data
 from holdfast.io.label_files import (
     LabelFile,
@@ -165,7 +165,7 @@ def save_stored(
             )
         labels_for(path, recording.digest)  # raises if the file is not this recording's
         write_whole(target, data, force=True)
-        _flush(target)
+        sync(target, target.parent)
         return StoredLabels(signed, "file", revision_of(path), author, time, note)
 
 
@@ -303,23 +303,10 @@ def _locked(folder: Path) -> Iterator[None]:
     if os.name != "posix":
         yield
         return
-    import fcntl
-
     handle = os.open(folder, os.O_RDONLY)
     try:
         with suppress(OSError):  # network file systems without locks
-            fcntl.flock(handle, fcntl.LOCK_EX)
+            lock(handle, wait=True)
         yield
     finally:
         os.close(handle)
-
-
-def _flush(target: Path) -> None:
-    """Return when the file and its entry in the folder are physically on the disk."""
-    paths = (target, target.parent) if os.name == "posix" else ()
-    for path in paths:
-        handle = os.open(path, os.O_RDONLY)
-        try:
-            os.fsync(handle)
-        finally:
-            os.close(handle)

@@ -1,43 +1,41 @@
 """What the page, the recorder and ROS see of a loop that controls the grip of a hand."""
 
-from collections.abc import Callable
-from concurrent.futures import Future
-from typing import Literal, Protocol
+from typing import TYPE_CHECKING
 
 from msgspec import Struct
 
-Number = float | None
-"""A number, or null if there is none (NaN and infinity are written as null)."""
+from holdfast.grip.command import FingerCommand, GripReason, LoopState
+from holdfast.grip.limits import Limits
+from holdfast.live.documents import Number, document_type
 
+if TYPE_CHECKING:
+    GripLimits = Limits
 
-class GripLimits(Struct, frozen=True, kw_only=True, gc=False):
-    """Limits of the controller, see `holdfast.grip.Limits`; null for no limit."""
+    class GripFinger(FingerCommand, frozen=True, kw_only=True):
+        """Command of a finger, see below."""
 
-    min_scale: float
-    max_scale: float
-    rise: float
-    fall: float
-    cooldown: float
-    max_force: Number
-    stale_after: float
-    fault_after: float
-    recovery: Number
-    on_fault: Literal["hold", "open"]
-    max_rate: float
+        highest: float
 
-
-class GripFinger(Struct, frozen=True, kw_only=True, gc=False):
-    """Newest command of a finger.
+else:
+    GripLimits = document_type(
+        "GripLimits",
+        Limits,
+        "Limits of the controller, see `holdfast.grip.Limits`; null for no limit.",
+        nullable=lambda name: name == "recovery",
+    )
+    GripFinger = document_type(
+        "GripFinger",
+        FingerCommand,
+        """Newest command of a finger.
 
     Attributes:
         scale: force as a multiple of that when the grip began.
         highest: highest scale that this finger may get.
         reason: why the force rises or falls; empty where it stays.
-    """
-
-    scale: float
-    highest: float
-    reason: str
+    """,
+        added=[("highest", float)],
+        at=1,
+    )
 
 
 class GripEntry(Struct, frozen=True, gc=False):
@@ -89,8 +87,8 @@ class GripDocument(Struct, frozen=True, kw_only=True, gc=False):
     law: str
     armed: bool
     limits: GripLimits
-    state: str
-    reason: str
+    state: LoopState
+    reason: GripReason
     stopped: bool
     released: bool
     time: Number
@@ -99,23 +97,3 @@ class GripDocument(Struct, frozen=True, kw_only=True, gc=False):
     failure: str
     events: list[GripEntry]
     fault: GripFault | None = None
-
-
-GripListener = Callable[[str, float], None]
-"""Function that gets each event of a loop as a text, and its time [s]. It must return at once."""
-
-
-class Grip(Protocol):
-    """A loop that runs beside a session."""
-
-    def document(self) -> GripDocument:
-        """Return the state."""
-
-    def stop(self) -> "Future[None]":
-        """Bring the hand into its safe state at once; the result is there when it was sent."""
-
-    def reset(self) -> "Future[None]":
-        """End a stop or a fault."""
-
-    def add_listener(self, listener: GripListener) -> None:
-        """Call `listener` with every event from now on."""

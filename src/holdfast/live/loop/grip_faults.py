@@ -4,7 +4,8 @@ import math
 from collections.abc import Mapping
 from typing import NamedTuple
 
-from holdfast.live.loop.documents import GripFault, GripLimits
+from holdfast.grip.limits import Limits
+from holdfast.live.loop.documents import GripFault
 
 ENDED = "ended"
 """Reason of a fault that ended the loop for good."""
@@ -88,7 +89,7 @@ UNKNOWN_FAULT = FaultMeaning("The loop is in FAULT.", "The events have the reaso
 
 
 def explain_fault(
-    reason: str, limits: GripLimits, *, armed: bool, released: bool, failure: str = ""
+    reason: str, limits: Limits, *, armed: bool, released: bool, failure: str = ""
 ) -> GripFault:
     """Return what a fault is, what is commanded now, and how it ends, in words.
 
@@ -110,7 +111,7 @@ def explain_fault(
     )
 
 
-def _commanded(limits: GripLimits, *, armed: bool, released: bool, ended: bool) -> str:
+def _commanded(limits: Limits, *, armed: bool, released: bool, ended: bool) -> str:
     if not armed:
         return "Dry run: nothing is sent to the hand."
     if ended:
@@ -121,16 +122,16 @@ def _commanded(limits: GripLimits, *, armed: bool, released: bool, ended: bool) 
     return "Held: the last command stays, no force rises or falls."
 
 
-def _continues(meaning: FaultMeaning, limits: GripLimits, *, ended: bool) -> str:
+def _continues(meaning: FaultMeaning, limits: Limits, *, ended: bool) -> str:
     if ended:
         return "Control has ended; only the estimates go on."
-    recovery = math.inf if limits.recovery is None else limits.recovery
-    if meaning.lasts or limits.on_fault == "open" or math.isinf(recovery):
+    if meaning.lasts or limits.on_fault == "open" or math.isinf(limits.recovery):
         return "Estimates go on. Control stays off, in later grasps too, until Reset."
-    return f"Estimates go on. Control continues by itself after {recovery:g} s of valid samples."
+    wait = f"after {limits.recovery:g} s of valid samples"
+    return f"Estimates go on. Control continues by itself {wait}."
 
 
-def _reset(limits: GripLimits, *, ended: bool) -> str:
+def _reset(limits: Limits, *, ended: bool) -> str:
     if ended:
         return "Reset has no effect: end this program, and start it again."
     if limits.on_fault == "open":

@@ -9,7 +9,7 @@ from typing import Self
 from msgspec import structs
 
 from holdfast.contact import HandEstimate
-from holdfast.devices.hands import Hand
+from holdfast.devices.hands import HandDevice
 from holdfast.errors import HandError
 from holdfast.grip.command import GripCommand, GripReason, LoopState
 from holdfast.grip.controller import GripController
@@ -40,7 +40,7 @@ class GripLoop:
 
     Attributes:
         last: the last command; None before the first.
-        n_sent: number of commands that were sent; a hand gets no command twice, see `Hand`.
+        n_sent: number of commands that were sent; a hand gets no command twice, see `HandDevice`.
     """
 
     _now = -math.inf
@@ -50,7 +50,7 @@ class GripLoop:
     def __init__(
         self,
         controller: GripController,
-        hand: Hand,
+        hand: HandDevice,
         *,
         armed: bool = False,
         watchdog: Watchdog | None = None,

@@ -1,23 +1,18 @@
 """A grip loop that runs in a thread beside a session, for the page and other programs."""
 
 from collections import deque
+from collections.abc import Callable
 from concurrent.futures import Future
 from threading import Event, Thread
 from types import TracebackType
 from typing import Self
 
-import msgspec
+from msgspec.structs import asdict
 
 from holdfast.errors import HandError
-from holdfast.grip.command import GripCommand, LoopState
-from holdfast.live.loop.documents import (
-    GripDocument,
-    GripEntry,
-    GripFault,
-    GripFinger,
-    GripLimits,
-    GripListener,
-)
+from holdfast.grip.command import GripCommand, GripReason, LoopState
+from holdfast.grip.limits import Limits
+from holdfast.live.loop.documents import GripDocument, GripEntry, GripFault, GripFinger
 from holdfast.live.loop.grip_faults import explain_fault
 from holdfast.live.loop.grip_loop import GripLoop
 from holdfast.live.loop.runner import LoopRunner
@@ -30,6 +25,9 @@ LOCK = (
     "change them"
 )
 """Reason of the lock of a session whose estimates move a hand."""
+
+GripListener = Callable[[str, float], None]
+"""Function that gets each event of a loop as a text, and its time [s]. It must return at once."""
 
 
 class EventLog:
@@ -96,9 +94,7 @@ class LiveGrip:
     def document(self) -> GripDocument:
         """Return the state and the newest command."""
         loop, last = self._loop, self._loop.last
-        controller = loop.controller
-        highest = controller.highest_scales
-        limits = GripLimits(**msgspec.structs.asdict(controller.limits))
+        limits, highest = loop.controller.limits, loop.controller.highest_scales
         state = LoopState.FAULT if self.failure else last.state if last else LoopState.IDLE
         return GripDocument(
             hand=loop.hand.name,
@@ -106,17 +102,13 @@ class LiveGrip:
             armed=loop.armed,
             limits=limits,
             state=state,
-            reason=last.reason if last else "",
+            reason=last.reason if last else GripReason.NONE,
             stopped=loop.stopped,
             released=last is not None and last.release,
             time=last.time if last else None,
             fingers={
-                name: GripFinger(
-                    scale=one.scale,
-                    highest=highest.get(name, controller.limits.max_scale),
-                    reason=one.reason,
-                )
-                for name, one in (last.fingers if last else {}).items()
+                name: GripFinger(**asdict(command), highest=highest.get(name, limits.max_scale))
+                for name, command in (last.fingers if last else {}).items()
             },
             n_sent=loop.n_sent,
             failure=str(self.failure or ""),
@@ -124,7 +116,7 @@ class LiveGrip:
             fault=self._fault(limits, last) if state is LoopState.FAULT else None,
         )
 
-    def _fault(self, limits: GripLimits, last: GripCommand | None) -> GripFault:
+    def _fault(self, limits: Limits, last: GripCommand | None) -> GripFault:
         """Return the explanation of the fault."""
         return explain_fault(
             last.reason if last else "",

@@ -10,6 +10,7 @@ from typing import NamedTuple
 from holdfast.contact import ContactState, HandEstimate
 from holdfast.grip.command import GripCommand, GripReason
 from holdfast.live.loop.grip_loop import GripLoop
+from holdfast.live.requests import RequestQueue
 from holdfast.live.stream_detector import StreamUpdate
 
 TICK = 0.01
@@ -57,7 +58,7 @@ class LoopRunner:
         self._on_command = on_command
         self._pending: deque[_Arrived] = deque(maxlen=MAX_PENDING)
         self._wake = Event()
-        self._requests: deque[tuple[Callable[[], None], Future[None]]] = deque()
+        self._requests = RequestQueue()
         self._estimate: HandEstimate | None = None
         self._received = 0.0
         self._stepped_at: float | None = None
@@ -89,7 +90,7 @@ class LoopRunner:
             self._process([self._pending.popleft() for _ in range(len(self._pending))])
 
     def process(self, update: StreamUpdate | None) -> None:
-        """Answer the requests, and step the loop with an update; None if nothing arrived.
+        """Carry out the requests, and step the loop with an update; None if nothing arrived.
 
         Raises:
             HandError: as `GripLoop.step`; waiting requests get it too.
@@ -97,23 +98,12 @@ class LoopRunner:
         self._process([] if update is None else [_arrived(update)])
 
     def _process(self, arrived: Sequence[_Arrived]) -> None:
-        requests = [self._requests.popleft() for _ in range(len(self._requests))]
-        try:
-            for work, _ in requests:
-                work()
-            if self._speed:
-                self._step(arrived, time.monotonic())
-            else:
-                self._step_each(arrived)
-        except Exception as failure:
-            for _, future in requests:
-                future.set_exception(failure)
-            raise
-        for _, future in requests:
-            future.set_result(None)
+        step = self._step if self._speed else self._step_each
+        self._requests.carry_out(lambda: step(arrived))
 
-    def _step(self, arrived: Sequence[_Arrived], now: float) -> None:
+    def _step(self, arrived: Sequence[_Arrived]) -> None:
         """Step the loop of a paced source once, with the newest estimate."""
+        now = time.monotonic()
         behind = self._stepped_at is not None and now - self._stepped_at > MAX_PAUSE
         estimates = [one.estimate for update, _ in arrived for one in update.estimates]
         for estimate in estimates[:-1]:
@@ -153,11 +143,9 @@ class LoopRunner:
 
     def _request(self, work: Callable[[], None]) -> "Future[None]":
         """Run `work` before the next step, and step at once."""
-        future: Future[None] = Future()
-        future.set_running_or_notify_cancel()  # whoever waits for it cannot cancel it
-        self._requests.append((work, future))
+        result = self._requests.append(work, cancellable=False)
         self._wake.set()
-        return future
+        return result
 
 
 def _arrived(update: StreamUpdate) -> _Arrived:

@@ -21,7 +21,7 @@ from typing import IO, Self
 import msgspec
 
 from holdfast.children import python_command
-from holdfast.devices.hands import Hand, open_hand
+from holdfast.devices.hands import HandDevice, open_hand
 from holdfast.errors import HandError, HoldfastError
 from holdfast.grip.command import GripCommand, GripReason, LoopState
 from holdfast.grip.guard import safe_command
@@ -258,7 +258,7 @@ def _watch(pipe: int, timeout: float) -> GripCommand | None:
     return last
 
 
-def _take_over(hand: Hand, last: GripCommand, *, release: bool) -> None:
+def _take_over(hand: HandDevice, last: GripCommand, *, release: bool) -> None:
     """Send the safe command several times; none to hold a hand that has no grip yet."""
     if last.state is LoopState.IDLE and not release:
         return

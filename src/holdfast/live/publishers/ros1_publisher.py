@@ -1,10 +1,9 @@
 """Publish estimates on ROS 1 topics, with rospy."""
 
 from collections.abc import Iterable, Mapping
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from holdfast.devices.ros import rospy_node
-from holdfast.live.loop.documents import Grip
 from holdfast.live.publishers.ros_publisher import (
     DIAGNOSTICS,
     VECTOR,
@@ -13,6 +12,9 @@ from holdfast.live.publishers.ros_publisher import (
     RosPublisher,
 )
 from holdfast.sensors.types import Unit
+
+if TYPE_CHECKING:
+    from holdfast.live.loop.live_grip import LiveGrip
 
 QUEUE_SIZE = 10
 """Messages that rospy keeps for a slow subscriber; the oldest is dropped first."""
@@ -36,7 +38,7 @@ class Ros1Publisher(RosPublisher):
         units: Mapping[str, Unit],
         namespace: str = "/holdfast",
         master: str | None = None,
-        grip: Grip | None = None,
+        grip: "LiveGrip | None" = None,
     ) -> None:
         super().__init__(units, namespace, grip)
         self._master = rospy_node.master_uri(master)

@@ -1,10 +1,9 @@
 """Publish estimates on ROS 2 topics, with Cyclone DDS; no ROS installation is needed."""
 
 from collections.abc import Callable, Iterable, Mapping
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from holdfast.devices.ros import dds
-from holdfast.live.loop.documents import Grip
 from holdfast.live.publishers.ros_publisher import (
     DIAGNOSTICS,
     FLOAT,
@@ -17,6 +16,9 @@ from holdfast.live.publishers.ros_publisher import (
 from holdfast.ros.cdr import MessageEncoder
 from holdfast.ros.definitions import parse_definition
 from holdfast.sensors.types import Unit
+
+if TYPE_CHECKING:
+    from holdfast.live.loop.live_grip import LiveGrip
 
 _LINE = "\n=====\nMSG: "
 _HEADER = (
@@ -71,7 +73,7 @@ class Ros2Publisher(RosPublisher):
         units: Mapping[str, Unit],
         namespace: str = "/holdfast",
         domain: int | None = None,
-        grip: Grip | None = None,
+        grip: "LiveGrip | None" = None,
     ) -> None:
         super().__init__(units, namespace, grip)
         self._domain = dds.domain_number(None if domain is None else str(domain))

@@ -8,13 +8,16 @@ from collections.abc import Iterable, Mapping
 from threading import Condition, Thread
 from typing import TYPE_CHECKING, NamedTuple
 
+from msgspec.structs import asdict
+
 from holdfast.contact import ContactEstimate, ContactState, HandEstimate, Reason
-from holdfast.live.loop.documents import Grip, GripDocument
+from holdfast.live.documents import numbered
 from holdfast.openable import Openable
-from holdfast.sensors import taxel_numbers
 from holdfast.sensors.types import Unit
 
 if TYPE_CHECKING:
+    from holdfast.live.loop.documents import GripDocument
+    from holdfast.live.loop.live_grip import LiveGrip
     from holdfast.live.stream_detector import StreamUpdate
 
 MAX_QUEUED_ESTIMATES = 64
@@ -31,6 +34,9 @@ GRIP_TEXTS = ("state", "reason")
 """Topics of the grip loop that are texts."""
 OK, WARN, ERROR = 0, 1, 2
 """Levels of diagnostics in ROS."""
+NOT_IN_DIAGNOSTICS = frozenset({"time", "stable_probability", "instability", "force", "cause"})
+"""Fields of an estimate that the diagnostics leave out: those with a topic, the time, and the
+cause, which is no problem of the sensor."""
 
 _Force = tuple[float, float, float]
 
@@ -80,7 +86,7 @@ class RosPublisher(Openable):
         self,
         units: Mapping[str, Unit],
         namespace: str = "/holdfast",
-        grip: Grip | None = None,
+        grip: "LiveGrip | None" = None,
     ) -> None:
         self._grip = grip
         self._grip_changed = False
@@ -218,14 +224,14 @@ class RosPublisher(Openable):
             self._publish_force(f"{name}/force", stamp, finger, one.force, newtons=newtons)
         self._publish_text(f"{self._namespace}/hand/state", estimate.state)
 
-    def _publish_grip(self, grip: GripDocument) -> None:
+    def _publish_grip(self, grip: "GripDocument") -> None:
         self._publish_text(f"{self._namespace}/grip/state", grip.state)
         self._publish_text(f"{self._namespace}/grip/reason", grip.reason)
         for finger, command in grip.fingers.items():
             if finger in self._names:
                 self._publish_number(f"{self._names[finger]}/force_scale", command.scale)
 
-    def _update_diagnostics(self, grip: GripDocument | None) -> None:
+    def _update_diagnostics(self, grip: "GripDocument | None") -> None:
         """Publish the diagnostics if they are due or have changed."""
         now = time.time()
         statuses = diagnostics_of(self._newest, now)
@@ -289,7 +295,7 @@ def diagnostics_of(newest: tuple[HandEstimate, float] | None, now: float) -> lis
     return [hand, *fingers]
 
 
-def diagnostic_of_grip(grip: GripDocument) -> DiagnosticStatus:
+def diagnostic_of_grip(grip: "GripDocument") -> DiagnosticStatus:
     """Return the health of the grip loop, with its newest command."""
     reason = grip.failure or grip.reason
     values = (
@@ -312,12 +318,16 @@ def _diagnostic(name: str, finger: ContactEstimate) -> DiagnosticStatus:
     faults = ", ".join(finger.faults)
     is_lost = finger.state is ContactState.UNKNOWN and finger.reason in (Reason.FAULT, Reason.GAP)
     level = ERROR if is_lost else WARN if faults else OK
-    values = (
-        ("state", str(finger.state)),
-        ("reason", str(finger.reason)),
-        ("faults", faults),
-        ("faulty_taxels", ", ".join(map(str, taxel_numbers(finger.faulty_taxels)))),
+    values = tuple(
+        (field, _text(value))
+        for field, value in asdict(numbered(finger)).items()
+        if field not in NOT_IN_DIAGNOSTICS
     )
     return DiagnosticStatus(
         name, level, faults or (str(finger.reason) if is_lost else "well"), values
     )
+
+
+def _text(value: object) -> str:
+    """Return the value of a field of an estimate as a text."""
+    return ", ".join(map(str, value)) if isinstance(value, tuple) else str(value)

@@ -9,7 +9,7 @@ import msgspec
 from aiohttp import web
 
 from holdfast.errors import HoldfastError
-from holdfast.live.loop.documents import Grip
+from holdfast.live.loop.live_grip import LiveGrip
 from holdfast.web.body import json_error
 
 ANSWER_TIMEOUT = 1.0
@@ -24,7 +24,7 @@ class GripRoutes:
         report: is called with the text of a notice.
     """
 
-    def __init__(self, grip: Grip | None, report: Callable[[str], None]) -> None:
+    def __init__(self, grip: LiveGrip | None, report: Callable[[str], None]) -> None:
         self._found = grip
         self._report = report
 
@@ -37,7 +37,7 @@ class GripRoutes:
         ]
 
     @property
-    def _grip(self) -> Grip:
+    def _grip(self) -> LiveGrip:
         if self._found is None:
             text = "no hand is controlled: start with holdfast serve ... --hand URI"
             raise json_error(web.HTTPNotFound, text)

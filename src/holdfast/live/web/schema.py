@@ -4,15 +4,12 @@ from typing import Literal
 
 from msgspec import Struct
 
-from holdfast.contact import Cause, ContactState, Fault, Reason
+from holdfast.contact import ContactState, Fault
+from holdfast.live.documents import FingerDocument, Number, Vector
 from holdfast.live.loop.documents import GripDocument
 
 SCHEMA = "holdfast.live/1"
 """Name of the schema. New fields may be added under this name; existing ones do not change."""
-
-Vector = tuple[float, float, float]
-Number = float | None
-"""A number, or null if it is not known (NaN is written as null)."""
 
 
 class FingerInfo(Struct, frozen=True, kw_only=True):
@@ -96,26 +93,6 @@ class HelloDocument(Struct, frozen=True, kw_only=True, tag_field="type", tag="he
     debounce: DebounceInfo | None = None
     operating_points: list[OperatingPoint] = []
     schema: Literal["holdfast.live/1"] = "holdfast.live/1"
-
-
-class FingerDocument(Struct, frozen=True, kw_only=True, gc=False):
-    """Newest estimate of a finger: see `holdfast.ContactEstimate`.
-
-    Attributes:
-        faulty_taxels: numbers of the taxels that are faulty by themselves, from 1.
-        taxels: readings minus the tare, in taxel frames [unit]; null before the tare.
-    """
-
-    time: float
-    state: ContactState
-    reason: Reason
-    stable_probability: Number
-    instability: Number
-    force: tuple[Number, Number, Number]
-    faults: tuple[Fault, ...]
-    faulty_taxels: tuple[int, ...]
-    cause: Cause | None
-    taxels: list[Vector] | None = None
 
 
 class EstimateSeries(Struct, frozen=True, gc=False):

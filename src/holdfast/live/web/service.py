@@ -13,15 +13,11 @@ import msgspec
 from aiohttp import WSMsgType, web
 
 from holdfast.errors import HoldfastError
-from holdfast.live.loop.documents import Grip
+from holdfast.live.documents import finger_document
+from holdfast.live.loop.live_grip import LiveGrip
 from holdfast.live.recorder import SessionRecorder
 from holdfast.live.session import Session
-from holdfast.live.status import (
-    StatusPublisher,
-    finger_document,
-    hello_document,
-    recording_info,
-)
+from holdfast.live.status import StatusPublisher, hello_document, recording_info
 from holdfast.live.stream_detector import StreamUpdate
 from holdfast.live.web import schema
 from holdfast.live.web.grip_routes import GripRoutes
@@ -106,7 +102,7 @@ class LiveService:
         guard: Guard,
         folder: Path | None = None,
         report: Callable[[str], None] = lambda _: None,
-        grip: Grip | None = None,
+        grip: LiveGrip | None = None,
     ) -> None:
         self._session = session
         self._model = model

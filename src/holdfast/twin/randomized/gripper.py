@@ -11,15 +11,15 @@ import numpy as np
 
 from holdfast.compiled import compiled
 from holdfast.sensors.types import Array
-from holdfast.twin.contact import LOAD, SLIP, constants_of, new_contact, touch
+from holdfast.twin.contact import touch
 from holdfast.twin.hand import HandModel, object_xml
 from holdfast.twin.mujoco_import import mujoco
 from holdfast.twin.objects import GraspObject, distance_to
 from holdfast.twin.protocol import OPEN_GAP
 from holdfast.twin.randomized.palm import PalmMotion
-from holdfast.twin.shapes import MU_KINETIC, MU_STATIC
 from holdfast.twin.skin import Skin
 from holdfast.twin.surface import Surface
+from holdfast.twin.world import ContactWorld
 
 STEP_RATE = 1500.0
 """Least rate of the physics [Hz]: stiff skins on light objects need more than soft fingertips."""
@@ -193,7 +193,7 @@ def _text(values: Array) -> str:
     return " ".join(f"{value:.12g}" for value in values)
 
 
-class GripperWorld:
+class GripperWorld(ContactWorld):
     """One object between the pads, stepped sample by sample.
 
     Args:
@@ -205,11 +205,9 @@ class GripperWorld:
         rate: samples per second [Hz].
 
     Attributes:
-        contact: state of the contact.
-        bodies: (n_pads + 1, 18) pads and object, in the palm frame.
-        outside: (6,) force and torque of the operator on the object.
-        set_point_error: largest jump of a set-point during the last sample [m].
-        friction_scale: factor on the friction of the object.
+        layout: of the pads.
+        drives: of the pads.
+        time: since the start [s].
     """
 
     def __init__(
@@ -221,17 +219,12 @@ class GripperWorld:
         generator: np.random.Generator,
         rate: float,
     ) -> None:
-        self.layout, self.item, self.drives = layout, item, drives
+        self.layout, self.drives = layout, drives
         self.n_substeps = max(1, int(np.ceil(_step_rate(layout, item, drives, skin) / rate)))
         self.timestep = 1 / (rate * self.n_substeps)
-        self.hand = gripper_model(layout, item, drives, self.timestep)
-        self.contact = new_contact(layout.surface, layout.n_pads)
-        self.constants = constants_of(layout.surface, item, skin)
-        self.bodies = np.zeros((layout.n_pads + 1, 18))
-        self.outside = np.zeros(6)
-        self.set_point_error = 0.0
-        self.friction_scale = 1.0
-        self._friction = self.constants.solid.copy()
+        super().__init__(
+            gripper_model(layout, item, drives, self.timestep), item, layout.surface, skin
+        )
         self._generator = generator
         self._wrench = np.zeros(6)
         self._jump = np.zeros(layout.n_pads)
@@ -239,16 +232,6 @@ class GripperWorld:
         self.time = 0.0
         mujoco.mj_forward(self.hand.model, self.hand.data)
         self.hand.bodies(self.bodies)
-
-    @property
-    def loads(self) -> Array:
-        """(n_pads,) pressing force of each pad [N]."""
-        return self.contact.tips[:, LOAD]
-
-    @property
-    def slip(self) -> float:
-        """Largest slip speed of a pad that presses [m/s]."""
-        return float(np.where(self.loads > 0, self.contact.tips[:, SLIP], 0.0).max())
 
     @property
     def unstable(self) -> bool:
@@ -269,7 +252,6 @@ class GripperWorld:
             row: time since the lock [s]; negative before.
         """
         model, data = self.hand.model, self.hand.data
-        self._scale_friction()
         self._draw_glitch()
         noise = self.drives.noise * self._generator.standard_normal(self.layout.n_pads)
         self.set_point_error = float(np.abs(self._jump).max())
@@ -303,10 +285,6 @@ class GripperWorld:
         torque = float(np.linalg.norm(self.outside[3:]))
         if torque > largest:
             self.outside[3:] *= largest / torque
-
-    def _scale_friction(self) -> None:
-        for place in (MU_STATIC, MU_KINETIC):
-            self.constants.solid[place] = self.friction_scale * self._friction[place]
 
     def _draw_glitch(self) -> None:
         if self.time >= self._jump_until:

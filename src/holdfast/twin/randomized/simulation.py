@@ -1,6 +1,5 @@
 """From a seed and a number to a recording of a randomized hand, with exact truth."""
 
-import zlib
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -10,9 +9,8 @@ import numpy.typing as npt
 
 from holdfast.contact import Phase
 from holdfast.metrics.truth_labels import LabelRule, labels_from_truth
-from holdfast.recordings import Recording, Tactile, Truth
+from holdfast.recordings import Recording, Tactile
 from holdfast.sensors.types import Array
-from holdfast.twin.contact import SLIP, SLIPPING_SHARE
 from holdfast.twin.hand import FINGERS
 from holdfast.twin.operator import draw_tremor, hold_wrench
 from holdfast.twin.profile import profile
@@ -31,7 +29,9 @@ from holdfast.twin.randomized.drawing import (
 from holdfast.twin.randomized.gripper import GripperWorld, OperatorForce
 from holdfast.twin.randomized.palm import log_uniform, palm_motion, uniform
 from holdfast.twin.randomized.scenario import Scenario, draw_events
-from holdfast.twin.uskin import Uskin, with_server_effects
+from holdfast.twin.simulation import generator_of
+from holdfast.twin.truth_log import TruthLog
+from holdfast.twin.uskin.fingertip import Uskin, with_server_effects
 
 MAX_TRIES = 12
 """Draws of an object and a place of the pads until the pads reach it."""
@@ -79,8 +79,7 @@ class RandomHold:
     def generator(self, part: str) -> np.random.Generator:
         """Make the random numbers of one part; parts do not disturb each other."""
         grasp = "" if self.grasp is None else f"grasp{self.grasp}/"
-        key = zlib.crc32(f"{self.number}/{grasp}{self.attempt}/{part}".encode())
-        return np.random.default_rng([self.seed, key])
+        return generator_of(self.seed, f"{self.number}/{grasp}{self.attempt}/{part}")
 
 
 def simulate_random(hold: RandomHold) -> Recording:
@@ -173,11 +172,7 @@ class _Run:
         self.skins = [
             Uskin(drawn.parameters, drawn.sensor, nodes, uskin) for _ in range(world.layout.n_pads)
         ]
-        self._phase: list[str] = []
-        self._rows: dict[str, list[Array]] = {
-            key: [] for key in ("outside_force", "object_pose", "set_point_error", "gravity")
-        }
-        self._tips: list[Array] = []
+        self._truth_log = TruthLog(FINGERS[: world.layout.n_pads])
         self._forces: list[list[Array]] = [[] for _ in self.skins]
 
     def play(self) -> None:
@@ -211,7 +206,7 @@ class _Run:
         if touch_depths is not None and command.phase is Phase.LOCKED:
             pressed = travels - (OPEN_GAP - touch_depths)
             travels = OPEN_GAP - touch_depths + self.scenario.grip_scale * pressed
-        self.world.friction_scale = self.scenario.friction_scale
+        self.world.scale_friction(self.scenario.friction_scale)
         self.holder.command(command, self.protocol.anchor, since, self.world.time)
         self.world.advance(travels, self.holder, self.palm, since)
 
@@ -226,17 +221,18 @@ class _Run:
 
     def _log(self, command: Command) -> None:
         world = self.world
-        self._phase.append(command.phase)
         acting = self.scenario.acting or command.hold > 0
-        self._rows["outside_force"].append(world.outside[:3].copy() * acting)
+        force = world.outside[:3] * acting
         if self.scenario.acting and np.linalg.norm(world.outside[3:]) > 0.002:
-            self._rows["outside_force"][-1] += 0.06 * np.array([0.0, 0.0, 1.0])
-        data = world.hand.data
-        pose = np.concatenate([world.bodies[-1, :3], data.qpos[-4:]])
-        self._rows["object_pose"].append(pose)
-        self._rows["set_point_error"].append(np.array(world.set_point_error))
-        self._rows["gravity"].append(world.hand.model.opt.gravity.copy())
-        self._tips.append(world.contact.tips.copy())
+            force = force + 0.06 * np.array([0.0, 0.0, 1.0])
+        self._truth_log.add(
+            command.phase,
+            world.contact,
+            outside_force=force,
+            object_pose=world.object_pose,
+            set_point_error=world.set_point_error,
+            gravity=world.hand.model.opt.gravity,
+        )
         for pile, skin, forces in zip(
             self._forces, self.skins, world.contact.node_forces, strict=True
         ):
@@ -248,13 +244,13 @@ class _Run:
         locked_at, lost_at = self.protocol.locked_at, self.protocol.lost_at
         if locked_at is None:
             return 0.0
-        return (len(self._phase) * self.period if lost_at is None else lost_at) - locked_at
+        return (len(self._truth_log) * self.period if lost_at is None else lost_at) - locked_at
 
     def recording(self) -> Recording:
         """Make the recording of what was simulated."""
-        times: Array = np.arange(len(self._phase), dtype=np.float64) * self.period
+        times: Array = np.arange(len(self._truth_log), dtype=np.float64) * self.period
         fingers = FINGERS[: self.world.layout.n_pads]
-        truth = self._truth(times, fingers)
+        truth = self._truth_log.truth(times)
         generator = self.hold.generator("readout")
         modules: dict[str, Tactile] = {}
         server = generator.random() < ranges()["sensor"]["server"]
@@ -282,19 +278,6 @@ class _Run:
             for name, module in whole.modules.items()
         }
         return Recording(whole.name, modules, {**whole.metadata, "starts_loaded": True})
-
-    def _truth(self, times: Array, fingers: tuple[str, ...]) -> Truth:
-        tips = np.array(self._tips)
-        of_fingers = {
-            finger: {
-                "contact_force": -tips[:, place, :3],
-                "slip_speed": tips[:, place, SLIP],
-                "slipping_share": tips[:, place, SLIPPING_SHARE],
-            }
-            for place, finger in enumerate(fingers)
-        }
-        hand = {name: np.array(rows) for name, rows in self._rows.items()}
-        return Truth(times, {"phase": np.array(self._phase, dtype=str), **hand}, of_fingers)
 
     def _metadata(self) -> dict[str, object]:
         item = self.world.item

@@ -207,7 +207,7 @@ class TestSilence:
     def test_it_is_silent_sooner_than_it_fails(self, driver, monkeypatch, period, longest):
         driver(ROS2["v4"])
         with open_hand("ros2:v4") as hand:
-            monkeypatch.setattr(hand, "_reader", SimpleNamespace(take=lambda: None))
+            monkeypatch.setattr(hand, "_reader", SimpleNamespace(take=list))
             newest = hand._states[-1][1]
             for age, silent in ((longest - 0.02, False), (longest + 0.02, True)):
                 monkeypatch.setattr(ros_hand, "time", SimpleNamespace(monotonic=lambda: 7.0))

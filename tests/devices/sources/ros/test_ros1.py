@@ -1,4 +1,6 @@
+import struct
 import time
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -92,3 +94,34 @@ def test_old_definitions_are_dropped(monkeypatch):
     assert len(subscription._decoders) == 3
     assert subscription._decoder(headers[4]) is decoders[4]
     assert subscription._decoder(headers[0]) is not decoders[0]
+
+
+class PlainMessage:
+    """Message of a rospy that keeps no header of the publisher with its messages."""
+
+    def serialize(self, file):
+        one = struct.pack("<IdI3sBII", 7, 0.5, 3, b"XR1", 2, 0, 0)
+        file.write(struct.pack("<I", 1) + one)
+
+
+def test_a_rospy_without_headers_takes_the_type_of_the_master(monkeypatch):
+    received, calls = [], []
+
+    def subscribe(topic, kind, callback, **_):
+        received.append(callback)
+
+    def published(master):
+        calls.append(master)
+        return {"/xServTopic": "xela_server_ros/SensStream"}
+
+    rospy = SimpleNamespace(AnyMsg=PlainMessage, Subscriber=subscribe)
+    monkeypatch.setattr(ros1.rospy_node, "start_node", lambda master: rospy)
+    monkeypatch.setattr(ros1.rospy_node, "published_topics", published)
+    subscription = ros1.Ros1Subscription("/xServTopic", "http://127.0.0.1:1")
+    subscription.open(0.0)
+    for _ in range(2):
+        received[0](PlainMessage())
+        message = subscription.take(1.0)
+        (sample,) = message.decode(message.data)
+        assert (sample.number, sample.model, sample.sequence) == (2, "XR1", 7)
+    assert calls == ["http://127.0.0.1:1"]

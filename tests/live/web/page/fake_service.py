@@ -19,9 +19,9 @@ from aiohttp import WSCloseCode, web
 
 from holdfast.contact import ContactState, Fault, Reason
 from holdfast.detector import detect
+from holdfast.grip import Limits
 from holdfast.io import load_recording
 from holdfast.live.fault_notices import FAULT_TEXTS
-from holdfast.live.loop.documents import GripLimits
 from holdfast.live.loop.grip_faults import explain_fault
 from holdfast.model import Model
 from holdfast.sensors import sensor
@@ -225,8 +225,11 @@ def explained(grip):
     """Return the document of a grip loop with the explanation of its fault."""
     if grip is None or grip["state"] != "FAULT":
         return grip
+    limits = dict(grip["limits"])
+    if limits["recovery"] is None:  # infinite
+        limits["recovery"] = math.inf
     fault = explain_fault(
-        grip["reason"], msgspec.convert(grip["limits"], GripLimits),
+        grip["reason"], Limits(**limits),
         armed=grip["armed"], released=grip["released"], failure=grip["failure"],
     )  # fmt: skip
     return grip | {"fault": msgspec.to_builtins(fault)}

@@ -5,7 +5,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from holdfast.devices.hands.base import Hand
+from holdfast.devices.hands.base import HandDevice
 from holdfast.devices.hands.ros import joints
 from holdfast.devices.hands.ros.joint_hand import JointHand, JointOutput, JointSetup
 from holdfast.devices.hands.ros.joints import (
@@ -64,7 +64,7 @@ class JointKind:
     home_topic: str | None = None
     release: tuple[str, ...] = ("home",)
 
-    def make(self, name: str, link: Link, given: Parameters, *, standby: bool) -> Hand:
+    def make(self, name: str, link: Link, given: Parameters, *, standby: bool) -> HandDevice:
         """Return the hand of a URI."""
         setup = self._setup(given)
         return JointHand(name, link, setup, shared=_shared(given), standby=standby)
@@ -122,7 +122,7 @@ class EnvelopKind:
     namespace: str
     words: str = ""
 
-    def make(self, name: str, link: Link, given: Parameters, *, standby: bool) -> Hand:
+    def make(self, name: str, link: Link, given: Parameters, *, standby: bool) -> HandDevice:
         """Return the hand of a URI."""
         namespace = given.topic("namespace", self.namespace)
         words = given.topic("words", f"{self.words or namespace}/lib_cmd")
@@ -149,7 +149,7 @@ class GripperKind:
 
     parameters = ("topic", "type", "effort", "max_effort", "open")
 
-    def make(self, name: str, link: Link, given: Parameters, *, standby: bool) -> Hand:
+    def make(self, name: str, link: Link, given: Parameters, *, standby: bool) -> HandDevice:
         """Return the hand of a URI."""
         setup = ScalarSetup(
             topic=given.topic("topic"),
@@ -204,7 +204,7 @@ KINDS: dict[str, dict[str, Kind]] = {
 """Hands by scheme and name."""
 
 
-def ros_hand(uri: str, *, standby: bool) -> Hand:
+def ros_hand(uri: str, *, standby: bool) -> HandDevice:
     """Return the hand of a URI, `ros2:KIND?name=value` or `ros1:KIND?name=value`.
 
     Args:

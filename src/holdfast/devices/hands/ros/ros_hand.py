@@ -7,7 +7,7 @@ from collections.abc import Callable, Mapping
 from functools import partial
 from typing import Any
 
-from holdfast.devices.hands.base import Hand
+from holdfast.devices.hands.base import HandDevice
 from holdfast.devices.hands.ros.link import Link, Publisher, StateReader
 from holdfast.errors import HandError
 from holdfast.grip.command import GripCommand
@@ -31,7 +31,7 @@ POLL_INTERVAL = 0.01
 """Time between two checks while the hand is opened [s]."""
 
 
-class RosHand(Hand):
+class RosHand(HandDevice):
     """Hand that takes commands on topics.
 
     It commands nothing before the grip begins (state IDLE), because another program closes the
@@ -76,7 +76,8 @@ class RosHand(Hand):
     @property
     def silent(self) -> bool:
         """Whether there have been no joint states for 0.1 s, or for three of their periods."""
-        if self._reader is None or not self._poll():
+        self._poll()
+        if self._reader is None or not self._states:
             return False
         times = [at for at, _ in self._states]
         if len(times) < 2:  # their period is not known

@@ -3,6 +3,8 @@
 import time
 from collections import deque
 from collections.abc import Callable, Mapping
+from io import BytesIO
+from operator import attrgetter
 from threading import Condition
 from types import ModuleType
 from typing import Any
@@ -19,7 +21,12 @@ from holdfast.devices.sources.ros.topic import (
 from holdfast.devices.uri import Address
 from holdfast.errors import SourceError
 from holdfast.ros.definitions import parse_definition
-from holdfast.ros.sensor_messages import SUPPORTED_MESSAGES, DeviceSample, SampleDecoder
+from holdfast.ros.sensor_messages import (
+    SUPPORTED_MESSAGES,
+    DeviceSample,
+    SampleDecoder,
+    known_definition,
+)
 
 MAX_QUEUED_MESSAGES = 256
 """Messages that wait for a busy reader; after that, the oldest ones are dropped."""
@@ -27,6 +34,10 @@ MAX_DECODERS = 64
 """Definitions of messages that are kept; of more, the oldest is parsed again when it comes."""
 SOCKET_READ_SIZE = 1 << 20
 """Bytes to read from a socket at a time. If a message is longer, rospy lags behind."""
+
+CONNECTION_HEADER = "_connection_header"
+"""Attribute of a message of rospy: the header of its publisher, with type and definition. rospy
+has no public name for it; without it, the ROS master gives the type."""
 
 Decode = Callable[[bytes], list[DeviceSample]]
 
@@ -58,11 +69,13 @@ class Ros1Subscription(Subscription):
         super().__init__(topic, f"at the ROS master {master}")
         self._master = master
         self._rospy: ModuleType | None = None
+        self._header_of: Callable[[Any], Mapping[str, str]] = attrgetter(CONNECTION_HEADER)
+        self._kind = ""
         self._subscriber: Any = None
         self._queue: deque[tuple[Any, float]] = deque()
         self._queue_changed = Condition()
         self._n_dropped = 0
-        self._decoders: dict[tuple[str, str], Decode] = {}
+        self._decoders: dict[tuple[str, str | None], Decode] = {}
 
     def open(self, deadline: float) -> None:
         """Subscribe.
@@ -71,6 +84,8 @@ class Ros1Subscription(Subscription):
             SourceError: rospy is not installed, or there is no master.
         """
         self._rospy = rospy_node.start_node(self._master)
+        if not hasattr(self._rospy.AnyMsg, CONNECTION_HEADER):
+            self._header_of = self._header_by_master
         self._subscribe()
 
     def take(self, timeout: float) -> ReceivedMessage | None:
@@ -79,7 +94,9 @@ class Ros1Subscription(Subscription):
             if not self._queue_changed.wait_for(lambda: self._queue, timeout):
                 return None
             message, received = self._queue.popleft()
-        return ReceivedMessage(message._buff, received, self._decoder(message._connection_header))
+        data = BytesIO()
+        message.serialize(data)
+        return ReceivedMessage(data.getvalue(), received, self._decoder(self._header_of(message)))
 
     def n_publishers(self) -> int:
         """Return the current number of publishers."""
@@ -131,18 +148,28 @@ class Ros1Subscription(Subscription):
             self._queue.append((message, received))
             self._queue_changed.notify()
 
-    def _decoder(self, header: dict[str, str]) -> Decode:
-        """Return the decoder of the definition that the publisher sent in its header."""
-        kind, text = header.get("type", ""), header.get("message_definition", "")
+    def _header_by_master(self, message: Any) -> Mapping[str, str]:  # noqa: ANN401
+        """Return the type of the topic, which the ROS master has, in place of a header."""
+        if not self._kind:
+            self._kind = self.published_topics().get(self._topic, "")
+        return {"type": self._kind}
+
+    def _decoder(self, header: Mapping[str, str]) -> Decode:
+        """Return the decoder of the definition that the publisher sent in its header.
+
+        A header without one gives the known definition of its type.
+        """
+        kind, text = header.get("type", ""), header.get("message_definition")
         if (kind, text) not in self._decoders:
             if len(self._decoders) == MAX_DECODERS:
                 del self._decoders[next(iter(self._decoders))]
             self._decoders[kind, text] = self._new_decoder(kind, text)
         return self._decoders[kind, text]
 
-    def _new_decoder(self, kind: str, text: str) -> Decode:
+    def _new_decoder(self, kind: str, text: str | None) -> Decode:
         try:
-            return SampleDecoder(parse_definition(kind, text), ros2=False)
+            known = known_definition(kind, ros2=False) if text is None else None
+            return SampleDecoder(known or parse_definition(kind, text or ""), ros2=False)
         except ValueError:
             message = self.unsupported(kind, SUPPORTED_MESSAGES)
 

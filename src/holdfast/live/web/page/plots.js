@@ -1,8 +1,7 @@
-// Plots of force, instability and probability over time, drawn by uPlot.
+// Plots of force, instability and probability over time, drawn by uPlot, a script of index.html.
 
 import { make, setText } from "../web/dom.js";
 import { colours, fingerColour, font } from "../web/theme.js";
-import uPlot from "./uplot/uPlot.esm.js";
 import { RIBBON_HEIGHT, drawLevel, drawMarkers, drawRibbons, shadeStates } from "./plot_layers.js";
 import { downsample } from "./store.js";
 import { number, unitWord } from "./format.js";
@@ -98,7 +97,7 @@ export class Plots {
     const box = make("div", `plot ${kind.key}${last ? " last" : ""}`, make("div", "plot-legend", title, legend), holder);
     this.stack.append(box);
     const row = { kind, holder, values, x: [0], indices: [] };
-    row.plot = new uPlot(this.options(row, last), [[], ...kind.lines.map(() => [])], holder);
+    row.plot = new window.uPlot(this.options(row, last), [[], ...kind.lines.map(() => [])], holder);
     return row;
   }
 

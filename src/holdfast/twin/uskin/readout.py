@@ -8,7 +8,7 @@ import numpy.typing as npt
 
 from holdfast.compiled import compiled
 from holdfast.sensors.types import Array
-from holdfast.twin.uskin_parameters import UskinParameters
+from holdfast.twin.uskin.parameters import UskinParameters
 
 Counts = npt.NDArray[np.uint16]
 

@@ -1,0 +1,1 @@
+"""Model of a uSkin fingertip: from forces on its skin to counts."""

@@ -1,0 +1,87 @@
+from concurrent.futures import CancelledError
+from threading import Thread
+
+import pytest
+
+from holdfast.live.requests import RequestQueue
+
+
+def fail():
+    raise ValueError("no")
+
+
+def test_requests_are_carried_out_in_order_and_once():
+    requests, calls = RequestQueue(), []
+    results = [requests.append(lambda k=k: calls.append(k)) for k in range(3)]
+    assert not any(result.done() for result in results)
+    requests.carry_out()
+    requests.carry_out()
+    assert calls == [0, 1, 2]
+    assert [result.result(0) for result in results] == [None] * 3
+
+
+def test_results_are_set_after_the_follow_up():
+    requests, states = RequestQueue(), []
+    result = requests.append(lambda: states.append("work"))
+    requests.carry_out(lambda: states.append(result.done()))
+    assert states == ["work", False]
+    assert result.done()
+
+
+def test_a_request_that_fails_has_its_exception_and_the_others_go_on():
+    requests, calls = RequestQueue(), []
+    failing, other = requests.append(fail), requests.append(lambda: calls.append(1))
+    requests.carry_out()
+    with pytest.raises(ValueError, match=r"^no$"):
+        failing.result(0)
+    assert (calls, other.result(0)) == ([1], None)
+
+
+def test_a_follow_up_that_fails_fails_all_requests_and_is_raised():
+    requests = RequestQueue()
+    result = requests.append(lambda: None)
+    with pytest.raises(ValueError, match=r"^no$"):
+        requests.carry_out(fail)
+    with pytest.raises(ValueError, match=r"^no$"):
+        result.result(0)
+
+
+def test_a_cancelled_request_is_not_carried_out():
+    requests, calls = RequestQueue(), []
+    result = requests.append(lambda: calls.append(1))
+    assert result.cancel()
+    requests.carry_out()
+    assert calls == []
+    with pytest.raises(CancelledError):
+        result.result(0)
+
+
+def test_a_request_that_cannot_be_cancelled_is_carried_out():
+    requests, calls = RequestQueue(), []
+    result = requests.append(lambda: calls.append(1), cancellable=False)
+    assert not result.cancel()
+    requests.carry_out()
+    assert (calls, result.result(0)) == ([1], None)
+
+
+def test_a_request_of_a_request_waits_for_the_next_time():
+    requests, calls = RequestQueue(), []
+    requests.append(lambda: requests.append(lambda: calls.append(1)))
+    requests.carry_out()
+    assert calls == []
+    requests.carry_out()
+    assert calls == [1]
+
+
+def test_requests_of_many_threads():
+    requests, calls = RequestQueue(), []
+    threads = [
+        Thread(target=lambda: [requests.append(lambda: calls.append(1)) for _ in range(100)])
+        for _ in range(8)
+    ]
+    for thread in threads:
+        thread.start()
+    while any(thread.is_alive() for thread in threads):
+        requests.carry_out()
+    requests.carry_out()
+    assert len(calls) == 800
