@@ -69,3 +69,15 @@ def test_without_an_installation_the_package_is_named(monkeypatch):
 def test_a_missing_extra_can_be_pickled():
     failure = errors.MissingExtra("torch", "deep")
     assert str(pickle.loads(pickle.dumps(failure))) == str(failure)
+
+
+def test_several_extras_are_added_by_one_command(monkeypatch):
+    origin = {"url": "file:///home/me/clone", "dir_info": {"editable": True}}
+    for installer, command in [
+        ("uv", "uv sync --inexact --extra twin --extra plot"),
+        ("pip", 'pip install -e "/home/me/clone[twin,plot]"'),
+    ]:
+        files = {"INSTALLER": installer, "direct_url.json": json.dumps(origin)}
+        found = SimpleNamespace(read_text=files.get)
+        monkeypatch.setattr("importlib.metadata.distribution", lambda name, found=found: found)
+        assert errors.install_command("twin,plot") == command

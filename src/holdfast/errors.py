@@ -16,6 +16,26 @@ says what was given, what was expected and what exists. The command line prints 
 line and exits with 2.
 """
 
+import sys
+from importlib.util import find_spec
+
+EXTRA_MODULES = {
+    "parquet": ("pyarrow",),
+    "train": ("sklearn", "scipy", "optuna", "joblib", "threadpoolctl"),
+    "twin": ("mujoco", "scipy", "PIL", "joblib"),
+    "plot": ("matplotlib",),
+    "label": ("scipy",),
+    "cluster": ("dask", "distributed", "threadpoolctl"),
+    "ros2": ("cyclonedds",),
+    "bags": ("rosbags",),
+    "serial": ("serial",),
+    "hdf5": ("h5py",),
+    "bench": ("pywt", "tsflex", "pandas", "sklearn", "scipy"),
+    "onnx": ("onnx", "onnxruntime"),
+    "deep": ("torch",),
+}
+"""Modules that each extra of `pyproject.toml` installs and that holdfast imports."""
+
 
 class HoldfastError(Exception):
     """Base class of all exceptions of holdfast; the text is one line."""
@@ -54,7 +74,12 @@ class OutputError(HoldfastError):
 
 
 class MissingExtra(HoldfastError):  # noqa: N818 (it names what to install, not what broke)
-    """An optional package is not installed: install the extra that the text names."""
+    """An optional package is not installed: install the extra that the text names.
+
+    Args:
+        package: name of the package or module.
+        extra: the extra, or several with commas between them.
+    """
 
     def __init__(self, package: str, extra: str) -> None:
         super().__init__(package, extra)
@@ -64,8 +89,39 @@ class MissingExtra(HoldfastError):  # noqa: N818 (it names what to install, not 
         return f"this needs the package {package}, which is not installed: {install_command(extra)}"
 
 
+def is_installed(module: str) -> bool:
+    """Return whether a module can be imported; it is not imported."""
+    try:
+        return sys.modules.get(module) is not None or find_spec(module) is not None
+    except ModuleNotFoundError:
+        return False
+
+
+def require_extras(*extras: str) -> None:
+    """Check that the packages of some extras are installed; none of them is imported.
+
+    Raises:
+        MissingExtra: one is not. The text names all extras that are missing.
+    """
+    modules = {
+        extra: [module for module in EXTRA_MODULES[extra] if not is_installed(module)]
+        for extra in extras
+    }
+    missing = [extra for extra in extras if modules[extra]]
+    if missing:
+        raise MissingExtra(modules[missing[0]][0], ",".join(missing))
+
+
+def missing_extra(cause: ModuleNotFoundError) -> MissingExtra | None:
+    """Return the error of a failed import of an optional package; None for any other module."""
+    module = (cause.name or "").partition(".")[0]
+    extras = (extra for extra, modules in EXTRA_MODULES.items() if module in modules)
+    extra = next(extras, None)
+    return None if extra is None else MissingExtra(module, extra)
+
+
 def install_command(extra: str) -> str:
-    """Return the command that adds an extra to this installation.
+    """Return the command that adds an extra, or several, to this installation.
 
     From a clone it installs the clone, and from a wheel the wheel, not a package of that name.
     """
@@ -81,7 +137,8 @@ def install_command(extra: str) -> str:
     if origin.get("dir_info", {}).get("editable"):
         folder = origin["url"].removeprefix("file://")
         pip = f'pip install -e "{folder}[{extra}]"'
-        return f"uv sync --inexact --extra {extra}" if with_uv else pip
+        options = "".join(f" --extra {name}" for name in extra.split(","))
+        return f"uv sync --inexact{options}" if with_uv else pip
     package = f"holdfast[{extra}] @ {origin['url']}" if origin else f"holdfast[{extra}]"
     return f'{"uv " * with_uv}pip install "{package}"'
 

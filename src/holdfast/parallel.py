@@ -16,7 +16,7 @@ from typing import Any, NamedTuple, Self, TypeVar, cast
 
 from holdfast.children import SAFE_PATH_VARIABLE, safe_path
 from holdfast.cluster import Arguments, Call, call_on_cluster
-from holdfast.errors import EngineError
+from holdfast.errors import EngineError, MissingExtra, is_installed
 
 T = TypeVar("T")
 K = TypeVar("K", bound=Hashable)
@@ -127,7 +127,7 @@ class Engine(NamedTuple):
             EngineError: the cluster cannot be reached, has no workers or a worker without this
                 version of holdfast, or the process died every time that one call was made.
                 The text names that call.
-            MissingExtra: dask is not installed.
+            MissingExtra: joblib or dask is not installed.
         """
         if self.scheduler is not None:
             return call_on_cluster(function, calls, self.scheduler, shared)
@@ -166,6 +166,8 @@ def _in_processes(
     A process that dies breaks the whole pool. Then each call that was running is made again
     alone, and the other calls in a new pool.
     """
+    if not is_installed("joblib"):
+        raise MissingExtra("joblib", "train")
     from joblib import delayed
     from joblib.externals.loky.process_executor import TerminatedWorkerError
 

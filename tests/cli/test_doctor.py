@@ -102,7 +102,7 @@ def test_a_listening_server_is_reported(monkeypatch):
 
 
 def test_missing_extras_are_reported(monkeypatch):
-    monkeypatch.setattr(verb, "find_spec", lambda name: None)
+    monkeypatch.setattr(verb, "is_installed", lambda name: False)
     found = verb.check_sources()
     assert found["ros2"] == f"not installed: {install_command('ros2')}"
     assert found["serial"] == f"not installed: {install_command('serial')}"

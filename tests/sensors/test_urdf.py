@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 
 from holdfast.sensors import Sensor
+from holdfast.sensors.urdf import taxel_poses
 
 FINGER = """<?xml version="1.0" encoding="utf-8"?>
 <robot name="finger">
@@ -148,3 +149,20 @@ def test_a_pipe_and_other_encodings_are_refused(tmp_path):
     (tmp_path / "a.urdf").write_text(FINGER, "utf-16")
     with pytest.raises(ValueError, match=r"a\.urdf is not a URDF file: 'utf-8' codec"):
         Sensor.from_urdf(tmp_path / "a.urdf", "tip")
+
+
+def test_rotations_equal_those_of_scipy(tmp_path):
+    from scipy.spatial.transform import Rotation
+
+    generator = np.random.default_rng(0)
+    right_angles = generator.choice([0.0, np.pi / 2, -np.pi / 2, np.pi, 1.5708], (20, 3))
+    angles = np.concatenate([generator.uniform(-4, 4, (80, 3)), right_angles])
+    joints = "".join(
+        f'<joint name="taxel_{k}"><origin xyz="0 0 0" rpy="{r!r} {p!r} {y!r}"/>'
+        f'<parent link="base"/><child link="t{k}"/></joint>'
+        for k, (r, p, y) in enumerate(angles.tolist())
+    )
+    (tmp_path / "a.urdf").write_text(f"<robot>{joints}</robot>")
+    rotations = taxel_poses(tmp_path / "a.urdf", "base", "taxel_")[1]
+    expected = Rotation.from_euler("xyz", angles).as_matrix()
+    np.testing.assert_allclose(rotations, expected, rtol=0, atol=1e-15)

@@ -18,7 +18,7 @@ import typer
 from typer.main import get_command
 
 from holdfast.cli.terminal.console import print_error, print_line
-from holdfast.errors import HoldfastError
+from holdfast.errors import HoldfastError, missing_extra
 
 VERBS = {
     "demo": "Simulate grasps, detect and train on them, and replay one.",
@@ -205,6 +205,8 @@ def _close_stdout() -> int:
 def _report(failure: BaseException) -> int:
     if os.environ.get("HOLDFAST_DEBUG"):
         traceback.print_exception(failure)
+    if isinstance(failure, ModuleNotFoundError):
+        failure = missing_extra(failure) or failure
     match failure:
         case SystemExit() | GeneratorExit():
             raise failure

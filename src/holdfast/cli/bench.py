@@ -15,6 +15,7 @@ from holdfast.classifiers import LinearClassifier
 from holdfast.cli.options import JsonOption
 from holdfast.cli.terminal.console import print_json, print_line, print_message
 from holdfast.detector import Detector
+from holdfast.errors import is_installed
 from holdfast.features import DEFAULT_WINDOW as WINDOW
 from holdfast.features import DEPLOYED_FEATURES, haar_features, parse_features
 from holdfast.features.haar import fill_features
@@ -126,7 +127,7 @@ def batch(n_samples: int) -> dict[str, Any]:
     per_sample = {name: value / n_samples for name, value in seconds.items()}
     peer_seconds = _measure(_peers(force[:N_PEER_SAMPLES]))
     peers = {name: value / N_PEER_SAMPLES for name, value in peer_seconds.items()}
-    per_sample |= {"scipy": _measure({"scipy": lambda: _scipy(force)})["scipy"] / n_samples}
+    whole = _measure({"scipy": lambda: _scipy(force)} if is_installed("scipy") else {})
     return {
         "n_samples": n_samples,
         "window": WINDOW,
@@ -134,7 +135,7 @@ def batch(n_samples: int) -> dict[str, Any]:
         "seconds_per_sample_allocating": per_sample["allocating"],
         "seconds_per_sample_copy": per_sample["copy"],
         "ratio_to_copy": per_sample["features"] / per_sample["copy"],
-        "speedup_over_scipy": per_sample["scipy"] / per_sample["features"],
+        "speedup_over_scipy": whole["scipy"] / seconds["features"] if whole else None,
         **{
             f"speedup_over_{name}": peers[name] / per_sample["features"] if name in peers else None
             for name in ("pywt", "tsflex")

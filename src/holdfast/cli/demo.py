@@ -11,6 +11,7 @@ import typer
 
 from holdfast.cli.options import JsonOption
 from holdfast.cli.terminal.console import print_json, print_line, print_lines, print_message
+from holdfast.errors import require_extras
 
 if TYPE_CHECKING:
     from holdfast.metrics import Metrics
@@ -55,6 +56,7 @@ def demo(
       holdfast demo --no-browser
       holdfast demo results/ --speed 0 --json
     """
+    require_extras("twin", "train", "parquet")
     from holdfast.files import refuse_overwrite
     from holdfast.model import Model
     from holdfast.training import evaluate

@@ -7,7 +7,6 @@ import socket
 import time
 from contextlib import suppress
 from importlib import metadata
-from importlib.util import find_spec
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -15,12 +14,19 @@ import typer
 
 from holdfast.cli.options import JsonOption
 from holdfast.cli.terminal.console import print_json, print_line, print_table
-from holdfast.errors import install_command
+from holdfast.errors import install_command, is_installed
 
 if TYPE_CHECKING:
     from holdfast.cli.config import Config
 
 EXTRA_PURPOSES = {
+    "all": "all of the others but deep",
+    "parquet": "recordings as Parquet files",
+    "train": "holdfast train, evaluate and tune",
+    "twin": "holdfast simulate and the source twin:",
+    "plot": "figures, --plot",
+    "label": "holdfast label",
+    "onnx": "classifiers as ONNX files",
     "bags": "import of ROS 1 and ROS 2 bags",
     "bench": "other libraries that holdfast bench compares with",
     "cluster": "a Dask cluster, --engine dask:ADDRESS",
@@ -216,13 +222,13 @@ def _ros1() -> str:
 
 
 def _ros2() -> str:
-    if find_spec("cyclonedds") is None:
+    if not is_installed("cyclonedds"):
         return f"not installed: {install_command('ros2')}"
     return f"cyclonedds, domain {os.environ.get('ROS_DOMAIN_ID', '0')}"
 
 
 def _serial() -> str:
-    if find_spec("serial") is None:
+    if not is_installed("serial"):
         return f"not installed: {install_command('serial')}"
     from serial.tools.list_ports import comports
 

@@ -24,6 +24,7 @@ from holdfast.cli.terminal.console import (
     print_table,
 )
 from holdfast.cli.terminal.progress import progress
+from holdfast.errors import require_extras
 
 if TYPE_CHECKING:
     from holdfast.metrics import EventMetrics, Intervals, Metrics, SampleMetrics
@@ -59,6 +60,7 @@ def evaluate(
       holdfast evaluate builtin:twin recordings/ --json
       holdfast evaluate model.json recordings/ --engine dask:tcp://hub:8786
     """
+    require_extras("train")
     import msgspec
 
     from holdfast.errors import TrainingError

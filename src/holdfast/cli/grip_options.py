@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Annotated, NamedTuple
 import typer
 
 from holdfast.cli.terminal.console import print_message
+from holdfast.errors import require_extras
 
 if TYPE_CHECKING:
     from holdfast.devices.hands import HandDevice
@@ -122,14 +123,17 @@ def find_source_and_hand(
 
     Raises:
         ValueError: the hand is the twin and the source is not, or a URI is not valid.
+        MissingExtra: the hand is the twin, or needs a package that is not installed.
     """
     from holdfast.devices.hands import open_hand
-    from holdfast.devices.live_twin import LiveTwin
     from holdfast.devices.sources import open_source
 
     if hand == TWIN:
         if not source.startswith(TWIN):
             raise ValueError(f"--hand twin: needs the source twin:..., {source} given")
+        require_extras("twin")
+        from holdfast.devices.live_twin import LiveTwin
+
         twin = LiveTwin(source, speed=speed, loop=loop)
         return twin, twin
     return open_source(source, speed=speed, loop=loop), open_hand(hand)

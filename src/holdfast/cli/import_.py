@@ -20,6 +20,7 @@ from holdfast.cli.options import (
 from holdfast.cli.sensors import find_sensor
 from holdfast.cli.terminal.console import print_json, print_line, print_message, print_table
 from holdfast.cli.terminal.progress import progress
+from holdfast.errors import is_installed
 
 if TYPE_CHECKING:
     from holdfast.labelling.review.findings import Finding
@@ -84,8 +85,12 @@ def import_(
     engine: EngineOption = "loky",
     jobs: JobsOption = 1,
     suffix: Annotated[
-        RecordingFormat, typer.Option(help="Format of the recordings to write.")
-    ] = RecordingFormat.PARQUET,
+        RecordingFormat | None,
+        typer.Option(
+            help="Format of the recordings to write.",
+            show_default="parquet; mcap without the extra parquet",
+        ),
+    ] = None,
     force: Annotated[
         bool, typer.Option("--force", help="Overwrite recordings of the same name.")
     ] = False,
@@ -114,6 +119,8 @@ def import_(
     if out.exists() and not out.is_dir():
         raise NotADirectoryError(20, "is a file; a folder expected", str(out))
     used = start_engine(engine, jobs)
+    if suffix is None:
+        suffix = RecordingFormat.PARQUET if is_installed("pyarrow") else RecordingFormat.MCAP
     task = _ImportTask(
         data_format, _sensors(sensor or ()), columns, not no_labels, suffix, force, used.path(out)
     )

@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from holdfast.cli.terminal.console import print_message
+from holdfast.errors import require_extras
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -314,11 +315,13 @@ def check_plot(plot: Path, force: bool) -> None:
     Raises:
         ValueError: the suffix is not one of `PLOT_SUFFIXES`.
         OutputError: the file exists and `force` is not given, or its folder does not exist.
+        MissingExtra: matplotlib is not installed.
     """
     from holdfast.files import refuse_overwrite
 
     if plot.suffix.lower() not in PLOT_SUFFIXES:
         raise ValueError(f"a plot ends in {', '.join(PLOT_SUFFIXES)}; {plot.name!r} given")
+    require_extras("plot")
     refuse_overwrite(plot, force=force)
 
 

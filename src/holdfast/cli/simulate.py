@@ -10,6 +10,7 @@ import typer
 from holdfast.cli.options import EngineOption, JobsOption, JsonOption, check_shared, start_engine
 from holdfast.cli.terminal.console import print_json, print_line, print_message
 from holdfast.cli.terminal.progress import ProgressBar
+from holdfast.errors import require_extras
 from holdfast.twin.profile import ATTEMPTS
 
 if TYPE_CHECKING:
@@ -89,6 +90,7 @@ def simulate(
       holdfast simulate few/ --objects can,ball --cases 2 --repeats 1
       holdfast simulate /shared/twin --engine dask:tcp://hub:8786
     """
+    require_extras("twin", "parquet")
     from holdfast.files import refuse_overwrite
 
     used = start_engine(engine, jobs)

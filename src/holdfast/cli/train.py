@@ -8,6 +8,7 @@ import typer
 from holdfast.cli.options import EngineOption, JobsOption, JsonOption, SeedOption, start_engine
 from holdfast.cli.terminal.console import print_json, print_line, print_message
 from holdfast.cli.terminal.progress import progress
+from holdfast.errors import require_extras
 
 if TYPE_CHECKING:
     from holdfast.model import Model
@@ -131,6 +132,8 @@ def train(
     from holdfast.cli.evaluate import print_metrics, print_verdict
     from holdfast.files import refuse_overwrite
     from holdfast.io import load_dataset
+
+    require_extras("train")
     from holdfast.labelling.review.findings import report_hidden_labels
     from holdfast.training import train as fit
     from holdfast.training.verdict import no_verdict

@@ -9,6 +9,7 @@ from holdfast.cli.evaluate import print_verdict, warn_about_training
 from holdfast.cli.options import JsonOption, ModelArgument
 from holdfast.cli.terminal.console import print_json, print_line, print_table
 from holdfast.cli.terminal.progress import progress
+from holdfast.errors import require_extras
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Iterator
@@ -41,6 +42,7 @@ def tune(
       holdfast tune model.json recordings/ -o tuned.json --false-alarms 1
       holdfast tune builtin:any recordings/ -o mine.json --false-alarms 0.5 --json
     """
+    require_extras("train")
     from holdfast.files import refuse_overwrite
     from holdfast.io import load_dataset
     from holdfast.model import Model

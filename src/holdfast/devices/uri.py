@@ -8,6 +8,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 from urllib.parse import parse_qsl, urlsplit
 
+from holdfast.errors import require_extras
 from holdfast.sensors import Sensor, built_in_sensors, sensor
 
 if TYPE_CHECKING:
@@ -173,6 +174,7 @@ def open_source(text: str, *, speed: float = 1.0, loop: bool = False) -> "Source
         return Replay(text, speed=speed, loop=loop)
     scheme, address = parse(text)
     if scheme == "twin":
+        require_extras("twin", "parquet")
         from holdfast.devices.sources.twin import Twin
 
         return Twin(address, speed=speed, loop=loop)

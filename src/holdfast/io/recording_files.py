@@ -8,7 +8,7 @@ from types import ModuleType
 import msgspec
 import numpy as np
 
-from holdfast.errors import OutputError, RecordingError
+from holdfast.errors import OutputError, RecordingError, require_extras
 from holdfast.io.header import Header
 from holdfast.io.label_files import labels_for, labels_path
 from holdfast.io.safe_reading import ReadBudget, recording_errors
@@ -73,7 +73,7 @@ def save_recording(recording: Recording, path: str | Path, force: bool = False) 
     target = Path(path)
     if target.suffix not in SUFFIXES:
         raise OutputError(f"cannot write {target}: {_expected_suffixes(target)}")
-    _format_module(target.suffix).save(_with_native_readings(recording), target, force=force)
+    format_module(target.suffix).save(_with_native_readings(recording), target, force=force)
 
 
 def read_chunks(
@@ -107,7 +107,7 @@ def is_recording(path: Path) -> bool:
     if path.suffix not in SUFFIXES or not path.is_file():
         return False
     try:
-        return not _format_module(path.suffix).is_foreign(path)
+        return not format_module(path.suffix).is_foreign(path)
     except OSError:  # it cannot be read; `load_recording` says why
         return True
 
@@ -119,12 +119,17 @@ def _format_of(path: Path) -> ModuleType:
         raise RecordingError(f"{path} {problem}; a recording's file expected")
     if path.suffix not in SUFFIXES:
         raise RecordingError(f"cannot read {path}: {_expected_suffixes(path)}")
-    return _format_module(path.suffix)
+    return format_module(path.suffix)
 
 
-def _format_module(suffix: str) -> ModuleType:
-    """Return the module of a format, which imports its libraries only when it is used."""
+def format_module(suffix: str) -> ModuleType:
+    """Return the module of a format, which imports its libraries only when it is used.
+
+    Raises:
+        MissingExtra: the libraries are not installed.
+    """
     if suffix == ".parquet":
+        require_extras("parquet")
         from holdfast.io import parquet
 
         return parquet

@@ -1,11 +1,11 @@
 """Taxel poses from a URDF file."""
 
+import math
 import xml.etree.ElementTree as ET
 from collections.abc import Mapping
 from pathlib import Path
 
 import numpy as np
-from scipy.spatial.transform import Rotation
 
 from holdfast.files import read_input
 from holdfast.sensors.types import Array
@@ -15,6 +15,8 @@ MAX_URDF_SIZE = 1 << 26
 
 Pose = tuple[Array, Array]
 """Position [m] and rotation matrix."""
+Quaternion = tuple[float, float, float, float]
+"""x, y, z, w."""
 
 
 def taxel_poses(path: Path, base: str, match: str) -> tuple[Array, Array]:
@@ -52,7 +54,7 @@ class _Joint:
         self.child = _link(element, "child")
         self.position = _three_numbers(attributes.get("xyz", "0 0 0"))
         angles = _three_numbers(attributes.get("rpy", "0 0 0"))
-        self.rotation: Array = Rotation.from_euler("xyz", angles).as_matrix()
+        self.rotation: Array = _rotation(*angles)
 
 
 def _joints(path: Path) -> list[_Joint]:
@@ -78,6 +80,37 @@ def _three_numbers(text: str) -> Array:
     if numbers.shape != (3,) or not np.isfinite(numbers).all():
         raise ValueError(f"three finite numbers expected, {text!r} given")
     return numbers
+
+
+def _rotation(roll: float, pitch: float, yaw: float) -> Array:
+    """Return the rotation matrix of roll, pitch and yaw [rad]: about x, then y, then z.
+
+    It is computed by a quaternion, as SciPy does, and equals SciPy's to the last bit.
+    """
+    turns = (
+        (math.sin(roll / 2), 0.0, 0.0, math.cos(roll / 2)),
+        (0.0, math.sin(pitch / 2), 0.0, math.cos(pitch / 2)),
+        (0.0, 0.0, math.sin(yaw / 2), math.cos(yaw / 2)),
+    )
+    x, y, z, w = _product(turns[2], _product(turns[1], turns[0]))
+    xx, yy, zz, ww = x * x, y * y, z * z, w * w
+    return np.array(
+        [
+            [xx - yy - zz + ww, 2 * (x * y - z * w), 2 * (x * z + y * w)],
+            [2 * (x * y + z * w), -xx + yy - zz + ww, 2 * (y * z - x * w)],
+            [2 * (x * z - y * w), 2 * (y * z + x * w), -xx - yy + zz + ww],
+        ]
+    )
+
+
+def _product(a: Quaternion, b: Quaternion) -> Quaternion:
+    """Return the quaternion of rotation b followed by rotation a."""
+    return (
+        a[3] * b[0] + b[3] * a[0] + (a[1] * b[2] - a[2] * b[1]),
+        a[3] * b[1] + b[3] * a[1] + (a[2] * b[0] - a[0] * b[2]),
+        a[3] * b[2] + b[3] * a[2] + (a[0] * b[1] - a[1] * b[0]),
+        a[3] * b[3] - a[0] * b[0] - a[1] * b[1] - a[2] * b[2],
+    )
 
 
 def _link(joint: ET.Element, end: str) -> str:

@@ -125,3 +125,28 @@ class TestLongCells:
         path.write_text("a\n1\n")
         read_table(path)
         assert csv.field_size_limit() == before
+
+
+@pytest.mark.parametrize("decimals", [0, 6, 17])
+def test_numbers_equal_those_of_another_reader(tmp_path, decimals):
+    from pyarrow import csv as other
+
+    generator = np.random.default_rng(decimals)
+    numbers = generator.normal(size=(200, 7)) * 10.0 ** generator.integers(-20, 20, size=(200, 7))
+    np.savetxt(tmp_path / "a.csv", numbers, f"%.{decimals}e", ",", header="a,b,c,d,e,f,g")
+    (tmp_path / "a.csv").write_text((tmp_path / "a.csv").read_text().replace("# ", "", 1))
+    expected = other.read_csv(tmp_path / "a.csv").to_pandas().to_numpy()
+    np.testing.assert_array_equal(read_table(tmp_path / "a.csv")[0].values, expected)
+
+
+@pytest.mark.parametrize("cell", ["1_000", "\u0661", '"1\n"', "0x1", "1,5"])
+def test_forms_of_numbers_that_only_python_reads(tmp_path, cell):
+    (tmp_path / "a.csv").write_text(f"a,b\n1,2\n1,{cell}\n")
+    with pytest.raises(RecordingError, match=r"a\.csv, row 3.* given, (a number|2) expected"):
+        read_table(tmp_path / "a.csv")
+
+
+def test_text_that_is_not_utf8(tmp_path):
+    (tmp_path / "a.csv").write_bytes(b"a,b\n1,\xff\n")
+    with pytest.raises(RecordingError, match=r"a\.csv is not CSV text: .* byte 0xff"):
+        read_table(tmp_path / "a.csv", ["b"])

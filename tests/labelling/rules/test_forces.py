@@ -3,6 +3,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from holdfast.labelling.rules import forces
 from holdfast.labelling.rules.forces import centre_of_pressure, final_drop, grip_force, hand_force
 from holdfast.recordings import Recording, Tactile
 
@@ -94,3 +95,13 @@ def test_an_empty_module_is_left_out():
     empty = replace(recording.modules["index"], times=np.zeros(0), readings=np.zeros((0, 16, 3)))
     hand = hand_force(Recording("empty", {**recording.modules, "index": empty}))
     assert list(hand.fingers) == ["thumb"]
+
+
+@pytest.mark.parametrize("n", [1, 2, 7, 38, 300])
+def test_the_moving_mean_equals_that_of_scipy(n):
+    from scipy.ndimage import uniform_filter1d
+
+    for seed in range(20):
+        values = np.random.default_rng(seed).normal(size=(1 + 9 * seed, 3)) * 1e3
+        expected = uniform_filter1d(values, n, axis=0, mode="nearest")
+        np.testing.assert_array_equal(forces._moving_mean(values, n), expected)

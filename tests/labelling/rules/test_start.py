@@ -5,7 +5,7 @@ import pytest
 
 from holdfast.features import Tare
 from holdfast.io import import_recordings
-from holdfast.labelling.rules import signal
+from holdfast.labelling.rules import signal, start
 from holdfast.labelling.rules.start import evidence_of_contact, fitting_tare
 from holdfast.recordings import Recording
 
@@ -79,3 +79,12 @@ def test_real_recordings(data_folder):
         assert fitting_tare(recording) == Tare.parse("first")
     by_readings = evidence_of_contact(replace(recording, metadata={}))  # the last one has slip
     assert by_readings == "the normal force of finger1, finger2 falls below its first value"
+
+
+@pytest.mark.parametrize("n", [1, 2, 7, 38, 300])
+def test_the_lowest_maximum_equals_that_of_scipy(n):
+    from scipy.ndimage import maximum_filter1d
+
+    for seed in range(20):
+        values = np.random.default_rng(seed).normal(size=1 + 9 * seed)
+        assert start.lowest_maximum(values, n) == maximum_filter1d(values, n).min()

@@ -16,6 +16,7 @@ from holdfast.cli.options import (
     find_token,
 )
 from holdfast.cli.serve import DEFAULT_HOST
+from holdfast.errors import require_extras
 
 DEFAULT_PORT = 8081
 
@@ -115,6 +116,7 @@ def label(
       holdfast label --export label-studio studio/ recordings/
       holdfast label --import export.json recordings/
     """
+    require_extras(*(("label", "train") if audit else ("label",)))
     from holdfast.cli.label.inputs import PageOptions, RuleOptions
 
     options = RuleOptions(tare, poses, tuple(tracks or ()), tuple(parameters or ()))

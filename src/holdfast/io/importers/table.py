@@ -2,10 +2,11 @@
 
 import csv
 import re
-from collections.abc import Iterable, Iterator, Sequence
-from contextlib import contextmanager
+from array import array
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager, suppress
 from pathlib import Path
-from typing import TYPE_CHECKING, NamedTuple, TextIO
+from typing import NamedTuple, TextIO, cast
 
 import numpy as np
 import numpy.typing as npt
@@ -15,16 +16,15 @@ from holdfast.files import check_regular
 from holdfast.io.safe_reading import ReadBudget
 from holdfast.sensors.types import Array
 
-if TYPE_CHECKING:
-    import pyarrow
-
-
 MAX_CELL_LENGTH = 1 << 20
 """Maximum length of a cell [characters]; the csv module itself stops at 131,072."""
 MAX_ROW_SIZE = 1 << 26
 """Maximum size of a row with long cells, and of all lines before the first row [bytes]."""
 COLUMN_SIZE = 1 << 13
 """Size in memory that a column counts besides its values [bytes]."""
+
+_OTHER_FORMS = re.compile(r"[^\x00-\x7f]|[_\r\n]")
+"""Characters with which Python reads numbers that no other program writes, such as `1_000`."""
 
 
 class Table(NamedTuple):
@@ -79,67 +79,64 @@ def read_table(path: Path, text: Sequence[str] = ()) -> tuple[Table, dict[str, l
         RecordingError: the file cannot be read, is empty, has rows of different lengths, a cell
             that is not a number, or a row that is too long.
     """
-    import pyarrow as pa
-
     comments, names, first_line = _head(path)
     ReadBudget(path).keep(len(names) * COLUMN_SIZE)
-    keys = [str(place) for place in range(len(names))]
-    places = {name: names.index(name) for name in text if name in names}
-    types = dict.fromkeys(keys, pa.float64())
-    types.update({str(place): pa.string() for place in places.values()})
+    cells: dict[int, list[str]] = {names.index(name): [] for name in text if name in names}
+    numbers = array("d")
     try:
-        table = _read(path, types, first_line)
+        with _long_cells():
+            rows = csv.reader(_lines(path, first_line))
+            for number, row in enumerate(rows, start=first_line):
+                if row:
+                    numbers.extend(_numbers(path, number, names, row, cells))
     except OSError as cause:
-        raise RecordingError(f"cannot read {path}: {cause}") from cause
-    except pa.ArrowException as cause:
-        raise _cause_of(path, names, first_line, set(text), str(cause)) from cause
-    if len(table) == 0:
-        raise _without_samples(path)
-    _check_cells(path, table, names, places.values())
-    cells = {
-        name: [cell or "" for cell in table[place].to_pylist()] for name, place in places.items()
-    }
-    return Table(path, names, _numbers(table, set(places.values())), first_line, comments), cells
+        raise RecordingError(f"cannot read {path}: {cause.strerror or cause}") from cause
+    except (UnicodeError, csv.Error) as cause:
+        raise RecordingError(f"{path} is not a table of numbers: {_text(cause)}") from cause
+    if not numbers:
+        raise RecordingError(f"{path} has a header but no samples; at least one expected")
+    values = np.frombuffer(numbers).reshape(-1, len(names))
+    return (
+        Table(path, names, values, first_line, comments),
+        {names[place]: column for place, column in cells.items()},
+    )
 
 
-def _read(path: Path, types: "dict[str, pyarrow.DataType]", first_line: int) -> "pyarrow.Table":
-    """Read the rows of a CSV file; rows of more than 1 MB need larger blocks."""
-    import pyarrow as pa
-    from pyarrow import csv as arrow
+def _numbers(
+    path: Path, number: int, names: Sequence[str], row: list[str], cells: dict[int, list[str]]
+) -> list[float]:
+    """Return the numbers of a row; NaN for empty cells and text, which is appended to `cells`.
 
-    def read(block_size: int | None) -> "pyarrow.Table":
-        with pa.OSFile(str(path)) as file:  # by its path, a packed file would be unpacked
-            return arrow.read_csv(
-                file,
-                read_options=arrow.ReadOptions(
-                    column_names=list(types), skip_rows=first_line - 1, block_size=block_size
-                ),
-                convert_options=arrow.ConvertOptions(
-                    column_types=types, null_values=["", "nan", "NaN", "NAN"]
-                ),
-            )
-
-    try:
-        return read(None)
-    except pa.ArrowInvalid as cause:
-        if "straddling" not in str(cause):
-            raise
-    return read(MAX_ROW_SIZE)
-
-
-def _check_cells(
-    path: Path, table: "pyarrow.Table", names: Sequence[str], places: Iterable[int]
-) -> None:
-    """Check the length of the cells of text."""
-    from pyarrow import compute
-
-    for place in places:
-        longest = compute.max(compute.utf8_length(table[place])).as_py() or 0
-        if longest > MAX_CELL_LENGTH:
+    Raises:
+        RecordingError: the row has another length, or a cell that is not a number.
+        UnicodeError: a cell of text is not UTF-8.
+    """
+    if len(row) != len(names):
+        raise RecordingError(
+            f"{path}, row {number}: {len(row)} cells given, {len(names)} expected as in the header"
+        )
+    for place, column in cells.items():
+        row[place].encode()
+        column.append(row[place])
+        row[place] = ""
+    if not _OTHER_FORMS.search("".join(row)):
+        with suppress(ValueError):  # a cell is empty or wrong
+            return list(map(float, row))
+    numbers = [_number(cell) for cell in row]
+    for name, cell, value in zip(names, row, numbers, strict=True):
+        if value is None:
             raise RecordingError(
-                f"{path}, column {names[place]!r}: a cell of {longest} characters given, at most "
-                f"{MAX_CELL_LENGTH} expected"
+                f"{path}, row {number}, column {name!r}: {_start(cell)} given, a number expected"
             )
+    return cast(list[float], numbers)
+
+
+def _number(cell: str) -> float | None:
+    """Return the number in a cell, NaN for an empty one; None if it is not a number."""
+    try:
+        return None if _OTHER_FORMS.search(cell) else float(cell or "nan")
+    except ValueError:
+        return None
 
 
 @contextmanager
@@ -216,7 +213,7 @@ def _lines(path: Path, first_line: int) -> Iterator[str]:
     Raises:
         csv.Error: a line is too long.
     """
-    with path.open(encoding="utf-8-sig", errors="replace", newline="") as file:
+    with path.open(encoding="utf-8-sig", errors="surrogateescape", newline="") as file:
         number = 0
         while line := file.readline(MAX_ROW_SIZE + 1):
             if len(line) > MAX_ROW_SIZE:
@@ -224,50 +221,6 @@ def _lines(path: Path, first_line: int) -> Iterator[str]:
             number += 1
             if number >= first_line:
                 yield line
-
-
-def _numbers(table: "pyarrow.Table", text: set[int]) -> Array:
-    values = np.full((len(table), table.num_columns), np.nan)
-    for place in range(table.num_columns):
-        if place not in text:
-            values[:, place] = table[place].to_numpy()
-    return values
-
-
-def _cause_of(
-    path: Path, names: tuple[str, ...], first_line: int, text: set[str], cause: str
-) -> RecordingError:
-    """Return an error that names the wrong cell or row; the file is read a second time."""
-    try:
-        if not any(line.strip() for line in _lines(path, first_line)):
-            return _without_samples(path)
-        with _long_cells():
-            wrong = _wrong_row(path, names, first_line, text, _lines(path, first_line))
-    except csv.Error as problem:
-        cause = _text(problem)
-    else:
-        if wrong is not None:
-            return wrong
-    return RecordingError(f"{path} is not a table of numbers: {' '.join(cause.split())[:200]}")
-
-
-def _wrong_row(
-    path: Path, names: tuple[str, ...], first_line: int, text: set[str], lines: Iterable[str]
-) -> RecordingError | None:
-    """Return an error that names the first row or cell that is wrong; None if there is none."""
-    for number, row in enumerate(csv.reader(lines), start=first_line):
-        if row and len(row) != len(names):
-            return RecordingError(
-                f"{path}, row {number}: {len(row)} cells given, {len(names)} expected as in "
-                "the header"
-            )
-        for name, cell in zip(names, row, strict=False):
-            if name not in text and not _is_number(cell):
-                return RecordingError(
-                    f"{path}, row {number}, column {name!r}: {_start(cell)} given, "
-                    "a number expected"
-                )
-    return None
 
 
 def _start(cell: str) -> str:
@@ -280,18 +233,6 @@ def _text(problem: Exception) -> str:
     if "field limit" in str(problem):
         return f"a cell of more than {MAX_CELL_LENGTH} characters"
     return str(problem)
-
-
-def _without_samples(path: Path) -> RecordingError:
-    return RecordingError(f"{path} has a header but no samples; at least one expected")
-
-
-def _is_number(cell: str) -> bool:
-    try:
-        float(cell or "nan")
-    except ValueError:
-        return False
-    return True
 
 
 def _shortened(names: Sequence[str]) -> str:

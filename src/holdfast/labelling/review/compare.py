@@ -8,7 +8,6 @@ from typing import NamedTuple
 import msgspec
 import numpy as np
 import numpy.typing as npt
-from scipy.optimize import linear_sum_assignment
 
 from holdfast.contact import ContactState
 from holdfast.errors import RecordingError
@@ -314,6 +313,8 @@ def _onsets(labels: Sequence[Label]) -> Array:
 
 def _match(a: Array, b: Array) -> _OnsetMatch:
     """Match as many onsets as possible, with the smallest sum of differences."""
+    from scipy.optimize import linear_sum_assignment
+
     differences = b[None, :] - a[:, None]
     near = np.abs(differences) <= MAX_ONSET_DIFFERENCE + TIME_TOLERANCE
     unmatched_cost = (len(a) + len(b) + 1) * (MAX_ONSET_DIFFERENCE + TIME_TOLERANCE)

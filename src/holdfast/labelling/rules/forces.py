@@ -5,14 +5,13 @@ from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
-from scipy.ndimage import maximum_filter1d, minimum_filter1d, uniform_filter1d
 
 from holdfast.contact import MERGE_GAP, MIN_CONTACT_DURATION
 from holdfast.errors import RecordingError
 from holdfast.features import Tare
 from holdfast.features.force import tared_force
 from holdfast.features.tare import TareArgument, baseline_of, offline_tare
-from holdfast.labelling.rules.start import fitting_tare
+from holdfast.labelling.rules.start import fitting_tare, lowest_maximum
 from holdfast.metrics.masks import Mask, covered, drop_short_runs, fill_short_gaps, n_samples_of
 from holdfast.recordings import GAP_PERIODS, Recording, Tactile
 from holdfast.sensors.types import Array
@@ -77,8 +76,8 @@ class FingerForce:
     @cached_property
     def _grip(self) -> float:
         """The largest F_a of the recording that lasts; a short knock does not."""
-        lasting = minimum_filter1d(np.where(self.known, self.amplitude, 0.0), self._n(MERGE_GAP))
-        return float(lasting.max())
+        amplitude = np.where(self.known, self.amplitude, 0.0)
+        return -lowest_maximum(-amplitude, self._n(MERGE_GAP))
 
     def _n(self, duration: float) -> int:
         return n_samples_of(duration, self.period)
@@ -92,6 +91,8 @@ class FingerForce:
 
     def change(self, window: float) -> Array:
         """Return (n,) how much the force changes within a window [s] around each instant."""
+        from scipy.ndimage import maximum_filter1d, minimum_filter1d
+
         n = self._n(window)
         span = maximum_filter1d(self.force, n, axis=0) - minimum_filter1d(self.force, n, axis=0)
         return np.asarray(np.linalg.norm(span, axis=1))
@@ -231,5 +232,9 @@ def final_drop(hand: HandForce, duration: float = 0.2, factor: float = 5.0) -> i
 
 
 def _moving_mean(values: Array, n: int) -> Array:
-    """Return the mean over n samples around each one, along the first axis."""
-    return np.asarray(uniform_filter1d(values, n, axis=0, mode="nearest"))
+    """Return the mean over n samples around each one, along the first axis; ends are repeated."""
+    ends = [(n // 2, n - 1 - n // 2)] + [(0, 0)] * (values.ndim - 1)
+    padded = np.pad(values, ends, mode="edge")
+    steps = padded[n:] - padded[:-n]
+    first = np.cumsum(padded[:n], axis=0)[-1:]  # one after the other, as SciPy adds them
+    return np.asarray(np.cumsum(np.concatenate([first, steps]), axis=0) / n)

@@ -1,15 +1,16 @@
 """Motion of an object relative to a fingertip: poses, speeds, their noise, and clock offsets."""
 
 from dataclasses import dataclass
-from typing import NamedTuple
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
-from scipy.ndimage import convolve1d
-from scipy.spatial.transform import Rotation
 
 from holdfast.labelling.rules.poses import PoseTrack
 from holdfast.metrics.masks import Mask, covered, n_samples_of
 from holdfast.sensors.types import Array
+
+if TYPE_CHECKING:
+    from scipy.spatial.transform import Rotation
 
 MAX_POSE_GAP = 0.1
 """Longest gap between poses that is interpolated [s]."""
@@ -142,6 +143,8 @@ def motion_of(
 
 def slope(values: Array, period: float) -> Array:
     """Return (n, k) rates of change: slopes of lines fitted over SPEED_WINDOW around a sample."""
+    from scipy.ndimage import convolve1d
+
     half = max(n_samples_of(SPEED_WINDOW, period) // 2, 1)
     steps = np.arange(-half, half + 1)
     weights = steps / ((steps**2).sum() * period)
@@ -204,7 +207,9 @@ def _continuous(quaternions: Array) -> Array:
     return np.asarray(quaternions * signs[:, None])
 
 
-def _rotation(quaternions: Array) -> Rotation:
+def _rotation(quaternions: Array) -> "Rotation":
+    from scipy.spatial.transform import Rotation
+
     return Rotation.from_quat(np.roll(quaternions, -1, axis=-1))
 
 

@@ -5,7 +5,7 @@ mean contains the grip, and the force falls below zero when the grip ends.
 """
 
 import numpy as np
-from scipy.ndimage import maximum_filter1d
+from numpy.lib.stride_tricks import sliding_window_view
 
 from holdfast.features import Tare
 from holdfast.features.faults import LOADED_SECONDS
@@ -13,6 +13,7 @@ from holdfast.features.force import tared_force
 from holdfast.features.tare import TareArgument
 from holdfast.metrics.masks import n_samples_of
 from holdfast.recordings import Recording, Tactile
+from holdfast.sensors.types import Array
 
 DEFAULT_TARE = Tare("seconds", 0.5)
 """Tare of a recording that begins without contact."""
@@ -69,6 +70,17 @@ def _falls_below_start(module: Tactile) -> bool:
     noise = float(normal[times < times[0] + DEFAULT_TARE.seconds].std())
     if noise == 0:  # a start without noise shows nothing about the load
         return False
-    lasting = maximum_filter1d(normal, n_samples_of(LOADED_SECONDS, module.period))
+    lasting = lowest_maximum(normal, n_samples_of(LOADED_SECONDS, module.period))
     largest = float(np.linalg.norm(force[known], axis=1).max())
-    return bool(lasting.min() < -max(FALL_OF_NOISE * noise, FALL_OF_RANGE * largest))
+    return bool(lasting < -max(FALL_OF_NOISE * noise, FALL_OF_RANGE * largest))
+
+
+def lowest_maximum(values: Array, n: int) -> float:
+    """Return the minimum over all windows of n samples of their maximum; ends are mirrored.
+
+    Example:
+        >>> lowest_maximum(np.array([3.0, 1.0, 2.0, 5.0]), 2)
+        2.0
+    """
+    mirrored = np.pad(values, (n // 2, n - 1 - n // 2), mode="symmetric")
+    return float(sliding_window_view(mirrored, n).max(axis=1).min())

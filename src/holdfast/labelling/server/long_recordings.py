@@ -16,9 +16,9 @@ import numpy.typing as npt
 
 from holdfast.compiled import compiled
 from holdfast.errors import RecordingError
-from holdfast.io import load_recording, mcap, parquet
+from holdfast.io import load_recording
 from holdfast.io.header import Header, header_sensors
-from holdfast.io.recording_files import SUFFIXES
+from holdfast.io.recording_files import SUFFIXES, format_module
 from holdfast.io.safe_reading import recording_errors
 from holdfast.io.timed_arrays import TACTILE, TimedArray, TimedArrays, recording_from
 from holdfast.recordings import Recording
@@ -43,7 +43,7 @@ def load_for_labelling(path: Path) -> tuple[Recording, bool]:
     if path.suffix != ".parquet" or not path.is_file():
         return load_recording(path, labels=False), True
     with recording_errors(path):
-        header, groups = parquet.read_columns(path)
+        header, groups = format_module(path.suffix).read_columns(path)
         if not _is_long(header):
             return load_recording(path, labels=False), True
         forces = _forces(header, groups)
@@ -73,8 +73,7 @@ def read_header(path: Path) -> tuple[Header | None, bool]:
     """
     if path.suffix not in SUFFIXES:
         return None, False
-    source = parquet if path.suffix == ".parquet" else mcap
-    header, groups, complete = source.read_groups(path)
+    header, groups, complete = format_module(path.suffix).read_groups(path)
     getattr(groups, "close", lambda: None)()
     return header, complete
 

@@ -13,7 +13,6 @@ from typing import NamedTuple
 import msgspec
 import numpy as np
 import numpy.typing as npt
-from scipy.ndimage import maximum_filter1d, uniform_filter1d
 
 from holdfast.features import DEFAULT_WINDOW, Tare, haar_features
 from holdfast.features.force import tared_force
@@ -314,6 +313,8 @@ def change_points(times: Array, force: Array, period: float) -> Array:
         >>> change_points(times, force, 1 / 150).round(2).tolist()
         [0.49, 1.01]
     """
+    from scipy.ndimage import maximum_filter1d, uniform_filter1d
+
     known = np.isfinite(force).all(axis=1)
     own, values = times[known], force[known]
     n = max(round(COMPARED_TIME / period), 1)

@@ -1,0 +1,188 @@
+"""An installation without extras: what works, and how it names the extra that is missing."""
+
+import re
+import subprocess
+import sys
+from importlib import metadata
+
+import numpy as np
+import pytest
+
+from holdfast import save_recording
+from holdfast.errors import (
+    EXTRA_MODULES,
+    MissingExtra,
+    is_installed,
+    missing_extra,
+    require_extras,
+)
+from holdfast.synthetic import synthetic_recording
+
+BLOCK = """
+import json, sys
+from holdfast.errors import EXTRA_MODULES
+
+for modules in EXTRA_MODULES.values():
+    sys.modules.update(dict.fromkeys([*modules, "jinja2"]))
+from holdfast.cli import main
+for words in json.loads(sys.stdin.read()):
+    for stream in (sys.stdout, sys.stderr):
+        print(chr(30), end="", file=stream, flush=True)
+    code = main(words)
+    print(f"exit {code}", file=sys.stderr, flush=True)
+"""
+"""A program that runs verbs in one process, in which no module of an extra can be imported."""
+
+CORE = [
+    ["--version"],
+    ["doctor"],
+    ["sensors"],
+    ["info", "builtin:any"],
+    ["info", "grasp.mcap"],
+    ["info", "."],
+    ["detect", "builtin:any", "grasp.mcap"],
+    ["detect", "builtin:twin", "grasp.mcap", "--json"],
+    ["record", "grasp.mcap", "again.mcap", "--speed", "0"],
+    ["import", "log.csv", "imported", "--sensor", "anyskin"],
+    ["detect", "builtin:any", "imported/log.mcap"],
+    ["hold", "builtin:any", "grasp.mcap", "--hand", "log:commands.jsonl", "--speed", "0"],
+    ["bench", "--samples", "1000", "--updates", "1000"],
+    ["simulate", "--help"],
+    ["label", "--help"],
+    ["train", "--help"],
+    ["play", "--help"],
+    ["serve", "--help"],
+]
+"""Commands that work without any extra."""
+
+MISSING = {
+    "twin,train,parquet": [["demo"]],
+    "twin,parquet": [
+        ["simulate", "twin"],
+        ["detect", "builtin:any", "twin:"],
+        ["play", "twin:"],
+        ["hold", "builtin:twin", "twin:", "--hand", "log:a.jsonl"],
+    ],
+    "twin": [["hold", "builtin:twin", "twin:", "--hand", "twin:", "--armed"]],
+    "train": [
+        ["train", ".", "-o", "m.json"],
+        ["evaluate", "builtin:any", "."],
+        ["tune", "builtin:any", ".", "-o", "m.json", "--false-alarms", "1"],
+        ["import", "log.csv", "others", "--sensor", "anyskin", "--jobs", "2"],
+    ],
+    "label": [["label", "."], ["label", "--auto", "signal", "grasp.mcap"]],
+    "label,train": [["label", "--audit", "grasp.mcap"]],
+    "parquet": [
+        ["info", "other/grasp.parquet"],
+        ["detect", "builtin:any", "other/grasp.parquet"],
+        ["import", "log.csv", "others", "--sensor", "anyskin", "--suffix", "parquet"],
+    ],
+    "plot": [["info", "grasp.mcap", "--plot", "a.png"], ["sensors", "anyskin", "--plot", "a.png"]],
+    "bags": [["import", "run.bag", "others", "--format", "rosbag"]],
+    "hdf5": [["import", "a.h5", "others", "--format", "arq-crisp"]],
+    "ros2": [["detect", "builtin:any", "ros2:///xServTopic"]],
+    "serial": [["detect", "builtin:any", "serial:///dev/ttyACM0?sensor=anyskin"]],
+    "cluster": [
+        ["import", "log.csv", "others", "--sensor", "anyskin", "--engine", "dask:tcp://a:1"]
+    ],
+}
+"""Commands that name an extra, and exit with 2."""
+
+
+@pytest.fixture(scope="module")
+def outcomes(tmp_path_factory):
+    """Return what each command printed on stdout and stderr, and its exit code."""
+    import json
+
+    folder = tmp_path_factory.mktemp("slim")
+    recording = synthetic_recording("grasp", seed=0)
+    save_recording(recording, folder / "grasp.mcap")
+    (folder / "other").mkdir()
+    (folder / "other" / "grasp.parquet").write_bytes(b"PAR1")
+    (folder / "run.bag").write_bytes(b"#ROSBAG V2.0\n")
+    (folder / "a.h5").write_bytes(b"\x89HDF\r\n\x1a\n")
+    columns = ["t", *(f"{axis}{taxel}" for taxel in range(1, 6) for axis in "xyz")]
+    numbers = np.column_stack(
+        [np.arange(300) / 100, np.random.default_rng(0).normal(size=(300, 15))]
+    )
+    np.savetxt(folder / "log.csv", numbers, "%.6f", ",", header=",".join(columns), comments="")
+    commands = [*CORE, *(words for group in MISSING.values() for words in group)]
+    done = subprocess.run(
+        [sys.executable, "-c", BLOCK], input=json.dumps(commands), capture_output=True,
+        text=True, check=False, cwd=folder, timeout=200,
+    )  # fmt: skip
+    out, err = (text.split(chr(30))[1:] for text in (done.stdout, done.stderr))
+    assert len(out) == len(err) == len(commands), done.stderr
+    codes = [re.search(r"exit (\d+)\n$", text) for text in err]
+    return {
+        tuple(words): (out[k], err[k][: codes[k].start()], int(codes[k][1]))
+        for k, words in enumerate(commands)
+    }
+
+
+@pytest.mark.parametrize("words", CORE, ids=" ".join)
+def test_the_core_needs_no_extra(words, outcomes):
+    out, err, code = outcomes[tuple(words)]
+    assert code == 0, err
+    assert out or words[0] == "record" or "--hand" in words
+
+
+@pytest.mark.parametrize(
+    ("extra", "words"),
+    [(extra, words) for extra, group in MISSING.items() for words in group],
+    ids=lambda value: value if isinstance(value, str) else " ".join(value),
+)
+def test_a_missing_extra_is_one_line(extra, words, outcomes):
+    out, err, code = outcomes[tuple(words)]
+    assert (out, code) == ("", 2)
+    assert err.count("\n") == 1
+    assert err.startswith("holdfast: this needs the package ")
+    expected = str(MissingExtra("x", extra)).partition("installed: ")[2]
+    assert err.rstrip("\n").endswith(f"not installed: {expected}")
+
+
+def requirements(extra):
+    """Return the names of the packages of an extra."""
+    return {
+        re.match(r"[\w.-]+", text)[0].lower()
+        for text in metadata.requires("holdfast")
+        if re.search(rf"extra == ['\"]{extra}['\"]", text)
+    }
+
+
+def test_the_table_of_modules_fits_the_metadata():
+    declared = set(metadata.metadata("holdfast").get_all("Provides-Extra"))
+    assert declared == {*EXTRA_MODULES, "all"}
+    every = {name for extra in declared - {"all", "deep"} for name in requirements(extra)}
+    assert requirements("all") == every
+
+
+@pytest.mark.parametrize("extra", EXTRA_MODULES)
+def test_each_module_belongs_to_a_package_of_its_extra(extra):
+    packages = metadata.packages_distributions()
+    for module in filter(is_installed, EXTRA_MODULES[extra]):
+        assert requirements(extra) & {name.lower() for name in packages[module]}
+
+
+def test_installed_extras_are_not_imported():
+    code = "import sys; from holdfast.errors import *; require_extras('twin', 'plot', 'parquet'); "
+    check = "print({'mujoco', 'scipy', 'matplotlib', 'pyarrow'} & set(sys.modules))"
+    done = subprocess.run(
+        [sys.executable, "-c", code + check], capture_output=True, text=True, check=True
+    )
+    assert done.stdout == "set()\n"
+
+
+def test_all_missing_extras_are_named(monkeypatch):
+    monkeypatch.setitem(sys.modules, "mujoco", None)
+    monkeypatch.setitem(sys.modules, "matplotlib", None)
+    with pytest.raises(MissingExtra, match="package mujoco, which") as raised:
+        require_extras("twin", "parquet", "plot")
+    assert raised.value.args == ("mujoco", "twin,plot")
+
+
+def test_an_import_that_fails_names_its_extra():
+    found = missing_extra(ModuleNotFoundError("no", name="pyarrow.parquet"))
+    assert found.args == ("pyarrow", "parquet")
+    assert missing_extra(ModuleNotFoundError("no", name="numpy")) is None
+    assert missing_extra(ModuleNotFoundError("no")) is None
