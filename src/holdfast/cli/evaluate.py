@@ -31,7 +31,7 @@ if TYPE_CHECKING:
 
 PERCENT_FIELDS = ("accuracy", "fdr", "fpr", "fnr")
 AUC_NOTE = (
-    "AUC in contact: stable against unstable. AUC of all: also against no contact,\n"
+    "AUC in contact: stable against unstable. AUC of all: also against no contact, "
     "where the force decides, not the probability."
 )
 """Explanation of the two AUCs below their table."""
@@ -119,7 +119,7 @@ def print_metrics(metrics: "Metrics") -> None:
         ("", "n", "accuracy %", "FDR %", "FPR %", "FNR %", "AUC in contact", "AUC of all"),
         [*rows, _sample_row("all", metrics.pooled)],
     )
-    print_line(AUC_NOTE)
+    print_paragraph(AUC_NOTE)
     print_line()
     print_line(f"by event (onset of instability in a held contact, {_onsets(metrics)})")
     events = [*metrics.events.fingers.items(), ("hand", metrics.events.hand)]

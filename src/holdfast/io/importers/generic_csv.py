@@ -63,10 +63,11 @@ def read(
     """
     reported: set[str] = set()
 
-    def report_once(guess: str, text: str) -> None:
+    def report_once(guess: str, lines: tuple[str, ...]) -> None:
         if guess not in reported:
             reported.add(guess)
-            report(text)
+            for line in lines:
+                report(line)
 
     files = parts(path, columns)
     return (_recording(file, sensors or {}, columns, report_once) for file in files)
@@ -110,7 +111,7 @@ def _recording(
     path: Path,
     sensors: Mapping[str, Sensor],
     columns: Columns | None,
-    report: Callable[[str, str], None],
+    report: Callable[[str, tuple[str, str]], None],
 ) -> Recording:
     try:
         if columns is None and _is_header(header_line(path)):
@@ -133,7 +134,7 @@ def _of_any_logger(
     path: Path,
     sensors: Mapping[str, Sensor],
     columns: Columns,
-    report: Callable[[str, str], None],
+    report: Callable[[str, tuple[str, str]], None],
 ) -> Recording:
     """Return the recording in a file with any names of the columns; report a guess."""
     names = header_line(path) or read_table(path)[0].names  # which reports what is wrong
@@ -169,8 +170,8 @@ def _times(table: Table, columns: Columns) -> tuple[Array, str]:
 
 def _guess_text(
     path: Path, columns: Columns, times: Array, layout: Layout, names: tuple[str, ...]
-) -> str:
-    """Return what was guessed, and the option that says the same."""
+) -> tuple[str, str]:
+    """Return two lines: what was guessed, and the option that says the same."""
     steps = np.diff(times)
     rate = 1 / float(np.median(steps)) if len(steps) and np.median(steps) > 0 else 0.0
     modules = [f"{name} {len(own) // 3} taxels" for name, own in layout.items()]
@@ -179,8 +180,8 @@ def _guess_text(
     unused = ", ".join(name for name in names if name not in used) or "none"
     return (
         f"{path.name}: the columns are a guess: {rate:.4g} Hz, {', '.join(modules)}; "
-        f"columns that are not used: {unused}\n"
-        f"  the same as --columns '{columns}' (give this option to correct it)"
+        f"columns that are not used: {unused}",
+        f"  the same as --columns '{columns}' (give this option to correct it)",
     )
 
 

@@ -4,7 +4,7 @@ import re
 
 import pytest
 
-from holdfast.live.loop.grip_faults import GRIP_FAULTS
+from holdfast.live.loop.grip_faults import ENDED, GRIP_FAULTS
 from live.web.page.fake_service import Service, Tape, gripping, made_up
 from live.web.page.test_main import requests, shows, until, wait_for_samples
 from web.screens import PHONE, SCREENS, flaws
@@ -296,7 +296,7 @@ def test_what_is_commanded(visit, holding, fields, word, finger):
 
 @pytest.mark.parametrize("reason", GRIP_FAULTS)
 def test_every_fault_is_explained(visit, holding, reason):
-    failure = "the hand does not answer" if reason == "hand" else ""
+    failure = "the hand does not answer" if reason == ENDED else ""
     holding.grip = gripping(state="FAULT", reason=reason, released=True, failure=failure)
     page = visit(holding.url)
     shows(page, "#fault-happened", re.escape(GRIP_FAULTS[reason].happened))
