@@ -83,7 +83,7 @@ def test_a_dataset_larger_than_a_limit_on_memory_trains(tmp_path):
 
 
 def _write_large(folder, n_recordings, n_samples):
-    """Recordings of 29 MB each, that compress well: most taxels are constant."""
+    """Recordings of 29 MB each, that compress well: all taxels repeat seven values."""
     import numpy as np
 
     from holdfast.contact import ContactState
@@ -96,7 +96,7 @@ def _write_large(folder, n_recordings, n_samples):
     half = n_samples // 2
     for k in range(n_recordings):
         readings = np.full((n_samples, tip.n_taxels, 3), 30_000.0)
-        readings[:, 0, 2] += np.arange(n_samples) % 7
+        readings += (np.arange(n_samples) % 7)[:, None, None]
         readings[half:, 0, 2] += 500.0 + k
         labels = (
             Label(0.0, times[half], ContactState.NO_CONTACT),
