@@ -109,7 +109,7 @@ def sockets(folder):
     with server("play", first(folder), "--port", 0, "--once", cwd=folder) as address:
         with connect(address.replace("xela://", "ws://")) as socket:
             packets = [json.loads(socket.recv(10)) for _ in range(N_PACKETS)]
-        yield "play", digest(json.dumps([without_clock(packet) for packet in packets]))
+        yield "play", digest(json.dumps(sorted({key for one in packets for key in one})))
     with server(
         "serve", "builtin:any", first(folder), "--port", 0, "--once", cwd=folder
     ) as address:
