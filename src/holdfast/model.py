@@ -371,7 +371,7 @@ class Model(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=Tru
 
     def _onnx_classifiers(self) -> list[OnnxClassifier]:
         classifiers = (finger.classifier for finger in self.fingers.values())
-        return [each for each in classifiers if isinstance(each, OnnxClassifier)]
+        return [classifier for classifier in classifiers if isinstance(classifier, OnnxClassifier)]
 
     def _encoded(self) -> bytes:
         """Return the JSON, without the contents of ONNX files; their digests are in it."""

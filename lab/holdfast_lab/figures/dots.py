@@ -61,7 +61,7 @@ def draw_dots(
     grid[0].set_ylim(-0.7, len(names) - 0.3)
     for name, label in zip(names, grid[0].get_yticklabels(), strict=True):
         label.set_fontweight("bold" if name in strong else "normal")
-    if any(each.paper is not None for values in groups.values() for each in values.values()):
+    if any(value.paper is not None for values in groups.values() for value in values.values()):
         diamond = Line2D([], [], color=INK, marker="D", markerfacecolor="white", linestyle="")
         diamond.set(label=PAPER, markersize=4.5)
         add_legend(figure, [diamond])
@@ -135,9 +135,9 @@ def _draw_dot(axes: Axes, row: int, estimate: IntervalEstimate, *, bold: bool) -
 def _draw_intervals(
     axes: Axes, x: Array, values: Sequence[IntervalEstimate], style: SeriesStyle
 ) -> None:
-    heights = np.array([_number(each.value) for each in values])
-    low = np.array([_number(each.low, each.value) for each in values])
-    high = np.array([_number(each.high, each.value) for each in values])
+    heights = np.array([_number(value.value) for value in values])
+    low = np.array([_number(value.low, value.value) for value in values])
+    high = np.array([_number(value.high, value.value) for value in values])
     axes.vlines(x, low, high, color=style.color, linewidth=1.1)
     axes.plot(x, heights, color=style.color, marker=style.marker, linestyle="", markersize=4)
 

@@ -100,7 +100,7 @@ def course_figure(courses: Mapping[str, TrialCourse], what: str) -> ReportFigure
 
 
 def _held(results: Sequence[TrialResult], value: Callable[[TrialResult], float]) -> Array:
-    return np.array([value(one) for one in results if one.held], dtype=np.float64)
+    return np.array([value(result) for result in results if result.held], dtype=np.float64)
 
 
 def _trade_offs(by_law: Mapping[str, Summary]) -> dict[str, TradeOff]:

@@ -37,7 +37,7 @@ def summarize(results: Sequence[TrialResult]) -> Summary:
         >>> summarize([held, held])["dropped"]
         {'value': 100.0, 'interval': [100.0, 100.0]}
     """
-    held = [one for one in results if one.held]
+    held = [result for result in results if result.held]
     reactions = [time for one in held if not math.isnan(time := reaction_time(one))]
     ones = [1.0] * len(held)
     return {
@@ -78,7 +78,9 @@ def compare(results: Sequence[TrialResult], others: Sequence[TrialResult]) -> Su
     """
     by_number = {one.number: one for one in others if one.held}
     pairs = [
-        (one, by_number[one.number]) for one in results if one.held and one.number in by_number
+        (result, by_number[result.number])
+        for result in results
+        if result.held and result.number in by_number
     ]
     ones = [1.0] * len(pairs)
     reactions = [(reaction_time(one), reaction_time(other)) for one, other in pairs]

@@ -222,8 +222,8 @@ def _read_updates(
         update = stream.read()
         for notice in update.arrival.notices if update.arrival else ():
             print_message(notice)
-        for one in update.estimates:
-            for problem in faults.update(one.estimate):
+        for estimate in update.estimates:
+            for problem in faults.update(estimate.estimate):
                 print_message(problem.text)
         yield update
     yield stream.finish()

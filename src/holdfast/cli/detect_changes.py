@@ -59,10 +59,10 @@ class ChangeLines:
     def _finger_changes(
         self, finger: str, estimates: Sequence[ContactEstimate]
     ) -> Iterator[tuple[ContactEvent, str]]:
-        for one in estimates:
-            if self._why.get(finger, (None,))[0] is not one.state:
-                self._why[finger] = one.state, why(one)
-            for event in self._lasting(finger, one.state, one.time):
+        for estimate in estimates:
+            if self._why.get(finger, (None,))[0] is not estimate.state:
+                self._why[finger] = estimate.state, why(estimate)
+            for event in self._lasting(finger, estimate.state, estimate.time):
                 yield event, self._why[finger][1]
 
     def _lasting(self, name: str, state: ContactState, time: float) -> list[ContactEvent]:

@@ -101,9 +101,9 @@ class DetectionSummary:
         for finger, estimates in chunk.fingers.items():
             self._add_changes(finger, map(attrgetter("time", "state"), estimates))
             counts = self._counts.setdefault(finger, _StateCounts())
-            counts.states.update(one.state for one in estimates)
-            counts.reasons.update(one.reason for one in estimates if one.reason)
-            counts.faults.update(chain.from_iterable(one.faults for one in estimates))
+            counts.states.update(estimate.state for estimate in estimates)
+            counts.reasons.update(estimate.reason for estimate in estimates if estimate.reason)
+            counts.faults.update(chain.from_iterable(estimate.faults for estimate in estimates))
         self._add_changes(HAND, chunk.hand)
         self._counts.setdefault(HAND, _StateCounts()).states.update(
             state for _, state in chunk.hand
@@ -144,8 +144,8 @@ class DetectionSummary:
         print_table(
             ("time [s]", "finger", "state", "previous"),
             [
-                (f"{one.time - origin:.3f}", one.finger, one.state, one.previous)
-                for one in events[:MAX_EVENTS_SHOWN]
+                (f"{event.time - origin:.3f}", event.finger, event.state, event.previous)
+                for event in events[:MAX_EVENTS_SHOWN]
             ],
         )
         if len(events) > MAX_EVENTS_SHOWN:

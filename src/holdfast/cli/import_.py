@@ -191,11 +191,11 @@ def _collect(
             if key not in printed:
                 print_message(text)
         printed |= messages.keys()
-        for one in recordings:
-            check_shared(folder / one.path.name, engine)
-            _check_new(one.name, one.path.name in names)
-            names.add(one.path.name)
-            yield one
+        for recording in recordings:
+            check_shared(folder / recording.path.name, engine)
+            _check_new(recording.name, recording.path.name in names)
+            names.add(recording.path.name)
+            yield recording
 
 
 def _check_new(name: str, known: bool) -> None:

@@ -141,7 +141,7 @@ def _document(recording: "Recording", tare: "Tare", path: Path) -> dict[str, Any
             "fingers": {finger: list(arrays) for finger, arrays in truth.fingers.items()},
         },
         "digest": recording.digest,
-        "findings": [one._asdict() for one in findings],
+        "findings": [finding._asdict() for finding in findings],
     }
 
 
@@ -222,8 +222,8 @@ def _print_findings(findings: list[Mapping[str, str]]) -> None:
     """Print one paragraph for each finding."""
     if findings:
         print_lines(("", "findings:"))
-    for one in findings:
-        text = f"{one['module']}: {one['text']}" if one["module"] else one["text"]
+    for finding in findings:
+        text = f"{finding['module']}: {finding['text']}" if finding["module"] else finding["text"]
         print_paragraph(text, "- ", "  ")
 
 

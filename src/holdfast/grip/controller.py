@@ -78,7 +78,7 @@ class GripController:
         given = 1.0 if newtons_per_unit is None else newtons_per_unit
         self._factors: Three = given if isinstance(given, tuple) else (given, given, given)
         self._normals = {name: _three(one.normal) for name, one in sensors.items()}
-        rates = [one.rate for one in sensors.values()]
+        rates = [sensor.rate for sensor in sensors.values()]
         self._max_age = 1 / min(rates, default=DETECTOR_RATE) + limits.stale_after
         self._thumb = thumb
         ceiling = math.inf if limits.max_force is None else limits.max_force
@@ -352,7 +352,7 @@ def _check_unit(
     sensors: Mapping[str, Sensor],
     newtons_per_unit: float | tuple[float, float, float] | None,
 ) -> None:
-    in_newtons = bool(sensors) and all(one.unit == "N" for one in sensors.values())
+    in_newtons = bool(sensors) and all(sensor.unit == "N" for sensor in sensors.values())
     if law.needs_newtons and not in_newtons and newtons_per_unit is None:
         raise ValueError(
             f"the law {type(law).__name__} needs forces in N and the readings are counts: give "

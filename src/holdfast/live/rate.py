@@ -21,7 +21,7 @@ def measure_rate(arrivals: list[Arrival], fingers: Iterable[str]) -> float | Non
     """Return the median rate of the fingers, from steps without gaps [Hz]; None without steps."""
     rates = []
     for name in fingers:
-        steps = np.diff([one.time for one in arrivals if name in one.samples])
+        steps = np.diff([arrival.time for arrival in arrivals if name in arrival.samples])
         if len(steps):
             rates.append(1 / steps[steps <= GAP_PERIODS * np.median(steps)].mean())
     return float(np.median(rates)) if rates else None

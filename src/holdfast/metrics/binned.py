@@ -41,7 +41,7 @@ class BinnedSamples:
     def of(cls, samples: ScoredSamples) -> Self:
         """Return the histogram of samples; scores outside [0, 1] count as 0 and 1."""
         kinds = (samples.stable, samples.unstable, samples.no_contact)
-        counts = np.array([np.bincount(bins_of(each), minlength=N_BINS) for each in kinds])
+        counts = np.array([np.bincount(bins_of(kind), minlength=N_BINS) for kind in kinds])
         return cls(counts, samples.confusion, samples.squared_error, samples.n_undecided)
 
     def __add__(self, other: Self) -> "BinnedSamples":

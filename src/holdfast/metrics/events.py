@@ -125,10 +125,10 @@ class EventCounts:
     def total(cls, parts: Sequence[Self]) -> Self:
         """Return the counts of all parts together."""
         return cls(
-            np.sort(np.concatenate([np.empty(0), *(each.delays for each in parts)])),
-            {state: sum(each.false_alarms[state] for each in parts) for state in ContactState},
-            sum(each.stable_seconds for each in parts),
-            frozenset[Onsets]().union(*(each.onsets for each in parts)),
+            np.sort(np.concatenate([np.empty(0), *(part.delays for part in parts)])),
+            {state: sum(part.false_alarms[state] for part in parts) for state in ContactState},
+            sum(part.stable_seconds for part in parts),
+            frozenset[Onsets]().union(*(part.onsets for part in parts)),
         )
 
     @property

@@ -135,7 +135,7 @@ def _draws(n_recordings: int, n: int, seed: int) -> Array:
 
 def _histograms(scores: Sequence[Array], edges: Array) -> Array:
     """Return (n_recordings, n_edges + 1) number of scores of each recording in each bin."""
-    bins = [np.searchsorted(edges, np.sort(each), side="right") for each in scores]
+    bins = [np.searchsorted(edges, np.sort(score), side="right") for score in scores]
     rows = [np.bincount(each, minlength=len(edges) + 1) for each in bins]
     return np.array(rows, dtype=np.float64)
 

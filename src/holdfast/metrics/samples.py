@@ -169,12 +169,12 @@ def score_samples(
 def pool_samples(parts: Sequence[ScoredSamples]) -> ScoredSamples:
     """Return the scores and counts of all samples together."""
     return ScoredSamples(
-        stable=np.concatenate([np.empty(0), *(each.stable for each in parts)]),
-        unstable=np.concatenate([np.empty(0), *(each.unstable for each in parts)]),
-        no_contact=np.concatenate([np.empty(0), *(each.no_contact for each in parts)]),
-        confusion=sum((each.confusion for each in parts), np.zeros((2, 2), dtype=np.int64)),
-        squared_error=float(sum(each.squared_error for each in parts)),
-        n_undecided=sum(each.n_undecided for each in parts),
+        stable=np.concatenate([np.empty(0), *(part.stable for part in parts)]),
+        unstable=np.concatenate([np.empty(0), *(part.unstable for part in parts)]),
+        no_contact=np.concatenate([np.empty(0), *(part.no_contact for part in parts)]),
+        confusion=sum((part.confusion for part in parts), np.zeros((2, 2), dtype=np.int64)),
+        squared_error=float(sum(part.squared_error for part in parts)),
+        n_undecided=sum(part.n_undecided for part in parts),
     )
 
 
@@ -212,12 +212,15 @@ def calibration_sums(decisions: Sequence[FingerDecisions]) -> Array:
         (10, 3) for each bin of probabilities: their sum, the number of samples labelled stable, and
         the number of all samples. The sums of several recordings can be added.
     """
-    known = [(each, (each.labels != UNKNOWN) & (each.states != UNKNOWN)) for each in decisions]
+    known = [
+        (decision, (decision.labels != UNKNOWN) & (decision.states != UNKNOWN))
+        for decision in decisions
+    ]
     score = np.concatenate([np.empty(0), *(each.stable_probability[rows] for each, rows in known)])
     stable = np.concatenate([np.empty(0), *(each.labels[rows] == STABLE for each, rows in known)])
     bins = np.clip((score * N_CALIBRATION_BINS).astype(int), 0, N_CALIBRATION_BINS - 1)
     columns = (score, stable, np.ones(len(bins)))
-    sums = [np.bincount(bins, weights=each, minlength=N_CALIBRATION_BINS) for each in columns]
+    sums = [np.bincount(bins, weights=column, minlength=N_CALIBRATION_BINS) for column in columns]
     return np.column_stack(sums).astype(np.float64)  # without samples, bincount returns integers
 
 

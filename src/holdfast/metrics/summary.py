@@ -165,7 +165,7 @@ def summarise(
         >>> metrics.pooled.accuracy, metrics.events.hand.n_events, metrics.intervals
         (100.0, 0, None)
     """
-    results = (score_recording(each) for each in decisions)
+    results = (score_recording(decision) for decision in decisions)
     return summarise_results(results, n_resamples=n_resamples, seed=seed, level=level)
 
 
@@ -212,8 +212,8 @@ def summarise_results(
         level: as in `summarise`.
     """
     total = ResultTotal()
-    for each in results:
-        total.add(each)
+    for result in results:
+        total.add(result)
     return total.metrics(n_resamples, seed, level)
 
 
@@ -309,7 +309,7 @@ def _event_metrics(
     hands: Sequence[EventCounts | None],
     names: Sequence[str],
 ) -> HandEventMetrics:
-    by_name = {name: [each[name] for each in fingers if name in each] for name in names}
+    by_name = {name: [finger[name] for finger in fingers if name in finger] for name in names}
     return HandEventMetrics(
         {name: event_metrics_of(EventCounts.total(own)) for name, own in by_name.items()},
         event_metrics_of(EventCounts.total([hand for hand in hands if hand is not None])),
@@ -319,7 +319,7 @@ def _event_metrics(
 def _sample_statistics(groups: Sequence[_Group]) -> dict[str, Statistic]:
     """Return the statistics of the sample metrics, given the samples of each group."""
     samples = [group.samples.samples for group in groups]
-    tn, fp, fn, tp = np.array([each.confusion.ravel() for each in samples]).T
+    tn, fp, fn, tp = np.array([sample.confusion.ravel() for sample in samples]).T
     n = tn + fp + fn + tp
     return {
         "accuracy": ratio_of_sums(100 * (tp + tn), n),
@@ -327,19 +327,19 @@ def _sample_statistics(groups: Sequence[_Group]) -> dict[str, Statistic]:
         "fpr": ratio_of_sums(100 * fp, fp + tn),
         "fnr": ratio_of_sums(100 * fn, fn + tp),
         **_auc_statistics(samples),
-        "brier": ratio_of_sums([each.squared_error for each in samples], n),
+        "brier": ratio_of_sums([sample.squared_error for sample in samples], n),
     }
 
 
 def _auc_statistics(samples: Sequence[ScoredSamples | BinnedSamples]) -> dict[str, Statistic]:
-    exact = [each for each in samples if isinstance(each, ScoredSamples)]
+    exact = [sample for sample in samples if isinstance(sample, ScoredSamples)]
     if exact:
         stable = [each.stable for each in exact]
         return {
             "auc": auc_of(stable, [each.not_stable for each in exact]),
             "auc_contact": auc_of(stable, [each.unstable for each in exact]),
         }
-    counts = np.array([each.counts for each in samples if isinstance(each, BinnedSamples)])
+    counts = np.array([sample.counts for sample in samples if isinstance(sample, BinnedSamples)])
     used = counts.any(axis=(0, 1))
     positive, unstable, no_contact = counts[:, :, used].transpose(1, 0, 2).astype(np.float64)
     return {
@@ -351,12 +351,12 @@ def _auc_statistics(samples: Sequence[ScoredSamples | BinnedSamples]) -> dict[st
 def _event_statistics(groups: Sequence[_Group]) -> dict[str, Statistic]:
     """Return the statistics of the hand's event metrics; missed events under their `post`."""
     counts = [EventCounts.total(group.hand) for group in groups]
-    n_events = [len(each.delays) for each in counts]
-    n_false = [each.n_false for each in counts]
-    minutes = [each.stable_seconds / 60 for each in counts]
-    delays = [each.delays for each in counts]
+    n_events = [len(count.delays) for count in counts]
+    n_false = [count.n_false for count in counts]
+    minutes = [count.stable_seconds / 60 for count in counts]
+    delays = [count.delays for count in counts]
     missed = {
-        str(post): ratio_of_sums([100 * each.n_missed(post) for each in counts], n_events)
+        str(post): ratio_of_sums([100 * count.n_missed(post) for count in counts], n_events)
         for post in POST_DURATIONS
     }
     return missed | {

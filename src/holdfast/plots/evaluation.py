@@ -141,9 +141,11 @@ def _draw_calibration(
 ) -> None:
     axes.plot([0, 1], [0, 1], color=GREY, linewidth=0.8, linestyle=":")
     for name, style in styles.items():
-        table = calibration([each.fingers[name] for each in decisions if name in each.fingers])
+        table = calibration(
+            [decision.fingers[name] for decision in decisions if name in decision.fingers]
+        )
         axes.plot(table[:, 0], table[:, 1], color=style.color, linewidth=0.8, alpha=0.7)
-    every = calibration([finger for each in decisions for finger in each.fingers.values()])
+    every = calibration([finger for decision in decisions for finger in decision.fingers.values()])
     if len(every):
         share = every[:, 2] / every[:, 2].sum()
         axes.bar(every[:, 0], 0.25 * share / share.max(), width=0.06, color="#dddddd", zorder=0)
@@ -164,9 +166,9 @@ def _draw_delays(
     for post in POST_DURATIONS:
         axes.axvline(post, color=GREY, linewidth=0.8, linestyle=":")
     for name, style in styles.items():
-        fingers = [each.fingers[name] for each in decisions if name in each.fingers]
+        fingers = [decision.fingers[name] for decision in decisions if name in decision.fingers]
         _draw_delay_curve(axes, fingers, color=style.color, linewidth=0.9, alpha=0.8)
-    hands = [each.hand for each in decisions if each.hand is not None]
+    hands = [decision.hand for decision in decisions if decision.hand is not None]
     _draw_delay_curve(axes, hands, color=HAND_COLOUR, linewidth=1.8, alpha=1.0)
     axes.set(xlim=(-EARLY_TOLERANCE, MAX_DELAY), ylim=(0, 1.02))
     axes.yaxis.set_major_formatter(PercentFormatter(1.0))
@@ -177,7 +179,7 @@ def _draw_delays(
 def _draw_delay_curve(
     axes: Axes, decisions: Sequence[FingerDecisions], *, color: str, linewidth: float, alpha: float
 ) -> None:
-    matches = [match_decisions(each) for each in decisions]
+    matches = [match_decisions(decision) for decision in decisions]
     delays = event_delays(matches)
     if not len(delays):
         return
@@ -206,7 +208,7 @@ def _add_legend(figure: Figure, styles: Mapping[str, SeriesStyle]) -> None:
 
 
 def _mean(fingers: Mapping[str, SampleMetrics], field: str) -> float:
-    values = [getattr(each, field) for each in fingers.values()]
+    values = [getattr(finger, field) for finger in fingers.values()]
     return float(np.mean([v for v in values if v is not None] or [-1.0]))
 
 

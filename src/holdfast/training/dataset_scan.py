@@ -104,7 +104,10 @@ class DatasetScan:
     def n_labelled(self) -> int:
         """Number of labelled samples that are used of the finger that has most."""
         return max(
-            sum(-(-each.n_labelled.get(finger, 0) // each.step) for each in self.recordings)
+            sum(
+                -(-recording.n_labelled.get(finger, 0) // recording.step)
+                for recording in self.recordings
+            )
             for finger in self.sensors
         )
 

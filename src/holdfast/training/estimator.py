@@ -88,9 +88,9 @@ class StabilityClassifier(ClassifierMixin, BaseEstimator):
         return [
             {
                 name: (finger.states == STABLE).astype(np.int64)
-                for name, finger in each.fingers.items()
+                for name, finger in decision.fingers.items()
             }
-            for each in decisions
+            for decision in decisions
         ]
 
     def score(self, X: Sequence[Recording], y: object = None) -> float:

@@ -197,8 +197,10 @@ def combine_decisions(
     for name, first in decisions[0].fingers.items():
         every = np.arange(len(first.times))
         unit = units_of(len(every))
-        states = np.stack([each.fingers[name].states for each in decisions])
-        probabilities = np.stack([each.fingers[name].stable_probability for each in decisions])
+        states = np.stack([decision.fingers[name].states for decision in decisions])
+        probabilities = np.stack(
+            [decision.fingers[name].stable_probability for decision in decisions]
+        )
         fingers[name] = replace(
             first,
             labels=np.where(unit < 0, UNKNOWN, first.labels),

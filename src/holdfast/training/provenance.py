@@ -78,12 +78,12 @@ def adaptation_warnings(init: Model, scan: DatasetScan, fingers: Collection[str]
 def known_recordings(init: Model, scan: DatasetScan) -> list[str]:
     """Return the names of the recordings that the model to adapt was trained on."""
     digests = _training_recordings(init).values()
-    return [each.name for each in scan.recordings if each.digest in digests]
+    return [recording.name for recording in scan.recordings if recording.digest in digests]
 
 
 def _digests(init: Model | None, scan: DatasetScan) -> dict[str, str]:
     """Return the digest of each training recording, including those of the adapted model."""
-    own = {each.name: each.digest for each in scan.recordings}
+    own = {recording.name: recording.digest for recording in scan.recordings}
     before = {} if init is None else _training_recordings(init)
     return {f"{name} (init)": digest for name, digest in before.items()} | own
 

@@ -82,7 +82,7 @@ def split_data(recordings: Sequence[ScannedRecording], split: Split, seed: int) 
     Raises:
         TrainingError: there are fewer than two units, or a recording does not name its object.
     """
-    names = [each.object if split == "object" else each.name for each in recordings]
+    names = [recording.object if split == "object" else recording.name for recording in recordings]
     unnamed = [each.name for each, name in zip(recordings, names, strict=True) if name is None]
     if unnamed:
         raise TrainingError(
@@ -92,7 +92,7 @@ def split_data(recordings: Sequence[ScannedRecording], split: Split, seed: int) 
     groups = list(dict.fromkeys(str(name) for name in names))
     places = {name: place for place, name in enumerate(groups)}
     group_of = np.array([places[str(name)] for name in names])
-    rates = np.array([each.rate for each in recordings])
+    rates = np.array([recording.rate for recording in recordings])
     if split in ("time", "random"):
         n_folds = TIME_FOLDS if split == "time" else RANDOM_FOLDS
         parts = tuple(f"fifth {k + 1}" for k in range(n_folds))

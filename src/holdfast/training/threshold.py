@@ -138,7 +138,7 @@ def _point(replays: Sequence[Replay], threshold: float) -> OperatingPoint:
 def _measure(hands: Sequence[FingerDecisions], threshold: float) -> OperatingPoint:
     matches: list[AlarmMatch] = [alarms(hand) for hand in hands]
     counts = [stable_counts(hand) for hand in hands]
-    labelled = sum(each["labelled"] for each in counts)
+    labelled = sum(count["labelled"] for count in counts)
     if not any(hand.labels.any() for hand in hands):
         raise TrainingError(f"{len(hands)} recordings without labels; labels expected")
     events = pool_events(matches)
@@ -147,7 +147,7 @@ def _measure(hands: Sequence[FingerDecisions], threshold: float) -> OperatingPoi
             "no time in which the hand is labelled stable; false alarms are counted per minute "
             "of it"
         )
-    decided = sum(each["decided"] for each in counts)
+    decided = sum(count["decided"] for count in counts)
     return OperatingPoint(threshold, 100 * decided / labelled, events)
 
 

@@ -147,18 +147,18 @@ def _alarm_curves(evaluation: MethodEvaluation) -> tuple[Curve, Curve]:
 
 
 def _false_alarms_per_minute(alarms: Sequence[AlarmStatistics]) -> float:
-    seconds = sum(each.stable_seconds for each in alarms)
-    return 60 * sum(each.n_under_stable for each in alarms) / seconds if seconds else np.nan
+    seconds = sum(alarm.stable_seconds for alarm in alarms)
+    return 60 * sum(alarm.n_under_stable for alarm in alarms) / seconds if seconds else np.nan
 
 
 def _missed_share(alarms: Sequence[AlarmStatistics]) -> float:
-    n_events = sum(len(each.delays) for each in alarms)
-    return _percent(sum(each.n_missed(POST_DURATIONS[0]) for each in alarms), n_events)
+    n_events = sum(len(alarm.delays) for alarm in alarms)
+    return _percent(sum(alarm.n_missed(POST_DURATIONS[0]) for alarm in alarms), n_events)
 
 
 def _slips_detected_share(alarms: Sequence[AlarmStatistics]) -> float:
-    n_slips = sum(len(each.slip_delays) for each in alarms)
-    return _percent(sum(each.n_slips_found(POST_DURATIONS[0]) for each in alarms), n_slips)
+    n_slips = sum(len(alarm.slip_delays) for alarm in alarms)
+    return _percent(sum(alarm.n_slips_found(POST_DURATIONS[0]) for alarm in alarms), n_slips)
 
 
 def _percent(part: int, whole: int) -> float:

@@ -35,7 +35,7 @@ def phases(plan: StudyPlan, results: Results) -> ResultTable:
     rows: list[Row] = []
     for keys, breakdowns in _lines(plan, results):
         for phase in map(str, Phase):
-            n, wrong = np.array([each.phases.get(phase, (0, 0)) for each in breakdowns]).T
+            n, wrong = np.array([breakdown.phases.get(phase, (0, 0)) for breakdown in breakdowns]).T
             if n.sum():
                 rows.append(ratio_row(keys | {"phase": phase}, wrong, n, plan.seed))
     note = "Share of wrong samples in each phase of the true course of the grasp; all fingers."
@@ -71,7 +71,7 @@ def directions(plan: StudyPlan, results: Results) -> ResultTable:
     n_disturbances: dict[str, int] = {}
     for keys, breakdowns in _lines(plan, results):
         for direction in (*DIRECTIONS, OBLIQUE):
-            found = [_disturbances(each, direction) for each in breakdowns]
+            found = [_disturbances(breakdown, direction) for breakdown in breakdowns]
             n = [sum(each.n for each in of_recording) for of_recording in found]
             wrong = [sum(each.n_wrong for each in of_recording) for of_recording in found]
             if sum(n):
@@ -90,7 +90,11 @@ def directions(plan: StudyPlan, results: Results) -> ResultTable:
 
 def _disturbances(breakdown: ErrorBreakdown, direction: str) -> list[DisturbanceErrors]:
     """Return the disturbances in a direction that have labelled samples."""
-    return [each for each in breakdown.disturbances if each.n and each.direction == direction]
+    return [
+        disturbance
+        for disturbance in breakdown.disturbances
+        if disturbance.n and disturbance.direction == direction
+    ]
 
 
 def force_quartiles(breakdowns: Sequence[ErrorBreakdown]) -> Array:
@@ -100,7 +104,7 @@ def force_quartiles(breakdowns: Sequence[ErrorBreakdown]) -> Array:
 
 
 def _holding_grips(breakdowns: Sequence[ErrorBreakdown]) -> Iterator[GripErrors]:
-    grips = chain.from_iterable(each.grips for each in breakdowns)
+    grips = chain.from_iterable(breakdown.grips for breakdown in breakdowns)
     return (grip for grip in grips if grip.force > CONTACT_FORCE)
 
 

@@ -83,8 +83,8 @@ def slips(plan: StudyPlan, results: Results) -> ResultTable:
     rows: list[Row] = []
     for keys, alarms in _lines(plan, results, SLIP_THRESHOLDS, SLIP_SPLITS):
         rows += slip_rows(keys, alarms, plan.seed)
-        not_stable = [each.n_not_called_stable for each in alarms]
-        stable = [each.n_stable for each in alarms]
+        not_stable = [alarm.n_not_called_stable for alarm in alarms]
+        stable = [alarm.n_stable for alarm in alarms]
         rows.append(ratio_row(keys | {"figure": NOT_CALLED_STABLE}, not_stable, stable, plan.seed))
         false_alarms = list(_false_alarm_rows(keys, alarms, plan.seed))
         rows += [row for row in false_alarms if row.keys["figure"] in _SLIP_FALSE_ALARMS]
@@ -128,7 +128,7 @@ def glitches(plan: StudyPlan, results: Results) -> ResultTable:
     rows: list[Row] = []
     for key, evaluation in method_results(plan, results, REFERENCE_METHOD):
         counts = evaluation.glitches
-        if key != "object" and any(each.held_seconds for each in counts):
+        if key != "object" and any(count.held_seconds for count in counts):
             rows += _glitch_rows({"on": SPLIT_TITLES[key]}, counts, plan.seed)
     note = (
         "By the truth of the recordings, while the hand holds the object; no method is involved. "
@@ -141,13 +141,13 @@ def glitches(plan: StudyPlan, results: Results) -> ResultTable:
 
 def event_rows(keys: Keys, alarms: Sequence[AlarmStatistics], seed: int) -> Iterator[Row]:
     """Yield the rows of one line of the table of events."""
-    n_events = [len(each.delays) for each in alarms]
+    n_events = [len(alarm.delays) for alarm in alarms]
     for post in POST_DURATIONS:
         figure = {"figure": f"missed at {1000 * post:.0f} ms [%]"}
-        yield ratio_row(keys | figure, [each.n_missed(post) for each in alarms], n_events, seed)
-    not_stable = [each.n_events_not_stable for each in alarms]
+        yield ratio_row(keys | figure, [alarm.n_missed(post) for alarm in alarms], n_events, seed)
+    not_stable = [alarm.n_events_not_stable for alarm in alarms]
     yield ratio_row(keys | {"figure": ALREADY_NOT_STABLE}, not_stable, n_events, seed)
-    delays = [each.delays for each in alarms]
+    delays = [alarm.delays for alarm in alarms]
     yield quantile_row(keys | {"figure": "delay median [s]"}, delays, 0.5, seed)
     yield quantile_row(keys | {"figure": "delay 95 % [s]"}, delays, 0.95, seed)
     yield from _false_alarm_rows(keys, alarms, seed)
@@ -156,14 +156,14 @@ def event_rows(keys: Keys, alarms: Sequence[AlarmStatistics], seed: int) -> Iter
 
 def slip_rows(keys: Keys, alarms: Sequence[AlarmStatistics], seed: int) -> Iterator[Row]:
     """Yield the rows of one line of the table of slips that concern slips."""
-    n_slips = [len(each.slip_delays) for each in alarms]
+    n_slips = [len(alarm.slip_delays) for alarm in alarms]
     for post in POST_DURATIONS:
-        found = [each.n_slips_found(post) for each in alarms]
+        found = [alarm.n_slips_found(post) for alarm in alarms]
         figure = {"figure": f"detected within {1000 * post:.0f} ms [%]"}
         yield ratio_row(keys | figure, found, n_slips, seed)
-    not_stable = [each.n_slips_not_stable for each in alarms]
+    not_stable = [alarm.n_slips_not_stable for alarm in alarms]
     yield ratio_row(keys | {"figure": ALREADY_NOT_STABLE}, not_stable, n_slips, seed)
-    distances = [[MILLIMETRES * d for d in each.slip_distances] for each in alarms]
+    distances = [[MILLIMETRES * d for d in alarm.slip_distances] for alarm in alarms]
     yield quantile_row(keys | {"figure": SLIP_MEDIAN}, distances, 0.5, seed)
     yield quantile_row(keys | {"figure": SLIP_P95}, distances, 0.95, seed)
 
@@ -205,25 +205,25 @@ def _event_splits(plan: StudyPlan) -> tuple[str, ...]:
 
 
 def _false_alarm_rows(keys: Keys, alarms: Sequence[AlarmStatistics], seed: int) -> Iterator[Row]:
-    minutes = [each.stable_seconds / 60 for each in alarms]
+    minutes = [alarm.stable_seconds / 60 for alarm in alarms]
     counts = {
-        FALSE_ALARMS: [each.n_false_alarms for each in alarms],
-        FALSE_ALARMS_UNDER_STABLE: [each.n_under_stable for each in alarms],
-        FALSE_ALARMS_OF_GLITCH: [each.n_of_glitch for each in alarms],
-        OTHER_FALSE_ALARMS: [each.n_under_stable - each.n_of_glitch for each in alarms],
+        FALSE_ALARMS: [alarm.n_false_alarms for alarm in alarms],
+        FALSE_ALARMS_UNDER_STABLE: [alarm.n_under_stable for alarm in alarms],
+        FALSE_ALARMS_OF_GLITCH: [alarm.n_of_glitch for alarm in alarms],
+        OTHER_FALSE_ALARMS: [alarm.n_under_stable - alarm.n_of_glitch for alarm in alarms],
     }
     for figure, count in counts.items():
         yield ratio_row(keys | {"figure": figure}, count, minutes, seed, scale=1.0)
 
 
 def _glitch_rows(keys: Keys, counts: Sequence[GlitchCount], seed: int) -> Iterator[Row]:
-    n = [each.n for each in counts]
-    minutes = [each.held_seconds / 60 for each in counts]
+    n = [count.n for count in counts]
+    minutes = [count.held_seconds / 60 for count in counts]
     yield ratio_row(keys | {"figure": "glitches per minute held"}, n, minutes, seed, scale=1.0)
     for figure, least in (("object slides [%]", 0.0), ("by 0.1 mm or more [%]", 1e-4)):
-        slid = [int((np.array(each.distances) > least).sum()) for each in counts]
+        slid = [int((np.array(count.distances) > least).sum()) for count in counts]
         yield ratio_row(keys | {"figure": figure}, slid, n, seed)
-    distances = [[MILLIMETRES * d for d in each.distances if d] for each in counts]
+    distances = [[MILLIMETRES * d for d in count.distances if d] for count in counts]
     yield quantile_row(keys | {"figure": SLIP_MEDIAN}, distances, 0.5, seed)
     yield quantile_row(keys | {"figure": SLIP_P95}, distances, 0.95, seed)
     yield count_row(keys | {"figure": "glitches"}, n)

@@ -122,7 +122,8 @@ def count_recordings(
         estimates: of the same recordings, by method.
     """
     common = [
-        common_samples([each[place] for each in estimates.values()]) for place in range(len(labels))
+        common_samples([estimate[place] for estimate in estimates.values()])
+        for place in range(len(labels))
     ]
     return {
         method: [_count(*each) for each in zip(labels, own, common, strict=True)]
@@ -132,7 +133,7 @@ def count_recordings(
 
 def common_samples(estimates: Sequence[RecordingEstimates]) -> Mask:
     """Return the (n,) samples of the hand at which every method with estimates has one."""
-    known = [each.known.array for each in estimates]
+    known = [estimate.known.array for estimate in estimates]
     return np.asarray(np.all([each for each in known if each.any()] or known, axis=0))
 
 
@@ -154,10 +155,10 @@ def count_pairs(
     for label, *both in zip(labels, first, second, strict=True):
         common = np.all([each.known.array for each in both], axis=0)
         counts = [_count(label, each, common) for each in both]
-        by_finger = all(each.fingers for each in counts)
+        by_finger = all(count.fingers for count in counts)
         scores = (
-            pool([unit.scores for unit in each.units]) if by_finger else each.hand.scores
-            for each in counts
+            pool([unit.scores for unit in count.units]) if by_finger else count.hand.scores
+            for count in counts
         )
         pairs.append(ScorePair(label.name, *scores))
     return pairs
@@ -171,7 +172,7 @@ def pair_rows(keys: Keys, pairs: Sequence[ScorePair], seed: int) -> list[Row]:
         pairs: scores on each recording.
         seed: of the bootstrap.
     """
-    first, second = [each.first for each in pairs], [each.second for each in pairs]
+    first, second = [pair.first for pair in pairs], [pair.second for pair in pairs]
     one = auc_row({**keys, "figure": AUC_OF_SHIPPED}, first, seed)
     other = auc_row({**keys, "figure": AUC}, second, seed)
     key = {**keys, "figure": DIFFERENCE}
@@ -194,14 +195,14 @@ def recording_rows(keys: Keys, counts: Sequence[RecordingCounts], seed: int) -> 
         counts: of the recordings.
         seed: of the bootstrap.
     """
-    pooled = [pool([unit.scores for unit in each.units]) for each in counts]
+    pooled = [pool([unit.scores for unit in count.units]) for count in counts]
     return [
         auc_row({**keys, "figure": AUC}, pooled, seed),
-        auc_row({**keys, "figure": AUC_OF_HAND}, [each.hand.scores for each in counts], seed),
+        auc_row({**keys, "figure": AUC_OF_HAND}, [count.hand.scores for count in counts], seed),
         _sample_row({**keys, "figure": ACCURACY}, counts, "n_correct", "n", seed),
         _sample_row({**keys, "figure": CALLED_STABLE}, counts, "n_called_stable", "n_stable", seed),
         _sample_row({**keys, "figure": WITHOUT_ESTIMATE}, counts, "n_without", "n_labelled", seed),
-        *_event_rows(keys, [each.events for each in counts], seed),
+        *_event_rows(keys, [count.events for count in counts], seed),
     ]
 
 
@@ -215,8 +216,8 @@ def mean_auc_row(keys: Keys, counts: Sequence[RecordingCounts], seed: int) -> Ro
         counts: of the recordings.
         seed: of the bootstrap.
     """
-    scores = (pool([unit.scores for unit in each.units]) for each in counts)
-    aucs = [each.auc for each in scores if each.auc is not None]
+    scores = (pool([unit.scores for unit in count.units]) for count in counts)
+    aucs = [score.auc for score in scores if score.auc is not None]
     row = ratio_row({**keys, "figure": MEAN_AUC}, aucs, np.ones(len(aucs)), seed, scale=1.0)
     return _with_interval_if_enough(row)
 
@@ -229,7 +230,7 @@ def auc_row(keys: Keys, scores: Sequence[Scores], seed: int) -> Row:
         scores: of the recordings. Those without a stable sample and without slip do not count.
         seed: of the bootstrap.
     """
-    known = [each for each in scores if len(each.stable) or len(each.slip)]
+    known = [score for score in scores if len(score.stable) or len(score.slip)]
     interval = None
     if len(known) >= MIN_RECORDINGS:
         statistic = auc_of([each.stable for each in known], [each.slip for each in known])
@@ -239,7 +240,7 @@ def auc_row(keys: Keys, scores: Sequence[Scores], seed: int) -> Row:
 
 def pool(scores: Sequence[Scores]) -> Scores:
     """Return all scores together."""
-    stable, slip = ([np.empty(0), *(each[k] for each in scores)] for k in range(2))
+    stable, slip = ([np.empty(0), *(score[k] for score in scores)] for k in range(2))
     return Scores(np.concatenate(stable), np.concatenate(slip))
 
 
@@ -248,17 +249,17 @@ def _sample_row(
 ) -> Row:
     """Return a share of the samples [%], from the names of two counts."""
     parts, wholes = (
-        [sum(getattr(unit, name) for unit in each.units) for each in counts]
+        [sum(getattr(unit, name) for unit in count.units) for count in counts]
         for name in (part, whole)
     )
     return _with_interval_if_enough(ratio_row(keys, parts, wholes, seed))
 
 
 def _event_rows(keys: Keys, events: Sequence[EventCounts], seed: int) -> Iterator[Row]:
-    n_slips = [each.n_slips for each in events]
-    missed = [each.n_missed for each in events]
-    alarms = [each.n_false_alarms for each in events]
-    minutes = [each.stable_minutes for each in events]
+    n_slips = [event.n_slips for event in events]
+    missed = [event.n_missed for event in events]
+    alarms = [event.n_false_alarms for event in events]
+    minutes = [event.stable_minutes for event in events]
     yield count_row({**keys, "figure": SLIPS}, n_slips)
     yield _with_interval_if_enough(ratio_row({**keys, "figure": MISSED}, missed, n_slips, seed))
     per_minute = ratio_row({**keys, "figure": FALSE_ALARMS}, alarms, minutes, seed, scale=1.0)

@@ -107,7 +107,7 @@ class RecordingLabels(msgspec.Struct, frozen=True):
 
 def recording_labels(real: Corpus) -> list[RecordingLabels]:
     """Return the labels of every recording that has one of the fingers of the corpus."""
-    return [_labels(each) for each in load_fingers(real)]
+    return [_labels(load_finger) for load_finger in load_fingers(real)]
 
 
 def load_fingers(real: Corpus) -> list[Recording]:

@@ -59,7 +59,7 @@ def model_estimates(making: Making, real: Corpus, seed: int) -> list[RecordingEs
 
 def _folds(recordings: Sequence[Recording], real: Corpus, seed: int) -> Iterator[frozenset[int]]:
     """Yield the folds, which are those of all other methods."""
-    objects = [each.metadata.get("object") for each in recordings]
+    objects = [recording.metadata.get("object") for recording in recordings]
     names = [None if held is None else str(held) for held in objects]
     return held_out_folds(names, "recording", n_folds(real), seed)
 
@@ -81,7 +81,7 @@ def _model(making: Making, others: Sequence[Recording], seed: int) -> Model | No
 
 def _one_with_both_classes(others: Sequence[Recording], seed: int) -> list[Recording]:
     """Return one recording, drawn from those with both classes on every finger; none without."""
-    able = [each for each in others if all(map(_has_both_classes, each.modules.values()))]
+    able = [other for other in others if all(map(_has_both_classes, other.modules.values()))]
     return [able[np.random.default_rng(seed).integers(len(able))]] if able else []
 
 
@@ -110,7 +110,7 @@ def _estimates(model: Model | None, recording: Recording) -> RecordingEstimates:
         decided = {}
     fingers = {n: _latest(decided.get(n), m.times) for n, m in recording.modules.items()}
     hand = hand_decisions(fingers, len(fingers))
-    at_hand = [_latest(each, hand.times) for each in fingers.values()]
+    at_hand = [_latest(finger, hand.times) for finger in fingers.values()]
     return RecordingEstimates(
         recording.name,
         {name: unit_estimates(f.stable_probability, f.states) for name, f in fingers.items()},
@@ -137,8 +137,8 @@ def _hand_probability(fingers: Sequence[FingerDecisions]) -> Array:
     If too few are in contact to hold an object, it is the smallest of all fingers: a finger that
     is called NO_CONTACT keeps its probability, as in all metrics.
     """
-    probability = np.array([each.stable_probability for each in fingers])
-    states = np.array([each.states for each in fingers])
+    probability = np.array([finger.stable_probability for finger in fingers])
+    states = np.array([finger.states for finger in fingers])
     in_contact = (states == STABLE) | (states == UNSTABLE)
     held = enough_contacts(in_contact.sum(axis=0), len(fingers))
     counted = np.where(held, in_contact, states != UNKNOWN)

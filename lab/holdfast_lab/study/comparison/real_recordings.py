@@ -215,7 +215,7 @@ def _each_recording(
 ) -> Iterator[tuple[Line, RecordingCounts]]:
     """Yield all lines of the first labelled recording, then those of the next."""
     for counts in zip(*by_line.values(), strict=True):
-        if any(unit.n_labelled for each in counts for unit in each.units):
+        if any(unit.n_labelled for count in counts for unit in count.units):
             yield from zip(by_line, counts, strict=True)
 
 

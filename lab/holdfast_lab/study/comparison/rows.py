@@ -90,7 +90,7 @@ def quantile_row(keys: Keys, values: Sequence[Sequence[float]], q: float, seed: 
         q: from 0 to 1.
         seed: of the bootstrap.
     """
-    known: list[Array] = [np.array(each, dtype=np.float64) for each in values if len(each)]
+    known: list[Array] = [np.array(value, dtype=np.float64) for value in values if len(value)]
     ours = quantile(np.sort(np.concatenate([np.empty(0), *known])), q)
     interval = bootstrap_interval(quantile_of(known, q), len(known), seed=seed) if known else None
     return Row(dict(keys), ours, None, len(known), interval)
@@ -119,7 +119,9 @@ def sample_rows(
     for figure in figures:
         name = SAMPLE_METRICS[figure]
         interval: Interval | None = None
-        n = sum(any(map(_has_samples, each.fingers.values())) for each in metrics.recordings)
+        n = sum(
+            any(map(_has_samples, recording.fingers.values())) for recording in metrics.recordings
+        )
         if metrics.intervals is not None:
             interval, n = getattr(metrics.intervals, name), metrics.intervals.n_recordings
         ours: float | None = getattr(metrics.pooled, name)

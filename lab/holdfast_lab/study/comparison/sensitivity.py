@@ -256,12 +256,12 @@ def _sigma_energy_table(plan: StudyPlan, results: Results) -> ResultTable:
 def _rows(keys: Keys, evaluation: MethodEvaluation, seed: int) -> Iterator[Row]:
     yield from sample_rows(keys, evaluation.metrics, SAMPLE_FIGURES)
     alarms = evaluation.alarms.compared
-    n_slips = [len(each.slip_delays) for each in alarms]
+    n_slips = [len(alarm.slip_delays) for alarm in alarms]
     if sum(n_slips):
-        found = [each.n_slips_found(POST_DURATIONS[0]) for each in alarms]
+        found = [alarm.n_slips_found(POST_DURATIONS[0]) for alarm in alarms]
         yield ratio_row(keys | {"figure": SLIPS_DETECTED}, found, n_slips, seed)
-    minutes = [each.stable_seconds / 60 for each in alarms]
-    n_false = [each.n_under_stable for each in alarms]
+    minutes = [alarm.stable_seconds / 60 for alarm in alarms]
+    n_false = [alarm.n_under_stable for alarm in alarms]
     figure = keys | {"figure": FALSE_ALARMS_UNDER_STABLE}
     yield ratio_row(figure, n_false, minutes, seed, scale=1.0)
 
@@ -284,7 +284,7 @@ def _curve(rows: Sequence[Row], key: str) -> Curve:
     rows = sorted(rows, key=lambda row: float(row.keys[key]))
     ends = [row.interval or (None, None) for row in rows]
     x, y, low, high = (
-        np.array([np.nan if each is None else float(each) for each in values])
+        np.array([np.nan if value is None else float(value) for value in values])
         for values in (
             [float(row.keys[key]) for row in rows],
             [row.ours for row in rows],

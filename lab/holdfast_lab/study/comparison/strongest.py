@@ -133,8 +133,8 @@ def _fewest_errors(counts: dict[str, Counts]) -> str | None:
 
 
 def _false_alarm_row(keys: dict[str, Key], alarms: Sequence[AlarmStatistics], seed: int) -> Row:
-    n = [each.n_under_stable for each in alarms]
-    return ratio_row(keys, n, [each.stable_seconds / 60 for each in alarms], seed, scale=1.0)
+    n = [alarm.n_under_stable for alarm in alarms]
+    return ratio_row(keys, n, [alarm.stable_seconds / 60 for alarm in alarms], seed, scale=1.0)
 
 
 def _sample_errors(metrics: Metrics) -> Counts:

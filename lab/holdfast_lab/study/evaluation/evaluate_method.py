@@ -311,14 +311,14 @@ def summarise_recordings(scored: Sequence[ScoredRecording]) -> MethodEvaluation:
     pairs = zip(scored, decisions, strict=True)
     return MethodEvaluation(
         names=[each.recording.name for each in scored],
-        fingers=summarise(decisions) if any(each.fingers for each in decisions) else None,
+        fingers=summarise(decisions) if any(decision.fingers for decision in decisions) else None,
         hand=summarise(_hands(decisions)),
         without_estimate=[_n_without_estimate(decided_units(each).values()) for each in every],
         hand_without_estimate=[_n_without_estimate([each.hand]) for each in every],
-        readings={reading: _pooled([each[reading] for each in alarms]) for reading in READINGS},
+        readings={reading: _pooled([alarm[reading] for alarm in alarms]) for reading in READINGS},
         glitches=[count_glitches(each.recording.truth) for each in scored],
         breakdown=[break_down_errors(each.recording.truth, decided) for each, decided in pairs],
-        calibration=[calibration_counts(each) for each in decisions],
+        calibration=[calibration_counts(decision) for decision in decisions],
     )
 
 
@@ -361,17 +361,17 @@ def _is_scored(slip: Slip, recording: RecordingFeatures) -> bool:
 def _pooled(alarms: Sequence[Sequence[AlarmStatistics]]) -> ReadingAlarms:
     """Return the alarms of all recordings, by threshold."""
     return ReadingAlarms(
-        own=[each[0] for each in alarms],
-        held=[each[1] for each in alarms],
-        by_rate=[[each[2 + k] for each in alarms] for k in range(len(FALSE_ALARM_RATES))],
+        own=[alarm[0] for alarm in alarms],
+        held=[alarm[1] for alarm in alarms],
+        by_rate=[[alarm[2 + k] for alarm in alarms] for k in range(len(FALSE_ALARM_RATES))],
     )
 
 
 def _hands(decisions: Iterable[Decisions]) -> Iterator[Decisions]:
     """Yield the hands alone, each as the one finger of its recording."""
-    for each in decisions:
-        if each.hand is not None:
-            yield Decisions(each.name, {HAND: each.hand}, each.hand)
+    for decision in decisions:
+        if decision.hand is not None:
+            yield Decisions(decision.name, {HAND: decision.hand}, decision.hand)
 
 
 def evaluate_pooled(job: EvaluationJob) -> list[list[int]]:

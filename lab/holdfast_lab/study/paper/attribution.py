@@ -150,7 +150,7 @@ def figures(plan: StudyPlan, results: Mapping[str, Any]) -> list[ReportFigure]:
 
 def switches(plan: StudyPlan) -> list[Switch]:
     """Return the switches whose recordings exist."""
-    return [each for each in SWITCHES if each.role in plan.corpora]
+    return [switch for switch in SWITCHES if switch.role in plan.corpora]
 
 
 def same_repeats(corpora: Mapping[str, Corpus]) -> dict[str, Corpus]:
@@ -162,7 +162,7 @@ def same_repeats(corpora: Mapping[str, Corpus]) -> dict[str, Corpus]:
     repeats = {
         role: [repeat_of(name) for name in corpus.recordings] for role, corpus in corpora.items()
     }
-    last = min(max(each, default=0) for each in repeats.values())
+    last = min(max(repeat, default=0) for repeat in repeats.values())
     return {
         role: msgspec.structs.replace(
             corpus, recordings=tuple(n for n in corpus.recordings if repeat_of(n) <= last)

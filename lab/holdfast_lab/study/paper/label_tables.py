@@ -140,7 +140,10 @@ def _features_by_source(
     """Return the features with each kind of labels."""
     by_name = {recording.name: recording for recording in corpus.load()}
     return {
-        source: [_with_labels(each, by_name[each.name], source, corpus.tare) for each in features]
+        source: [
+            _with_labels(feature, by_name[feature.name], source, corpus.tare)
+            for feature in features
+        ]
         for source in SOURCES
     }
 
@@ -234,21 +237,21 @@ def _ceiling_table(plan: StudyPlan, results: Mapping[str, Any]) -> ResultTable:
 
 def ceiling_rows(keys: Keys, counts: Sequence[HiddenCounts], seed: int) -> Iterator[Row]:
     """Yield the number of samples, the hidden share and the ceiling, by cause."""
-    found = dict.fromkeys(kind for each in counts for kind in each.samples)
+    found = dict.fromkeys(kind for count in counts for kind in count.samples)
     kinds = [kind for kind in found if kind != "stable"]
     for kind in kinds:
-        n = [each.samples.get(kind, 0) for each in counts]
-        hidden = [each.hidden.get(kind, 0) for each in counts]
+        n = [count.samples.get(kind, 0) for count in counts]
+        hidden = [count.hidden.get(kind, 0) for count in counts]
         yield from _cause_rows(keys | {"cause": kind}, hidden, n, seed)
     held = [cause.value for cause in HELD_CAUSES]
-    n = [sum(each.samples.get(kind, 0) for kind in held) for each in counts]
-    hidden = [sum(each.hidden.get(kind, 0) for kind in held) for each in counts]
+    n = [sum(count.samples.get(kind, 0) for kind in held) for count in counts]
+    hidden = [sum(count.hidden.get(kind, 0) for kind in held) for count in counts]
     yield from _cause_rows(keys | {"cause": HELD}, hidden, n, seed)
-    n_all = [each.n_labelled for each in counts]
+    n_all = [count.n_labelled for count in counts]
     yield from _cause_rows(keys | {"cause": ALL_SAMPLES}, hidden, n_all, seed)
     if "stable" in found:
-        n = [each.samples.get("stable", 0) for each in counts]
-        hidden = [each.hidden.get("stable", 0) for each in counts]
+        n = [count.samples.get("stable", 0) for count in counts]
+        hidden = [count.hidden.get("stable", 0) for count in counts]
         yield from list(_cause_rows(keys | {"cause": "stable"}, hidden, n, seed))[:2]
 
 

@@ -68,7 +68,9 @@ def tasks(plan: StudyPlan) -> list[Task]:
             *(("logreg", names) for names in FEATURE_SETS.values()), _ZHANG, _BEST_THRESHOLD,
         )  # fmt: skip
         new = tuple(
-            each for each in variants if window != DEFAULT_WINDOW or each not in _PAPER_VARIANTS
+            variant
+            for variant in variants
+            if window != DEFAULT_WINDOW or variant not in _PAPER_VARIANTS
         )
         every.append(_task(plan, f"window/{window}", first, window, new))
     for window in ABLATION_WINDOWS:

@@ -79,7 +79,7 @@ class Statement(NamedTuple):
 def _statements(
     about: str, *parts: tuple[str, str] | tuple[str, str, float]
 ) -> tuple[Statement, ...]:
-    return tuple(Statement(about, *each) for each in parts)
+    return tuple(Statement(about, *part) for part in parts)
 
 
 STATEMENTS: tuple[Statement, ...] = (
@@ -181,11 +181,16 @@ def discrepancies() -> ResultTable:
     """Return the table of statements that contradict each other or leave a question open."""
     rows = [
         Row(
-            {"about": each.about, "where": each.where, "says": each.says, "figure": "printed"},
+            {
+                "about": statement.about,
+                "where": statement.where,
+                "says": statement.says,
+                "figure": "printed",
+            },
             ours=None,
-            paper=each.value,
+            paper=statement.value,
         )
-        for each in STATEMENTS
+        for statement in STATEMENTS
     ]
     return ResultTable(
         name="discrepancies",

@@ -164,8 +164,8 @@ def grasp_verdicts(
         if role != "main" and names:
             chosen = msgspec.structs.replace(corpus, recordings=names)
             verdicts += [
-                _verdict(role, cases[role][each.name], each, fitted)
-                for each in corpus_features(method, chosen, Variation())
+                _verdict(role, cases[role][corpus_feature.name], corpus_feature, fitted)
+                for corpus_feature in corpus_features(method, chosen, Variation())
             ]
     return verdicts
 
@@ -180,8 +180,8 @@ def _verdict(
     decisions = fitted.scores(recording).decide(recording, recording.exact_labels)
     contact, unstable = _contact_counts(decisions, recording.truth)
     stable_after = [
-        stable_after_lock(each.times, each.states, recording.truth)
-        for each in decisions.fingers.values()
+        stable_after_lock(finger.times, finger.states, recording.truth)
+        for finger in decisions.fingers.values()
     ]
     known = [each for each in stable_after if each is not None]
     return GraspVerdict(
@@ -206,15 +206,15 @@ def _contact_counts(
     """
     contact, unstable = np.zeros(2, dtype=int), np.zeros(2, dtype=int)
     if truth is not None:
-        for each in decisions.fingers.values():
-            phase = truth.hand["phase"][_at(truth, each.times)]
+        for finger in decisions.fingers.values():
+            phase = truth.hand["phase"][_at(truth, finger.times)]
             closing = np.flatnonzero(phase == Phase.CLOSING)
             grasp = np.zeros(len(phase), dtype=bool)
             grasp[closing[0] if len(closing) else len(phase) :] = True
-            grasp &= (phase != Phase.RELEASED) & (each.states != UNKNOWN)
-            grasp &= (each.labels != UNKNOWN) & (each.labels != NO_CONTACT)
-            not_stable = each.states != STABLE
-            is_unstable = grasp & (each.labels == UNSTABLE)
+            grasp &= (phase != Phase.RELEASED) & (finger.states != UNKNOWN)
+            grasp &= (finger.labels != UNKNOWN) & (finger.labels != NO_CONTACT)
+            not_stable = finger.states != STABLE
+            is_unstable = grasp & (finger.labels == UNSTABLE)
             contact += (grasp.sum(), (grasp & not_stable).sum())
             unstable += (is_unstable.sum(), (is_unstable & not_stable).sum())
     return (int(contact[0]), int(contact[1])), (int(unstable[0]), int(unstable[1]))
@@ -291,7 +291,7 @@ def _at(truth: Truth, times: Array) -> Any:  # noqa: ANN401 (indices)
 def _failed_table(found: Mapping[str, Sequence[GraspVerdict]], seed: int) -> ResultTable:
     rows: list[Row] = []
     for name, verdicts in found.items():
-        failed = [each for each in verdicts if each.case == "failed"]
+        failed = [verdict for verdict in verdicts if verdict.case == "failed"]
         for title, chosen in _groups(failed):
             keys: Keys = {"on": title, "method": METHODS[name].title}
             rows.append(count_row(keys | {"figure": "failed grasps"}, [1] * len(chosen)))
@@ -317,7 +317,7 @@ def _failed_table(found: Mapping[str, Sequence[GraspVerdict]], seed: int) -> Res
 def _disturbed_table(found: Mapping[str, Sequence[GraspVerdict]], seed: int) -> ResultTable:
     rows: list[Row] = []
     for name, verdicts in found.items():
-        whole = [each for each in verdicts if each.role not in ONLY_FAILED]
+        whole = [verdict for verdict in verdicts if verdict.role not in ONLY_FAILED]
         for title, chosen in _groups([each for each in whole if each.case != "failed"]):
             rows += _disturbed_rows({"on": title, "method": METHODS[name].title}, chosen, seed)
     note = (
@@ -390,7 +390,9 @@ def _single_table(found: Mapping[str, Sequence[GraspVerdict]], seed: int) -> Res
 
 def _first_of_each_object(verdicts: Iterable[GraspVerdict]) -> list[GraspVerdict]:
     """Return the first recording with disturbances of each object; fresh ones, if there are."""
-    disturbed = [each for each in verdicts if each.disturbances and each.case != "failed"]
+    disturbed = [
+        verdict for verdict in verdicts if verdict.disturbances and verdict.case != "failed"
+    ]
     roles = {each.role for each in disturbed}
     role = "fresh" if "fresh" in roles else "main"
     first: dict[str, GraspVerdict] = {}
@@ -402,9 +404,9 @@ def _first_of_each_object(verdicts: Iterable[GraspVerdict]) -> list[GraspVerdict
 
 def _groups(verdicts: Sequence[GraspVerdict]) -> Iterator[tuple[str, list[GraspVerdict]]]:
     """Yield the verdicts of each role, and of all roles if there are several."""
-    roles = [role for role in ROLE_TITLES if any(each.role == role for each in verdicts)]
+    roles = [role for role in ROLE_TITLES if any(verdict.role == role for verdict in verdicts)]
     for role in roles:
-        yield ROLE_TITLES[role], [each for each in verdicts if each.role == role]
+        yield ROLE_TITLES[role], [verdict for verdict in verdicts if verdict.role == role]
     if len(roles) > 1:
         yield "all", list(verdicts)
 

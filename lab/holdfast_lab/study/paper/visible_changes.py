@@ -143,15 +143,15 @@ def _count(fingers: Sequence[_Changes], limits: Mapping[str, Array]) -> HiddenCo
     samples: dict[str, int] = {}
     hidden: dict[str, int] = {}
     n_labelled = 0
-    for each in fingers:
-        known = ~np.isnan(each.values).any(axis=1)
-        unseen = known & (each.values <= limits[each.finger]).all(axis=1)
-        kinds = np.array(each.kinds)
+    for finger in fingers:
+        known = ~np.isnan(finger.values).any(axis=1)
+        unseen = known & (finger.values <= limits[finger.finger]).all(axis=1)
+        kinds = np.array(finger.kinds)
         for kind in np.unique(kinds[kinds != ""]).tolist():
             of_kind = kinds == kind
             samples[kind] = samples.get(kind, 0) + int((of_kind & known).sum())
             hidden[kind] = hidden.get(kind, 0) + int((of_kind & unseen).sum())
-        n_labelled += int((each.labelled & known).sum())
+        n_labelled += int((finger.labelled & known).sum())
     return HiddenCounts(samples, hidden, n_labelled)
 
 

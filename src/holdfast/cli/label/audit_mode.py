@@ -41,11 +41,12 @@ def audit_labels(paths: Sequence[Path], jobs: int, *, as_json: bool) -> "Sequenc
 def _print(found: "Audit") -> None:
     rows = [
         (
-            each.recording, each.finger, each.kind, f"{each.start:.2f}", f"{each.end:.2f}",
-            each.given, each.expected, f"{each.confidence:.2f}",
-            "-" if each.shift is None else f"{each.shift:+.2f}",
+            suspect.recording, suspect.finger, suspect.kind,
+            f"{suspect.start:.2f}", f"{suspect.end:.2f}",
+            suspect.given, suspect.expected, f"{suspect.confidence:.2f}",
+            "-" if suspect.shift is None else f"{suspect.shift:+.2f}",
         )
-        for each in found.suspects
+        for suspect in found.suspects
     ]  # fmt: skip
     if rows:
         header = (

@@ -153,7 +153,7 @@ def write_labels(path: Path, recording: "Recording", labels: "Labels", author: s
 
 def print_documents(documents: Sequence[dict[str, Any]]) -> None:
     """Print seconds per state of each recording, and labels with low confidence."""
-    good = [each for each in documents if "error" not in each]
+    good = [document for document in documents if "error" not in document]
     if not good:
         return
     rows = [
@@ -203,7 +203,7 @@ def report_loaded_starts(documents: Sequence[dict[str, Any]], tare: str | None) 
     """
     from holdfast.features import Tare
 
-    loaded = [each for each in documents if each.get("starts_loaded")]
+    loaded = [document for document in documents if document.get("starts_loaded")]
     if not loaded or (tare is not None and not Tare.parse(tare).without_contact):
         return
     first = loaded[0]
@@ -228,10 +228,10 @@ def report_failures(documents: Sequence[dict[str, Any]], *, written: bool) -> No
     """
     from holdfast.errors import RecordingError
 
-    n_hidden = sum(bool(each.get("n_inside")) for each in documents)
+    n_hidden = sum(bool(document.get("n_inside")) for document in documents)
     if n_hidden:
         print_message(_hidden_text(n_hidden, len(documents), written=written))
-    errors = [each["error"] for each in documents if "error" in each]
+    errors = [document["error"] for document in documents if "error" in document]
     for error in errors[:-1]:
         print_error(error)
     if errors:

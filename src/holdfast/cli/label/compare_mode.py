@@ -53,7 +53,7 @@ def compare_labels(
     files = _recordings_to_compare(a, b)
     both = (_labels_of(a, options, annotator), _labels_of(b, options, annotator))
     results = dict(_compare_each(files, both))
-    compared = [each for each in results.values() if not isinstance(each, str)]
+    compared = [result for result in results.values() if not isinstance(result, str)]
     left_out = {name: each for name, each in results.items() if isinstance(each, str)}
     if not compared:
         raise _nothing_to_compare(left_out)
@@ -160,9 +160,9 @@ def _print(agreement: "Agreement") -> None:
         "only A [%]", "only B [%]", "not in A", "not in B",
     )  # fmt: skip
     rows = [
-        (one.name, finger, *_row(each), len(each.missing_in_a), len(each.missing_in_b))
-        for one in agreement.recordings
-        for finger, each in one.fingers.items()
+        (recording.name, finger, *_row(each), len(each.missing_in_a), len(each.missing_in_b))
+        for recording in agreement.recordings
+        for finger, each in recording.fingers.items()
     ]
     pooled = {**agreement.fingers, "all": agreement.pooled}
     if len(agreement.recordings) > 1:

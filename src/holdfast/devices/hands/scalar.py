@@ -124,7 +124,7 @@ def _resource(module: ModuleType, name: str) -> str:
 
 def largest_scale(command: GripCommand) -> float:
     """Return the force scale of a gripper: the largest of all fingers, 1 without any."""
-    return max((one.scale for one in command.fingers.values()), default=1.0)
+    return max((finger.scale for finger in command.fingers.values()), default=1.0)
 
 
 def _heartbeat(function: Callable[[float], object], name: str) -> float | None:

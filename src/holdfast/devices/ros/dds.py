@@ -92,11 +92,17 @@ class Node:
 
     def published_topics(self) -> dict[str, str]:
         """Return the types of all published topics by name, both as in ROS."""
-        return {_ros_topic(one): ros_type(one.type_name) for one in _endpoints(self._publications)}
+        return {
+            _ros_topic(endpoint): ros_type(endpoint.type_name)
+            for endpoint in _endpoints(self._publications)
+        }
 
     def subscribed_topics(self) -> dict[str, str]:
         """Return the types of all topics with a subscriber by name, both as in ROS."""
-        return {_ros_topic(one): ros_type(one.type_name) for one in _endpoints(self._subscriptions)}
+        return {
+            _ros_topic(endpoint): ros_type(endpoint.type_name)
+            for endpoint in _endpoints(self._subscriptions)
+        }
 
     def n_other_writers(self, topic: str) -> int:
         """Return the number of publishers on a topic that do not belong to this node.
@@ -104,8 +110,8 @@ class Node:
         Those of a program that was killed count until DDS notices, 10 s by default.
         """
         mine = self._participant.guid
-        found = [one.participant_key for one in _endpoints(self._publications)
-                 if _ros_topic(one) == topic]  # fmt: skip
+        found = [endpoint.participant_key for endpoint in _endpoints(self._publications)
+                 if _ros_topic(endpoint) == topic]  # fmt: skip
         return sum(key != mine for key in found)
 
     def reader(self, topic: str, definition: Definition) -> "TopicReader":

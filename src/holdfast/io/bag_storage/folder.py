@@ -45,7 +45,7 @@ class FolderBag:
         self._packed = packed
         self._budget = budget
         check_number(len(topics))
-        inside = [one for storage in storages for one in storage.connections]
+        inside = [connection for storage in storages for connection in storage.connections]
         definitions = {one.kind: one.definition for one in reversed(inside) if one.definition}
         self._connections = [
             _connection(number, topic, definitions) for number, topic in enumerate(topics)
@@ -61,9 +61,9 @@ class FolderBag:
         wanted = {(self._connections[n].topic, self._connections[n].kind): n for n in numbers}
         for storage in self._storages:
             places = {
-                one.number: wanted[one.topic, one.kind]
-                for one in storage.connections
-                if (one.topic, one.kind) in wanted
+                connection.number: wanted[connection.topic, connection.kind]
+                for connection in storage.connections
+                if (connection.topic, connection.kind) in wanted
             }
             if not places:
                 continue

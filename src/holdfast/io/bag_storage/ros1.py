@@ -36,8 +36,14 @@ class Ros1Bag:
     def connections(self) -> list[BagConnection]:
         """All connections."""
         return [
-            BagConnection(one.id, one.topic, one.msgtype, one.msgdef.data, one.msgcount)
-            for one in self._reader.connections
+            BagConnection(
+                connection.id,
+                connection.topic,
+                connection.msgtype,
+                connection.msgdef.data,
+                connection.msgcount,
+            )
+            for connection in self._reader.connections
         ]
 
     def messages(self, numbers: Collection[int]) -> Iterator[tuple[int, int, bytes]]:

@@ -275,7 +275,7 @@ def _with_module(patterns: Sequence[str]) -> str:
     start = _common_start(words)
     while start and start[-1].isalnum():  # "f1" and "f2" are whole names
         start = start[:-1]
-    rest = [each[len(start) :] for each in words]
+    rest = [word[len(start) :] for word in words]
     end = _common_start([each[::-1] for each in rest])[::-1]
     names = ["".join(each[: len(each) - len(end)]) for each in rest]
     if len(patterns) == 1 or any("{" in name or not name for name in names):

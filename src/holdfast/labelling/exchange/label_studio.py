@@ -131,13 +131,15 @@ def annotations_of(path: str | Path, recording: Recording) -> list[Annotation]:
     """
     task = _task_of(_tasks(Path(path)), recording, Path(path))
     found = []
-    for each in task.annotations:
-        if not each.was_cancelled:
-            annotator = _annotator(each.completed_by)
-            number = "an annotation" if each.id is None else f"annotation {each.id}"
+    for annotation in task.annotations:
+        if not annotation.was_cancelled:
+            annotator = _annotator(annotation.completed_by)
+            number = "an annotation" if annotation.id is None else f"annotation {annotation.id}"
             where = f"{path}, {recording.name!r}, {number}"
             found.append(
-                Annotation(annotator, False, _labels(each.result, recording, where, annotator))
+                Annotation(
+                    annotator, False, _labels(annotation.result, recording, where, annotator)
+                )
             )
     for made in task.predictions:
         if isinstance(made, _Prediction):
@@ -215,7 +217,7 @@ def _names(task: _Task) -> list[str]:
     given = task.data.get("recording")
     texts = [each for each in task.data.values() if isinstance(each, str)]
     files = [*texts, task.file_upload or ""]
-    stems = [_stem(each) for each in files if each.lower().endswith((".csv", ".tsv"))]
+    stems = [_stem(file) for file in files if file.lower().endswith((".csv", ".tsv"))]
     bare = [re.sub(r"^[0-9a-f]{8}-", "", stem) for stem in stems]  # without the prefix of an upload
     return [*([given] if isinstance(given, str) else []), *bare, *stems]
 

@@ -191,9 +191,10 @@ def pool(recordings: Sequence[RecordingAgreement]) -> Agreement:
     Args:
         recordings: from `compare`.
     """
-    names = list(dict.fromkeys(finger for each in recordings for finger in each.fingers))
+    names = list(dict.fromkeys(finger for recording in recordings for finger in recording.fingers))
     by_finger = {
-        name: [each.fingers[name] for each in recordings if name in each.fingers] for name in names
+        name: [recording.fingers[name] for recording in recordings if name in recording.fingers]
+        for name in names
     }
     return Agreement(
         list(recordings),
@@ -259,24 +260,24 @@ def _agreement(counted: _FingerCounts) -> FingerAgreement:
 
 
 def _pooled(parts: Sequence[FingerAgreement]) -> PooledAgreement:
-    confusion = sum((np.array(each.confusion) for each in parts), np.zeros((3, 3), dtype=np.int64))
-    n_samples = sum(each.n_samples for each in parts)
-    onsets = [each.onset_differences for each in parts]
+    confusion = sum((np.array(part.confusion) for part in parts), np.zeros((3, 3), dtype=np.int64))
+    n_samples = sum(part.n_samples for part in parts)
+    onsets = [part.onset_differences for part in parts]
     return PooledAgreement(
         kappa=cohens_kappa(confusion),
         kappa_stable=cohens_kappa(_binary(confusion)),
         n=int(confusion.sum()),
         n_samples=n_samples,
-        only_a=sum(each.only_a * each.n_samples for each in parts) / max(n_samples, 1),
-        only_b=sum(each.only_b * each.n_samples for each in parts) / max(n_samples, 1),
+        only_a=sum(part.only_a * part.n_samples for part in parts) / max(n_samples, 1),
+        only_b=sum(part.only_b * part.n_samples for part in parts) / max(n_samples, 1),
         confusion=confusion.tolist(),
         onset_differences=_differences(
-            [value for each in onsets for value in each.values],
-            sum(each.only_a for each in onsets),
-            sum(each.only_b for each in onsets),
+            [value for onset in onsets for value in onset.values],
+            sum(onset.only_a for onset in onsets),
+            sum(onset.only_b for onset in onsets),
         ),
-        n_missing_in_a=sum(len(each.missing_in_a) for each in parts),
-        n_missing_in_b=sum(len(each.missing_in_b) for each in parts),
+        n_missing_in_a=sum(len(part.missing_in_a) for part in parts),
+        n_missing_in_b=sum(len(part.missing_in_b) for part in parts),
     )
 
 

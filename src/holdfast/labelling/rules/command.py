@@ -96,7 +96,8 @@ def propose(
         ValueError: the tare is unknown.
     """
     commands = [
-        ProtocolMarker(each.time - delay, each.word) for each in protocol_markers(recording)
+        ProtocolMarker(protocol_marker.time - delay, protocol_marker.word)
+        for protocol_marker in protocol_markers(recording)
     ]
     if not commands:
         raise RecordingError(

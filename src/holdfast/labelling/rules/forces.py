@@ -218,7 +218,7 @@ def final_drop(hand: HandForce, duration: float = 0.2, factor: float = 5.0) -> i
         duration: of the drop [s].
         factor: least ratio of the drop to the range of the force before it.
     """
-    normal = np.sum([each.force @ each.normal for each in hand.fingers.values()], axis=0)
+    normal = np.sum([finger.force @ finger.normal for finger in hand.fingers.values()], axis=0)
     n = n_samples_of(duration, hand.period)
     if len(normal) <= 2 * n:
         return None

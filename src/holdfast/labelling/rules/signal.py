@@ -165,14 +165,14 @@ class _GraspLabeller:
         self._rule = rule
         self._inside = np.zeros(len(hand.times), dtype=bool)
         self._inside[span] = True
-        self._begins_in_contact = all(each.threshold is None for each in hand.fingers.values())
+        self._begins_in_contact = all(finger.threshold is None for finger in hand.fingers.values())
         self._end = span.stop
         self._locked = span.start if self._begins_in_contact else self._lock()
 
     def _lock(self) -> int:
         """Return the sample from which no finger in contact changes for long enough."""
         hand = self._hand
-        n_grasping = sum((each.contact & self._inside).any() for each in hand.fingers.values())
+        n_grasping = sum((finger.contact & self._inside).any() for finger in hand.fingers.values())
         calm = self._inside & (hand.n_touching >= min(2, n_grasping))
         for mask in self._changing.values():
             calm &= ~mask
@@ -225,7 +225,7 @@ def _contact_ratio(finger: FingerForce) -> Array | float:
 
 def _label_loss(hand: HandForce, timelines: Mapping[str, StateTimeline]) -> None:
     """Label no contact after the final drop of the force in a recording that begins in contact."""
-    if any(each.threshold is not None for each in hand.fingers.values()):
+    if any(finger.threshold is not None for finger in hand.fingers.values()):
         return
     drop = final_drop(hand)
     if drop is None:

@@ -162,8 +162,8 @@ def _clock_offset(poses: Poses, tracks: Mapping[str, PoseTrack], hand: HandForce
     if poses.same_clock:
         return ClockOffset(0.0, 1.0)
     motions = [motion_of(track, hand.times) for track in tracks.values()]
-    seen = np.nanmax([np.where(each.known, each.speed, 0.0) for each in motions], axis=0)
-    known = np.any([each.known for each in motions], axis=0)
+    seen = np.nanmax([np.where(motion.known, motion.speed, 0.0) for motion in motions], axis=0)
+    known = np.any([motion.known for motion in motions], axis=0)
     felt = np.sum([hand.fingers[name].change(UNSTABLE_MARGIN) for name in tracks], axis=0)
     return clock_offset(seen, felt, known, hand.period)
 

@@ -103,7 +103,7 @@ def labels_data(labels: Labels) -> dict[str, list[LabelData]]:
 
 def _is_labelled(labels: Sequence[Label], proposal: Label) -> bool:
     middle = (proposal.start + proposal.end) / 2
-    return any(each.start <= middle < each.end for each in labels)
+    return any(label.start <= middle < label.end for label in labels)
 
 
 def _suspects(workspace: Workspace, recording: Recording) -> list[SuspectLabel]:

@@ -284,12 +284,12 @@ def _cut(labels: Sequence[Label], module: Tactile | None, start: float, end: flo
         return list(labels)
     first, last = float(module.times[0]), float(module.times[-1])
     cut = []
-    for each in labels:
-        if start - TIME_TOLERANCE <= each.start and each.end <= end + TIME_TOLERANCE:
-            begins, ends = max(each.start, first), min(each.end, last + module.period)
-            cut += [replace(each, start=begins, end=ends)] if begins < ends else []
+    for label in labels:
+        if start - TIME_TOLERANCE <= label.start and label.end <= end + TIME_TOLERANCE:
+            begins, ends = max(label.start, first), min(label.end, last + module.period)
+            cut += [replace(label, start=begins, end=ends)] if begins < ends else []
         else:
-            cut.append(each)
+            cut.append(label)
     return cut
 
 

@@ -155,11 +155,11 @@ class JointHand(RosHand):
         states = [one for _, one in self._states]
         if not states:
             return np.full(N_JOINTS, np.nan), np.zeros(N_JOINTS)
-        efforts = [one.efforts for one in states if len(one.efforts)]
+        efforts = [state.efforts for state in states if len(state.efforts)]
         torques = np.zeros(N_JOINTS)
         if len(efforts) == len(states):
             torques = np.median(efforts, axis=0)
-        return np.median([one.positions for one in states], axis=0), torques
+        return np.median([state.positions for state in states], axis=0), torques
 
     def _press(self, command: GripCommand) -> None:
         if self._grip is None:

@@ -66,7 +66,7 @@ class MessageAssembler:
         Raises:
             SourceError: they do not fit the arguments of the assembler.
         """
-        found = {_number(one): one for one in samples if has_taxels(one)}
+        found = {_number(sample): sample for sample in samples if has_taxels(sample)}
         for number, one in found.items():
             if one.counts is not None and self._unit == "N" and not len(one.forces):
                 raise SourceError(no_calibration(number, one.model))
@@ -87,7 +87,7 @@ class MessageAssembler:
             samples: samples of the message.
             received: time of arrival, on the host's monotonic clock [s].
         """
-        new = [one for one in samples if self._is_new(one, received)]
+        new = [sample for sample in samples if self._is_new(sample, received)]
         stamps = [received if self._stamp is None else self._stamp(one) for one in new]
         newest = max((stamp for stamp in stamps if stamp is not None), default=None)
         if newest is not None:

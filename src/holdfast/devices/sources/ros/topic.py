@@ -157,11 +157,11 @@ class TopicSource(DeviceSource):
                 invalid = why
                 continue
             messages.append(message)
-            if any(one.number in found for one in samples):
+            if any(sample.number in found for sample in samples):
                 break
             if samples and not found:
                 deadline = min(deadline, time.monotonic() + DEVICES_TIMEOUT)
-            found.update((one.number, one) for one in samples)
+            found.update((sample.number, sample) for sample in samples)
         if found:
             return messages, list(found.values())
         if invalid is not None:
