@@ -128,6 +128,10 @@ class ContactEstimate(msgspec.Struct, frozen=True, gc=False):
             faulty by themselves; empty where the finger as a whole is faulty. Documents and
             messages have the numbers of these taxels, from 1 (`sensors.taxel_numbers`).
         cause: the likely cause while UNSTABLE, for a model that tells causes apart; else None.
+            With a slip rule it is `slip` whenever the finger is decided to slide, also before
+            the state becomes UNSTABLE.
+        slip_probability: probability that the finger slides; NaN while UNKNOWN, and for a model
+            without a slip rule.
     """
 
     time: float
@@ -139,6 +143,7 @@ class ContactEstimate(msgspec.Struct, frozen=True, gc=False):
     faults: tuple[Fault, ...] = ()
     faulty_taxels: tuple[int, ...] = ()
     cause: Cause | None = None
+    slip_probability: float = math.nan
 
 
 class HandEstimate(msgspec.Struct, frozen=True, gc=False):
@@ -439,5 +444,7 @@ def _with_faults(
         state=ContactState.UNKNOWN,
         reason=reason,
         stable_probability=math.nan,
+        slip_probability=math.nan,
+        cause=None,
         faults=tuple(fault for fault in Fault if fault in both),
     )

@@ -14,6 +14,7 @@ import numpy.typing as npt
 from holdfast.classifiers import LinearClassifier, ModelClassifier, OnnxClassifier
 from holdfast.classifiers.cause import CauseClassifier
 from holdfast.classifiers.onnx_classifier import MAX_ONNX_SIZE
+from holdfast.classifiers.slip import SlipRule
 from holdfast.errors import ModelError, OutputError
 from holdfast.features import DEFAULT_WINDOW, FeatureSpec, Tare
 from holdfast.features.stream import StreamPlan, extract
@@ -56,6 +57,7 @@ class FingerModel(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_on
         contact_load: threshold of contact on the load, as a multiple of the noise of the stream,
             for relative features; used instead of the others if it is given.
         causes: tells the causes of an unstable contact apart; None for none.
+        slip: decides from the same features whether the finger slides; None for none.
 
     Raises:
         ModelError: the fields contradict each other.
@@ -68,11 +70,17 @@ class FingerModel(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_on
     contact_noise: float | None = None
     contact_load: float | None = None
     causes: CauseClassifier | None = None
+    slip: SlipRule | None = None
 
     def __post_init__(self) -> None:
         if self.causes is not None and self.causes.n_features != len(self.features):
             raise ModelError(
                 f"{len(self.features)} features given, the causes expect {self.causes.n_features}"
+            )
+        if self.slip is not None and self.slip.classifier.n_features != len(self.features):
+            raise ModelError(
+                f"{len(self.features)} features given, the slip rule expects "
+                f"{self.slip.classifier.n_features}"
             )
         _check_limit("features of a finger", len(self.features), MAX_FEATURES)
         _check_limit(

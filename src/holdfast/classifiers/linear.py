@@ -107,12 +107,18 @@ def feature_rows(features: npt.ArrayLike, n_features: int) -> Array:
 
 
 @compiled_step
-def linear_probability(features: Array, weights: Array) -> float:
-    """Return the logistic function of the weighted sum, for offline and live detection."""
+def log_odds(features: Array, weights: Array) -> float:
+    """Return the weighted sum w_0 + sum_j w_j phi_j, for offline and live detection."""
     value = weights[0]
     for j in range(len(weights) - 1):
         value += weights[j + 1] * features[j]
-    return 1.0 / (1.0 + math.exp(-value))
+    return float(value)
+
+
+@compiled_step
+def linear_probability(features: Array, weights: Array) -> float:
+    """Return the logistic function of the weighted sum, for offline and live detection."""
+    return 1.0 / (1.0 + math.exp(-log_odds(features, weights)))
 
 
 @compiled_step

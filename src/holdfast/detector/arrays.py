@@ -17,14 +17,23 @@ from holdfast.features.arrays import Floats2, Floats3, Integers1, Integers2
     LIMITS_WIDTH,
 ) = range(5)
 
+# DecisionRule.slip_limits.
+(
+    SLIP_THRESHOLD,  # of the probability of a slip; NaN without a slip rule
+    SLIP_GAIN,  # share of a new sample in the smoothed log odds
+    SLIP_HOLD,  # time for which a slip is still reported [s]
+    SLIP_LIMITS_WIDTH,
+) = range(4)
+
 # DecisionMemory.codes.
 (
     STATE,  # the state that is reported, as a code of holdfast.contact
     CANDIDATE,  # the state of the last sample, which may not have lasted long enough yet
     EXCESS,  # how the load came over the threshold of contact: one of the next three
     CAUSE,  # code of the cause while unstable; 0 for none
+    SLIPS,  # 1 while the finger is decided to slide, else 0
     CODES_WIDTH,
-) = range(5)
+) = range(6)
 NO_EXCESS, TOUCH, DRIFT = range(3)
 
 # DecisionMemory.values.
@@ -37,8 +46,11 @@ NO_EXCESS, TOUCH, DRIFT = range(3)
     REST, _, _,  # F_tip without contact, beyond the tare, in three components
     PEAK,  # largest load so far, slowly forgotten [unit of the readings]
     SHAKEN_AT,  # when sigma was last much larger than that of noise [s]
+    SLIP_LOG_ODDS,  # smoothed log odds of a slip; NaN before the first
+    SLIP_PROBABILITY,  # NaN without an estimate or a slip rule
+    LAST_SLIP,  # time of the last sample over the threshold of a slip [s]
     DECIDED_WIDTH,
-) = range(11)  # fmt: skip
+) = range(14)  # fmt: skip
 
 # Rows of the report, one for each finger.
 (
@@ -47,8 +59,9 @@ NO_EXCESS, TOUCH, DRIFT = range(3)
     REPORT_PROBABILITY,
     REPORT_SIGMA,
     REPORT_FORCE, _, _,  # F_tip, in three components
+    REPORT_SLIP,  # probability of a slip
     REPORT_WIDTH,
-) = range(8)  # fmt: skip
+) = range(9)  # fmt: skip
 
 
 class DecisionRule(NamedTuple):
@@ -57,6 +70,9 @@ class DecisionRule(NamedTuple):
     weights: Floats2  # (n_fingers, n_features + 1)
     n_weights: Integers1  # (n_fingers,)
     causes: Floats3  # (n_fingers, n_causes, n_features + 1); n_causes is 0 without them
+    slips: Floats2  # (n_fingers, n_features + 1)
+    n_slip_weights: Integers1  # (n_fingers,)
+    slip_limits: Floats2  # (n_fingers, SLIP_LIMITS_WIDTH)
     limits: Floats2  # (n_fingers, LIMITS_WIDTH)
     hysteresis: float
     min_duration: float

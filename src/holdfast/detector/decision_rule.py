@@ -8,21 +8,30 @@ import numpy as np
 import numpy.typing as npt
 
 from holdfast.classifiers.cause import CAUSES, add_scores
-from holdfast.classifiers.linear import LinearClassifier, linear_probability
+from holdfast.classifiers.linear import LinearClassifier, linear_probability, log_odds
+from holdfast.classifiers.slip import probability_of, smooth
 from holdfast.compiled import compiled_step, inlined
-from holdfast.contact import NO_CONTACT, STABLE, UNKNOWN, UNSTABLE, hand_state, is_held
+from holdfast.contact import NO_CONTACT, STABLE, UNKNOWN, UNSTABLE, Cause, hand_state, is_held
 from holdfast.detector.arrays import (
     CANDIDATE,
     CANDIDATE_SINCE,
     CAUSE,
     CODES_WIDTH,
     DECIDED_WIDTH,
+    LAST_SLIP,
     LAST_UNSTABLE,
     LOAD_LIMIT,
     PEAK,
     PROBABILITY,
     REST,
     SHAKEN_AT,
+    SLIP_GAIN,
+    SLIP_HOLD,
+    SLIP_LIMITS_WIDTH,
+    SLIP_LOG_ODDS,
+    SLIP_PROBABILITY,
+    SLIP_THRESHOLD,
+    SLIPS,
     STATE,
     THRESHOLD,
     DecisionMemory,
@@ -58,6 +67,8 @@ from holdfast.sensors.types import Array, Flags, Integers
 
 _hand_state = compiled_step(hand_state)
 _is_held = compiled_step(is_held)
+SLIP_CODE = CAUSES.index(Cause.SLIP) + 1
+"""Code of the cause slip."""
 
 
 class TraceRows(NamedTuple):
@@ -70,6 +81,7 @@ class TraceRows(NamedTuple):
     probability: Array
     values: Array  # (n, n_fingers, VALUES_WIDTH), as in Output
     cause: npt.NDArray[np.int8]  # codes of the causes
+    slip: Array  # probability of a slip
     hand: npt.NDArray[np.int8]  # (n,)
 
     @classmethod
@@ -84,6 +96,7 @@ class TraceRows(NamedTuple):
             probability=np.zeros(shape),
             values=np.zeros((*shape, VALUES_WIDTH)),
             cause=np.zeros(shape, dtype=np.int8),
+            slip=np.zeros(shape),
             hand=np.zeros(n, dtype=np.int8),
         )
 
@@ -105,11 +118,15 @@ def rule_of(model: Model, plan: StreamPlan) -> DecisionRule:
         )
         for part in parts
     ]
+    slips, slip_limits = _slip_rules(parts, width, plan.rate)
     any_finger = ANY_FINGER in model.fingers
     return DecisionRule(
         weights=weights,
         n_weights=np.array([_n_weights(part) for part in parts]),
+        n_slip_weights=np.array([len(part.features) + 1 for part in parts]),
         causes=_cause_weights(parts, width),
+        slips=slips,
+        slip_limits=slip_limits,
         limits=np.array(limits, dtype=np.float64),  # None becomes NaN
         hysteresis=float(model.debounce.hysteresis),
         min_duration=float(model.debounce.min_duration),
@@ -132,7 +149,22 @@ def _cause_weights(parts: Sequence[FingerModel], width: int) -> Array:
     for row, part in zip(weights, parts, strict=True):
         if part.causes is not None:
             row[:, : part.causes.n_features + 1] = part.causes.weights()
+            if part.slip is not None:  # the slip rule decides about slips
+                row[SLIP_CODE - 1] = 0.0
+                row[SLIP_CODE - 1, 0] = -math.inf
     return weights
+
+
+def _slip_rules(parts: Sequence[FingerModel], width: int, rate: float) -> tuple[Array, Array]:
+    """Return the weights and the limits of the slip rules; NaN without a rule."""
+    weights = np.zeros((len(parts), width))
+    limits = np.full((len(parts), SLIP_LIMITS_WIDTH), np.nan)
+    for row, limit, part in zip(weights, limits, parts, strict=True):
+        if part.slip is not None:
+            rule = part.slip
+            row[: rule.classifier.n_features + 1] = rule.classifier.weights()
+            limit[:] = rule.classifier.threshold, rule.gain(rate), rule.hold
+    return weights, limits
 
 
 def new_decision_memory(n_fingers: int, n_causes: int = 0) -> DecisionMemory:
@@ -236,6 +268,7 @@ def _decide_unready(
     if codes[STATE] == UNKNOWN:
         decided[PROBABILITY] = decided[LAST_UNSTABLE] = math.nan
         _forget_cause(codes, decision.scores, f)
+        end_slip(codes, decided, math.nan)
     else:
         output.status[f, REASON] = READY
 
@@ -271,7 +304,45 @@ def _decide(
         follow(output.values[f], decided, period)
     if state != UNSTABLE:
         _forget_cause(codes, decision.scores, f)
+    if not math.isnan(rule.slip_limits[f, SLIP_THRESHOLD]):
+        if unloaded:
+            end_slip(codes, decided, 0.0)
+        else:
+            value = log_odds(output.features[f], rule.slips[f, : rule.n_slip_weights[f]])
+            decide_slip(codes, decided, rule.slip_limits[f], value, time, period)
     debounce(codes, decided, state, rule.min_duration, time, period)
+
+
+@compiled_step
+def decide_slip(
+    codes: Integers, decided: Array, limits: Array, value: float, time: float, period: float
+) -> None:
+    """Decide whether a finger slides, from the log odds of its last sample."""
+    # s(k) = s(k-1) + gain (z(k) - s(k-1)), p = 1 / (1 + exp(-s)).
+    decided[SLIP_LOG_ODDS] = smooth(decided[SLIP_LOG_ODDS], value, limits[SLIP_GAIN])
+    decided[SLIP_PROBABILITY] = probability_of(decided[SLIP_LOG_ODDS])
+    # It slides while p >= threshold, and until t - t_last reaches the hold time.
+    if decided[SLIP_PROBABILITY] >= limits[SLIP_THRESHOLD]:
+        decided[LAST_SLIP] = time
+        codes[SLIPS] = 1
+    else:
+        codes[SLIPS] = int(_is_held(time, decided[LAST_SLIP], limits[SLIP_HOLD], period))
+
+
+@compiled_step
+def end_slip(codes: Integers, decided: Array, probability: float) -> None:
+    """Report no slip, with a probability of 0 without contact or NaN without an estimate."""
+    codes[SLIPS] = 0
+    decided[SLIP_LOG_ODDS] = decided[LAST_SLIP] = math.nan
+    decided[SLIP_PROBABILITY] = probability
+
+
+@compiled_step
+def reported_cause(codes: Integers) -> int:
+    """Return the code of the cause: slip while the finger slides, else that while unstable."""
+    if codes[SLIPS]:
+        return SLIP_CODE
+    return int(codes[CAUSE]) if codes[STATE] == UNSTABLE else 0
 
 
 @compiled_step
@@ -318,7 +389,8 @@ def run(
             rows.faults[k, f] = output.status[f, FAULTS]
             rows.taxels[k, f] = output.status[f, TAXELS]
             rows.probability[k, f] = decision.values[f, PROBABILITY]
-            rows.cause[k, f] = decision.codes[f, CAUSE] if state == UNSTABLE else 0
+            rows.cause[k, f] = reported_cause(decision.codes[f])
+            rows.slip[k, f] = decision.values[f, SLIP_PROBABILITY]
             for column in range(VALUES_WIDTH):
                 rows.values[k, f, column] = output.values[f, column]
 

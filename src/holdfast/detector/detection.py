@@ -49,6 +49,7 @@ class FingerTrace(NamedTuple):
         faults: (n,) bits in the order of `Fault`.
         faulty_taxels: (n,) bit i is set if the taxel at index i is faulty by itself.
         cause: (n,) codes of the causes while UNSTABLE: 1 is the first of `Cause`; 0 for none.
+        slip_probability: (n,); NaN while UNKNOWN, and without a slip rule.
     """
 
     times: Array
@@ -60,6 +61,7 @@ class FingerTrace(NamedTuple):
     faults: npt.NDArray[np.int16]
     faulty_taxels: npt.NDArray[np.int64]
     cause: npt.NDArray[np.int8]
+    slip_probability: Array
 
     def __len__(self) -> int:
         return len(self.times)
@@ -82,6 +84,7 @@ class FingerTrace(NamedTuple):
                 map(faults_of, self.faults[rows].tolist()),
                 map(taxels_of, self.faulty_taxels[rows].tolist()),
                 [CAUSES_BY_CODE[code] for code in self.cause[rows].tolist()],
+                self.slip_probability[rows].tolist(),
             )
         )
 
@@ -134,5 +137,6 @@ def detection_of(
                 rows.faults[own, place],
                 rows.taxels[own, place],
                 rows.cause[own, place],
+                rows.slip[own, place],
             )
     return Detection(name, found, times, rows.hand)

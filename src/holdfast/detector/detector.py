@@ -326,13 +326,13 @@ class Detector:
     def _estimate(self, time: float, code: int) -> HandEstimate:
         """Return the estimate that the kernel reported, and note its changes of state."""
         fingers, known = {}, self._decisions
-        for name, (at, number, probability, sigma, x, y, z) in zip(
+        for name, (at, number, probability, sigma, x, y, z, slip) in zip(
             self._slots, self._read_report(), strict=False
         ):
             state, reason, faults, cause = known.get(number) or self._decode(number)
             taxels = self._faulty_taxels(name) if faults else ()
             fingers[name] = ContactEstimate(
-                at, state, reason, probability, sigma, (x, y, z), faults, taxels, cause
+                at, state, reason, probability, sigma, (x, y, z), faults, taxels, cause, slip
             )
         hand = STATES[code % CHANGED]
         if code >= CHANGED:

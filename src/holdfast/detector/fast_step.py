@@ -4,21 +4,21 @@ from collections.abc import Callable
 from typing import Any, NamedTuple
 
 from holdfast.compiled import compiled_step
-from holdfast.contact import UNSTABLE
 from holdfast.detector.address_table import kept_by, reader_of
 from holdfast.detector.arrays import (
-    CAUSE,
     PROBABILITY,
     REPORT_CODE,
     REPORT_FORCE,
     REPORT_PROBABILITY,
     REPORT_SIGMA,
+    REPORT_SLIP,
     REPORT_TIME,
+    SLIP_PROBABILITY,
     STATE,
     DecisionMemory,
     DecisionRule,
 )
-from holdfast.detector.decision_rule import hand_code, step
+from holdfast.detector.decision_rule import hand_code, reported_cause, step
 from holdfast.detector.sample_arrays import copy_samples
 from holdfast.features.arrays import (
     FAULTS,
@@ -102,10 +102,11 @@ def fast_step(table: Integers, time: float, samples: int) -> int:
     for f in range(len(present)):
         state, status = decision.codes[f, STATE], output.status[f]
         changed |= report[f, REPORT_CODE] != state
-        cause = decision.codes[f, CAUSE] if state == UNSTABLE else 0
+        cause = reported_cause(decision.codes[f])
         report[f, REPORT_TIME] = memory.levels[f, LAST_TIME]
         report[f, REPORT_CODE] = estimate_code(state, status[REASON], status[FAULTS], cause)
         report[f, REPORT_PROBABILITY] = decision.values[f, PROBABILITY]
+        report[f, REPORT_SLIP] = decision.values[f, SLIP_PROBABILITY]
         report[f, REPORT_SIGMA] = output.values[f, SIGMA]
         for axis in range(3):
             report[f, REPORT_FORCE + axis] = output.values[f, FORCE + axis]

@@ -1,0 +1,106 @@
+"""Rule that decides whether a finger slides: a probability, smoothed, with its own threshold."""
+
+import math
+
+import msgspec
+import numpy as np
+
+from holdfast.classifiers.linear import LinearClassifier
+from holdfast.compiled import compiled_step
+from holdfast.errors import ModelError
+from holdfast.sensors.types import Array, Flags
+
+MAX_SLIP_DURATION = 10.0
+"""Maximum smoothing and hold time of a slip rule [s]."""
+
+
+class SlipThresholds(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
+    """How the threshold of a slip rule was chosen, and what it gave on those recordings.
+
+    Attributes:
+        requested: maximum number of false alarms per minute of all held time, of one finger.
+        false_alarms_per_minute: that it gave, of held time.
+        found: share of the slips found within 0.1 s of their onset [%]; None without slips.
+        n_slips: number of slips of the fingers.
+        held_minutes: held time of the fingers [min].
+        recordings: content digest of each recording, by name; empty if they are those of the
+            training.
+    """
+
+    requested: float
+    false_alarms_per_minute: float
+    found: float | None
+    n_slips: int
+    held_minutes: float
+    recordings: dict[str, str] = {}
+
+
+class SlipRule(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
+    """Decision whether a finger slides, from the features of its classifier of stability.
+
+    The log odds z(k) of the classifier are smoothed over time, with the period T of the samples:
+
+        s(k) = s(k-1) + (1 - exp(-T / smoothing)) (z(k) - s(k-1))
+
+    The probability of a slip is 1 / (1 + exp(-s)). The finger slides from the threshold of the
+    classifier on, and for the hold time after that.
+
+    Attributes:
+        classifier: maps features to a probability that the finger slides, with the threshold.
+        smoothing: time constant [s]; 0 for none.
+        hold: time for which a slip is still reported [s].
+        thresholds: how the threshold was chosen; None if it was given.
+
+    Raises:
+        ModelError: a duration is out of range.
+    """
+
+    classifier: LinearClassifier
+    smoothing: float = 0.0
+    hold: float = 0.0
+    thresholds: SlipThresholds | None = None
+
+    def __post_init__(self) -> None:
+        for name, seconds in (("smoothing", self.smoothing), ("hold", self.hold)):
+            if not 0 <= seconds <= MAX_SLIP_DURATION:
+                raise ModelError(
+                    f"a {name} of slips from 0 to {MAX_SLIP_DURATION:g} s expected, {seconds} given"
+                )
+
+    def gain(self, rate: float) -> float:
+        """Return the share of a new sample in the smoothed log odds at a rate [Hz]."""
+        return 1.0 if self.smoothing == 0 else -math.expm1(-1.0 / (rate * self.smoothing))
+
+
+@compiled_step
+def smooth(smoothed: float, value: float, gain: float) -> float:
+    """Return the smoothed value after a new one; the first value starts it."""
+    return value if math.isnan(smoothed) else smoothed + gain * (value - smoothed)
+
+
+@compiled_step
+def probability_of(log_odds: float) -> float:
+    """Return 1 / (1 + exp(-log odds))."""
+    return 1.0 / (1.0 + math.exp(-log_odds))
+
+
+def raised_at(times: Array, probability: Array, threshold: float, hold: float) -> Flags:
+    """Return where a slip is reported, from its probability: the rule of the detector.
+
+    Args:
+        times: (n,) [s].
+        probability: (n,) smoothed; NaN and 0 end a slip at once.
+        threshold: from which the finger slides.
+        hold: time for which it is still reported [s].
+
+    Returns:
+        (n,) True where the finger is reported to slide.
+    """
+    with np.errstate(invalid="ignore"):
+        over = probability >= threshold
+        ended = ~(probability > 0)
+    last = np.maximum.accumulate(np.where(over, times, -np.inf))
+    end = np.maximum.accumulate(np.where(ended, times, -np.inf))
+    period = float(np.median(np.diff(times))) if len(times) > 1 else 0.0
+    held = (times - last + 0.5 * period < hold) & (last > end)
+    return np.asarray((over | held) & ~ended)
