@@ -9,6 +9,7 @@ import numpy as np
 import numpy.typing as npt
 
 from holdfast.contact import STABLE, UNKNOWN, UNSTABLE, enough_contacts, hand_states
+from holdfast.metrics.slip_truth import SlipDecisions
 from holdfast.sensors.types import Array
 
 Codes = npt.NDArray[np.int8]
@@ -28,6 +29,7 @@ class FingerDecisions:
             UNKNOWN. All NaN for a hand, whose state follows from those of its fingers.
         exact_labels: (n,) codes of the states by the truth; None if it is not known. Events are
             found in them, because a person draws labels with a margin around a disturbance.
+        slip: decisions about slips; None for a hand, or a model without a slip rule.
 
     Raises:
         ValueError: the lengths of the arrays differ, or the times do not increase.
@@ -38,6 +40,7 @@ class FingerDecisions:
     states: Codes
     stable_probability: Array
     exact_labels: Codes | None = None
+    slip: SlipDecisions | None = None
 
     def __post_init__(self) -> None:
         arrays: dict[str, npt.NDArray[Any]] = {

@@ -8,7 +8,7 @@ import math
 from collections.abc import Mapping, Sequence
 from collections.abc import Set as AbstractSet
 from dataclasses import dataclass, replace
-from typing import Literal, NamedTuple, Self
+from typing import NamedTuple, Self
 
 import msgspec
 import numpy as np
@@ -18,6 +18,7 @@ from holdfast.contact import NO_CONTACT, STABLE, TIME_TOLERANCE, UNSTABLE, Conta
 from holdfast.metrics.decisions import Codes, FingerDecisions, check_lengths, check_times
 from holdfast.metrics.masks import runs
 from holdfast.metrics.statistics import finite_or_none, percent, quantile
+from holdfast.metrics.truth_labels import Onsets
 from holdfast.sensors.types import Array
 
 MIN_EVENT_DURATION = 0.05
@@ -37,9 +38,6 @@ LATE_TOLERANCE = 0.25
 
 POST_DURATIONS = (0.05, 0.1, 0.2)
 """Values of `post` [s]: an event is missed at `post` without an alarm until onset + post."""
-
-Onsets = Literal["truth", "labels", "mixed"]
-"""Where the onsets of events come from: the truth, the labels, or one in each recording."""
 
 
 class InstabilityEvent(NamedTuple):

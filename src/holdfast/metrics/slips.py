@@ -1,48 +1,30 @@
-"""Slips of a finger: the truth by sample, and the score of decisions about them.
-
-A finger slides where the load-weighted speed of its contact exceeds 1 mm/s, and is still below
-0.3 mm/s. Between the two it creeps: such samples are neither right nor wrong.
-"""
+"""Score of decisions about slips, by the truth: found in time, found early, false alarms."""
 
 import math
 from collections.abc import Iterable, Sequence
 from collections.abc import Set as AbstractSet
 from dataclasses import dataclass
-from typing import NamedTuple, Self
+from typing import Self
 
 import msgspec
 import numpy as np
-import numpy.typing as npt
 
-from holdfast.contact import (
-    CONTACT_FORCE,
-    HELD_PHASES,
-    MIN_CONTACT_DURATION,
-    SLIP_SPEED,
-    TIME_TOLERANCE,
-    Cause,
-    ContactState,
-)
+from holdfast.contact import TIME_TOLERANCE
 from holdfast.metrics.binned import N_BINS, bins_of
-from holdfast.metrics.events import MIN_GAP_DURATION, Onsets
-from holdfast.metrics.masks import Mask, join_runs, runs
+from holdfast.metrics.masks import Mask, runs
+from holdfast.metrics.slip_truth import (
+    CREEPING,
+    DISTANCES,
+    SLIDING,
+    STILL,
+    Slip,
+    SlipDecisions,
+    sample_durations,
+)
 from holdfast.metrics.statistics import percent
-from holdfast.recordings import Label, Recording, Truth
+from holdfast.metrics.truth_labels import Onsets
 from holdfast.sensors.types import Array, Integers
 
-Codes = npt.NDArray[np.int8]
-
-NOT_HELD, STILL, CREEPING, SLIDING = range(-1, 3)
-"""Codes of the truth of a slip at a sample."""
-
-STILL_SPEED = 0.0003
-"""Speed below which a held contact does not slide [m/s]."""
-GROSS_SHARE = 0.9
-"""Share of the load on sliding parts of the contact from which a slip is gross."""
-MIN_SLIP_DURATION = 0.02
-"""A slip lasts at least this time [s], or slides at least `MIN_SLIP_DISTANCE`."""
-MIN_SLIP_DISTANCE = 1e-4
-"""Sliding distance from which a shorter slip counts [m]."""
 EARLIEST_ALARM = 0.5
 """An alarm that comes more than this time before the onset does not belong to the slip [s]."""
 LATEST_ALARM = 0.25
@@ -51,206 +33,6 @@ FALSE_ALARM_DURATION = 0.5
 """Each begun part of this length of a decision that is wrongly raised is one false alarm [s]."""
 FOUND_WITHIN = (0.03, 0.05, 0.1)
 """Times after the onset within which the slips are counted that are found [s]."""
-DISTANCES = (0.001, 0.003)
-"""Sliding distances before which the slips are counted that are found [m]."""
-
-_OUT_OF_HOLD = {Cause.CLOSING, Cause.RELEASED, Cause.LOST}
-
-
-class Slip(NamedTuple):
-    """A slip of one finger over a held object.
-
-    Attributes:
-        onset: time of the first sliding sample: the incipient slip [s].
-        end: time of the first sample after it [s].
-        gross: time from which 90 % of the load slides [s]; NaN if that never happens, or if it
-            is not known.
-        distance: slid from the onset to the end [m]; NaN if it is not known.
-        reached: times at which each of `DISTANCES` was slid [s]; NaN if it was not.
-    """
-
-    onset: float
-    end: float
-    gross: float = math.nan
-    distance: float = math.nan
-    reached: tuple[float, ...] = (math.nan,) * len(DISTANCES)
-
-
-@dataclass(frozen=True, eq=False)
-class SlipTruth:
-    """Truth of the slips of one finger, at the samples of its decisions.
-
-    Attributes:
-        codes: (n,) NOT_HELD, STILL, CREEPING or SLIDING.
-        quiet: (n,) True where the finger holds still and nothing disturbs the object.
-        slips: in order of time.
-        onsets: where the slips come from.
-    """
-
-    codes: Codes
-    quiet: Mask
-    slips: tuple[Slip, ...]
-    onsets: Onsets
-
-
-@dataclass(frozen=True, eq=False)
-class SlipDecisions:
-    """Decisions about the slips of one finger, sample by sample.
-
-    Attributes:
-        times: (n,) strictly increasing [s].
-        probability: (n,) that the finger slides; NaN without an estimate.
-        raised: (n,) True where the finger is decided to slide.
-        truth: of the same samples; None if it is not known.
-    """
-
-    times: Array
-    probability: Array
-    raised: Mask
-    truth: SlipTruth | None
-
-
-def finger_slips(truth: Truth, finger: str) -> tuple[Slip, ...]:
-    """Return the slips of one finger by the truth.
-
-    Sliding that stops for less than 0.1 s is one slip. A slip lasts at least 20 ms, or slides at
-    least 0.1 mm.
-
-    Args:
-        truth: with `phase` of the hand, and `contact_force`, `slip_speed` and, for gross slips,
-            `slipping_share` of the finger.
-        finger: name of the finger.
-    """
-    times, arrays = truth.times, truth.fingers[finger]
-    sliding = _truth_codes(truth, finger) == SLIDING
-    speed = np.where(sliding, arrays["slip_speed"], 0.0)
-    share = arrays.get("slipping_share", np.full(len(times), np.nan))
-    steps = sample_durations(times)
-    period = float(np.median(steps)) if len(steps) else 0.0
-    joined = join_runs(sliding, times, MIN_GAP_DURATION + period - TIME_TOLERANCE)
-    slips = (_slip(times, steps, speed, share, int(a), int(b)) for a, b in runs(joined))
-    return tuple(
-        slip
-        for slip in slips
-        if slip.end - slip.onset >= MIN_SLIP_DURATION - TIME_TOLERANCE
-        or slip.distance >= MIN_SLIP_DISTANCE
-    )
-
-
-def _slip(times: Array, steps: Array, speed: Array, share: Array, start: int, end: int) -> Slip:
-    """Return the slip of the samples from `start` up to `end`."""
-    slid = np.cumsum((speed * steps)[start:end])
-    ends = times[start:end] + steps[start:end]
-    gross = np.flatnonzero((share[start:end] >= GROSS_SHARE) & (speed[start:end] > 0))
-    places = np.searchsorted(slid, DISTANCES)
-    return Slip(
-        float(times[start]),
-        float(ends[-1]),
-        float(times[start + gross[0]]) if len(gross) else math.nan,
-        float(slid[-1]),
-        tuple(float(ends[k]) if k < len(ends) else math.nan for k in places),
-    )
-
-
-def label_slips(labels: Sequence[Label]) -> tuple[Slip, ...]:
-    """Return the slips that labels name by their cause; labels that touch are one slip."""
-    slips: list[Slip] = []
-    for label in labels:
-        if label.cause is not Cause.SLIP:
-            continue
-        if slips and label.start - slips[-1].end < MIN_GAP_DURATION - TIME_TOLERANCE:
-            slips[-1] = slips[-1]._replace(end=label.end)
-        else:
-            slips.append(Slip(label.start, label.end))
-    return tuple(slips)
-
-
-def slip_truth(
-    recording: Recording, finger: str, times: Array, quiet: Mask | None = None
-) -> SlipTruth | None:
-    """Return the truth of the slips of a finger at some times.
-
-    It is that of the recording; without it, labels are taken as they are: a label with the cause
-    slip slides, another one of a held contact does not.
-
-    Args:
-        recording: with a truth or labels of the finger.
-        finger: name of the finger.
-        times: (n,) [s].
-        quiet: (n,) where the contact is stable by the truth; by default, by the labels.
-
-    Returns:
-        The truth; None if the recording has neither.
-    """
-    module, truth = recording.modules[finger], recording.truth
-    stable = module_states(module.labels, times) if quiet is None else quiet
-    if truth is not None and has_slip_truth(truth, finger):
-        place = np.clip(np.searchsorted(truth.times, times, side="right") - 1, 0, None)
-        codes = _truth_codes(truth, finger)[place]
-        return SlipTruth(codes, stable & (codes == STILL), finger_slips(truth, finger), "truth")
-    if not module.labels:
-        return None
-    codes = _label_codes(module.labels, times)
-    return SlipTruth(codes, stable & (codes == STILL), label_slips(module.labels), "labels")
-
-
-def has_slip_truth(truth: Truth, finger: str) -> bool:
-    """Return whether a truth has what the slips of a finger need."""
-    arrays = truth.fingers.get(finger, {})
-    return "phase" in truth.hand and {"contact_force", "slip_speed"} <= arrays.keys()
-
-
-def sample_durations(times: Array) -> Array:
-    """Return the time from each sample to the next, (n,) [s]; the median for the last."""
-    if len(times) < 2:
-        return np.zeros(len(times))
-    steps = np.diff(times)
-    return np.append(steps, np.median(steps))
-
-
-def module_states(labels: Sequence[Label], times: Array) -> Mask:
-    """Return (n,) True where a label is STABLE."""
-    stable = np.zeros(len(times), dtype=bool)
-    for label in labels:
-        if label.state is ContactState.STABLE:
-            stable[_places(label, times)] = True
-    return stable
-
-
-def _truth_codes(truth: Truth, finger: str) -> Codes:
-    """Return (n,) the code of each sample of the truth."""
-    arrays, times = truth.fingers[finger], truth.times
-    force = np.linalg.norm(arrays["contact_force"], axis=1)
-    touching = ~join_runs(
-        ~join_runs(force > CONTACT_FORCE, times, MIN_CONTACT_DURATION), times, MIN_CONTACT_DURATION
-    )
-    speed = arrays["slip_speed"]
-    codes = np.full(len(times), CREEPING, dtype=np.int8)
-    codes[speed > SLIP_SPEED] = SLIDING
-    codes[speed < STILL_SPEED] = STILL
-    codes[~(touching & np.isin(truth.hand["phase"], HELD_PHASES))] = NOT_HELD
-    return codes
-
-
-def _label_codes(labels: Sequence[Label], times: Array) -> Codes:
-    codes = np.full(len(times), NOT_HELD, dtype=np.int8)
-    for label in labels:
-        codes[_places(label, times)] = _label_code(label)
-    return codes
-
-
-def _label_code(label: Label) -> int:
-    if label.state is ContactState.NO_CONTACT or label.cause in _OUT_OF_HOLD:
-        return NOT_HELD
-    if label.cause is Cause.SLIP:
-        return SLIDING
-    is_known = label.state is ContactState.STABLE or label.cause is not None
-    return STILL if is_known else CREEPING
-
-
-def _places(label: Label, times: Array) -> slice:
-    first, last = np.searchsorted(times, (label.start - TIME_TOLERANCE, label.end - TIME_TOLERANCE))
-    return slice(int(first), int(last))
 
 
 @dataclass(frozen=True, eq=False)
@@ -426,13 +208,6 @@ class SlipMetrics(msgspec.Struct, frozen=True):
     quiet_minutes: float
     held_minutes: float
     onsets: Onsets
-
-
-class SlipSummary(msgspec.Struct, frozen=True):
-    """Metrics of the slips of each finger, and of all fingers together."""
-
-    fingers: dict[str, SlipMetrics]
-    pooled: SlipMetrics
 
 
 def slip_metrics(counts: SlipCounts) -> SlipMetrics:

@@ -1,7 +1,7 @@
 """Metrics of several recordings: per finger, pooled, per recording, by event."""
 
 from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from functools import partial
 
 import msgspec
@@ -31,6 +31,15 @@ from holdfast.metrics.samples import (
     metrics_of_samples,
     score_samples,
 )
+from holdfast.metrics.slip_thresholds import (
+    Curve,
+    SlipIntervals,
+    SlipSummary,
+    slip_curve,
+    slip_intervals,
+    slip_summary,
+)
+from holdfast.metrics.slips import SlipCounts, count_slips
 
 MAX_EXACT_SCORES = 10_000_000
 """Number of labelled samples above which the AUC comes from a histogram of the scores.
@@ -112,6 +121,7 @@ class Metrics(msgspec.Struct, frozen=True, omit_defaults=True):
         intervals: by bootstrap over recordings; None with fewer than two labelled recordings.
         score_bins: number of bins of the histogram of scores from which the AUC of all recordings
             is computed; None if it is exact, as up to 10 million samples.
+        slips: of the slip rule; None without one, or if no slips are known.
     """
 
     fingers: dict[str, SampleMetrics]
@@ -120,6 +130,7 @@ class Metrics(msgspec.Struct, frozen=True, omit_defaults=True):
     events: HandEventMetrics
     intervals: Intervals | None
     score_bins: int | None = None
+    slips: SlipSummary | None = None
 
 
 @dataclass(frozen=True, eq=False)
@@ -133,12 +144,16 @@ class RecordingResults:
         samples: by finger.
         events: by finger with labels.
         hand: events of the hand; None without labels.
+        slips: by finger whose slips are known.
+        slip_curves: the same at many thresholds, if they were asked for.
     """
 
     metrics: RecordingMetrics
     samples: Mapping[str, ScoredSamples]
     events: Mapping[str, EventCounts]
     hand: EventCounts | None
+    slips: Mapping[str, SlipCounts] = field(default_factory=dict)
+    slip_curves: Mapping[str, Curve] = field(default_factory=dict)
 
 
 def summarise(
@@ -169,8 +184,12 @@ def summarise(
     return summarise_results(results, n_resamples=n_resamples, seed=seed, level=level)
 
 
-def score_recording(decisions: Decisions) -> RecordingResults:
+def score_recording(decisions: Decisions, *, slip_curves: bool = False) -> RecordingResults:
     """Return what `summarise_results` needs of the decisions about a recording.
+
+    Args:
+        decisions: about the recording.
+        slip_curves: count the slips at many thresholds, too.
 
     Raises:
         ValueError: the probability of a decided sample is NaN.
@@ -193,7 +212,19 @@ def score_recording(decisions: Decisions) -> RecordingResults:
         {name: metrics_of_samples(own) for name, own in samples.items()},
         _event_metrics([events], [hand], list(samples)),
     )
-    return RecordingResults(metrics, samples, events, hand)
+    slips = {
+        name: finger.slip
+        for name, finger in decisions.fingers.items()
+        if finger.slip is not None and finger.slip.truth is not None
+    }
+    return RecordingResults(
+        metrics,
+        samples,
+        events,
+        hand,
+        {name: count_slips(slip) for name, slip in slips.items()},
+        {name: slip_curve(slip) for name, slip in slips.items()} if slip_curves else {},
+    )
 
 
 def summarise_results(
@@ -222,6 +253,7 @@ class _Group:
 
     def __init__(self) -> None:
         self.samples, self.hand = SampleTotal(), list[EventCounts]()
+        self.slips = SlipCounts.total([])
 
 
 class ResultTotal:
@@ -238,6 +270,7 @@ class ResultTotal:
         self.pooled = SampleTotal()
         self.events: list[Mapping[str, EventCounts]] = []
         self.hands: list[EventCounts | None] = []
+        self.slips: dict[str, SlipCounts] = {}
         self.groups: list[_Group] = []
         self.n_labelled = self.n_scores = 0
         self.binned = False
@@ -250,6 +283,10 @@ class ResultTotal:
         group = self._group() if results.events and self._keeps_groups else _Group()
         if results.hand is not None:
             group.hand.append(results.hand)
+        for name, counts in results.slips.items():
+            known = [self.slips[name]] if name in self.slips else []
+            self.slips[name] = SlipCounts.total([*known, counts])
+            group.slips = SlipCounts.total([group.slips, counts])
         for name, samples in results.samples.items():
             part = BinnedSamples.of(samples) if self.binned else samples
             for total in (self._finger(name), self.pooled, group.samples):
@@ -267,7 +304,12 @@ class ResultTotal:
             events=_event_metrics(self.events, self.hands, list(self.fingers)),
             intervals=self._intervals(n_resamples, seed, level),
             score_bins=N_BINS if self.binned else None,
+            slips=slip_summary([self.slips], self._slip_intervals(n_resamples, seed, level)),
         )
+
+    def _slip_intervals(self, n: int, seed: int, level: float) -> SlipIntervals | None:
+        curves = [(group.slips,) for group in self.groups] if self.slips else []
+        return slip_intervals(curves, n=n, seed=seed, level=level)
 
     def _finger(self, name: str) -> SampleTotal:
         if name not in self.fingers:

@@ -5,6 +5,7 @@ acts" changes often within one shake. A person labels the shake as a whole, and 
 """
 
 from dataclasses import dataclass, replace
+from typing import Literal
 
 import numpy as np
 import numpy.typing as npt
@@ -24,6 +25,9 @@ from holdfast.contact import (
 from holdfast.metrics.masks import Mask, join_runs, runs, runs_with, widen_runs
 from holdfast.recordings import Label, Recording, Truth, labels_from_samples
 from holdfast.sensors.types import Array
+
+Onsets = Literal["truth", "labels", "mixed"]
+"""Where onsets come from: the truth, the labels, or one in each recording."""
 
 HAND_TRUTH = {"phase", "outside_force"}
 """Arrays of the truth of the hand without which there are no labels."""

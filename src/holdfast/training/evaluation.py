@@ -5,8 +5,9 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from holdfast.contact import SIGNAL_FAULTS, UNKNOWN, Fault
-from holdfast.detector import detect
+from holdfast.classifiers.cause import CAUSES
+from holdfast.contact import SIGNAL_FAULTS, STABLE, UNKNOWN, Cause, Fault
+from holdfast.detector import FingerTrace, detect
 from holdfast.metrics import (
     Decisions,
     FingerDecisions,
@@ -17,10 +18,11 @@ from holdfast.metrics import (
     summarise,
 )
 from holdfast.metrics.decisions import hand_decisions
+from holdfast.metrics.slip_truth import SlipDecisions, slip_truth
 from holdfast.metrics.truth_labels import LabelRule, labels_by_truth
 from holdfast.model import Model
 from holdfast.parallel import Engine
-from holdfast.recordings import Recording, label_states
+from holdfast.recordings import Label, Recording, label_states
 from holdfast.sensors.types import Integers
 from holdfast.training.dataset_scan import OneRecording
 from holdfast.training.progress import Progress, show_nothing
@@ -57,11 +59,33 @@ def judge(model: Model, recording: Recording) -> tuple[Decisions, bool]:
             states=trace.state,
             stable_probability=trace.stable_probability,
             exact_labels=label_states(exact[name], trace.times) if name in exact else None,
+            slip=_slip_decisions(model, recording, name, trace, exact.get(name)),
         )
         for name, trace in detection.fingers.items()
     }
     hand = replace(hand_decisions(fingers, len(model.fingers)), states=detection.hand)
     return Decisions(recording.name, fingers, hand), loaded
+
+
+def _slip_decisions(
+    model: Model,
+    recording: Recording,
+    finger: str,
+    trace: FingerTrace,
+    exact: tuple[Label, ...] | None,
+) -> SlipDecisions | None:
+    """Return the decisions about the slips of a finger; None without a slip rule."""
+    rule = model.finger(finger).slip
+    if rule is None:
+        return None
+    quiet = None if exact is None else label_states(exact, trace.times) == STABLE
+    return SlipDecisions(
+        trace.times,
+        trace.slip_probability,
+        trace.cause == CAUSES.index(Cause.SLIP) + 1,
+        rule.hold,
+        slip_truth(recording, finger, trace.times, quiet),
+    )
 
 
 def was_trained_on(model: Model, recording: Recording) -> bool:
