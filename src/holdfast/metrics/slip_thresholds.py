@@ -113,6 +113,21 @@ class ThresholdChoice:
     false_alarms: float
 
 
+def held_out_places(
+    curves: Sequence[Curve], groups: Sequence[int], choice: ThresholdChoice
+) -> Integers:
+    """Return the place of the threshold for each recording, chosen without its group.
+
+    Args:
+        curves: of each recording.
+        groups: of each recording.
+        choice: of the threshold; if no threshold fits, the highest is taken.
+    """
+    others = np.array([[group != own for group in groups] for own in groups], dtype=np.float64)
+    table = [[_ratios(counts) for counts in curve] for curve in curves]
+    return _chooser(table, choice)(others)
+
+
 class _Ratio(NamedTuple):
     """A metric of one recording at one threshold, as part / whole times a factor."""
 

@@ -1,7 +1,7 @@
 """Fit of a model to training samples, with or without some units."""
 
 from collections.abc import Collection, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import numpy as np
 
@@ -11,6 +11,7 @@ from holdfast.model import FingerModel, Model
 from holdfast.recordings import Recording
 from holdfast.training.dataset_scan import DatasetScan, scan_dataset
 from holdfast.training.setting import Setting
+from holdfast.training.slips import SlipSamples
 from holdfast.training.splits import DataSplit, split_data
 from holdfast.training.training_samples import FingerSamples, gather_samples
 
@@ -23,11 +24,13 @@ class TrainingData:
         scan: of the dataset.
         data_split: of the dataset into units.
         fingers: training samples of each classifier: by finger, or `"*"` for all fingers.
+        slips: training samples of each slip rule, likewise.
     """
 
     scan: DatasetScan
     data_split: DataSplit
     fingers: Mapping[str, FingerSamples]
+    slips: Mapping[str, SlipSamples] = field(default_factory=dict)
 
     @property
     def thinned(self) -> dict[str, tuple[int, int]]:
@@ -101,6 +104,7 @@ def fit_model(
                 own.contact_threshold(recordings) if threshold is None else threshold
             ),
             contact_load=setting.contact_load_of(finger),
+            slip=data.slips[finger].fit(held) if finger in data.slips else None,
         )
     if not fingers:
         return None

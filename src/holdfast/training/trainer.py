@@ -15,6 +15,7 @@ from holdfast.metrics import (
     score_recording,
     summarise_results,
 )
+from holdfast.metrics.slip_thresholds import Curve
 from holdfast.model import ANY_FINGER, Model
 from holdfast.parallel import Engine
 from holdfast.recordings import Recording
@@ -30,8 +31,9 @@ from holdfast.training.model_fit import TrainingData, fit_full_model, fit_model
 from holdfast.training.progress import Progress, show_nothing
 from holdfast.training.provenance import adaptation_warnings, known_recordings, training_record
 from holdfast.training.setting import SEARCH_SAMPLES, Setting, Split
+from holdfast.training.slips import choose_slip_threshold, gather_slip_samples, with_slip_threshold
 from holdfast.training.splits import DataSplit, inner_folds, split_data
-from holdfast.training.training_samples import gather_samples, thin, thinning_step
+from holdfast.training.training_samples import SamplesPlan, gather_samples, thin, thinning_step
 from holdfast.training.tuning import INNER_FOLDS, search
 from holdfast.training.verdict import LoadedTares, verdict
 
@@ -117,6 +119,7 @@ def train(
     model = fit_full_model(trainer.data, trainer.setting, final)
     metrics = trainer.cross_validate(held_out or [final])
     _warn_of_undecided(metrics, warn)
+    model, metrics = trainer.choose_slip_threshold(model, metrics)
     provenance = training_record(
         trainer.setting, trainer.scan, final, metrics.pooled, trainer.data.thinned
     )
@@ -149,7 +152,12 @@ class _Trainer:
         self.fingers = gather_samples(
             recordings, self.scan, setting, self.data_split, engine, progress
         )
-        self.data = TrainingData(self.scan, self.data_split, self.fingers)
+        plan = SamplesPlan(self.scan, setting, self.data_split)
+        slips = (
+            gather_slip_samples(recordings, plan, engine, progress) if setting.init is None else {}
+        )
+        self.data = TrainingData(self.scan, self.data_split, self.fingers, slips)
+        self.slip_curves: list[tuple[Mapping[str, Curve], int]] = []
 
     def _with_split(self, setting: Setting) -> Setting:
         """Return the setting; a model is adapted to one recording with the split by time."""
@@ -260,11 +268,35 @@ class _Trainer:
             used = [models[self.data_split.group_of[place] % len(models)]]
         return place, scanned.name, OneRecording(self.recordings, place), used
 
+    def choose_slip_threshold(self, model: Model, metrics: Metrics) -> tuple[Model, Metrics]:
+        """Return the model with the threshold of its slip rules, and the metrics of slips.
+
+        Call it after the cross-validation. A model that is adapted keeps its slip rules.
+        """
+        replace_fields, init = msgspec.structs.replace, self.setting.init
+        if init is not None:
+            slips = {name: init.finger(name).slip for name in model.fingers}
+            fingers = {
+                name: replace_fields(part, slip=slips[name]) for name, part in model.fingers.items()
+            }
+            return replace_fields(model, fingers=fingers), metrics
+        curves = [curve for curve, _ in self.slip_curves]
+        groups = [group for _, group in self.slip_curves]
+        chosen = choose_slip_threshold(curves, groups, self.setting.seed)
+        if chosen is None:
+            return with_slip_threshold(model, None), metrics
+        if chosen.reason:
+            self.warn(chosen.reason)
+        return with_slip_threshold(model, chosen), replace_fields(metrics, slips=chosen.metrics)
+
     def _results(
         self, evaluated: Iterator[tuple[RecordingResults, bool]]
     ) -> Iterator[RecordingResults]:
-        for results, loaded in self.progress(evaluated, "evaluating", len(self.recordings)):
+        groups = self.data_split.group_of
+        done = self.progress(evaluated, "evaluating", len(self.recordings))
+        for place, (results, loaded) in enumerate(done):
             self.n_loaded += loaded
+            self.slip_curves.append((results.slip_curves, int(groups[place])))
             yield results
 
 
@@ -308,7 +340,7 @@ def _score_out_of_fold(
         decisions = each[0]
     elif len(each) == len(models) and len({tuple(one.fingers) for one in each}) == 1:
         decisions = combine_decisions(each, lambda n: data_split.units_of(place, n), n_fingers)
-    return score_recording(decisions), loaded
+    return score_recording(decisions, slip_curves=True), loaded
 
 
 def _judge(model: Model, recording: Recording) -> tuple[Decisions, bool]:

@@ -163,8 +163,8 @@ def gather_samples(
         for finger, samples in found.items():
             parts[finger][place] = samples
     n = len(scan.recordings)
-    fingers = {finger: _concatenate(own, n) for finger, own in parts.items() if own}
-    return {ANY_FINGER: _pool(fingers)} if setting.is_shared else fingers
+    fingers = {finger: concatenate_parts(own, n) for finger, own in parts.items() if own}
+    return {ANY_FINGER: pool_fingers(fingers)} if setting.is_shared else fingers
 
 
 def _read(
@@ -213,7 +213,7 @@ def _samples_of_part(
     (given,) = part
     recording = given if scan.relative else resample_if_needed(given, scan.rate)
     rate = scan.model_rate or recording.rate
-    stream = stream_plan(_sensors_of(recording, scan), setting.features, setting, rate)
+    stream = stream_plan(sensors_of(recording, scan), setting.features, setting, rate)
     found = {}
     for finger, rows in extract(stream, recording).items():
         module = recording.modules[finger]
@@ -234,7 +234,7 @@ def _samples_of_part(
     return found
 
 
-def _concatenate(parts: Mapping[int, RecordingSamples], n_recordings: int) -> FingerSamples:
+def concatenate_parts(parts: Mapping[int, RecordingSamples], n_recordings: int) -> FingerSamples:
     """Return the samples of a finger in all recordings, in order.
 
     Args:
@@ -256,7 +256,7 @@ def _concatenate(parts: Mapping[int, RecordingSamples], n_recordings: int) -> Fi
     )
 
 
-def _sensors_of(recording: Recording, scan: DatasetScan) -> dict[str, Sensor]:
+def sensors_of(recording: Recording, scan: DatasetScan) -> dict[str, Sensor]:
     """Return the sensor of each finger that has samples, and the sensor of the scan."""
     modules = {f: recording.modules[f] for f in scan.sensors if f in recording.modules}
     return {
@@ -357,7 +357,7 @@ def rest_moments(module: Tactile, tare: Tare, rate: float) -> tuple[int, float, 
     return len(amplitude), float(amplitude.sum()), float((amplitude**2).sum())
 
 
-def _pool(fingers: Mapping[str, FingerSamples]) -> FingerSamples:
+def pool_fingers(fingers: Mapping[str, FingerSamples]) -> FingerSamples:
     """Return the samples of all fingers together."""
     each = list(fingers.values())
     if len({own.sensor for own in each}) > 1:
