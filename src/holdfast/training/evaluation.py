@@ -205,6 +205,21 @@ def _evaluate_part(
     return score_recording(decisions), loaded, known, [decisions] if keep else []
 
 
+def _combined_slips(
+    decisions: Sequence[SlipDecisions | None], unit: Integers
+) -> SlipDecisions | None:
+    """Return the decisions about slips of several models, each about its own samples."""
+    known = [slip for slip in decisions if slip is not None]
+    if not known or len(known) < len(decisions):
+        return None
+    every = np.arange(len(unit))
+    return replace(
+        known[0],
+        probability=np.stack([slip.probability for slip in known])[unit, every],
+        raised=np.stack([slip.raised for slip in known])[unit, every],
+    )
+
+
 def combine_decisions(
     decisions: Sequence[Decisions], units_of: Callable[[int], Integers], n_model_fingers: int
 ) -> Decisions:
@@ -235,5 +250,6 @@ def combine_decisions(
             ),
             states=states[unit, every],
             stable_probability=probabilities[unit, every],
+            slip=_combined_slips([decision.fingers[name].slip for decision in decisions], unit),
         )
     return Decisions.of(decisions[0].name, fingers, n_model_fingers)

@@ -7,7 +7,7 @@ from itertools import repeat
 import msgspec
 import numpy as np
 
-from holdfast.classifiers import LogisticRegression
+from holdfast.classifiers.logreg import LogisticRegression
 from holdfast.classifiers.slip import SlipRule, SlipThresholds
 from holdfast.contact import STABLE, UNKNOWN, UNSTABLE
 from holdfast.features.stream import extract
