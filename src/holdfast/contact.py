@@ -130,7 +130,7 @@ class ContactEstimate(msgspec.Struct, frozen=True, gc=False):
         cause: the likely cause while UNSTABLE, for a model that tells causes apart; else None.
             With a slip rule it is `slip` whenever the finger is decided to slide, also before
             the state becomes UNSTABLE.
-        slip_probability: probability that the finger slides; NaN while UNKNOWN, and for a model
+        slip_probability: probability that the finger slides; NaN while UNKNOWN, None for a model
             without a slip rule.
     """
 
@@ -143,7 +143,7 @@ class ContactEstimate(msgspec.Struct, frozen=True, gc=False):
     faults: tuple[Fault, ...] = ()
     faulty_taxels: tuple[int, ...] = ()
     cause: Cause | None = None
-    slip_probability: float = math.nan
+    slip_probability: float | None = None
 
 
 class HandEstimate(msgspec.Struct, frozen=True, gc=False):
@@ -444,7 +444,7 @@ def _with_faults(
         state=ContactState.UNKNOWN,
         reason=reason,
         stable_probability=math.nan,
-        slip_probability=math.nan,
+        slip_probability=None if finger.slip_probability is None else math.nan,
         cause=None,
         faults=tuple(fault for fault in Fault if fault in both),
     )

@@ -1,7 +1,8 @@
 """Estimates of a whole recording, as arrays."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
+from itertools import repeat
 from typing import NamedTuple
 
 import numpy as np
@@ -49,7 +50,7 @@ class FingerTrace(NamedTuple):
         faults: (n,) bits in the order of `Fault`.
         faulty_taxels: (n,) bit i is set if the taxel at index i is faulty by itself.
         cause: (n,) codes of the causes while UNSTABLE: 1 is the first of `Cause`; 0 for none.
-        slip_probability: (n,); NaN while UNKNOWN, and without a slip rule.
+        slip_probability: (n,); NaN while UNKNOWN. None for a model without a slip rule.
     """
 
     times: Array
@@ -61,7 +62,7 @@ class FingerTrace(NamedTuple):
     faults: npt.NDArray[np.int16]
     faulty_taxels: npt.NDArray[np.int64]
     cause: npt.NDArray[np.int8]
-    slip_probability: Array
+    slip_probability: Array | None = None
 
     def __len__(self) -> int:
         return len(self.times)
@@ -84,9 +85,15 @@ class FingerTrace(NamedTuple):
                 map(faults_of, self.faults[rows].tolist()),
                 map(taxels_of, self.faulty_taxels[rows].tolist()),
                 [CAUSES_BY_CODE[code] for code in self.cause[rows].tolist()],
-                self.slip_probability[rows].tolist(),
+                self._slips(rows),
             )
         )
+
+    def _slips(self, rows: slice) -> Iterable[float | None]:
+        if self.slip_probability is None:
+            return repeat(None)
+        slips: list[float] = self.slip_probability[rows].tolist()
+        return slips
 
 
 @dataclass(frozen=True)
@@ -110,6 +117,8 @@ def detection_of(
     name: str,
     fingers: Sequence[str],
     chunks: Sequence[tuple[Array, npt.NDArray[np.bool_], TraceRows]],
+    *,
+    has_slips: bool = False,
 ) -> Detection:
     """Join the chunks that the compiled rule filled.
 
@@ -117,6 +126,7 @@ def detection_of(
         name: of the recording.
         fingers: in the order of the columns.
         chunks: times, present fingers and rows of each chunk.
+        has_slips: whether the model has a slip rule.
     """
     if not chunks:
         return Detection(name, {}, np.empty(0), np.empty(0, dtype=np.int8))
@@ -137,6 +147,6 @@ def detection_of(
                 rows.faults[own, place],
                 rows.taxels[own, place],
                 rows.cause[own, place],
-                rows.slip[own, place],
+                rows.slip[own, place] if has_slips else None,
             )
     return Detection(name, found, times, rows.hand)

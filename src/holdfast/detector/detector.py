@@ -127,6 +127,7 @@ class Detector:
     def _start(self, model: Model, stream: FeatureStream) -> None:
         self._rule = rule_of(model, stream.plan)
         self._parts = [model.finger(name) for name in stream.plan.fingers]
+        self._has_slips = any(part.slip is not None for part in self._parts)
         n_fingers = len(stream.plan.fingers)
         self._names = (*stream.plan.fingers, HAND)
         self._readings = np.zeros((len(stream.layout.rotations), 3))
@@ -268,7 +269,7 @@ class Detector:
             self._last_time = float(times[-1])
             chunks.append((times, present, rows))
         self._states = tuple(self._changes.states)
-        return detection_of(recording.name, stream.plan.fingers, chunks)
+        return detection_of(recording.name, stream.plan.fingers, chunks, has_slips=self._has_slips)
 
     def _run_chunk(self, readings: Array, present: Flags, times: Array, rows: TraceRows) -> None:
         """Fill the rows of a chunk; sample by sample, if a classifier is not compiled."""
@@ -325,15 +326,16 @@ class Detector:
 
     def _estimate(self, time: float, code: int) -> HandEstimate:
         """Return the estimate that the kernel reported, and note its changes of state."""
-        fingers, known = {}, self._decisions
+        fingers, known, has_slips = {}, self._decisions, self._has_slips
         for name, (at, number, probability, sigma, x, y, z, slip) in zip(
             self._slots, self._read_report(), strict=False
         ):
             state, reason, faults, cause = known.get(number) or self._decode(number)
             taxels = self._faulty_taxels(name) if faults else ()
             fingers[name] = ContactEstimate(
-                at, state, reason, probability, sigma, (x, y, z), faults, taxels, cause, slip
-            )
+                at, state, reason, probability, sigma, (x, y, z), faults, taxels, cause,
+                slip if has_slips else None,
+            )  # fmt: skip
         hand = STATES[code % CHANGED]
         if code >= CHANGED:
             states = (*[finger.state for finger in fingers.values()], hand)

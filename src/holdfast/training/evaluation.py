@@ -76,7 +76,7 @@ def _slip_decisions(
 ) -> SlipDecisions | None:
     """Return the decisions about the slips of a finger; None without a slip rule."""
     rule = model.finger(finger).slip
-    if rule is None:
+    if rule is None or trace.slip_probability is None:
         return None
     quiet = None if exact is None else label_states(exact, trace.times) == STABLE
     return SlipDecisions(
