@@ -39,6 +39,8 @@ MIN_STILL_DURATION = 0.1
 """Sliding that stops for less than this time is one slip [s]."""
 MIN_SLIP_DURATION = 0.02
 """A slip lasts at least this time [s], or slides at least `MIN_SLIP_DISTANCE`."""
+ROUNDING = 1e-9
+"""Share of a distance by which a sum of steps may fall short of it."""
 MIN_SLIP_DISTANCE = 1e-4
 """Sliding distance from which a shorter slip counts [m]."""
 DISTANCES = (0.001, 0.003)
@@ -134,7 +136,7 @@ def _slip(times: Array, steps: Array, speed: Array, share: Array, start: int, en
     slid = np.cumsum((speed * steps)[start:end])
     ends = times[start:end] + steps[start:end]
     gross = np.flatnonzero((share[start:end] >= GROSS_SHARE) & (speed[start:end] > 0))
-    places = np.searchsorted(slid, DISTANCES)
+    places = np.searchsorted(slid, np.array(DISTANCES) * (1 - ROUNDING))
     return Slip(
         float(times[start]),
         float(ends[-1]),
