@@ -20,7 +20,7 @@ from holdfast.metrics.slips import (
 )
 from holdfast.sensors.types import Array, Flags, Integers
 
-LOG_ODDS = np.arange(-24, 41) * 0.25
+LOG_ODDS = np.arange(-40, 81) * 0.1
 """Log odds of the thresholds that are tried."""
 THRESHOLDS = 1.0 / (1.0 + np.exp(-LOG_ODDS))
 """Thresholds of the probability of a slip that are tried, lowest first."""

@@ -1,8 +1,8 @@
 """Training of slip rules: samples that slide or hold still, and the threshold of the decision."""
 
-from collections.abc import Collection, Iterator, Mapping, Sequence
+import math
+from collections.abc import Callable, Collection, Iterable, Mapping, Sequence
 from dataclasses import dataclass
-from itertools import repeat
 
 import msgspec
 import numpy as np
@@ -10,8 +10,11 @@ import numpy as np
 from holdfast.classifiers.logreg import LogisticRegression
 from holdfast.classifiers.slip import SlipRule, SlipThresholds
 from holdfast.contact import STABLE, UNKNOWN, UNSTABLE
+from holdfast.errors import ModelError, TrainingError
 from holdfast.features.stream import extract
+from holdfast.metrics import RecordingResults, score_recording
 from holdfast.metrics.slip_thresholds import (
+    MAX_RAISED_QUIET,
     THRESHOLDS,
     Curve,
     SlipSummary,
@@ -23,11 +26,12 @@ from holdfast.metrics.slip_thresholds import (
     total_curve,
 )
 from holdfast.metrics.slip_truth import SLIDING, STILL, slip_truth
-from holdfast.metrics.slips import SlipCounts, found_shares
+from holdfast.metrics.slips import SlipCounts, SlipMetrics, found_shares, slip_metrics
 from holdfast.model import ANY_FINGER, Model
 from holdfast.parallel import Engine
 from holdfast.recordings import Recording
 from holdfast.training.dataset_scan import OneRecording
+from holdfast.training.evaluation import compute_decisions
 from holdfast.training.progress import Progress
 from holdfast.training.training_samples import (
     FingerSamples,
@@ -48,6 +52,10 @@ SLIP_FALSE_ALARMS = 1.0
 """False alarms per minute of all held time of a finger for which the threshold is set."""
 MIN_SLIDING_SAMPLES = 50
 """Fewer sliding samples train no slip rule."""
+N_SHOWN = 3
+"""Thresholds that are shown on either side of the chosen one."""
+
+Steps = Callable[[Iterable[Recording]], Iterable[Recording]]
 
 
 @dataclass(frozen=True)
@@ -206,22 +214,20 @@ def choose_slip_threshold(
 
 def with_slip_threshold(model: Model, chosen: ChosenThreshold | None) -> Model:
     """Return the model whose slip rules have a threshold; without slip rules if there is none."""
-    rules: Iterator[tuple[str, SlipRule | None]]
     if chosen is None or chosen.place is None:
-        rules = zip(model.fingers, repeat(None))
-    else:
-        record = threshold_record(chosen.counts)
-        rules = (
-            (
-                name,
-                part.slip and _with_threshold(part.slip, float(THRESHOLDS[chosen.place]), record),
-            )
-            for name, part in model.fingers.items()
-        )
+        return _with_rules(model, lambda _: None)
+    record, threshold = threshold_record(chosen.counts), float(THRESHOLDS[chosen.place])
+    return _with_rules(model, lambda rule: _with_threshold(rule, threshold, record))
+
+
+def _with_rules(model: Model, change: Callable[[SlipRule], SlipRule | None]) -> Model:
+    """Return the model with changed slip rules."""
+    replace = msgspec.structs.replace
     fingers = {
-        name: msgspec.structs.replace(model.fingers[name], slip=rule) for name, rule in rules
+        name: replace(part, slip=part.slip and change(part.slip))
+        for name, part in model.fingers.items()
     }
-    return msgspec.structs.replace(model, fingers=fingers)
+    return replace(model, fingers=fingers)
 
 
 def _with_threshold(rule: SlipRule, threshold: float, record: SlipThresholds) -> SlipRule:
@@ -244,3 +250,96 @@ def threshold_record(
         held_minutes=minutes,
         recordings=dict(recordings or {}),
     )
+
+
+@dataclass(frozen=True)
+class TunedSlips:
+    """Result of tuning the slip rules of a model.
+
+    Attributes:
+        model: with the chosen threshold.
+        threshold: that was chosen.
+        chosen: metrics at this threshold, on the recordings from which it was chosen.
+        before: metrics of the model that was given.
+        points: thresholds around it and their metrics, lowest first.
+    """
+
+    model: Model
+    threshold: float
+    chosen: SlipMetrics
+    before: SlipMetrics
+    points: tuple[tuple[float, SlipMetrics], ...]
+
+
+def tune_slips(
+    model: Model,
+    recordings: Sequence[Recording],
+    false_alarms: float,
+    *,
+    progress: Steps = lambda recordings: recordings,
+) -> TunedSlips:
+    """Choose the threshold of the slip rules for a rate of false alarms in held time.
+
+    Args:
+        model: with slip rules.
+        recordings: with a truth, or labels of slips.
+        false_alarms: maximum number per minute of held time, of one finger.
+        progress: iterates over the recordings.
+
+    Raises:
+        ValueError: the rate is not above 0.
+        ModelError: the model has no slip rule; or a recording has other fingers or sensors.
+        TrainingError: no slips are known, the held time is too short for the rate, or no
+            threshold gives so few false alarms.
+    """
+    if not (math.isfinite(false_alarms) and false_alarms > 0):
+        raise ValueError(f"false alarms per minute above 0 expected, {false_alarms:g} given")
+    if all(part.slip is None for part in model.fingers.values()):
+        raise ModelError(
+            f"{model.name or 'the model'} has no slip rule; train one on recordings whose slips "
+            "are known"
+        )
+    digests: dict[str, str] = {}
+    results: list[RecordingResults] = []
+    for recording in progress(recordings):
+        digests[recording.name] = recording.digest
+        results.append(score_recording(compute_decisions(model, recording), slip_curves=True))
+    curve = total_curve([curve for result in results for curve in result.slip_curves.values()])
+    if not curve:
+        raise TrainingError(f"{len(results)} recordings without slips that are known")
+    place = _supported(curve, false_alarms)
+    before = SlipCounts.total(counts for result in results for counts in result.slips.values())
+    threshold = float(THRESHOLDS[place])
+    record = threshold_record(curve[place], false_alarms, digests)
+    tuned = _with_rules(model, lambda rule: _with_threshold(rule, threshold, record))
+    around = range(max(place - N_SHOWN, 0), min(place + N_SHOWN + 1, len(curve)))
+    return TunedSlips(
+        msgspec.structs.replace(tuned, name=f"{model.name}, tuned" if model.name else ""),
+        threshold,
+        slip_metrics(curve[place]),
+        slip_metrics(before),
+        tuple((float(THRESHOLDS[k]), slip_metrics(curve[k])) for k in around),
+    )
+
+
+def _supported(curve: Curve, false_alarms: float) -> int:
+    """Return the place of the threshold.
+
+    Raises:
+        TrainingError: the data do not support the rate, or no threshold has it.
+    """
+    minutes = curve[0].held_seconds / 60
+    if minutes * false_alarms < 1:
+        raise TrainingError(
+            f"{minutes:.2g} min of held time given; {false_alarms:g} false alarms a minute need "
+            f"at least {1 / false_alarms:.2g} min"
+        )
+    place = choose_threshold(curve, false_alarms)
+    if place is None:
+        least = min(60 * counts.false_held / counts.held_seconds for counts in curve)
+        raise TrainingError(
+            f"no threshold gives at most {false_alarms:g} false alarms a minute of held time "
+            f"with a slip reported in at most {MAX_RAISED_QUIET:g} % of quiet hold; the least is "
+            f"{least:.2g}"
+        )
+    return place
