@@ -3,7 +3,7 @@ import pytest
 from sklearn.metrics import roc_auc_score
 
 from holdfast.metrics import bootstrap_interval, ratio_of_sums
-from holdfast.metrics.intervals import _draws, auc_of, quantile_of
+from holdfast.metrics.statistics import _draws, auc_of, quantile_of
 
 RNG = np.random.default_rng(5)
 DRAWS = RNG.multinomial(6, np.full(6, 1 / 6), size=20).astype(float)

@@ -11,8 +11,8 @@ from holdfast.metrics.events import (
     match_decisions,
     pool_events,
 )
-from holdfast.metrics.intervals import Interval, bootstrap_interval, ratio_of_sums
 from holdfast.metrics.samples import SampleMetrics, calibration_sums, sample_metrics
+from holdfast.metrics.statistics import Interval, bootstrap_interval, ratio_of_sums
 from holdfast.metrics.summary import (
     EventIntervals,
     HandEventMetrics,

@@ -9,9 +9,8 @@ from msgspec.structs import replace
 from holdfast.contact import STABLE, TIME_TOLERANCE, UNKNOWN, ContactState
 from holdfast.metrics import bootstrap_interval, match_alarms
 from holdfast.metrics.decisions import Codes
-from holdfast.metrics.intervals import auc_of
 from holdfast.metrics.masks import Mask
-from holdfast.metrics.statistics import mann_whitney_u
+from holdfast.metrics.statistics import auc_of, mann_whitney_u
 from holdfast.sensors.types import Array
 from holdfast_lab.report.result_tables import Row
 from holdfast_lab.study.comparison.real_estimates import (

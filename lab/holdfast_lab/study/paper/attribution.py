@@ -9,7 +9,7 @@ import numpy as np
 
 from holdfast.features import DEFAULT_WINDOW, DEPLOYED_FEATURES
 from holdfast.metrics import bootstrap_interval
-from holdfast.metrics.intervals import Statistic
+from holdfast.metrics.statistics import Statistic
 from holdfast.sensors.types import Array
 from holdfast.twin.uskin.parameters import UskinParameters
 from holdfast_lab.report.html_report import ReportFigure

@@ -15,8 +15,8 @@ from scipy.ndimage import minimum_filter1d
 from holdfast.contact import GLITCH_DURATION, HELD_PHASES, SLIP_SPEED, Phase
 from holdfast.features import DEFAULT_WINDOW, Tare, haar_features
 from holdfast.metrics import Interval, bootstrap_interval
-from holdfast.metrics.intervals import Statistic
 from holdfast.metrics.masks import Mask
+from holdfast.metrics.statistics import Statistic
 from holdfast.metrics.truth_labels import LabelRule, glitches
 from holdfast.recordings import Truth
 from holdfast.sensors.types import Array

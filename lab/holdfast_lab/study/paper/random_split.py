@@ -14,8 +14,7 @@ import numpy.typing as npt
 
 from holdfast.classifiers import RECIPES, Classifier, Parameters, Recipe, Samples, Threshold
 from holdfast.metrics import bootstrap_interval, ratio_of_sums
-from holdfast.metrics.intervals import Interval
-from holdfast.metrics.statistics import percent
+from holdfast.metrics.statistics import Interval, percent
 from holdfast.sensors.types import Integers
 from holdfast.training.setting import SEARCH_SAMPLES
 from holdfast.training.splits import inner_folds
