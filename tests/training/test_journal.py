@@ -6,7 +6,7 @@ import pytest
 
 from holdfast.errors import OutputError
 from holdfast.parallel import map_ordered
-from holdfast.training.journal import Journal, search_key
+from holdfast.training.tuning import Journal, search_key
 
 ONE = {"C": 0.1 + 0.2, "class_weight": "balanced"}
 TWO = {"C": 1e-4, "class_weight": None}

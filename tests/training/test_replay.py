@@ -7,7 +7,7 @@ import pytest
 from holdfast.features import parse_features
 from holdfast.model import Debounce
 from holdfast.training import Setting, compute_decisions, train
-from holdfast.training.replay import Replay, alarms, stable_counts, with_threshold
+from holdfast.training.threshold import Replay, alarms, stable_counts, with_threshold
 
 from .build import tiny_recording
 

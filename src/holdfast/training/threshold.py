@@ -1,20 +1,41 @@
-"""Choice of the threshold of a model for a wanted rate of false alarms."""
+"""Choice of the threshold of a model for a wanted rate of false alarms.
+
+The decision rule is replayed with each threshold, from probabilities that are computed once.
+"""
 
 import math
-from collections.abc import Callable, Iterable, Sequence
-from dataclasses import dataclass
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from dataclasses import dataclass, replace
 from typing import Any
 
 import msgspec
 import numpy as np
 import numpy.typing as npt
 
+from holdfast.compiled import compiled
+from holdfast.contact import NO_CONTACT, STABLE, UNKNOWN
+from holdfast.detector.arrays import CANDIDATE, LAST_UNSTABLE, STATE
+from holdfast.detector.decision_rule import (
+    classify_contact,
+    debounce,
+    hold_unstable,
+    new_decision_memory,
+)
 from holdfast.errors import ModelError, TrainingError
-from holdfast.metrics import AlarmMatch, EventMetrics, FingerDecisions, pool_events
-from holdfast.model import Model, ThresholdPoint, Tuning
+from holdfast.metrics import (
+    AlarmMatch,
+    Decisions,
+    EventMetrics,
+    FingerDecisions,
+    hand_decisions,
+    match_decisions,
+    pool_events,
+)
+from holdfast.metrics.decisions import Codes
+from holdfast.model import Debounce, Model, ThresholdPoint, Tuning
 from holdfast.recordings import Recording
+from holdfast.sensors.types import Array, Integers
 from holdfast.training.evaluation import compute_decisions
-from holdfast.training.replay import Replay, alarms, stable_counts, with_threshold
 
 LOG_ODDS = np.arange(-40, 41) * 0.2
 """Log odds of the thresholds that are tried first."""
@@ -25,6 +46,66 @@ USABLE_SHARE = 0.5
 which it is STABLE at the lowest threshold: a hand that is never STABLE gives no false alarm."""
 N_SHOWN = 3
 """Thresholds that are shown on either side of the chosen one."""
+
+
+def with_threshold(model: Model, threshold: float) -> Model:
+    """Return the model with another threshold of the probability for all fingers."""
+    fingers = {
+        name: msgspec.structs.replace(
+            part, classifier=msgspec.structs.replace(part.classifier, threshold=threshold)
+        )
+        for name, part in model.fingers.items()
+    }
+    return msgspec.structs.replace(model, fingers=fingers)
+
+
+@dataclass(frozen=True)
+class Replay:
+    """Decisions about one recording, for any threshold.
+
+    Attributes:
+        raw: decisions without debouncing, hold and hysteresis.
+        debounce: of the model.
+        period: of the samples [s].
+        n_model_fingers: number of fingers of the model.
+    """
+
+    raw: Decisions
+    debounce: Debounce
+    period: float
+    n_model_fingers: int
+
+    @classmethod
+    def of(cls, model: Model, recording: Recording) -> "Replay":
+        """Compute the probabilities of a recording.
+
+        Raises:
+            ModelError: the recording has other fingers or sensors.
+        """
+        raw = compute_decisions(msgspec.structs.replace(model, debounce=Debounce()), recording)
+        n_fingers = len(raw.fingers) if "*" in model.fingers else len(model.fingers)
+        period = 1 / (model.rate or recording.rate)
+        return cls(raw, model.debounce, period, n_fingers)
+
+    def hand(self, threshold: float) -> FingerDecisions:
+        """Return the decisions about the hand at a threshold."""
+        fingers = {
+            name: replace(finger, states=self._states(finger, threshold))
+            for name, finger in self.raw.fingers.items()
+        }
+        return hand_decisions(fingers, self.n_model_fingers)
+
+    def _states(self, finger: FingerDecisions, threshold: float) -> Codes:
+        out = np.zeros(len(finger.times), dtype=np.int8)
+        rule = self.debounce
+        memory = new_decision_memory(1)
+        limits = np.array([threshold, rule.hysteresis, rule.hold, rule.min_duration, self.period])
+        _replay(
+            np.array(finger.times), np.array(finger.stable_probability), np.array(finger.states),
+            limits, memory.codes[0], memory.values[0], out,
+        )  # fmt: skip
+        return out
+
 
 Steps = Callable[[Iterable[Recording]], Iterable[Recording]]
 
@@ -110,7 +191,7 @@ def tune(
     every = _in_order(_usable([*points, *fine]))
     chosen = _confirm(model, recordings, _ranked(every, false_alarms), false_alarms)
     tuned = with_threshold(model, chosen.threshold)
-    own = max(part.classifier.threshold for part in model.fingers.values())
+    before = max(part.classifier.threshold for part in model.fingers.values())
     return Tuned(
         msgspec.structs.replace(
             tuned,
@@ -118,7 +199,7 @@ def tune(
             tuning=_record(chosen, points, digests, false_alarms),
         ),
         chosen,
-        _point(replays, own),
+        _point(replays, before),
         _around(points, chosen),
     )
 
@@ -171,10 +252,10 @@ def _ranked(points: Sequence[OperatingPoint], false_alarms: float) -> list[Opera
 
     Without events, the most sensitive first.
     """
-    found = [point for point in points if point.false_alarms <= false_alarms]
+    quiet = [point for point in points if point.false_alarms <= false_alarms]
     if points[0].events.n_events:
-        return sorted(found, key=lambda point: (point.missed, point.false_alarms))
-    return sorted(found, key=lambda point: -point.threshold)
+        return sorted(quiet, key=lambda point: (point.missed, point.false_alarms))
+    return sorted(quiet, key=lambda point: -point.threshold)
 
 
 def _best(points: Sequence[OperatingPoint], false_alarms: float) -> OperatingPoint:
@@ -204,11 +285,11 @@ def _confirm(
 ) -> OperatingPoint:
     """Return the first point that the detector confirms; a long debouncing can differ a little."""
     for point in ranked:
-        own = with_threshold(model, point.threshold)
-        hands = [compute_decisions(own, recording).hand for recording in recordings]
-        found = _measure([hand for hand in hands if hand is not None], point.threshold)
-        if found.false_alarms <= false_alarms:
-            return found
+        candidate = with_threshold(model, point.threshold)
+        hands = [compute_decisions(candidate, recording).hand for recording in recordings]
+        confirmed = _measure([hand for hand in hands if hand is not None], point.threshold)
+        if confirmed.false_alarms <= false_alarms:
+            return confirmed
     raise TrainingError(f"no threshold gives at most {false_alarms:g} false alarms a minute")
 
 
@@ -246,3 +327,52 @@ def _record(
 
 def _threshold_point(point: OperatingPoint) -> ThresholdPoint:
     return ThresholdPoint(point.threshold, round(point.false_alarms, 3), point.events.missed["0.2"])
+
+
+@compiled
+def _replay(
+    times: Array,
+    probability: Array,
+    raw: Codes,
+    limits: Array,
+    codes: Integers,
+    decided: Array,
+    out: Codes,
+) -> None:
+    """Fill the states of a finger, by the steps of the detector.
+
+    Args:
+        times: (n,) [s].
+        probability: (n,) of stability.
+        raw: (n,) states without debouncing; UNKNOWN and NO_CONTACT do not depend on the threshold.
+        limits: threshold, hysteresis, hold [s], minimum duration [s] and period [s].
+        codes: as in `DecisionMemory`; is changed.
+        decided: as in `DecisionMemory`; is changed.
+        out: (n,) is filled.
+    """
+    threshold, hysteresis, hold, min_duration, period = limits
+    for k in range(len(times)):
+        if raw[k] == UNKNOWN:
+            codes[STATE] = codes[CANDIDATE] = UNKNOWN
+            decided[LAST_UNSTABLE] = np.nan
+        else:
+            state = NO_CONTACT
+            if raw[k] != NO_CONTACT:
+                state = classify_contact(probability[k], threshold, hysteresis, codes[STATE])
+                state = hold_unstable(state, decided, hold, times[k], period)
+            debounce(codes, decided, state, min_duration, times[k], period)
+        out[k] = codes[STATE]
+
+
+def alarms(hand: FingerDecisions) -> AlarmMatch:
+    """Return the events and alarms of the hand; none without labels."""
+    return match_decisions(hand) if hand.labels.any() else AlarmMatch((), (), 0.0)
+
+
+def stable_counts(hand: FingerDecisions) -> Mapping[str, int]:
+    """Return the number of samples labelled STABLE, and of these decided STABLE."""
+    labelled = hand.labels == STABLE
+    return {
+        "labelled": int(labelled.sum()),
+        "decided": int((labelled & (hand.states == STABLE)).sum()),
+    }
