@@ -4,7 +4,7 @@ from typing import TYPE_CHECKING
 
 from holdfast.training.evaluation import compute_decisions, evaluate
 from holdfast.training.setting import SPLITS, Setting
-from holdfast.training.threshold import OperatingPoint, Tuned, tune
+from holdfast.training.threshold import ThresholdMetrics, Tuned, tune
 from holdfast.training.trainer import Trained, train
 
 if TYPE_CHECKING:
@@ -12,9 +12,9 @@ if TYPE_CHECKING:
 
 __all__ = [
     "SPLITS",
-    "OperatingPoint",
     "Setting",
     "StabilityClassifier",
+    "ThresholdMetrics",
     "Trained",
     "Tuned",
     "compute_decisions",

@@ -60,7 +60,7 @@ def with_threshold(model: Model, threshold: float) -> Model:
 
 
 @dataclass(frozen=True)
-class Replay:
+class ThresholdReplay:
     """Decisions about one recording, for any threshold.
 
     Attributes:
@@ -76,7 +76,7 @@ class Replay:
     n_model_fingers: int
 
     @classmethod
-    def of(cls, model: Model, recording: Recording) -> "Replay":
+    def of(cls, model: Model, recording: Recording) -> "ThresholdReplay":
         """Compute the probabilities of a recording.
 
         Raises:
@@ -110,7 +110,7 @@ class Replay:
 Steps = Callable[[Iterable[Recording]], Iterable[Recording]]
 
 
-class OperatingPoint(msgspec.Struct, frozen=True):
+class ThresholdMetrics(msgspec.Struct, frozen=True):
     """Metrics of the hand at one threshold.
 
     Attributes:
@@ -146,9 +146,9 @@ class Tuned:
     """
 
     model: Model
-    chosen: OperatingPoint
-    before: OperatingPoint
-    points: tuple[OperatingPoint, ...]
+    chosen: ThresholdMetrics
+    before: ThresholdMetrics
+    points: tuple[ThresholdMetrics, ...]
 
 
 def tune(
@@ -184,7 +184,7 @@ def tune(
     replays = []
     for recording in progress(recordings):
         digests[recording.name] = recording.digest
-        replays.append(Replay.of(model, recording))
+        replays.append(ThresholdReplay.of(model, recording))
     points = _usable([_point(replays, t) for t in _probabilities(LOG_ODDS)])
     first = _best(points, false_alarms)
     fine = [_point(replays, t) for t in _probabilities(_log_odds(first.threshold) + FINE_STEPS)]
@@ -212,11 +212,11 @@ def _log_odds(probability: float) -> float:
     return math.log(probability / (1 - probability))
 
 
-def _point(replays: Sequence[Replay], threshold: float) -> OperatingPoint:
+def _point(replays: Sequence[ThresholdReplay], threshold: float) -> ThresholdMetrics:
     return _measure([replay.hand(threshold) for replay in replays], threshold)
 
 
-def _measure(hands: Sequence[FingerDecisions], threshold: float) -> OperatingPoint:
+def _measure(hands: Sequence[FingerDecisions], threshold: float) -> ThresholdMetrics:
     matches: list[AlarmMatch] = [alarms(hand) for hand in hands]
     counts = [stable_counts(hand) for hand in hands]
     labelled = sum(count["labelled"] for count in counts)
@@ -229,10 +229,10 @@ def _measure(hands: Sequence[FingerDecisions], threshold: float) -> OperatingPoi
             "of it"
         )
     decided = sum(count["decided"] for count in counts)
-    return OperatingPoint(threshold, 100 * decided / labelled, events)
+    return ThresholdMetrics(threshold, 100 * decided / labelled, events)
 
 
-def _usable(points: list[OperatingPoint]) -> list[OperatingPoint]:
+def _usable(points: list[ThresholdMetrics]) -> list[ThresholdMetrics]:
     """Return the thresholds at which the hand is STABLE often enough, and not for ever.
 
     Below the hysteresis of the model a stable contact stays stable, so that every event is missed.
@@ -247,7 +247,7 @@ def _usable(points: list[OperatingPoint]) -> list[OperatingPoint]:
     return [point for point in usable if (point.events.missed["0.2"] or 0.0) < 100] or usable
 
 
-def _ranked(points: Sequence[OperatingPoint], false_alarms: float) -> list[OperatingPoint]:
+def _ranked(points: Sequence[ThresholdMetrics], false_alarms: float) -> list[ThresholdMetrics]:
     """Return the points with few enough false alarms, those that miss least first.
 
     Without events, the most sensitive first.
@@ -258,7 +258,7 @@ def _ranked(points: Sequence[OperatingPoint], false_alarms: float) -> list[Opera
     return sorted(quiet, key=lambda point: -point.threshold)
 
 
-def _best(points: Sequence[OperatingPoint], false_alarms: float) -> OperatingPoint:
+def _best(points: Sequence[ThresholdMetrics], false_alarms: float) -> ThresholdMetrics:
     ranked = _ranked(points, false_alarms)
     if ranked:
         return ranked[0]
@@ -270,7 +270,7 @@ def _best(points: Sequence[OperatingPoint], false_alarms: float) -> OperatingPoi
     )
 
 
-def _cost(point: OperatingPoint) -> str:
+def _cost(point: ThresholdMetrics) -> str:
     n = point.events.n_events
     if not n:
         return "has no event to miss"
@@ -280,9 +280,9 @@ def _cost(point: OperatingPoint) -> str:
 def _confirm(
     model: Model,
     recordings: Sequence[Recording],
-    ranked: Sequence[OperatingPoint],
+    ranked: Sequence[ThresholdMetrics],
     false_alarms: float,
-) -> OperatingPoint:
+) -> ThresholdMetrics:
     """Return the first point that the detector confirms; a long debouncing can differ a little."""
     for point in ranked:
         candidate = with_threshold(model, point.threshold)
@@ -293,11 +293,13 @@ def _confirm(
     raise TrainingError(f"no threshold gives at most {false_alarms:g} false alarms a minute")
 
 
-def _in_order(points: Iterable[OperatingPoint]) -> list[OperatingPoint]:
+def _in_order(points: Iterable[ThresholdMetrics]) -> list[ThresholdMetrics]:
     return sorted({point.threshold: point for point in points}.values(), key=lambda p: p.threshold)
 
 
-def _around(points: Sequence[OperatingPoint], chosen: OperatingPoint) -> tuple[OperatingPoint, ...]:
+def _around(
+    points: Sequence[ThresholdMetrics], chosen: ThresholdMetrics
+) -> tuple[ThresholdMetrics, ...]:
     """Return the chosen point and its neighbours among the first thresholds."""
     others = [p for p in points if p.threshold != chosen.threshold]
     below = [p for p in others if p.threshold < chosen.threshold][-N_SHOWN:]
@@ -306,8 +308,8 @@ def _around(points: Sequence[OperatingPoint], chosen: OperatingPoint) -> tuple[O
 
 
 def _record(
-    chosen: OperatingPoint,
-    points: Sequence[OperatingPoint],
+    chosen: ThresholdMetrics,
+    points: Sequence[ThresholdMetrics],
     digests: dict[str, str],
     false_alarms: float,
 ) -> Tuning:
@@ -325,7 +327,7 @@ def _record(
     )
 
 
-def _threshold_point(point: OperatingPoint) -> ThresholdPoint:
+def _threshold_point(point: ThresholdMetrics) -> ThresholdPoint:
     return ThresholdPoint(point.threshold, round(point.false_alarms, 3), point.events.missed["0.2"])
 
 
