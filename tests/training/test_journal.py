@@ -5,7 +5,7 @@ import numpy as np
 import pytest
 
 from holdfast.errors import OutputError
-from holdfast.parallel import map_ordered
+from holdfast.parallel import Engine
 from holdfast.training.tuning import Journal, search_key
 
 ONE = {"C": 0.1 + 0.2, "class_weight": "balanced"}
@@ -59,7 +59,7 @@ def fill(path, name):
 
 def test_parallel_searches_share_a_file(tmp_path):
     path = tmp_path / "search"
-    list(map_ordered(fill, [(path, name) for name in "abcd"], n_jobs=2))
+    list(Engine(2).map_ordered(fill, [(path, name) for name in "abcd"]))
     for name in "abcd":
         journal = Journal(path, name)
         found = [journal.find({"C": float(k), "class_weight": "balanced"}) for k in range(50)]

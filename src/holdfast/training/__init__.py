@@ -3,7 +3,7 @@
 from typing import TYPE_CHECKING
 
 from holdfast.training.evaluation import compute_decisions, evaluate
-from holdfast.training.setting import SPLITS, Setting
+from holdfast.training.setting import Setting
 from holdfast.training.threshold import ThresholdMetrics, Tuned, tune
 from holdfast.training.trainer import Trained, train
 
@@ -11,7 +11,6 @@ if TYPE_CHECKING:
     from holdfast.training.estimator import StabilityClassifier
 
 __all__ = [
-    "SPLITS",
     "Setting",
     "StabilityClassifier",
     "ThresholdMetrics",

@@ -21,7 +21,7 @@ from holdfast.classifiers.folds import deal_folds, shuffled
 from holdfast.contact import ContactState
 from holdfast.errors import TrainingError
 from holdfast.model import ANY_FINGER, Model
-from holdfast.parallel import map_ordered
+from holdfast.parallel import Engine
 from holdfast.recordings import Label, Recording
 from holdfast.sensors.types import Array
 from holdfast.training.model_fit import TrainingData, fit_model
@@ -160,7 +160,7 @@ class _FoldModels:
             for fold in range(min(n_folds, n_units))
         ]
         fingers = recordings.fingers - one_class.keys()
-        models = list(map_ordered(fit_model, tasks, n_jobs))
+        models = list(Engine(n_jobs).map_ordered(fit_model, tasks))
         return cls(
             fingers, {**constant, **one_class}, models, unit_folds[data_split.group_of].tolist()
         )
