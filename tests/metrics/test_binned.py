@@ -87,6 +87,7 @@ class TestSummary:
         assert binned.intervals.hand == exact.intervals.hand
         assert binned.intervals.auc == pytest.approx(exact.intervals.auc, abs=5e-3)
 
+    @pytest.mark.slow
     def test_many_recordings_are_drawn_in_groups(self, monkeypatch):
         alone = summarise(recordings(40))
         monkeypatch.setattr(summary, "MAX_GROUPS", 20)

@@ -27,6 +27,7 @@ def test_a_ratio_is_that_of_the_recordings_drawn():
     assert values == pytest.approx(expected)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("n", [30, 3000])
 def test_an_auc_is_that_of_the_samples_of_the_recordings_drawn(n):
     positives = [RNG.normal(r / 3, 1, n).round(3) for r in range(6)]

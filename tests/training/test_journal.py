@@ -57,6 +57,7 @@ def fill(path, name):
         journal.add({"C": float(k), "class_weight": "balanced"}, k / 7)
 
 
+@pytest.mark.slow  # it starts processes
 def test_parallel_searches_share_a_file(tmp_path):
     path = tmp_path / "search"
     list(Engine(2).map_ordered(fill, [(path, name) for name in "abcd"]))
