@@ -19,11 +19,12 @@ for _signal, _handler in (
         signal.signal(_signal, _handler)
 
 
-# The checks of a submission try the same examples every time; at home they differ.
-hypothesis.settings.register_profile("checks", derandomize=True)
-hypothesis.settings.register_profile("quick", max_examples=5)
-if os.environ.get("CI"):
-    hypothesis.settings.load_profile("checks")
+# The checks of a submission try the same examples every time; at home they differ. No example has
+# a deadline: pytest limits the time of a test.
+hypothesis.settings.register_profile("home", deadline=None)
+hypothesis.settings.register_profile("checks", deadline=None, derandomize=True)
+hypothesis.settings.register_profile("quick", deadline=None, max_examples=5)
+hypothesis.settings.load_profile("checks" if os.environ.get("CI") else "home")
 
 SLOW_FOLDERS = ("tests/attack", "tests/cli/label", "tests/docs", "tests/examples")
 """Folders without quick tests."""
@@ -145,7 +146,7 @@ def is_slow(path):
 
 
 def pytest_sessionstart(session):
-    """Deletes compiled kernels that are older than a source that they may be made of.
+    """Delete compiled kernels that are older than a source that they may be made of.
 
     Numba looks at the file of a kernel only, not at those that it imports, whose functions and
     constants are compiled into it.
@@ -153,12 +154,13 @@ def pytest_sessionstart(session):
     if hasattr(session.config, "workerinput"):
         return
     package = Path(__file__).parent / "src" / "holdfast"
-    for folder in package.rglob("__pycache__"):
-        for cache in folder.glob("*.nb[ci]"):
-            source = folder.parent / f"{cache.name.split('.')[0]}.py"
-            with suppress(FileNotFoundError):  # another run of the tests deletes them too
-                if cache.stat().st_mtime < newest(source):
-                    cache.unlink()
+    newest_source = max(path.stat().st_mtime for path in package.rglob("*.py"))
+    for cache in package.rglob("__pycache__/*.nb[ci]"):
+        source = cache.parents[1] / f"{cache.name.split('.')[0]}.py"
+        with suppress(FileNotFoundError):  # another run of the tests deletes them too
+            made = cache.stat().st_mtime
+            if made < newest_source and made < newest(source):  # the second one takes seconds
+                cache.unlink()
 
 
 @functools.cache

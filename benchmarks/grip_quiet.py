@@ -11,7 +11,7 @@ import argparse
 from dataclasses import replace
 
 from holdfast.grip import LAWS
-from holdfast.parallel import map_ordered
+from holdfast.parallel import Engine
 from holdfast_lab.trial.run import run_trial
 from holdfast_lab.trial.trials import Trial, draw_trials
 
@@ -24,7 +24,7 @@ def quiet(trial: Trial, hold: float, glitch_rate: float | None) -> Trial:
 
 def rate(law: str, trials: list[Trial]) -> str:
     """Return the false reactions per minute of a law, and the time that they rest on."""
-    results = list(map_ordered(run_trial, [(trial, law) for trial in trials], n_jobs=-1))
+    results = list(Engine(-1).map_ordered(run_trial, [(trial, law) for trial in trials]))
     minutes = sum(one.quiet_time for one in results) / 60
     return f"{sum(one.n_false for one in results) / minutes:8.1f} ({minutes:.1f} min)"
 

@@ -12,7 +12,7 @@ import pytest
 from holdfast.children import SAFE_PATH_VARIABLE, python_command, safe_path
 from holdfast.io import save_recording
 from holdfast.live.loop.watchdog import N_SAFE_COMMANDS
-from holdfast.parallel import map_ordered
+from holdfast.parallel import Engine
 from holdfast.synthetic import synthetic_recording
 
 OTHER_MODULES = (
@@ -146,7 +146,7 @@ def has_safe_path(number):
 
 def test_workers_have_a_safe_path_and_this_process_keeps_its_environment():
     before = os.environ.get(SAFE_PATH_VARIABLE)
-    assert set(map_ordered(has_safe_path, ((k,) for k in range(4)), 2)) == {(True, "1")}
+    assert set(Engine(2).map_ordered(has_safe_path, ((k,) for k in range(4)))) == {(True, "1")}
     assert os.environ.get(SAFE_PATH_VARIABLE) == before
 
 

@@ -12,7 +12,7 @@ import pytest
 
 from holdfast import cluster as cluster_module
 from holdfast.errors import EngineError, MissingExtra
-from holdfast.parallel import Engine, map_ordered
+from holdfast.parallel import Engine
 
 PRIVATE = {
     "threads_per_worker": 1,
@@ -58,13 +58,13 @@ def joined(*parts):
 
 ENDLESS = """
 import os, sys, time
-from holdfast.parallel import map_ordered
+from holdfast.parallel import Engine
 
 def work(place):
     print(os.getpid(), flush=True)
     time.sleep(100)
 
-list(map_ordered(work, [(0,), (1,)], n_jobs=2))
+list(Engine(2).map_ordered(work, [(0,), (1,)]))
 """
 
 
@@ -123,7 +123,7 @@ class TestMapOrdered:
     @pytest.mark.parametrize("n_jobs", [1, 2])
     def test_results_come_in_the_order_of_the_arguments(self, n_jobs):
         arguments = [(base, base % 3) for base in range(20)]
-        assert [n for n, _ in map_ordered(power, iter(arguments), n_jobs)] == [
+        assert [n for n, _ in Engine(n_jobs).map_ordered(power, iter(arguments))] == [
             b**e for b, e in arguments
         ]
 
@@ -135,22 +135,22 @@ class TestMapOrdered:
                 taken.append(base)
                 yield base, 1
 
-        results = map_ordered(power, arguments())
+        results = Engine().map_ordered(power, arguments())
         assert taken == []
         assert next(results) == (0, os.getpid())
         assert taken == [0]
 
     def test_two_at_a_time_run_in_other_processes(self):
-        assert os.getpid() not in {pid for _, pid in map_ordered(power, [(1, 1)] * 4, n_jobs=2)}
+        assert os.getpid() not in {pid for _, pid in Engine(2).map_ordered(power, [(1, 1)] * 4)}
 
     @pytest.mark.parametrize("n_jobs", [1, 2])
     def test_nothing_to_do(self, n_jobs):
-        assert list(map_ordered(power, [], n_jobs)) == []
+        assert list(Engine(n_jobs).map_ordered(power, [])) == []
 
     @pytest.mark.parametrize("n_jobs", [1, 2])
     def test_an_exception_of_the_function_is_raised(self, n_jobs):
         with pytest.raises(ValueError, match="negative"):
-            list(map_ordered(power, [(1, 1), (1, -1)], n_jobs))
+            list(Engine(n_jobs).map_ordered(power, [(1, 1), (1, -1)]))
 
 
 class TestEngine:

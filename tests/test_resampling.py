@@ -65,6 +65,7 @@ def test_up_is_linear():
     assert found.readings[:, 0, 0] == pytest.approx([0, 0.25, 0.5, 0.75, 1, 0.75, 0.5, 0.25, 0])
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("source", "rate"), RATES)
 def test_time_since_1970(source, rate):
     signal = np.random.default_rng(0).normal(size=20_000)

@@ -153,8 +153,8 @@ def _keys(tasks: Sequence[Task]) -> dict[str, str]:
 def _key(task: Task) -> str:
     function = f"{task.function.__module__}.{task.function.__qualname__}"
     version = task.version or source_digest((task.function.__module__,))
-    given = (version, function, task.arguments)
-    return sha256(msgpack.encode(given, order="deterministic")).hexdigest()
+    contents = (version, function, task.arguments)
+    return sha256(msgpack.encode(contents, order="deterministic")).hexdigest()
 
 
 def _cost(done: tuple[Task, Any]) -> float:

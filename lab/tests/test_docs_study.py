@@ -42,6 +42,7 @@ class TestPublished:
         others = {p.name for p in PUBLISHED.iterdir() if p.suffix != ".csv"}
         assert others == {"study.json", *templates}
 
+    @pytest.mark.slow
     def test_csv_and_json_have_the_same_values(self, summary):
         for name, rows in summary["tables"].items():
             text = (PUBLISHED / f"{name}.csv").read_text("utf-8").splitlines()

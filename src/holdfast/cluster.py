@@ -54,12 +54,12 @@ def call_on_cluster(
     with _client(scheduler) as client:
         _check_workers(client)
         copies = client.scatter(list(shared), broadcast=True, hash=False) if shared else []
-        given = (package_digest(), function, *copies)
+        common = (package_digest(), function, *copies)
         suspects: list[Call[K]] = []
-        yield from _submit(client, given, calls, suspects)
+        yield from _submit(client, common, calls, suspects)
         for call in suspects:
             failed: list[Call[K]] = []
-            yield from _submit(client, given, [call], failed)
+            yield from _submit(client, common, [call], failed)
             if failed:
                 raise EngineError(f"{call[0]}: its worker died each time, killed or out of memory")
 
@@ -113,7 +113,7 @@ _NO_HOLDFAST = "{} cannot import this holdfast: install the same version for it 
 
 
 def _submit(
-    client: "Client", given: Arguments, calls: Iterable[Call[K]], suspects: list[Call[K]]
+    client: "Client", common: Arguments, calls: Iterable[Call[K]], suspects: list[Call[K]]
 ) -> Iterator[tuple[K, Any]]:
     """Make calls on a cluster; append to `suspects` those whose workers died."""
     from distributed import KilledWorker
@@ -124,7 +124,7 @@ def _submit(
     while True:
         n_free = CALLS_PER_THREAD * max(sum(client.nthreads().values()), 1) - len(waiting)
         for call in islice(rest, max(n_free, 0)):
-            future = client.submit(_call, *given, *call[1], pure=False)
+            future = client.submit(_call, *common, *call[1], pure=False)
             waiting[future.key] = call, future
             future.add_done_callback(done.put)
         if not waiting:
@@ -187,10 +187,10 @@ def _check_workers(client: "Client") -> None:
     except NoWorker:
         raise _without_workers(client) from None
     expected = package_digest()
-    for address, found in client.run(package_digest, on_error="return").items():
-        if isinstance(found, Exception) and ModuleNotFoundError.__name__ in repr(found):
-            raise EngineError(_NO_HOLDFAST.format(f"the worker at {address}")) from found
-        if not isinstance(found, OSError) and found != expected:  # OSError: it died meanwhile
+    for address, digest in client.run(package_digest, on_error="return").items():
+        if isinstance(digest, Exception) and ModuleNotFoundError.__name__ in repr(digest):
+            raise EngineError(_NO_HOLDFAST.format(f"the worker at {address}")) from digest
+        if not isinstance(digest, OSError) and digest != expected:  # OSError: it died meanwhile
             raise EngineError(_OTHER_VERSION.format(f"the worker at {address}"))
 
 

@@ -129,11 +129,11 @@ def install_command(extra: str) -> str:
     from importlib.metadata import PackageNotFoundError, distribution
 
     try:
-        found = distribution("holdfast")
+        installed = distribution("holdfast")
     except PackageNotFoundError:
         return f'pip install "holdfast[{extra}]"'
-    with_uv = (found.read_text("INSTALLER") or "").strip() == "uv"
-    origin = json.loads(found.read_text("direct_url.json") or "{}")
+    with_uv = (installed.read_text("INSTALLER") or "").strip() == "uv"
+    origin = json.loads(installed.read_text("direct_url.json") or "{}")
     if origin.get("dir_info", {}).get("editable"):
         folder = origin["url"].removeprefix("file://")
         pip = f'pip install -e "{folder}[{extra}]"'

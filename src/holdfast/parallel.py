@@ -138,26 +138,6 @@ class Engine(NamedTuple):
         return ((name, function(*arguments)) for name, arguments in calls)
 
 
-def map_ordered(
-    function: Callable[..., T], arguments: Iterable[Arguments], n_jobs: int = 1
-) -> Iterator[T]:
-    """Call a function with many arguments on this machine, as `Engine.map_ordered` does.
-
-    Args:
-        function: any function that can be sent to another process.
-        arguments: the arguments of each call.
-        n_jobs: number of calls at a time; -1 for one per processor. With 1, all calls are made
-            in this process.
-
-    Yields:
-        The result of each call, in the order of the arguments.
-
-    Raises:
-        EngineError: the process died every time that one call was made.
-    """
-    return Engine(n_jobs).map_ordered(function, arguments)
-
-
 def _in_processes(
     function: Callable[..., T], calls: Iterable[Call[K]], n_jobs: int
 ) -> Iterator[tuple[K, T]]:

@@ -415,9 +415,9 @@ def _check_labels(labels: tuple[Label, ...], times: Array, period: float) -> Non
                 f"label {_span(label)} lies outside the recording, "
                 f"which runs from {start:.15g} to {end:.15g} s"
             )
-    for one, two in pairwise(labels):
-        if two.start < one.end - tolerance:
-            raise RecordingError(f"labels overlap: {_span(one)} and {_span(two)}")
+    for label, following in pairwise(labels):
+        if following.start < label.end - tolerance:
+            raise RecordingError(f"labels overlap: {_span(label)} and {_span(following)}")
 
 
 def _span(label: Label) -> str:

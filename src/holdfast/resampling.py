@@ -103,8 +103,8 @@ class Resampler:
     """
 
     def __init__(self, source_rate: float, rate: float) -> None:
-        for given in (source_rate, rate):
-            _check_rate(given)
+        for checked in (source_rate, rate):
+            _check_rate(checked)
         self._rate = rate
         self._gap = GAP_PERIODS / source_rate
         self._push = self._interpolate if rate / source_rate >= 1 else self._average
@@ -136,32 +136,32 @@ class Resampler:
             self._last, self._reading = time, values
             return [(time, values.copy())]
         reached = int((time - self._start + TOLERANCE_PERIODS / self._rate) * self._rate)
-        found = self._push(time, values, reached)
+        samples = self._push(time, values, reached)
         self._last = time
-        return found
+        return samples
 
     def _interpolate(self, time: float, values: Array, reached: int) -> list[tuple[float, Array]]:
-        found = []
+        samples = []
         while self._step <= reached:
             wanted = self._start + self._step / self._rate
             share = min(max((wanted - self._last) / (time - self._last), 0.0), 1.0)
-            found.append((wanted, (1 - share) * self._reading + share * values))
+            samples.append((wanted, (1 - share) * self._reading + share * values))
             self._step += 1
         self._reading = values
-        return found
+        return samples
 
     def _average(self, time: float, values: Array, reached: int) -> list[tuple[float, Array]]:
-        found = []
+        samples = []
         on_time = time <= self._start + reached / self._rate + TOLERANCE_PERIODS / self._rate
         if reached >= self._step:
             if self._n_summed and (reached > self._step or not on_time):
-                found.append(self._mean(self._step))
+                samples.append(self._mean(self._step))
             self._step = reached + 1
             if on_time:
                 self._add(values)
-                return [*found, self._mean(reached)]
+                return [*samples, self._mean(reached)]
         self._add(values)
-        return found
+        return samples
 
     def _add(self, values: Array) -> None:
         self._reading = self._reading + values if self._n_summed else values

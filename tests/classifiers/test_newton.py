@@ -70,6 +70,7 @@ def test_one_sample_of_a_class_and_a_constant_feature():
     assert found.weights[2] == 0.0
 
 
+@pytest.mark.slow
 def test_many_samples_have_a_finite_loss():
     """The product of the probabilities of 100,000 samples is far below the least number."""
     features, stable = samples(n=100_000, shift=0.1)
@@ -83,6 +84,7 @@ def classes_of(features, n_classes, seed=0):
     return (scores + np.random.default_rng(seed + 1).gumbel(size=scores.shape)).argmax(axis=1)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("c", [1e-4, 1.0, 1e4])
 @pytest.mark.parametrize("n_classes", [3, 5])
 def test_more_classes_have_the_weights_of_scikit_learn(n_classes, c):

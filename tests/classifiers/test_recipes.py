@@ -59,11 +59,13 @@ def test_it_learns(name):
     assert right.mean() > 0.8
 
 
+@pytest.mark.slow
 def test_it_is_deterministic(name):
     one, two = (recipe(name).fit(samples(), recipe(name).reference, 3) for _ in range(2))
     assert one == two
 
 
+@pytest.mark.slow
 def test_units_do_not_matter(name):
     given = samples()
     scaled = given._replace(features=given.features * [1e-3, 1e3, 1.0] + [7.0, 0.0, -2.0])
@@ -73,6 +75,7 @@ def test_units_do_not_matter(name):
     )
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("weight", WEIGHTS)
 @pytest.mark.parametrize("share", [0.1, 0.5, 0.9])
 def test_the_mean_probability_is_the_base_rate(name, weight, share):
@@ -81,6 +84,7 @@ def test_the_mean_probability_is_the_base_rate(name, weight, share):
     assert fitted.probability(given.features).mean() == pytest.approx(given.stable.mean(), abs=0.03)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("weight", WEIGHTS)
 @pytest.mark.parametrize("share", [0.15, 0.85])
 def test_probabilities_are_calibrated(name, weight, share):

@@ -22,7 +22,7 @@ class Taxel:
         self.share = share
         self.changed = []
         self.longest = 0  # samples without a change, but not by a fault
-        self.steps = []  # (number, squared change, squared change of the change)
+        self.steps = np.empty((0, 3))  # number, squared change, squared change of the change
         self.step = np.zeros(3)
 
     def watch(self, before, now, number, fresh, n_before, long):
@@ -39,16 +39,17 @@ class Taxel:
             self.changed.append(number)
             if before.any() and now.any():
                 turn = change - self.step
-                self.steps.append((number, change @ change, turn @ turn))
+                self.steps = np.vstack([self.steps, (number, change @ change, turn @ turn)])
                 self.step = change
             else:
                 self.step = np.zeros(3)
         if fresh:
-            self.steps, self.step = [], np.zeros(3)
+            self.steps, self.step = self.steps[:0], np.zeros(3)
 
-    def smooth(self, number, which):
-        keep = 1 - self.share
-        return sum(self.share * keep ** (number - x[0]) * x[which] for x in self.steps)
+    def smooth(self, number):
+        """Smoothed squared change, and squared change of the change."""
+        weights = self.share * (1 - self.share) ** (number - self.steps[:, 0])
+        return weights @ self.steps[:, 1:]
 
     def still(self, number):
         return number - (self.changed[-1] if self.changed else 0)
@@ -190,8 +191,8 @@ class Finger:
     def noisy(self):
         if len(self.used) < 4:
             return set()
-        rough = {i: taxel.smooth(self.n_news, 1) for i, taxel in self.taxels.items()}
-        rougher = {i: taxel.smooth(self.n_news, 2) for i, taxel in self.taxels.items()}
+        smooth = {i: taxel.smooth(self.n_news) for i, taxel in self.taxels.items()}
+        rough, rougher = ({i: pair[k] for i, pair in smooth.items()} for k in range(2))
         i = max(rougher, key=lambda i: rougher[i])
         quiet = 1 / math.sqrt(12)
         if self.sensor.unit == "N":

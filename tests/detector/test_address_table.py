@@ -41,6 +41,7 @@ def double(table):
     return values.inner.ready, values.inner.period, values.n, values.forces.shape, len(values.flags)
 
 
+@pytest.mark.slow
 def test_a_kernel_works_on_the_arrays_themselves():
     values = outer()
     table, arrays = table_of(values)

@@ -390,6 +390,7 @@ def test_is_not_copied(how):
     assert str(raised.value) == expected
 
 
+@pytest.mark.slow
 def test_memory_does_not_grow():
     detector, values = Detector(model(threshold=5.0)), lively(500)
 

@@ -13,6 +13,10 @@ from holdfast.features.haar import N_SUMS, append_pair, n_levels, newest_moments
 from . import naive
 
 WINDOWS = range(2, 65, 2)
+KINDS = [
+    np.float64,
+    *(pytest.param(kind, marks=pytest.mark.slow) for kind in (np.float32, np.int64, np.int16)),
+]
 BAR = 1e-9
 """Of the largest F_a in the window."""
 
@@ -46,7 +50,7 @@ def test_names():
 
 
 @pytest.mark.parametrize("window", WINDOWS)
-@pytest.mark.parametrize("kind", [np.float64, np.float32, np.int64, np.int16])
+@pytest.mark.parametrize("kind", KINDS)
 def test_equals_pywavelets_in_every_window_at_both_parities(window, kind):
     force = walk(window + 71, seed=window).astype(kind)
     assert worst(haar_features(force, window), by_pywt(force, window), force, window) < BAR
@@ -126,6 +130,7 @@ def test_takes_any_layout_and_changes_nothing(order):
     assert np.array_equal(force, before)
 
 
+@pytest.mark.slow
 @given(
     n=st.integers(0, 1500),
     half=st.integers(1, 32),

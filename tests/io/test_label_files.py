@@ -183,6 +183,7 @@ def test_missing_files(tmp_path):
             read(tmp_path / "none")
 
 
+@pytest.mark.slow
 def test_any_flipped_bit_is_found(make_recording, tmp_path):
     recording = make_recording(150)
     path = save_labels(recording, tmp_path / "a.parquet", author="ada", notes="ü", time="2026")

@@ -14,6 +14,7 @@ from holdfast.recordings import Recording, Tactile, Truth
 from holdfast.sensors import sensor
 
 
+@pytest.mark.slow
 @settings(deadline=None, max_examples=60)
 @given(data=st.data())
 def test_what_is_written_is_read(data, recordings, assert_same, tmp_path_factory):
@@ -84,6 +85,7 @@ def test_row_groups_are_a_minute_at_most(tmp_path):
     assert "BYTE_STREAM_SPLIT" in column.encodings
 
 
+@pytest.mark.slow
 def test_any_flipped_bit_is_found(make_recording, flipped, tmp_path):
     path, damaged = tmp_path / "a.parquet", tmp_path / "b.parquet"
     save_recording(make_recording(90), path)

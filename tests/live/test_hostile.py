@@ -58,6 +58,7 @@ def garbage(packet, generator):
     return generator.randbytes(generator.randrange(300))
 
 
+@pytest.mark.slow
 def test_ten_thousand_invalid_packets_do_no_harm():
     recording = build.grasp()
     packets = packets_of(recording)

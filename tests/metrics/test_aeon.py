@@ -15,6 +15,7 @@ import pytest
 
 from holdfast.contact import NO_CONTACT, STABLE, UNKNOWN, UNSTABLE
 from holdfast.metrics import match_alarms, sample_metrics
+from holdfast.metrics.events import EventCounts
 
 aeon = pytest.importorskip("aeon.benchmarking.metrics.anomaly_detection")
 
@@ -81,7 +82,9 @@ def test_events_without_an_alarm_against_recall_by_existence():
         found = match(case)
         hit = aeon.range_recall(spans(runs, len(states), 2, 26), alarms(states), alpha=1)
         assert len(found.events) == len(runs)
-        assert hit == pytest.approx(1 - found.n_missed(np.finfo(float).max) / len(runs))
+        assert hit == pytest.approx(
+            1 - EventCounts.of(found).n_missed(np.finfo(float).max) / len(runs)
+        )
 
 
 @pytest.mark.parametrize("post", [0.05, 0.1, 0.2])
@@ -90,7 +93,7 @@ def test_missed_at_post_against_recall_by_existence(post):
         _, runs, states = case
         soon = [(first, first + round(post * RATE)) for first, _ in runs]
         hit = aeon.range_recall(spans(soon, len(states), 2, 1), alarms(states), alpha=1)
-        assert hit == pytest.approx(1 - match(case).n_missed(post) / len(runs))
+        assert hit == pytest.approx(1 - EventCounts.of(match(case)).n_missed(post) / len(runs))
 
 
 def test_false_alarms_against_precision():
@@ -108,7 +111,7 @@ def test_a_state_that_was_not_stable_before_is_no_alarm():
         _, runs, states = case
         given_up = np.isin(states, (UNSTABLE, NO_CONTACT)).astype(np.int64)
         hit = aeon.range_recall(spans(runs, len(states), 2, 26), given_up, alpha=1)
-        ours = 1 - match(case).n_missed(np.finfo(float).max) / len(runs)
+        ours = 1 - EventCounts.of(match(case)).n_missed(np.finfo(float).max) / len(runs)
         assert hit >= ours - 1e-12
         more += hit > ours + 1e-12
     assert more > 0

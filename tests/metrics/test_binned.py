@@ -4,8 +4,14 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from holdfast.metrics import Decisions, FingerDecisions, summarise, summary
-from holdfast.metrics.binned import N_BINS, BinnedSamples, SampleTotal, bins_of
-from holdfast.metrics.samples import metrics_of_samples, score_samples
+from holdfast.metrics.samples import (
+    N_BINS,
+    BinnedSamples,
+    SampleTotal,
+    bins_of,
+    metrics_of_samples,
+    score_samples,
+)
 
 
 def scored(n, seed=0, spread=2.0):
@@ -81,6 +87,7 @@ class TestSummary:
         assert binned.intervals.hand == exact.intervals.hand
         assert binned.intervals.auc == pytest.approx(exact.intervals.auc, abs=5e-3)
 
+    @pytest.mark.slow
     def test_many_recordings_are_drawn_in_groups(self, monkeypatch):
         alone = summarise(recordings(40))
         monkeypatch.setattr(summary, "MAX_GROUPS", 20)

@@ -3,7 +3,7 @@ import pytest
 from sklearn.metrics import roc_auc_score
 
 from holdfast.metrics import bootstrap_interval, ratio_of_sums
-from holdfast.metrics.intervals import _draws, auc_of, quantile_of
+from holdfast.metrics.statistics import _draws, auc_of, quantile_of
 
 RNG = np.random.default_rng(5)
 DRAWS = RNG.multinomial(6, np.full(6, 1 / 6), size=20).astype(float)
@@ -27,6 +27,7 @@ def test_a_ratio_is_that_of_the_recordings_drawn():
     assert values == pytest.approx(expected)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("n", [30, 3000])
 def test_an_auc_is_that_of_the_samples_of_the_recordings_drawn(n):
     positives = [RNG.normal(r / 3, 1, n).round(3) for r in range(6)]

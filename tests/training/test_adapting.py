@@ -63,6 +63,7 @@ def test_given_fields_replace_those_of_the_model(known, few):
     assert (adapted.tare, adapted.debounce) == ("first", Debounce(0.02, 0.05, 0.3))
 
 
+@pytest.mark.slow
 def test_with_few_samples_adapting_is_better_than_training(known):
     """On other recordings of a hand where what is known before is right."""
     eager = msgspec.structs.replace(known, debounce=Debounce())

@@ -16,6 +16,8 @@ from holdfast.training import Setting, train
 
 from .build import tiny_recording
 
+pytestmark = pytest.mark.slow
+
 
 def test_parameters_are_kept_as_given():
     given = {"classifier": "svm", "window": 8, "features": "F_a,sigma", "tare": "first", "C": 3.0,

@@ -5,8 +5,8 @@ import numpy as np
 import pytest
 
 from holdfast.errors import OutputError
-from holdfast.parallel import map_ordered
-from holdfast.training.journal import Journal, search_key
+from holdfast.parallel import Engine
+from holdfast.training.tuning import Journal, search_key
 
 ONE = {"C": 0.1 + 0.2, "class_weight": "balanced"}
 TWO = {"C": 1e-4, "class_weight": None}
@@ -57,9 +57,10 @@ def fill(path, name):
         journal.add({"C": float(k), "class_weight": "balanced"}, k / 7)
 
 
+@pytest.mark.slow  # it starts processes
 def test_parallel_searches_share_a_file(tmp_path):
     path = tmp_path / "search"
-    list(map_ordered(fill, [(path, name) for name in "abcd"], n_jobs=2))
+    list(Engine(2).map_ordered(fill, [(path, name) for name in "abcd"]))
     for name in "abcd":
         journal = Journal(path, name)
         found = [journal.find({"C": float(k), "class_weight": "balanced"}) for k in range(50)]

@@ -7,7 +7,7 @@ import pytest
 from holdfast.features import parse_features
 from holdfast.model import Debounce
 from holdfast.training import Setting, compute_decisions, train
-from holdfast.training.replay import Replay, alarms, stable_counts, with_threshold
+from holdfast.training.threshold import ThresholdReplay, alarms, stable_counts, with_threshold
 
 from .build import tiny_recording
 
@@ -26,7 +26,7 @@ def test_it_gives_the_states_of_the_detector(model, debounce, threshold):
     own = msgspec.structs.replace(model, debounce=debounce)
     recording = tiny_recording(20)
     expected = compute_decisions(with_threshold(own, threshold), recording).hand
-    found = Replay.of(own, recording).hand(threshold)
+    found = ThresholdReplay.of(own, recording).hand(threshold)
     np.testing.assert_array_equal(found.times, expected.times)
     np.testing.assert_array_equal(found.labels, expected.labels)
     np.testing.assert_array_equal(found.states, expected.states)
@@ -35,7 +35,7 @@ def test_it_gives_the_states_of_the_detector(model, debounce, threshold):
 
 
 def test_a_lower_threshold_is_stable_more_often(model):
-    replay = Replay.of(model, tiny_recording(21))
+    replay = ThresholdReplay.of(model, tiny_recording(21))
     counts = [stable_counts(replay.hand(p)) for p in (0.999, 0.5, 0.001)]
     decided = [each["decided"] for each in counts]
     assert decided == sorted(decided)

@@ -5,6 +5,8 @@ from holdfast.classifiers import Samples, recipe
 from holdfast.training.splits import inner_folds
 from holdfast.training.tuning import search
 
+pytestmark = pytest.mark.slow
+
 
 def blobs(seed=0, n=240, n_groups=6):
     """Two overlapping clouds; groups are shifted against each other."""

@@ -96,6 +96,7 @@ def test_noise_has_the_documented_size():
 
 
 class TestGlitches:
+    @pytest.mark.slow
     def test_are_as_frequent_short_and_large_as_documented(self):
         errors = draw(0, 3000.0).errors
         struck = errors.any(axis=1)

@@ -8,6 +8,8 @@ from holdfast.twin.grasp import _aims as aims
 from holdfast.twin.hand import FINGERS, JOINTS, MIRRORED, HandModel
 from holdfast.twin.objects import OTHER_OBJECTS, distance_to, load_objects, object_named
 
+pytestmark = pytest.mark.slow
+
 OBJECTS = tuple(load_objects())
 OTHERS = tuple(load_objects(OTHER_OBJECTS))
 

@@ -80,6 +80,7 @@ def naive_distance(one: GraspObject, point: tuple[float, float, float]) -> float
     return segments_distance(corners, np.array([q, z])) - r
 
 
+@pytest.mark.slow
 @settings(max_examples=300)
 @given(name=names, point=points)
 def test_same_as_the_naive_distance(name: str, point: tuple[float, float, float]) -> None:
@@ -87,6 +88,7 @@ def test_same_as_the_naive_distance(name: str, point: tuple[float, float, float]
     assert float(distance_to(SMOOTH[name], point)) == pytest.approx(expected, abs=1e-12)
 
 
+@pytest.mark.slow
 @settings(max_examples=300)
 @given(name=names, point=points, other=points)
 def test_it_is_a_distance(name: str, point: tuple[float, ...], other: tuple[float, ...]) -> None:
@@ -101,6 +103,7 @@ def test_it_is_a_distance(name: str, point: tuple[float, ...], other: tuple[floa
         )
 
 
+@pytest.mark.slow
 @settings(max_examples=300)
 @given(
     name=names, angle=st.floats(-3.1, 3.1), height=st.floats(-0.9, 0.9), d=st.floats(-2.5e-3, 9e-3)

@@ -119,6 +119,7 @@ class TestHold:
 
 
 class TestPush:
+    @pytest.mark.slow
     @settings(deadline=None, max_examples=200)
     @given(
         place=st.tuples(*[st.floats(-0.05, 0.05)] * 3),

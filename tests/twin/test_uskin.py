@@ -252,6 +252,7 @@ def test_an_axis_reads_the_others_by_the_row_of_its_mixing():
     np.testing.assert_allclose(counts[1] - counts[0], expected, atol=0.51)
 
 
+@pytest.mark.slow
 def test_drift_over_50_minutes_is_that_of_the_data_sheet():
     """Standard deviation of z over many runs: 3.5 K and 120 counts, x and y hardly any."""
     times = np.arange(0.0, 3000.1, 10.0)

@@ -81,7 +81,7 @@ class Network:
         """
         torch = _torch()
         rows = feature_rows(features, self.n_features)
-        found = np.full(len(rows), np.nan)
+        probabilities = np.full(len(rows), np.nan)
         known = np.flatnonzero(~np.isnan(rows).any(axis=1))
         weights = {name: torch.from_numpy(array) for name, array in self.weights.items()}
         with _one_thread(torch), torch.no_grad():
@@ -90,8 +90,8 @@ class Network:
             ):
                 windows = torch.from_numpy(_windows(rows[chunk], self.mean, self.scale))
                 scores = torch.softmax(forward(windows, weights).double(), dim=1)
-                found[chunk] = undo_balancing(scores[:, 1].numpy(), self.class_ratio)
-        return found
+                probabilities[chunk] = undo_balancing(scores[:, 1].numpy(), self.class_ratio)
+        return probabilities
 
 
 @dataclass(frozen=True)
@@ -157,17 +157,17 @@ class TemporalConvolution:
 
 def weight_shapes(n_channels: int) -> dict[str, tuple[int, ...]]:
     """Return the shape of every array of weights: 9974 numbers for Grover's six channels."""
-    found: dict[str, tuple[int, ...]] = {"match": (N_FILTERS, n_channels, 1)}
-    found["match/bias"] = (N_FILTERS,)
+    shapes: dict[str, tuple[int, ...]] = {"match": (N_FILTERS, n_channels, 1)}
+    shapes["match/bias"] = (N_FILTERS,)
     for block in range(N_BLOCKS):
         for layer in range(2):
             width = N_FILTERS if block or layer else n_channels
-            found[f"block{block}/{layer}"] = (N_FILTERS, width, KERNEL_SIZE)
-            for each in ("bias", "gain", "shift"):
-                found[f"block{block}/{layer}/{each}"] = (N_FILTERS,)
+            shapes[f"block{block}/{layer}"] = (N_FILTERS, width, KERNEL_SIZE)
+            for part in ("bias", "gain", "shift"):
+                shapes[f"block{block}/{layer}/{part}"] = (N_FILTERS,)
     for k, (before, after) in enumerate(pairwise((N_FILTERS, N_HIDDEN, N_HIDDEN, 2))):
-        found |= {f"dense{k}": (after, before), f"dense{k}/bias": (after,)}
-    return found
+        shapes |= {f"dense{k}": (after, before), f"dense{k}/bias": (after,)}
+    return shapes
 
 
 def forward(
@@ -213,12 +213,12 @@ def _convolve(values: Tensor, weights: Mapping[str, Tensor], name: str) -> Tenso
     """Apply a causal convolution, the normalisation over channels and the activation."""
     from torch.nn import functional
 
-    found = functional.conv1d(
+    filtered = functional.conv1d(
         functional.pad(values, (KERNEL_SIZE - 1, 0)), weights[name], weights[f"{name}/bias"]
     )
     gain, shift = weights[f"{name}/gain"], weights[f"{name}/shift"]
-    found = functional.layer_norm(found.transpose(1, 2), (N_FILTERS,), gain, shift, EPSILON)
-    return functional.selu(found.transpose(1, 2))
+    filtered = functional.layer_norm(filtered.transpose(1, 2), (N_FILTERS,), gain, shift, EPSILON)
+    return functional.selu(filtered.transpose(1, 2))
 
 
 class EarlyStopping:

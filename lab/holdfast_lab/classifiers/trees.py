@@ -50,13 +50,13 @@ class Trees:
             ValueError: the number of features is not `n_features`.
         """
         rows = feature_rows(features, self.n_features)
-        found = np.full(len(rows), np.nan)
+        probabilities = np.full(len(rows), np.nan)
         known = ~np.isnan(rows).any(axis=1)
         if known.any():
             with _one_thread():
                 balanced = self.estimator.predict_proba(rows[known])[:, 1]
-            found[known] = undo_balancing(balanced, self.class_ratio)
-        return found
+            probabilities[known] = undo_balancing(balanced, self.class_ratio)
+        return probabilities
 
 
 @dataclass(frozen=True)

@@ -122,9 +122,9 @@ def draw_reliability(curves: Mapping[str, Array], notes: Mapping[str, str] | Non
         _draw_bins(axes, below, table, styles[name])
     axes.set(xlim=(-0.02, 1.02), ylim=(-0.02, 1.02))
     below.set_yscale("log")
-    for each in (axes, below):
-        style_axes(each)
-        each.grid(color=FAINT, linewidth=0.5)
+    for panel in (axes, below):
+        style_axes(panel)
+        panel.grid(color=FAINT, linewidth=0.5)
     add_labels(axes, y="fraction labelled stable")
     add_labels(below, "probability of stability", "samples [%]")
     handles = legend_handles({name: styles[name] for name in curves}, [curves])

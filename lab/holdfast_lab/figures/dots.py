@@ -144,7 +144,7 @@ def _draw_intervals(
 
 def _number(value: float | None, otherwise: float | None = None) -> float:
     """Return the first of the two that is neither None nor NaN, else NaN."""
-    for each in (value, otherwise):
-        if each is not None and not np.isnan(each):
-            return float(each)
+    for number in (value, otherwise):
+        if number is not None and not np.isnan(number):
+            return float(number)
     return float("nan")

@@ -177,7 +177,7 @@ def _paragraph(text: str) -> Paragraph:
 
 def _fact_lines(value: object) -> list[str]:
     if isinstance(value, Mapping):
-        return [f"{name}: {each}" for name, each in value.items()]
+        return [f"{name}: {text}" for name, text in value.items()]
     if isinstance(value, Iterable) and not isinstance(value, str):
-        return [str(each) for each in value]
+        return [str(item) for item in value]
     return [str(value)]

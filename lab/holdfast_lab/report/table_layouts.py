@@ -120,7 +120,7 @@ def to_latex(table: ResultTable) -> str:
         "table.tex",
         table=text,
         environment="table*" if n_columns > WIDE_COLUMNS else "table",
-        caption=" ".join(_sentence(each) for each in (text.title, *text.notes)),
+        caption=" ".join(_sentence(sentence) for sentence in (text.title, *text.notes)),
         alignment="l" * len(text.keys) + "r" * len(text.columns),
     )
 

@@ -52,7 +52,7 @@ def run_notes(summary: Mapping[str, Any]) -> list[str]:
         f"{summary['tasks']} tasks with seed {summary['seed']}. Results that were stored by an "
         "earlier run are not counted in the time."
     )
-    return [*notes, *(f"Left out: {each}" for each in summary["left_out"])]
+    return [*notes, *(f"Left out: {sentence}" for sentence in summary["left_out"])]
 
 
 def _describe(corpus: Corpus) -> dict[str, Any]:

@@ -115,8 +115,8 @@ def scan_corpus(name: str, folder: str | Path, tare: str = "0.5") -> Corpus:
             _count(recording, n_labelled)
             yield recording
 
-    found = scan_dataset(counted())
-    labelled = [entry.name for entry in found.recordings if entry.n_labelled]
+    scan = scan_dataset(counted())
+    labelled = [entry.name for entry in scan.recordings if entry.n_labelled]
     if len(labelled) < 2:
         raise TrainingError(
             f"{folder}: one recording with labels given ({labelled[0]}); at least two are "
@@ -128,7 +128,7 @@ def scan_corpus(name: str, folder: str | Path, tare: str = "0.5") -> Corpus:
         recordings=dataset.names,
         digest=digest.hexdigest(),
         fingers=_fingers_of_both_classes(n_labelled, folder),
-        rate=found.rate,
+        rate=scan.rate,
         tare=str(Tare.parse(tare)),
         n_samples=sum(n_samples),
     )

@@ -33,15 +33,15 @@ def _accuracies(rows: list[Row]) -> Iterator[str]:
         ("held out", "The paper's protocol (samples split at random)"),
         ("other objects", "The same classifiers on objects that were not in training"),
     ):
-        found = [
+        accuracies = [
             (name, row)
             for name in CLASSIFIERS
             for row in _select(rows, {"classifier": name, "on": on, "figure": "accuracy"})
         ]
-        if found:
+        if accuracies:
             paper = _paper if on == "held out" else lambda _: ""  # it tested no other objects
-            parts = [f"{name} {_value(row)} % correct{paper(row)}" for name, row in found]
-            yield f"{words}: {', '.join(parts)}{_recordings(found[0][1])}."
+            parts = [f"{name} {_value(row)} % correct{paper(row)}" for name, row in accuracies]
+            yield f"{words}: {', '.join(parts)}{_recordings(accuracies[0][1])}."
 
 
 def _strongest(rows: list[Row]) -> Iterator[str]:

@@ -63,12 +63,12 @@ class TrialCourse(msgspec.Struct, frozen=True):
     def of(cls, instants: Iterable[Instant]) -> Self:
         """Return the course of the samples."""
         every = list(instants)
-        lost = (one.time for one in every if one.is_lost)
+        lost = (moment.time for moment in every if moment.is_lost)
         return cls(
-            times=[one.time for one in every],
-            force=[one.force for one in every],
-            least=[one.least for one in every],
-            slip_speed=[one.slip_speed for one in every],
+            times=[moment.time for moment in every],
+            force=[moment.force for moment in every],
+            least=[moment.least for moment in every],
+            slip_speed=[moment.slip_speed for moment in every],
             lost_at=next(lost, None),
         )
 

@@ -80,7 +80,7 @@ def _results(plan: TrialPlan, runner: TaskRunner) -> Results:
     tasks = {law: [plan.trial_task(number, law) for number in range(plan.n)] for law in plan.laws}
     by_number = (task for same in zip(*tasks.values(), strict=True) for task in same)
     done = runner.run(list(by_number))
-    return {law: [done[task.name] for task in each] for law, each in tasks.items()}
+    return {law: [done[task.name] for task in tasks_of_law] for law, tasks_of_law in tasks.items()}
 
 
 def _example(plan: TrialPlan, number: int, runner: TaskRunner) -> Example:

@@ -86,10 +86,10 @@ def course_figure(courses: Mapping[str, TrialCourse], what: str) -> ReportFigure
     """
     drawn = {
         law: ForceCourse(
-            np.array(each.times), np.array(each.force), np.array(each.least),
-            np.array(each.slip_speed), each.lost_at,
+            np.array(course.times), np.array(course.force), np.array(course.least),
+            np.array(course.slip_speed), course.lost_at,
         )
-        for law, each in courses.items()
+        for law, course in courses.items()
     }  # fmt: skip
     return ReportFigure(
         "course",
@@ -105,9 +105,9 @@ def _held(results: Sequence[TrialResult], value: Callable[[TrialResult], float])
 
 def _trade_offs(by_law: Mapping[str, Summary]) -> dict[str, TradeOff]:
     return {
-        law: TradeOff(_estimate(each["force_ratio_mean"]), _estimate(each["dropped"]))
-        for law, each in by_law.items()
-        if each["n"]
+        law: TradeOff(_estimate(summary["force_ratio_mean"]), _estimate(summary["dropped"]))
+        for law, summary in by_law.items()
+        if summary["n"]
     }
 
 

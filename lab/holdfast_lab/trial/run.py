@@ -155,8 +155,8 @@ def _model(name: str) -> Model:
 
 
 def _scale(command: GripCommand, finger: str) -> float:
-    one = command.fingers.get(finger)
-    return 1.0 if one is None else one.scale
+    finger_command = command.fingers.get(finger)
+    return 1.0 if finger_command is None else finger_command.scale
 
 
 def least_force_at(trial: Trial, held_for: float) -> float:

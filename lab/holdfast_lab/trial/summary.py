@@ -11,8 +11,13 @@ from typing import Any
 
 import numpy as np
 
-from holdfast.metrics.intervals import bootstrap_interval, quantile_of, ratio_of_sums
-from holdfast.metrics.statistics import finite_or_none, quantile
+from holdfast.metrics.statistics import (
+    bootstrap_interval,
+    finite_or_none,
+    quantile,
+    quantile_of,
+    ratio_of_sums,
+)
 from holdfast.sensors.types import Array
 from holdfast_lab.trial.run import TrialResult
 

@@ -40,6 +40,7 @@ def test_nan_features_have_no_probability():
     assert trees.probability(np.empty((0, 2))).shape == (0,)
 
 
+@pytest.mark.slow
 def test_they_are_deterministic():
     given = square()
     one, two = (fitted(given, 3).probability(given.features) for _ in range(2))
@@ -74,6 +75,7 @@ def test_one_class_is_refused():
     )
 
 
+@pytest.mark.slow
 def test_a_search_begins_with_the_reference():
     import optuna
 

@@ -1,6 +1,7 @@
 import io
 
 import numpy as np
+import pytest
 
 from holdfast.plots.style import PAPER
 from holdfast_lab.figures.curves import Curve, draw_alarms, draw_lines, draw_reliability
@@ -58,6 +59,7 @@ def test_alarms_without_curves():
     drawn(draw_alarms({"missed": {"a": Curve(np.zeros(2), np.zeros(2))}}))
 
 
+@pytest.mark.slow
 def test_reliability_shows_bins_and_sample_counts():
     table = np.array([[0.1, 0.2, 30], [0.9, 0.8, 10]])
     figure = drawn(draw_reliability({"a": table, "b": np.empty((0, 3))}, {"a": "Brier 0.1"}))

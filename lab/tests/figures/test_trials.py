@@ -1,6 +1,7 @@
 import io
 
 import numpy as np
+import pytest
 
 from holdfast_lab.figures.dots import IntervalEstimate
 from holdfast_lab.figures.trials import (
@@ -40,6 +41,7 @@ def test_a_trade_off_has_both_intervals():
     assert len(axes.lines) == 1
 
 
+@pytest.mark.slow
 def test_courses_share_their_axes():
     times = np.array([-0.5, 0.0, 1.0])
     lost = ForceCourse(times, np.array([2.0, 2, 0]), np.ones(3), np.array([0, 0, 0.1]), 1.0)

@@ -22,6 +22,7 @@ def quick(monkeypatch):
     monkeypatch.setattr(experiment, "report_sections", lambda *_: [Section("All", "")])
 
 
+@pytest.mark.slow
 def test_trial_json_has_every_law(tmp_path, capsys, quick):
     assert main(["trial", "--out", str(tmp_path / "out"), "--n", "3", "--jobs", "1"]) == 0
     document = json.loads((tmp_path / "out/trial.json").read_text())
@@ -33,6 +34,7 @@ def test_trial_json_has_every_law(tmp_path, capsys, quick):
     assert lines[-1].startswith(f"{tmp_path / 'out' / 'report.html'}: ")
 
 
+@pytest.mark.slow
 def test_json_goes_to_stdout(tmp_path, capsys, quick):
     words = ["--n", "2", "--laws", "holdfast", "--jobs", "1", "--json"]
     assert main(["trial", "--out", str(tmp_path / "out"), *words]) == 0

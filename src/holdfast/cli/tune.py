@@ -15,7 +15,7 @@ if TYPE_CHECKING:
     from collections.abc import Iterable, Iterator
 
     from holdfast.recordings import Recording
-    from holdfast.training import OperatingPoint, Tuned
+    from holdfast.training import ThresholdMetrics, Tuned
 
 
 def tune(
@@ -103,7 +103,7 @@ def _print_points(tuned: "Tuned") -> None:
     print_table(header, [(*_cells(p), notes.get(p.threshold, "")) for p in points])
 
 
-def _cells(point: "OperatingPoint") -> tuple[str, ...]:
+def _cells(point: "ThresholdMetrics") -> tuple[str, ...]:
     events = point.events
     missed = ("-" if share is None else f"{share:.1f}" for share in events.missed.values())
     late = "never" if events.n_events else "-"

@@ -171,16 +171,8 @@ def header_sensors(header: Header) -> dict[str, Sensor]:
 
 def label_data(label: Label) -> LabelData:
     """Convert a label to its form in a file."""
-    state: Any = label.state.value.lower()
-    return LabelData(
-        float(label.start),
-        float(label.end),
-        state,
-        label.cause,
-        label.evidence,
-        float(label.confidence),
-        label.author,
-    )
+    numbers = {name: float(getattr(label, name)) for name in ("start", "end", "confidence")}
+    return LabelData(**{**vars(label), **numbers, "state": label.state.value.lower()})
 
 
 def label_of(data: LabelData) -> Label:
@@ -189,15 +181,7 @@ def label_of(data: LabelData) -> Label:
     Raises:
         ValueError: its interval or its confidence is not valid.
     """
-    return Label(
-        data.start,
-        data.end,
-        ContactState(data.state.upper()),
-        data.cause,
-        data.evidence,
-        data.confidence,
-        data.author,
-    )
+    return Label(**{**msgspec.structs.asdict(data), "state": ContactState(data.state.upper())})
 
 
 def number_type(array: npt.NDArray[Any], name: str) -> NumberType:

@@ -4,18 +4,15 @@ from holdfast.metrics.decisions import Decisions, FingerDecisions, hand_decision
 from holdfast.metrics.events import (
     AlarmMatch,
     EventMetrics,
-    FalseAlarm,
     InstabilityEvent,
     event_metrics,
     match_alarms,
     match_decisions,
     pool_events,
 )
-from holdfast.metrics.intervals import Interval, bootstrap_interval, ratio_of_sums
 from holdfast.metrics.samples import SampleMetrics, calibration_sums, sample_metrics
+from holdfast.metrics.statistics import Interval, bootstrap_interval, ratio_of_sums
 from holdfast.metrics.summary import (
-    EventIntervals,
-    HandEventMetrics,
     Intervals,
     Metrics,
     RecordingMetrics,
@@ -29,11 +26,8 @@ from holdfast.metrics.summary import (
 __all__ = [
     "AlarmMatch",
     "Decisions",
-    "EventIntervals",
     "EventMetrics",
-    "FalseAlarm",
     "FingerDecisions",
-    "HandEventMetrics",
     "InstabilityEvent",
     "Interval",
     "Intervals",

@@ -104,21 +104,21 @@ def hand_decisions(fingers: Mapping[str, FingerDecisions], n_model_fingers: int)
         >>> hand_decisions({"thumb": thumb, "index": index}, 2).states.tolist()
         [0, 3, 2, 2]
     """
-    each = list(fingers.values())
-    times = np.unique(np.concatenate([np.empty(0), *(finger.times for finger in each)]))
+    hand = list(fingers.values())
+    times = np.unique(np.concatenate([np.empty(0), *(finger.times for finger in hand)]))
 
     def of_hand(codes: Sequence[Codes]) -> Codes:
-        pairs = zip(each, codes, strict=True)
-        latest = [_latest_codes(finger.times, own, times) for finger, own in pairs]
+        pairs = zip(hand, codes, strict=True)
+        latest = [_latest_codes(finger.times, states, times) for finger, states in pairs]
         return _hand_states(latest, len(times), n_model_fingers)
 
-    exact = [finger.exact_labels for finger in each if finger.exact_labels is not None]
+    exact = [finger.exact_labels for finger in hand if finger.exact_labels is not None]
     return FingerDecisions(
         times,
-        of_hand([finger.labels for finger in each]),
-        of_hand([finger.states for finger in each]),
+        of_hand([finger.labels for finger in hand]),
+        of_hand([finger.states for finger in hand]),
         np.full(len(times), np.nan),
-        of_hand(exact) if each and len(exact) == len(each) else None,
+        of_hand(exact) if hand and len(exact) == len(hand) else None,
     )
 
 

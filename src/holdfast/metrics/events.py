@@ -6,7 +6,6 @@ last for the median interval between samples.
 
 import math
 from collections.abc import Mapping, Sequence
-from collections.abc import Set as AbstractSet
 from dataclasses import dataclass, replace
 from typing import NamedTuple, Self
 
@@ -86,10 +85,6 @@ class AlarmMatch:
     false_alarms: tuple[FalseAlarm, ...]
     stable_seconds: float
     onsets: Onsets = "labels"
-
-    def n_missed(self, post: float) -> int:
-        """Return the number of events without an alarm until onset + post [s]."""
-        return sum(event.delay > post + TIME_TOLERANCE for event in self.events)
 
 
 @dataclass(frozen=True, eq=False)
@@ -282,17 +277,13 @@ def event_metrics_of(counts: EventCounts) -> EventMetrics:
         delay_p95=finite_or_none(quantile(counts.delays, 0.95)),
         false_alarms_per_minute=counts.n_false / minutes if minutes else None,
         false_alarms={str(state): n for state, n in counts.false_alarms.items()},
-        onsets=_common_onsets(counts.onsets),
+        onsets=next(iter(counts.onsets), "labels") if len(counts.onsets) < 2 else "mixed",
     )
 
 
 def event_delays(matches: Sequence[AlarmMatch]) -> Array:
     """Return the delays of all events in ascending order [s]; infinite for a missed event."""
     return np.sort(np.array([event.delay for match in matches for event in match.events]))
-
-
-def _common_onsets(found: AbstractSet[Onsets]) -> Onsets:
-    return next(iter(found), "labels") if len(found) < 2 else "mixed"
 
 
 _STATES = tuple(ContactState)

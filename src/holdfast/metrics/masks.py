@@ -75,10 +75,10 @@ def widen_runs(mask: Mask, positions: Positions, margin: float) -> Mask:
 
 def runs_with(mask: Mask, selected: Mask) -> Mask:
     """Keep the runs of a mask that contain at least one selected sample."""
-    found = np.zeros_like(mask)
+    kept = np.zeros_like(mask)
     for start, end in runs(mask):
-        found[start:end] = selected[start:end].any()
-    return found
+        kept[start:end] = selected[start:end].any()
+    return kept
 
 
 def hysteresis(values: Array, low: float, high: float) -> Mask:

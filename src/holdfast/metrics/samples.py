@@ -1,9 +1,9 @@
-"""Metrics by sample: class 1 is a stable label, class 0 any other."""
+"""Metrics by sample, of scores or of histograms: class 1 is a stable label, class 0 any other."""
 
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Protocol
+from typing import Any, Self
 
 import msgspec
 import numpy as np
@@ -12,10 +12,15 @@ import numpy.typing as npt
 from holdfast.contact import NO_CONTACT, STABLE, UNKNOWN, UNSTABLE
 from holdfast.metrics.decisions import FingerDecisions, check_lengths
 from holdfast.metrics.statistics import finite_or_none, mann_whitney_u, percent
-from holdfast.sensors.types import Array
+from holdfast.sensors.types import Array, Integers
 
 N_CALIBRATION_BINS = 10
 """Number of bins of probabilities from 0 to 1."""
+MAX_LOG_ODDS = 40.0
+"""Log odds at the first and the last bin; those of float64 end at 37."""
+BINS_PER_UNIT = 50
+"""Number of bins for each unit of the log odds."""
+N_BINS = int(2 * MAX_LOG_ODDS * BINS_PER_UNIT) + 1
 
 
 class SampleMetrics(msgspec.Struct, frozen=True):
@@ -85,32 +90,87 @@ class ScoredSamples:
         return u_unstable, mann_whitney_u(self.stable, self.no_contact)
 
 
-class CountedSamples(Protocol):
-    """What the metrics need of samples: counts, and pairs in the right order."""
+@dataclass(frozen=True, eq=False)
+class BinnedSamples:
+    """Number of samples by label and score: of more samples than memory holds.
 
-    @property
-    def confusion(self) -> npt.NDArray[np.int64]:
-        """(2, 2) counts [[TN, FP], [FN, TP]]."""
-        ...
+    A bin is 0.02 wide in log odds, so bins are narrow where probabilities are near 0 or 1. Two
+    scores in the same bin count as a tie. The area under the ROC curve then changes by less than
+    half of the share of pairs that have the same bin.
 
-    @property
-    def squared_error(self) -> float:
-        """Sum of (score - class)^2; NaN where a score lies outside [0, 1]."""
-        ...
+    Attributes:
+        counts: (3, N_BINS) samples labelled STABLE, UNSTABLE and NO_CONTACT in each bin.
+        confusion: as in `ScoredSamples`.
+        squared_error: as in `ScoredSamples`.
+        n_undecided: as in `ScoredSamples`.
+    """
 
-    @property
-    def n_undecided(self) -> int:
-        """Number of samples with a label whose decided state is UNKNOWN."""
-        ...
+    counts: Integers
+    confusion: Integers
+    squared_error: float
+    n_undecided: int
+
+    @classmethod
+    def of(cls, samples: ScoredSamples) -> Self:
+        """Return the histogram of samples; scores outside [0, 1] count as 0 and 1."""
+        kinds = (samples.stable, samples.unstable, samples.no_contact)
+        counts = np.array([np.bincount(bins_of(kind), minlength=N_BINS) for kind in kinds])
+        return cls(counts, samples.confusion, samples.squared_error, samples.n_undecided)
+
+    def __add__(self, other: Self) -> "BinnedSamples":
+        return BinnedSamples(
+            self.counts + other.counts,
+            self.confusion + other.confusion,
+            self.squared_error + other.squared_error,
+            self.n_undecided + other.n_undecided,
+        )
 
     @property
     def n_scores(self) -> tuple[int, int, int]:
         """Number of samples labelled STABLE, UNSTABLE and NO_CONTACT."""
-        ...
+        stable, unstable, no_contact = self.counts.sum(axis=1).tolist()
+        return stable, unstable, no_contact
 
     def ordered_pairs(self) -> tuple[float, float]:
         """Return the Mann-Whitney statistics of STABLE against UNSTABLE and NO_CONTACT."""
-        ...
+        stable, unstable, no_contact = self.counts
+        return _ordered_pairs(stable, unstable), _ordered_pairs(stable, no_contact)
+
+
+class SampleTotal:
+    """Sum of scored samples: exact as long as the scores are few, then a histogram.
+
+    Example:
+        >>> total = SampleTotal()
+        >>> total.add(score_samples([3, 2], [3, 2], [0.9, 0.2]))
+        >>> total.bin().n_scores, total.samples.ordered_pairs()
+        ((1, 1, 0), (1.0, 0.0))
+    """
+
+    def __init__(self) -> None:
+        self._parts: list[ScoredSamples] = []
+        self._binned: BinnedSamples | None = None
+
+    def add(self, samples: ScoredSamples | BinnedSamples) -> None:
+        """Add the samples of a finger of a recording; a histogram turns all into histograms."""
+        if isinstance(samples, BinnedSamples):
+            self._binned = self.bin() + samples
+        elif self._binned is not None:
+            self._binned += BinnedSamples.of(samples)
+        else:
+            self._parts.append(samples)
+
+    def bin(self) -> BinnedSamples:
+        """Replace all scores by their histogram, now and for samples that are added later."""
+        if self._binned is None:
+            self._binned = BinnedSamples.of(pool_samples(self._parts))
+            self._parts = []
+        return self._binned
+
+    @property
+    def samples(self) -> ScoredSamples | BinnedSamples:
+        """All samples together."""
+        return pool_samples(self._parts) if self._binned is None else self._binned
 
 
 def sample_metrics(
@@ -178,10 +238,10 @@ def pool_samples(parts: Sequence[ScoredSamples]) -> ScoredSamples:
     )
 
 
-def metrics_of_samples(samples: CountedSamples) -> SampleMetrics:
+def metrics_of_samples(samples: ScoredSamples | BinnedSamples) -> SampleMetrics:
     """Compute the metrics of scored samples."""
-    (tn, fp), (fn, tp) = samples.confusion.tolist()
-    n = tn + fp + fn + tp
+    ratios = confusion_ratios(samples.confusion.tolist())
+    n = ratios["accuracy"][1]
     u_unstable, u_no_contact = samples.ordered_pairs()
     u = u_unstable + u_no_contact
     n_stable, n_unstable, n_no_contact = samples.n_scores
@@ -189,17 +249,29 @@ def metrics_of_samples(samples: CountedSamples) -> SampleMetrics:
     pairs = contact_pairs + n_stable * n_no_contact
     return SampleMetrics(
         n=n,
-        accuracy=percent(tp + tn, n),
-        fdr=percent(fp, tp + fp),
-        fpr=percent(fp, fp + tn),
-        fnr=percent(fn, fn + tp),
+        **{name: percent(part, whole) for name, (part, whole) in ratios.items()},
         auc=u / pairs if pairs else None,
         auc_contact=u_unstable / contact_pairs if contact_pairs else None,
-        confusion=[[tn, fp], [fn, tp]],
+        confusion=samples.confusion.tolist(),
         brier=finite_or_none(samples.squared_error / n) if n else None,
         n_undecided=samples.n_undecided,
         without_estimate=percent(samples.n_undecided, n + samples.n_undecided),
     )
+
+
+def confusion_ratios(confusion: Any) -> dict[str, tuple[Any, Any]]:  # noqa: ANN401 (numbers, or arrays)
+    """Return numerator and denominator of the ratios of `SampleMetrics` that count samples.
+
+    Args:
+        confusion: [[TN, FP], [FN, TP]]; each is a number, or an array of numbers.
+    """
+    (tn, fp), (fn, tp) = confusion
+    return {
+        "accuracy": (tp + tn, tn + fp + fn + tp),
+        "fdr": (fp, tp + fp),
+        "fpr": (fp, fp + tn),
+        "fnr": (fn, fn + tp),
+    }
 
 
 def calibration_sums(decisions: Sequence[FingerDecisions]) -> Array:
@@ -212,12 +284,10 @@ def calibration_sums(decisions: Sequence[FingerDecisions]) -> Array:
         (10, 3) for each bin of probabilities: their sum, the number of samples labelled stable, and
         the number of all samples. The sums of several recordings can be added.
     """
-    known = [
-        (decision, (decision.labels != UNKNOWN) & (decision.states != UNKNOWN))
-        for decision in decisions
-    ]
-    score = np.concatenate([np.empty(0), *(each.stable_probability[rows] for each, rows in known)])
-    stable = np.concatenate([np.empty(0), *(each.labels[rows] == STABLE for each, rows in known)])
+    known = [(finger.labels != UNKNOWN) & (finger.states != UNKNOWN) for finger in decisions]
+    pairs = list(zip(decisions, known, strict=True))
+    score = np.concatenate([np.empty(0), *(f.stable_probability[rows] for f, rows in pairs)])
+    stable = np.concatenate([np.empty(0), *(f.labels[rows] == STABLE for f, rows in pairs)])
     bins = np.clip((score * N_CALIBRATION_BINS).astype(int), 0, N_CALIBRATION_BINS - 1)
     columns = (score, stable, np.ones(len(bins)))
     sums = [np.bincount(bins, weights=column, minlength=N_CALIBRATION_BINS) for column in columns]
@@ -228,3 +298,24 @@ def _squared_error(score: Array, truth: npt.NDArray[np.bool_]) -> float:
     if ((score < 0) | (score > 1)).any():
         return math.nan
     return float(np.square(score - truth).sum())
+
+
+def bins_of(scores: Array) -> npt.NDArray[np.intp]:
+    """Return (n,) the bin of each score.
+
+    Example:
+        >>> bins_of(np.array([0.0, 0.5, 1.0])).tolist()
+        [0, 2000, 4000]
+    """
+    inside = np.clip(scores, 0.0, 1.0)
+    with np.errstate(divide="ignore"):
+        log_odds = np.log(inside) - np.log1p(-inside)
+    bounded = np.clip(log_odds, -MAX_LOG_ODDS, MAX_LOG_ODDS)
+    bins: npt.NDArray[np.intp] = np.rint((bounded + MAX_LOG_ODDS) * BINS_PER_UNIT).astype(np.intp)
+    return bins
+
+
+def _ordered_pairs(upper: Integers, lower: Integers) -> float:
+    """Return the number of pairs in which the upper has the higher score; a tie counts half."""
+    below = np.cumsum(lower) - lower
+    return float((upper.astype(np.float64) * (below + 0.5 * lower)).sum())

@@ -9,7 +9,6 @@ import numpy as np
 
 from holdfast.classifiers.slip import raised_at
 from holdfast.contact import TIME_TOLERANCE
-from holdfast.metrics.intervals import Interval, Statistic, bootstrap_interval
 from holdfast.metrics.slip_truth import SlipDecisions
 from holdfast.metrics.slips import (
     FOUND_WITHIN,
@@ -18,6 +17,7 @@ from holdfast.metrics.slips import (
     count_slips,
     slip_metrics,
 )
+from holdfast.metrics.statistics import Interval, Statistic, bootstrap_interval
 from holdfast.sensors.types import Array, Flags, Integers
 
 LOG_ODDS = np.arange(-40, 81) * 0.1

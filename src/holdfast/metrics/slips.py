@@ -10,8 +10,8 @@ import msgspec
 import numpy as np
 
 from holdfast.contact import TIME_TOLERANCE
-from holdfast.metrics.binned import N_BINS, bins_of
 from holdfast.metrics.masks import Mask, runs
+from holdfast.metrics.samples import N_BINS, bins_of
 from holdfast.metrics.slip_truth import (
     CREEPING,
     DISTANCES,

@@ -2,12 +2,10 @@
 
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
-from functools import partial
 
 import msgspec
 import numpy as np
 
-from holdfast.metrics.binned import N_BINS, BinnedSamples, SampleTotal
 from holdfast.metrics.decisions import Decisions
 from holdfast.metrics.events import (
     POST_DURATIONS,
@@ -16,18 +14,13 @@ from holdfast.metrics.events import (
     event_metrics_of,
     match_decisions,
 )
-from holdfast.metrics.intervals import (
-    Interval,
-    Statistic,
-    auc_of,
-    auc_of_counts,
-    bootstrap_interval,
-    quantile_of,
-    ratio_of_sums,
-)
 from holdfast.metrics.samples import (
+    N_BINS,
+    BinnedSamples,
     SampleMetrics,
+    SampleTotal,
     ScoredSamples,
+    confusion_ratios,
     metrics_of_samples,
     score_samples,
 )
@@ -40,11 +33,22 @@ from holdfast.metrics.slip_thresholds import (
     slip_summary,
 )
 from holdfast.metrics.slips import SlipCounts, count_slips
+from holdfast.metrics.statistics import (
+    Interval,
+    Statistic,
+    auc_of,
+    auc_of_counts,
+    bootstrap_interval,
+    quantile_of,
+    ratio_of_sums,
+)
 
 MAX_EXACT_SCORES = 10_000_000
 """Number of labelled samples above which the AUC comes from a histogram of the scores.
 
 The scores of all recordings would not fit into memory (80 bytes for each, with copies)."""
+LEVEL = 0.95
+"""Fraction of the resamples within each interval."""
 MAX_GROUPS = 1000
 """Number of recordings above which the bootstrap draws groups of recordings.
 
@@ -156,9 +160,7 @@ class RecordingResults:
     slip_curves: Mapping[str, Curve] = field(default_factory=dict)
 
 
-def summarise(
-    decisions: Iterable[Decisions], *, n_resamples: int = 1000, seed: int = 0, level: float = 0.95
-) -> Metrics:
+def summarise(decisions: Iterable[Decisions], *, n_resamples: int = 1000, seed: int = 0) -> Metrics:
     """Compute the metrics of several recordings.
 
     The recordings are read one at a time. Only the scores of labelled samples, counts, events
@@ -168,7 +170,6 @@ def summarise(
         decisions: of each recording.
         n_resamples: number of resamples of the bootstrap over recordings.
         seed: of the bootstrap.
-        level: fraction of the resamples within each interval.
 
     Raises:
         ValueError: the probability of a decided sample is NaN.
@@ -181,7 +182,7 @@ def summarise(
         (100.0, 0, None)
     """
     results = (score_recording(decision) for decision in decisions)
-    return summarise_results(results, n_resamples=n_resamples, seed=seed, level=level)
+    return summarise_results(results, n_resamples=n_resamples, seed=seed)
 
 
 def score_recording(decisions: Decisions, *, slip_curves: bool = False) -> RecordingResults:
@@ -203,13 +204,12 @@ def score_recording(decisions: Decisions, *, slip_curves: bool = False) -> Recor
         for name, finger in decisions.fingers.items()
         if finger.labels.any()
     }
-    found = decisions.hand
     hand = None
-    if found is not None and found.labels.any():
-        hand = EventCounts.of(match_decisions(found))
+    if decisions.hand is not None and decisions.hand.labels.any():
+        hand = EventCounts.of(match_decisions(decisions.hand))
     metrics = RecordingMetrics(
         decisions.name,
-        {name: metrics_of_samples(own) for name, own in samples.items()},
+        {name: metrics_of_samples(scores) for name, scores in samples.items()},
         _event_metrics([events], [hand], list(samples)),
     )
     slips = {
@@ -228,24 +228,13 @@ def score_recording(decisions: Decisions, *, slip_curves: bool = False) -> Recor
 
 
 def summarise_results(
-    results: Iterable[RecordingResults],
-    *,
-    n_resamples: int = 1000,
-    seed: int = 0,
-    level: float = 0.95,
+    results: Iterable[RecordingResults], *, n_resamples: int = 1000, seed: int = 0
 ) -> Metrics:
-    """Compute the metrics of several recordings from the results of each.
-
-    Args:
-        results: of each recording, in a fixed order.
-        n_resamples: as in `summarise`.
-        seed: as in `summarise`.
-        level: as in `summarise`.
-    """
+    """Compute the metrics of several recordings, in a fixed order, from the results of each."""
     total = ResultTotal()
     for result in results:
         total.add(result)
-    return total.metrics(n_resamples, seed, level)
+    return total.metrics(n_resamples, seed)
 
 
 class _Group:
@@ -295,21 +284,23 @@ class ResultTotal:
         if self.n_scores > MAX_EXACT_SCORES and not self.binned:
             self._bin()
 
-    def metrics(self, n_resamples: int = 1000, seed: int = 0, level: float = 0.95) -> Metrics:
+    def metrics(self, n_resamples: int = 1000, seed: int = 0) -> Metrics:
         """Compute the metrics; the arguments are those of `summarise`."""
         return Metrics(
-            fingers={name: metrics_of_samples(own.samples) for name, own in self.fingers.items()},
+            fingers={
+                name: metrics_of_samples(total.samples) for name, total in self.fingers.items()
+            },
             pooled=metrics_of_samples(self.pooled.samples),
             recordings=self.recordings,
             events=_event_metrics(self.events, self.hands, list(self.fingers)),
-            intervals=self._intervals(n_resamples, seed, level),
+            intervals=self._intervals(n_resamples, seed),
             score_bins=N_BINS if self.binned else None,
-            slips=slip_summary([self.slips], self._slip_intervals(n_resamples, seed, level)),
+            slips=slip_summary([self.slips], self._slip_intervals(n_resamples, seed)),
         )
 
-    def _slip_intervals(self, n: int, seed: int, level: float) -> SlipIntervals | None:
+    def _slip_intervals(self, n: int, seed: int) -> SlipIntervals | None:
         curves = [(group.slips,) for group in self.groups] if self.slips else []
-        return slip_intervals(curves, n=n, seed=seed, level=level)
+        return slip_intervals(curves, n=n, seed=seed, level=LEVEL)
 
     def _finger(self, name: str) -> SampleTotal:
         if name not in self.fingers:
@@ -329,20 +320,24 @@ class ResultTotal:
         for total in (*self.fingers.values(), self.pooled, *(g.samples for g in self.groups)):
             total.bin()
 
-    def _intervals(self, n: int, seed: int, level: float) -> Intervals | None:
+    def _intervals(self, n: int, seed: int) -> Intervals | None:
         n_groups = len(self.groups)
         if n_groups < 2:
             return None
-        interval = partial(bootstrap_interval, n_recordings=n_groups, n=n, seed=seed, level=level)
-        by_sample = {name: interval(each) for name, each in _sample_statistics(self.groups).items()}
-        events = {name: interval(each) for name, each in _event_statistics(self.groups).items()}
+        samples, events = (
+            {
+                name: bootstrap_interval(statistic, n_groups, n=n, seed=seed, level=LEVEL)
+                for name, statistic in statistics.items()
+            }
+            for statistics in (_sample_statistics(self.groups), _event_statistics(self.groups))
+        )
         missed = {str(post): events.pop(str(post)) for post in POST_DURATIONS}
         return Intervals(
             n_recordings=self.n_labelled,
-            level=level,
+            level=LEVEL,
             hand=EventIntervals(missed=missed, **events),
             n_groups=n_groups if self.n_labelled > n_groups else None,
-            **by_sample,
+            **samples,
         )
 
 
@@ -353,7 +348,7 @@ def _event_metrics(
 ) -> HandEventMetrics:
     by_name = {name: [finger[name] for finger in fingers if name in finger] for name in names}
     return HandEventMetrics(
-        {name: event_metrics_of(EventCounts.total(own)) for name, own in by_name.items()},
+        {name: event_metrics_of(EventCounts.total(counts)) for name, counts in by_name.items()},
         event_metrics_of(EventCounts.total([hand for hand in hands if hand is not None])),
     )
 
@@ -361,25 +356,22 @@ def _event_metrics(
 def _sample_statistics(groups: Sequence[_Group]) -> dict[str, Statistic]:
     """Return the statistics of the sample metrics, given the samples of each group."""
     samples = [group.samples.samples for group in groups]
-    tn, fp, fn, tp = np.array([sample.confusion.ravel() for sample in samples]).T
-    n = tn + fp + fn + tp
+    confusion = np.array([sample.confusion for sample in samples])
+    ratios = confusion_ratios(confusion.transpose(1, 2, 0))
     return {
-        "accuracy": ratio_of_sums(100 * (tp + tn), n),
-        "fdr": ratio_of_sums(100 * fp, tp + fp),
-        "fpr": ratio_of_sums(100 * fp, fp + tn),
-        "fnr": ratio_of_sums(100 * fn, fn + tp),
+        **{name: ratio_of_sums(100 * part, whole) for name, (part, whole) in ratios.items()},
         **_auc_statistics(samples),
-        "brier": ratio_of_sums([sample.squared_error for sample in samples], n),
+        "brier": ratio_of_sums([sample.squared_error for sample in samples], ratios["accuracy"][1]),
     }
 
 
 def _auc_statistics(samples: Sequence[ScoredSamples | BinnedSamples]) -> dict[str, Statistic]:
     exact = [sample for sample in samples if isinstance(sample, ScoredSamples)]
     if exact:
-        stable = [each.stable for each in exact]
+        stable = [sample.stable for sample in exact]
         return {
-            "auc": auc_of(stable, [each.not_stable for each in exact]),
-            "auc_contact": auc_of(stable, [each.unstable for each in exact]),
+            "auc": auc_of(stable, [sample.not_stable for sample in exact]),
+            "auc_contact": auc_of(stable, [sample.unstable for sample in exact]),
         }
     counts = np.array([sample.counts for sample in samples if isinstance(sample, BinnedSamples)])
     used = counts.any(axis=(0, 1))

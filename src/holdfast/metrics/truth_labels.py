@@ -97,19 +97,8 @@ def labels_from_truth(
     unstable = held & _joined_to(phase == Phase.CLOSING, unstable, times, rule.merge)
     lost = _from_first(held) & ~_from_first(phase == Phase.RELEASED) & (phase == Phase.FREE)
     slipped = runs_with(unstable, sliding)
-    states = [
-        _state(*row)
-        for row in zip(
-            touching.tolist(),
-            held.tolist(),
-            unstable.tolist(),
-            slipped.tolist(),
-            (phase == Phase.CLOSING).tolist(),
-            lost.tolist(),
-            glitched.tolist(),
-            strict=True,
-        )
-    ]
+    closing = phase == Phase.CLOSING
+    states = _states(touching, held, unstable, slipped, closing, lost, glitched)
     period = float(np.median(np.diff(times)))
     return labels_from_samples(times, states, period=period, evidence="truth", author="twin")
 
@@ -123,12 +112,12 @@ def relabel(recording: Recording, rule: LabelRule) -> Recording:
         recording: to label.
         rule: thresholds and margins.
     """
-    found = labels_by_truth(recording, rule)
+    labels = labels_by_truth(recording, rule)
     modules = {
-        name: replace(module, labels=found.get(name, module.labels))
+        name: replace(module, labels=labels.get(name, module.labels))
         for name, module in recording.modules.items()
     }
-    return replace(recording, modules=modules) if found else recording
+    return replace(recording, modules=modules) if labels else recording
 
 
 def labels_by_truth(recording: Recording, rule: LabelRule) -> dict[str, tuple[Label, ...]]:
@@ -160,11 +149,11 @@ def glitches(truth: Truth, rule: LabelRule) -> Mask:
     error = truth.hand.get("set_point_error")
     if rule.glitch is None or error is None:
         return np.zeros(len(truth.times), dtype=bool)
-    found = error > 0
-    for _, end in runs(found):
+    glitched = np.asarray(error > 0)
+    for _, end in runs(glitched):
         last = np.searchsorted(truth.times, truth.times[end - 1] + rule.glitch, side="right")
-        found[end:last] = True
-    return np.asarray(found)
+        glitched[end:last] = True
+    return glitched
 
 
 def phases_from_touch(
@@ -189,26 +178,24 @@ def phases_from_touch(
     return np.where(planned & ~touched, Phase.LOCKED.value, phase)
 
 
-def _state(
-    touching: bool,
-    held: bool,
-    unstable: bool,
-    slipped: bool,
-    closing: bool,
-    lost: bool,
-    glitched: bool,
-) -> tuple[ContactState, Cause | None]:
-    if unstable:
-        return ContactState.UNSTABLE, Cause.SLIP if slipped else Cause.DISTURBANCE
-    if not touching:
-        return ContactState.NO_CONTACT, Cause.LOST if lost else None
-    if glitched:
-        return ContactState.UNSTABLE, Cause.GLITCH
-    if held:
-        return ContactState.STABLE, None
-    if closing:
-        return ContactState.UNSTABLE, Cause.CLOSING
-    return ContactState.UNSTABLE, Cause.LOST if lost else Cause.RELEASED
+def _states(
+    touching: Mask, held: Mask, unstable: Mask, slipped: Mask, closing: Mask, lost: Mask,
+    glitched: Mask,
+) -> list[tuple[ContactState, Cause | None]]:  # fmt: skip
+    """Return the state and cause of each sample: those of the first rule that applies."""
+    rules = (
+        (unstable & slipped, (ContactState.UNSTABLE, Cause.SLIP)),
+        (unstable, (ContactState.UNSTABLE, Cause.DISTURBANCE)),
+        (~touching & lost, (ContactState.NO_CONTACT, Cause.LOST)),
+        (~touching, (ContactState.NO_CONTACT, None)),
+        (glitched, (ContactState.UNSTABLE, Cause.GLITCH)),
+        (held, (ContactState.STABLE, None)),
+        (closing, (ContactState.UNSTABLE, Cause.CLOSING)),
+        (lost, (ContactState.UNSTABLE, Cause.LOST)),
+        (np.full_like(held, True), (ContactState.UNSTABLE, Cause.RELEASED)),
+    )
+    first = np.argmax([mask for mask, _ in rules], axis=0)
+    return [rules[k][1] for k in first.tolist()]
 
 
 def _joined_to(before: Mask, mask: Mask, times: Array, gap: float) -> Mask:

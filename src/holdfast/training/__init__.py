@@ -3,18 +3,17 @@
 from typing import TYPE_CHECKING
 
 from holdfast.training.evaluation import compute_decisions, evaluate
-from holdfast.training.setting import SPLITS, Setting
-from holdfast.training.threshold import OperatingPoint, Tuned, tune
+from holdfast.training.setting import Setting
+from holdfast.training.threshold import ThresholdMetrics, Tuned, tune
 from holdfast.training.trainer import Trained, train
 
 if TYPE_CHECKING:
     from holdfast.training.estimator import StabilityClassifier
 
 __all__ = [
-    "SPLITS",
-    "OperatingPoint",
     "Setting",
     "StabilityClassifier",
+    "ThresholdMetrics",
     "Trained",
     "Tuned",
     "compute_decisions",

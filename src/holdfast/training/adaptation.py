@@ -1,4 +1,4 @@
-"""How far a model is adapted to recordings: chosen by folds, in doubt not at all."""
+"""How far a model is adapted to recordings: chosen by folds, in doubt not at all; warnings."""
 
 from collections.abc import Collection, Iterator, Sequence
 from typing import NamedTuple
@@ -8,7 +8,10 @@ import numpy as np
 from holdfast.classifiers import LinearClassifier, Parameters, Samples
 from holdfast.classifiers.adapted import CALIBRATION, NONE, WEIGHTS, Adapted
 from holdfast.classifiers.folds import group_folds, time_folds
+from holdfast.model import Model
 from holdfast.sensors.types import Array, Flags, Integers
+from holdfast.training.dataset_scan import DatasetScan
+from holdfast.training.evaluation import was_trained_on
 from holdfast.training.splits import TIME_FOLDS, TIME_GAP
 from holdfast.training.training_samples import FingerSamples, thinning_step
 from holdfast.training.tuning import log_losses
@@ -67,7 +70,7 @@ class Adaptation(NamedTuple):
 
 
 def choose_adaptation(
-    own: FingerSamples, prior: LinearClassifier, held: Collection[int] = ()
+    pool: FingerSamples, prior: LinearClassifier, held: Collection[int] = ()
 ) -> Adaptation:
     """Choose how far a classifier is adapted to samples.
 
@@ -77,15 +80,15 @@ def choose_adaptation(
     best.
 
     Args:
-        own: samples of one classifier.
+        pool: samples of one classifier.
         prior: to adapt.
         held: units that are left out.
     """
-    kept = np.flatnonzero(own.kept(held))
+    kept = np.flatnonzero(pool.kept(held))
     step = thinning_step(len(kept), MAX_ADAPTATION_SAMPLES)
-    rows = np.zeros(len(own.times), dtype=bool)
+    rows = np.zeros(len(pool.times), dtype=bool)
     rows[kept[::step]] = True
-    samples, recordings, times = own.samples.take(rows), own.recordings[rows], own.times[rows]
+    samples, recordings, times = pool.samples.take(rows), pool.recordings[rows], pool.times[rows]
     blocks = time_folds(recordings, times, TIME_FOLDS)
     n_recordings = len(np.unique(recordings))
     many = n_recordings >= ENOUGH_RECORDINGS
@@ -122,6 +125,44 @@ def choose_nearest(losses: Array) -> int:
     return int(np.flatnonzero(worse.mean(axis=1) <= error)[0])
 
 
+def adaptation_warnings(init: Model, scan: DatasetScan, fingers: Collection[str]) -> Iterator[str]:
+    """Yield the reasons why the metrics of an adapted model may be wrong.
+
+    Args:
+        init: the model to adapt.
+        scan: of the recordings that it is adapted to.
+        fingers: names of the classifiers; `"*"` for one of all fingers.
+
+    Raises:
+        ModelError: the model to adapt lacks one of the fingers.
+    """
+    for finger in fingers:
+        init.finger(finger)
+    name = init.name or "the model to adapt"
+    fingers_of: dict[tuple[str, ...], list[str]] = {}
+    for finger, sensor in scan.sensors.items():
+        trained_on = init.finger(finger).sensor
+        if trained_on is not None and init.sensors[trained_on] != sensor:
+            pair = (sensor, init.sensors[trained_on])
+            fingers_of.setdefault(tuple(f"{s.name} ({s.unit})" for s in pair), []).append(finger)
+    for (used, expected), names in fingers_of.items():
+        yield (
+            f"{', '.join(names)}: the sensor is {used}, {name} was trained on "
+            f"{expected}; its features are used unchanged, its weights may not fit"
+        )
+    if known := known_recordings(init, scan):
+        first = ", ".join(known[:3]) + (" ..." if len(known) > 3 else "")
+        yield (
+            f"{name} was trained on {len(known)} of these {len(scan.recordings)} recordings "
+            f"({first}): the metrics on them are too good"
+        )
+
+
+def known_recordings(init: Model, scan: DatasetScan) -> list[str]:
+    """Return the names of the recordings that the model to adapt was trained on."""
+    return [recording.name for recording in scan.recordings if was_trained_on(init, recording)]
+
+
 class _Fold(NamedTuple):
     trained: Flags
     tested: Flags
@@ -154,10 +195,9 @@ def _held_out_losses(
     """
     trained, tested = samples.take(fold.trained), samples.take(fold.tested)
     recipe = Adapted(prior)
-    found = []
+    losses = []
     for candidate in candidates:
         weighted = {**candidate, "C": step * candidate["C"]}
         rule = prior if trained.one_class else recipe.fit(trained, weighted, 0)
-        probability = rule.probability(tested.features)
-        found.append(log_losses(probability, tested.stable))
-    return np.array(found)
+        losses.append(log_losses(rule.probability(tested.features), tested.stable))
+    return np.array(losses)

@@ -1,8 +1,8 @@
-"""Scan of a dataset before training: names, sensors, labels, and checks that they agree."""
+"""Reading of a dataset, with progress, and its scan: names, sensors, and checks that they agree."""
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass
-from typing import Any, NamedTuple
+from typing import Any, NamedTuple, Protocol, TypeVar
 
 import numpy as np
 
@@ -11,10 +11,32 @@ from holdfast.model import EXACT_RATE, RELATIVE_RATES
 from holdfast.recordings import Recording
 from holdfast.sensors import Sensor
 
+T = TypeVar("T")
+
 RELATIVE_SAMPLE_RATE = 20.0
 """Approximate number of samples per second that train a model of any rate [Hz].
 
 So a fast sensor counts no more than a slow one. Neighbouring samples are nearly copies."""
+
+
+class Progress(Protocol):
+    """Iteration over items that may show a progress bar."""
+
+    def __call__(self, items: Iterable[T], what: str, total: int) -> Iterator[T]:
+        """Yield the items.
+
+        Args:
+            items: to yield.
+            what: is done with them, in one word.
+            total: number of items.
+        """
+        ...
+
+
+def show_nothing(items: Iterable[T], what: str, total: int) -> Iterator[T]:
+    """Yield the items without a progress bar."""
+    del what, total
+    return iter(items)
 
 
 class OneRecording(Sequence[Recording]):
@@ -137,8 +159,23 @@ def scan_recording(recording: Recording, *, relative: bool = False) -> Recording
     Raises:
         TrainingError: relative features are not made for its rate.
     """
-    found = _scan(recording, relative)
-    return RecordingScan(found, {f: recording.modules[f].sensor for f in found.n_labelled})
+    modules = {name: module for name, module in recording.modules.items() if module.labels}
+    counts = {name: int((module.label_states > 0).sum()) for name, module in modules.items()}
+    counts = {name: count for name, count in counts.items() if count}
+    step = 1
+    if relative and counts:
+        _check_rate(recording)
+        step = max(1, round(recording.rate / RELATIVE_SAMPLE_RATE))
+    held_object = recording.metadata.get("object")
+    scanned = ScannedRecording(
+        name=recording.name,
+        digest=recording.digest,
+        object=None if held_object is None else str(held_object),
+        rate=recording.rate,
+        n_labelled=counts,
+        step=step,
+    )
+    return RecordingScan(scanned, {name: modules[name].sensor for name in counts})
 
 
 def combine_scans(
@@ -147,38 +184,18 @@ def combine_scans(
     """Return the scan of a dataset from those of its recordings; see `scan_dataset`."""
     scanned: list[ScannedRecording] = []
     sensors: dict[str, Sensor] = {}
-    for found, own in scans:
-        scanned.append(found)
-        for finger, given in own.items():
-            known = sensors.setdefault(finger, given)
+    for recording, sensors_of_recording in scans:
+        scanned.append(recording)
+        for finger, sensor in sensors_of_recording.items():
+            known = sensors.setdefault(finger, sensor)
             if not relative:
-                _check_same_sensor(f"{finger} of {found.name!r}", given, known)
+                _check_same_sensor(f"{finger} of {recording.name!r}", sensor, known)
     if not scanned:
         raise TrainingError("no recordings given; at least one expected")
     if not sensors:
         raise TrainingError(f"none of the {len(scanned)} recordings has labels to train from")
     _check_no_duplicates(scanned)
     return DatasetScan(tuple(scanned), sensors, rate, relative)
-
-
-def _scan(recording: Recording, relative: bool) -> ScannedRecording:
-    counts = {
-        name: int((module.label_states > 0).sum())
-        for name, module in recording.modules.items()
-        if module.labels
-    }
-    counts = {name: count for name, count in counts.items() if count}
-    if relative and counts:
-        _check_rate(recording)
-    held_object = recording.metadata.get("object")
-    return ScannedRecording(
-        name=recording.name,
-        digest=recording.digest,
-        object=None if held_object is None else str(held_object),
-        rate=recording.rate,
-        n_labelled=counts,
-        step=max(1, round(recording.rate / RELATIVE_SAMPLE_RATE)) if relative and counts else 1,
-    )
 
 
 def _check_rate(recording: Recording) -> None:
@@ -192,10 +209,10 @@ def _check_rate(recording: Recording) -> None:
 
 def _check_same_sensor(what: str, sensor: Sensor, known: Sensor) -> None:
     if sensor != known:
-        given, expected = (f"{s.name} ({s.n_taxels} taxels, {s.unit})" for s in (sensor, known))
-        layout = "" if given != expected else " with another layout or rate"
+        texts = [f"{s.name} ({s.n_taxels} taxels, {s.unit})" for s in (sensor, known)]
+        layout = "" if texts[0] != texts[1] else " with another layout or rate"
         raise TrainingError(
-            f"{what} has the sensor {given}, other recordings have {expected}{layout}"
+            f"{what} has the sensor {texts[0]}, other recordings have {texts[1]}{layout}"
         )
 
 

@@ -24,8 +24,12 @@ from holdfast.model import Model
 from holdfast.parallel import Engine
 from holdfast.recordings import Label, Recording, label_states
 from holdfast.sensors.types import Integers
-from holdfast.training.dataset_scan import OneRecording
-from holdfast.training.progress import Progress, show_nothing
+from holdfast.training.dataset_scan import (
+    OneRecording,
+    Progress,
+    ScannedRecording,
+    show_nothing,
+)
 from holdfast.training.verdict import LoadedTares, verdict
 
 TARE_LOADED = 1 << SIGNAL_FAULTS.index(Fault.TARE_LOADED)
@@ -88,7 +92,7 @@ def _slip_decisions(
     )
 
 
-def was_trained_on(model: Model, recording: Recording) -> bool:
+def was_trained_on(model: Model, recording: Recording | ScannedRecording) -> bool:
     """Return whether a model was trained on a recording, by the digest of its samples."""
     return model.training is not None and recording.digest in model.training.recordings.values()
 
@@ -176,14 +180,14 @@ def evaluate_recordings(
     tares: list[bool] = []
     kept: list[Decisions] = []
     total, unseen = ResultTotal(), ResultTotal(intervals=False)
-    found = engine.map_ordered(_evaluate_part, parts, shared=(model, keep))
-    for own, loaded, known, decisions in progress(found, "evaluating", len(recordings)):
-        total.add(own)
+    evaluated = engine.map_ordered(_evaluate_part, parts, shared=(model, keep))
+    for results, loaded, known, decisions in progress(evaluated, "evaluating", len(recordings)):
+        total.add(results)
         kept.extend(decisions)
         if known:
-            trained_on.append(own.metrics.name)
+            trained_on.append(results.metrics.name)
         else:
-            unseen.add(own)
+            unseen.add(results)
             tares.append(loaded)
     metrics = total.metrics(seed=seed)
     return Evaluation(

@@ -1,19 +1,26 @@
-"""Fit of a model to training samples, with or without some units."""
+"""Fit of a model to training samples, with or without some units, and its provenance."""
 
 from collections.abc import Collection, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
+from importlib.metadata import version
+from typing import Self
 
 import numpy as np
+from msgspec import UNSET
 
 from holdfast.classifiers import Parameters
 from holdfast.errors import TrainingError
-from holdfast.model import FingerModel, Model
+from holdfast.metrics import SampleMetrics
+from holdfast.model import FingerModel, Model, Training
 from holdfast.recordings import Recording
 from holdfast.training.dataset_scan import DatasetScan, scan_dataset
 from holdfast.training.setting import Setting
 from holdfast.training.slips import SlipSamples
 from holdfast.training.splits import DataSplit, split_data
 from holdfast.training.training_samples import FingerSamples, gather_samples
+
+FIGURES = ("accuracy", "fdr", "fnr", "auc_contact", "auc")
+"""Metrics out of fold that a model file has."""
 
 
 @dataclass(frozen=True)
@@ -32,10 +39,21 @@ class TrainingData:
     fingers: Mapping[str, FingerSamples]
     slips: Mapping[str, SlipSamples] = field(default_factory=dict)
 
+    @classmethod
+    def of(cls, recordings: Sequence[Recording], setting: Setting) -> Self:
+        """Read the samples of recordings, one after the other in this process.
+
+        Raises:
+            TrainingError: the recordings have no labels, or cannot be split.
+        """
+        scan = scan_dataset(recordings, setting.rate, relative=setting.relative)
+        data_split = split_data(scan.recordings, setting.split, setting.seed)
+        return cls(scan, data_split, gather_samples(recordings, scan, setting, data_split))
+
     @property
     def thinned(self) -> dict[str, tuple[int, int]]:
         """Number of used and of all labelled samples of each finger of which not all are used."""
-        counts = {f: (len(own.units), own.n_usable) for f, own in self.fingers.items()}
+        counts = {f: (len(pool.units), pool.n_usable) for f, pool in self.fingers.items()}
         return {finger: (used, n) for finger, (used, n) in counts.items() if used < n}
 
     def check_classes(self) -> None:
@@ -44,12 +62,12 @@ class TrainingData:
         Raises:
             TrainingError: a finger has only one class.
         """
-        for finger, own in self.fingers.items():
-            if own.samples.one_class:
-                n_stable = int(np.count_nonzero(own.samples.stable))
+        for finger, pool in self.fingers.items():
+            if pool.samples.one_class:
+                n_stable = int(np.count_nonzero(pool.samples.stable))
                 raise TrainingError(
                     f"{finger}: {n_stable} samples labelled stable and "
-                    f"{len(own.samples.stable) - n_stable} labelled not stable; both classes "
+                    f"{len(pool.samples.stable) - n_stable} labelled not stable; both classes "
                     "are needed"
                 )
 
@@ -63,12 +81,12 @@ class TrainingData:
         """
         names = np.array(self.data_split.units)
         n = len(names)
-        if not any(own.can_evaluate(n).any() for own in self.fingers.values()):
+        if not any(pool.can_evaluate(n).any() for pool in self.fingers.values()):
             raise TrainingError(
                 "no finger has both classes in the training samples when one "
                 f"{self.data_split.split} is held out: cross-validation is not possible"
             )
-        skipped = {f: own.present(n) & ~own.can_evaluate(n) for f, own in self.fingers.items()}
+        skipped = {f: pool.present(n) & ~pool.can_evaluate(n) for f, pool in self.fingers.items()}
         return {finger: names[units].tolist() for finger, units in skipped.items() if units.any()}
 
 
@@ -91,17 +109,17 @@ def fit_model(
     """
     recordings = data.data_split.recordings_without(held)
     fingers = {}
-    for finger, own in data.fingers.items():
-        samples = own.without(held)
+    for finger, pool in data.fingers.items():
+        samples = pool.without(held)
         if samples.one_class:
             continue
         threshold = setting.contact_threshold
         fingers[finger] = FingerModel(
             features=setting.features,
             classifier=setting.recipe_of(finger).fit(samples, parameters[finger], setting.seed),
-            sensor=None if own.sensor is None else own.sensor.name,
+            sensor=None if pool.sensor is None else pool.sensor.name,
             contact_threshold=(
-                own.contact_threshold(recordings) if threshold is None else threshold
+                pool.contact_threshold(recordings) if threshold is None else threshold
             ),
             contact_load=setting.contact_load_of(finger),
             slip=data.slips[finger].fit(held) if finger in data.slips else None,
@@ -111,7 +129,7 @@ def fit_model(
     return Model(
         fingers=fingers,
         rate=data.scan.model_rate,
-        sensors={own.sensor.name: own.sensor for own in data.fingers.values() if own.sensor},
+        sensors={pool.sensor.name: pool.sensor for pool in data.fingers.values() if pool.sensor},
         window=setting.window,
         tare=str(setting.used_tare),
         debounce=setting.debounce,
@@ -141,8 +159,35 @@ def fit_recordings(
     Raises:
         TrainingError: the recordings have no labels, or only one class.
     """
-    scan = scan_dataset(recordings, setting.rate, relative=setting.relative)
-    data_split = split_data(scan.recordings, "random", setting.seed)
-    fingers = gather_samples(recordings, scan, setting, data_split)
-    data = TrainingData(scan, data_split, fingers)
-    return fit_full_model(data, setting, dict.fromkeys(fingers, parameters))
+    data = TrainingData.of(recordings, replace(setting, split="random"))
+    return fit_full_model(data, setting, dict.fromkeys(data.fingers, parameters))
+
+
+def training_record(
+    setting: Setting,
+    scan: DatasetScan,
+    parameters: Mapping[str, Parameters],
+    pooled: SampleMetrics,
+    thinned: Mapping[str, tuple[int, int]],
+) -> Training:
+    """Return the provenance of a model, which its file contains.
+
+    Args:
+        setting: of the training.
+        scan: of the training recordings.
+        parameters: hyper-parameters of each finger's classifier.
+        pooled: metrics out of fold, of all fingers and recordings.
+        thinned: number of used and of all samples of each finger of which not all are used.
+    """
+    init = None if setting.init is None else setting.init.training
+    before = {} if init is None else init.recordings
+    return Training(
+        recordings={f"{name} (init)": digest for name, digest in before.items()}
+        | {recording.name: recording.digest for recording in scan.recordings},
+        split=setting.split,
+        parameters={finger: dict(chosen) for finger, chosen in parameters.items()},
+        figures={name: getattr(pooled, name) for name in FIGURES},
+        seed=setting.seed,
+        samples=dict(thinned) or UNSET,
+        versions={name: version(name) for name in ("holdfast", "numpy", "scikit-learn")},
+    )

@@ -124,9 +124,13 @@ class Setting:
                 f"{_name(init)} has different features for its fingers; only a model with the same "
                 "features for all fingers can be adapted"
             )
-        own = {"features": features.pop(), "window": init.window, "tare": Tare.parse(init.tare)}
-        own |= {"hold": init.debounce.hold, "hysteresis": init.debounce.hysteresis}
-        return cls(**{**own, **chosen}, init=init)
+        defaults = {
+            "features": features.pop(),
+            "window": init.window,
+            "tare": Tare.parse(init.tare),
+        }
+        defaults |= {"hold": init.debounce.hold, "hysteresis": init.debounce.hysteresis}
+        return cls(**{**defaults, **chosen}, init=init)
 
     def recipe_of(self, finger: str) -> ModelRecipe:
         """Return the way of fitting the classifier of a finger.

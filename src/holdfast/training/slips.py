@@ -11,7 +11,7 @@ from holdfast.classifiers.logreg import LogisticRegression
 from holdfast.classifiers.slip import SlipRule, SlipThresholds
 from holdfast.contact import STABLE, UNKNOWN, UNSTABLE
 from holdfast.errors import ModelError, TrainingError
-from holdfast.features.stream import extract
+from holdfast.features.stream import StreamPlan, extract
 from holdfast.metrics import RecordingResults, score_recording
 from holdfast.metrics.slip_thresholds import (
     MAX_RAISED_QUIET,
@@ -30,19 +30,16 @@ from holdfast.metrics.slips import SlipCounts, SlipMetrics, found_shares, slip_m
 from holdfast.model import ANY_FINGER, Model
 from holdfast.parallel import Engine
 from holdfast.recordings import Recording
-from holdfast.training.dataset_scan import OneRecording
+from holdfast.training.dataset_scan import OneRecording, Progress
 from holdfast.training.evaluation import compute_decisions
-from holdfast.training.progress import Progress
 from holdfast.training.training_samples import (
     FingerSamples,
-    RecordingSamples,
     SamplesPlan,
-    concatenate_parts,
+    join_samples,
     labelled_samples,
     pool_fingers,
     resample_if_needed,
     sensors_of,
-    stream_plan,
     usable_rows,
 )
 
@@ -103,14 +100,14 @@ def gather_slip_samples(
     Returns:
         By finger; none without a truth or labels of slips.
     """
-    parts: dict[str, dict[int, RecordingSamples]] = {finger: {} for finger in plan.scan.sensors}
+    parts: dict[str, list[FingerSamples]] = {finger: [] for finger in plan.scan.sensors}
     calls = ((place, OneRecording(recordings, place)) for place in plan.places)
     read = engine.map_ordered(_samples_of_part, calls, shared=(plan,))
-    for place, fingers in zip(plan.places, progress(read, "slips", len(plan.places)), strict=True):
+    for fingers in progress(read, "slips", len(plan.places)):
         for finger, samples in fingers.items():
-            parts[finger][place] = samples
-    n = len(plan.scan.recordings)
-    by_finger = {f: concatenate_parts(part, n) for f, part in parts.items() if part}
+            parts[finger].append(samples)
+    no_rest = np.zeros((len(plan.scan.recordings), 3))
+    by_finger = {finger: join_samples(part, no_rest) for finger, part in parts.items() if part}
     if plan.setting.is_shared and by_finger:
         by_finger = {ANY_FINGER: pool_fingers(by_finger)}
     return {
@@ -122,14 +119,15 @@ def gather_slip_samples(
 
 def _samples_of_part(
     plan: SamplesPlan, place: int, part: Sequence[Recording]
-) -> dict[str, RecordingSamples]:
+) -> dict[str, FingerSamples]:
     """Return the samples of one recording by finger; class 1 slides."""
     scan, setting = plan.scan, plan.setting
     (recording,) = part
     if not scan.relative:
         recording = resample_if_needed(recording, scan.rate)
-    rate = scan.model_rate or recording.rate
-    stream = stream_plan(sensors_of(recording, scan), setting.features, setting, rate)
+    rate, sensors = scan.model_rate or recording.rate, sensors_of(recording, scan)
+    features = dict.fromkeys(sensors, setting.features)
+    stream = StreamPlan(sensors, features, setting.window, setting.used_tare, rate)
     fingers = {}
     for finger, rows in extract(stream, recording).items():
         module = recording.modules[finger]
@@ -142,12 +140,13 @@ def _samples_of_part(
         step = scan.recordings[place].step * plan.step
         still = usable[states[usable] == UNSTABLE][::step]
         kept = np.sort(np.concatenate([usable[states[usable] == STABLE], still]))
-        fingers[finger] = RecordingSamples(
+        fingers[finger] = FingerSamples(
             None if scan.relative else module.sensor,
             labelled_samples(rows.features, states, kept, int(plan.data_split.group_of[place])),
             plan.data_split.units_of(place, module.n_samples)[kept],
+            np.full(len(kept), place),
             module.times[kept] - recording.start,
-            (0.0, 0.0, 0.0),
+            np.zeros((1, 3)),
             len(usable),
         )
     return fingers

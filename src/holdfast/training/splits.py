@@ -83,7 +83,9 @@ def split_data(recordings: Sequence[ScannedRecording], split: Split, seed: int) 
         TrainingError: there are fewer than two units, or a recording does not name its object.
     """
     names = [recording.object if split == "object" else recording.name for recording in recordings]
-    unnamed = [each.name for each, name in zip(recordings, names, strict=True) if name is None]
+    unnamed = [
+        recording.name for recording, name in zip(recordings, names, strict=True) if name is None
+    ]
     if unnamed:
         raise TrainingError(
             f"recording {unnamed[0]!r} does not name its object ('object' in its metadata); "

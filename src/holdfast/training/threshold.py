@@ -1,20 +1,41 @@
-"""Choice of the threshold of a model for a wanted rate of false alarms."""
+"""Choice of the threshold of a model for a wanted rate of false alarms.
+
+The decision rule is replayed with each threshold, from probabilities that are computed once.
+"""
 
 import math
-from collections.abc import Callable, Iterable, Sequence
-from dataclasses import dataclass
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from dataclasses import dataclass, replace
 from typing import Any
 
 import msgspec
 import numpy as np
 import numpy.typing as npt
 
+from holdfast.compiled import compiled
+from holdfast.contact import NO_CONTACT, STABLE, UNKNOWN
+from holdfast.detector.arrays import CANDIDATE, LAST_UNSTABLE, STATE
+from holdfast.detector.decision_rule import (
+    classify_contact,
+    debounce,
+    hold_unstable,
+    new_decision_memory,
+)
 from holdfast.errors import ModelError, TrainingError
-from holdfast.metrics import AlarmMatch, EventMetrics, FingerDecisions, pool_events
-from holdfast.model import Model, ThresholdPoint, Tuning
+from holdfast.metrics import (
+    AlarmMatch,
+    Decisions,
+    EventMetrics,
+    FingerDecisions,
+    hand_decisions,
+    match_decisions,
+    pool_events,
+)
+from holdfast.metrics.decisions import Codes
+from holdfast.model import Debounce, Model, ThresholdPoint, Tuning
 from holdfast.recordings import Recording
+from holdfast.sensors.types import Array, Integers
 from holdfast.training.evaluation import compute_decisions
-from holdfast.training.replay import Replay, alarms, stable_counts, with_threshold
 
 LOG_ODDS = np.arange(-40, 41) * 0.2
 """Log odds of the thresholds that are tried first."""
@@ -26,10 +47,70 @@ which it is STABLE at the lowest threshold: a hand that is never STABLE gives no
 N_SHOWN = 3
 """Thresholds that are shown on either side of the chosen one."""
 
+
+def with_threshold(model: Model, threshold: float) -> Model:
+    """Return the model with another threshold of the probability for all fingers."""
+    fingers = {
+        name: msgspec.structs.replace(
+            part, classifier=msgspec.structs.replace(part.classifier, threshold=threshold)
+        )
+        for name, part in model.fingers.items()
+    }
+    return msgspec.structs.replace(model, fingers=fingers)
+
+
+@dataclass(frozen=True)
+class ThresholdReplay:
+    """Decisions about one recording, for any threshold.
+
+    Attributes:
+        raw: decisions without debouncing, hold and hysteresis.
+        debounce: of the model.
+        period: of the samples [s].
+        n_model_fingers: number of fingers of the model.
+    """
+
+    raw: Decisions
+    debounce: Debounce
+    period: float
+    n_model_fingers: int
+
+    @classmethod
+    def of(cls, model: Model, recording: Recording) -> "ThresholdReplay":
+        """Compute the probabilities of a recording.
+
+        Raises:
+            ModelError: the recording has other fingers or sensors.
+        """
+        raw = compute_decisions(msgspec.structs.replace(model, debounce=Debounce()), recording)
+        n_fingers = len(raw.fingers) if "*" in model.fingers else len(model.fingers)
+        period = 1 / (model.rate or recording.rate)
+        return cls(raw, model.debounce, period, n_fingers)
+
+    def hand(self, threshold: float) -> FingerDecisions:
+        """Return the decisions about the hand at a threshold."""
+        fingers = {
+            name: replace(finger, states=self._states(finger, threshold))
+            for name, finger in self.raw.fingers.items()
+        }
+        return hand_decisions(fingers, self.n_model_fingers)
+
+    def _states(self, finger: FingerDecisions, threshold: float) -> Codes:
+        out = np.zeros(len(finger.times), dtype=np.int8)
+        rule = self.debounce
+        memory = new_decision_memory(1)
+        limits = np.array([threshold, rule.hysteresis, rule.hold, rule.min_duration, self.period])
+        _replay(
+            np.array(finger.times), np.array(finger.stable_probability), np.array(finger.states),
+            limits, memory.codes[0], memory.values[0], out,
+        )  # fmt: skip
+        return out
+
+
 Steps = Callable[[Iterable[Recording]], Iterable[Recording]]
 
 
-class OperatingPoint(msgspec.Struct, frozen=True):
+class ThresholdMetrics(msgspec.Struct, frozen=True):
     """Metrics of the hand at one threshold.
 
     Attributes:
@@ -65,9 +146,9 @@ class Tuned:
     """
 
     model: Model
-    chosen: OperatingPoint
-    before: OperatingPoint
-    points: tuple[OperatingPoint, ...]
+    chosen: ThresholdMetrics
+    before: ThresholdMetrics
+    points: tuple[ThresholdMetrics, ...]
 
 
 def tune(
@@ -103,14 +184,14 @@ def tune(
     replays = []
     for recording in progress(recordings):
         digests[recording.name] = recording.digest
-        replays.append(Replay.of(model, recording))
+        replays.append(ThresholdReplay.of(model, recording))
     points = _usable([_point(replays, t) for t in _probabilities(LOG_ODDS)])
     first = _best(points, false_alarms)
     fine = [_point(replays, t) for t in _probabilities(_log_odds(first.threshold) + FINE_STEPS)]
     every = _in_order(_usable([*points, *fine]))
     chosen = _confirm(model, recordings, _ranked(every, false_alarms), false_alarms)
     tuned = with_threshold(model, chosen.threshold)
-    own = max(part.classifier.threshold for part in model.fingers.values())
+    before = max(part.classifier.threshold for part in model.fingers.values())
     return Tuned(
         msgspec.structs.replace(
             tuned,
@@ -118,7 +199,7 @@ def tune(
             tuning=_record(chosen, points, digests, false_alarms),
         ),
         chosen,
-        _point(replays, own),
+        _point(replays, before),
         _around(points, chosen),
     )
 
@@ -131,11 +212,11 @@ def _log_odds(probability: float) -> float:
     return math.log(probability / (1 - probability))
 
 
-def _point(replays: Sequence[Replay], threshold: float) -> OperatingPoint:
+def _point(replays: Sequence[ThresholdReplay], threshold: float) -> ThresholdMetrics:
     return _measure([replay.hand(threshold) for replay in replays], threshold)
 
 
-def _measure(hands: Sequence[FingerDecisions], threshold: float) -> OperatingPoint:
+def _measure(hands: Sequence[FingerDecisions], threshold: float) -> ThresholdMetrics:
     matches: list[AlarmMatch] = [alarms(hand) for hand in hands]
     counts = [stable_counts(hand) for hand in hands]
     labelled = sum(count["labelled"] for count in counts)
@@ -148,10 +229,10 @@ def _measure(hands: Sequence[FingerDecisions], threshold: float) -> OperatingPoi
             "of it"
         )
     decided = sum(count["decided"] for count in counts)
-    return OperatingPoint(threshold, 100 * decided / labelled, events)
+    return ThresholdMetrics(threshold, 100 * decided / labelled, events)
 
 
-def _usable(points: list[OperatingPoint]) -> list[OperatingPoint]:
+def _usable(points: list[ThresholdMetrics]) -> list[ThresholdMetrics]:
     """Return the thresholds at which the hand is STABLE often enough, and not for ever.
 
     Below the hysteresis of the model a stable contact stays stable, so that every event is missed.
@@ -166,18 +247,18 @@ def _usable(points: list[OperatingPoint]) -> list[OperatingPoint]:
     return [point for point in usable if (point.events.missed["0.2"] or 0.0) < 100] or usable
 
 
-def _ranked(points: Sequence[OperatingPoint], false_alarms: float) -> list[OperatingPoint]:
+def _ranked(points: Sequence[ThresholdMetrics], false_alarms: float) -> list[ThresholdMetrics]:
     """Return the points with few enough false alarms, those that miss least first.
 
     Without events, the most sensitive first.
     """
-    found = [point for point in points if point.false_alarms <= false_alarms]
+    quiet = [point for point in points if point.false_alarms <= false_alarms]
     if points[0].events.n_events:
-        return sorted(found, key=lambda point: (point.missed, point.false_alarms))
-    return sorted(found, key=lambda point: -point.threshold)
+        return sorted(quiet, key=lambda point: (point.missed, point.false_alarms))
+    return sorted(quiet, key=lambda point: -point.threshold)
 
 
-def _best(points: Sequence[OperatingPoint], false_alarms: float) -> OperatingPoint:
+def _best(points: Sequence[ThresholdMetrics], false_alarms: float) -> ThresholdMetrics:
     ranked = _ranked(points, false_alarms)
     if ranked:
         return ranked[0]
@@ -189,7 +270,7 @@ def _best(points: Sequence[OperatingPoint], false_alarms: float) -> OperatingPoi
     )
 
 
-def _cost(point: OperatingPoint) -> str:
+def _cost(point: ThresholdMetrics) -> str:
     n = point.events.n_events
     if not n:
         return "has no event to miss"
@@ -199,24 +280,26 @@ def _cost(point: OperatingPoint) -> str:
 def _confirm(
     model: Model,
     recordings: Sequence[Recording],
-    ranked: Sequence[OperatingPoint],
+    ranked: Sequence[ThresholdMetrics],
     false_alarms: float,
-) -> OperatingPoint:
+) -> ThresholdMetrics:
     """Return the first point that the detector confirms; a long debouncing can differ a little."""
     for point in ranked:
-        own = with_threshold(model, point.threshold)
-        hands = [compute_decisions(own, recording).hand for recording in recordings]
-        found = _measure([hand for hand in hands if hand is not None], point.threshold)
-        if found.false_alarms <= false_alarms:
-            return found
+        candidate = with_threshold(model, point.threshold)
+        hands = [compute_decisions(candidate, recording).hand for recording in recordings]
+        confirmed = _measure([hand for hand in hands if hand is not None], point.threshold)
+        if confirmed.false_alarms <= false_alarms:
+            return confirmed
     raise TrainingError(f"no threshold gives at most {false_alarms:g} false alarms a minute")
 
 
-def _in_order(points: Iterable[OperatingPoint]) -> list[OperatingPoint]:
+def _in_order(points: Iterable[ThresholdMetrics]) -> list[ThresholdMetrics]:
     return sorted({point.threshold: point for point in points}.values(), key=lambda p: p.threshold)
 
 
-def _around(points: Sequence[OperatingPoint], chosen: OperatingPoint) -> tuple[OperatingPoint, ...]:
+def _around(
+    points: Sequence[ThresholdMetrics], chosen: ThresholdMetrics
+) -> tuple[ThresholdMetrics, ...]:
     """Return the chosen point and its neighbours among the first thresholds."""
     others = [p for p in points if p.threshold != chosen.threshold]
     below = [p for p in others if p.threshold < chosen.threshold][-N_SHOWN:]
@@ -225,8 +308,8 @@ def _around(points: Sequence[OperatingPoint], chosen: OperatingPoint) -> tuple[O
 
 
 def _record(
-    chosen: OperatingPoint,
-    points: Sequence[OperatingPoint],
+    chosen: ThresholdMetrics,
+    points: Sequence[ThresholdMetrics],
     digests: dict[str, str],
     false_alarms: float,
 ) -> Tuning:
@@ -244,5 +327,54 @@ def _record(
     )
 
 
-def _threshold_point(point: OperatingPoint) -> ThresholdPoint:
+def _threshold_point(point: ThresholdMetrics) -> ThresholdPoint:
     return ThresholdPoint(point.threshold, round(point.false_alarms, 3), point.events.missed["0.2"])
+
+
+@compiled
+def _replay(
+    times: Array,
+    probability: Array,
+    raw: Codes,
+    limits: Array,
+    codes: Integers,
+    decided: Array,
+    out: Codes,
+) -> None:
+    """Fill the states of a finger, by the steps of the detector.
+
+    Args:
+        times: (n,) [s].
+        probability: (n,) of stability.
+        raw: (n,) states without debouncing; UNKNOWN and NO_CONTACT do not depend on the threshold.
+        limits: threshold, hysteresis, hold [s], minimum duration [s] and period [s].
+        codes: as in `DecisionMemory`; is changed.
+        decided: as in `DecisionMemory`; is changed.
+        out: (n,) is filled.
+    """
+    threshold, hysteresis, hold, min_duration, period = limits
+    for k in range(len(times)):
+        if raw[k] == UNKNOWN:
+            codes[STATE] = codes[CANDIDATE] = UNKNOWN
+            decided[LAST_UNSTABLE] = np.nan
+        else:
+            state = NO_CONTACT
+            if raw[k] != NO_CONTACT:
+                state = classify_contact(probability[k], threshold, hysteresis, codes[STATE])
+                state = hold_unstable(state, decided, hold, times[k], period)
+            debounce(codes, decided, state, min_duration, times[k], period)
+        out[k] = codes[STATE]
+
+
+def alarms(hand: FingerDecisions) -> AlarmMatch:
+    """Return the events and alarms of the hand; none without labels."""
+    return match_decisions(hand) if hand.labels.any() else AlarmMatch((), (), 0.0)
+
+
+def stable_counts(hand: FingerDecisions) -> Mapping[str, int]:
+    """Return the number of samples labelled STABLE, and of these decided STABLE."""
+    labelled = hand.labels == STABLE
+    return {
+        "labelled": int(labelled.sum()),
+        "decided": int((labelled & (hand.states == STABLE)).sum()),
+    }

@@ -19,17 +19,26 @@ from holdfast.metrics.slip_thresholds import Curve
 from holdfast.model import ANY_FINGER, Model
 from holdfast.parallel import Engine
 from holdfast.recordings import Recording
-from holdfast.training.adaptation import choose_adaptation
+from holdfast.training.adaptation import (
+    adaptation_warnings,
+    choose_adaptation,
+    known_recordings,
+)
 from holdfast.training.dataset_scan import (
     OneRecording,
+    Progress,
     RecordingScan,
     combine_scans,
     scan_recording,
+    show_nothing,
 )
 from holdfast.training.evaluation import combine_decisions, judge
-from holdfast.training.model_fit import TrainingData, fit_full_model, fit_model
-from holdfast.training.progress import Progress, show_nothing
-from holdfast.training.provenance import adaptation_warnings, known_recordings, training_record
+from holdfast.training.model_fit import (
+    TrainingData,
+    fit_full_model,
+    fit_model,
+    training_record,
+)
 from holdfast.training.setting import SEARCH_SAMPLES, Setting, Split
 from holdfast.training.slips import choose_slip_threshold, gather_slip_samples, with_slip_threshold
 from holdfast.training.splits import DataSplit, inner_folds, split_data
@@ -215,38 +224,39 @@ class _Trainer:
         if setting.init is not None:
             return [self._adapt(held, setting.init) for held in held_units]
         tasks = (
-            (thin(own.without(held), SEARCH_SAMPLES), setting, finger, self.journal)
+            (thin(pool.without(held), SEARCH_SAMPLES), setting, finger, self.journal)
             for held in held_units
-            for finger, own in self.fingers.items()
+            for finger, pool in self.fingers.items()
         )
         results = self.engine.map_ordered(_search, tasks)
         n_tasks = len(held_units) * len(self.fingers)
-        found = list(self.progress(results, "searching", n_tasks))
-        for warning in dict.fromkeys(warning for _, warning in found if warning):
+        searched = list(self.progress(results, "searching", n_tasks))
+        for warning in dict.fromkeys(warning for _, warning in searched if warning):
             self.warn(warning)
-        parameters = iter(parameters for parameters, _ in found)
+        parameters = iter(parameters for parameters, _ in searched)
         return [{finger: next(parameters) for finger in self.fingers} for _ in held_units]
 
     def _adapt(self, held: Collection[int], init: Model) -> dict[str, Parameters]:
         """Choose how far every finger is adapted; report it if nothing is held out."""
-        found: dict[str, Parameters] = {}
-        for finger, own in self.fingers.items():
-            adaptation = choose_adaptation(own, linear_prior(init.finger(finger).classifier), held)
-            found[finger] = adaptation.parameters
+        parameters: dict[str, Parameters] = {}
+        for finger, pool in self.fingers.items():
+            adaptation = choose_adaptation(pool, linear_prior(init.finger(finger).classifier), held)
+            parameters[finger] = adaptation.parameters
             if not held:
                 self.warn(adaptation.describe(init.name or "the model to adapt", finger))
-        return found
+        return parameters
 
-    def cross_validate(self, found: Sequence[Mapping[str, Parameters]]) -> Metrics:
+    def cross_validate(self, searched: Sequence[Mapping[str, Parameters]]) -> Metrics:
         """Compute the metrics of predictions out of fold.
 
         Args:
-            found: parameters of every finger from each search. Unit k uses those of search k
+            searched: parameters of every finger from each search. Unit k uses those of search k
                 modulo the number of searches.
         """
         n_units = len(self.data_split.units)
         n_fits = min(n_units, MAX_FITS)
-        tasks = ((found[k % len(found)], set(range(k, n_units, n_fits))) for k in range(n_fits))
+        n = len(searched)
+        tasks = ((searched[k % n], set(range(k, n_units, n_fits))) for k in range(n_fits))
         fits = self.engine.map_ordered(fit_model, tasks, shared=(self.data, self.setting))
         models = list(self.progress(fits, "fitting", n_fits))
         if n_fits < n_units:
@@ -333,14 +343,14 @@ def _score_out_of_fold(
         return score_recording(Decisions(name, {})), False
     (recording,) = part
     judged = [_judge(model, recording) for model in used]
-    each = [decisions for decisions, _ in judged]
+    by_model = [decisions for decisions, _ in judged]
     loaded = any(loaded for _, loaded in judged)
-    decisions = Decisions(name, {})
+    combined = Decisions(name, {})
     if data_split.split not in ("time", "random"):
-        decisions = each[0]
-    elif len(each) == len(models) and len({tuple(one.fingers) for one in each}) == 1:
-        decisions = combine_decisions(each, lambda n: data_split.units_of(place, n), n_fingers)
-    return score_recording(decisions, slip_curves=True), loaded
+        combined = by_model[0]
+    elif len(used) == len(models) and len({tuple(by.fingers) for by in by_model}) == 1:
+        combined = combine_decisions(by_model, lambda n: data_split.units_of(place, n), n_fingers)
+    return score_recording(combined, slip_curves=True), loaded
 
 
 def _judge(model: Model, recording: Recording) -> tuple[Decisions, bool]:

@@ -3,7 +3,7 @@
 from collections import Counter
 from collections.abc import Collection, Iterator, Mapping, Sequence
 from dataclasses import dataclass
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 import numpy.typing as npt
@@ -11,7 +11,7 @@ import numpy.typing as npt
 from holdfast.classifiers import Samples
 from holdfast.contact import NO_CONTACT, STABLE, UNKNOWN
 from holdfast.errors import TrainingError
-from holdfast.features import FeatureSpec, Tare
+from holdfast.features import Tare
 from holdfast.features.force import rest_amplitude
 from holdfast.features.stream import StreamPlan, extract
 from holdfast.model import ANY_FINGER, RATE_TOLERANCE
@@ -20,8 +20,7 @@ from holdfast.recordings import Recording, Tactile, label_states
 from holdfast.resampling import resample
 from holdfast.sensors import Sensor
 from holdfast.sensors.types import Integers
-from holdfast.training.dataset_scan import DatasetScan, OneRecording
-from holdfast.training.progress import Progress, show_nothing
+from holdfast.training.dataset_scan import DatasetScan, OneRecording, Progress, show_nothing
 from holdfast.training.setting import Setting
 from holdfast.training.splits import DataSplit
 
@@ -64,13 +63,13 @@ class FingerSamples:
         """Return (n_units,) whether a unit has samples, and both classes are left without it."""
         counts = self._class_counts(n_units)
         left = counts.sum(axis=1, keepdims=True) - counts
-        found: npt.NDArray[np.bool_] = self.present(n_units) & (left > 0).all(axis=0)
-        return found
+        can: npt.NDArray[np.bool_] = self.present(n_units) & (left > 0).all(axis=0)
+        return can
 
     def present(self, n_units: int) -> npt.NDArray[np.bool_]:
         """Return (n_units,) whether a unit has samples."""
-        found: npt.NDArray[np.bool_] = self._class_counts(n_units).sum(axis=0) > 0
-        return found
+        present: npt.NDArray[np.bool_] = self._class_counts(n_units).sum(axis=0) > 0
+        return present
 
     def _class_counts(self, n_units: int) -> Integers:
         """Return (2, n_units) number of samples of class 0 and class 1 in each unit."""
@@ -81,26 +80,6 @@ class FingerSamples:
     def contact_threshold(self, recordings: Sequence[int]) -> float | None:
         """Return the contact threshold from the tare intervals of some recordings."""
         return contact_threshold(self.at_rest[list(recordings)])
-
-
-class RecordingSamples(NamedTuple):
-    """Training samples of one finger in one recording.
-
-    Attributes:
-        sensor: of the finger; None for any sensor.
-        samples: labelled, with features; the groups are those of the split.
-        units: (n,) as in `FingerSamples`.
-        times: (n,) since the start of the recording [s].
-        at_rest: number, sum and sum of squares of F_a in the tare interval.
-        n_usable: number of samples before thinning.
-    """
-
-    sensor: Sensor | None
-    samples: Samples
-    units: Integers
-    times: npt.NDArray[np.float64]
-    at_rest: tuple[float, float, float]
-    n_usable: int
 
 
 @dataclass(frozen=True)
@@ -125,7 +104,8 @@ class SamplesPlan:
     @property
     def places(self) -> list[int]:
         """Indices of the recordings with labels."""
-        return [place for place, each in enumerate(self.scan.recordings) if each.n_labelled]
+        scanned = enumerate(self.scan.recordings)
+        return [place for place, recording in scanned if recording.n_labelled]
 
 
 def gather_samples(
@@ -155,21 +135,22 @@ def gather_samples(
         TrainingError: one classifier of all fingers is required, but their sensors differ.
     """
     plan = SamplesPlan(scan, setting, data_split)
-    parts: dict[str, dict[int, RecordingSamples]] = {finger: {} for finger in scan.sensors}
-    for place, found in zip(
-        plan.places, progress(_read(recordings, plan, engine), "features", len(plan.places)),
-        strict=True,
-    ):  # fmt: skip
-        for finger, samples in found.items():
-            parts[finger][place] = samples
-    n = len(scan.recordings)
-    fingers = {finger: concatenate_parts(own, n) for finger, own in parts.items() if own}
+    parts: dict[str, list[FingerSamples]] = {finger: [] for finger in scan.sensors}
+    at_rest = {finger: np.zeros((len(scan.recordings), 3)) for finger in scan.sensors}
+    read = progress(_read(recordings, plan, engine), "features", len(plan.places))
+    for place, samples_of_fingers in zip(plan.places, read, strict=True):
+        for finger, samples in samples_of_fingers.items():
+            parts[finger].append(samples)
+            at_rest[finger][place] = samples.at_rest[0]
+    fingers = {
+        finger: join_samples(part, at_rest[finger]) for finger, part in parts.items() if part
+    }
     return {ANY_FINGER: pool_fingers(fingers)} if setting.is_shared else fingers
 
 
 def _read(
     recordings: Sequence[Recording], plan: SamplesPlan, engine: Engine
-) -> Iterator[dict[str, RecordingSamples]]:
+) -> Iterator[dict[str, FingerSamples]]:
     """Yield the samples of each recording with labels, by finger.
 
     Which samples are kept depends on the number of usable samples in all recordings before.
@@ -187,21 +168,21 @@ def _read(
             if counts is not None:
                 n_seen.update(next(counts))
 
-    for found in engine.map_ordered(_samples_of_part, calls(), shared=(plan,)):
+    for fingers in engine.map_ordered(_samples_of_part, calls(), shared=(plan,)):
         if counts is None:
-            n_seen.update({finger: samples.n_usable for finger, samples in found.items()})
-        yield found
+            n_seen.update({name: samples.n_usable for name, samples in fingers.items()})
+        yield fingers
 
 
 def _count_usable(plan: SamplesPlan, place: int, part: Sequence[Recording]) -> dict[str, int]:
-    found = _samples_of_part(plan, place, part, {})
-    return {finger: samples.n_usable for finger, samples in found.items()}
+    fingers = _samples_of_part(plan, place, part, {})
+    return {name: samples.n_usable for name, samples in fingers.items()}
 
 
 def _samples_of_part(
     plan: SamplesPlan, place: int, part: Sequence[Recording], n_seen: Mapping[str, int]
-) -> dict[str, RecordingSamples]:
-    """Return the samples of one recording by finger.
+) -> dict[str, FingerSamples]:
+    """Return the samples of one recording by finger; `at_rest` has only its own row.
 
     Args:
         plan: of the dataset.
@@ -210,50 +191,30 @@ def _samples_of_part(
         n_seen: usable samples of each finger in all recordings before.
     """
     scan, setting, step = plan.scan, plan.setting, plan.step
-    (given,) = part
-    recording = given if scan.relative else resample_if_needed(given, scan.rate)
-    rate = scan.model_rate or recording.rate
-    stream = stream_plan(sensors_of(recording, scan), setting.features, setting, rate)
-    found = {}
+    (recording,) = part
+    if not scan.relative:
+        recording = resample_if_needed(recording, scan.rate)
+    rate, tare = scan.model_rate or recording.rate, setting.used_tare
+    sensors = sensors_of(recording, scan)
+    features = dict.fromkeys(sensors, setting.features)
+    stream = StreamPlan(sensors, features, setting.window, tare, rate)
+    fingers = {}
     for finger, rows in extract(stream, recording).items():
         module = recording.modules[finger]
         states = _states_to_learn(module, scan.relative)
         usable = usable_rows(rows.features, states)[:: scan.recordings[place].step]
         kept = usable[-n_seen.get(finger, 0) % step :: step]
-        at_rest = (0.0, 0.0, 0.0)
-        if stream.tare.without_contact and not scan.relative:
-            at_rest = rest_moments(module, stream.tare, rate)
-        found[finger] = RecordingSamples(
+        has_rest = tare.without_contact and not scan.relative
+        fingers[finger] = FingerSamples(
             None if scan.relative else module.sensor,
             labelled_samples(rows.features, states, kept, int(plan.data_split.group_of[place])),
             plan.data_split.units_of(place, module.n_samples)[kept],
+            np.full(len(kept), place),
             module.times[kept] - recording.start,
-            at_rest,
+            np.array([rest_moments(module, tare, rate) if has_rest else (0.0, 0.0, 0.0)]),
             len(usable),
         )
-    return found
-
-
-def concatenate_parts(parts: Mapping[int, RecordingSamples], n_recordings: int) -> FingerSamples:
-    """Return the samples of a finger in all recordings, in order.
-
-    Args:
-        parts: by index of the recording; at least one.
-        n_recordings: in the dataset.
-    """
-    own = list(parts.values())
-    at_rest = np.zeros((n_recordings, 3))
-    at_rest[list(parts)] = [each.at_rest for each in own]
-    n_kept = [len(each.units) for each in own]
-    return FingerSamples(
-        own[0].sensor,
-        concatenate([each.samples for each in own]),
-        np.concatenate([each.units for each in own]),
-        np.repeat(list(parts), n_kept),
-        np.concatenate([each.times for each in own]),
-        at_rest,
-        n_usable=sum(each.n_usable for each in own),
-    )
+    return fingers
 
 
 def sensors_of(recording: Recording, scan: DatasetScan) -> dict[str, Sensor]:
@@ -317,17 +278,6 @@ def resample_if_needed(recording: Recording, rate: float) -> Recording:
     return resample(recording, rate)
 
 
-def stream_plan(
-    sensors: dict[str, Sensor],
-    features: tuple[FeatureSpec, ...],
-    setting: Setting,
-    rate: float,
-) -> StreamPlan:
-    """Return the plan of the feature stream of some fingers, with a setting's window and tare."""
-    tare = Tare.parse(setting.used_tare)
-    return StreamPlan(sensors, dict.fromkeys(sensors, features), setting.window, tare, rate)
-
-
 def contact_threshold(moments: npt.NDArray[np.float64]) -> float | None:
     """Return the mean + 5 standard deviations of F_a at rest.
 
@@ -359,23 +309,25 @@ def rest_moments(module: Tactile, tare: Tare, rate: float) -> tuple[int, float, 
 
 def pool_fingers(fingers: Mapping[str, FingerSamples]) -> FingerSamples:
     """Return the samples of all fingers together."""
-    each = list(fingers.values())
-    if len({own.sensor for own in each}) > 1:
+    parts = list(fingers.values())
+    if len({part.sensor for part in parts}) > 1:
         raise TrainingError(
             "one classifier for all fingers needs one sensor; given are "
-            + ", ".join(f"{f} ({own.sensor.name})" for f, own in fingers.items() if own.sensor)
+            + ", ".join(
+                f"{name} ({part.sensor.name})" for name, part in fingers.items() if part.sensor
+            )
         )
-    return _join(each)
+    return join_samples(parts, np.sum([part.at_rest for part in parts], axis=0))
 
 
-def _join(parts: Sequence[FingerSamples]) -> FingerSamples:
-    """Return the samples of all parts, in order."""
+def join_samples(parts: Sequence[FingerSamples], at_rest: npt.NDArray[np.float64]) -> FingerSamples:
+    """Return the samples of at least one part, in order, with the moments of the result."""
     return FingerSamples(
         parts[0].sensor,
-        concatenate([own.samples for own in parts]),
-        np.concatenate([own.units for own in parts]),
-        np.concatenate([own.recordings for own in parts]),
-        np.concatenate([own.times for own in parts]),
-        np.sum([own.at_rest for own in parts], axis=0),
-        sum(own.n_usable for own in parts),
+        concatenate([part.samples for part in parts]),
+        np.concatenate([part.units for part in parts]),
+        np.concatenate([part.recordings for part in parts]),
+        np.concatenate([part.times for part in parts]),
+        at_rest,
+        sum(part.n_usable for part in parts),
     )

@@ -196,6 +196,7 @@ def test_a_reset_drops_half_a_packet():
     assert got.n_refused == 0
 
 
+@pytest.mark.slow
 def test_endless_garbage_needs_bounded_memory():
     decoder = AnySkinDecoder(5)
     rng = np.random.default_rng(0)

@@ -203,6 +203,7 @@ def test_texts_and_huge_arrays_are_refused(tmp_path):
         list(import_recordings(tmp_path / "b.h5", "arq-crisp"))
 
 
+@pytest.mark.slow
 def test_a_flipped_bit_raises_no_other_error(tmp_path):
     write(tmp_path / "a.h5", [4, 5, 4, 4])
     raw = (tmp_path / "a.h5").read_bytes()

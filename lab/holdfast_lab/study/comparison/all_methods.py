@@ -167,8 +167,8 @@ def _percent(part: int, whole: int) -> float:
 
 def _reliability_figure(plan: StudyPlan, results: Results) -> ReportFigure:
     evaluations = _by_recording(plan, results, DETAIL_METHODS)
-    curves = {title: _reliability_bins(each) for title, each in evaluations.items()}
-    notes = {title: _brier_note(each) for title, each in evaluations.items()}
+    curves = {title: _reliability_bins(evaluation) for title, evaluation in evaluations.items()}
+    notes = {title: _brier_note(evaluation) for title, evaluation in evaluations.items()}
     caption = "Reliability of the probabilities, by recording. On the dotted line they are right."
     return ReportFigure("reliability", caption, draw_reliability(curves, notes))
 
@@ -216,9 +216,9 @@ def _groups(
     plan: StudyPlan, rows: Sequence[Row], key: str
 ) -> dict[str, Mapping[str, IntervalEstimate]]:
     """Return the values of the rows by recording, by method and by the values of `key`."""
-    own = [row for row in rows if row.keys["on"] == SPLIT_TITLES["recording"]]
+    shown = [row for row in rows if row.keys["on"] == SPLIT_TITLES["recording"]]
     drawn = {
-        title: _estimates([r for r in own if _short_title(str(r.keys["method"])) == title], key)
+        title: _estimates([r for r in shown if _short_title(str(r.keys["method"])) == title], key)
         for title in _short_titles(plan, DETAIL_METHODS).values()
     }
     return {title: values for title, values in drawn.items() if values}

@@ -46,7 +46,7 @@ def phases(plan: StudyPlan, results: Results) -> ResultTable:
 def force(plan: StudyPlan, results: Results) -> ResultTable:
     """Return the table of errors by grip force. The paper states that it has no influence."""
     rows: list[Row] = []
-    lines = [line for line in _lines(plan, results) if any(each.grips for each in line[1])]
+    lines = [line for line in _lines(plan, results) if any(errors.grips for errors in line[1])]
     edges = force_quartiles(lines[0][1]) if lines else np.empty(0)
     for keys, breakdowns in lines:
         for quarter, title in enumerate(QUARTERS):
@@ -71,12 +71,12 @@ def directions(plan: StudyPlan, results: Results) -> ResultTable:
     n_disturbances: dict[str, int] = {}
     for keys, breakdowns in _lines(plan, results):
         for direction in (*DIRECTIONS, OBLIQUE):
-            found = [_disturbances(breakdown, direction) for breakdown in breakdowns]
-            n = [sum(each.n for each in of_recording) for of_recording in found]
-            wrong = [sum(each.n_wrong for each in of_recording) for of_recording in found]
+            events = [_disturbances(breakdown, direction) for breakdown in breakdowns]
+            n = [sum(event.n for event in of_recording) for of_recording in events]
+            wrong = [sum(event.n_wrong for event in of_recording) for of_recording in events]
             if sum(n):
                 rows.append(ratio_row(keys | {"direction": direction}, wrong, n, plan.seed))
-                n_disturbances.setdefault(direction, sum(map(len, found)))
+                n_disturbances.setdefault(direction, sum(map(len, events)))
     ordered = [each for each in (*DIRECTIONS, OBLIQUE) if each in n_disturbances]
     counts = ", ".join(f"{direction} {n_disturbances[direction]}" for direction in ordered)
     note = (
@@ -113,8 +113,8 @@ def _counts_of_quarter(
 ) -> Array:
     """Return (2, n_recordings) samples, and wrong samples, of the fingers in one quarter."""
     counts = np.zeros((2, len(breakdowns)))
-    for column, each in enumerate(breakdowns):
-        for grip in _holding_grips([each]):
+    for column, errors in enumerate(breakdowns):
+        for grip in _holding_grips([errors]):
             if np.searchsorted(edges, grip.force) == quarter:
                 counts[:, column] += _count_of(grip, kind)
     return counts
@@ -127,5 +127,5 @@ def _count_of(grip: GripErrors, kind: str) -> Count:
 def _lines(plan: StudyPlan, results: Results) -> Iterator[Line]:
     for name, title in method_titles(plan).items():
         for key, evaluation in method_results(plan, results, name):
-            if key in SHOWN_SPLITS and any(each.phases for each in evaluation.breakdown):
+            if key in SHOWN_SPLITS and any(errors.phases for errors in evaluation.breakdown):
                 yield {"on": SPLIT_TITLES[key], "method": title}, evaluation.breakdown

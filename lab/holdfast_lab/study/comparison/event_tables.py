@@ -158,9 +158,9 @@ def slip_rows(keys: Keys, alarms: Sequence[AlarmStatistics], seed: int) -> Itera
     """Yield the rows of one line of the table of slips that concern slips."""
     n_slips = [len(alarm.slip_delays) for alarm in alarms]
     for post in POST_DURATIONS:
-        found = [alarm.n_slips_found(post) for alarm in alarms]
+        n_detected = [alarm.n_slips_found(post) for alarm in alarms]
         figure = {"figure": f"detected within {1000 * post:.0f} ms [%]"}
-        yield ratio_row(keys | figure, found, n_slips, seed)
+        yield ratio_row(keys | figure, n_detected, n_slips, seed)
     not_stable = [alarm.n_slips_not_stable for alarm in alarms]
     yield ratio_row(keys | {"figure": ALREADY_NOT_STABLE}, not_stable, n_slips, seed)
     distances = [[MILLIMETRES * d for d in alarm.slip_distances] for alarm in alarms]

@@ -68,9 +68,9 @@ def method_titles(plan: StudyPlan) -> dict[str, str]:
     left_out = SLOW_METHODS if plan.quick else () if is_torch_installed() else (NETWORK,)
     one_finger = len(plan.main.fingers) < 2
     return {
-        name: each.title
-        for name, each in METHODS.items()
-        if name not in left_out and not (each.whole_hand and one_finger)
+        name: method.title
+        for name, method in METHODS.items()
+        if name not in left_out and not (method.whole_hand and one_finger)
     }
 
 

@@ -9,9 +9,8 @@ from msgspec.structs import replace
 from holdfast.contact import STABLE, TIME_TOLERANCE, UNKNOWN, ContactState
 from holdfast.metrics import bootstrap_interval, match_alarms
 from holdfast.metrics.decisions import Codes
-from holdfast.metrics.intervals import auc_of
 from holdfast.metrics.masks import Mask
-from holdfast.metrics.statistics import mann_whitney_u
+from holdfast.metrics.statistics import auc_of, mann_whitney_u
 from holdfast.sensors.types import Array
 from holdfast_lab.report.result_tables import Row
 from holdfast_lab.study.comparison.real_estimates import (
@@ -173,18 +172,18 @@ def pair_rows(keys: Keys, pairs: Sequence[ScorePair], seed: int) -> list[Row]:
         seed: of the bootstrap.
     """
     first, second = [pair.first for pair in pairs], [pair.second for pair in pairs]
-    one = auc_row({**keys, "figure": AUC_OF_SHIPPED}, first, seed)
+    shipped = auc_row({**keys, "figure": AUC_OF_SHIPPED}, first, seed)
     other = auc_row({**keys, "figure": AUC}, second, seed)
     key = {**keys, "figure": DIFFERENCE}
-    if one.ours is None or other.ours is None:
-        return [one, other, Row(key, None, None, one.n)]
+    if shipped.ours is None or other.ours is None:
+        return [shipped, other, Row(key, None, None, shipped.n)]
     interval = None
-    if (one.n or 0) >= MIN_RECORDINGS:
+    if (shipped.n or 0) >= MIN_RECORDINGS:
         statistics = [auc_of([x.stable for x in s], [x.slip for x in s]) for s in (first, second)]
         interval = bootstrap_interval(
             lambda draws: statistics[0](draws) - statistics[1](draws), len(pairs), seed=seed
         )
-    return [one, other, Row(key, one.ours - other.ours, None, one.n, interval)]
+    return [shipped, other, Row(key, shipped.ours - other.ours, None, shipped.n, interval)]
 
 
 def recording_rows(keys: Keys, counts: Sequence[RecordingCounts], seed: int) -> list[Row]:
@@ -272,10 +271,10 @@ def _with_interval_if_enough(row: Row) -> Row:
 
 def _count(labels: RecordingLabels, estimates: RecordingEstimates, common: Mask) -> RecordingCounts:
     fingers = {}
-    for name, own in estimates.fingers.items():
+    for name, estimate in estimates.fingers.items():
         finger = labels.fingers[name]
         at_finger = common[np.searchsorted(labels.hand.times.array, finger.times.array)]
-        fingers[name] = _count_unit(finger, own, own.states.array != UNKNOWN, at_finger)
+        fingers[name] = _count_unit(finger, estimate, estimate.states.array != UNKNOWN, at_finger)
     hand = _count_unit(labels.hand, estimates.hand, estimates.known.array, common)
     events = _count_events(labels.hand, estimates.alarm_states.array, common)
     return RecordingCounts(labels.name, fingers, hand, events)

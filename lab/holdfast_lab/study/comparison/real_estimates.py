@@ -115,7 +115,7 @@ def load_fingers(real: Corpus) -> list[Recording]:
 
     A recording without any of these fingers is left out.
     """
-    found = []
+    shortened = []
     for recording in real.load():
         modules: dict[str, Tactile] = {
             name: recording.modules[name]
@@ -123,8 +123,8 @@ def load_fingers(real: Corpus) -> list[Recording]:
             if name in recording.modules and recording.modules[name].n_samples
         }
         if modules:
-            found.append(replace(recording, modules=modules))
-    return found
+            shortened.append(replace(recording, modules=modules))
+    return shortened
 
 
 def n_folds(real: Corpus) -> int:
@@ -171,10 +171,10 @@ def unit_estimates(probability: Array, states: Codes) -> UnitEstimates:
 
 def _labels(recording: Recording) -> RecordingLabels:
     modules = recording.modules
-    codes = {name: label_states(each.labels, each.times) for name, each in modules.items()}
-    slip = {name: _slip_samples(each) for name, each in modules.items()}
+    codes = {name: label_states(module.labels, module.times) for name, module in modules.items()}
+    slip = {name: _slip_samples(module) for name, module in modules.items()}
     hand = _of_hand(modules, codes)
-    sliding = {name: np.where(own, UNSTABLE, STABLE) for name, own in slip.items()}
+    sliding = {name: np.where(mask, UNSTABLE, STABLE) for name, mask in slip.items()}
     hand_slip = _of_hand(modules, sliding).labels == UNSTABLE
     fingers = {n: _unit_labels(m.times, codes[n], slip[n]) for n, m in modules.items()}
     return RecordingLabels(
@@ -192,12 +192,12 @@ def _of_hand(modules: Mapping[str, Tactile], codes: Mapping[str, Codes]) -> Fing
     """Return the hand with the labels that follow from those of its fingers."""
     fingers = {
         name: FingerDecisions(
-            each.times,
+            module.times,
             codes[name],
-            np.full(each.n_samples, UNKNOWN),
-            np.full(each.n_samples, np.nan),
+            np.full(module.n_samples, UNKNOWN),
+            np.full(module.n_samples, np.nan),
         )
-        for name, each in modules.items()
+        for name, module in modules.items()
     }
     return hand_decisions(fingers, len(fingers))
 

@@ -49,12 +49,12 @@ def model_estimates(making: Making, real: Corpus, seed: int) -> list[RecordingEs
         seed: of the folds, and of the choice of one of the other recordings.
     """
     recordings = load_fingers(real)
-    found: dict[int, RecordingEstimates] = {}
+    estimates: dict[int, RecordingEstimates] = {}
     for held in _folds(recordings, real, seed):
-        others = [each for place, each in enumerate(recordings) if place not in held]
+        others = [recording for place, recording in enumerate(recordings) if place not in held]
         model = _model(making, others, seed + min(held))
-        found |= {place: _estimates(model, recordings[place]) for place in held}
-    return [found[place] for place in sorted(found)]
+        estimates |= {place: _estimates(model, recordings[place]) for place in held}
+    return [estimates[place] for place in sorted(estimates)]
 
 
 def _folds(recordings: Sequence[Recording], real: Corpus, seed: int) -> Iterator[frozenset[int]]:

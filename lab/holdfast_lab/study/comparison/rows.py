@@ -6,8 +6,7 @@ import numpy as np
 import numpy.typing as npt
 
 from holdfast.metrics import Interval, Metrics, SampleMetrics, bootstrap_interval, ratio_of_sums
-from holdfast.metrics.intervals import Statistic, quantile_of
-from holdfast.metrics.statistics import quantile
+from holdfast.metrics.statistics import Statistic, quantile, quantile_of
 from holdfast.sensors.types import Array
 from holdfast_lab.report.result_tables import Key, Row
 from holdfast_lab.study.evaluation.evaluate_method import MethodEvaluation

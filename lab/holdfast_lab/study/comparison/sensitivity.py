@@ -167,10 +167,10 @@ def _margins(plan: StudyPlan) -> dict[float, Variation]:
     if first.truth is None or "phase" not in first.truth.hand:
         return {}
     known = str(first.metadata.get("profile"))
-    own = profile(known).label_margin if known in profiles() else UNSTABLE_MARGIN
+    usual = profile(known).label_margin if known in profiles() else UNSTABLE_MARGIN
     margins = (0.0, UNSTABLE_MARGIN) if plan.quick else MARGINS
     return {
-        margin: Variation() if margin == own else Variation(margin=margin) for margin in margins
+        margin: Variation() if margin == usual else Variation(margin=margin) for margin in margins
     }
 
 
@@ -258,8 +258,8 @@ def _rows(keys: Keys, evaluation: MethodEvaluation, seed: int) -> Iterator[Row]:
     alarms = evaluation.alarms.compared
     n_slips = [len(alarm.slip_delays) for alarm in alarms]
     if sum(n_slips):
-        found = [alarm.n_slips_found(POST_DURATIONS[0]) for alarm in alarms]
-        yield ratio_row(keys | {"figure": SLIPS_DETECTED}, found, n_slips, seed)
+        n_detected = [alarm.n_slips_found(POST_DURATIONS[0]) for alarm in alarms]
+        yield ratio_row(keys | {"figure": SLIPS_DETECTED}, n_detected, n_slips, seed)
     minutes = [alarm.stable_seconds / 60 for alarm in alarms]
     n_false = [alarm.n_under_stable for alarm in alarms]
     figure = keys | {"figure": FALSE_ALARMS_UNDER_STABLE}

@@ -95,7 +95,7 @@ def strongest_of_family(
 def _measure_rows(plan: StudyPlan, results: Results, measure: Measure) -> Iterator[Row]:
     key = "others" if "others" in plan.corpora else "object"
     evaluations = _evaluations(plan, results, key)
-    counts = {name: measure.counts(each) for name, each in evaluations.items()}
+    counts = {name: measure.counts(evaluation) for name, evaluation in evaluations.items()}
     known = {name: each for name, each in counts.items() if each and sum(n for _, n in each)}
     if OURS not in known:
         return
@@ -119,15 +119,15 @@ def _measure_rows(plan: StudyPlan, results: Results, measure: Measure) -> Iterat
 
 def _evaluations(plan: StudyPlan, results: Results, key: str) -> dict[str, MethodEvaluation]:
     """Return the evaluations of all methods on a split or corpus, by name."""
-    found = {name: dict(method_results(plan, results, name)) for name in method_titles(plan)}
-    return {name: each[key] for name, each in found.items() if key in each}
+    evaluations = {name: dict(method_results(plan, results, name)) for name in method_titles(plan)}
+    return {name: by_split[key] for name, by_split in evaluations.items() if key in by_split}
 
 
 def _fewest_errors(counts: dict[str, Counts]) -> str | None:
     """Return the name with the smallest share of errors; the first of equals."""
     shares = {
-        name: sum(wrong for wrong, _ in each) / max(sum(n for _, n in each), 1)
-        for name, each in counts.items()
+        name: sum(wrong for wrong, _ in errors) / max(sum(n for _, n in errors), 1)
+        for name, errors in counts.items()
     }
     return min(shares, key=lambda name: shares[name], default=None)
 
@@ -154,23 +154,23 @@ def _held_errors(evaluation: MethodEvaluation) -> Counts | None:
     if evaluation.fingers is None or not any(each.phases for each in evaluation.breakdown):
         return None
     counts = []
-    for each in evaluation.breakdown:
-        held = [each.phases.get(str(phase), (0, 0)) for phase in HELD_PHASES]
+    for breakdown in evaluation.breakdown:
+        held = [breakdown.phases.get(str(phase), (0, 0)) for phase in HELD_PHASES]
         counts.append((sum(wrong for _, wrong in held), sum(n for n, _ in held)))
     return counts
 
 
 def _missed_events(reading: str) -> Callable[[MethodEvaluation], Counts]:
     return lambda evaluation: [
-        (each.n_missed(POST_DURATIONS[0]), len(each.delays))
-        for each in evaluation.readings[reading].compared
+        (alarms.n_missed(POST_DURATIONS[0]), len(alarms.delays))
+        for alarms in evaluation.readings[reading].compared
     ]
 
 
 def _missed_slips(reading: str) -> Callable[[MethodEvaluation], Counts]:
     return lambda evaluation: [
-        (len(each.slip_delays) - each.n_slips_found(POST_DURATIONS[0]), len(each.slip_delays))
-        for each in evaluation.readings[reading].compared
+        (len(alarms.slip_delays) - alarms.n_slips_found(POST_DURATIONS[0]), len(alarms.slip_delays))
+        for alarms in evaluation.readings[reading].compared
     ]
 
 

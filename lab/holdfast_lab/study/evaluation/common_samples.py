@@ -58,8 +58,8 @@ def warm_up(method: str, rate: float) -> float:
         (13, 1)
     """
     hand = hand_signal(_probe(rate), Tare.parse("none"), PROBE_FINGERS)
-    found = find_method(method).features(hand)
-    known = np.all([np.isfinite(rows).all(axis=1) for rows in found.values()], axis=0)
+    features = find_method(method).features(hand)
+    known = np.all([np.isfinite(rows).all(axis=1) for rows in features.values()], axis=0)
     return int(np.argmax(known)) / rate if known.any() else math.inf
 
 

@@ -106,7 +106,7 @@ def _phase_errors(truth: Truth, units: Mapping[str, FingerDecisions]) -> dict[st
 def _grip_errors(truth: Truth, units: Mapping[str, FingerDecisions]) -> list[GripErrors]:
     phase = truth.hand["phase"]
     locked = phase == Phase.LOCKED
-    found = []
+    grips = []
     for name, unit in units.items():
         if "contact_force" not in truth.fingers.get(name, {}) or not locked.any():
             continue
@@ -114,21 +114,21 @@ def _grip_errors(truth: Truth, units: Mapping[str, FingerDecisions]) -> list[Gri
         held = np.isin(phase, HELD_PHASES)[_truth_rows(truth, unit.times)]
         known, wrong = _known_and_wrong(unit)
         stable = unit.labels == STABLE
-        found.append(
+        grips.append(
             GripErrors(
                 force=float(force[locked].mean()),
                 stable=_count(known & held & stable, wrong),
                 not_stable=_count(known & held & ~stable, wrong),
             )
         )
-    return found
+    return grips
 
 
 def _disturbance_errors(
     truth: Truth, units: Mapping[str, FingerDecisions]
 ) -> list[DisturbanceErrors]:
     disturbed = np.isin(truth.hand["phase"], (Phase.DISTURBED, Phase.SLIPPING))
-    found = []
+    disturbances = []
     for start, end in runs(disturbed):
         n = n_wrong = 0
         for unit in units.values():
@@ -138,8 +138,8 @@ def _disturbance_errors(
             of_unit, wrong_of_unit = _count(inside & known & (unit.labels != STABLE), wrong)
             n, n_wrong = n + of_unit, n_wrong + wrong_of_unit
         force = truth.hand["outside_force"][start:end].mean(axis=0)
-        found.append(DisturbanceErrors(_direction(force), n, n_wrong))
-    return found
+        disturbances.append(DisturbanceErrors(_direction(force), n, n_wrong))
+    return disturbances
 
 
 def _direction(force: Array) -> str:

@@ -339,16 +339,16 @@ def _alarms(scored: ScoredRecording) -> dict[str, list[AlarmStatistics]]:
     scores = scored.scores.hand(recording)
     held = scores.hold(HOLD_TIME)
     slips = [slip for slip in find_slips(recording.truth) if _is_scored(slip, recording)]
-    found = {}
+    by_reading = {}
     for reading, hand in labels_by_reading(recording).items():
         decided = [scores.decide(hand.labels)]
         decided += [held.decide(hand.labels, s) for s in (0.0, *scored.shifts[reading])]
         left_out = hand.without_glitches
-        found[reading] = [
+        by_reading[reading] = [
             alarm_statistics(each, slips, hand.glitch, without_glitches=left_out)
             for each in decided
         ]
-    return found
+    return by_reading
 
 
 def _is_scored(slip: Slip, recording: RecordingFeatures) -> bool:

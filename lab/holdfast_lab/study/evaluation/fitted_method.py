@@ -73,11 +73,11 @@ def gather_training_samples(
 
 def _n_features(recordings: Sequence[RecordingFeatures]) -> dict[str, int]:
     """Return the number of features of each unit: the largest of all recordings."""
-    found: dict[str, int] = {}
+    widths: dict[str, int] = {}
     for recording in recordings:
         for unit, features in recording.features.items():
-            found[unit] = max(found.get(unit, 0), features.shape[1])
-    return found
+            widths[unit] = max(widths.get(unit, 0), features.shape[1])
+    return widths
 
 
 @dataclass(frozen=True, eq=False)

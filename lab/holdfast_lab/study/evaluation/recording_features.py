@@ -98,14 +98,14 @@ def corpus_features(
         stride: keep the features of every n-th sample. They are computed from all samples.
         warm_up: time at the start of every unbroken stretch that is not scored [s].
     """
-    found = []
+    rows = []
     for recording in corpus.load():
         varied = variation.apply(recording)
         fingers = _fingers(corpus, varied)
         if fingers:
             hand = hand_signal(varied, Tare.parse(corpus.tare), fingers)
-            found.append(_recording_features(method, hand, fingers, stride, warm_up))
-    return found
+            rows.append(_recording_features(method, hand, fingers, stride, warm_up))
+    return rows
 
 
 def _fingers(corpus: Corpus, recording: Recording) -> tuple[str, ...]:
@@ -171,4 +171,4 @@ def _glitch_samples(recording: Recording, name: str) -> Mask:
 
 def _label_codes(recording: Recording, fingers: Sequence[str], stride: int) -> dict[str, Codes]:
     modules = {name: recording.modules[name] for name in fingers}
-    return {n: label_states(each.labels, each.times)[::stride] for n, each in modules.items()}
+    return {n: label_states(module.labels, module.times)[::stride] for n, module in modules.items()}

@@ -111,8 +111,8 @@ class RecordingScores:
         """
         times = np.unique(np.concatenate(list(recording.times.values())))
         last = {
-            finger: np.searchsorted(own, times, side="right") - 1
-            for finger, own in recording.times.items()
+            finger: np.searchsorted(finger_times, times, side="right") - 1
+            for finger, finger_times in recording.times.items()
         }
         in_contact = np.array([(at >= 0) & self.in_contact[f][at] for f, at in last.items()])
         held = enough_contacts(in_contact.sum(axis=0), len(last))

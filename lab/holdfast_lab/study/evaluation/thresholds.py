@@ -74,12 +74,12 @@ def threshold_shift(ranges: Sequence[FalseAlarmRanges], per_minute: float) -> fl
         The shift [log odds]; minus infinity if the alarms by loss of contact alone are too many,
         0 if there is no false alarm at any threshold.
     """
-    upper = np.sort(np.concatenate([each.upper for each in ranges]))
-    lower = np.sort(np.concatenate([each.lower for each in ranges]))
+    upper = np.sort(np.concatenate([interval.upper for interval in ranges]))
+    lower = np.sort(np.concatenate([interval.lower for interval in ranges]))
     edges = np.unique(np.concatenate([upper, lower]))
     if not len(edges):
         return 0.0
     n_alarms = np.searchsorted(lower, edges, "right") - np.searchsorted(upper, edges, "right")
-    too_many = n_alarms > per_minute * sum(each.minutes for each in ranges)
+    too_many = n_alarms > per_minute * sum(interval.minutes for interval in ranges)
     last = int(np.argmax(too_many)) if too_many.any() else int(np.argmax(n_alarms)) + 1
     return float(edges[last])

@@ -24,8 +24,8 @@ from holdfast_lab.study.methods.wavelets import (
 )
 
 METHODS: dict[str, Method] = {
-    each.name: each
-    for each in (
+    method.name: method
+    for method in (
         LOGREG,
         LOGREG_UNWEIGHTED,
         SVM,
@@ -47,7 +47,7 @@ METHODS: dict[str, Method] = {
 }
 """All methods by name, in the order of the tables."""
 
-PAPER_FAMILY = tuple(name for name, each in METHODS.items() if each.category == "paper")
+PAPER_FAMILY = tuple(name for name, method in METHODS.items() if method.category == "paper")
 """Names of the paper's method and of its variants. Ours is compared with the best of them."""
 
 __all__ = [

@@ -131,11 +131,11 @@ def hand_motion(hand: HandSignal) -> dict[str, Array]:
 
 def _motion_of_finger(finger: FingerSignal) -> Array:
     n_samples = max(1, round(MOTION_STEP * finger.rate))
-    found = np.full((len(finger.times), SUMMARY_FEATURES + finger.sensor.n_taxels), np.nan)
+    features = np.full((len(finger.times), SUMMARY_FEATURES + finger.sensor.n_taxels), np.nan)
     shear = finger.readings[:, :, :2]
     if len(shear) > n_samples:
-        found[n_samples:] = motion_features(shear[n_samples:] - shear[:-n_samples])
-    return found
+        features[n_samples:] = motion_features(shear[n_samples:] - shear[:-n_samples])
+    return features
 
 
 def motion_features(motion: Array) -> Array:
@@ -183,14 +183,14 @@ def last_second(hand: HandSignal) -> dict[str, Array]:
 
 def _steps(finger: FingerSignal) -> Array:
     """Return the steps of the second that ends at each sample: x y z of one after the other."""
-    found = np.full((len(finger.times), N_STEPS, 3), np.nan)
+    features = np.full((len(finger.times), N_STEPS, 3), np.nan)
     first = finger.times[:1] + (N_STEPS - 1) * STEP - 0.5 / finger.rate
     full = finger.times >= first
     at = finger.times[full, None] - STEP * np.arange(N_STEPS)[::-1]
     if full.any():
         for axis in range(3):
-            found[full, :, axis] = np.interp(at, finger.times, finger.force[:, axis])
-    return found.reshape(len(found), 3 * N_STEPS)
+            features[full, :, axis] = np.interp(at, finger.times, finger.force[:, axis])
+    return features.reshape(len(features), 3 * N_STEPS)
 
 
 def _james_lepora(scope: str, classifier: str, title: str) -> Method:

@@ -206,6 +206,6 @@ def windowed(values: Array, window: int, function: Callable[[Array], Array]) -> 
     """
     padding = np.zeros((max(window - len(values), 0), *values.shape[1:]))
     windows = sliding_window_view(np.concatenate([padding, values]), window, axis=0)
-    found = function(windows[len(padding) > 0 :])
-    empty = np.full((len(values) - len(found), found.shape[1]), np.nan)
-    return np.concatenate([empty, found])
+    values_of_windows = function(windows[len(padding) > 0 :])
+    empty = np.full((len(values) - len(values_of_windows), values_of_windows.shape[1]), np.nan)
+    return np.concatenate([empty, values_of_windows])

@@ -124,8 +124,8 @@ def band_energy(
 
     def of_windows(windows: Array) -> Array:
         centred = windows - windows.mean(axis=-1, keepdims=True)
-        found = rfft(centred * weights, axis=-1)
-        power = (found.real**2 + found.imag**2).sum(axis=1)
+        spectrum = rfft(centred * weights, axis=-1)
+        power = (spectrum.real**2 + spectrum.imag**2).sum(axis=1)
         return np.asarray(power @ inside.T * (2 / (window * (weights**2).sum())))
 
     return windowed(values, window, of_windows)

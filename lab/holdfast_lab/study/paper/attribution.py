@@ -9,7 +9,7 @@ import numpy as np
 
 from holdfast.features import DEFAULT_WINDOW, DEPLOYED_FEATURES
 from holdfast.metrics import bootstrap_interval
-from holdfast.metrics.intervals import Statistic
+from holdfast.metrics.statistics import Statistic
 from holdfast.sensors.types import Array
 from holdfast.twin.uskin.parameters import UskinParameters
 from holdfast_lab.report.html_report import ReportFigure
@@ -111,17 +111,17 @@ def tables(plan: StudyPlan, results: Mapping[str, Any]) -> list[ResultTable]:
     base: VariantResult = results["attribution/base"][0]
     rows: list[Row] = []
     for switch in switches(plan):
-        found: VariantResult = results[f"attribution/{switch.name}"][0]
+        result: VariantResult = results[f"attribution/{switch.name}"][0]
         for on in (HELD_OUT, OTHER_RECORDINGS):
             keys: Keys = {"switched": switch.factor, "to": switch.setting, "on": on}
             paper = published.WINDOW[DEFAULT_WINDOW] if switch.name == "base" else {}
-            for rate, row in rate_rows(found.counts[on], RATES, plan.seed):
+            for rate, row in rate_rows(result.counts[on], RATES, plan.seed):
                 figure = keys | {"figure": rate}
                 rows.append(Row(figure, row.ours, paper.get(rate), row.n, row.interval))
             if switch.name != "base":
                 paired = switch.role == "main"
                 rows.append(
-                    difference_row(keys, found.counts[on], base.counts[on], plan.seed, paired)
+                    difference_row(keys, result.counts[on], base.counts[on], plan.seed, paired)
                 )
     left_out = {each.role for each in SWITCHES} - set(plan.corpora)
     missing = f" Not simulated in this run: {', '.join(sorted(left_out))}." if left_out else ""
@@ -178,8 +178,8 @@ def repeat_of(name: str) -> int:
         >>> repeat_of("can-case2-3"), repeat_of("can-case2-3-failed1"), repeat_of("mine")
         (3, 3, 0)
     """
-    found = re.search(r"-case\d+-(\d+)", name)
-    return int(found[1]) if found else 0
+    match = re.search(r"-case\d+-(\d+)", name)
+    return int(match[1]) if match else 0
 
 
 def difference_row(

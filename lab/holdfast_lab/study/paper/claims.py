@@ -15,8 +15,8 @@ from scipy.ndimage import minimum_filter1d
 from holdfast.contact import GLITCH_DURATION, HELD_PHASES, SLIP_SPEED, Phase
 from holdfast.features import DEFAULT_WINDOW, Tare, haar_features
 from holdfast.metrics import Interval, bootstrap_interval
-from holdfast.metrics.intervals import Statistic
 from holdfast.metrics.masks import Mask
+from holdfast.metrics.statistics import Statistic
 from holdfast.metrics.truth_labels import LabelRule, glitches
 from holdfast.recordings import Truth
 from holdfast.sensors.types import Array
@@ -109,13 +109,13 @@ def tasks(plan: StudyPlan) -> list[Task]:
 
 def tables(plan: StudyPlan, results: Mapping[str, Any]) -> list[ResultTable]:
     """Return the table of the two claims; none without a truth."""
-    found = {role: results[f"claims/{role}"] for role in ROLES if f"claims/{role}" in results}
-    if not found:
+    by_role = {role: results[f"claims/{role}"] for role in ROLES if f"claims/{role}" in results}
+    if not by_role:
         return []
     rows: list[Row] = []
-    every = [each for of_role in found.values() for each in of_role]
+    every = [each for of_role in by_role.values() for each in of_role]
     for expectation in (GRIP, SETTLES):
-        for role, data in [("all", every), *found.items()]:
+        for role, data in [("all", every), *by_role.items()]:
             effect, interval, n = _effect(expectation, data, plan.seed)
             about: dict[str, Key] = {
                 "claim": expectation.claim,
@@ -165,7 +165,7 @@ def verdict(expectation: Expectation, effect: float | None, interval: Interval |
 
 def claim_data(corpus: Corpus) -> list[ClaimData]:
     """Return what each recording of a corpus contributes; recordings without a truth nothing."""
-    found = []
+    claims = []
     for recording in corpus.load():
         truth = recording.truth
         if truth is None or not has_truth(recording):
@@ -182,8 +182,8 @@ def claim_data(corpus: Corpus) -> list[ClaimData]:
             fall = settling_fall(signal, truth)
             if fall is not None:
                 settling.append(fall)
-        found.append(ClaimData(n, moments.ravel().tolist(), products.tolist(), settling))
-    return found
+        claims.append(ClaimData(n, moments.ravel().tolist(), products.tolist(), settling))
+    return claims
 
 
 def sliding_samples(signal: FingerSignal, truth: Truth, finger: str) -> tuple[Array, Array]:
@@ -211,9 +211,9 @@ def sliding_samples(signal: FingerSignal, truth: Truth, finger: str) -> tuple[Ar
 def window_mean(values: Array, window: int) -> Array:
     """Return (n,) the mean over the window that ends at each sample."""
     total = np.concatenate([[0.0], np.cumsum(values)])
-    found = np.full(len(values), np.nan)
-    found[window - 1 :] = (total[window:] - total[:-window]) / window
-    return found
+    means = np.full(len(values), np.nan)
+    means[window - 1 :] = (total[window:] - total[:-window]) / window
+    return means
 
 
 def settling_fall(signal: FingerSignal, truth: Truth) -> float | None:
@@ -273,10 +273,10 @@ def _effect(
 ) -> tuple[float | None, Interval | None, int]:
     """Return the effect, its interval and the number of recordings."""
     if expectation is GRIP:
-        used = [each for each in data if each.n_sliding]
+        used = [recording for recording in data if recording.n_sliding]
         statistic = _exponent(used)
     else:
-        used = [each for each in data if each.settling]
+        used = [recording for recording in data if recording.settling]
         statistic = _ratio(used)
     if not used:
         return None, None, 0
@@ -287,8 +287,8 @@ def _effect(
 
 def _exponent(data: Sequence[ClaimData]) -> Statistic:
     """Return the statistic: the exponent of the force in the regression of the energy."""
-    moments = np.array([each.moments for each in data]).reshape(-1, 3, 3)
-    products = np.array([each.products for each in data]).reshape(-1, 3)
+    moments = np.array([recording.moments for recording in data]).reshape(-1, 3, 3)
+    products = np.array([recording.products for recording in data]).reshape(-1, 3)
 
     def statistic(draws: Array) -> Array:
         return np.array(list(_solve(draws, moments, products)))
@@ -306,6 +306,6 @@ def _solve(draws: Array, moments: Array, products: Array) -> Iterator[float]:
 
 def _ratio(data: Sequence[ClaimData]) -> Statistic:
     """Return the statistic: the ratio of the geometric means of sigma, over all fingers."""
-    total = np.array([sum(each.settling) for each in data])
-    n = np.array([len(each.settling) for each in data], dtype=np.float64)
+    total = np.array([sum(recording.settling) for recording in data])
+    n = np.array([len(recording.settling) for recording in data], dtype=np.float64)
     return lambda draws: np.exp((draws @ total) / (draws @ n))

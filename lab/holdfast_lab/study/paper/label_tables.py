@@ -114,7 +114,7 @@ def evaluate_labels(
     method = METHODS[name]
     by_source = _features_by_source(corpus, corpus_features(method, corpus, Variation()))
     n = len(by_source["exact"])
-    objects = [each.object for each in by_source["exact"]]
+    objects = [samples.object for samples in by_source["exact"]]
     metrics = {}
     for trained in SOURCES:
         training = gather_training_samples(by_source[trained], max_samples)
@@ -237,8 +237,8 @@ def _ceiling_table(plan: StudyPlan, results: Mapping[str, Any]) -> ResultTable:
 
 def ceiling_rows(keys: Keys, counts: Sequence[HiddenCounts], seed: int) -> Iterator[Row]:
     """Yield the number of samples, the hidden share and the ceiling, by cause."""
-    found = dict.fromkeys(kind for count in counts for kind in count.samples)
-    kinds = [kind for kind in found if kind != "stable"]
+    all_kinds = dict.fromkeys(kind for count in counts for kind in count.samples)
+    kinds = [kind for kind in all_kinds if kind != "stable"]
     for kind in kinds:
         n = [count.samples.get(kind, 0) for count in counts]
         hidden = [count.hidden.get(kind, 0) for count in counts]
@@ -249,14 +249,14 @@ def ceiling_rows(keys: Keys, counts: Sequence[HiddenCounts], seed: int) -> Itera
     yield from _cause_rows(keys | {"cause": HELD}, hidden, n, seed)
     n_all = [count.n_labelled for count in counts]
     yield from _cause_rows(keys | {"cause": ALL_SAMPLES}, hidden, n_all, seed)
-    if "stable" in found:
+    if "stable" in all_kinds:
         n = [count.samples.get("stable", 0) for count in counts]
         hidden = [count.hidden.get("stable", 0) for count in counts]
         yield from list(_cause_rows(keys | {"cause": "stable"}, hidden, n, seed))[:2]
 
 
 def _cause_rows(keys: Keys, hidden: Sequence[int], n: Sequence[int], seed: int) -> Iterator[Row]:
-    n_recordings = sum(each > 0 for each in n)
+    n_recordings = sum(number > 0 for number in n)
     yield Row(keys | {"figure": "samples"}, float(sum(n)), None, n_recordings)
     yield ratio_row(keys | {"figure": HIDDEN}, hidden, n, seed)
     visible = [whole - part for part, whole in zip(hidden, n, strict=True)]

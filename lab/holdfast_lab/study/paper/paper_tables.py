@@ -87,12 +87,12 @@ def tables(plan: StudyPlan, results: Mapping[str, Any]) -> list[ResultTable]:
         plan: of the study.
         results: of the tasks, by name.
     """
-    found = PaperResults(plan, results)
+    fits = PaperResults(plan, results)
     makers = (
         _confusion_table, _window_table, _ablation_table, _unseen_table, _finger_table,
         _zhang_table,
     )  # fmt: skip
-    return [*(make(found) for make in makers), published.discrepancies()]
+    return [*(make(fits) for make in makers), published.discrepancies()]
 
 
 def figures(plan: StudyPlan, results: Mapping[str, Any]) -> list[ReportFigure]:
@@ -132,8 +132,8 @@ class PaperResults:
         self.by_variant: dict[tuple[str, int, Variant], VariantResult] = {}
         for task in tasks(plan):
             _, finger, window, *_ = task.arguments
-            for each in results[task.name]:
-                self.by_variant[finger, window, (each.classifier, each.features)] = each
+            for result in results[task.name]:
+                self.by_variant[finger, window, (result.classifier, result.features)] = result
         roles = {FRESH: "fresh", OBJECTS: "others"}
         self.tests = [on for on in SHORT_TESTS if on not in roles or roles[on] in plan.corpora]
 
@@ -176,13 +176,16 @@ class PaperResults:
         )
 
 
-def _confusion_table(found: PaperResults) -> ResultTable:
+def _confusion_table(fits: PaperResults) -> ResultTable:
     rows: list[Row] = []
     for name, title in TITLES.items():
         keys: Keys = {"classifier": title}
         names = ("TNR", "FPR", "FNR", "TPR", "accuracy")
-        rows += found.rows(
-            found.of((name, DEPLOYED_FEATURES)), keys, names, published.CONFUSION[base_name(name)]
+        rows += fits.rows(
+            fits.of((name, DEPLOYED_FEATURES)),
+            keys,
+            names,
+            published.CONFUSION[base_name(name)],
         )
     note = " ".join(
         [
@@ -190,68 +193,68 @@ def _confusion_table(found: PaperResults) -> ResultTable:
             "and TPR to class 1. The paper prints one matrix, of 'the training process'. It is "
             "given beside every line. Its toolbox weights all samples alike; with balanced "
             "classes both classes have the same weight.",
-            *_protocol(found.plan, found.of(("logreg", DEPLOYED_FEATURES))),
+            *_protocol(fits.plan, fits.of(("logreg", DEPLOYED_FEATURES))),
         ]
     )
     title = "The paper's Table I: confusion [%]"
     return ResultTable("confusion", title, note, rows, ("classifier", "on"))
 
 
-def _window_table(found: PaperResults) -> ResultTable:
+def _window_table(fits: PaperResults) -> ResultTable:
     rows: list[Row] = []
-    for window in _windows(found.plan):
+    for window in _windows(fits.plan):
         for title, names in FEATURE_SETS.items():
             keys: Keys = {"features": title, "N_w": window}
-            result = found.of(("logreg", names), window)
+            result = fits.of(("logreg", names), window)
             paper = published.WINDOW[window]
-            rows += found.rows(result, keys, published.RATES, paper, found.tests)
+            rows += fits.rows(result, keys, published.RATES, paper, fits.tests)
     rows.sort(key=lambda row: str(row.keys["features"]))
-    note = f"All six features include m; the deployed five do not. {found.protocol}"
+    note = f"All six features include m; the deployed five do not. {fits.protocol}"
     title = "The paper's Table II: LogReg by window [%]"
     return ResultTable("window", title, note, rows, ("features", "N_w", "on"))
 
 
-def _ablation_table(found: PaperResults) -> ResultTable:
+def _ablation_table(fits: PaperResults) -> ResultTable:
     rows: list[Row] = []
     for window in ABLATION_WINDOWS:
         for subset, paper in published.ABLATION.items():
             keys: Keys = {"N_w": window, "features": ", ".join(subset)}
-            result = found.of(("logreg", columns_of(subset)), window)
-            rows += found.rows(result, keys, published.RATES, paper, found.tests)
-    note = f"The paper prints one table; its window is not certain. {found.protocol}"
+            result = fits.of(("logreg", columns_of(subset)), window)
+            rows += fits.rows(result, keys, published.RATES, paper, fits.tests)
+    note = f"The paper prints one table; its window is not certain. {fits.protocol}"
     title = "The paper's Table III: LogReg by features [%]"
     return ResultTable("ablation", title, note, rows, ("N_w", "features", "on"))
 
 
-def _unseen_table(found: PaperResults) -> ResultTable:
+def _unseen_table(fits: PaperResults) -> ResultTable:
     rows: list[Row] = []
     for name, title in TITLES.items():
         keys: Keys = {"classifier": title}
         paper = {"accuracy": published.UNSEEN[base_name(name)]}
         on = (FRESH, OTHER_RECORDINGS, OBJECTS)
-        rows += found.rows(found.of((name, DEPLOYED_FEATURES)), keys, ("accuracy",), paper, on)
+        rows += fits.rows(fits.of((name, DEPLOYED_FEATURES)), keys, ("accuracy",), paper, on)
     title = "Accuracy on unseen data [%]"
-    note = f"The paper does not say what its unseen data are. {found.protocol}"
+    note = f"The paper does not say what its unseen data are. {fits.protocol}"
     return ResultTable("unseen", title, note, rows, ("classifier", "on"))
 
 
-def _finger_table(found: PaperResults) -> ResultTable:
+def _finger_table(fits: PaperResults) -> ResultTable:
     rows: list[Row] = []
-    for finger in _fingers(found.plan):
+    for finger in _fingers(fits.plan):
         for name, title in FINGER_TITLES.items():
             keys: Keys = {"finger": finger, "classifier": title}
-            paper = _published_values(found.plan, finger) if name == "logreg" else {}
-            result = found.of((name, DEPLOYED_FEATURES), finger=finger)
-            rows += found.rows(result, keys, ("accuracy", "FDR"), paper)
+            paper = _published_values(fits.plan, finger) if name == "logreg" else {}
+            result = fits.of((name, DEPLOYED_FEATURES), finger=finger)
+            rows += fits.rows(result, keys, ("accuracy", "FDR"), paper)
     note = (
         "The paper names the middle finger and the thumb. Its values of the finger that it does "
-        f"not name are given beside ours of the {first_finger(found.plan)}. {found.protocol}"
+        f"not name are given beside ours of the {first_finger(fits.plan)}. {fits.protocol}"
     )
     lines = ("finger", "classifier", "on")
     return ResultTable("fingers", "Every finger [%]", note, rows, lines)
 
 
-def _zhang_table(found: PaperResults) -> ResultTable:
+def _zhang_table(fits: PaperResults) -> ResultTable:
     methods = {
         "energy of F_x (Zhang), SVM": (_ZHANG, published.ZHANG),
         "energy of F_x, best cut": (_BEST_THRESHOLD, {}),
@@ -259,15 +262,15 @@ def _zhang_table(found: PaperResults) -> ResultTable:
     }
     rows: list[Row] = []
     for title, (variant, paper) in methods.items():
-        for window in _windows(found.plan):
+        for window in _windows(fits.plan):
             keys: Keys = {"method": title, "N_w": window}
-            result = found.of(variant, window)
-            rows += found.rows(result, keys, ("accuracy", "FDR"), paper, found.tests)
+            result = fits.of(variant, window)
+            rows += fits.rows(result, keys, ("accuracy", "FDR"), paper, fits.tests)
     note = (
         "Zhang: one threshold on the energy of the Haar details of F_x, by a linear SVM with one "
         "feature. Best cut: the threshold with the best balanced accuracy in training. The paper "
         "gives an accuracy of 'not more than' 62.7 and an FDR 'up to' 49.1, without a window. "
-        f"There is no FDR if nothing is called stable. {found.protocol}"
+        f"There is no FDR if nothing is called stable. {fits.protocol}"
     )
     title = "Zhang et al. and the paper's method [%]"
     return ResultTable("zhang", title, note, rows, ("method", "N_w", "on"))

@@ -126,8 +126,8 @@ def _corpus_forces(
 
 
 def _read_forces(corpus: Corpus, rate: float, treatment: Treatment) -> Iterator[_RecordingForces]:
-    for given in corpus.load():
-        recording = resample_if_needed(treatment.apply(given, corpus.tare), rate)
+    for original in corpus.load():
+        recording = resample_if_needed(treatment.apply(original, corpus.tare), rate)
         hand = hand_signal(recording, Tare.parse(corpus.tare))
         fingers = {
             name: (_without_readings(signal), recording.modules[name].label_states)

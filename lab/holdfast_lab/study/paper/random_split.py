@@ -14,8 +14,7 @@ import numpy.typing as npt
 
 from holdfast.classifiers import RECIPES, Classifier, Parameters, Recipe, Samples, Threshold
 from holdfast.metrics import bootstrap_interval, ratio_of_sums
-from holdfast.metrics.intervals import Interval
-from holdfast.metrics.statistics import percent
+from holdfast.metrics.statistics import Interval, percent
 from holdfast.sensors.types import Integers
 from holdfast.training.setting import SEARCH_SAMPLES
 from holdfast.training.splits import inner_folds
@@ -78,7 +77,7 @@ class FixedWeights:
 
 FIT_RECIPES: dict[str, Recipe] = {
     **{name: FixedWeights(recipe, None) for name, recipe in RECIPES.items()},
-    **{f"{name}_balanced": FixedWeights(each, "balanced") for name, each in RECIPES.items()},
+    **{f"{name}_balanced": FixedWeights(recipe, "balanced") for name, recipe in RECIPES.items()},
     "threshold": Threshold(side="below"),
 }
 """How each classifier is fitted; a threshold calls samples below it stable.
@@ -281,8 +280,8 @@ def _search(train: Samples, folds: Integers, recipe: Recipe, trials: int, seed: 
     few = _ungrouped(thin(train, SEARCH_SAMPLES))
     step = thinning_step(len(folds), SEARCH_SAMPLES)
     masks = [folds[::step] == fold for fold in range(N_FOLDS)]
-    found = search(few, masks, recipe, n_trials=trials, seed=seed, objective="error")
-    return recipe.fixed(found) if isinstance(recipe, FixedWeights) else found
+    parameters = search(few, masks, recipe, n_trials=trials, seed=seed, objective="error")
+    return recipe.fixed(parameters) if isinstance(recipe, FixedWeights) else parameters
 
 
 def _percent(interval: Interval | None) -> Interval | None:

@@ -118,9 +118,9 @@ def tasks(plan: StudyPlan) -> list[Task]:
 
 def tables(plan: StudyPlan, results: Mapping[str, Any]) -> list[ResultTable]:
     """Return the tables of experiment 1, experiment 2 and single disturbances."""
-    found = {n: results[f"verdicts/{n}"] for n in _methods(plan) if f"verdicts/{n}" in results}
+    by_method = {n: results[f"verdicts/{n}"] for n in _methods(plan) if f"verdicts/{n}" in results}
     makers = (_failed_table, _disturbed_table, _single_table)
-    made = [make(found, plan.seed) for make in makers] if found else []
+    made = [make(by_method, plan.seed) for make in makers] if by_method else []
     return [table for table in made if table.rows]
 
 
@@ -147,13 +147,13 @@ def grasp_verdicts(
     cases = {role: _cases(corpus) for role, corpus in corpora.items()}
     training = gather_training_samples(main, max_samples)
     everything = set(range(len(main)))
-    found: dict[int, GraspVerdict] = {}
+    by_place: dict[int, GraspVerdict] = {}
     for held in held_out_folds(training.objects, "recording", n_folds, seed):
         fitted = FittedMethod.fit(method, training, everything - held, seed)
         for place in held:
             case = cases["main"][main[place].name]
-            found[place] = _verdict("main", case, main[place], fitted)
-    verdicts = [found[place] for place in sorted(found)]
+            by_place[place] = _verdict("main", case, main[place], fitted)
+    verdicts = [by_place[place] for place in sorted(by_place)]
     fitted = FittedMethod.fit(method, training, everything, seed)
     for role, corpus in corpora.items():
         names = tuple(
@@ -171,7 +171,7 @@ def grasp_verdicts(
 
 
 def _cases(corpus: Corpus) -> dict[str, str]:
-    return {each.name: str(each.metadata.get("case", "")) for each in corpus.load()}
+    return {recording.name: str(recording.metadata.get("case", "")) for recording in corpus.load()}
 
 
 def _verdict(
@@ -183,7 +183,7 @@ def _verdict(
         stable_after_lock(finger.times, finger.states, recording.truth)
         for finger in decisions.fingers.values()
     ]
-    known = [each for each in stable_after if each is not None]
+    known = [time for time in stable_after if time is not None]
     return GraspVerdict(
         role=role,
         recording=recording.name,
@@ -265,13 +265,13 @@ def find_disturbances(
     alarm[1:] = (
         (hand.states[:-1] == STABLE) & (hand.states[1:] != STABLE) & (hand.states[1:] != UNKNOWN)
     )
-    found = []
+    disturbances = []
     for start, end in runs(join_runs(disturbed, truth.times, MERGE_GAP)):
         onset, last = float(truth.times[start]), float(truth.times[end - 1])
         inside = (hand.times >= onset - TIME_TOLERANCE) & (hand.times <= last + TIME_TOLERANCE)
         before = int(np.searchsorted(hand.times, onset - TIME_TOLERANCE)) - 1
         alarms = hand.times[alarm & inside]
-        found.append(
+        disturbances.append(
             DisturbanceOutcome(
                 start=onset,
                 end=last,
@@ -280,7 +280,7 @@ def find_disturbances(
                 delay=max(float(alarms[0]) - onset, 0.0) if len(alarms) else math.inf,
             )
         )
-    return found
+    return disturbances
 
 
 def _at(truth: Truth, times: Array) -> Any:  # noqa: ANN401 (indices)
@@ -288,16 +288,16 @@ def _at(truth: Truth, times: Array) -> Any:  # noqa: ANN401 (indices)
     return np.clip(last, 0, len(truth.times) - 1)
 
 
-def _failed_table(found: Mapping[str, Sequence[GraspVerdict]], seed: int) -> ResultTable:
+def _failed_table(by_method: Mapping[str, Sequence[GraspVerdict]], seed: int) -> ResultTable:
     rows: list[Row] = []
-    for name, verdicts in found.items():
+    for name, verdicts in by_method.items():
         failed = [verdict for verdict in verdicts if verdict.case == "failed"]
         for title, chosen in _groups(failed):
             keys: Keys = {"on": title, "method": METHODS[name].title}
             rows.append(count_row(keys | {"figure": "failed grasps"}, [1] * len(chosen)))
             for figure, counts in (
-                ("of the grasp, called unstable [%]", [each.contact for each in chosen]),
-                ("of its unstable samples [%]", [each.unstable for each in chosen]),
+                ("of the grasp, called unstable [%]", [grasp.contact for grasp in chosen]),
+                ("of its unstable samples [%]", [grasp.unstable for grasp in chosen]),
             ):
                 n, called = np.array(counts).reshape(-1, 2).T
                 rows.append(ratio_row(keys | {"figure": figure}, called, n, seed))
@@ -314,11 +314,11 @@ def _failed_table(found: Mapping[str, Sequence[GraspVerdict]], seed: int) -> Res
     )
 
 
-def _disturbed_table(found: Mapping[str, Sequence[GraspVerdict]], seed: int) -> ResultTable:
+def _disturbed_table(by_method: Mapping[str, Sequence[GraspVerdict]], seed: int) -> ResultTable:
     rows: list[Row] = []
-    for name, verdicts in found.items():
+    for name, verdicts in by_method.items():
         whole = [verdict for verdict in verdicts if verdict.role not in ONLY_FAILED]
-        for title, chosen in _groups([each for each in whole if each.case != "failed"]):
+        for title, chosen in _groups([grasp for grasp in whole if grasp.case != "failed"]):
             rows += _disturbed_rows({"on": title, "method": METHODS[name].title}, chosen, seed)
     note = (
         "Grasps that held the object. Time from the lock to the first stable estimate of a "
@@ -343,35 +343,35 @@ _LOCK_FIGURES = (
 
 
 def _disturbed_rows(keys: Keys, chosen: Sequence[GraspVerdict], seed: int) -> Iterator[Row]:
-    first = [each.first_stable for each in chosen]
-    lasting = [each.lasting_stable for each in chosen]
+    first = [grasp.first_stable for grasp in chosen]
+    lasting = [grasp.lasting_stable for grasp in chosen]
     for figure, values, q in zip(
         _LOCK_FIGURES, (first, lasting, lasting), (0.5, 0.5, 0.95), strict=True
     ):
         yield quantile_row(keys | {"figure": figure}, values, q, seed)
-    n = [len(each.disturbances) for each in chosen]
+    n = [len(grasp.disturbances) for grasp in chosen]
     yield count_row(keys | {"figure": "disturbances"}, n)
-    detected = [sum(math.isfinite(d.delay) for d in each.disturbances) for each in chosen]
+    detected = [sum(math.isfinite(d.delay) for d in grasp.disturbances) for grasp in chosen]
     yield ratio_row(keys | {"figure": "detected [%]"}, detected, n, seed)
-    already = [sum(not d.was_stable for d in each.disturbances) for each in chosen]
+    already = [sum(not d.was_stable for d in grasp.disturbances) for grasp in chosen]
     yield ratio_row(keys | {"figure": "not stable before [%]"}, already, n, seed)
-    delays = [[d.delay for d in each.disturbances] for each in chosen]
+    delays = [[d.delay for d in grasp.disturbances] for grasp in chosen]
     yield quantile_row(keys | {"figure": "delay median [s]"}, delays, 0.5, seed)
     yield quantile_row(keys | {"figure": "delay 95 % [s]"}, delays, 0.95, seed)
 
 
-def _single_table(found: Mapping[str, Sequence[GraspVerdict]], seed: int) -> ResultTable:
+def _single_table(by_method: Mapping[str, Sequence[GraspVerdict]], seed: int) -> ResultTable:
     del seed
     rows: list[Row] = []
     digits: dict[str, int] = {}
-    for name, verdicts in found.items():
+    for name, verdicts in by_method.items():
         short = METHODS[name].title.split(" (", maxsplit=1)[0]
         detected, delay = f"{short}: detected", f"{short}: delay [s]"
         digits |= {detected: 0, delay: 3}
-        for each in _first_of_each_object(verdicts):
-            for number, disturbance in enumerate(each.disturbances, 1):
-                keys: Keys = {"recording": each.recording, "disturbance": number}
-                if name == next(iter(found)):
+        for grasp in _first_of_each_object(verdicts):
+            for number, disturbance in enumerate(grasp.disturbances, 1):
+                keys: Keys = {"recording": grasp.recording, "disturbance": number}
+                if name == next(iter(by_method)):
                     rows.append(Row(keys | {"figure": "from [s]"}, disturbance.start))
                     rows.append(Row(keys | {"figure": "to [s]"}, disturbance.end))
                     rows.append(Row(keys | {"figure": "slides"}, float(disturbance.slides)))
@@ -393,12 +393,12 @@ def _first_of_each_object(verdicts: Iterable[GraspVerdict]) -> list[GraspVerdict
     disturbed = [
         verdict for verdict in verdicts if verdict.disturbances and verdict.case != "failed"
     ]
-    roles = {each.role for each in disturbed}
+    roles = {grasp.role for grasp in disturbed}
     role = "fresh" if "fresh" in roles else "main"
     first: dict[str, GraspVerdict] = {}
-    for each in sorted(disturbed, key=lambda each: each.recording):
-        if each.role == role:
-            first.setdefault(each.object, each)
+    for grasp in sorted(disturbed, key=lambda grasp: grasp.recording):
+        if grasp.role == role:
+            first.setdefault(grasp.object, grasp)
     return list(first.values())
 
 

@@ -67,8 +67,8 @@ def count_hidden(corpus: Corpus, window: int) -> list[HiddenCounts]:
     """
     found = [list(_recording_changes(corpus, recording, window)) for recording in corpus.load()]
     rest: dict[str, list[Array]] = {}
-    for each in (changes for recording in found for changes in recording):
-        rest.setdefault(each.finger, []).append(each.values[each.at_rest])
+    for change in (changes for recording in found for changes in recording):
+        rest.setdefault(change.finger, []).append(change.values[change.at_rest])
     limits = {}
     for finger, parts in rest.items():
         limit = noise_limits(parts)

@@ -65,6 +65,7 @@ def test_recordings_without_a_finger_of_the_corpus_are_left_out(tmp_path):
     assert [each.name for each in recording_labels(corpus)] == ["r0", "r1"]
 
 
+@pytest.mark.slow
 def test_each_recording_has_the_estimates_of_a_fit_to_the_others(corpus):
     """They are the decisions of the study's evaluation with a fold for each recording."""
     found = method_estimates("logreg", corpus, seed=0)
@@ -81,6 +82,7 @@ def test_each_recording_has_the_estimates_of_a_fit_to_the_others(corpus):
         assert (each.known.array == (decided.hand.states != UNKNOWN)).all()
 
 
+@pytest.mark.slow
 def test_alarms_come_from_states_that_are_held(corpus):
     """A hand that is not stable stays so for 0.1 s: 15 samples at 150 Hz."""
     for each in method_estimates("difference", corpus, seed=0):

@@ -14,6 +14,8 @@ from holdfast_lab.study.methods import METHODS
 from holdfast_lab.study.plan import StudyPlan, scan_corpus
 from study.example_recordings import save_all
 
+pytestmark = pytest.mark.slow
+
 DISTURBED = [
     Label(3.0, 5.3, ContactState.STABLE),
     Label(5.3, 6.5, ContactState.UNSTABLE),

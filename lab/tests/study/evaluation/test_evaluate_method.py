@@ -24,6 +24,8 @@ from holdfast_lab.study.evaluation.variation import Variation
 from holdfast_lab.study.plan import scan_corpus
 from study.example_recordings import recording_with_truth, save_all, save_synthetic
 
+pytestmark = pytest.mark.slow
+
 EFFORT = EvaluationEffort(folds=3, inner=2, max_samples=1000)
 
 

@@ -188,6 +188,7 @@ def test_the_window_is_one_second_at_any_rate():
         assert (rows[k, :, :2] == 0).all()
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("rate", [80.0, 100.0, 150.0])
 def test_the_last_second_is_causal(rate):
     module = tiny_module(1, rate=rate)

@@ -53,11 +53,13 @@ def plan(tmp_path_factory):
     return StudyPlan(corpora, quick=True)
 
 
+@pytest.mark.slow
 def test_all_corpora_have_the_same_repeats(plan):
     cut = same_repeats(plan.corpora)
     assert cut["main"].recordings == cut["finger"].recordings == plan.corpora["finger"].recordings
 
 
+@pytest.mark.slow
 def test_treatments_change_labels_and_readings(plan):
     pools = {
         name: pool_samples(plan.main, 150.0, "index", 14, 0, treatment)
@@ -73,6 +75,7 @@ def test_treatments_change_labels_and_readings(plan):
     assert sigma["noisy"] > 2 * sigma["exact"]
 
 
+@pytest.mark.slow
 def test_the_table(plan):
     results = {task.name: task.function(*task.arguments) for task in attribution.tasks(plan)}
     (table,) = attribution.tables(plan, results)

@@ -90,6 +90,7 @@ def plan(tmp_path_factory):
     return StudyPlan({"main": scan_corpus("main", save_all(folder, made))}, quick=True)
 
 
+@pytest.mark.slow
 def test_the_table_of_four(plan):
     results = {t.name: t.function(*t.arguments) for t in label_tables.tasks(plan)}
     labels, ceiling = label_tables.tables(plan, results)

@@ -21,14 +21,12 @@ from holdfast.classifiers.folds import deal_folds, shuffled
 from holdfast.contact import ContactState
 from holdfast.errors import TrainingError
 from holdfast.model import ANY_FINGER, Model
-from holdfast.parallel import map_ordered
+from holdfast.parallel import Engine
 from holdfast.recordings import Label, Recording
 from holdfast.sensors.types import Array
-from holdfast.training.dataset_scan import scan_dataset
 from holdfast.training.model_fit import TrainingData, fit_model
 from holdfast.training.setting import Setting
-from holdfast.training.splits import split_data
-from holdfast.training.training_samples import gather_samples, resample_if_needed
+from holdfast.training.training_samples import resample_if_needed
 
 MAX_FOLDS = 10
 """Largest number of groups of recordings that are held out in turn."""
@@ -151,11 +149,8 @@ class _FoldModels:
     ) -> "_FoldModels":
         if not recordings.fingers:
             return cls(frozenset(), constant, [None], [0] * len(recordings))
-        found = scan_dataset(recordings, setting.rate, relative=setting.relative)
-        data_split = split_data(found.recordings, setting.split, setting.seed)
-        data = TrainingData(
-            found, data_split, gather_samples(recordings, found, setting, data_split)
-        )
+        data = TrainingData.of(recordings, setting)
+        data_split = data.data_split
         one_class = _one_class_fingers(data, recordings.fingers)
         n_units = len(data_split.units)
         unit_folds = deal_folds(n_units, n_folds, shuffled(n_units, setting.seed))
@@ -165,7 +160,7 @@ class _FoldModels:
             for fold in range(min(n_folds, n_units))
         ]
         fingers = recordings.fingers - one_class.keys()
-        models = list(map_ordered(fit_model, tasks, n_jobs))
+        models = list(Engine(n_jobs).map_ordered(fit_model, tasks))
         return cls(
             fingers, {**constant, **one_class}, models, unit_folds[data_split.group_of].tolist()
         )

@@ -46,6 +46,7 @@ def test_commands_through_the_wire_reach_the_twin(hand):
     assert twin.n_refused == 0
 
 
+@pytest.mark.slow
 def test_a_message_that_is_no_command_is_refused(hand):
     with DrivenTwin("twin:?object=ball", hand, speed=0) as twin:
         node = dds.Node(int(hand.rpartition("=")[2]))

@@ -420,6 +420,7 @@ def mutated(packet, dice):
     return bytes(given)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("seed", range(4))
 def test_damaged_packets_do_no_harm(seed):
     """10,000 of them, among good ones."""
