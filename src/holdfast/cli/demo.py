@@ -1,6 +1,5 @@
 """`holdfast demo`: the whole chain, from simulation to replay, on simulated data."""
 
-import math
 import sys
 import time
 from collections.abc import Sequence
@@ -9,7 +8,14 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from holdfast.cli.options import JsonOption
+from holdfast.cli.options import (
+    BrowserOption,
+    ForceOption,
+    JsonOption,
+    SeedOption,
+    SpeedOption,
+    check_speed,
+)
 from holdfast.cli.terminal.console import print_json, print_line, print_lines, print_message
 from holdfast.errors import require_extras
 
@@ -29,19 +35,10 @@ def demo(
     out: Annotated[
         Path, typer.Argument(help="Folder for the results; it is created if missing.")
     ] = Path("holdfast-demo"),
-    speed: Annotated[
-        float, typer.Option(help="Speed of the replay: 1 is real time, 0 as fast as possible.")
-    ] = 1.0,
-    seed: Annotated[int, typer.Option(help="Seed of the recordings.")] = 0,
-    browser: Annotated[
-        bool | None,
-        typer.Option(
-            "--browser/--no-browser",
-            help="Replay on a web page, or in the terminal.",
-            show_default="page if a browser can be opened",
-        ),
-    ] = None,
-    force: Annotated[bool, typer.Option("--force", help="Overwrite an earlier demo.")] = False,
+    speed: SpeedOption = 1.0,
+    seed: SeedOption = 0,
+    browser: BrowserOption = None,
+    force: ForceOption = False,
     as_json: JsonOption = False,
 ) -> None:
     """Simulate grasps, detect and train on them, and replay one.
@@ -61,8 +58,7 @@ def demo(
     from holdfast.model import Model
     from holdfast.training import evaluate
 
-    if not (math.isfinite(speed) and speed >= 0):
-        raise ValueError(f"--speed: at least 0 expected, {speed:g} given")
+    check_speed("twin:", speed)
     start = time.monotonic()
     folder, model = out / "recordings", out / "model.json"
     folder.mkdir(parents=True, exist_ok=True)

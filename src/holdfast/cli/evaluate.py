@@ -7,13 +7,11 @@ import typer
 
 from holdfast.cli.options import (
     EngineOption,
-    ForcePlotOption,
     JobsOption,
     JsonOption,
     ModelArgument,
-    PlotOption,
-    check_plot,
-    save_plot,
+    PlotOptions,
+    SeedOption,
     start_engine,
 )
 from holdfast.cli.terminal.console import (
@@ -27,7 +25,10 @@ from holdfast.cli.terminal.progress import progress
 from holdfast.errors import require_extras
 
 if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
     from holdfast.metrics import EventMetrics, Intervals, Metrics, SampleMetrics
+    from holdfast.training.evaluation import Evaluation
 
 PERCENT_FIELDS = ("accuracy", "fdr", "fpr", "fnr")
 AUC_NOTE = (
@@ -40,11 +41,11 @@ AUC_NOTE = (
 def evaluate(
     model: ModelArgument,
     data: Annotated[Path, typer.Argument(help="A labelled recording, or a folder of them.")],
-    seed: Annotated[int, typer.Option(help="Seed of the bootstrap.")] = 0,
+    *,
+    seed: SeedOption = 0,
     engine: EngineOption = "loky",
     jobs: JobsOption = 1,
-    plot: PlotOption = None,
-    force: ForcePlotOption = False,
+    figure: PlotOptions,
     as_json: JsonOption = False,
 ) -> None:
     """Evaluate a model on labelled recordings.
@@ -69,30 +70,32 @@ def evaluate(
     from holdfast.training.evaluation import evaluate_recordings
     from holdfast.training.verdict import no_verdict
 
-    if plot is not None:
-        check_plot(plot, force)
+    figure.check()
     loaded = Model.load(model)
     used = start_engine(engine, jobs)
     recordings = load_dataset(used.path(data))
-    found = evaluate_recordings(
-        loaded, recordings, seed, used, progress=progress, keep=plot is not None
+    evaluation = evaluate_recordings(
+        loaded, recordings, seed, used, progress=progress, keep=figure.plot is not None
     )
-    metrics = found.metrics
+    metrics = evaluation.metrics
     if metrics.pooled.n + metrics.pooled.n_undecided == 0:
         raise TrainingError(f"{data}: {len(recordings)} recordings without labels; labels expected")
-    warn_about_training(found.trained_on, len(recordings))
-    if plot is not None:
-        from holdfast.plots.evaluation import draw_evaluation
-
-        save_plot(draw_evaluation(metrics, found.decisions), plot, force)
+    warn_about_training(evaluation.trained_on, len(recordings))
+    figure.save(lambda: _draw(evaluation))
     if as_json:
-        document = {"trained_on": found.trained_on, "verdict": found.verdict}
+        document = {"trained_on": evaluation.trained_on, "verdict": evaluation.verdict}
         print_json({**msgspec.to_builtins(metrics), **document})
         return
-    print_verdict(found.verdict or no_verdict(len(found.trained_on), len(recordings)))
+    print_verdict(evaluation.verdict or no_verdict(len(evaluation.trained_on), len(recordings)))
     print_metrics(metrics)
     print_line()
     print_line(f"{model} on {len(recordings)} recordings")
+
+
+def _draw(evaluation: "Evaluation") -> "Figure":
+    from holdfast.plots.evaluation import draw_evaluation
+
+    return draw_evaluation(evaluation.metrics, evaluation.decisions)
 
 
 def warn_about_training(trained_on: list[str], n_recordings: int) -> None:

@@ -12,6 +12,7 @@ import typer
 
 from holdfast.cli.options import (
     EngineOption,
+    ForceOption,
     JobsOption,
     JsonOption,
     check_shared,
@@ -91,9 +92,7 @@ def import_(
             show_default="parquet; mcap without the extra parquet",
         ),
     ] = None,
-    force: Annotated[
-        bool, typer.Option("--force", help="Overwrite recordings of the same name.")
-    ] = False,
+    force: ForceOption = False,
     as_json: JsonOption = False,
 ) -> None:
     r"""Import recordings from other formats.

@@ -6,10 +6,12 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from holdfast.cli.options import ForcePlotOption, JsonOption, PlotOption, check_plot, save_plot
+from holdfast.cli.options import JsonOption, PlotOptions
 from holdfast.cli.terminal.console import print_json, print_line, print_lines, print_table
 
 if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
     from holdfast.sensors import Hand, Sensor
 
 
@@ -34,8 +36,8 @@ def sensors(
     unit: Annotated[
         str, typer.Option(help="With --template: unit of the readings, count or N.")
     ] = "count",
-    plot: PlotOption = None,
-    force: ForcePlotOption = False,
+    *,
+    figure: PlotOptions,
     as_json: JsonOption = False,
 ) -> None:
     """List the known sensors and hands, or show one of them.
@@ -58,12 +60,12 @@ def sensors(
         _print_template(template, pitch, rate, unit)
         return
     if name is None:
-        _refuse_options(plot, base)
+        _refuse_options(figure.plot, base)
         _show_all(as_json)
         return
     found = _find(name, base)
-    if plot is not None:
-        _draw(found, plot, force)
+    figure.check()
+    figure.save(lambda: _draw(found))
     _show_one(found, as_json)
 
 
@@ -255,9 +257,8 @@ def _ranges(indices: list[int]) -> str:
     return ", ".join(f"{a}-{b}" if a < b else f"{a}" for a, b in runs)
 
 
-def _draw(found: "Sensor | Hand", plot: Path, force: bool) -> None:
-    check_plot(plot, force)
+def _draw(found: "Sensor | Hand") -> "Figure":
     from holdfast.plots.sensors import plot_hand, plot_sensor
     from holdfast.sensors import Sensor
 
-    save_plot(plot_sensor(found) if isinstance(found, Sensor) else plot_hand(found), plot, force)
+    return plot_sensor(found) if isinstance(found, Sensor) else plot_hand(found)

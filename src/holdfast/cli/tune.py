@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from holdfast.cli.evaluate import print_verdict, warn_about_training
-from holdfast.cli.options import JsonOption, ModelArgument
+from holdfast.cli.options import ForceOption, JsonOption, ModelArgument, ModelOutput
 from holdfast.cli.terminal.console import print_json, print_line, print_table
 from holdfast.cli.terminal.progress import progress
 from holdfast.errors import require_extras
@@ -21,14 +21,14 @@ if TYPE_CHECKING:
 def tune(
     model: ModelArgument,
     data: Annotated[Path, typer.Argument(help="A labelled recording, or a folder of them.")],
-    out: Annotated[Path, typer.Option("--output", "-o", help="The model file to write (JSON).")],
+    out: ModelOutput,
     false_alarms: Annotated[
         float,
         typer.Option(
             "--false-alarms", help="Maximum number of false alarms per minute of stable hold."
         ),
     ],
-    force: Annotated[bool, typer.Option("--force", help="Overwrite the model.")] = False,
+    force: ForceOption = False,
     as_json: JsonOption = False,
 ) -> None:
     """Choose the threshold for a wanted rate of false alarms.

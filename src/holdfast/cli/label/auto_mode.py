@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 from holdfast.cli.label.inputs import (
     RuleOptions,
+    SaveOptions,
     check_rule,
     current_time,
     recordings_at,
@@ -32,10 +33,8 @@ def label_by_rule(
     paths: Sequence[Path],
     rule: str,
     options: RuleOptions,
+    saving: SaveOptions,
     *,
-    author: str | None,
-    dry_run: bool,
-    force: bool,
     as_json: bool,
 ) -> None:
     """Write the labels that a rule proposes, and print those with low confidence.
@@ -44,9 +43,7 @@ def label_by_rule(
         paths: recordings, or folders of recordings.
         rule: name of the rule.
         options: options of the rule.
-        author: author of the label files; by default the rule.
-        dry_run: write nothing.
-        force: overwrite labels of a person.
+        saving: how they are saved; the author is the rule by default.
         as_json: print JSON.
 
     Raises:
@@ -57,22 +54,22 @@ def label_by_rule(
     check_rule(rule)
     options.arguments(rule)
     files = recordings_at(paths)
-    if not (dry_run or force):
+    if not (saving.dry_run or saving.force):
         check_no_manual_labels(files)
 
     def label(path: Path, recording: "Recording") -> "Labels":
         labels = options.propose(rule, recording)
-        if not dry_run:
-            write_labels(path, recording, labels, author or f"rule:{rule}")
+        if not saving.dry_run:
+            write_labels(path, recording, labels, saving.author or f"rule:{rule}")
         return labels
 
     documents = label_all(files, label)
     report_loaded_starts(documents, options.tare)
     if as_json:
-        print_json({"rule": rule, "written": not dry_run, "recordings": documents})
+        print_json({"rule": rule, "written": not saving.dry_run, "recordings": documents})
     else:
         print_documents(documents)
-    report_failures(documents, written=not dry_run)
+    report_failures(documents, written=not saving.dry_run)
 
 
 def check_no_manual_labels(files: Sequence[Path]) -> None:
