@@ -27,7 +27,7 @@ from holdfast.cli.options import (
     check_seconds,
 )
 from holdfast.cli.terminal.console import print_line, print_message
-from holdfast.cli.terminal.stopping import StopRequest, handle_stop_signals
+from holdfast.cli.terminal.control import StopRequest, handle_stop_signals
 
 if TYPE_CHECKING:
     from holdfast.devices.sources import Source

@@ -17,7 +17,7 @@ from holdfast.cli.options import (
     check_speed,
 )
 from holdfast.cli.terminal.console import print_json, print_message
-from holdfast.cli.terminal.stopping import handle_stop_signals
+from holdfast.cli.terminal.control import handle_stop_signals
 
 if TYPE_CHECKING:
     from holdfast.devices.sources import Source

@@ -19,7 +19,7 @@ from holdfast.cli.options import (
     check_speed,
 )
 from holdfast.cli.terminal.console import print_json, print_line, print_message
-from holdfast.cli.terminal.stopping import StopRequest, handle_stop_signals
+from holdfast.cli.terminal.control import StopRequest, handle_stop_signals
 
 if TYPE_CHECKING:
     from holdfast.devices.sources import Arrival, Source
@@ -112,8 +112,8 @@ def _record(
         OutputError: the file cannot be written.
         SourceError: no samples arrived; the file is removed.
     """
-    from holdfast.cli.terminal.keys import KEY_HELP, MarkerKeys
-    from holdfast.cli.terminal.status_line import StatusLine
+    from holdfast.cli.terminal.control import KEY_HELP, MarkerKeys
+    from holdfast.cli.terminal.progress import StatusLine
     from holdfast.errors import OutputError, SourceError
     from holdfast.live.recording_buffer import marker_text
 
@@ -237,7 +237,7 @@ def _print_result(path: Path, status: "RecorderStatus", as_json: bool) -> None:
     if as_json:
         print_json(_to_dict(path, status))
         return
-    from holdfast.cli.terminal.status_line import format_size
+    from holdfast.cli.terminal.progress import format_size
 
     print_line(
         f"{status.seconds:.2f} s, {status.n_samples} samples of {len(status.modules)} modules "

@@ -111,7 +111,7 @@ def label(
 
         label_by_rule(paths, mode.auto, options, saving, as_json=as_json)
     elif mode.compare:
-        from holdfast.cli.label.compare_mode import compare_labels
+        from holdfast.cli.label.check_modes import compare_labels
 
         compare_labels(paths, options, saving.annotator, as_json=as_json)
     elif mode.export is not None:
@@ -123,7 +123,7 @@ def label(
 
         import_labels(paths, mode.import_from, saving, as_json=as_json)
     else:
-        from holdfast.cli.label.audit_mode import audit_labels
+        from holdfast.cli.label.check_modes import audit_labels
         from holdfast.cli.label.page_mode import show_label_page
 
         show = mode.page or not mode.audit

@@ -22,11 +22,11 @@ from holdfast.cli.options import (
     report_missing_fingers,
 )
 from holdfast.cli.terminal.console import print_json, print_line, print_message
+from holdfast.cli.terminal.control import StopRequest, handle_stop_signals
 from holdfast.cli.terminal.progress import progress
-from holdfast.cli.terminal.stopping import StopRequest, handle_stop_signals
 
 if TYPE_CHECKING:
-    from holdfast.cli.detect_output import EstimateChunk
+    from holdfast.cli.detect.output import EstimateChunk
     from holdfast.live.stream_detector import StreamDetector, StreamUpdate
     from holdfast.model import Model
     from holdfast.recordings import Recording
@@ -89,7 +89,7 @@ def detect(
 
 
 def _print_estimates(chunks: Iterator["EstimateChunk"], *, live: bool) -> None:
-    from holdfast.cli.detect_output import json_lines
+    from holdfast.cli.detect.output import json_lines
 
     for chunk in chunks:
         for text in json_lines(chunk):
@@ -100,7 +100,7 @@ def _print_estimates(chunks: Iterator["EstimateChunk"], *, live: bool) -> None:
 
 def _print_changes(chunks: Iterator["EstimateChunk"], *, live: bool) -> None:
     """Print the changes that lasted: of a live source at once, else below the progress bar."""
-    from holdfast.cli.detect_changes import HEADER, ChangeLines
+    from holdfast.cli.detect.output import HEADER, ChangeLines
 
     changes = ChangeLines(from_first=live)
     if live:
@@ -119,7 +119,7 @@ def _print_changes(chunks: Iterator["EstimateChunk"], *, live: bool) -> None:
 
 
 def _print_summary(chunks: Iterator["EstimateChunk"], model: str, *, as_json: bool) -> None:
-    from holdfast.cli.detect_output import DetectionSummary
+    from holdfast.cli.detect.output import DetectionSummary
 
     summary = DetectionSummary()
     for chunk in chunks:
@@ -133,7 +133,7 @@ def _print_summary(chunks: Iterator["EstimateChunk"], model: str, *, as_json: bo
 def _detect_recording(
     model: "Model", path: Path, options: DetectorOptions
 ) -> Iterator["EstimateChunk"]:
-    from holdfast.cli.detect_output import chunk_from_detection
+    from holdfast.cli.detect.output import chunk_from_detection
     from holdfast.detector import Detector
     from holdfast.live.readings_monitor import ReadingsMonitor
 
@@ -182,7 +182,7 @@ def _detect_live(
     model: "Model", uri: str, options: DetectorOptions, seconds: float | None
 ) -> Iterator["EstimateChunk"]:
     """Yield the estimates of each arrival, until a signal or for `seconds`."""
-    from holdfast.cli.detect_output import chunk_from_stream
+    from holdfast.cli.detect.output import chunk_from_stream
     from holdfast.devices.sources import open_source
     from holdfast.live.stream_detector import compile_kernels
 

@@ -1,10 +1,10 @@
-"""`holdfast label --compare A B`: print the agreement of two sets of labels."""
+"""`holdfast label --compare` and `--audit`: check labels against others, or a classifier."""
 
 from collections.abc import Callable, Iterator, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from holdfast.cli.label.inputs import RuleOptions
+from holdfast.cli.label.inputs import RuleOptions, recordings_at
 from holdfast.cli.terminal.console import (
     print_json,
     print_line,
@@ -15,6 +15,7 @@ from holdfast.cli.terminal.console import (
 from holdfast.cli.terminal.progress import progress
 
 if TYPE_CHECKING:
+    from holdfast.labelling.review.audit import Audit, Suspect
     from holdfast.labelling.review.compare import (
         Agreement,
         FingerAgreement,
@@ -193,3 +194,53 @@ def _row(each: "FingerAgreement | PooledAgreement") -> tuple[str, ...]:
 
 def _number(value: float | None, digits: int, scale: float = 1.0) -> str:
     return "-" if value is None else f"{scale * value:.{digits}f}"
+
+
+def audit_labels(paths: Sequence[Path], jobs: int, *, as_json: bool) -> "Sequence[Suspect]":
+    """Print the labels that a classifier contradicts, and return them.
+
+    Args:
+        paths: recordings, or folders of recordings.
+        jobs: number of parallel fits; -1: one per processor.
+        as_json: print JSON.
+
+    Raises:
+        TrainingError: there are too few labels to train a classifier.
+        RecordingError: a recording cannot be read.
+    """
+    from msgspec import to_builtins
+
+    from holdfast.io import Dataset
+    from holdfast.labelling.review.audit import audit
+
+    files = recordings_at(paths)
+    print_message(f"cross-validating the labels of {len(files)} recordings")
+    result = audit(Dataset(files), n_jobs=jobs)
+    if as_json:
+        print_json(to_builtins(result))
+    else:
+        _print_suspects(result)
+    return result.suspects
+
+
+def _print_suspects(result: "Audit") -> None:
+    rows = [
+        (
+            suspect.recording, suspect.finger, suspect.kind,
+            f"{suspect.start:.2f}", f"{suspect.end:.2f}",
+            suspect.given, suspect.expected, f"{suspect.confidence:.2f}",
+            "-" if suspect.shift is None else f"{suspect.shift:+.2f}",
+        )
+        for suspect in result.suspects
+    ]  # fmt: skip
+    if rows:
+        header = (
+            "recording", "finger", "kind", "start [s]", "end [s]",
+            "label", "expected", "confidence", "shift [s]",
+        )  # fmt: skip
+        print_table(header, rows)
+        print_line()
+    print_line(
+        f"{len(rows)} suspects in {result.judged:.1f} s of labels of "
+        f"{result.n_recordings} recordings"
+    )
