@@ -16,7 +16,13 @@ from holdfast.cli.options import (
     SpeedOption,
     check_speed,
 )
-from holdfast.cli.terminal.console import print_json, print_line, print_lines, print_message
+from holdfast.cli.terminal.console import (
+    format_number,
+    print_json,
+    print_line,
+    print_lines,
+    print_message,
+)
 from holdfast.errors import require_extras
 
 if TYPE_CHECKING:
@@ -192,20 +198,18 @@ def _replay_on_page(model: "Model", path: Path, out: Path, speed: float) -> None
 def _print_results(metrics: "Metrics", trained: "Trained", n: int) -> None:
     hand = metrics.events.hand
     missed, delay = hand.missed["0.1"], hand.delay_median
+    false_alarms = format_number(hand.false_alarms_per_minute, 1)
+    accuracies = (metrics.pooled.accuracy, trained.cross_validation.pooled.accuracy)
+    shipped, trained_here = (format_number(accuracy, 1) for accuracy in accuracies)
     detected = "-" if missed is None else f"{100 - missed:.0f} %"
     print_line()
     print_line(f"{DEMO_MODEL} on {n} grasps of objects that it was not trained on:")
     print_line(f"  {hand.n_events} disturbances of a held object, {detected} detected within 0.1 s")
     print_line(f"  median delay {'-' if delay is None else f'{1000 * delay:.0f} ms'}")
-    print_line(f"  {_text(hand.false_alarms_per_minute)} false alarms per minute of quiet hold")
-    print_line(f"  {_text(metrics.pooled.accuracy)} % of all samples are classified as labelled")
-    own = trained.cross_validation.pooled.accuracy
+    print_line(f"  {false_alarms} false alarms per minute of quiet hold")
+    print_line(f"  {shipped} % of all samples are classified as labelled")
     print_line("a model of the paper's features, trained here, each grasp left out once:")
-    print_line(f"  {_text(own)} % of all samples are classified as labelled")
-
-
-def _text(value: float | None) -> str:
-    return "-" if value is None else f"{value:.1f}"
+    print_line(f"  {trained_here} % of all samples are classified as labelled")
 
 
 def _print_next_steps(out: Path, shown: Path, seconds: float) -> None:
@@ -242,8 +246,8 @@ class TrueEvents(NamedTuple):
         labels = labels_by_truth(recording, LabelRule(margin=0.0))
         causes = sorted(
             (label.start, label.end, CAUSES[label.cause])
-            for own in labels.values()
-            for label in own
+            for finger_labels in labels.values()
+            for label in finger_labels
             if label.cause is not None
         )
         hand = compute_decisions(model, recording).hand

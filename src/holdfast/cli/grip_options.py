@@ -98,8 +98,8 @@ class GripSettings:
         from holdfast.grip import Limits
 
         scales = {"min_scale": self.min_scale, "max_scale": self.max_scale}
-        given = {name: scale for name, scale in scales.items() if scale is not None}
-        return Limits(max_force=self.max_force, on_fault=self.on_fault.value, **given)
+        wanted = {name: scale for name, scale in scales.items() if scale is not None}
+        return Limits(max_force=self.max_force, on_fault=self.on_fault.value, **wanted)
 
 
 NO_HAND = GripSettings(hand="")

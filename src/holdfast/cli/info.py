@@ -284,7 +284,7 @@ def _summary(document: Mapping[str, Any]) -> tuple[object, ...]:
     modules = list(document["modules"].values())
     rates = sorted(m["rate"] for m in modules if m["n_samples"])
     faults = sorted({fault for m in modules for fault in m["faults"]})
-    found = dict.fromkeys(one["kind"] for one in document["findings"])
+    findings = dict.fromkeys(finding["kind"] for finding in document["findings"])
     return (
         document["name"],
         len(modules),
@@ -292,7 +292,7 @@ def _summary(document: Mapping[str, Any]) -> tuple[object, ...]:
         f"{rates[len(rates) // 2]:.1f}",
         f"{document['duration']:.2f}",
         sum(m["gaps"] for m in modules),
-        ", ".join(([] if document["complete"] else ["cut off"]) + [*faults, *found]) or "ok",
+        ", ".join(([] if document["complete"] else ["cut off"]) + [*faults, *findings]) or "ok",
     )
 
 

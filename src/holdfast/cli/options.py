@@ -283,9 +283,9 @@ def start_engine(engine: str, jobs: int) -> "Engine":
 
     if jobs == 0:
         raise ValueError("jobs other than 0 expected, 0 given")
-    chosen = Engine.parse(engine, jobs)
-    chosen.check()
-    return chosen
+    started = Engine.parse(engine, jobs)
+    started.check()
+    return started
 
 
 def check_shared(path: Path, engine: "Engine") -> None:

@@ -63,10 +63,10 @@ def sensors(
         _refuse_options(figure.plot, base)
         _show_all(as_json)
         return
-    found = _find(name, base)
+    layout = _find(name, base)
     figure.check()
-    figure.save(lambda: _draw(found))
-    _show_one(found, as_json)
+    figure.save(lambda: _draw(layout))
+    _show_one(layout, as_json)
 
 
 def find_sensor(name: str) -> "Sensor":
@@ -118,7 +118,7 @@ def _lines(value: object) -> str:
     import json
 
     if isinstance(value, list) and isinstance(value[0], list):
-        return "[\n    " + ",\n    ".join(json.dumps(each) for each in value) + "\n  ]"
+        return "[\n    " + ",\n    ".join(json.dumps(row) for row in value) + "\n  ]"
     return json.dumps(value)
 
 
@@ -171,18 +171,18 @@ def _show_all(as_json: bool) -> None:
     )
 
 
-def _show_one(found: "Sensor | Hand", as_json: bool) -> None:
+def _show_one(layout: "Sensor | Hand", as_json: bool) -> None:
     from holdfast.sensors import Sensor
 
-    if isinstance(found, Sensor):
+    if isinstance(layout, Sensor):
         if as_json:
-            print_json(found.to_dict() | {"n_taxels": found.n_taxels})
+            print_json(layout.to_dict() | {"n_taxels": layout.n_taxels})
         else:
-            _print_sensor(found)
+            _print_sensor(layout)
     elif as_json:
-        print_json(_hand_summary(found))
+        print_json(_hand_summary(layout))
     else:
-        _print_hand(found)
+        _print_hand(layout)
 
 
 def _sensor_summary(sensor: "Sensor") -> dict[str, Any]:
@@ -257,8 +257,8 @@ def _ranges(indices: list[int]) -> str:
     return ", ".join(f"{a}-{b}" if a < b else f"{a}" for a, b in runs)
 
 
-def _draw(found: "Sensor | Hand") -> "Figure":
+def _draw(layout: "Sensor | Hand") -> "Figure":
     from holdfast.plots.sensors import plot_hand, plot_sensor
     from holdfast.sensors import Sensor
 
-    return plot_sensor(found) if isinstance(found, Sensor) else plot_hand(found)
+    return plot_sensor(layout) if isinstance(layout, Sensor) else plot_hand(layout)

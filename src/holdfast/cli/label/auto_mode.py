@@ -155,15 +155,15 @@ def print_documents(documents: Sequence[dict[str, Any]]) -> None:
         return
     rows = [
         (
-            each["name"],
-            *(f"{each['seconds'][state]:.2f}" for state in each["seconds"]),
-            len(each["doubtful"]),
+            document["name"],
+            *(f"{seconds:.2f}" for seconds in document["seconds"].values()),
+            len(document["doubtful"]),
         )
-        for each in good
+        for document in good
     ]
     print_table(("recording", "stable [s]", "unstable [s]", "no contact [s]", "doubtful"), rows)
     doubtful = sorted(
-        ((each["name"], label) for each in good for label in each["doubtful"]),
+        ((document["name"], label) for document in good for label in document["doubtful"]),
         key=lambda item: item[1]["confidence"],
     )
     if doubtful:
@@ -176,14 +176,14 @@ def _print_doubtful(doubtful: Sequence[tuple[str, dict[str, Any]]]) -> None:
     rows = [
         (
             name,
-            one["finger"],
-            f"{one['start']:.2f}",
-            f"{one['end']:.2f}",
-            one["state"],
-            f"{one['confidence']:.2f}",
-            one["evidence"],
+            label["finger"],
+            f"{label['start']:.2f}",
+            f"{label['end']:.2f}",
+            label["state"],
+            f"{label['confidence']:.2f}",
+            label["evidence"],
         )
-        for name, one in doubtful[:MAX_DOUBTFUL_SHOWN]
+        for name, label in doubtful[:MAX_DOUBTFUL_SHOWN]
     ]
     header = ("recording", "finger", "start [s]", "end [s]", "state", "confidence", "evidence")
     print_table(header, rows)
@@ -289,5 +289,5 @@ def _labels_json(labels: "Labels") -> Mapping[str, Any]:
 
     from holdfast.labelling.server.api import labels_data
 
-    found: Mapping[str, Any] = to_builtins(labels_data(labels))
-    return found
+    values: Mapping[str, Any] = to_builtins(labels_data(labels))
+    return values

@@ -69,13 +69,7 @@ def show_label_page(
     )
 
     def announce(url: str) -> None:
-        page = page_url(url, token)
-        if as_json:
-            print_json({"url": page, "recordings": len(files)})
-            sys.stdout.flush()
-        opened = browser and open_browser(page)
-        where = "is open in the browser" if opened else "is the page"
-        print_message(f"{page} {where} for {_describe(files)}; Ctrl-C stops it")
+        _announce(page_url(url, token), files, browser=browser, as_json=as_json)
 
     threads = [
         Thread(target=work, args=(workspace,), daemon=True)
@@ -88,8 +82,14 @@ def show_label_page(
         thread.join(END_TIMEOUT)
 
 
-def _describe(files: Sequence[Path]) -> str:
-    return f"{len(files)} recordings" if len(files) > 1 else str(files[0])
+def _announce(page: str, files: Sequence[Path], *, browser: bool, as_json: bool) -> None:
+    """Print the address of the page, and open it in a browser."""
+    if as_json:
+        print_json({"url": page, "recordings": len(files)})
+        sys.stdout.flush()
+    where = "is open in the browser" if browser and open_browser(page) else "is the page"
+    what = f"{len(files)} recordings" if len(files) > 1 else files[0]
+    print_message(f"{page} {where} for {what}; Ctrl-C stops it")
 
 
 def _prepare(workspace: "Workspace") -> None:
