@@ -169,7 +169,7 @@ def _publish(
     with ExitStack() as stack:
         publishers = [
             stack.enter_context(publisher)
-            for publisher in _create_publishers(session.stream, grip, ros2=ros2, ros1=ros1)
+            for publisher in _create_publishers(session.stream, grip=grip, ros2=ros2, ros1=ros1)
         ]
         for publisher in publishers:
             session.add_listener(publisher.put)
@@ -183,7 +183,7 @@ def _publish(
 
 
 def _create_publishers(
-    stream: "StreamDetector", grip: "LiveGrip | None", *, ros2: bool, ros1: bool
+    stream: "StreamDetector", *, grip: "LiveGrip | None", ros2: bool, ros1: bool
 ) -> "Iterator[RosPublisher]":
     units = {name: sensor.unit for name, sensor in stream.fingers.items()}
     if ros2:
