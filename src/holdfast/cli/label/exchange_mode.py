@@ -4,19 +4,12 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from holdfast.cli.label.auto_mode import (
-    check_no_manual_labels,
-    label_all,
-    print_documents,
-    report_failures,
-    write_labels,
-)
+from holdfast.cli.label.auto_mode import label_all, print_labelled
 from holdfast.cli.label.inputs import SaveOptions, login_name, recordings_at
 from holdfast.cli.terminal.console import print_json, print_line
 from holdfast.cli.terminal.progress import progress
 
 if TYPE_CHECKING:
-    from holdfast.labelling.server.store import Labels
     from holdfast.recordings import Recording
 
 FORMATS = ("label-studio", "csv")
@@ -101,19 +94,10 @@ def import_labels(
         raise RecordingError(f"{source} does not exist; labels of Label Studio or CSV expected")
     if source.is_file() and source.suffix == ".csv" and len(files) > 1:
         raise ValueError(f"{source} has the labels of one recording; {len(files)} recordings given")
-    if not (saving.dry_run or saving.force):
-        check_no_manual_labels(files)
-
-    def label(path: Path, recording: "Recording") -> "Labels":
-        labels = read_labels(source, recording, saving.annotator)
-        if not saving.dry_run:
-            author = saving.author or saving.annotator or login_name()
-            write_labels(path, recording, labels, author)
-        return labels
-
-    documents = label_all(files, label)
-    if as_json:
-        print_json({"source": str(source), "written": not saving.dry_run, "recordings": documents})
-    else:
-        print_documents(documents)
-    report_failures(documents, written=not saving.dry_run)
+    documents = label_all(
+        files,
+        lambda recording: read_labels(source, recording, saving.annotator),
+        saving,
+        saving.author or saving.annotator or login_name(),
+    )
+    print_labelled(("source", str(source)), documents, saving, as_json=as_json)
