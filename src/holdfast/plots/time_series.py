@@ -135,8 +135,8 @@ def _first_of_each(values: Array, extremes: Array, edges: Codes) -> Codes:
 
     Without one, because the extreme is NaN, it is that of a later stretch, or the last edge.
     """
-    found = np.flatnonzero(values == np.repeat(extremes, np.diff(edges)))
-    return np.append(found, len(values))[np.searchsorted(found, edges[:-1])]
+    places = np.flatnonzero(values == np.repeat(extremes, np.diff(edges)))
+    return np.append(places, len(values))[np.searchsorted(places, edges[:-1])]
 
 
 def draw_curve(

@@ -2,7 +2,7 @@ import tracemalloc
 
 import pytest
 
-from holdfast.cli.detect_output import (
+from holdfast.cli.detect.output import (
     DetectionSummary,
     EstimateChunk,
     chunk_from_detection,

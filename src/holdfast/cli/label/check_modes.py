@@ -1,11 +1,12 @@
-"""`holdfast label --compare A B`: print the agreement of two sets of labels."""
+"""`holdfast label --compare` and `--audit`: check labels against others, or a classifier."""
 
 from collections.abc import Callable, Iterator, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from holdfast.cli.label.inputs import RuleOptions
+from holdfast.cli.label.inputs import RuleOptions, recordings_at
 from holdfast.cli.terminal.console import (
+    format_number,
     print_json,
     print_line,
     print_message,
@@ -15,6 +16,7 @@ from holdfast.cli.terminal.console import (
 from holdfast.cli.terminal.progress import progress
 
 if TYPE_CHECKING:
+    from holdfast.labelling.review.audit import Audit, Suspect
     from holdfast.labelling.review.compare import (
         Agreement,
         FingerAgreement,
@@ -54,7 +56,7 @@ def compare_labels(
     both = (_labels_of(a, options, annotator), _labels_of(b, options, annotator))
     results = dict(_compare_each(files, both))
     compared = [result for result in results.values() if not isinstance(result, str)]
-    left_out = {name: each for name, each in results.items() if isinstance(each, str)}
+    left_out = {name: text for name, text in results.items() if isinstance(text, str)}
     if not compared:
         raise _nothing_to_compare(left_out)
     agreement = pool(compared)
@@ -86,13 +88,13 @@ def _compare_each(
     for path in progress(files, "comparing"):
         try:
             recording = load_recording(path, labels=False)
-            one, other = (labels_of(recording) for labels_of in both)
-            if not (any(one.values()) and any(other.values())):
-                side = "B" if any(one.values()) else "A"
+            a, b = (labels_of(recording) for labels_of in both)
+            if not (any(a.values()) and any(b.values())):
+                side = "B" if any(a.values()) else "A"
                 yield recording.name, f"{side} has no labels of this recording"
                 continue
             times = {name: module.times for name, module in recording.modules.items()}
-            yield recording.name, compare(one, other, times, recording.name)
+            yield recording.name, compare(a, b, times, recording.name)
         except RecordingError as cause:
             yield path.stem, str(cause)
 
@@ -126,8 +128,8 @@ def _recordings_to_compare(a: Path, b: Path) -> list[Path]:
         if not _is_rule(place) and not place.exists():
             raise RecordingError(f"{place} does not exist; labels, recordings or a rule expected")
     for place in (a, b):
-        if not _is_rule(place) and (found := _recordings_beside(place)):
-            return found
+        if not _is_rule(place) and (files := _recordings_beside(place)):
+            return files
     raise RecordingError(
         f"no recordings beside the labels in {a} or {b}; recordings give the sample times"
     )
@@ -160,15 +162,15 @@ def _print(agreement: "Agreement") -> None:
         "only A [%]", "only B [%]", "not in A", "not in B",
     )  # fmt: skip
     rows = [
-        (recording.name, finger, *_row(each), len(each.missing_in_a), len(each.missing_in_b))
+        (recording.name, finger, *_row(labels), len(labels.missing_in_a), len(labels.missing_in_b))
         for recording in agreement.recordings
-        for finger, each in recording.fingers.items()
+        for finger, labels in recording.fingers.items()
     ]
     pooled = {**agreement.fingers, "all": agreement.pooled}
     if len(agreement.recordings) > 1:
         rows += [
-            ("all", finger, *_row(each), each.n_missing_in_a, each.n_missing_in_b)
-            for finger, each in pooled.items()
+            ("all", finger, *_row(labels), labels.n_missing_in_a, labels.n_missing_in_b)
+            for finger, labels in pooled.items()
         ]
     print_table(header, rows)
     print_line()
@@ -178,18 +180,68 @@ def _print(agreement: "Agreement") -> None:
     )
 
 
-def _row(each: "FingerAgreement | PooledAgreement") -> tuple[str, ...]:
-    onsets = each.onset_differences
+def _row(labels: "FingerAgreement | PooledAgreement") -> tuple[str, ...]:
+    onsets = labels.onset_differences
     return (
-        _number(each.kappa, 3),
-        _number(each.kappa_stable, 3),
+        format_number(labels.kappa, 3),
+        format_number(labels.kappa_stable, 3),
         f"{onsets.n}",
-        _number(onsets.median, 0, 1e3),
-        _number(onsets.p95, 0, 1e3),
-        f"{100 * each.only_a:.1f}",
-        f"{100 * each.only_b:.1f}",
+        _milliseconds(onsets.median),
+        _milliseconds(onsets.p95),
+        f"{100 * labels.only_a:.1f}",
+        f"{100 * labels.only_b:.1f}",
     )
 
 
-def _number(value: float | None, digits: int, scale: float = 1.0) -> str:
-    return "-" if value is None else f"{scale * value:.{digits}f}"
+def _milliseconds(seconds: float | None) -> str:
+    return format_number(None if seconds is None else 1e3 * seconds, 0)
+
+
+def audit_labels(paths: Sequence[Path], jobs: int, *, as_json: bool) -> "Sequence[Suspect]":
+    """Print the labels that a classifier contradicts, and return them.
+
+    Args:
+        paths: recordings, or folders of recordings.
+        jobs: number of parallel fits; -1: one per processor.
+        as_json: print JSON.
+
+    Raises:
+        TrainingError: there are too few labels to train a classifier.
+        RecordingError: a recording cannot be read.
+    """
+    from msgspec import to_builtins
+
+    from holdfast.io import Dataset
+    from holdfast.labelling.review.audit import audit
+
+    files = recordings_at(paths)
+    print_message(f"cross-validating the labels of {len(files)} recordings")
+    result = audit(Dataset(files), n_jobs=jobs)
+    if as_json:
+        print_json(to_builtins(result))
+    else:
+        _print_suspects(result)
+    return result.suspects
+
+
+def _print_suspects(result: "Audit") -> None:
+    rows = [
+        (
+            suspect.recording, suspect.finger, suspect.kind,
+            f"{suspect.start:.2f}", f"{suspect.end:.2f}",
+            suspect.given, suspect.expected, f"{suspect.confidence:.2f}",
+            "-" if suspect.shift is None else f"{suspect.shift:+.2f}",
+        )
+        for suspect in result.suspects
+    ]  # fmt: skip
+    if rows:
+        header = (
+            "recording", "finger", "kind", "start [s]", "end [s]",
+            "label", "expected", "confidence", "shift [s]",
+        )  # fmt: skip
+        print_table(header, rows)
+        print_line()
+    print_line(
+        f"{len(rows)} suspects in {result.judged:.1f} s of labels of "
+        f"{result.n_recordings} recordings"
+    )

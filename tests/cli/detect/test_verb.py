@@ -11,7 +11,7 @@ import pytest
 
 from holdfast.classifiers import LinearClassifier
 from holdfast.cli import main
-from holdfast.cli.detect import CHUNK_SIZE
+from holdfast.cli.detect.verb import CHUNK_SIZE
 from holdfast.contact import UNSTABLE, Fault
 from holdfast.detector import detect
 from holdfast.devices.sources import open_source

@@ -11,25 +11,22 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from holdfast.cli.options import (
-    DebounceOption,
-    HysteresisOption,
-    IgnoreOption,
+    DetectorOptions,
+    JsonOption,
     ModelArgument,
-    RateOption,
     RatePolicy,
-    RawOption,
+    SecondsOption,
     SourceArgument,
-    create_stream_detector,
-    load_model,
+    check_seconds,
     parse_taxels,
     report_missing_fingers,
 )
 from holdfast.cli.terminal.console import print_json, print_line, print_message
+from holdfast.cli.terminal.control import StopRequest, handle_stop_signals
 from holdfast.cli.terminal.progress import progress
-from holdfast.cli.terminal.stopping import StopRequest, handle_stop_signals
 
 if TYPE_CHECKING:
-    from holdfast.cli.detect_output import EstimateChunk
+    from holdfast.cli.detect.output import EstimateChunk
     from holdfast.live.stream_detector import StreamDetector, StreamUpdate
     from holdfast.model import Model
     from holdfast.recordings import Recording
@@ -45,18 +42,10 @@ def detect(
         bool,
         typer.Option("--summary", help="Print the share of each state, and the contact events."),
     ] = False,
-    rate: RateOption = RatePolicy.RESAMPLE,
-    debounce: DebounceOption = None,
-    hysteresis: HysteresisOption = None,
-    raw: RawOption = False,
-    seconds: Annotated[
-        float | None, typer.Option(help="Stop a live source after this time [s].")
-    ] = None,
-    ignore: IgnoreOption = "",
-    as_json: Annotated[
-        bool,
-        typer.Option("--json", help="Print JSON on a terminal too; with --summary, no table."),
-    ] = False,
+    *,
+    options: DetectorOptions,
+    seconds: SecondsOption = None,
+    as_json: JsonOption = False,
 ) -> None:
     """Detect the contact state of every finger at every sample.
 
@@ -66,7 +55,8 @@ def detect(
     force (both in the unit of the readings), faults, faulty_taxels and cause. Values that are not
     known are null. The memory does not grow with the length of the recording.
 
-    SOURCE is the path of a recording, or the URI of a live source, which is read until Ctrl-C:
+    SOURCE is the path of a recording, or the URI of a live source, which is read until Ctrl-C or
+    for --seconds:
     xela://HOST:PORT (or xela://auto), twin:?object=can, ros2:///xServTopic, ros1:///xServTopic
     or serial:///dev/ttyACM0?sensor=anyskin.
 
@@ -79,12 +69,14 @@ def detect(
     from holdfast.devices.uri import is_uri
 
     live = is_uri(source)
-    _check_seconds(seconds, source, live=live)
-    loaded = load_model(model, debounce, hysteresis, raw=raw)
+    if seconds is not None and not live:
+        raise ValueError(f"--seconds is for live sources; {source} is a recording")
+    check_seconds(seconds)
+    loaded = options.load_model(model)
     if live:
-        chunks = _detect_live(loaded, source, rate, ignore, seconds)
+        chunks = _detect_live(loaded, source, options, seconds)
     else:
-        chunks = _detect_recording(loaded, Path(source), rate, ignore)
+        chunks = _detect_recording(loaded, Path(source), options)
         if summary or not (as_json and sys.stdout.isatty()):  # lines on the screen need no bar
             chunks = progress(chunks, "detecting")
     if summary:
@@ -97,7 +89,7 @@ def detect(
 
 
 def _print_estimates(chunks: Iterator["EstimateChunk"], *, live: bool) -> None:
-    from holdfast.cli.detect_output import json_lines
+    from holdfast.cli.detect.output import json_lines
 
     for chunk in chunks:
         for text in json_lines(chunk):
@@ -108,7 +100,7 @@ def _print_estimates(chunks: Iterator["EstimateChunk"], *, live: bool) -> None:
 
 def _print_changes(chunks: Iterator["EstimateChunk"], *, live: bool) -> None:
     """Print the changes that lasted: of a live source at once, else below the progress bar."""
-    from holdfast.cli.detect_changes import HEADER, ChangeLines
+    from holdfast.cli.detect.output import HEADER, ChangeLines
 
     changes = ChangeLines(from_first=live)
     if live:
@@ -126,17 +118,8 @@ def _print_changes(chunks: Iterator["EstimateChunk"], *, live: bool) -> None:
         print_line(line)
 
 
-def _check_seconds(seconds: float | None, source: str, *, live: bool) -> None:
-    if seconds is None:
-        return
-    if not live:
-        raise ValueError(f"--seconds is for live sources; {source} is a recording")
-    if not seconds > 0:
-        raise ValueError(f"--seconds: more than 0 s expected, {seconds:g} given")
-
-
 def _print_summary(chunks: Iterator["EstimateChunk"], model: str, *, as_json: bool) -> None:
-    from holdfast.cli.detect_output import DetectionSummary
+    from holdfast.cli.detect.output import DetectionSummary
 
     summary = DetectionSummary()
     for chunk in chunks:
@@ -148,17 +131,17 @@ def _print_summary(chunks: Iterator["EstimateChunk"], model: str, *, as_json: bo
 
 
 def _detect_recording(
-    model: "Model", path: Path, rate: RatePolicy, ignore: str
+    model: "Model", path: Path, options: DetectorOptions
 ) -> Iterator["EstimateChunk"]:
-    from holdfast.cli.detect_output import chunk_from_detection
+    from holdfast.cli.detect.output import chunk_from_detection
     from holdfast.detector import Detector
     from holdfast.live.readings_monitor import ReadingsMonitor
 
     detector = None
-    for part in _read_parts(model, path, rate):
+    for part in _read_parts(model, path, options.rate):
         if detector is None:
             sensors = {name: module.sensor for name, module in part.modules.items()}
-            taxels = parse_taxels(ignore, sensors)
+            taxels = parse_taxels(options.ignore, sensors)
             detector = Detector.for_recording(model, part, ignore=taxels)
             report_missing_fingers(model, part.name, part.modules)
             readings = ReadingsMonitor(model.fingers_of(sensors))
@@ -196,16 +179,16 @@ def _read_parts(model: "Model", path: Path, rate: RatePolicy) -> Iterator["Recor
 
 
 def _detect_live(
-    model: "Model", uri: str, rate: RatePolicy, ignore: str, seconds: float | None
+    model: "Model", uri: str, options: DetectorOptions, seconds: float | None
 ) -> Iterator["EstimateChunk"]:
     """Yield the estimates of each arrival, until a signal or for `seconds`."""
-    from holdfast.cli.detect_output import chunk_from_stream
+    from holdfast.cli.detect.output import chunk_from_stream
     from holdfast.devices.sources import open_source
     from holdfast.live.stream_detector import compile_kernels
 
     compile_kernels()
     with handle_stop_signals() as stop, open_source(uri) as source:
-        stream = create_stream_detector(model, source, rate, ignore)
+        stream = options.create_stream(model, source)
         stop.graceful = True
         for update in _read_updates(stream, seconds, stop):
             yield chunk_from_stream(source.name, update.estimates)

@@ -1,11 +1,17 @@
-"""Read markers from stdin while a command runs: keys of a terminal, or lines of a pipe."""
+"""Control a running command: signals that stop it, and markers from stdin.
+
+Markers are keys of a terminal, or lines of a pipe.
+"""
 
 import os
 import select
+import signal
 import sys
-from collections.abc import Callable
-from contextlib import suppress
-from types import TracebackType
+import threading
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager, suppress
+from dataclasses import dataclass
+from types import FrameType, TracebackType
 from typing import Self
 
 STOP_KEY = "q"
@@ -105,3 +111,45 @@ class MarkerKeys:
             lines, self._unfinished_line = [*lines, self._unfinished_line], b""
         texts = (line.decode(errors="replace").strip() for line in lines)
         return [text for text in texts if text]
+
+
+@dataclass
+class StopRequest:
+    """Handler of the signals that stop a command.
+
+    Attributes:
+        requested: True after the first signal.
+        graceful: True if the first signal only sets `requested`. Otherwise every signal raises
+            KeyboardInterrupt, and the second one always does.
+    """
+
+    requested: bool = False
+    graceful: bool = False
+
+    def __call__(self, number: int, frame: FrameType | None) -> None:
+        """Handle a signal."""
+        if self.requested or not self.graceful:
+            raise KeyboardInterrupt
+        self.requested = True
+
+
+@contextmanager
+def handle_stop_signals() -> Iterator[StopRequest]:
+    """Handle the stop signals inside a `with` block; only in the main thread."""
+    stop = StopRequest()
+    numbers = _stop_signals() if threading.current_thread() is threading.main_thread() else []
+    previous = [(number, signal.signal(number, stop)) for number in numbers]
+    try:
+        yield stop
+    finally:
+        for number, handler in previous:
+            signal.signal(number, handler)
+
+
+def _stop_signals() -> list[signal.Signals]:
+    """Return the stop signals; without SIGHUP if it is ignored, as under nohup."""
+    numbers = [signal.SIGINT, signal.SIGTERM]
+    hang_up = getattr(signal, "SIGHUP", None)
+    if hang_up is not None and signal.getsignal(hang_up) is not signal.SIG_IGN:
+        numbers.append(hang_up)
+    return numbers

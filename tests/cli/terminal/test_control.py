@@ -5,7 +5,7 @@ import sys
 
 import pytest
 
-from holdfast.cli.terminal.keys import KEY_HELP, MARKER_KEYS, STOP_KEY, MarkerKeys
+from holdfast.cli.terminal.control import KEY_HELP, MARKER_KEYS, STOP_KEY, MarkerKeys
 
 
 class Stdin:
