@@ -13,13 +13,10 @@ from holdfast.compiled import compiled_step, inlined
 from holdfast.features.arrays import (
     AFTER_GAP,
     AMPLITUDE,
-    CHANGE,
     FAULT,
     FAULTS,
     FAULTY_TAXELS,
-    FIRST_RELATIVE,
     FIRST_TIME,
-    FIRST_WINDOWED,
     GAP,
     HIGH_LIMIT,
     HISTORY_END,
@@ -29,6 +26,7 @@ from holdfast.features.arrays import (
     MAX_AMPLITUDE,
     MEAN,
     MIN_NOISE,
+    N_CHANNELS,
     N_PULLED,
     N_SEEN,
     N_STEPS,
@@ -43,7 +41,6 @@ from holdfast.features.arrays import (
     SCOPE,
     SIGMA,
     SIGMA_WINDOW,
-    SIGMA_XYZ,
     SQUARED_STEPS,
     TARE,
     TARE_SECONDS,
@@ -74,8 +71,17 @@ from holdfast.features.faults import (
 from holdfast.features.force import sum_taxels
 from holdfast.features.haar import N_SUMS, append_pair, newest_moments, newest_variance
 from holdfast.features.motion import update_motion
+from holdfast.features.specs import FEATURE_KINDS, SCOPES, TRANSFORMS, VALUE_KINDS
 from holdfast.features.tare import update_baseline
 from holdfast.sensors.types import Array, Flags, Integers
+
+# Codes of features: positions in the lists of holdfast.features.specs.
+FIRST_RELATIVE = len(VALUE_KINDS)
+OF_M, OF_SIGMA, OF_SIGMA_XYZ, OF_CHANGE = map(
+    FEATURE_KINDS.index, ("m", "sigma", "sigma_xyz", "change")
+)
+NO_TRANSFORM, LOG = map(TRANSFORMS.index, ("none", "log"))
+OF_HAND = SCOPES.index("hand")
 
 GAP_LIMIT_PERIODS = 3.0003
 """A step in time of more sample periods is a gap. The part over 3 allows for rounding."""
@@ -282,9 +288,10 @@ def _compute_own(layout: Layout, memory: Memory, output: Output, f: int) -> None
         elif counts[f, N_STRETCH] < max(window, 1):
             own[f, place] = math.nan
         else:
-            if window == reported and kind < SIGMA_XYZ:
-                # m or sigma, which are computed already.
-                value = output.values[f, MEAN + kind - FIRST_WINDOWED]
+            if window == reported and kind == OF_M:
+                value = output.values[f, MEAN]  # is computed already
+            elif window == reported and kind == OF_SIGMA:
+                value = output.values[f, SIGMA]
             else:
                 value = _feature(kind, window, history, memory.blocks, counts, layout.n_levels, f)
             noise, floor = levels[f, NOISE], floors[f, place]
@@ -298,7 +305,7 @@ def _fill_features(layout: Layout, memory: Memory, output: Output, f: int) -> fl
     total = 0.0
     for place in range(layout.specs.shape[1]):
         value = own[f, place]
-        if layout.specs[f, place, SCOPE] == 1:
+        if layout.specs[f, place, SCOPE] == OF_HAND:
             for other in range(len(own)):
                 rival = own[other, place]
                 if not layout.alike:
@@ -330,20 +337,24 @@ def _feature_of_other(layout: Layout, memory: Memory, f: int, place: int, other:
 def _feature(
     kind: int, window: int, history: Array, blocks: Array, counts: Integers, n_levels: int, f: int
 ) -> float:
-    if kind < FIRST_WINDOWED:
+    """Return a value of a finger whose stretch is long enough for it."""
+    newest = counts[f, HISTORY_END] - 1
+    if kind < N_CHANNELS:
         # F_a, F_x, F_y or F_z of the newest sample.
-        return float(history[f, kind, counts[f, HISTORY_END] - 1])
-    if kind < SIGMA_XYZ:
-        # m or sigma of F_a: equations 1 and 2.
-        return _moments(blocks, counts, f, 0, window)[kind - FIRST_WINDOWED]
+        return float(history[f, kind, newest])
+    # m or sigma of F_a: equations 1 and 2.
+    if kind == OF_M:
+        return _moments(blocks, counts, f, 0, window)[0]
+    if kind == OF_SIGMA:
+        return _moments(blocks, counts, f, 0, window)[1]
     # change = |F_tip(k) - F_tip(k - N_w + 1)|.
     # sigma_xyz = sqrt(sigma(F_x)^2 + sigma(F_y)^2 + sigma(F_z)^2).
-    total, newest = 0.0, counts[f, HISTORY_END] - 1
+    total = 0.0
     for axis in range(1, 4):
-        if kind == CHANGE:
+        if kind == OF_CHANGE:
             value = history[f, axis, newest] - history[f, axis, newest + 1 - window]
             total += value * value
-        else:
+        elif kind == OF_SIGMA_XYZ:
             row, first = newest - blocks.shape[1], N_SUMS * n_levels * axis
             total += newest_variance(blocks[f], row, first, window)[1]
     return math.sqrt(total)
@@ -361,9 +372,9 @@ def _moments(
 def _transform(value: float, transform: int, window: int, noise: float, floor: float) -> float:
     # none: v. log: log(sqrt(v^2 + floor^2)).
     # noise: log(max(v, sigma_n / 1000) / sigma_n), with sigma_n = `noise_sigma`.
-    if transform == 0:
+    if transform == NO_TRANSFORM:
         return float(value)
-    if transform == 1:
+    if transform == LOG:
         return math.log(math.sqrt(value * value + floor * floor))
     expected = noise_sigma(noise, window)
     return math.log(max(value, 1e-3 * expected) / expected)

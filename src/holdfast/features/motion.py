@@ -14,14 +14,11 @@ from holdfast.features.arrays import (
     BLOCK_START,
     BLOCK_STEPS,
     BLOCK_TAXEL_SQUARES,
-    FORCE_CHANGE,
     LEAST_NOISE,
     LEAST_NORMAL,
     LEAST_TAXEL_NOISE,
     LOAD,
-    LOAD_TO_NOISE,
     MIN_NOISE,
-    MOMENT_CHANGE,
     MOVED_AT,
     N_STRETCH,
     N_UNCHANGED,
@@ -29,11 +26,7 @@ from holdfast.features.arrays import (
     NOISE_NOW,
     PEAK_LOAD,
     PEAK_TAXEL_LOAD,
-    PRESSURE_SHIFT,
     REFERENCE,
-    RESIDUAL,
-    SHEAR_CHANGE,
-    SHEAR_RESIDUAL,
     TAXEL_LOAD,
     TAXEL_NOISE_NOW,
     TRACK_MOMENT,
@@ -41,7 +34,14 @@ from holdfast.features.arrays import (
     Layout,
     Memory,
 )
+from holdfast.features.specs import RELATIVE_KINDS
 from holdfast.sensors.types import Array, Integers
+
+# Rows of Memory.relative.
+(
+    FORCE_CHANGE, SHEAR_CHANGE, RESIDUAL, SHEAR_RESIDUAL,
+    PRESSURE_SHIFT, MOMENT_CHANGE, LOAD_TO_NOISE,
+) = range(len(RELATIVE_KINDS))  # fmt: skip
 
 LOAD_DECAY_SECONDS = 5.0
 """Time constant with which the largest load so far is forgotten [s]."""

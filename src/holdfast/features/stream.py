@@ -25,11 +25,9 @@ from holdfast.features.arrays import (
     MOTION_WIDTH,
     MOVED_AT,
     N_CHANNELS,
-    N_RELATIVE,
     N_TARED,
     NOISE,
     REASON,
-    SIGMA_XYZ,
     STATUS_WIDTH,
     TARE,
     TARE_FIRST,
@@ -45,7 +43,13 @@ from holdfast.features.arrays import (
     Output,
 )
 from holdfast.features.haar import N_SUMS, n_levels
-from holdfast.features.specs import FeatureSpec, spec_codes
+from holdfast.features.specs import (
+    FEATURE_KINDS,
+    OF_COMPONENTS,
+    RELATIVE_KINDS,
+    FeatureSpec,
+    spec_codes,
+)
 from holdfast.features.tare import Tare, baseline_of
 from holdfast.recordings import Recording
 from holdfast.sensors import Sensor
@@ -336,7 +340,8 @@ def _memory(layout: Layout) -> Memory:
     motion[:, [LEAST_NOISE, LEAST_TAXEL_NOISE]] = np.inf
     motion[:, BLOCK_START] = np.nan
     motion[:, MOVED_AT] = -np.inf
-    n_channels = N_CHANNELS if (layout.specs[:, :, KIND] == SIGMA_XYZ).any() else 1
+    of_components = [FEATURE_KINDS.index(kind) for kind in OF_COMPONENTS]
+    n_channels = N_CHANNELS if np.isin(layout.specs[:, :, KIND], of_components).any() else 1
     taxels = np.zeros((n_taxels, TAXELS_WIDTH))
     taxels[layout.ignored, CHANGED_AT] = np.inf  # never long ago
     return Memory(
@@ -351,7 +356,7 @@ def _memory(layout: Layout) -> Memory:
         reference=np.zeros((n_taxels, 3)),
         track=np.zeros((n_fingers, TRACK_WIDTH, length)),
         motion=motion,
-        relative=np.full((n_fingers, N_RELATIVE, len(layout.lags)), np.nan),
+        relative=np.full((n_fingers, len(RELATIVE_KINDS), len(layout.lags)), np.nan),
         blocks=np.zeros((n_fingers, longest, n_channels * layout.n_levels * N_SUMS)),
     )
 
