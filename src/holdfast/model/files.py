@@ -22,8 +22,8 @@ if TYPE_CHECKING:
 ModelT = TypeVar("ModelT", bound="Model")
 Fingers = Mapping[str, FingerModel]
 
-SCHEMA = "holdfast.model/1"
-MAX_FILE_SIZE = 1 << 24
+MODEL_SCHEMA = "holdfast.model/1"
+MAX_MODEL_SIZE = 1 << 24
 """Maximum size of a model file; one of all 18 modules of a hand has 2 MB [bytes]."""
 ONNX_NAME = re.compile(r'"([0-9a-f]{16}\.onnx)"')
 """Name of an ONNX file in a model file, by the digest of its content."""
@@ -36,7 +36,7 @@ def read_model(path: str | Path, kind: type[ModelT]) -> ModelT:
         ModelError: a file cannot be read or is no model, see `Model.load`.
     """
     try:
-        data = read_input(path, MAX_FILE_SIZE)
+        data = read_input(path, MAX_MODEL_SIZE)
     except OSError as cause:
         raise ModelError(f"cannot read the model {path}: {cause.strerror}") from cause
     try:
@@ -48,7 +48,7 @@ def read_model(path: str | Path, kind: type[ModelT]) -> ModelT:
         folder = Path(path).parent
         return _with_contents(model, lambda classifier: _read_onnx(folder / classifier.file))
     except (ModelError, TypeError, ValueError, ArithmeticError, RecursionError) as cause:
-        raise ModelError(f"{path} is not a model of {SCHEMA}: {cause}") from cause
+        raise ModelError(f"{path} is not a model of {MODEL_SCHEMA}: {cause}") from cause
 
 
 def write_model(path: str | Path, model: "Model", *, force: bool) -> None:
@@ -126,7 +126,7 @@ def _read_onnx(path: Path) -> bytes:
 def _onnx_names(path: Path) -> set[str]:
     """Return the names of ONNX files in a model file; none if it cannot be read."""
     try:
-        return set(ONNX_NAME.findall(read_input(path, MAX_FILE_SIZE).decode(errors="replace")))
+        return set(ONNX_NAME.findall(read_input(path, MAX_MODEL_SIZE).decode(errors="replace")))
     except OSError:
         return set()
 

@@ -6,8 +6,8 @@ from typing import NamedTuple
 import numpy as np
 
 from holdfast.classifiers import LinearClassifier, Parameters, Samples
-from holdfast.classifiers.adapted import CALIBRATION, NONE, WEIGHTS, Adapted
 from holdfast.classifiers.folds import group_folds, time_folds
+from holdfast.classifiers.logreg import CALIBRATION, NONE, WEIGHTS, Adapted
 from holdfast.sensors.types import Array, Flags, Integers
 from holdfast.training.splits import TIME_FOLDS, TIME_GAP
 from holdfast.training.training_samples import FingerSamples, thinning_step
