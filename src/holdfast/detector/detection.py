@@ -2,8 +2,7 @@
 
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
-from functools import cache
-from typing import NamedTuple
+from typing import NamedTuple, TypeVar
 
 import numpy as np
 import numpy.typing as npt
@@ -25,37 +24,48 @@ from holdfast.detector.arrays import (
     REPORT_SIGMA,
 )
 from holdfast.detector.decision_rule import TraceRows, estimate_code, split_code
-from holdfast.sensors.types import Array
+from holdfast.sensors.types import Array, Integers
 
 STATE_BY_CODE = tuple(ContactState)
 REASON_BY_CODE = tuple(Reason)
 CAUSE_BY_CODE: tuple[Cause | None, ...] = (None, *ALL_CAUSES)
 
 
-@cache
-def _decision(code: float) -> tuple[ContactState, Reason, tuple[Fault, ...], Cause | None]:
-    """Return state, reason, faults and cause of a code that the kernel reports."""
-    state, reason, faults, cause = split_code(int(code))
-    return STATE_BY_CODE[state], REASON_BY_CODE[reason], faults_of(faults), CAUSE_BY_CODE[cause]
+Decision = tuple[ContactState, Reason, tuple[Fault, ...], Cause | None]
+
+
+class Decisions(dict[float, Decision]):
+    """State, reason, faults and cause by the code that the kernel reports, of the codes so far."""
+
+    def __missing__(self, code: float) -> Decision:
+        state, reason, faults, cause = split_code(int(code))
+        self[code] = (
+            STATE_BY_CODE[state], REASON_BY_CODE[reason], faults_of(faults), CAUSE_BY_CODE[cause]
+        )  # fmt: skip
+        return self[code]
+
+
+_DECISIONS = Decisions()
+Name = TypeVar("Name", str, int)
 
 
 def estimates_of(
-    report: Iterable[Sequence[float]], taxel_masks: npt.NDArray[np.int64]
-) -> list[ContactEstimate]:
+    names: Iterable[Name], report: Iterable[Sequence[float]], taxel_masks: Integers
+) -> dict[Name, ContactEstimate]:
     """Return the estimates of rows of a report, see `decision_rule.fill_report`.
 
     Args:
+        names: of the rows: fingers, or numbers of samples.
         report: rows of `REPORT_WIDTH` numbers.
         taxel_masks: bits of the faulty taxels of each row.
     """
-    estimates = []
-    for place, (time, code, probability, sigma, x, y, z) in enumerate(report):
-        state, reason, faults, cause = _decision(code)
-        taxels = taxels_of(int(taxel_masks[place])) if faults else ()
-        estimates.append(
-            ContactEstimate(
-                time, state, reason, probability, sigma, (x, y, z), faults, taxels, cause
-            )
+    estimates: dict[Name, ContactEstimate] = {}
+    known = _DECISIONS
+    for name, (time, code, probability, sigma, x, y, z) in zip(names, report, strict=False):
+        state, reason, faults, cause = known[code]
+        taxels = taxels_of(int(taxel_masks[len(estimates)])) if faults else ()
+        estimates[name] = ContactEstimate(
+            time, state, reason, probability, sigma, (x, y, z), faults, taxels, cause
         )
     return estimates
 
@@ -82,7 +92,7 @@ class FingerTrace(NamedTuple):
     instability: Array
     force: Array
     faults: npt.NDArray[np.int16]
-    faulty_taxels: npt.NDArray[np.int64]
+    faulty_taxels: Integers
     cause: npt.NDArray[np.int8]
 
     def __len__(self) -> int:
@@ -99,7 +109,8 @@ class FingerTrace(NamedTuple):
         columns = (self.times, self.stable_probability, self.instability, *self.force.T)
         times, *numbers = (column[rows] for column in columns)
         report = np.column_stack([times, codes, *numbers]).tolist()
-        return estimates_of(report, self.faulty_taxels[rows])
+        numbered = estimates_of(range(len(report)), report, self.faulty_taxels[rows])
+        return list(numbered.values())
 
 
 @dataclass(frozen=True)
@@ -144,7 +155,7 @@ def detection_of(
     return Detection(name, found, times, rows.hand)
 
 
-def _trace_of(times: Array, report: Array, taxels: npt.NDArray[np.int64]) -> FingerTrace:
+def _trace_of(times: Array, report: Array, taxels: Integers) -> FingerTrace:
     state, reason, faults, cause = split_code(report[:, REPORT_CODE].astype(np.int64))
     return FingerTrace(
         times,

@@ -318,11 +318,10 @@ class Detector:
 
     def _estimate(self, time: float, code: int) -> HandEstimate:
         """Return the estimate that the kernel reported, and note its changes of state."""
-        estimates = estimates_of(self._read_report(), self._taxel_masks)
-        fingers = dict(zip(self._slots, estimates, strict=False))
+        fingers = estimates_of(self._slots, self._read_report(), self._taxel_masks)
         hand = STATE_BY_CODE[code % CHANGED]
         if code >= CHANGED:
-            states = (*[finger.state for finger in estimates], hand)
+            states = (*[finger.state for finger in fingers.values()], hand)
             self._transitions.append((time, self._states, states))
             self._states = states
         return HandEstimate(time, hand, fingers)
