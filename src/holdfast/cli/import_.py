@@ -111,10 +111,9 @@ def import_(
 ) -> None:
     r"""Import recordings from other formats.
 
-    Formats: uskin-pick-move, xela-log, gtac, anyskin-slip, arq-crisp, rosbag, csv (see
-    docs/formats.md), and recordings of holdfast itself. From an .mcap file that was cut off,
-    everything up to the cut is recovered. Write OUT/NAME.parquet for each recording. If one of
-    them fails, none is written.
+    Formats: those of docs/formats.md, and recordings of holdfast itself. From an .mcap file that
+    was cut off, everything up to the cut is recovered. Write OUT/NAME.parquet for each recording.
+    If one of them fails, none is written.
 
     A CSV file of any other logger needs its sensor. Its columns are guessed from the header; the
     guess is shown first, as the text of --columns, which corrects it

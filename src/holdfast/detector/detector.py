@@ -17,30 +17,23 @@ from numpy import ndarray
 
 from holdfast.classifiers import LinearClassifier
 from holdfast.contact import (
-    ContactEstimate,
     ContactEvent,
     ContactState,
     HandEstimate,
     StateChanges,
-    taxels_of,
 )
 from holdfast.detector.address_table import table_of
-from holdfast.detector.arrays import REPORT_WIDTH, THRESHOLD
-from holdfast.detector.decision_rule import TraceRows, new_decision_memory, rule_of, run
-from holdfast.detector.detection import (
-    STATES,
-    Decision,
-    Detection,
-    decision_of,
-    detection_of,
+from holdfast.detector.arrays import REPORT_CODE, REPORT_WIDTH, THRESHOLD
+from holdfast.detector.decision_rule import (
+    ProbabilityFeeder,
+    TraceRows,
+    new_decision_memory,
+    rule_of,
+    run,
+    split_code,
 )
-from holdfast.detector.fast_step import (
-    CHANGED,
-    UNREADABLE,
-    StepArrays,
-    compiled_fast_step,
-)
-from holdfast.detector.probabilities import ProbabilityFeeder
+from holdfast.detector.detection import STATE_BY_CODE, Detection, detection_of, estimates_of
+from holdfast.detector.fast_step import CHANGED, UNREADABLE, StepArrays, compiled_fast_step
 from holdfast.detector.sample_arrays import KNOWN_TYPES
 from holdfast.errors import ModelError, StreamError
 from holdfast.features.arrays import TAXELS
@@ -140,7 +133,6 @@ class Detector:
         }
         self._take = itemgetter(*stream.plan.fingers)  # a tuple, unless the finger is single
         self._step = compiled_fast_step()
-        self._decisions: dict[float, Decision] = {}  # of the codes so far
         self._use(stream)
 
     def _use(self, stream: FeatureStream) -> None:
@@ -157,7 +149,7 @@ class Detector:
             self._readings, self._present, self._report, KNOWN_TYPES,
         )  # fmt: skip
         self._table, self._arrays = table_of(arrays)
-        self._status = stream.output.status
+        self._taxel_masks = stream.output.status[:, TAXELS]
         self._changes = StateChanges(self._names)
         self._states: States = tuple(self._changes.states)
         self._transitions: deque[tuple[float, States, States]] = deque(maxlen=MAX_EVENTS)
@@ -263,7 +255,8 @@ class Detector:
         for times, present, readings in stream.samples_of(recording):
             rows = TraceRows.empty(len(times), present.shape[1])
             self._run_chunk(readings, present, times, rows)
-            codes = np.column_stack([rows.state, rows.hand])
+            states, *_ = split_code(rows.report[:, :, REPORT_CODE].astype(np.int64))
+            codes = np.column_stack([states, rows.hand])
             self._events += self._changes.update_chunk(times, codes)
             self._last_time = float(times[-1])
             chunks.append((times, present, rows))
@@ -325,16 +318,8 @@ class Detector:
 
     def _estimate(self, time: float, code: int) -> HandEstimate:
         """Return the estimate that the kernel reported, and note its changes of state."""
-        fingers, known = {}, self._decisions
-        for name, (at, number, probability, sigma, x, y, z) in zip(
-            self._slots, self._read_report(), strict=False
-        ):
-            state, reason, faults, cause = known.get(number) or self._decode(number)
-            taxels = self._faulty_taxels(name) if faults else ()
-            fingers[name] = ContactEstimate(
-                at, state, reason, probability, sigma, (x, y, z), faults, taxels, cause
-            )
-        hand = STATES[code % CHANGED]
+        fingers = estimates_of(self._slots, self._read_report(), self._taxel_masks)
+        hand = STATE_BY_CODE[code % CHANGED]
         if code >= CHANGED:
             states = (*[finger.state for finger in fingers.values()], hand)
             self._transitions.append((time, self._states, states))
@@ -347,13 +332,6 @@ class Detector:
             self._changes.states = list(before)
             self._events += self._changes.update(after, time)
         self._transitions.clear()
-
-    def _decode(self, number: float) -> Decision:
-        self._decisions[number] = decision_of(number)
-        return self._decisions[number]
-
-    def _faulty_taxels(self, finger: str) -> tuple[int, ...]:
-        return taxels_of(int(self._status[self._slots[finger][0], TAXELS]))
 
 
 def detect(model: Model, recording: Recording) -> Detection:

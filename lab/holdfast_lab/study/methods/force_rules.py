@@ -4,8 +4,9 @@ from collections.abc import Mapping
 
 import numpy as np
 
-from holdfast.classifiers import Threshold, recipe
+from holdfast.classifiers import recipe
 from holdfast.sensors.types import Array
+from holdfast_lab.classifiers.threshold import Threshold
 from holdfast_lab.study.methods.method import FingerSignal, HandSignal, Method, stretchwise
 
 FRICTION_SOURCE = (

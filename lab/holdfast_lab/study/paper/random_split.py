@@ -12,7 +12,7 @@ import msgspec
 import numpy as np
 import numpy.typing as npt
 
-from holdfast.classifiers import RECIPES, Classifier, Parameters, Recipe, Samples, Threshold
+from holdfast.classifiers import RECIPES, Classifier, Parameters, Recipe, Samples
 from holdfast.metrics import bootstrap_interval, ratio_of_sums
 from holdfast.metrics.statistics import Interval, percent
 from holdfast.sensors.types import Integers
@@ -20,6 +20,7 @@ from holdfast.training.setting import SEARCH_SAMPLES
 from holdfast.training.splits import inner_folds
 from holdfast.training.training_samples import thin, thinning_step
 from holdfast.training.tuning import search
+from holdfast_lab.classifiers.threshold import Threshold
 from holdfast_lab.report.result_tables import Row
 from holdfast_lab.study.paper.pooled_samples import UNTREATED, SamplePool, Treatment, pool_samples
 from holdfast_lab.study.plan import Corpus

@@ -6,8 +6,8 @@ from hypothesis import strategies as st
 
 from holdfast.classifiers import LinearClassifier, Samples
 from holdfast.classifiers.logreg import LogisticRegression
-from holdfast.classifiers.threshold import best_cut
 from holdfast.features import DEPLOYED_FEATURES
+from holdfast_lab.classifiers.threshold import best_cut
 from holdfast_lab.study.paper.pooled_samples import pool_samples
 from holdfast_lab.study.paper.random_split import (
     CONFUSION_RATES,

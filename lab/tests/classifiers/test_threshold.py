@@ -5,9 +5,9 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 
-from holdfast.classifiers import Samples, Threshold
-from holdfast.classifiers.threshold import best_cut
+from holdfast.classifiers import Samples
 from holdfast.errors import TrainingError
+from holdfast_lab.classifiers.threshold import Threshold, best_cut
 
 pytestmark = pytest.mark.slow
 
