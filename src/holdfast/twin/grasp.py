@@ -14,7 +14,7 @@ from scipy.optimize import least_squares
 
 from holdfast.compiled import compiled
 from holdfast.sensors.types import Array
-from holdfast.twin.hand import FINGERS, JOINTS, MIRRORED, MOUNTS, N_JOINTS, HandModel
+from holdfast.twin.hand import FINGERS, JOINTS, MOUNTS, N_JOINTS, HandModel
 from holdfast.twin.mujoco_import import mujoco
 from holdfast.twin.objects import GraspObject, distance_to
 
@@ -62,15 +62,11 @@ class ClosingPath(NamedTuple):
         return wanted
 
 
-def closing_path(item: GraspObject, side: str = "right") -> ClosingPath:
-    """Compute the path on which a hand closes around an object.
-
-    Args:
-        item: the object.
-        side: "right", or "left", whose path is the mirror image of the right hand's.
+def closing_path(item: GraspObject) -> ClosingPath:
+    """Compute the path on which the hand closes around an object.
 
     Raises:
-        ValueError: a pad cannot reach the object, or the side is neither of the two.
+        ValueError: a pad cannot reach the object.
 
     Example:
         >>> from holdfast.twin.objects import object_named
@@ -78,8 +74,6 @@ def closing_path(item: GraspObject, side: str = "right") -> ClosingPath:
         >>> bool(path.misses.max() < 0.002)  # [m]
         True
     """
-    if side not in ("right", "left"):
-        raise ValueError(f"side 'right' or 'left' expected, {side!r} given")
     hand = HandModel.build(item)
     touch = int(np.abs(PATH_GAPS).argmin())
     joints = np.empty((len(FINGERS), len(PATH_GAPS), 4))
@@ -91,19 +85,16 @@ def closing_path(item: GraspObject, side: str = "right") -> ClosingPath:
         misses[place] = np.linalg.norm(pad - points[touch])
         cosines[place] = normal @ push
     _check(item, misses, cosines)
-    if side == "left":
-        joints *= MIRRORED.reshape(4, 1, 4)[[3, 0, 1, 2]]
     return ClosingPath(PATH_GAPS, joints, misses, cosines)
 
 
-def object_pose(item: GraspObject, side: str = "right") -> tuple[Array, float]:
+def object_pose(item: GraspObject) -> tuple[Array, float]:
     """Return position in the world [m] and turn about z [rad] of the object before the grasp.
 
     The position is that of its centre of mass; its middle is at `MIDDLE_PLACE`.
     """
-    mirror = 1.0 if side == "right" else -1.0
     x, y, z = MIDDLE_PLACE
-    return np.array([x, -mirror * z, y - _middle(item)]), mirror * item.yaw
+    return np.array([x, -z, y - _middle(item)]), item.yaw
 
 
 _FIRST = np.array([JOINTS[finger] for finger in FINGERS])

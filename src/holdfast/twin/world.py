@@ -83,7 +83,6 @@ class World(ContactWorld):
         tremors: (2, 3, n, 3) tremor of the hand that holds, and of the hand or finger that
             disturbs.
         start: (4,) offset of the object's position [m] and turn [rad] at the start.
-        side: "right" or "left" hand.
     """
 
     def __init__(
@@ -94,7 +93,6 @@ class World(ContactWorld):
         controller: Controller,
         tremors: Array,
         start: Array,
-        side: str = "right",
     ) -> None:
         super().__init__(hand, item, curved_fingertip())
         self.path, self.controller, self.tremors = path, controller, tremors
@@ -106,7 +104,7 @@ class World(ContactWorld):
         self._origin = np.zeros(12)
         self._disturbance = -1
         self._tick = 0
-        self._place(start, side)
+        self._place(start)
 
     def set_load(self, load: LoadState) -> None:
         """Set force, friction and acceleration of the hand until they are set again.
@@ -155,8 +153,8 @@ class World(ContactWorld):
             command.elapsed, self._pull,
         )  # fmt: skip
 
-    def _place(self, start: Array, side: str) -> None:
-        place, turn = object_pose(self.item, side)
+    def _place(self, start: Array) -> None:
+        place, turn = object_pose(self.item)
         model, data = self.hand.model, self.hand.data
         mujoco.mj_resetData(model, data)
         data.qpos[:N_JOINTS] = self.path.targets(np.full(len(FINGERS), OPEN_GAP))
