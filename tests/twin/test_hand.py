@@ -3,7 +3,6 @@
 import numpy as np
 import pytest
 
-from holdfast.twin.contact import N_BODY
 from holdfast.twin.hand import (
     FINGERS,
     JOINTS,
@@ -12,6 +11,8 @@ from holdfast.twin.hand import (
     TIMESTEP,
     TIP_MASS,
     HandModel,
+    apply_forces,
+    fill_bodies,
     hand_xml,
 )
 from holdfast.twin.mujoco_import import mujoco
@@ -41,8 +42,8 @@ def moving(hand, seed=0):
     hand.data.qpos[N_JOINTS:] = [0.1, -0.05, 0.2, *rotation(draw)]
     hand.data.qvel[:] = draw.normal(size=hand.model.nv)
     mujoco.mj_forward(hand.model, hand.data)
-    bodies = np.full((5, N_BODY), np.nan)
-    hand.bodies(bodies)
+    bodies = np.full((5, 18), np.nan)
+    fill_bodies(hand.arrays, bodies)
     return bodies
 
 
@@ -121,7 +122,7 @@ def test_velocities_are_the_rates_of_places(hand):
     after, step = np.zeros_like(before), 1e-6
     mujoco.mj_integratePos(hand.model, hand.data.qpos, hand.data.qvel, step)
     mujoco.mj_kinematics(hand.model, hand.data)
-    hand.bodies(after)
+    fill_bodies(hand.arrays, after)
     np.testing.assert_allclose((after - before)[:, :3] / step, before[:, 12:15], atol=1e-5)
 
 
@@ -138,7 +139,7 @@ def test_applied_forces_do_what_mujoco_computes(hand):
     bodies = moving(hand)
     draw = np.random.default_rng(2)
     tips, item = draw.normal(size=(4, 6)), draw.normal(size=6)
-    hand.apply(tips, item, bodies)
+    apply_forces(hand.arrays, tips, item, bodies)
     expected = np.zeros(hand.model.nv)
     for body, wrench, row in zip(
         [*hand.tips, hand.object_body], [*tips, item], bodies, strict=True

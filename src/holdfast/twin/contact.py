@@ -39,10 +39,6 @@ from holdfast.twin.vectors import (
     subtract,
 )
 
-N_BODY = 18
-"""Numbers of a body in the world frame: position [m], rotation matrix (9, by rows), velocity of
-its origin [m/s] and angular velocity [rad/s]."""
-
 # Columns of Contact.tips.
 FX, FY, FZ, TX, TY, TZ = range(6)  # force [N] and torque [N m] on the fingertip, world frame
 SLIP, SLIPPING_SHARE, LOAD = 6, 7, 8  # slip speed [m/s], slipping share of the load, load [N]
@@ -95,24 +91,9 @@ class Contact(NamedTuple):
         return self.tips[:, FX : FZ + 1]
 
     @property
-    def tip_torque(self) -> Array:
-        """Torques about the origins of the fingertip frames, (n_tips, 3), world frame [N m]."""
-        return self.tips[:, TX : TZ + 1]
-
-    @property
     def contact_force(self) -> Array:
         """Force of each finger on the object in the world frame, (n_tips, 3) [N]."""
         return -self.tip_force
-
-    @property
-    def object_force(self) -> Array:
-        """Force of all fingers on the object in the world frame, (3,) [N]."""
-        return self.wrench[:3]
-
-    @property
-    def object_torque(self) -> Array:
-        """Torque of all fingers about the object's centre of mass, (3,), world frame [N m]."""
-        return self.wrench[3:]
 
     @property
     def slip_speed(self) -> Array:

@@ -163,26 +163,14 @@ class HandModel:
             self.model.body_rootid, self.tips, self.mounts, self.object_body,
         )  # fmt: skip
 
-    def bodies(self, out: Array) -> None:
-        """Write pose and motion of the fingertip frames and the object in the world, (5, 18)."""
-        fill_bodies(self.arrays, out)
-
-    def apply(self, tips: Array, object_wrench: Array, bodies: Array) -> None:
-        """Apply force and torque on fingertips and object in MuJoCo.
-
-        Args:
-            tips: (4, 6 or more) force [N] and torque about the frame's origin [N m] on the
-                fingertips in the world frame.
-            object_wrench: (6,) force [N] and torque about the centre of mass [N m] on the object
-                in the world frame.
-            bodies: poses as `bodies` writes them.
-        """
-        apply_forces(self.arrays, tips, object_wrench, bodies)
-
 
 @compiled
 def fill_bodies(hand: HandArrays, out: Array) -> None:
-    """Write the rows of `HandModel.bodies`."""
+    """Write pose and motion of the fingertip frames and the object in the world, (5, 18).
+
+    A row has position [m], rotation matrix (9, by rows), velocity of its origin [m/s] and angular
+    velocity [rad/s].
+    """
     for i in range(len(hand.tips)):
         b = hand.tips[i]
         for r in range(3):
@@ -213,7 +201,16 @@ def _fill_motion(cvel: Array, com: Array, row: Array) -> None:
 
 @compiled
 def apply_forces(hand: HandArrays, tips: Array, object_wrench: Array, bodies: Array) -> None:
-    """Write MuJoCo's forces on bodies, see `HandModel.apply`."""
+    """Apply force and torque on fingertips and object in MuJoCo.
+
+    Args:
+        hand: arrays of MuJoCo's state.
+        tips: (4, 6 or more) force [N] and torque about the frame's origin [N m] on the
+            fingertips in the world frame.
+        object_wrench: (6,) force [N] and torque about the centre of mass [N m] on the object in
+            the world frame.
+        bodies: poses as `fill_bodies` writes them.
+    """
     out = hand.xfrc_applied
     for i in range(len(hand.tips)):
         b = hand.tips[i]

@@ -3,14 +3,21 @@
 import numpy as np
 
 from holdfast.sensors.types import Array
-from holdfast.twin.contact import LOAD, constants_of, new_contact
-from holdfast.twin.control import STEPS_PER_CONTROL, Controller
+from holdfast.twin.contact import constants_of, new_contact
+from holdfast.twin.control import Controller
 from holdfast.twin.grasp import ClosingPath, object_pose
-from holdfast.twin.hand import FINGERS, GRAVITY, N_JOINTS, SUBSTEPS, TIMESTEP, HandModel
+from holdfast.twin.hand import (
+    FINGERS,
+    GRAVITY,
+    N_JOINTS,
+    SUBSTEPS,
+    HandModel,
+    fill_bodies,
+)
 from holdfast.twin.loads import LoadState
 from holdfast.twin.mujoco_import import mujoco
 from holdfast.twin.objects import GraspObject
-from holdfast.twin.physics import Action, Steps, Wrenches, advance_of
+from holdfast.twin.physics import Action, Physics, Wrenches, advance_of
 from holdfast.twin.protocol import OPEN_GAP, Command, Plan
 from holdfast.twin.shapes import MU_KINETIC, MU_STATIC
 from holdfast.twin.skin import Skin
@@ -54,7 +61,7 @@ class ContactWorld:
     @property
     def loads(self) -> Array:
         """Load of each fingertip, (n_fingers,) [N]."""
-        return self.contact.tips[:, LOAD]
+        return self.contact.load
 
     @property
     def slip(self) -> float:
@@ -97,8 +104,10 @@ class World(ContactWorld):
         super().__init__(hand, item, curved_fingertip())
         self.path, self.controller, self.tremors = path, controller, tremors
         self._advance = advance_of(hand)
-        self._steps = Steps(SUBSTEPS, TIMESTEP, STEPS_PER_CONTROL)
-        self._wrenches = Wrenches(self.outside, np.zeros(6))
+        self._physics = Physics(
+            hand.arrays, self.contact, self.constants, controller, self.bodies,
+            Wrenches(self.outside, np.zeros(6)),
+        )  # fmt: skip
         self._pull = np.zeros(3)
         self._parameters = np.zeros(9)
         self._origin = np.zeros(12)
@@ -130,11 +139,9 @@ class World(ContactWorld):
         if displacement is not None:
             target = target + displacement
         self.set_point_error = self._advance(
-            self._steps, self.hand.arrays, self.contact, self.constants,
-            self.controller, self._tick, target, self._action(command, plan, anchor),
-            self.bodies, self._wrenches,
-        )  # fmt: skip
-        self._tick += self._steps.n
+            self._physics, self._tick, target, self._action(command, plan, anchor)
+        )
+        self._tick += SUBSTEPS
         if self.bodies[-1, 2] < MIN_HEIGHT:
             self._freeze()
 
@@ -162,7 +169,7 @@ class World(ContactWorld):
         half = 0.5 * (turn + start[3])
         data.qpos[N_JOINTS + 3 :] = (np.cos(half), 0.0, 0.0, np.sin(half))
         mujoco.mj_forward(model, data)
-        self.hand.bodies(self.bodies)
+        fill_bodies(self.hand.arrays, self.bodies)
 
     def _freeze(self) -> None:
         self.hand.data.qvel[N_JOINTS:] = 0.0

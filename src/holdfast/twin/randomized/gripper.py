@@ -12,7 +12,7 @@ import numpy as np
 from holdfast.compiled import compiled
 from holdfast.sensors.types import Array
 from holdfast.twin.contact import touch
-from holdfast.twin.hand import HandModel, object_xml
+from holdfast.twin.hand import HandModel, apply_forces, fill_bodies, object_xml
 from holdfast.twin.mujoco_import import mujoco
 from holdfast.twin.objects import GraspObject, distance_to
 from holdfast.twin.protocol import OPEN_GAP
@@ -231,7 +231,7 @@ class GripperWorld(ContactWorld):
         self._jump_until = -1.0
         self.time = 0.0
         mujoco.mj_forward(self.hand.model, self.hand.data)
-        self.hand.bodies(self.bodies)
+        fill_bodies(self.hand.arrays, self.bodies)
 
     @property
     def unstable(self) -> bool:
@@ -259,7 +259,7 @@ class GripperWorld(ContactWorld):
             at = palm.at(row + k * self.timestep)
             model.opt.gravity[:] = palm.gravity[at]
             mujoco.mj_step1(model, data)
-            self.hand.bodies(self.bodies)
+            fill_bodies(self.hand.arrays, self.bodies)
             touch(self.contact, self.constants, self.bodies, self.timestep)
             operator.fill(self.bodies[-1], self.outside, k * self.timestep)
             self._limit_torque()
@@ -267,7 +267,7 @@ class GripperWorld(ContactWorld):
                 self.contact.wrench, self.outside, self.bodies[-1], self.item.inertia,
                 self.item.mass, palm.spin[at], palm.turn[at], self._wrench,
             )  # fmt: skip
-            self.hand.apply(self.contact.tips, self._wrench, self.bodies)
+            apply_forces(self.hand.arrays, self.contact.tips, self._wrench, self.bodies)
             _drive(
                 data.qpos, data.qvel, travels, self._jump, noise, self.drives.stiffness,
                 self.drives.damping, data.qfrc_applied,
