@@ -8,7 +8,7 @@ and of 1 s that begins 0.5 s after it.
     python benchmarks/grip_position.py [--scales 1.5 2 3] [--n 6] [--seed 3] [--gain 1]
 
 `--gain` multiplies the change of the scale: 1.8 is what the twin's own hand needs
-(`holdfast.twin.gripping.SERIES_GAIN`).
+(`holdfast.twin.grasp.SERIES_GAIN`).
 """
 
 import argparse

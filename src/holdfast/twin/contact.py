@@ -20,24 +20,22 @@ from holdfast.twin.skin import (
     N_BRISTLE,
     SLIDING,
     SLIPPING,
-    Skin,
-    friction,
-    memory_after,
-    pressure,
-    tangential,
-)
-from holdfast.twin.surface import Surface
-from holdfast.twin.vectors import (
     Nine,
+    Skin,
     Three,
     add,
     apply,
     apply_transposed,
     cross,
     dot,
+    friction,
+    memory_after,
+    pressure,
     scaled,
     subtract,
+    tangential,
 )
+from holdfast.twin.surface import Surface
 
 # Columns of Contact.tips.
 FX, FY, FZ, TX, TY, TZ = range(6)  # force [N] and torque [N m] on the fingertip, world frame

@@ -8,8 +8,7 @@ import numpy as np
 
 from holdfast.errors import HoldfastError
 from holdfast.io.label_files import labels_path, load_labels
-from holdfast.labelling.rules.forces import hand_force
-from holdfast.labelling.rules.start import evidence_of_contact
+from holdfast.labelling.rules.forces import evidence_of_contact, hand_force
 from holdfast.labelling.server.workspace import summary_of
 from holdfast.metrics.masks import runs
 from holdfast.model import RELATIVE_RATES

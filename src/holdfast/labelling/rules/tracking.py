@@ -36,6 +36,7 @@ from holdfast.labelling.rules.forces import (
     HandForce,
     centre_of_pressure,
     final_drop,
+    fitting_tare,
     hand_force,
 )
 from holdfast.labelling.rules.motion import (
@@ -47,7 +48,6 @@ from holdfast.labelling.rules.motion import (
     relative_track,
 )
 from holdfast.labelling.rules.poses import Poses, PoseTrack, poses_of, tip_tracks_of
-from holdfast.labelling.rules.start import fitting_tare
 from holdfast.metrics.masks import (
     Mask,
     drop_short_runs,

@@ -9,18 +9,16 @@ import msgspec
 from aiohttp import web
 
 from holdfast.errors import HoldfastError, OutputError
-from holdfast.labelling.server.api import (
-    describe_recording,
-    doubtful_labels,
-    labels_data,
-    list_recordings,
-)
-from holdfast.labelling.server.schema import (
+from holdfast.labelling.server.documents import (
     ChangePoints,
     ProposeReply,
     ProposeRequest,
     SaveReply,
     SaveRequest,
+    describe_recording,
+    doubtful_labels,
+    labels_data,
+    list_recordings,
 )
 from holdfast.labelling.server.signals import DEFAULT_POINTS
 from holdfast.labelling.server.store import ConflictError, ReadOnlyError, parse_labels

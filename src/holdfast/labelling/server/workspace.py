@@ -17,8 +17,8 @@ from holdfast.io import load_recording
 from holdfast.io.header import Header
 from holdfast.io.safe_reading import recording_errors
 from holdfast.labelling.rules import propose
+from holdfast.labelling.rules.forces import fitting_tare
 from holdfast.labelling.rules.poses import Poses, poses_of
-from holdfast.labelling.rules.start import fitting_tare
 from holdfast.labelling.server.long_recordings import (
     load_for_labelling,
     read_header,

@@ -15,7 +15,7 @@ from holdfast.twin.randomized.gripper import Drives, PadLayout, flat_patch, pad_
 from holdfast.twin.randomized.palm import log_uniform, uniform
 from holdfast.twin.skin import Skin
 from holdfast.twin.surface import curved_fingertip
-from holdfast.twin.uskin.parameters import Three, UskinParameters
+from holdfast.twin.uskin_readout import Three, UskinParameters
 
 PAD = (0.0261, 0.0, 0.016)
 """The middle of a curved fingertip's pad, in the fingertip frame [m]."""

@@ -30,8 +30,8 @@ from holdfast.twin.randomized.gripper import GripperWorld, OperatorForce
 from holdfast.twin.randomized.palm import log_uniform, palm_motion, uniform
 from holdfast.twin.randomized.scenario import Scenario, draw_events
 from holdfast.twin.simulation import generator_of
-from holdfast.twin.truth_log import TruthLog
-from holdfast.twin.uskin.fingertip import Uskin, with_server_effects
+from holdfast.twin.uskin import Uskin, with_server_effects
+from holdfast.twin.world import TruthLog
 
 MAX_TRIES = 12
 """Draws of an object and a place of the pads until the pads reach it."""
