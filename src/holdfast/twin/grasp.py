@@ -42,7 +42,7 @@ JOINT_MARGIN = 0.03
 """Minimum distance of joints from their limits [rad]."""
 N_SETTLE_SOLUTIONS = 20
 """Repeated solutions of the first point, each from the last, until it has converged."""
-MAX_MISS, MIN_COSINE = 0.005, 0.8
+MAX_MISS, MIN_PAD_COSINE = 0.005, 0.8
 """Maximum position error [m] and minimum cosine of the angle error of a pad that grasps."""
 
 
@@ -178,8 +178,8 @@ def _pad(hand: HandModel, place: int, joints: Array) -> tuple[Array, Array]:
 
 
 def _check(item: GraspObject, misses: Array, cosines: Array) -> None:
-    worst = int(np.argmax(np.maximum(misses / MAX_MISS, (1 - cosines) / (1 - MIN_COSINE))))
-    if misses[worst] > MAX_MISS or cosines[worst] < MIN_COSINE:
+    worst = int(np.argmax(np.maximum(misses / MAX_MISS, (1 - cosines) / (1 - MIN_PAD_COSINE))))
+    if misses[worst] > MAX_MISS or cosines[worst] < MIN_PAD_COSINE:
         angle = np.degrees(np.arccos(np.clip(cosines[worst], -1.0, 1.0)))
         raise ValueError(
             f"the object {item.name!r} cannot be grasped: the pad of the {FINGERS[worst]} misses "

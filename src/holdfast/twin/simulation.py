@@ -28,7 +28,7 @@ from holdfast.twin.world import TruthLog, World
 
 RETRY_DEPTH_FACTOR = 0.75
 """Factor of the depths of disturbances after a failed grasp, as a person disturbs the next less."""
-CASES = (1, 2)
+GRASP_CASES = (1, 2)
 """1: close, hold, release. 2: the same with disturbances while the object is locked."""
 MAX_DURATION = 60.0
 """Time for which random numbers of the controller are drawn, longer than any grasp [s]."""
@@ -125,7 +125,7 @@ class Simulation:
         plan: Plan | None = None,
         loads: Sequence[Load] = (),
     ) -> None:
-        if grasp.case not in CASES:
+        if grasp.case not in GRASP_CASES:
             raise ValueError(f"case 1 or 2 expected, {grasp.case} given")
         chosen = profile(grasp.profile)
         if grasp.glitch_rate is not None:

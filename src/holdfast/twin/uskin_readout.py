@@ -12,8 +12,7 @@ import numpy.typing as npt
 
 from holdfast.compiled import compiled
 from holdfast.sensors.types import Array
-
-Three = tuple[float, float, float]
+from holdfast.twin.skin import Three
 
 
 @dataclass(frozen=True)

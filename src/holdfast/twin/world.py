@@ -7,7 +7,7 @@ import numpy as np
 from holdfast.contact import Phase
 from holdfast.recordings import Truth
 from holdfast.sensors.types import Array
-from holdfast.twin.contact import SLIP, SLIPPING_SHARE, Contact, constants_of, new_contact
+from holdfast.twin.contact import TIP_SLIP, TIP_SLIPPING_SHARE, Contact, constants_of, new_contact
 from holdfast.twin.control import Controller
 from holdfast.twin.grasp import ClosingPath, object_pose
 from holdfast.twin.hand import (
@@ -209,8 +209,8 @@ class TruthLog:
         fingers = {
             finger: {
                 "contact_force": -tips[:, place, :3],
-                "slip_speed": tips[:, place, SLIP],
-                "slipping_share": tips[:, place, SLIPPING_SHARE],
+                "slip_speed": tips[:, place, TIP_SLIP],
+                "slipping_share": tips[:, place, TIP_SLIPPING_SHARE],
             }
             for place, finger in enumerate(self._fingers)
         }

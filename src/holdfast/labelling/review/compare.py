@@ -9,9 +9,9 @@ import msgspec
 import numpy as np
 import numpy.typing as npt
 
-from holdfast.contact import ContactState
+from holdfast.contact import TIME_TOLERANCE, ContactState
 from holdfast.errors import RecordingError
-from holdfast.labelling.review.spans import TIME_TOLERANCE, Span, spans_of
+from holdfast.labelling.review.spans import Span, spans_of
 from holdfast.metrics.statistics import quantile
 from holdfast.recordings import Label, label_states
 from holdfast.sensors.types import Array
@@ -22,7 +22,7 @@ MAX_ONSET_DIFFERENCE = 0.5
 MAX_LABEL_GAP = 0.1
 """Largest gap between two labels that follow each other; people draw small gaps [s]."""
 
-Counts = npt.NDArray[np.int64]
+Confusion = npt.NDArray[np.int64]
 
 
 class OnsetDifferences(msgspec.Struct, frozen=True):
@@ -215,7 +215,7 @@ class _OnsetMatch(NamedTuple):
 class _FingerCounts:
     """Counts of one finger in one recording."""
 
-    confusion: Counts
+    confusion: Confusion
     n_samples: int
     n_only_a: int
     n_only_b: int
@@ -281,7 +281,7 @@ def _pooled(parts: Sequence[FingerAgreement]) -> PooledAgreement:
     )
 
 
-def _binary(confusion: Counts) -> Counts:
+def _binary(confusion: Confusion) -> Confusion:
     """Return (2, 2) counts of not stable and stable."""
     return np.add.reduceat(np.add.reduceat(confusion, [0, 2], axis=0), [0, 2], axis=1)
 

@@ -30,7 +30,7 @@ from holdfast.training.setting import Setting
 from holdfast.training.splits import split_data
 from holdfast.training.training_samples import gather_samples, resample_if_needed
 
-MAX_FOLDS = 10
+MAX_AUDIT_FOLDS = 10
 """Largest number of groups of recordings that are held out in turn."""
 
 Probabilities = dict[str, Array]
@@ -49,7 +49,7 @@ def out_of_fold(
     recordings: Sequence[Recording],
     setting: Setting,
     *,
-    n_folds: int = MAX_FOLDS,
+    n_folds: int = MAX_AUDIT_FOLDS,
     n_jobs: int = 1,
 ) -> Iterator[tuple[Recording, Probabilities]]:
     """Yield recordings with probabilities from classifiers that are trained on other recordings.

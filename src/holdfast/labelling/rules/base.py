@@ -9,6 +9,7 @@ import numpy as np
 import numpy.typing as npt
 
 from holdfast.contact import UNKNOWN, Cause, ContactState
+from holdfast.detector.detection import CAUSES_BY_CODE, STATES
 from holdfast.metrics.masks import Mask
 from holdfast.recordings import Label
 from holdfast.sensors.types import Array
@@ -21,9 +22,6 @@ EVIDENCE_QUANTILE = 0.25
 
 MAX_RATIO = 200.0
 """Largest evidence ratio, of a confidence of 0.998. A ratio over a threshold of 0 is this one."""
-
-_CAUSES = (None, *Cause)
-_STATES = tuple(ContactState)
 
 EvidenceText = Callable[[ContactState, Cause | None, float], str]
 """Function that returns the evidence of a label from its state, cause and evidence ratio."""
@@ -59,12 +57,12 @@ class StateTimeline:
     ) -> None:
         """Set the state, cause and evidence ratio where the mask is True."""
         self.codes[mask] = state
-        self.causes[mask] = _CAUSES.index(cause)
+        self.causes[mask] = CAUSES_BY_CODE.index(cause)
         self.ratio[mask] = np.broadcast_to(ratio, mask.shape)[mask]
 
     def set_cause(self, mask: Mask, cause: Cause) -> None:
         """Set only the cause where the mask is True."""
-        self.causes[mask] = _CAUSES.index(cause)
+        self.causes[mask] = CAUSES_BY_CODE.index(cause)
 
 
 @dataclass(frozen=True)
@@ -96,8 +94,8 @@ class LabelWriter:
         return tuple(found)
 
     def _label(self, timeline: StateTimeline, part: slice, start: float, end: float) -> Label:
-        state = _STATES[timeline.codes[part.start]]
-        cause = _CAUSES[timeline.causes[part.start]]
+        state = STATES[timeline.codes[part.start]]
+        cause = CAUSES_BY_CODE[timeline.causes[part.start]]
         ratio = max(float(np.quantile(timeline.ratio[part], EVIDENCE_QUANTILE)), 1.0)
         confidence = self.trust * label_confidence(ratio, end - start)
         text = self.evidence(state, cause, ratio) + (f"; {self.note}" if self.note else "")

@@ -34,7 +34,7 @@ from holdfast.labelling.rules.forces import FingerForce, HandForce, hand_force
 from holdfast.metrics.masks import Mask
 from holdfast.recordings import Label, Recording
 
-AUTHOR = "rule:command"
+COMMAND_RULE = "rule:command"
 
 WORDS = {
     "closing": ("closing", "close", "closed", "grasp", "grasping"),
@@ -53,7 +53,7 @@ CLEAR_RATIO = 5.0
 OPEN_ENDED_RATIO = 1.5
 """Evidence ratio of a disturbance without an end, or with repeated beginnings."""
 
-_STATES: dict[str, tuple[int, Cause | None]] = {
+_STATE_OF_WORD: dict[str, tuple[int, Cause | None]] = {
     "closing": (UNSTABLE, Cause.CLOSING),
     "locked": (STABLE, None),
     "disturbance": (UNSTABLE, Cause.DISTURBANCE),
@@ -105,7 +105,7 @@ def propose(
             f"{', '.join(WORDS)} expected, it has {_shown(recording)}"
         )
     hand = hand_force(recording, tare)
-    writer = LabelWriter(AUTHOR, _evidence)
+    writer = LabelWriter(COMMAND_RULE, _evidence)
     return {
         name: writer.labels(_timeline(finger, hand, commands, opening), finger.span)
         for name, finger in hand.fingers.items()
@@ -145,7 +145,7 @@ def _timeline(
     if commands[0].word == "closing":
         timeline.set_state(known & (times < commands[0].time), NO_CONTACT, None, CLEAR_RATIO)
     for one, end, ratio in _spans(commands):
-        state, cause = _STATES[one.word]
+        state, cause = _STATE_OF_WORD[one.word]
         inside = known & (times >= one.time) & (times < end)
         timeline.set_state(inside, state, cause, ratio)
         if one.word == "released":

@@ -13,7 +13,7 @@ from holdfast.labelling.server.store import LabelInput, Labels, Origin, is_read_
 from holdfast.labelling.server.workspace import Workspace, beside
 from holdfast.recordings import Label, Recording
 
-SCHEMA = "holdfast.label/1"
+LABEL_SCHEMA = "holdfast.label/1"
 
 
 class RecordingEntry(msgspec.Struct, frozen=True):
@@ -47,7 +47,7 @@ class RecordingList(msgspec.Struct, frozen=True):
 
     author: str
     recordings: list[RecordingEntry]
-    schema: str = SCHEMA
+    schema: str = LABEL_SCHEMA
 
 
 class DoubtfulLabel(msgspec.Struct, frozen=True):

@@ -41,7 +41,7 @@ MIN_DISTANCE = 0.1
 """Shortest time between two change points; the clearer one is kept [s]."""
 MIN_RATIO = 2.5
 """Least ratio of the movement on one side to that on the other."""
-NOISE_FACTOR = 2.0
+MOVEMENT_NOISE_FACTOR = 2.0
 """Movement below this multiple of its median is noise."""
 NOISE_SHARE = 0.01
 """Movement below this share of the largest force is noise, invisible on a plot."""
@@ -324,7 +324,7 @@ def change_points(times: Array, force: Array, period: float) -> Array:
     after, before = _movements(values, n)
     largest = float(np.quantile(np.linalg.norm(values, axis=1), 0.99))
     tiny = float(np.finfo(float).tiny)
-    noise = max(NOISE_FACTOR * float(np.median(after)), NOISE_SHARE * largest, tiny)
+    noise = max(MOVEMENT_NOISE_FACTOR * float(np.median(after)), NOISE_SHARE * largest, tiny)
     contrast = np.abs(np.log((after + noise) / (before + noise)))
     width = 2 * max(round(MIN_DISTANCE / period), 1) + 1
     peaks = (contrast >= math.log(MIN_RATIO)) & (contrast == maximum_filter1d(contrast, width))

@@ -15,7 +15,7 @@ from typing import Literal
 
 import msgspec
 
-from holdfast.contact import LABEL_STATES, Cause, ContactState
+from holdfast.contact import LABEL_STATES, TIME_TOLERANCE, Cause, ContactState
 from holdfast.errors import HoldfastError, OutputError, RecordingError
 from holdfast.files import lock, sync, write_whole
 from holdfast.io.header import label_data
@@ -26,14 +26,13 @@ from holdfast.io.label_files import (
     labels_path,
     load_labels,
 )
-from holdfast.labelling.review.spans import TIME_TOLERANCE
 from holdfast.recordings import Label, Recording, Tactile
 
 NO_REVISION = "none"
 """Revision of a label file that does not exist."""
 
-STATES = tuple(state.value.lower() for state in LABEL_STATES)
-CAUSES = tuple(cause.value for cause in Cause)
+STATE_NAMES = tuple(state.value.lower() for state in LABEL_STATES)
+CAUSE_NAMES = tuple(cause.value for cause in Cause)
 
 Labels = Mapping[str, Sequence[Label]]
 Origin = Literal["file", "inside", "none"]
@@ -250,11 +249,11 @@ def cut_to_samples(recording: Recording, labels: Labels) -> dict[str, tuple[Labe
 
 def _parse(finger: str, given: LabelInput) -> Label:
     where = f"{finger}, [{given.start:.10g}, {given.end:.10g}) s"
-    if given.state not in STATES:
-        raise ValueError(f"{where}: state {', '.join(STATES)} expected, {given.state!r} given")
-    if given.cause not in (None, *CAUSES):
+    if given.state not in STATE_NAMES:
+        raise ValueError(f"{where}: state {', '.join(STATE_NAMES)} expected, {given.state!r} given")
+    if given.cause not in (None, *CAUSE_NAMES):
         raise ValueError(
-            f"{where}: cause {', '.join(CAUSES)} or none expected, {given.cause!r} given"
+            f"{where}: cause {', '.join(CAUSE_NAMES)} or none expected, {given.cause!r} given"
         )
     state, cause = ContactState(given.state.upper()), given.cause and Cause(given.cause)
     span = given.start, given.end

@@ -25,7 +25,7 @@ STEP_RATE = 1500.0
 """Least rate of the physics [Hz]: stiff skins on light objects need more than soft fingertips."""
 MAX_TURN_CHANGE = 0.3
 """Largest change of the object's angular velocity by the operator in a step [rad/s]."""
-N_AXES = 3
+N_PAD_JOINTS = 3
 """Joints of a pad: along its closing line, and two across it."""
 
 
@@ -359,5 +359,5 @@ def _drive(
     out: Array,
 ) -> None:
     for i in range(len(travels)):
-        j = N_AXES * i
+        j = N_PAD_JOINTS * i
         out[j] = stiffness * (travels[i] + jump[i] - place[j]) - damping * speed[j] + noise[i]

@@ -19,9 +19,9 @@ from holdfast.twin.operator import (
     disturb_wrench,
     hold_wrench,
 )
+from holdfast.twin.profile import Span
 from holdfast.twin.randomized.gripper import OperatorForce
-from holdfast.twin.randomized.palm import KINDS as PALM_KINDS
-from holdfast.twin.randomized.palm import Segment, Span, draw_segment, log_uniform, uniform
+from holdfast.twin.randomized.palm import PALM_KINDS, Segment, draw_segment, log_uniform, uniform
 
 OPERATOR_KINDS = ("move", "push", "pull", "twist", "drag", "spin", "weight")
 """A person acts on the object: moves it to and fro, pushes it with a finger, pulls or twists it
@@ -29,7 +29,7 @@ with a growing force or torque, drags or spins it through the fingers at a stead
 something into it."""
 GRIP_KINDS = ("regrip", "loosen", "slippery")
 """The grip changes slowly, or falls until the object slides; or friction falls."""
-KINDS = (*PALM_KINDS, *PALM_KINDS, *OPERATOR_KINDS, *GRIP_KINDS, "drag", "spin", "loosen")
+EVENT_KINDS = (*PALM_KINDS, *PALM_KINDS, *OPERATOR_KINDS, *GRIP_KINDS, "drag", "spin", "loosen")
 """Events, as often as they are drawn."""
 LONGEST_EVENT = 3.0
 """An event that does not end by itself ends after this [s]."""
@@ -49,7 +49,7 @@ class Event(NamedTuple):
     """One event of a hold.
 
     Attributes:
-        kind: one of `KINDS`.
+        kind: one of `EVENT_KINDS`.
         start: since the lock [s].
         duration: after which it is over [s]; a provoked slip may end it before.
         size: of the change: share of the grip, factor of friction, share of weight.
@@ -98,7 +98,7 @@ def draw_events(
 def _draw_event(
     generator: np.random.Generator, ranges: dict[str, Span], arm: dict[str, Span], start: float
 ) -> Event:
-    kind = str(generator.choice(KINDS))
+    kind = str(generator.choice(EVENT_KINDS))
     if kind in PALM_KINDS:
         segment = draw_segment(generator, arm, kind, start)
         return Event(kind, start, segment.duration, segment=segment)
