@@ -22,7 +22,7 @@ from holdfast.sensors.types import Array
 from holdfast.twin.control import PROPORTIONAL
 from holdfast.twin.hand import FINGERS, JOINTS, MOUNTS, N_JOINTS, HandModel
 from holdfast.twin.mujoco_import import mujoco
-from holdfast.twin.objects import GraspObject, distance_to
+from holdfast.twin.objects import GraspObject, reach_of
 
 MIDDLE_PLACE = (0.108, 0.020, 0.021)
 """Position of the object's middle in the right palm [m]; its axis is parallel to the palm's y.
@@ -134,12 +134,9 @@ def _aims(item: GraspObject, finger: str) -> tuple[Array, Array]:
 
 def _reach(item: GraspObject, outward: Array, height: float) -> float:
     """Return the distance from the object's axis to its surface in a direction of the palm [m]."""
-    distances = np.linspace(0.0, 0.09, 901)
     angle = np.arctan2(-outward[2], outward[0]) - item.yaw  # palm x, z to world x, y
-    line = np.array([np.cos(angle), np.sin(angle), 0.0])
-    points = distances[:, None] * line + [0.0, 0.0, height]
-    inside = np.flatnonzero(distance_to(item, points) < 0)
-    return float(distances[inside[-1]]) if len(inside) else 0.0
+    reach = reach_of(item, np.array([np.cos(angle), np.sin(angle), 0.0]), height)
+    return 0.0 if np.isnan(reach) else reach
 
 
 def _follow(hand: HandModel, place: int, points: Array, push: Array) -> Array:
@@ -215,12 +212,12 @@ class Pressing:
         self._pressing = np.zeros(N_JOINTS)
         self._finger = np.zeros(N_JOINTS, dtype=np.intp)
         for place, finger in enumerate(FINGERS):
-            one = slice(JOINTS[finger], JOINTS[finger] + 4)
-            weighted = PROPORTIONAL[one] * ahead[one]
-            length = float(weighted @ ahead[one])
-            share = float(weighted @ error[one]) / length if length > 0 else 0.0
-            self._pressing[one] = share * ahead[one]
-            self._finger[one] = place
+            joints_of_finger = slice(JOINTS[finger], JOINTS[finger] + 4)
+            weighted = PROPORTIONAL[joints_of_finger] * ahead[joints_of_finger]
+            length = float(weighted @ ahead[joints_of_finger])
+            share = float(weighted @ error[joints_of_finger]) / length if length > 0 else 0.0
+            self._pressing[joints_of_finger] = share * ahead[joints_of_finger]
+            self._finger[joints_of_finger] = place
 
     def displacement(self, scales: Array) -> Array:
         """Return the displacement of the set-points (16,) [rad] for force scales (4,)."""

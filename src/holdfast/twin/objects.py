@@ -327,10 +327,27 @@ def distance_to(item: GraspObject, points: npt.ArrayLike) -> Array:
         >>> round(float(distance_to(object_named("ball"), [0.0, 0.0, 0.043])), 3)
         0.01
     """
-    given = np.asarray(points, dtype=np.float64)
-    flat = np.ascontiguousarray(given.reshape(-1, 3))
+    places = np.asarray(points, dtype=np.float64)
+    flat = np.ascontiguousarray(places.reshape(-1, 3))
     signed: Array = distances(solid(item), flat)
-    return signed.reshape(given.shape[:-1])
+    return signed.reshape(places.shape[:-1])
+
+
+def reach_of(item: GraspObject, direction: Array, height: float) -> float:
+    """Return the distance from the object's axis to its surface in a direction [m].
+
+    Args:
+        item: the object.
+        direction: (3,) horizontal unit vector in the object's frame.
+        height: height over the centre of mass [m].
+
+    Returns:
+        The distance of the last point inside, of points 0.1 mm apart; NaN without any.
+    """
+    distances = np.linspace(0.0, 0.09, 901)
+    points = distances[:, None] * direction + [0.0, 0.0, height]
+    inside = np.flatnonzero(distance_to(item, points) < 0)
+    return float(distances[inside[-1]]) if len(inside) else math.nan
 
 
 def _mass_of(core: Array) -> tuple[float, float, Array]:

@@ -190,8 +190,8 @@ class Simulation:
             set_point_error=world.set_point_error,
         )
         self._bodies.append(world.bodies[:-1].copy())
-        one = self.uskins[FINGERS[0]]  # all fingertips have the same nodes and taxels
-        self._taxel_forces.append(one.taxel_forces(world.contact.node_forces))
+        skin = self.uskins[FINGERS[0]]  # all fingertips have the same nodes and taxels
+        self._taxel_forces.append(skin.taxel_forces(world.contact.node_forces))
         self.command = command
         self.n_samples += 1
 

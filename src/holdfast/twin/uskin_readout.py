@@ -209,9 +209,9 @@ class Readout:
                 f"taxel forces of shape (n, {n_taxels}, 3) and n times expected, "
                 f"{forces.shape} and {clock.shape} given"
             )
-        if not (_is_finite(forces.ravel()) and _is_finite(clock)):
+        if not (np.isfinite(forces).all() and np.isfinite(clock).all()):
             raise ValueError("finite taxel forces and times expected, NaN or infinity given")
-        if not _is_increasing(self._state.numbers[_TIME], clock):
+        if (np.diff(clock, prepend=self._state.numbers[_TIME]) <= 0).any():  # before it, NaN
             raise ValueError("increasing times expected")
         return forces, clock
 
@@ -247,24 +247,6 @@ def saturated(newtons: float, limit: float) -> float:
     """
     square = (newtons / limit) ** 2
     return newtons / math.sqrt(math.sqrt(1.0 + square * square))
-
-
-@compiled
-def _is_finite(values: Array) -> bool:
-    for value in values:  # noqa: SIM110 (compiled)
-        if not math.isfinite(value):
-            return False
-    return True
-
-
-@compiled
-def _is_increasing(before: float, times: Array) -> bool:
-    """Return whether times increase, also from the one before them, if it is not NaN."""
-    for time in times:
-        if time <= before:
-            return False
-        before = time
-    return True
 
 
 @compiled

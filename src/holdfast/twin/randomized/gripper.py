@@ -14,7 +14,7 @@ from holdfast.sensors.types import Array
 from holdfast.twin.contact import touch
 from holdfast.twin.hand import HandModel, apply_forces, fill_bodies, object_xml
 from holdfast.twin.mujoco_import import mujoco
-from holdfast.twin.objects import GraspObject, distance_to
+from holdfast.twin.objects import GraspObject, reach_of
 from holdfast.twin.protocol import OPEN_GAP
 from holdfast.twin.randomized.palm import PalmMotion
 from holdfast.twin.skin import Skin
@@ -141,15 +141,13 @@ def _frame(normal: Array, inward: Array) -> Array:
 
 
 def _reach(item: GraspObject, outward: Array, height: float) -> float:
-    """Distance from the object's axis to its surface along a direction, at a height [m]."""
-    distances = np.linspace(0.0, 0.09, 901)
-    points = distances[:, None] * outward + [0.0, 0.0, height]
-    inside = np.flatnonzero(distance_to(item, points) < 0)
-    if not len(inside):
+    """Return the distance at which a pad meets the object, along a direction at a height [m]."""
+    reach = reach_of(item, outward, height)
+    if np.isnan(reach):
         raise ValueError(
             f"the pad at {1e3 * height:.0f} mm does not reach the object {item.name!r}"
         )
-    return float(distances[inside[-1]])
+    return reach
 
 
 def gripper_model(
