@@ -67,6 +67,8 @@ def propose(
         )
     arguments = {name: value for name, value in parameters.items() if name in chosen.arguments}
     if chosen.thresholds is not None:
-        given = {name: parameters[name] for name in chosen.threshold_names if name in parameters}
-        arguments["rule"] = chosen.thresholds(**given)
+        thresholds = {
+            name: parameters[name] for name in chosen.threshold_names if name in parameters
+        }
+        arguments["rule"] = chosen.thresholds(**thresholds)
     return chosen.propose(recording, **arguments)

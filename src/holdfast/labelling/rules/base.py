@@ -83,15 +83,15 @@ class LabelWriter:
 
     def labels(self, timeline: StateTimeline, span: tuple[float, float]) -> tuple[Label, ...]:
         """Return intervals of equal state and cause, cut to the span of the module [s]."""
-        times, found = timeline.times, []
+        times, labels = timeline.times, []
         change = (np.diff(timeline.codes) != 0) | (np.diff(timeline.causes) != 0)
         edges = np.concatenate([[0], np.flatnonzero(change) + 1, [len(times)]])
         ends = np.append(times, np.inf)
         for first, last in zip(edges[:-1].tolist(), edges[1:].tolist(), strict=True):
             start, end = max(float(times[first]), span[0]), min(float(ends[last]), span[1])
             if timeline.codes[first] != UNKNOWN and start < end:
-                found.append(self._label(timeline, slice(first, last), start, end))
-        return tuple(found)
+                labels.append(self._label(timeline, slice(first, last), start, end))
+        return tuple(labels)
 
     def _label(self, timeline: StateTimeline, part: slice, start: float, end: float) -> Label:
         state = STATES[timeline.codes[part.start]]
@@ -115,11 +115,11 @@ def evidence_ratio(quantity: npt.ArrayLike, threshold: npt.ArrayLike) -> Array:
         >>> evidence_ratio([1.0, 3.0, 0.0], 2.0).tolist(), evidence_ratio([0.0, 3.0], 0.0).tolist()
         ([0.5, 1.5, 0.005], [1.0, 200.0])
     """
-    given, least = np.broadcast_arrays(
+    values, least = np.broadcast_arrays(
         np.asarray(quantity, dtype=np.float64), np.asarray(threshold, dtype=np.float64)
     )
-    ratio = np.where(given > 0, MAX_RATIO, 1.0)
-    np.divide(given, least, out=ratio, where=least > given / MAX_RATIO)
+    ratio = np.where(values > 0, MAX_RATIO, 1.0)
+    np.divide(values, least, out=ratio, where=least > values / MAX_RATIO)
     return np.clip(ratio, 1 / MAX_RATIO, MAX_RATIO)
 
 

@@ -208,7 +208,7 @@ def _track(times: Array, pose: npt.NDArray[np.generic]) -> PoseTrack:
 
 def _measured(rows: Mapping[str, Array], path: Path) -> Poses:
     """Return poses from rows of time and pose by body, on a clock of their own."""
-    tracks = {body: _measured_track(own, path) for body, own in rows.items()}
+    tracks = {body: _measured_track(body_rows, path) for body, body_rows in rows.items()}
     object_track = tracks.pop(OBJECT)
     return Poses(path.name, object_track, tracks, same_clock=False)
 

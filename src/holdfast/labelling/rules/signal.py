@@ -131,8 +131,8 @@ def _changing(hand: HandForce, change: Mapping[str, Array], rule: SignalRule) ->
     shared = np.sum([ratio > 1 for ratio in change.values()], axis=0) >= 2
     gap = n_samples_of(rule.merge - rule.window, hand.period)  # the window fills the rest
     return {
-        name: fill_short_gaps(((change[name] > 1) | shared) & each.contact, gap) & each.contact
-        for name, each in hand.fingers.items()
+        name: fill_short_gaps(((change[name] > 1) | shared) & finger.contact, gap) & finger.contact
+        for name, finger in hand.fingers.items()
     }
 
 
@@ -233,8 +233,8 @@ def _label_loss(hand: HandForce, timelines: Mapping[str, StateTimeline]) -> None
     if drop is None:
         return
     after = np.arange(len(hand.times)) >= drop
-    for name, each in hand.fingers.items():
-        timelines[name].set_state(after & each.known, NO_CONTACT, Cause.LOST, UNMEASURED_RATIO)
+    for name, finger in hand.fingers.items():
+        timelines[name].set_state(after & finger.known, NO_CONTACT, Cause.LOST, UNMEASURED_RATIO)
 
 
 def _evidence(state: ContactState, cause: Cause | None, ratio: float) -> str:

@@ -237,24 +237,24 @@ def describe_recording(workspace: Workspace, index: int) -> RecordingDetails:
 
 def doubtful_labels(labels: Labels, proposals: Labels) -> list[DoubtfulLabel]:
     """Return labels and open proposals of low confidence, lowest first."""
-    found = [*doubtful(labels), *doubtful(open_proposals(proposals, labels))]
+    unsure = [*doubtful(labels), *doubtful(open_proposals(proposals, labels))]
     return [
-        DoubtfulLabel(finger, each.start, each.end, state_name(each.state), each.confidence)
-        for finger, each in sorted(found, key=lambda one: one[1].confidence)
+        DoubtfulLabel(finger, label.start, label.end, state_name(label.state), label.confidence)
+        for finger, label in sorted(unsure, key=lambda pair: pair[1].confidence)
     ]
 
 
 def open_proposals(proposals: Labels, labels: Labels) -> dict[str, list[Label]]:
     """Return the proposals whose middle has no label yet."""
     return {
-        finger: [each for each in own if not _is_labelled(labels.get(finger, ()), each)]
-        for finger, own in proposals.items()
+        finger: [label for label in proposed if not _is_labelled(labels.get(finger, ()), label)]
+        for finger, proposed in proposals.items()
     }
 
 
 def labels_data(labels: Labels) -> dict[str, list[LabelData]]:
     """Return labels by finger as they are written to JSON."""
-    return {finger: [label_data(each) for each in own] for finger, own in labels.items()}
+    return {name: [label_data(label) for label in finger] for name, finger in labels.items()}
 
 
 def _is_labelled(labels: Sequence[Label], proposal: Label) -> bool:

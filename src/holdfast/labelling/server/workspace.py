@@ -104,8 +104,8 @@ class OpenRecording:
         """Change points by finger [s]."""
         modules = self.recording.modules
         return {
-            name: change_points(each.times, each.values[:, 1:4], modules[name].period).tolist()
-            for name, each in self.signals.fingers.items()
+            name: change_points(finger.times, finger.values[:, 1:4], modules[name].period).tolist()
+            for name, finger in self.signals.fingers.items()
         }
 
 
@@ -254,10 +254,10 @@ class Workspace:
         with self._compute_lock:
             recording = opened.with_readings()
             chosen = rule or default_rule(recording, self._poses)
-            given: dict[str, Any] = {"tare": opened.tare, **parameters}
+            arguments: dict[str, Any] = {"tare": opened.tare, **parameters}
             if chosen == "tracking":
-                given["tracking"] = self._poses
-            self._proposals[index] = propose(chosen, recording, **given)
+                arguments["tracking"] = self._poses
+            self._proposals[index] = propose(chosen, recording, **arguments)
         return chosen, self._proposals[index]
 
     def proposals(self, index: int) -> Proposals:
