@@ -31,7 +31,7 @@ from holdfast.sensors.types import Array
 TASKS, CONFIG, SIGNALS = "label-studio.json", "label-studio.xml", ".signals.csv"
 TARE_DURATION = 0.5
 """Duration of the tare at the start of a recording [s]."""
-STATE_COLOURS = {
+LABEL_COLOURS = {
     ContactState.STABLE: "#2a9d5c",
     ContactState.UNSTABLE: "#d1495b",
     ContactState.NO_CONTACT: "#8a8f98",
@@ -223,4 +223,4 @@ def _finger_config(finger: str, unit: str, names: Sequence[str]) -> str:
 
 
 def _colour(name: str) -> str:
-    return STATE_COLOURS[state_of(name)[0]]
+    return LABEL_COLOURS[state_of(name)[0]]

@@ -41,7 +41,7 @@ from holdfast.sensors.types import Array
 SIGNAL_RULE = "rule:signal"
 RELEASE_SHARE = 0.9
 """A release begins when the force was last above this share of the grip force."""
-FALL_TIME = 0.1
+MAX_FALL_TIME = 0.1
 """A hand that is empty within this time lost the object: it cannot open so fast [s]."""
 CHANGE_NOISE_FACTOR = 6.0
 """Least change in standard deviations of a component of the smoothed force. Noise exceeds it in
@@ -205,7 +205,7 @@ class _GraspLabeller:
         if not len(strong) or last + 1 >= len(touching) or not finger.known[last + 1]:
             return
         onset = int(strong[-1])
-        cause = Cause.LOST if last - onset < self._n(FALL_TIME) else Cause.RELEASED
+        cause = Cause.LOST if last - onset < self._n(MAX_FALL_TIME) else Cause.RELEASED
         start = self._start_of_end(self._changing[name] & held, onset)
         timeline.set_state(touching & (samples >= start), UNSTABLE, cause, self._change[name])
 
