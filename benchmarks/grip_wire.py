@@ -28,7 +28,7 @@ from holdfast.devices.ros import dds
 from holdfast.live.publishers.xela_server import XelaServer
 from holdfast.ros.cdr import MessageDecoder, MessageEncoder
 from holdfast.ros.hand_messages import FLOATS, JOINT_STATE, hand_definition, joint_message
-from holdfast.twin.contact import LOAD, SLIP
+from holdfast.twin.contact import TIP_LOAD, TIP_SLIP
 from holdfast.twin.hand import RATE
 from holdfast.twin.loads import LoadKind
 from holdfast.twin.simulation import Simulation
@@ -79,7 +79,7 @@ class TrialTwin(DrivenTwin):
         arrival = super().read(timeout)
         if arrival is not None and self.simulation is not None and self._begun_at is not None:
             tips = self.simulation.world.contact.tips
-            speed = np.where(tips[:, LOAD] > CONTACT_FORCE, tips[:, SLIP], 0.0).max()
+            speed = np.where(tips[:, TIP_LOAD] > CONTACT_FORCE, tips[:, TIP_SLIP], 0.0).max()
             due = self._begun_at + (self.simulation.n_samples - 1) / RATE
             loaded = self.simulation.held_for >= self._trial.load.start
             self.slips.append((due, float(speed), bool(loaded)))

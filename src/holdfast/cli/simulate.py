@@ -20,7 +20,7 @@ from holdfast.cli.options import (
 from holdfast.cli.terminal.console import print_json, print_line, print_message
 from holdfast.cli.terminal.progress import ProgressBar
 from holdfast.errors import require_extras
-from holdfast.twin.profile import ATTEMPTS
+from holdfast.twin.profile import GRASP_ATTEMPTS
 
 if TYPE_CHECKING:
     from holdfast.parallel import Engine
@@ -256,7 +256,7 @@ def simulate_grasp(grasp: "Grasp", out: Path, force: bool) -> list[str]:
     from holdfast.twin.simulation import simulate as run
 
     names = []
-    for attempt in range(ATTEMPTS):
+    for attempt in range(GRASP_ATTEMPTS):
         trial = replace(grasp, attempt=attempt)
         if not force and _exists(trial, _path_of(trial.failed_name, out)):
             continue
@@ -287,11 +287,11 @@ def plan_grasps(
     """
     from holdfast.twin.objects import load_objects
     from holdfast.twin.profile import profile as check_profile
-    from holdfast.twin.simulation import CASES, Grasp
+    from holdfast.twin.simulation import GRASP_CASES, Grasp
 
     names = [name.strip() for name in objects.split(",")] if objects else list(load_objects(table))
     check_profile(profile)
-    if not {case.strip() for case in cases.split(",")} <= {str(case) for case in CASES}:
+    if not {case.strip() for case in cases.split(",")} <= {str(case) for case in GRASP_CASES}:
         raise ValueError(f"--cases 1, 2 or 1,2 expected, {cases!r} given")
     _check_numbers(repeats, seed)
     chosen = sorted({int(case) for case in cases.split(",")})
@@ -321,7 +321,7 @@ def _path_of(name: str, out: Path) -> Path:
 
 def _is_finished(grasp: "Grasp", out: Path) -> bool:
     """Return whether the recording of the grasp, or of its last failed attempt, exists."""
-    last_failed = f"{grasp.name}-failed{ATTEMPTS}"
+    last_failed = f"{grasp.name}-failed{GRASP_ATTEMPTS}"
     return any(_exists(grasp, _path_of(name, out)) for name in (grasp.name, last_failed))
 
 
@@ -361,7 +361,7 @@ def _remove_others(grasp: "Grasp", out: Path, names: "Sequence[str]") -> None:
 
     With another seed, other attempts fail.
     """
-    failed = [f"{grasp.name}-failed{attempt + 1}" for attempt in range(ATTEMPTS)]
+    failed = [f"{grasp.name}-failed{attempt + 1}" for attempt in range(GRASP_ATTEMPTS)]
     for name in (grasp.name, *failed):
         if name not in names:
             _path_of(name, out).unlink(missing_ok=True)

@@ -11,7 +11,7 @@ from holdfast.features import DEFAULT_WINDOW, DEPLOYED_FEATURES
 from holdfast.metrics import bootstrap_interval
 from holdfast.metrics.statistics import Statistic
 from holdfast.sensors.types import Array
-from holdfast.twin.uskin.parameters import UskinParameters
+from holdfast.twin.uskin_readout import UskinParameters
 from holdfast_lab.report.html_report import ReportFigure
 from holdfast_lab.report.result_tables import Key, ResultTable, Row
 from holdfast_lab.study.paper import published

@@ -1,7 +1,7 @@
 import numpy as np
 import pytest
 
-from holdfast.twin.uskin.parameters import UskinParameters
+from holdfast.twin.uskin_readout import UskinParameters
 from holdfast_lab.study.paper import attribution
 from holdfast_lab.study.paper.attribution import (
     DOUBLE_NOISE,

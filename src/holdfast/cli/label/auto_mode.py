@@ -265,7 +265,7 @@ def _hidden_text(n_hidden: int, n: int, *, written: bool) -> str:
 
 def _document(path: Path, recording: "Recording", labels: "Labels") -> dict[str, Any]:
     from holdfast.io.label_files import labels_path
-    from holdfast.labelling.rules.start import evidence_of_contact
+    from holdfast.labelling.rules.forces import evidence_of_contact
 
     return {
         "name": recording.name,
@@ -308,7 +308,7 @@ def _labels_json(labels: "Labels") -> Mapping[str, Any]:
     """Return labels by finger as JSON values."""
     from msgspec import to_builtins
 
-    from holdfast.labelling.server.api import labels_data
+    from holdfast.labelling.server.documents import labels_data
 
     values: Mapping[str, Any] = to_builtins(labels_data(labels))
     return values

@@ -11,8 +11,7 @@ import numpy.typing as npt
 
 from holdfast.sensors import Sensor
 from holdfast.sensors.types import Array
-from holdfast.twin.uskin.parameters import UskinParameters
-from holdfast.twin.uskin.readout import Counts, Readout, Taxels
+from holdfast.twin.uskin_readout import Counts, Readout, Taxels, UskinParameters
 
 MAX_STAMP_SHIFT = 0.45
 """Maximum shift of a packet's stamp, in periods; below a half, so stamps keep their order."""

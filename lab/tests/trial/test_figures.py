@@ -4,9 +4,9 @@ import numpy as np
 import pytest
 
 from holdfast_lab.figures.dots import IntervalEstimate
-from holdfast_lab.figures.trials import (
+from holdfast_lab.trial.course import TrialCourse
+from holdfast_lab.trial.figures import (
     Distribution,
-    ForceCourse,
     TradeOff,
     draw_courses,
     draw_distributions,
@@ -43,9 +43,8 @@ def test_a_trade_off_has_both_intervals():
 
 @pytest.mark.slow
 def test_courses_share_their_axes():
-    times = np.array([-0.5, 0.0, 1.0])
-    lost = ForceCourse(times, np.array([2.0, 2, 0]), np.ones(3), np.array([0, 0, 0.1]), 1.0)
-    held = ForceCourse(2 * times, np.array([2.0, 2, 5]), np.ones(3), np.zeros(3))
+    lost = TrialCourse([-0.5, 0.0, 1.0], [2.0, 2, 0], [1.0] * 3, [0, 0, 0.1], 1.0)
+    held = TrialCourse([-1.0, 0.0, 2.0], [2.0, 2, 5], [1.0] * 3, [0.0] * 3)
     figure = drawn(draw_courses({"fixed": lost, "holdfast": held}))
     upper, lower = figure.axes[:2], figure.axes[2:]
     assert upper[0].get_ylim() == upper[1].get_ylim() and upper[0].get_ylim()[1] > 5
