@@ -143,7 +143,7 @@ def read():
 
 
 def estimates():
-    from holdfast.live.publishers.ros1_publisher import Ros1Publisher
+    from holdfast.live.publishers.ros_publisher import Ros1Publisher
     from live.estimates import UNITS, FakeGrip, estimate
 
     with Ros1Publisher(UNITS, grip=FakeGrip()) as publisher:

@@ -6,7 +6,7 @@ from typing import NamedTuple
 import numpy as np
 
 from holdfast.grip.command import GripCommand
-from holdfast.ros.hand_messages import JointStates
+from holdfast.ros.topic_messages import JointStates
 from holdfast.sensors.types import Array
 
 N_JOINTS, JOINTS_PER_FINGER = 16, 4

@@ -15,11 +15,11 @@ from holdfast.devices.hands.ros.joints import (
     ByFinger,
     JointOrder,
 )
-from holdfast.devices.hands.ros.link import Link
 from holdfast.devices.hands.ros.parameters import Parameters
 from holdfast.devices.hands.ros.scalar_hand import ScalarHand, ScalarSetup
+from holdfast.devices.ros.link import Link
 from holdfast.devices.uri import Address, parse
-from holdfast.ros.hand_messages import FLOAT32, FLOAT64, FLOATS, JOINT_STATE
+from holdfast.ros.topic_messages import FLOAT32, FLOAT64, FLOATS, JOINT_STATE
 from holdfast.sensors.types import Array
 
 COMMON = ("shared",)
@@ -229,13 +229,13 @@ def ros_hand(uri: str, *, standby: bool) -> HandDevice:
 
 
 def _ros2_link(address: Address) -> Link:
-    from holdfast.devices.hands.ros.ros2_link import Ros2Link
+    from holdfast.devices.ros.ros2_link import Ros2Link
 
     return Ros2Link(address.parameters.get("domain"))
 
 
 def _ros1_link(address: Address) -> Link:
-    from holdfast.devices.hands.ros.ros1_link import Ros1Link
+    from holdfast.devices.ros.ros1_link import Ros1Link
 
     return Ros1Link(address.parameters.get("master"))
 

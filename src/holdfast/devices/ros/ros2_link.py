@@ -1,12 +1,12 @@
-"""Connection to the topics of a hand by ROS 2, over DDS. ROS 2 need not be installed."""
+"""Connection to the topics of ROS 2, over DDS. ROS 2 need not be installed."""
 
 from functools import partial
 
-from holdfast.devices.hands.ros.link import Link, Publisher, TakeStates, hand_errors
 from holdfast.devices.ros import dds
-from holdfast.errors import HandError
+from holdfast.devices.ros.link import Link, Publisher, TakeStates
+from holdfast.errors import SourceError
 from holdfast.ros.cdr import MessageDecoder, MessageEncoder
-from holdfast.ros.hand_messages import JOINT_STATE, JointStates, hand_definition
+from holdfast.ros.topic_messages import JOINT_STATE, JointStates, topic_definition
 
 
 class Ros2Link(Link):
@@ -19,7 +19,7 @@ class Ros2Link(Link):
         ValueError: there is no such domain.
     """
 
-    def __init__(self, domain: str | None) -> None:
+    def __init__(self, domain: str | None = None) -> None:
         self._domain = dds.domain_number(domain)
         self.where = f"in ROS domain {self._domain}"
         self._joined: dds.Node | None = None
@@ -28,20 +28,19 @@ class Ros2Link(Link):
         """Join the domain.
 
         Raises:
-            HandError: DDS reports an error.
+            SourceError: DDS reports an error.
         """
-        with hand_errors():
-            self._joined = dds.Node(self._domain)
+        self._joined = dds.Node(self._domain)
 
     def publisher(self, topic: str, kind: str) -> Publisher:
         """Return a publisher of messages of a type on a topic."""
-        definition = hand_definition(kind)
+        definition = topic_definition(kind)
         write, encode = self._node.writer(topic, definition), MessageEncoder(definition)
         return Publisher(lambda message: write(encode(message)), write.n_readers)
 
     def joint_states(self, topic: str) -> TakeStates:
         """Subscribe to the joint states of a topic."""
-        definition = hand_definition(JOINT_STATE)
+        definition = topic_definition(JOINT_STATE)
         decode = MessageDecoder(definition, ros2=True)
         return partial(_take, topic, self._node.reader(topic, definition), decode)
 
@@ -64,7 +63,7 @@ class Ros2Link(Link):
     @property
     def _node(self) -> dds.Node:
         if self._joined is None:
-            raise HandError(f"the link {self.where} is not open")
+            raise SourceError(f"the link {self.where} is not open")
         return self._joined
 
 
@@ -77,5 +76,5 @@ def _take(topic: str, reader: dds.TopicReader, decode: MessageDecoder) -> list[J
     try:
         messages = [decode(data) for data in waiting]
     except ValueError as cause:
-        raise HandError(f"{topic} sends damaged joint states: {cause}") from cause
+        raise SourceError(f"{topic} sends damaged joint states: {cause}") from cause
     return [JointStates.of_message(m["name"], m["position"], m["effort"]) for m in messages]
