@@ -16,8 +16,8 @@ from typing import Any
 import numpy as np
 
 from holdfast.contact import Cause, ContactState
-from holdfast.errors import MissingExtra, RecordingError
-from holdfast.io.importers.table import natural_order, with_integer_type
+from holdfast.errors import RecordingError
+from holdfast.io.importers.table import errors_named, natural_order, with_integer_type
 from holdfast.io.safe_reading import ReadBudget, one_line
 from holdfast.recordings import Label, Recording, Tactile, labels_from_samples
 from holdfast.sensors import Sensor, sensor
@@ -71,26 +71,6 @@ def parts(path: Path) -> list[Path]:
     return files
 
 
-def read(path: Path) -> Iterator[Recording]:
-    """Read the recordings in an HDF5 file, or in the HDF5 files of a folder.
-
-    Raises:
-        RecordingError: there is no such file, or one has another form.
-        MissingExtra: h5py is not installed.
-    """
-    h5py = _import_h5py()
-    return (recording for file in parts(path) for recording in _recordings(file, h5py))
-
-
-def _import_h5py() -> ModuleType:
-    try:
-        import h5py
-    except ImportError as cause:
-        raise MissingExtra("h5py", "hdf5") from cause
-    module: ModuleType = h5py
-    return module
-
-
 def _files(path: Path) -> list[Path]:
     if path.is_file():
         return [path]
@@ -102,7 +82,14 @@ def _is_hdf5(path: Path) -> bool:
         return file.read(len(HDF5_MAGIC)) == HDF5_MAGIC
 
 
-def _recordings(path: Path, h5py: ModuleType) -> Iterator[Recording]:
+def read(path: Path) -> Iterator[Recording]:
+    """Yield the recordings in an HDF5 file.
+
+    Raises:
+        RecordingError: it has another form.
+    """
+    import h5py
+
     if not _is_hdf5(path):
         raise RecordingError(
             f"{path} is not an HDF5 file (for a Git LFS pointer, fetch the data by `git lfs pull`)"
@@ -272,14 +259,12 @@ def _recording(place: str, parts: list[str], group: _Arrays) -> Recording:
             f"{place}: {DATA} of shape (n_taxels, 3, {len(times)}) expected, {raw.shape} given"
         )
     readings = with_integer_type(raw.transpose(2, 0, 1))
-    try:
+    with errors_named(place):
         module = Tactile(_sensor(readings.shape[1]), times, readings)
         if LABELS in group:
             labels = _labels(group[LABELS].ravel(), module)
             module = replace(module, labels=labels)
         return Recording("_".join(parts), {"finger1": module}, _metadata(parts))
-    except RecordingError as cause:
-        raise RecordingError(f"{place}: {cause}") from cause
 
 
 def _metadata(parts: list[str]) -> dict[str, str]:

@@ -10,7 +10,13 @@ from pathlib import Path
 import numpy as np
 
 from holdfast.errors import RecordingError
-from holdfast.io.importers.table import Table, csv_files, header_line, read_table, with_integer_type
+from holdfast.io.importers.table import (
+    CsvFormat,
+    Table,
+    errors_named,
+    read_table,
+    with_integer_type,
+)
 from holdfast.recordings import Recording, Tactile
 from holdfast.sensors import sensor
 from holdfast.sensors.types import Array
@@ -23,32 +29,6 @@ TO_TAXEL_FRAME = np.array([1, -1, -1])
 increases."""
 
 
-def can_read(path: Path) -> bool:
-    """Return whether `path` is such a CSV file, or a folder with one."""
-    return any(_is_header(header_line(file)) for file in csv_files(path))
-
-
-def parts(path: Path) -> list[Path]:
-    """Return the file, or the files of this format in a folder.
-
-    Raises:
-        RecordingError: there is none.
-    """
-    files = [file for file in csv_files(path) if path.is_file() or _is_header(header_line(file))]
-    if not files:
-        raise RecordingError(f"no gtac file in {path}; CSV files with columns mag_x1.. expected")
-    return files
-
-
-def read(path: Path) -> Iterator[Recording]:
-    """Read the recording in a CSV file, or those in the CSV files of a folder.
-
-    Raises:
-        RecordingError: there is no CSV file, or one has another form.
-    """
-    return (_recording(file) for file in parts(path))
-
-
 def _is_header(names: tuple[str, ...]) -> bool:
     if set(NAMES) <= set(names):
         return True
@@ -56,7 +36,16 @@ def _is_header(names: tuple[str, ...]) -> bool:
     return len(names) > len(NAMES) + 2 and names == ("", *numbered)
 
 
-def _recording(path: Path) -> Recording:
+_FORMAT = CsvFormat(_is_header, "no gtac file in {}; CSV files with columns mag_x1.. expected")
+can_read, parts = _FORMAT.can_read, _FORMAT.parts
+
+
+def read(path: Path) -> Iterator[Recording]:
+    """Yield the recording in a CSV file.
+
+    Raises:
+        RecordingError: it has another form.
+    """
     table, _ = read_table(path)
     if not _is_header(table.names):
         raise RecordingError(
@@ -69,10 +58,10 @@ def _recording(path: Path) -> Recording:
     rotated = values[n_without_time:].reshape(-1, N_NODES, 3) * TO_TAXEL_FRAME
     readings = with_integer_type(rotated)
     metadata = {"source": "roobooot/GTac_", "rows_without_time": n_without_time}
-    try:
-        return Recording(path.stem, {"finger1": Tactile(sensor("gtac"), times, readings)}, metadata)
-    except RecordingError as cause:
-        raise RecordingError(f"{path}: {cause}") from cause
+    with errors_named(path):
+        modules = {"finger1": Tactile(sensor("gtac"), times, readings)}
+        recording = Recording(path.stem, modules, metadata)
+    yield recording
 
 
 def _times(table: Table) -> tuple[Array, int]:
