@@ -25,7 +25,7 @@ from holdfast.ros.topic_messages import (
 from holdfast.sensors.types import Unit
 
 if TYPE_CHECKING:
-    from holdfast.live.loop.documents import GripDocument
+    from holdfast.live.documents import GripDocument
     from holdfast.live.loop.live_grip import LiveGrip
     from holdfast.live.stream_detector import StreamUpdate
 
@@ -260,7 +260,7 @@ class Ros1Publisher(RosPublisher):
     def __init__(
         self, units: Mapping[str, Unit], *, master: str | None = None, **others: Unpack[Others]
     ) -> None:
-        from holdfast.devices.ros.ros1_link import Ros1Link
+        from holdfast.devices.ros.rospy_node import Ros1Link
 
         super().__init__(units, Ros1Link(master), **others)
 
@@ -271,7 +271,7 @@ class Ros2Publisher(RosPublisher):
     def __init__(
         self, units: Mapping[str, Unit], *, domain: str | None = None, **others: Unpack[Others]
     ) -> None:
-        from holdfast.devices.ros.ros2_link import Ros2Link
+        from holdfast.devices.ros.dds import Ros2Link
 
         super().__init__(units, Ros2Link(domain), **others)
 

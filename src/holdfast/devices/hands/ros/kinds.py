@@ -229,13 +229,13 @@ def ros_hand(uri: str, *, standby: bool) -> HandDevice:
 
 
 def _ros2_link(address: Address) -> Link:
-    from holdfast.devices.ros.ros2_link import Ros2Link
+    from holdfast.devices.ros.dds import Ros2Link
 
     return Ros2Link(address.parameters.get("domain"))
 
 
 def _ros1_link(address: Address) -> Link:
-    from holdfast.devices.ros.ros1_link import Ros1Link
+    from holdfast.devices.ros.rospy_node import Ros1Link
 
     return Ros1Link(address.parameters.get("master"))
 

@@ -3,8 +3,8 @@
 from collections.abc import Iterable
 from dataclasses import dataclass
 
+from holdfast.devices.hands.local import largest_scale
 from holdfast.devices.hands.ros.ros_hand import RosHand
-from holdfast.devices.hands.scalar import largest_scale
 from holdfast.devices.ros.link import Link
 from holdfast.errors import HandError
 from holdfast.grip.command import GripCommand
