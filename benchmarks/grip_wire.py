@@ -27,7 +27,7 @@ from holdfast.devices.hands.ros.driven_twin import DrivenTwin
 from holdfast.devices.ros import dds
 from holdfast.live.publishers.xela_server import XelaServer
 from holdfast.ros.cdr import MessageDecoder, MessageEncoder
-from holdfast.ros.topic_messages import FLOATS, JOINT_STATE, joint_message, topic_definition
+from holdfast.ros.topic_messages import FLOAT_ARRAY, JOINT_STATE, joint_message, topic_definition
 from holdfast.twin.contact import LOAD, SLIP
 from holdfast.twin.hand import RATE
 from holdfast.twin.loads import LoadKind
@@ -180,7 +180,7 @@ def reaction(trial: Trial, output) -> float | None:
         0 if it rose before the slip, infinite if never; None if nothing slipped or the loop had
         not begun.
     """
-    listener = Listener("/allegro_hand_position_effort_controller/efforts", FLOATS)
+    listener = Listener("/allegro_hand_position_effort_controller/efforts", FLOAT_ARRAY)
     twin = TrialTwin(trial)
     serve(twin, PLEXUS, output)
     listener.close()

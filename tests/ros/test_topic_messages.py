@@ -8,7 +8,7 @@ from rosbags.typesys import Stores, get_typestore
 from holdfast.ros.cdr import MessageDecoder, MessageEncoder
 from holdfast.ros.definitions import parse_definition
 from holdfast.ros.topic_messages import (
-    FLOATS,
+    FLOAT_ARRAY,
     JOINT_STATE,
     MESSAGE_TYPES,
     array_message,
@@ -31,7 +31,7 @@ def test_definitions_are_those_of_ros(name):
 
 def test_another_program_reads_the_messages():
     values = np.linspace(0.0, 1.0, 16)
-    data = MessageEncoder(topic_definition(FLOATS))(array_message(values))
+    data = MessageEncoder(topic_definition(FLOAT_ARRAY))(array_message(values))
     read = TYPES.deserialize_cdr(data, "std_msgs/msg/Float64MultiArray")
     np.testing.assert_array_equal(read.data, values)
     data = MessageEncoder(topic_definition(JOINT_STATE))(

@@ -9,7 +9,7 @@ from holdfast.ros.definitions import ROS2_HEADER, SEPARATOR, Definition, parse_d
 from holdfast.sensors.types import Array
 
 FLOAT32, FLOAT64, STRING = "std_msgs/Float32", "std_msgs/Float64", "std_msgs/String"
-FLOATS, JOINT_STATE = "std_msgs/Float64MultiArray", "sensor_msgs/JointState"
+FLOAT_ARRAY, JOINT_STATE = "std_msgs/Float64MultiArray", "sensor_msgs/JointState"
 """Message types of the topics of hands."""
 VECTOR, WRENCH = "geometry_msgs/Vector3Stamped", "geometry_msgs/WrenchStamped"
 DIAGNOSTICS = "diagnostic_msgs/DiagnosticArray"
@@ -20,7 +20,7 @@ _DEFINITIONS = {
     FLOAT32: "float32 data",
     FLOAT64: "float64 data",
     STRING: "string data",
-    FLOATS: (
+    FLOAT_ARRAY: (
         "MultiArrayLayout layout\nfloat64[] data"
         + SEPARATOR
         + "std_msgs/MultiArrayLayout\nMultiArrayDimension[] dim\nuint32 data_offset"

@@ -63,7 +63,7 @@ def source(uri, until, patience=5.0):
     from holdfast.devices.sources.ros import topic
     from holdfast.errors import HoldfastError
 
-    topic.OPEN_TIMEOUT = float(patience)
+    topic.TOPIC_OPEN_TIMEOUT = float(patience)
     result = {"numbers": [], "times": [], "n_lost": 0, "notices": []}
     try:
         with open_source(uri) as opened:

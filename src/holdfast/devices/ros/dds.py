@@ -8,7 +8,7 @@ from typing import Any, Self
 from holdfast.devices.ros.link import Link, Publisher, TakeStates
 from holdfast.errors import MissingExtra, SourceError
 from holdfast.ros.cdr import MessageDecoder, MessageEncoder
-from holdfast.ros.definitions import NUMBER_CODES, Definition, Field
+from holdfast.ros.definitions import NUMBER_CODES, Definition, MessageField
 from holdfast.ros.topic_messages import JOINT_STATE, JointStates, topic_definition
 
 try:
@@ -269,20 +269,20 @@ class _Raw:
 
 
 @cache
-def _raw_type(name: str, types: tuple[tuple[str, tuple[Field, ...]], ...]) -> type[Any]:
+def _raw_type(name: str, types: tuple[tuple[str, tuple[MessageField, ...]], ...]) -> type[Any]:
     made = _struct(name, dict(types))
     for method in ("__init__", "serialize", "deserialize", "deserialize_key"):
         setattr(made, method, vars(_Raw)[method])
     return made
 
 
-def _struct(name: str, types: Mapping[str, tuple[Field, ...]]) -> type[Any]:
+def _struct(name: str, types: Mapping[str, tuple[MessageField, ...]]) -> type[Any]:
     fields = {field.name: _member(field, types) for field in types[name]}
     _, kind = name.split("/")
     return make_idl_struct(kind, dds_type(name), fields, dataclassify=False)
 
 
-def _member(field: Field, types: Mapping[str, tuple[Field, ...]]) -> Any:  # noqa: ANN401
+def _member(field: MessageField, types: Mapping[str, tuple[MessageField, ...]]) -> Any:  # noqa: ANN401
     one = _PRIMITIVES.get(field.kind) or _struct(field.kind, types)
     if field.size is None:
         return one

@@ -19,8 +19,8 @@ from holdfast.sensors import sensor
 from holdfast.sensors.types import Array
 
 SOURCE = "pollen-robotics/anyskin_slip_detection"
-NAMES = tuple(f"mag{node}_{axis}" for node in range(1, 6) for axis in "xyz")
-SLIP = "slip"
+MAGNETOMETER_COLUMNS = tuple(f"mag{node}_{axis}" for node in range(1, 6) for axis in "xyz")
+SLIP_COLUMN = "slip"
 TIME_NAMES = ("log_time", "timestamp", "time")
 """Names of the column of times; the first that a file has is used."""
 MIXED = "no_slip"
@@ -36,7 +36,7 @@ _UNITS = ((1e17, 1), (1e14, 1_000), (1e11, 1_000_000))
 
 
 _FORMAT = CsvFormat(
-    lambda names: set(NAMES) <= set(names),
+    lambda names: set(MAGNETOMETER_COLUMNS) <= set(names),
     "no anyskin-slip file in {}; CSV files with columns mag1_x.. and slip expected",
 )
 can_read, parts = _FORMAT.can_read, _FORMAT.parts
@@ -49,8 +49,8 @@ def read(path: Path) -> Iterator[Recording]:
         RecordingError: it has another form.
     """
     names = header_line(path)
-    table, cells = read_table(path, [name for name in names if name not in NAMES])
-    readings = table.columns(NAMES).reshape(-1, 5, 3)
+    table, cells = read_table(path, [name for name in names if name not in MAGNETOMETER_COLUMNS])
+    readings = table.columns(MAGNETOMETER_COLUMNS).reshape(-1, 5, 3)
     skin = sensor("anyskin")
     metadata: dict[str, Any] = {"source": SOURCE}
     if path.stem != MIXED:
@@ -64,7 +64,7 @@ def read(path: Path) -> Iterator[Recording]:
         metadata["clock"] = time_name
     with errors_named(path):
         module = Tactile(skin, times, readings)
-        labels = {"finger1": _labels(table, cells.get(SLIP), module)}
+        labels = {"finger1": _labels(table, cells.get(SLIP_COLUMN), module)}
         recording = Recording(path.stem, {"finger1": module}, metadata).with_labels(labels)
     yield recording
 
@@ -120,5 +120,7 @@ def _state(place: str, cell: str) -> tuple[ContactState, Cause | None] | None:
     if not cell:
         return None
     if cell not in _FLAGS:
-        raise RecordingError(f"{place}, column {SLIP!r}: {cell[:40]!r} given, 0 or 1 expected")
+        raise RecordingError(
+            f"{place}, column {SLIP_COLUMN!r}: {cell[:40]!r} given, 0 or 1 expected"
+        )
     return (ContactState.UNSTABLE, Cause.SLIP) if _FLAGS[cell] else (ContactState.STABLE, None)

@@ -22,7 +22,7 @@ from holdfast.sensors import sensor
 from holdfast.sensors.types import Array
 
 N_NODES = 15
-NAMES = tuple(f"mag_{axis}{node + 1}" for node in range(N_NODES) for axis in "xyz")
+NODE_COLUMNS = tuple(f"mag_{axis}{node + 1}" for node in range(N_NODES) for axis in "xyz")
 MILLISECOND = 1e-3
 TO_TAXEL_FRAME = np.array([1, -1, -1])
 """Half a turn about x: z of the device decreases when a section is pressed, z of a taxel
@@ -30,10 +30,10 @@ increases."""
 
 
 def _is_header(names: tuple[str, ...]) -> bool:
-    if set(NAMES) <= set(names):
+    if set(NODE_COLUMNS) <= set(names):
         return True
     numbered = tuple(str(k) for k in range(len(names) - 1))
-    return len(names) > len(NAMES) + 2 and names == ("", *numbered)
+    return len(names) > len(NODE_COLUMNS) + 2 and names == ("", *numbered)
 
 
 _FORMAT = CsvFormat(_is_header, "no gtac file in {}; CSV files with columns mag_x1.. expected")
@@ -53,7 +53,7 @@ def read(path: Path) -> Iterator[Recording]:
             f"after an unnamed index; {', '.join(map(repr, table.names[:4]))}... given"
         )
     numbered = table.names[0] == "" and "mag_x1" not in table.names
-    values = table.values[:, 1 : 1 + len(NAMES)] if numbered else table.columns(NAMES)
+    values = table.values[:, 1 : 1 + len(NODE_COLUMNS)] if numbered else table.columns(NODE_COLUMNS)
     times, n_without_time = _times(table)
     rotated = values[n_without_time:].reshape(-1, N_NODES, 3) * TO_TAXEL_FRAME
     readings = with_integer_type(rotated)

@@ -35,14 +35,14 @@ DIAGNOSTICS_PERIOD = 1.0
 """Maximum time between two diagnostics messages [s]."""
 MAX_ESTIMATE_AGE = 1.0
 """Age from which an estimate counts as missing in the diagnostics [s]."""
-NUMBERS = ("stable_probability", "instability")
+NUMBER_FIELDS = ("stable_probability", "instability")
 """Fields of an estimate with a topic of numbers for each finger."""
 NO_TORQUE = {"x": 0.0, "y": 0.0, "z": 0.0}
 GRIP_TEXTS = ("state", "reason")
 """Topics of the grip loop that are texts."""
 OK, WARN, ERROR = 0, 1, 2
 """Levels of diagnostics in ROS."""
-NOT_IN_DIAGNOSTICS = frozenset({"time", "force", "cause", *NUMBERS})
+NOT_IN_DIAGNOSTICS = frozenset({"time", "force", "cause", *NUMBER_FIELDS})
 """Fields of an estimate that the diagnostics leave out: those with a topic, the time, and the
 cause, which is no problem of the sensor."""
 
@@ -139,7 +139,7 @@ class RosPublisher(Openable):
         topics = {f"{self._namespace}/hand/state": STRING, "/diagnostics": DIAGNOSTICS}
         for finger, name in self._names.items():
             topics[f"{name}/state"] = STRING
-            topics |= {f"{name}/{field}": FLOAT64 for field in NUMBERS}
+            topics |= {f"{name}/{field}": FLOAT64 for field in NUMBER_FIELDS}
             topics[f"{name}/force"] = WRENCH if self._units[finger] == "N" else VECTOR
         if self._grip is not None:
             topics |= dict.fromkeys((f"{self._namespace}/grip/{n}" for n in GRIP_TEXTS), STRING)
@@ -222,7 +222,7 @@ class RosPublisher(Openable):
         for name in fingers:
             finger, topic = estimate.fingers[name], self._names[name]
             self._publish_text(f"{topic}/state", finger.state)
-            for field in NUMBERS:
+            for field in NUMBER_FIELDS:
                 self._publish(f"{topic}/{field}", number_message(getattr(finger, field)))
             force = dict(zip("xyz", finger.force, strict=True))
             message: dict[str, Any] = {"header": header(stamp, name), "vector": force}

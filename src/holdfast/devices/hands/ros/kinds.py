@@ -19,7 +19,7 @@ from holdfast.devices.hands.ros.parameters import Parameters
 from holdfast.devices.hands.ros.scalar_hand import ScalarHand, ScalarSetup
 from holdfast.devices.ros.link import Link
 from holdfast.devices.uri import Address, parse
-from holdfast.ros.topic_messages import FLOAT32, FLOAT64, FLOATS, JOINT_STATE
+from holdfast.ros.topic_messages import FLOAT32, FLOAT64, FLOAT_ARRAY, JOINT_STATE
 from holdfast.sensors.types import Array
 
 COMMON = ("shared",)
@@ -165,17 +165,17 @@ class GripperKind:
         return ScalarHand(name, link, setup, shared=_shared(given), standby=standby)
 
 
-Kind = JointKind | EnvelopKind | GripperKind
+HandKind = JointKind | EnvelopKind | GripperKind
 
-HAND_KINDS: dict[str, dict[str, Kind]] = {
+HAND_KINDS: dict[str, dict[str, HandKind]] = {
     "ros2": {
         "plexus": JointKind(
-            JointOutput.LARGEST, "/allegro_hand_position_effort_controller", "efforts", FLOATS,
+            JointOutput.LARGEST, "/allegro_hand_position_effort_controller", "efforts", FLOAT_ARRAY,
             "/joint_states", THUMB_FIRST, "ah_joint", home_topic="commands",
             release=("limp", "home"),
         ),
         "v4": JointKind(
-            JointOutput.POSITIONS, "/allegro_hand_position_controller", "commands", FLOATS,
+            JointOutput.POSITIONS, "/allegro_hand_position_controller", "commands", FLOAT_ARRAY,
             "/joint_states", THUMB_FIRST, "ah_joint",
             max_torque=joints.V4_MAX_TORQUE, stiffness=joints.ROS2_STIFFNESS, home=joints.V4_HOME,
         ),

@@ -14,7 +14,7 @@ from holdfast.errors import HandError, SourceError
 from holdfast.grip.command import GripCommand
 from holdfast.ros.topic_messages import JointStates
 
-OPEN_TIMEOUT = 5.0
+HAND_OPEN_TIMEOUT = 5.0
 """Longest wait until the hand listens and sends its joint states [s]."""
 DISCOVERY_TIME = 0.5
 """Time in which other publishers are found [s]."""
@@ -28,7 +28,7 @@ STATE_MEMORY = 0.2
 for as long [s]."""
 MIN_STATES = 5
 """Least number of these joint states, so that two wrong ones cannot define their median."""
-POLL_INTERVAL = 0.01
+HAND_POLL_INTERVAL = 0.01
 """Time between two checks while the hand is opened [s]."""
 
 
@@ -191,9 +191,9 @@ class RosHand(HandDevice):
 
     def _wait(self, done: Callable[[], object], begun_at: float, why: Callable[[], str]) -> None:
         while not done():
-            if time.monotonic() - begun_at > OPEN_TIMEOUT:
+            if time.monotonic() - begun_at > HAND_OPEN_TIMEOUT:
                 raise HandError(why())
-            time.sleep(POLL_INTERVAL)
+            time.sleep(HAND_POLL_INTERVAL)
 
     def _refuse_others(self, at: float) -> None:
         time.sleep(max(at - time.monotonic(), 0.0))
@@ -208,11 +208,11 @@ class RosHand(HandDevice):
         others = ", ".join(self._link.subscribed_topics()) or "none"
         return (
             f"{self.name}: nothing listens on {topic} {self._link.where} after "
-            f"{OPEN_TIMEOUT:g} s; topics with a subscriber: {others}"
+            f"{HAND_OPEN_TIMEOUT:g} s; topics with a subscriber: {others}"
         )
 
     def _no_states(self) -> str:
-        where = f"{self._states_topic} {self._link.where} in {OPEN_TIMEOUT:g} s"
+        where = f"{self._states_topic} {self._link.where} in {HAND_OPEN_TIMEOUT:g} s"
         if self._states or self._refusal:
             return (
                 f"{self.name}: {len(self._states)} valid joint states on {where}, at least "
