@@ -17,11 +17,11 @@ from dataclasses import replace
 import numpy as np
 
 from holdfast.devices.hands.ros.kinds import HAND_KINDS
-from holdfast.devices.hands.ros.link import Link, Publisher, TakeStates
 from holdfast.devices.hands.ros.parameters import Parameters
+from holdfast.devices.ros.link import Link, Publisher, TakeStates
 from holdfast.devices.uri import parse
 from holdfast.grip import FingerCommand, GripCommand, LoopState
-from holdfast.ros.hand_messages import JointStates
+from holdfast.ros.topic_messages import JointStates
 from holdfast.twin.contact import TIP_LOAD
 from holdfast.twin.control import PROPORTIONAL
 from holdfast.twin.hand import FINGERS, N_JOINTS

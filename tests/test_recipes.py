@@ -247,8 +247,8 @@ def test_add_a_grip_law(copy_of):
     copy.add("holdfast/grip/laws/double.py", "name", LAW)
     copy.change(
         "holdfast/grip/laws/__init__.py",
-        ("from holdfast.grip.laws.fixed", "from holdfast.grip.laws.double import Double\n"
-         "from holdfast.grip.laws.fixed"),
+        ("from holdfast.grip.laws.friction_margin", "from holdfast.grip.laws.double import Double\n"
+         "from holdfast.grip.laws.friction_margin"),
         ('    "fixed": Fixed,\n', '    "fixed": Fixed,\n    "double": Double,\n'),
     )  # fmt: skip
     program = (

@@ -98,7 +98,7 @@ def test_limits_that_the_hand_does_not_have_are_one_line(grasp, capsys, hand, me
 def test_a_hand_that_does_not_answer_is_one_line(grasp, capsys, monkeypatch):
     pytest.importorskip("cyclonedds", reason="cyclonedds is not installed")
     monkeypatch.setenv("ROS_LOCALHOST_ONLY", "1")
-    monkeypatch.setattr(ros_hand, "OPEN_TIMEOUT", 0.1)
+    monkeypatch.setattr(ros_hand, "HAND_OPEN_TIMEOUT", 0.1)
     hand = "ros2:v4?domain=229"
     words = ["hold", "builtin:twin", str(grasp), "--hand", hand, "--armed", "--confirm", hand]
     assert main(words) == 2

@@ -15,8 +15,13 @@ import holdfast
 from holdfast.cli.detect.output import EstimateChunk, json_lines
 from holdfast.contact import ContactEstimate
 from holdfast.grip import FingerCommand, Limits
-from holdfast.live.documents import FingerDocument, document_type, finger_document
-from holdfast.live.loop.documents import GripFinger, GripLimits
+from holdfast.live.documents import (
+    FingerDocument,
+    GripFinger,
+    GripLimits,
+    document_type,
+    finger_document,
+)
 from holdfast.live.publishers.ros_publisher import NOT_IN_DIAGNOSTICS, diagnostics_of
 from live import estimates
 

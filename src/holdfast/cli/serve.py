@@ -186,13 +186,11 @@ def _create_publishers(
     stream: "StreamDetector", *, grip: "LiveGrip | None", ros2: bool, ros1: bool
 ) -> "Iterator[RosPublisher]":
     units = {name: sensor.unit for name, sensor in stream.fingers.items()}
+    if ros2 or ros1:
+        from holdfast.live.publishers.ros_publisher import Ros1Publisher, Ros2Publisher
     if ros2:
-        from holdfast.live.publishers.ros2_publisher import Ros2Publisher
-
         yield Ros2Publisher(units, grip=grip)
     if ros1:
-        from holdfast.live.publishers.ros1_publisher import Ros1Publisher
-
         yield Ros1Publisher(units, grip=grip)
 
 

@@ -1,6 +1,6 @@
-"""ROS messages of hands: their definitions in ROS 2, joint states, and commands of joints."""
+"""ROS messages that holdfast publishes, of hands and of estimates: their definitions in ROS 2."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -9,14 +9,18 @@ from holdfast.ros.definitions import ROS2_HEADER, SEPARATOR, Definition, parse_d
 from holdfast.sensors.types import Array
 
 FLOAT32, FLOAT64, STRING = "std_msgs/Float32", "std_msgs/Float64", "std_msgs/String"
-FLOATS, JOINT_STATE = "std_msgs/Float64MultiArray", "sensor_msgs/JointState"
+FLOAT_ARRAY, JOINT_STATE = "std_msgs/Float64MultiArray", "sensor_msgs/JointState"
 """Message types of the topics of hands."""
+VECTOR, WRENCH = "geometry_msgs/Vector3Stamped", "geometry_msgs/WrenchStamped"
+DIAGNOSTICS = "diagnostic_msgs/DiagnosticArray"
+"""Message types of the topics of estimates, besides `STRING` and `FLOAT64`."""
 
+_VECTOR3 = SEPARATOR + "geometry_msgs/Vector3\nfloat64 x\nfloat64 y\nfloat64 z"
 _DEFINITIONS = {
     FLOAT32: "float32 data",
     FLOAT64: "float64 data",
     STRING: "string data",
-    FLOATS: (
+    FLOAT_ARRAY: (
         "MultiArrayLayout layout\nfloat64[] data"
         + SEPARATOR
         + "std_msgs/MultiArrayLayout\nMultiArrayDimension[] dim\nuint32 data_offset"
@@ -27,12 +31,29 @@ _DEFINITIONS = {
         "std_msgs/Header header\nstring[] name\nfloat64[] position\nfloat64[] velocity\n"
         "float64[] effort" + ROS2_HEADER
     ),
+    VECTOR: "std_msgs/Header header\nVector3 vector" + ROS2_HEADER + _VECTOR3,
+    WRENCH: (
+        "std_msgs/Header header\nWrench wrench"
+        + ROS2_HEADER
+        + SEPARATOR
+        + "geometry_msgs/Wrench\nVector3 force\nVector3 torque"
+        + _VECTOR3
+    ),
+    DIAGNOSTICS: (
+        "std_msgs/Header header\nDiagnosticStatus[] status"
+        + ROS2_HEADER
+        + SEPARATOR
+        + "diagnostic_msgs/DiagnosticStatus\nbyte level\nstring name\nstring message\n"
+        + "string hardware_id\nKeyValue[] values"
+        + SEPARATOR
+        + "diagnostic_msgs/KeyValue\nstring key\nstring value"
+    ),
 }
 MESSAGE_TYPES = tuple(_DEFINITIONS)
 """Message types whose definition in ROS 2 is known here."""
 
 
-def hand_definition(kind: str) -> Definition:
+def topic_definition(kind: str) -> Definition:
     """Return the definition in ROS 2 of one of `MESSAGE_TYPES`."""
     return parse_definition(kind, _DEFINITIONS[kind])
 
@@ -83,7 +104,7 @@ def joint_message(
     """
     empty = np.empty(0)
     return {
-        "header": {"stamp": _stamp(time), "frame_id": ""},
+        "header": header(time),
         "name": list(names),
         "position": empty if positions is None else positions,
         "velocity": empty,
@@ -91,8 +112,8 @@ def joint_message(
     }
 
 
-def _stamp(time: float) -> Mapping[str, int]:
-    if not 0.0 <= time < 2.0**31:
-        return {"sec": 0, "nanosec": 0}
-    seconds = int(time)
-    return {"sec": seconds, "nanosec": int((time - seconds) * 1e9)}
+def header(time: float, frame: str = "") -> dict[str, Any]:
+    """Return a header with a time [s], which is not set if it is negative or NaN."""
+    seconds = int(time) if 0.0 <= time < 2.0**31 else 0
+    nanoseconds = int((time - seconds) * 1e9) if 0.0 <= time < 2.0**31 else 0
+    return {"stamp": {"sec": seconds, "nanosec": nanoseconds}, "frame_id": frame}

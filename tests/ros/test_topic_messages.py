@@ -7,13 +7,13 @@ from rosbags.typesys import Stores, get_typestore
 
 from holdfast.ros.cdr import MessageDecoder, MessageEncoder
 from holdfast.ros.definitions import parse_definition
-from holdfast.ros.hand_messages import (
-    FLOATS,
+from holdfast.ros.topic_messages import (
+    FLOAT_ARRAY,
     JOINT_STATE,
     MESSAGE_TYPES,
     array_message,
-    hand_definition,
     joint_message,
+    topic_definition,
 )
 
 TYPES = get_typestore(Stores.ROS2_HUMBLE)
@@ -23,7 +23,7 @@ TYPES = get_typestore(Stores.ROS2_HUMBLE)
 def test_definitions_are_those_of_ros(name):
     text, _ = TYPES.generate_msgdef(name.replace("/", "/msg/"), ros_version=2)
     theirs = parse_definition(name, text)
-    ours = hand_definition(name)
+    ours = topic_definition(name)
     assert {k: f for k, f in ours.types.items() if "/" in k} == {
         k: f for k, f in theirs.types.items() if "/" in k
     }
@@ -31,10 +31,10 @@ def test_definitions_are_those_of_ros(name):
 
 def test_another_program_reads_the_messages():
     values = np.linspace(0.0, 1.0, 16)
-    data = MessageEncoder(hand_definition(FLOATS))(array_message(values))
+    data = MessageEncoder(topic_definition(FLOAT_ARRAY))(array_message(values))
     read = TYPES.deserialize_cdr(data, "std_msgs/msg/Float64MultiArray")
     np.testing.assert_array_equal(read.data, values)
-    data = MessageEncoder(hand_definition(JOINT_STATE))(
+    data = MessageEncoder(topic_definition(JOINT_STATE))(
         joint_message(12.5, ["a", "b"], efforts=np.array([1.0, 2.0]))
     )
     read = TYPES.deserialize_cdr(data, "sensor_msgs/msg/JointState")
@@ -44,6 +44,6 @@ def test_another_program_reads_the_messages():
 
 @pytest.mark.parametrize("time", [float("nan"), -1.0, 1e12])
 def test_a_time_that_is_no_stamp_is_not_set(time):
-    data = MessageEncoder(hand_definition(JOINT_STATE))(joint_message(time, []))
-    stamp = MessageDecoder(hand_definition(JOINT_STATE), ros2=True)(data)["header"]["stamp"]
+    data = MessageEncoder(topic_definition(JOINT_STATE))(joint_message(time, []))
+    stamp = MessageDecoder(topic_definition(JOINT_STATE), ros2=True)(data)["header"]["stamp"]
     assert stamp == {"sec": 0, "nanosec": 0}

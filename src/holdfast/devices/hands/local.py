@@ -1,4 +1,4 @@
-"""Grippers with one force: a Python function gets the largest scale of all fingers."""
+"""Hands without a network: a function of Python that gets one force, and a file for dry runs."""
 
 import math
 import os
@@ -8,6 +8,10 @@ from contextlib import suppress
 from importlib import import_module
 from pathlib import Path
 from types import ModuleType
+from typing import BinaryIO
+
+import msgspec
+from msgspec import structs
 
 from holdfast.devices.hands.base import HandDevice
 from holdfast.errors import HandError
@@ -138,3 +142,51 @@ def _heartbeat(function: Callable[[float], object], name: str) -> float | None:
             f"{found!r} given"
         )
     return float(found)
+
+
+class LogFile(HandDevice):
+    """Hand that appends each command to a file, except one that differs in its time alone.
+
+    Args:
+        name: URI of the hand.
+        path: of the file; it is created if it does not exist.
+    """
+
+    def __init__(self, name: str, path: str | Path) -> None:
+        self.name = name
+        self._path = Path(path)
+        self._file: BinaryIO | None = None
+
+    @property
+    def resource(self) -> str:
+        """What only one controller may command: the file, by its real path."""
+        return f"log:{os.path.realpath(self._path)}"
+
+    def open(self) -> None:
+        """Open the file.
+
+        Raises:
+            HandError: it cannot be written.
+        """
+        try:
+            self._file = self._path.open("ab", buffering=0)
+        except OSError as cause:
+            raise HandError(f"cannot write {self._path}: {cause.strerror}") from cause
+
+    def _send(self, command: GripCommand) -> None:
+        try:
+            if self._file is None:
+                raise HandError(f"{self.name} is not open")
+            self._file.write(msgspec.json.encode(command) + b"\n")
+        except OSError as cause:
+            raise HandError(f"cannot write {self._path}: {cause.strerror}") from cause
+
+    def _content(self, command: GripCommand) -> object:
+        return structs.replace(command, time=0.0)
+
+    def close(self) -> None:
+        """Close the file."""
+        self.forget()
+        if self._file is not None:
+            self._file.close()
+            self._file = None

@@ -1,39 +1,29 @@
-"""Connection to the topics of a hand: what ROS 1 and ROS 2 share."""
+"""Connection to ROS, the same for ROS 1 and ROS 2: publishers, and joint states of hands."""
 
 from abc import abstractmethod
-from collections.abc import Callable, Iterator, Mapping
-from contextlib import contextmanager
+from collections.abc import Callable, Mapping
 from typing import Any, NamedTuple
 
-from holdfast.errors import HandError, SourceError
 from holdfast.openable import Openable
-from holdfast.ros.hand_messages import JointStates
+from holdfast.ros.topic_messages import JointStates
 
 
 class Publisher(NamedTuple):
     """Publisher of messages on a topic.
 
     Attributes:
-        publish: publishes a message, given by its fields, and returns at once.
+        publish: publishes a message, given by its fields, and returns at once; it raises a
+            `SourceError` if ROS refuses the message.
         n_listeners: returns the number of subscribers.
     """
 
     publish: Callable[[Mapping[str, Any]], None]
     n_listeners: Callable[[], int]
 
-    def __call__(self, message: Mapping[str, Any]) -> None:
-        """Publish a message.
-
-        Raises:
-            HandError: ROS refuses it.
-        """
-        with hand_errors():
-            self.publish(message)
-
 
 TakeStates = Callable[[], list[JointStates]]
 """Function that returns the joint states of a hand since its last call, the oldest first. It
-raises a `HandError` if a message is damaged."""
+raises a `SourceError` if a message is damaged."""
 
 
 class Link(Openable):
@@ -55,7 +45,7 @@ class Link(Openable):
         """Join ROS.
 
         Raises:
-            HandError: ROS cannot be reached.
+            SourceError: ROS cannot be reached.
         """
 
     @abstractmethod
@@ -77,16 +67,3 @@ class Link(Openable):
     @abstractmethod
     def published_topics(self) -> list[str]:
         """Return the names of all topics with a publisher."""
-
-
-@contextmanager
-def hand_errors() -> Iterator[None]:
-    """Turn an error of ROS into one of the hand.
-
-    Raises:
-        HandError: the block raised a `SourceError`.
-    """
-    try:
-        yield
-    except SourceError as cause:
-        raise HandError(str(cause)) from cause
