@@ -282,13 +282,13 @@ class TestCluster:
     @pytest.mark.parametrize("address", ["missing", "127.0.0.1:1", "spark://127.0.0.1:1"])
     def test_no_scheduler_at_the_address(self, monkeypatch, address):
         pytest.importorskip("distributed")
-        monkeypatch.setattr(cluster_module, "CONNECT_TIMEOUT", 0.5)
+        monkeypatch.setattr(cluster_module, "SCHEDULER_TIMEOUT", 0.5)
         with pytest.raises(EngineError, match=rf"^no Dask scheduler answers at {address}: start"):
             list(Engine.parse(f"dask:{address}").map_ordered(power, [(1, 1)]))
 
     def test_another_server_at_the_address(self, monkeypatch):
         pytest.importorskip("distributed")
-        monkeypatch.setattr(cluster_module, "CONNECT_TIMEOUT", 0.5)
+        monkeypatch.setattr(cluster_module, "SCHEDULER_TIMEOUT", 0.5)
         with socket.create_server(("127.0.0.1", 0)) as silent:
             engine = Engine.parse("dask:{}:{}".format(*silent.getsockname()))
             with pytest.raises(EngineError, match=r"^no Dask scheduler answers at 127\.0\.0\.1:"):
@@ -303,7 +303,7 @@ class TestCluster:
 class TestNothingGlobalStays:
     def test_the_filter_of_warnings_is_there_while_pools_run_only(self):
         before = list(warnings.filters)
-        first, second = (map_ordered(abs, [(-1,), (-2,)], n_jobs=2) for _ in range(2))
+        first, second = (Engine(2).map_ordered(abs, [(-1,), (-2,)]) for _ in range(2))
         assert [next(first), next(second)] == [1, 1]
         (added,) = [one for one in warnings.filters if one not in before]
         assert added[1].match("A worker stopped while some jobs were given to the executor")
@@ -314,7 +314,7 @@ class TestNothingGlobalStays:
 
     def test_filters_that_the_program_reset_meanwhile_stay_so(self):
         with warnings.catch_warnings():
-            calls = map_ordered(abs, [(-1,), (-2,)], n_jobs=2)
+            calls = Engine(2).map_ordered(abs, [(-1,), (-2,)])
             next(calls)
             warnings.resetwarnings()
             assert list(calls) == [2]

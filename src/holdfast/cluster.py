@@ -20,7 +20,7 @@ K = TypeVar("K", bound=Hashable)
 Arguments = tuple[object, ...]
 Call = tuple[K, Arguments]
 
-CONNECT_TIMEOUT = 10.0
+SCHEDULER_TIMEOUT = 10.0
 """Time within which a scheduler must answer [s]."""
 
 NO_WORKER_TIMEOUT = 30.0
@@ -172,8 +172,8 @@ def _connect(scheduler: str) -> "Client":
 
     try:
         with ThreadPoolExecutor(1) as thread:  # the calling thread may have an event loop
-            thread.submit(run, wait_for(_connect_once(scheduler), CONNECT_TIMEOUT)).result()
-        return Client(scheduler, timeout=CONNECT_TIMEOUT, set_as_default=False)
+            thread.submit(run, wait_for(_connect_once(scheduler), SCHEDULER_TIMEOUT)).result()
+        return Client(scheduler, timeout=SCHEDULER_TIMEOUT, set_as_default=False)
     except Exception as cause:  # a server of any other kind may answer there
         raise EngineError(
             f"no Dask scheduler answers at {scheduler}: start one with `dask scheduler` "

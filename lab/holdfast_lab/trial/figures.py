@@ -26,7 +26,7 @@ from holdfast.sensors.types import Array
 from holdfast_lab.figures.dots import IntervalEstimate, draw_groups
 from holdfast_lab.report.html_report import ReportFigure
 from holdfast_lab.trial.course import TrialCourse
-from holdfast_lab.trial.document import GOALS, Results
+from holdfast_lab.trial.document import GOALS, TrialResults
 from holdfast_lab.trial.run import TrialResult
 from holdfast_lab.trial.summary import Summary, reaction_time
 
@@ -206,7 +206,7 @@ def _share_limits(row: Sequence[Axes]) -> None:
         axes.set(xlim=(left, right), ylim=(0, top))
 
 
-def distribution_figure(results: Results) -> ReportFigure:
+def distribution_figure(results: TrialResults) -> ReportFigure:
     """Return the distributions of slip and reaction time."""
     slips = {law: _held(trials, lambda trial: 1e3 * trial.slip) for law, trials in results.items()}
     times = {

@@ -37,14 +37,19 @@ if TYPE_CHECKING:
 
 DEMO_MODEL = "builtin:twin"
 """The model of the demo: the best one that ships for the sensor of the simulated hand."""
-OBJECTS, CASES, N_REPEATS = "mug,carton", "1,2", 1
+DEMO_OBJECTS, DEMO_CASES, N_DEMO_REPEATS = "mug,carton", "1,2", 1
 """Objects of the demo, none of which `DEMO_MODEL` was trained on; cases and grasps of each."""
 MIN_DURATION = 0.15
 """Minimum time that a new state must last to be printed [s]."""
-REFRESH_INTERVAL = 0.1
+SCREEN_INTERVAL = 0.1
 """Time between two updates of the table on the terminal [s]."""
 BAR_WIDTH = 10
-COLOURS = {"UNKNOWN": "dim", "NO_CONTACT": "white", "UNSTABLE": "bold red", "STABLE": "green"}
+TERMINAL_COLOURS = {
+    "UNKNOWN": "dim",
+    "NO_CONTACT": "white",
+    "UNSTABLE": "bold red",
+    "STABLE": "green",
+}
 STATES = {
     "UNKNOWN": "no samples yet, or a fault",
     "NO_CONTACT": "nothing touches",
@@ -127,8 +132,10 @@ def _simulate(folder: Path, seed: int, force: bool) -> "Sequence[Recording]":
     from holdfast.io import load_dataset
     from holdfast.twin.objects import OTHER_OBJECTS
 
-    grasps = plan_grasps(OBJECTS, CASES, N_REPEATS, "reference", seed, table=OTHER_OBJECTS)
-    names = OBJECTS.replace(",", " and ")
+    grasps = plan_grasps(
+        DEMO_OBJECTS, DEMO_CASES, N_DEMO_REPEATS, "reference", seed, table=OTHER_OBJECTS
+    )
+    names = DEMO_OBJECTS.replace(",", " and ")
     print_message(f"1/4  simulating {len(grasps)} grasps: {names}, Allegro hand, uSkin fingertips")
     simulate_grasps(grasps, folder, jobs=-1, force=force, report=_report_grasp)
     return load_dataset(folder)
@@ -320,7 +327,7 @@ def _show_table(model: "Model", source: "Source", true_events: TrueEvents) -> in
     with Live(console=console, auto_refresh=False, transient=True, redirect_stdout=False) as screen:
         for estimate in print_changes(model, source, true_events, console.print):
             n_updates += 1
-            if time.monotonic() - updated_at > REFRESH_INTERVAL:
+            if time.monotonic() - updated_at > SCREEN_INTERVAL:
                 updated_at = time.monotonic()
                 screen.update(finger_table(estimate), refresh=True)
     return n_updates
@@ -365,4 +372,4 @@ def _number(value: float, digits: int) -> str:
 
 
 def _coloured(state: str) -> str:
-    return f"[{COLOURS[state]}]{state:10}[/]"
+    return f"[{TERMINAL_COLOURS[state]}]{state:10}[/]"

@@ -36,7 +36,7 @@ EXTRA_PURPOSES = {
     "hdf5": "import of HDF5 recordings",
 }
 """Purpose of each extra."""
-CONNECT_TIMEOUT = 0.3
+PROBE_TIMEOUT = 0.3
 """Time in which a server must accept a connection [s]."""
 
 _REQUIREMENT = re.compile(r"(?P<package>[\w.-]+)(?:.*extra\s*==\s*['\"](?P<extra>[\w-]+)['\"])?")
@@ -204,7 +204,7 @@ def _xela() -> str:
 
     addresses = places(parse("xela://auto")[1])
     for address in addresses:
-        with suppress(OSError), socket.create_connection(address, CONNECT_TIMEOUT):
+        with suppress(OSError), socket.create_connection(address, PROBE_TIMEOUT):
             return f"a server listens at {address}"
     return f"no server listens at {' or '.join(map(str, addresses))}"
 

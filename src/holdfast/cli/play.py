@@ -23,9 +23,9 @@ if TYPE_CHECKING:
     from holdfast.devices.sources import Source
     from holdfast.live.publishers.xela_server import XelaServer
 
-POLL_INTERVAL = 0.2
+END_POLL_INTERVAL = 0.2
 """Time between two checks whether the server has ended [s]."""
-REFRESH_INTERVAL = 1.0
+PLAY_REFRESH_INTERVAL = 1.0
 """Time between two updates of the rate on a terminal [s]."""
 
 
@@ -123,9 +123,9 @@ def _print_address(server: "XelaServer", source: str, version: str, *, as_json: 
 def _print_status(server: "XelaServer") -> None:
     """Print the number of clients until the server ends; without a terminal only its changes."""
     updated_at, n_sent, n_clients = time.monotonic(), 0, -1
-    while not server.wait(POLL_INTERVAL):
+    while not server.wait(END_POLL_INTERVAL):
         now = time.monotonic()
-        if sys.stderr.isatty() and now - updated_at >= REFRESH_INTERVAL:
+        if sys.stderr.isatty() and now - updated_at >= PLAY_REFRESH_INTERVAL:
             rate = (server.n_packets - n_sent) / (now - updated_at)
             sys.stderr.write(f"\r{_clients(server.n_clients)}, {rate:.1f} packets/s \033[K")
             updated_at, n_sent = now, server.n_packets

@@ -34,7 +34,7 @@ CAUSE_BY_CODE: tuple[Cause | None, ...] = (None, *ALL_CAUSES)
 Decision = tuple[ContactState, Reason, tuple[Fault, ...], Cause | None]
 
 
-class Decisions(dict[float, Decision]):
+class DecisionCache(dict[float, Decision]):
     """State, reason, faults and cause by the code that the kernel reports, of the codes so far."""
 
     def __missing__(self, code: float) -> Decision:
@@ -45,7 +45,7 @@ class Decisions(dict[float, Decision]):
         return self[code]
 
 
-_DECISIONS = Decisions()
+_DECISIONS = DecisionCache()
 Name = TypeVar("Name", str, int)
 
 

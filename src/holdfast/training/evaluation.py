@@ -30,7 +30,7 @@ from holdfast.training.dataset_scan import (
 )
 from holdfast.training.verdict import LoadedTares, verdict
 
-TARE_LOADED = 1 << SIGNAL_FAULTS.index(Fault.TARE_LOADED)
+TARE_LOADED_BIT = 1 << SIGNAL_FAULTS.index(Fault.TARE_LOADED)
 """Bit of the fault of a tare that was taken under load."""
 
 
@@ -52,7 +52,7 @@ def judge(model: Model, recording: Recording) -> tuple[Decisions, bool]:
         ModelError: the recording has other fingers or sensors.
     """
     detection = detect(model, recording)
-    loaded = any((trace.faults & TARE_LOADED).any() for trace in detection.fingers.values())
+    loaded = any((trace.faults & TARE_LOADED_BIT).any() for trace in detection.fingers.values())
     exact = labels_by_truth(recording, LabelRule(margin=0.0))
     fingers = {
         name: FingerDecisions(

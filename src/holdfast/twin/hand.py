@@ -35,7 +35,7 @@ JOINTS = {"thumb": 12, "index": 0, "middle": 4, "ring": 8}
 MOUNTS = np.array([[-0.013, 0.0, 0.0315], *[[-0.013, 0.0, 0.016]] * 3])
 """Origin of each fingertip frame in its last link, (4, 3) [m], as XELA mounts the tips."""
 
-ARMATURE, JOINT_DAMPING, JOINT_FRICTION = 6e-4, 0.012, 0.012
+ARMATURE, DAMPING, FRICTION = 6e-4, 0.012, 0.012
 """Gear inertia [kg m^2], viscous damping [N m s/rad] and dry friction [N m] of a joint. Own
 choices: small gear motors that can be turned back by hand."""
 PALM_MASS, PALM_SIDES, PALM_MIDDLE = 0.4154, (0.0408, 0.113, 0.095), (-0.0093, 0.0, -0.0475)
@@ -106,7 +106,7 @@ def hand_xml(item: GraspObject | None = None) -> str:
   </visual>
   <default>
     <geom contype="0" conaffinity="0" rgba="{SHELL_COLOUR}"/>
-    <joint armature="{ARMATURE}" damping="{JOINT_DAMPING}" frictionloss="{JOINT_FRICTION}"
+    <joint armature="{ARMATURE}" damping="{DAMPING}" frictionloss="{FRICTION}"
       limited="true"/>
   </default>
   <asset>

@@ -68,7 +68,7 @@ N_BRISTLE = 4
 Bristle = tuple[float, float, float, float]
 
 # Columns of a packed skin: the fields of Skin in their order, and the ball around all nodes.
-STIFFNESS, HARDENING, DAMPING, SHEAR, ENGAGEMENT, SHEAR_TIME, STRIBECK, MEMORY, SLIPPING = range(9)
+STIFFNESS, HARDENING, VISCOUS, SHEAR, ENGAGEMENT, SHEAR_TIME, STRIBECK, MEMORY, SLIPPING = range(9)
 BALL = 9
 
 _MIN_SLIP_SPEED = 1e-12  # slower slip [m/s] is set to zero, to avoid denormal numbers
@@ -124,7 +124,7 @@ def pressure(skin: Numbers, stiffness: float, depth: float, leaving: float) -> f
         depth: depth of the node below the surface, above 0 [m].
         leaving: speed along the outward normal [m/s].
     """
-    force: float = elastic(skin, stiffness, depth) * max(1.0 - skin[DAMPING] * leaving, 0.0)
+    force: float = elastic(skin, stiffness, depth) * max(1.0 - skin[VISCOUS] * leaving, 0.0)
     return force
 
 

@@ -68,7 +68,7 @@ def _force_rate(finger: FingerSignal) -> Array:
     return np.asarray(np.linalg.norm(steps, axis=1, keepdims=True) * finger.rate)
 
 
-FRICTION = Method(
+FRICTION_METHOD = Method(
     "friction",
     "Coulomb friction margin",
     "friction",

@@ -89,6 +89,6 @@ def test_the_table(plan):
     }
     first = SWITCHES[0].setting
     for row in table.rows:
-        if row.keys["figure"] == attribution.DIFFERENCE:
+        if row.keys["figure"] == attribution.LINE_DIFFERENCE:
             to, on = row.keys["to"], row.keys["on"]
             assert row.ours == pytest.approx(accuracy[to, on] - accuracy[first, on])

@@ -22,7 +22,7 @@ from holdfast.cli.terminal.console import (
 from holdfast.cli.terminal.progress import progress
 
 if TYPE_CHECKING:
-    from holdfast.labelling.server.store import Labels
+    from holdfast.labelling.server.store import ModuleLabels
     from holdfast.recordings import Recording
 
 MAX_DOUBTFUL_SHOWN = 20
@@ -101,7 +101,7 @@ def _manual_author(path: Path) -> str | None:
 
 def label_all(
     files: Sequence[Path],
-    labels_of: "Callable[[Recording], Labels]",
+    labels_of: "Callable[[Recording], ModuleLabels]",
     saving: SaveOptions,
     author: str,
 ) -> list[dict[str, Any]]:
@@ -128,7 +128,7 @@ def label_all(
     return documents
 
 
-def write_labels(path: Path, recording: "Recording", labels: "Labels", author: str) -> None:
+def write_labels(path: Path, recording: "Recording", labels: "ModuleLabels", author: str) -> None:
     """Write the label file of a recording; keep its note.
 
     Raises:
@@ -263,7 +263,7 @@ def _hidden_text(n_hidden: int, n: int, *, written: bool) -> str:
     return f"{text}outrank them in train and evaluate: delete NAME.labels.json to use them again"
 
 
-def _document(path: Path, recording: "Recording", labels: "Labels") -> dict[str, Any]:
+def _document(path: Path, recording: "Recording", labels: "ModuleLabels") -> dict[str, Any]:
     from holdfast.io.label_files import labels_path
     from holdfast.labelling.rules.forces import evidence_of_contact
 
@@ -279,7 +279,7 @@ def _document(path: Path, recording: "Recording", labels: "Labels") -> dict[str,
     }
 
 
-def _label_seconds(labels: "Labels") -> dict[str, float]:
+def _label_seconds(labels: "ModuleLabels") -> dict[str, float]:
     """Return the duration of each state over all fingers [s], rounded to microseconds."""
     from holdfast.cli.info import label_seconds
 
@@ -287,7 +287,7 @@ def _label_seconds(labels: "Labels") -> dict[str, float]:
     return {state: round(seconds, 6) for state, seconds in total.items()}
 
 
-def _doubtful_labels(labels: "Labels") -> list[dict[str, Any]]:
+def _doubtful_labels(labels: "ModuleLabels") -> list[dict[str, Any]]:
     """Return the labels with low confidence as JSON values, the lowest first."""
     from holdfast.labelling.review.spans import doubtful
 
@@ -304,7 +304,7 @@ def _doubtful_labels(labels: "Labels") -> list[dict[str, Any]]:
     ]
 
 
-def _labels_json(labels: "Labels") -> Mapping[str, Any]:
+def _labels_json(labels: "ModuleLabels") -> Mapping[str, Any]:
     """Return labels by finger as JSON values."""
     from msgspec import to_builtins
 

@@ -12,7 +12,7 @@ from holdfast.cli.terminal.progress import progress
 if TYPE_CHECKING:
     from holdfast.recordings import Recording
 
-FORMATS = ("label-studio", "csv")
+EXCHANGE_FORMATS = ("label-studio", "csv")
 
 
 def export_labels(
@@ -22,7 +22,7 @@ def export_labels(
 
     Args:
         paths: recordings, or folders of recordings.
-        kind: one of `FORMATS`.
+        kind: one of `EXCHANGE_FORMATS`.
         out: folder for the files.
         force: overwrite existing files.
         as_json: print JSON.
@@ -34,8 +34,8 @@ def export_labels(
     """
     from holdfast.io import Dataset
 
-    if kind not in FORMATS:
-        raise ValueError(f"--export {' or '.join(FORMATS)} expected, {kind!r} given")
+    if kind not in EXCHANGE_FORMATS:
+        raise ValueError(f"--export {' or '.join(EXCHANGE_FORMATS)} expected, {kind!r} given")
     recordings = Dataset(recordings_at(paths))
     if kind == "csv":
         written = _export_csv(recordings, out, force)

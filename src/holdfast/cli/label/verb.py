@@ -16,7 +16,7 @@ from holdfast.cli.options import (
 )
 from holdfast.errors import require_extras
 
-ADDRESS = ServerOptions(LOCALHOST, port=8081)
+LABEL_ADDRESS = ServerOptions(LOCALHOST, port=8081)
 
 
 @dataclass(frozen=True)
@@ -73,7 +73,7 @@ def label(
     options: RuleOptions,
     saving: SaveOptions,
     jobs: JobsOption = -1,
-    access: ServerOptions = ADDRESS,
+    access: ServerOptions = LABEL_ADDRESS,
     browser: BrowserOption = None,
     as_json: JsonOption = False,
 ) -> None:

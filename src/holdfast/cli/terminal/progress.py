@@ -22,7 +22,7 @@ T = TypeVar("T")
 DISPLAY_DELAY = 2.0
 """Time after which a progress bar appears [s]."""
 
-MESSAGE_INTERVAL = 60.0
+PROGRESS_INTERVAL = 60.0
 """Minimum time between two progress messages where stderr is no terminal [s]."""
 
 MIN_ESTIMATE_SHARE = 0.03
@@ -111,7 +111,7 @@ class ProgressBar:
 
     def _print_sometimes(self) -> None:
         now = time.monotonic()
-        if self._total and now - self._last_message_at > MESSAGE_INTERVAL:
+        if self._total and now - self._last_message_at > PROGRESS_INTERVAL:
             self._last_message_at = now
             left = self._expected_duration() - (now - self._started_at)
             text = "" if math.isnan(left) else f", about {left / 60:.0f} min left"

@@ -86,9 +86,7 @@ def start_node(master: str) -> ModuleType:
             if _master not in (None, master):
                 raise SourceError(f"this process is a node of {_master} and cannot be of {master}")
             return rospy
-        os.environ["ROS_MASTER_URI"] = (
-            master  # rospy reads it as long as the process runs
-        )
+        os.environ["ROS_MASTER_URI"] = master  # rospy reads it as long as the process runs
         rospy.init_node("holdfast", argv=["holdfast"], anonymous=True, disable_signals=True)
         atexit.register(rospy.signal_shutdown, "the process ends")
         _remove_console_log()

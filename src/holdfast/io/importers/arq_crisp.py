@@ -26,7 +26,7 @@ from holdfast.sensors.types import Array
 HDF5_SUFFIXES = (".h5", ".hdf5")
 HDF5_MAGIC = b"\x89HDF\r\n\x1a\n"
 SOURCE = "ARQ-CRISP"
-READINGS, TIMES_NAME, LABELS_NAME = (
+RAW_DATA, TIMES_NAME, LABELS_NAME = (
     "tactile_data_raw",
     "tactile_timestamps",
     "tactile_slips_label",
@@ -104,7 +104,7 @@ def read(path: Path) -> Iterator[Recording]:
             names = _names_of_recordings(file, h5py, budget)
             seen: set[int] = set()
             if not names:
-                raise RecordingError(f"{path}: no group with {READINGS} in it")
+                raise RecordingError(f"{path}: no group with {RAW_DATA} in it")
             for name in sorted(names, key=lambda name: natural_order(Path(name.replace("/", "_")))):
                 arrays = _Arrays(path, file[name], h5py, budget, seen)
                 yield _recording(f"{path}: {name}", name.split("/"), arrays)
@@ -135,7 +135,7 @@ def _names_of_recordings(file: Any, h5py: ModuleType, budget: ReadBudget) -> lis
             raise RecordingError(
                 f"{budget.path}: groups are nested more than {MAX_GROUP_DEPTH} deep; 4 expected"
             )
-        if name and READINGS in group:
+        if name and RAW_DATA in group:
             names.append(name)
             continue
         for key in group:
@@ -256,11 +256,11 @@ class _Arrays:
 def _recording(place: str, parts: list[str], group: _Arrays) -> Recording:
     if TIMES_NAME not in group:
         raise RecordingError(f"{place} has no {TIMES_NAME}; it has {', '.join(group.names())}")
-    raw = group[READINGS]
+    raw = group[RAW_DATA]
     times = group[TIMES_NAME].ravel() * MILLISECOND
     if raw.ndim != 3 or raw.shape[1:] != (3, len(times)):
         raise RecordingError(
-            f"{place}: {READINGS} of shape (n_taxels, 3, {len(times)}) expected, {raw.shape} given"
+            f"{place}: {RAW_DATA} of shape (n_taxels, 3, {len(times)}) expected, {raw.shape} given"
         )
     readings = with_integer_type(raw.transpose(2, 0, 1))
     with errors_named(place):

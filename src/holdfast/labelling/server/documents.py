@@ -9,7 +9,7 @@ from holdfast.errors import HoldfastError
 from holdfast.io.header import LabelData, label_data
 from holdfast.io.label_files import labels_for
 from holdfast.labelling.review.spans import State, doubtful, state_name
-from holdfast.labelling.server.store import LabelInput, Labels, Origin, is_read_only
+from holdfast.labelling.server.store import LabelInput, ModuleLabels, Origin, is_read_only
 from holdfast.labelling.server.workspace import Workspace, beside
 from holdfast.recordings import Label, Recording
 
@@ -235,7 +235,7 @@ def describe_recording(workspace: Workspace, index: int) -> RecordingDetails:
     )
 
 
-def doubtful_labels(labels: Labels, proposals: Labels) -> list[DoubtfulLabel]:
+def doubtful_labels(labels: ModuleLabels, proposals: ModuleLabels) -> list[DoubtfulLabel]:
     """Return labels and open proposals of low confidence, lowest first."""
     unsure = [*doubtful(labels), *doubtful(open_proposals(proposals, labels))]
     return [
@@ -244,7 +244,7 @@ def doubtful_labels(labels: Labels, proposals: Labels) -> list[DoubtfulLabel]:
     ]
 
 
-def open_proposals(proposals: Labels, labels: Labels) -> dict[str, list[Label]]:
+def open_proposals(proposals: ModuleLabels, labels: ModuleLabels) -> dict[str, list[Label]]:
     """Return the proposals whose middle has no label yet."""
     return {
         finger: [label for label in proposed if not _is_labelled(labels.get(finger, ()), label)]
@@ -252,7 +252,7 @@ def open_proposals(proposals: Labels, labels: Labels) -> dict[str, list[Label]]:
     }
 
 
-def labels_data(labels: Labels) -> dict[str, list[LabelData]]:
+def labels_data(labels: ModuleLabels) -> dict[str, list[LabelData]]:
     """Return labels by finger as they are written to JSON."""
     return {name: [label_data(label) for label in finger] for name, finger in labels.items()}
 

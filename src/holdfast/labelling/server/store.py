@@ -34,7 +34,7 @@ NO_REVISION = "none"
 STATE_NAMES = tuple(state.value.lower() for state in LABEL_STATES)
 CAUSE_NAMES = tuple(cause.value for cause in Cause)
 
-Labels = Mapping[str, Sequence[Label]]
+ModuleLabels = Mapping[str, Sequence[Label]]
 Origin = Literal["file", "inside", "none"]
 
 
@@ -113,7 +113,7 @@ def read_stored(path: Path, recording: Recording) -> StoredLabels:
 def save_stored(
     path: Path,
     recording: Recording,
-    labels: Labels,
+    labels: ModuleLabels,
     *,
     revision: str,
     author: str,
@@ -192,7 +192,7 @@ def is_read_only(path: Path) -> bool:
     return not (_writable(target.parent) and (not target.exists() or _writable(target)))
 
 
-def validated(recording: Recording, labels: Labels) -> dict[str, tuple[Label, ...]]:
+def validated(recording: Recording, labels: ModuleLabels) -> dict[str, tuple[Label, ...]]:
     """Return the labels of every finger of a recording in order of time, after validation.
 
     Args:
@@ -232,7 +232,7 @@ def parse_labels(inputs: Mapping[str, Sequence[LabelInput]]) -> dict[str, tuple[
     }
 
 
-def cut_to_samples(recording: Recording, labels: Labels) -> dict[str, tuple[Label, ...]]:
+def cut_to_samples(recording: Recording, labels: ModuleLabels) -> dict[str, tuple[Label, ...]]:
     """Cut each label to the samples of its own finger.
 
     Fingers begin and end at different times, while a page has one time axis. Labels that exceed

@@ -26,7 +26,7 @@ from holdfast.labelling.server.long_recordings import (
 )
 from holdfast.labelling.server.signals import Signals, change_points
 from holdfast.labelling.server.store import (
-    Labels,
+    ModuleLabels,
     StoredLabels,
     cut_to_samples,
     read_stored,
@@ -216,7 +216,7 @@ class Workspace:
             return read_stored(opened.path, opened.recording)
 
     def save(
-        self, index: int, labels: Labels, *, revision: str, author: str, note: str
+        self, index: int, labels: ModuleLabels, *, revision: str, author: str, note: str
     ) -> StoredLabels:
         """Save the labels of a recording with the current time, each cut to its finger's samples.
 
